@@ -4,7 +4,6 @@ from datetime import timedelta
 from typing import Any
 
 import numpy as np
-from pydantic import Field
 
 from fleet2d import (
     Algorithm,
@@ -20,11 +19,13 @@ from fleet2d import (
 
 
 class SightingShare(Algorithm):
-    """Share of sightings per room; older sightings count less."""
+    """Share of sightings per room; older sightings count less.
 
-    forget: Duration = Field(
-        default=timedelta(days=14), description="about how long a sighting counts"
-    )
+    Attributes:
+        forget: About how long a sighting counts.
+    """
+
+    forget: Duration = timedelta(days=14)
 
     def start(self, home: Home) -> None:
         """Begin without a sighting."""
@@ -39,12 +40,17 @@ class SightingShare(Algorithm):
 
 
 class VisitMostSeen(Behavior):
-    """Every other time wait in the room where an algorithm says that people were seen most."""
+    """Every other time wait in the room where an algorithm says that people were seen most.
+
+    Attributes:
+        of: The algorithm to go by.
+        dwell: How long it waits.
+    """
 
     records = frozenset({"visit"})
 
-    of: str = Field(default="share", description="the algorithm to go by")
-    dwell: Duration = Field(default=timedelta(hours=1), description="how long it waits")
+    of: str = "share"
+    dwell: Duration = timedelta(hours=1)
 
     def start(self, actor: Any) -> None:
         """Let the next behavior act first."""

@@ -10,19 +10,21 @@ from fleet2d import Behavior, Duration, Length, Plan, Situation
 
 
 class Greeter(Behavior):
-    """Go from room to room; when a user comes into view, drive up and stay a while."""
+    """Go from room to room; when a user comes into view, drive up and stay a while.
+
+    Attributes:
+        dwell: How long it looks around in a room.
+        company: How long it stays with a user.
+        distance: How near it goes to a user [m].
+    """
 
     records = frozenset({"greeting"})
 
     # A typed field is a key in the YAML, checked and converted: `company: 10 min`.
-    dwell: Duration = Field(
-        default=timedelta(minutes=5), description="how long it looks around in a room"
-    )
-    company: Duration = Field(
-        default=timedelta(minutes=10), description="how long it stays with a user"
-    )
+    dwell: Duration = timedelta(minutes=5)
+    company: Duration = timedelta(minutes=10)
 
-    distance: Length = Field(default=1.0, gt=0, description="how near it goes to a user [m]")
+    distance: Length = Field(default=1.0, gt=0)
 
     def start(self, actor: Any) -> None:
         """Find the rooms that the robot can enter; other attributes than fields are run state."""

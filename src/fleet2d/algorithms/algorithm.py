@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
-from pydantic import Field
 
 from fleet2d.algorithms.history import History
 from fleet2d.algorithms.learned import check_shapes, run_state
@@ -58,6 +57,13 @@ class Algorithm(Component):
     None for nothing) is stored as rows of the algorithm's table, and all components read it from
     the next step on. Run state is set in `start`.
 
+    Attributes:
+        period: How often it is updated.
+        on: Events that update it, instead of the period: user_seen, user_lost, sensor, or what a
+            robot's plan notes.
+        reads: Algorithms whose output it uses; they are updated before it.
+        learned: What it starts from: a file of the folder learned/ of another run.
+
     Example:
         >>> import numpy as np
         >>> from fleet2d import Algorithm, RoomDistribution
@@ -79,22 +85,11 @@ class Algorithm(Component):
     # What has to be computed for it: evidence, exposure, explored, first_seen, last_seen …
     needs: ClassVar[Set[str]] = frozenset()
 
-    period: PositiveDuration = Field(
-        default=timedelta(hours=1), description="how often it is updated"
-    )
-    on: tuple[str, ...] = Field(
-        default=(),
-        description="events that update it, instead of the period: user_seen, user_lost, sensor, or"
-        " what a robot's plan notes",
-    )
-    reads: tuple[str, ...] = Field(
-        default=(), description="algorithms whose output it uses; they are updated before it"
-    )
+    period: PositiveDuration = timedelta(hours=1)
+    on: tuple[str, ...] = ()
+    reads: tuple[str, ...] = ()
 
-    learned: InputPath | None = Field(
-        default=None,
-        description="what it starts from: a file of the folder learned/ of another run",
-    )
+    learned: InputPath | None = None
 
     def start(self, home: "Home") -> None:
         """Prepare for a run."""

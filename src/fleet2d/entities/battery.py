@@ -4,7 +4,6 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
 
 from fleet2d.component import Settings
 from fleet2d.entities.furniture import stop_at
@@ -23,15 +22,21 @@ I64 = NDArray[np.int64]
 
 
 class Battery(Settings):
-    """A battery, described by how long it lasts; the charge falls at one of two constant rates."""
+    """A battery, described by how long it lasts; the charge falls at one of two constant rates.
 
-    driving: PositiveDuration = Field(description="how long a full charge lasts driving or turning")
-    standing: PositiveDuration = Field(description="how long a full charge lasts standing still")
-    charging: PositiveDuration = Field(description="how long it takes to charge from empty to full")
-    charger: Place = Field(
-        description="where the charger is: a point, or a room, at the point farthest from its walls"
-    )
-    charge: Share = Field(default=1.0, description="charge when the run begins")
+    Attributes:
+        driving: How long a full charge lasts driving or turning.
+        standing: How long a full charge lasts standing still.
+        charging: How long it takes to charge from empty to full.
+        charger: Where the charger is: a point, or a room, at the point farthest from its walls.
+        charge: Charge when the run begins.
+    """
+
+    driving: PositiveDuration
+    standing: PositiveDuration
+    charging: PositiveDuration
+    charger: Place
+    charge: Share = 1.0
 
 
 class Course(NamedTuple):

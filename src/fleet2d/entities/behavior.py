@@ -5,8 +5,6 @@ from dataclasses import dataclass, field
 from datetime import datetime, timedelta
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
-from pydantic import Field
-
 from fleet2d.component import Component
 from fleet2d.entities.hours import Hours
 from fleet2d.entities.plan import Plan
@@ -161,6 +159,11 @@ class Behavior(Component):
     State that a behavior keeps between decisions is set in `start`, as attributes that aren't
     fields.
 
+    Attributes:
+        when: The hours in which it may decide; left out: at all times.
+        cooldown: How long it isn't asked again after its plan has ended.
+        preempts: Whether it may interrupt behaviors after it; else it waits.
+
     Example:
         >>> from fleet2d import Behavior, Plan, Situation
         >>> class Pace(Behavior):
@@ -188,15 +191,9 @@ class Behavior(Component):
     # Kinds of commands that it carries out: find, come, dock, or a name of its own.
     answers: ClassVar[frozenset[str]] = frozenset()
 
-    when: Hours = Field(
-        default=(), description="the hours in which it may decide; left out: at all times"
-    )
-    cooldown: Duration = Field(
-        default=timedelta(0), description="how long it isn't asked again after its plan has ended"
-    )
-    preempts: bool = Field(
-        default=True, description="whether it may interrupt behaviors after it; else it waits"
-    )
+    when: Hours = ()
+    cooldown: Duration = timedelta(0)
+    preempts: bool = True
 
     def start(self, actor: "Actor") -> None:
         """Prepare for a run; check here that the places it names exist."""

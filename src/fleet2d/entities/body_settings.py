@@ -11,24 +11,25 @@ from fleet2d.units import AngleDeg, Length, Speed, TurnRateDeg
 
 
 class BodySettings(Settings):
-    """A body in the home: its size, how fast it moves, and where it is at first."""
+    """A body in the home: its size, how fast it moves, and where it is at first.
 
-    radius: Length = Field(default=0.2, gt=0, le=2, description="radius of the body [m]")
-    speed: Speed = Field(default=1.0, ge=0.01, le=20, description="walking speed [m/s]")
-    turn_rate_deg: TurnRateDeg = Field(
-        default=180.0, ge=0.01, le=36000, description="how fast it turns on the spot [deg/s]"
-    )
-    start: Place | None = Field(
-        default=None,
-        description="where it is at first; left out: where its behavior would be, else drawn",
-    )
-    start_heading_deg: AngleDeg | None = Field(
-        default=None, description="heading at first, counter-clockwise from +x; left out: drawn"
-    )
-    color: str | None = Field(default=None, min_length=1, description="color in pictures")
-    opens_doors: bool = Field(
-        default=False, description="opens doors in its way; else a shut door is a wall to it"
-    )
+    Attributes:
+        radius: Radius of the body [m].
+        speed: Walking speed [m/s].
+        turn_rate_deg: How fast it turns on the spot [deg/s].
+        start: Where it is at first; left out: where its behavior would be, else drawn.
+        start_heading_deg: Heading at first, counter-clockwise from +x; left out: drawn.
+        color: Color in pictures.
+        opens_doors: Opens doors in its way; else a shut door is a wall to it.
+    """
+
+    radius: Length = Field(default=0.2, gt=0, le=2)
+    speed: Speed = Field(default=1.0, ge=0.01, le=20)
+    turn_rate_deg: TurnRateDeg = Field(default=180.0, ge=0.01, le=36000)
+    start: Place | None = None
+    start_heading_deg: AngleDeg | None = None
+    color: str | None = Field(default=None, min_length=1)
+    opens_doors: bool = False
     # Whether its routes are the cheapest by the costmap, if there is one, and not the shortest.
     minds_costs: ClassVar[bool] = False
     # Whether it sits or lies on furniture that a place names, instead of stopping before it.

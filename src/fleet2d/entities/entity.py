@@ -22,24 +22,24 @@ class Entity(BodySettings):
 
     Short form in a scenario: ``ana: {type: schedule, radius: 0.2, days: […]}`` gives the body one
     behavior, of that type, with all keys that aren't the body's own.
+
+    Attributes:
+        behaviors: What decides where it goes: the first that has a plan; none: it stays still.
     """
 
-    behaviors: tuple[Annotated[Behavior, OneOf("behavior")], ...] = Field(
-        default=(),
-        description="what decides where it goes: the first that has a plan; none: it stays still",
-    )
+    behaviors: tuple[Annotated[Behavior, OneOf("behavior")], ...] = ()
 
 
 class User(Entity):
-    """A person who lives in the home; with a camera, one who also sees robots."""
+    """A person who lives in the home; with a camera, one who also sees robots.
 
-    opens_doors: bool = Field(
-        default=True, description="opens doors in the way; else a shut door is a wall to it"
-    )
-    camera: Camera | None = Field(
-        default=None,
-        description="what the user could see: with it, robots that come into view are events",
-    )
+    Attributes:
+        opens_doors: Opens doors in the way; else a shut door is a wall to it.
+        camera: What the user could see: with it, robots that come into view are events.
+    """
+
+    opens_doors: bool = True
+    camera: Camera | None = None
     sight_events: ClassVar[tuple[str, str]] = ("robot_lost", "robot_seen")
     uses_furniture: ClassVar[bool] = True
 
@@ -56,37 +56,31 @@ class User(Entity):
 
 
 class Robot(Entity):
-    """A robot, which sees users with its camera, or with several."""
+    """A robot, which sees users with its camera, or with several.
 
-    radius: Length = Field(default=0.15, gt=0, le=2, description="radius of the body [m]")
-    speed: Speed = Field(default=0.6, ge=0.01, le=20, description="driving speed [m/s]")
-    turn_rate_deg: TurnRateDeg = Field(
-        default=90.0, ge=0.01, le=36000, description="how fast it turns on the spot [deg/s]"
-    )
-    camera: Camera | None = Field(
-        default=Camera(), description="what it sees with; null: it is blind, or has `cameras`"
-    )
-    cameras: dict[str, Camera] = Field(
-        default={},
-        description="several cameras, by name, in place of `camera`; their order doesn't matter",
-    )
-    perception: Perception | None = Field(
-        default=None,
-        description="how its cameras err, unless they say so themselves; null: they don't",
-    )
+    Attributes:
+        radius: Radius of the body [m].
+        speed: Driving speed [m/s].
+        turn_rate_deg: How fast it turns on the spot [deg/s].
+        camera: What it sees with; null: it is blind, or has `cameras`.
+        cameras: Several cameras, by name, in place of `camera`; their order doesn't matter.
+        perception: How its cameras err, unless they say so themselves; null: they don't.
+        battery: What it drives on, for the behavior dock; null: its charge never ends.
+        gives_way: How it keeps clear of people; null: it drives on, and people go round it.
+        localization: How wrong it is about where it is; null: it always knows.
+    """
+
+    radius: Length = Field(default=0.15, gt=0, le=2)
+    speed: Speed = Field(default=0.6, ge=0.01, le=20)
+    turn_rate_deg: TurnRateDeg = Field(default=90.0, ge=0.01, le=36000)
+    camera: Camera | None = Camera()
+    cameras: dict[str, Camera] = Field(default={})
+    perception: Perception | None = None
 
     minds_costs: ClassVar[bool] = True
-    battery: Battery | None = Field(
-        default=None,
-        description="what it drives on, for the behavior dock; null: its charge never ends",
-    )
-    gives_way: GivesWay | None = Field(
-        default=None,
-        description="how it keeps clear of people; null: it drives on, and people go round it",
-    )
-    localization: Localization | None = Field(
-        default=None, description="how wrong it is about where it is; null: it always knows"
-    )
+    battery: Battery | None = None
+    gives_way: GivesWay | None = None
+    localization: Localization | None = None
     sight_events: ClassVar[tuple[str, str]] = ("user_lost", "user_seen")
 
     @model_validator(mode="before")

@@ -32,19 +32,17 @@ I64 = NDArray[np.int64]
 
 
 class GivesWay(Settings):
-    """Keep clear of people: wait before them, in doorways as elsewhere; go round, or give up."""
+    """Keep clear of people: wait before them, in doorways as elsewhere; go round, or give up.
 
-    distance: Length = Field(
-        default=0.4, ge=0, le=3, description="it comes no nearer on its own, from body to body [m]"
-    )
-    patience: PositiveDuration = Field(
-        default=timedelta(seconds=10),
-        description="how long it waits before it goes round, by 0.1 m where there is no more room",
-    )
-    gives_up: PositiveDuration = Field(
-        default=timedelta(minutes=2),
-        description="how long it waits where there is no way round: then it leaves out that stop",
-    )
+    Attributes:
+        distance: It comes no nearer on its own, from body to body [m].
+        patience: How long it waits before it goes round, by 0.1 m where there is no more room.
+        gives_up: How long it waits where there is no way round: then it leaves out that stop.
+    """
+
+    distance: Length = Field(default=0.4, ge=0, le=3)
+    patience: PositiveDuration = timedelta(seconds=10)
+    gives_up: PositiveDuration = timedelta(minutes=2)
 
 
 class Surroundings(NamedTuple):

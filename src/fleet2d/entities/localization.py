@@ -32,24 +32,22 @@ class Localization(Settings):
 
     The error drifts from a residual after each correction, may jump once between two corrections,
     and is corrected at fixed intervals. The people that the robot sees are misplaced by it, too.
+
+    Attributes:
+        drift: Standard deviation per axis a minute after [m].
+        drift_deg: Likewise of its heading [deg].
+        jump: Standard deviation per axis of a jump [m].
+        jumps_per_hour: How often the error jumps.
+        corrected_every: Time from correction to correction.
+        left: Standard deviation per axis after a correction [m].
     """
 
-    drift: Length = Field(
-        default=0.0, ge=0, le=10, description="standard deviation per axis a minute after [m]"
-    )
-    drift_deg: AngleDeg = Field(
-        default=0.0, ge=0, le=90, description="likewise of its heading [deg]"
-    )
-    jump: Length = Field(
-        default=0.0, ge=0, le=100, description="standard deviation per axis of a jump [m]"
-    )
-    jumps_per_hour: float = Field(default=0.0, ge=0, description="how often the error jumps")
-    corrected_every: PositiveDuration = Field(
-        default=timedelta(minutes=10), description="time from correction to correction"
-    )
-    left: Length = Field(
-        default=0.0, ge=0, le=10, description="standard deviation per axis after a correction [m]"
-    )
+    drift: Length = Field(default=0.0, ge=0, le=10)
+    drift_deg: AngleDeg = Field(default=0.0, ge=0, le=90)
+    jump: Length = Field(default=0.0, ge=0, le=100)
+    jumps_per_hour: float = Field(default=0.0, ge=0)
+    corrected_every: PositiveDuration = timedelta(minutes=10)
+    left: Length = Field(default=0.0, ge=0, le=10)
 
     @model_validator(mode="after")
     def _jumps_at_most_once(self) -> Self:

@@ -29,19 +29,15 @@ class Meander(Behavior):
     goes forward at its speed. Where a wall is in the way it turns instead, by any angle that its
     turn rate allows. With `at_walls: stay` it turns by the same small angles as everywhere, like
     the published Fleet2D, and so spends most of the time at walls.
+
+    Attributes:
+        turn_std_deg: Standard deviation of the turn in one second [deg/sqrt(s)].
+        at_walls: Where a wall is in the way: turn by any angle, or sway until it isn't.
     """
 
-    turn_std_deg: AngleDeg = Field(
-        default=15.0,
-        ge=0,
-        le=36000,
-        description="standard deviation of the turn in one second [deg/sqrt(s)]",
-    )
+    turn_std_deg: AngleDeg = Field(default=15.0, ge=0, le=36000)
 
-    at_walls: Literal["turn", "stay"] = Field(
-        default="turn",
-        description="where a wall is in the way: turn by any angle, or sway until it isn't",
-    )
+    at_walls: Literal["turn", "stay"] = "turn"
 
     def start(self, actor: "Actor") -> None:
         """Convert the rule of the walk to lattice units per step."""

@@ -26,25 +26,23 @@ from fleet2d.units import Length
 class RoomCorrection(Settings):
     """A room to name or retype, given by a place in it, or to draw anew, given by its corners.
 
+    Attributes:
+        at: A place in the room [x, y] [m].
+        polygon: Corners of a room that takes this space from others.
+        name: Its name; left out: as it is, or by its type.
+        type: What it is used for; left out: as it is, or room.
+
     Example:
         >>> RoomCorrection(at=(2, 1), type="Kitchen").type
         'Kitchen'
     """
 
-    at: tuple[Length, Length] | None = Field(
-        default=None, description="a place in the room [x, y] [m]", examples=[[2.5, 1.0]]
-    )
+    at: tuple[Length, Length] | None = Field(default=None, examples=[[2.5, 1.0]])
     polygon: tuple[tuple[Length, Length], ...] | None = Field(
-        default=None,
-        description="corners of a room that takes this space from others",
-        examples=[[[0, 0], [4, 0], [4, 3]]],
+        default=None, examples=[[[0, 0], [4, 0], [4, 3]]]
     )
-    name: str | None = Field(
-        default=None, min_length=1, description="its name; left out: as it is, or by its type"
-    )
-    type: str | None = Field(
-        default=None, min_length=1, description="what it is used for; left out: as it is, or room"
-    )
+    name: str | None = Field(default=None, min_length=1)
+    type: str | None = Field(default=None, min_length=1)
 
     @model_validator(mode="after")
     def _says_where_and_what(self) -> Self:

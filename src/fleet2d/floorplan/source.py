@@ -42,36 +42,28 @@ class FloorPlanSource(Component):
 
     Attributes:
         cell: Side of a grid cell, 0.01 m to 1 m.
-        rooms: Names and types of rooms, where the source has none or a wrong one.
-        furniture: Pieces that the scenario places in the home.
-        furnish: Whether rooms without furniture are furnished by rule, or by which settings.
+        rooms: Rooms to name, retype or draw, beyond what the source says.
+        furniture: Pieces to place in the home.
+        furnish: Furnish rooms without furniture by rule, by their types.
+        layers: Named arrays with a value for each cell; explored, first_seen, last_seen and
+            time_since_seen are kept by the run, for each robot with a camera.
+        costmap: Costs that routes of robots pay; null: they take the shortest.
     """
 
     kind: ClassVar[str] = "floorplan"
 
-    cell: Length = Field(default=0.05, description="side of a grid cell, 0.01 m to 1 m")
+    cell: Length = 0.05
     rooms: tuple[RoomCorrection, ...] = Field(
-        default=(),
-        description="rooms to name, retype or draw, beyond what the source says",
-        examples=[[{"at": [2.5, 1.0], "name": "den", "type": "office"}]],
+        default=(), examples=[[{"at": [2.5, 1.0], "name": "den", "type": "office"}]]
     )
     furniture: tuple[FurniturePiece, ...] = Field(
-        default=(),
-        description="pieces to place in the home",
-        examples=[[{"type": "bed", "at": [2.0, 3.5]}]],
+        default=(), examples=[[{"type": "bed", "at": [2.0, 3.5]}]]
     )
-    furnish: bool | Furnishing = Field(
-        default=False, description="furnish rooms without furniture by rule, by their types"
-    )
+    furnish: bool | Furnishing = False
     layers: Annotated[dict[str, LayerSettings], AfterValidator(check_layers)] = Field(
-        default={},
-        description="named arrays with a value for each cell; explored, first_seen, last_seen and"
-        " time_since_seen are kept by the run, for each robot with a camera",
-        examples=[{"explored": {"every": "1 d"}, "dust": {"unit": "g"}}],
+        default={}, examples=[{"explored": {"every": "1 d"}, "dust": {"unit": "g"}}]
     )
-    costmap: CostmapSettings | None = Field(
-        default=None, description="costs that routes of robots pay; null: they take the shortest"
-    )
+    costmap: CostmapSettings | None = None
 
     @abstractmethod
     def load(self) -> FloorPlan:
@@ -118,13 +110,10 @@ class PixelSource(FloorPlanSource):
     """A source of a floor plan made of pixels; their side is the default of `cell`.
 
     Attributes:
-        cell: Side of a grid cell, 0.01 m to 1 m; None for the side of the pixels.
+        cell: Side of a grid cell, 0.01 m to 1 m; left out: the side of the map's pixels.
     """
 
-    cell: Length | None = Field(  # type: ignore[assignment]
-        default=None,
-        description="side of a grid cell, 0.01 m to 1 m; left out: the side of the map's pixels",
-    )
+    cell: Length | None = None  # type: ignore[assignment]
 
     @classmethod
     @abstractmethod

@@ -18,13 +18,15 @@ class Reset(Intervention):
     """Let an algorithm forget what it has learned, or load what another run has learned.
 
     Its present output remains until its next update.
+
+    Attributes:
+        algorithm: The algorithm.
+        learned: A file of the folder learned/ of another run; left out: nothing.
     """
 
     subject: ClassVar[str] = "algorithm"
-    algorithm: str = Field(description="the algorithm")
-    learned: InputPath | None = Field(
-        default=None, description="a file of the folder learned/ of another run; left out: nothing"
-    )
+    algorithm: str
+    learned: InputPath | None = None
 
     def check(self, world: World) -> None:
         """Refuse an unknown algorithm."""
@@ -40,18 +42,21 @@ class Replace(Lasting):
     """Let behaviors and other algorithms read another output of an algorithm for a while.
 
     The algorithm itself continues, and its tables and metrics show its real output.
+
+    Attributes:
+        algorithm: The algorithm.
+        rooms: Weights of rooms; 0 for those left out.
+        values: Or numbers and texts by name, for an output that is a mapping.
+        frozen: Or its output at that step.
+        withheld: Or no output, as before the first one.
     """
 
     subject: ClassVar[str] = "algorithm"
-    algorithm: str = Field(description="the algorithm")
-    rooms: dict[str, float] = Field(
-        default={}, description="weights of rooms; 0 for those left out", min_length=0
-    )
-    values: dict[str, float | str] = Field(
-        default={}, description="or numbers and texts by name, for an output that is a mapping"
-    )
-    frozen: bool = Field(default=False, description="or its output at that step")
-    withheld: bool = Field(default=False, description="or no output, as before the first one")
+    algorithm: str
+    rooms: dict[str, float] = Field(default={}, min_length=0)
+    values: dict[str, float | str] = Field(default={})
+    frozen: bool = False
+    withheld: bool = False
 
     @model_validator(mode="after")
     def _is_one_output(self) -> Self:

@@ -2,8 +2,6 @@
 
 from typing import Any
 
-from pydantic import Field
-
 from fleet2d.component import register
 from fleet2d.entities import orders
 from fleet2d.entities.actor import Actor
@@ -19,9 +17,13 @@ from fleet2d.units import AngleDeg, PositiveDuration
 
 
 class BodyIntervention(Intervention):
-    """Base of interventions on a body."""
+    """Base of interventions on a body.
 
-    entity: str = Field(description="the person or robot")
+    Attributes:
+        entity: The person or robot.
+    """
+
+    entity: str
 
     def check(self, world: World) -> None:
         """Refuse an unknown body."""
@@ -34,12 +36,14 @@ class Put(BodyIntervention):
 
     A robot is not told that it was moved; it can notice only by its position. In a room the point
     is drawn at random; at furniture it is the point from which the furniture is used.
+
+    Attributes:
+        to: Where: a room, furniture, or a point.
+        heading_deg: Its heading, counter-clockwise from +x; left out: as before.
     """
 
-    to: Place = Field(description="where: a room, furniture, or a point")
-    heading_deg: AngleDeg | None = Field(
-        default=None, description="its heading, counter-clockwise from +x; left out: as before"
-    )
+    to: Place
+    heading_deg: AngleDeg | None = None
 
     def check(self, world: World) -> None:
         """Refuse a place where the body doesn't fit."""
@@ -75,15 +79,16 @@ class Send(BodyIntervention):
 
     A person sits or lies on furniture as is usual there, and comes home if away. While shut doors
     block the way, the body waits and tries again.
+
+    Attributes:
+        to: Where to: a room, furniture, or a point.
+        heading_deg: Its heading there, counter-clockwise from +x; left out: ahead.
+        duration: For how long it stays there; left out: until it is released.
     """
 
-    to: Place = Field(description="where to: a room, furniture, or a point")
-    heading_deg: AngleDeg | None = Field(
-        default=None, description="its heading there, counter-clockwise from +x; left out: ahead"
-    )
-    duration: PositiveDuration | None = Field(
-        default=None, description="for how long it stays there; left out: until it is released"
-    )
+    to: Place
+    heading_deg: AngleDeg | None = None
+    duration: PositiveDuration | None = None
 
     def check(self, world: World) -> None:
         """Refuse a place that doesn't exist or can't be reached."""
@@ -97,11 +102,13 @@ class Send(BodyIntervention):
 
 @register("intervention", "hold")
 class HoldStill(BodyIntervention):
-    """Let a body stand still where it is, until it is released."""
+    """Let a body stand still where it is, until it is released.
 
-    duration: PositiveDuration | None = Field(
-        default=None, description="for how long; left out: until it is released"
-    )
+    Attributes:
+        duration: For how long; left out: until it is released.
+    """
+
+    duration: PositiveDuration | None = None
 
     def begin(self, world: World) -> None:
         """Give the order."""
@@ -137,9 +144,13 @@ class Drive(BodyIntervention):
 
 @register("intervention", "decide")
 class Decide(BodyIntervention):
-    """Give a plan to an externally controlled body."""
+    """Give a plan to an externally controlled body.
 
-    plan: dict[str, Any] = Field(description="the plan, as Plan.data() returns it")
+    Attributes:
+        plan: The plan, as Plan.data() returns it.
+    """
+
+    plan: dict[str, Any]
 
     def begin(self, world: World) -> None:
         """Let the body follow the plan from the present step on."""

@@ -30,10 +30,14 @@ class HomeIntervention(Intervention):
 
 @register("intervention", "change")
 class Change(HomeIntervention):
-    """Change the home like an entry of `changes`."""
+    """Change the home like an entry of `changes`.
+
+    Attributes:
+        change: The change, as in `changes` of a scenario.
+    """
 
     subject: ClassVar[str] = "change"
-    change: HomeChange = Field(description="the change, as in `changes` of a scenario")
+    change: HomeChange
 
     @property
     def home_change(self) -> HomeChange:
@@ -42,10 +46,14 @@ class Change(HomeIntervention):
 
 
 class DoorIntervention(HomeIntervention):
-    """Base of interventions on a door."""
+    """Base of interventions on a door.
+
+    Attributes:
+        door: The door.
+    """
 
     subject: ClassVar[str] = "door"
-    door: str = Field(description="the door")
+    door: str
 
     @property
     def home_change(self) -> HomeChange:
@@ -75,14 +83,18 @@ class Unlock(DoorIntervention):
 
 @register("intervention", "move")
 class Move(HomeIntervention):
-    """Move a piece of furniture."""
+    """Move a piece of furniture.
+
+    Attributes:
+        object: The piece of furniture.
+        to: Where its centre is then, [x, y] in metres.
+        turn_deg: How far it is turned, counter-clockwise.
+    """
 
     subject: ClassVar[str] = "object"
-    object: str = Field(description="the piece of furniture")
-    to: Point = Field(description="where its centre is then, [x, y] in metres")
-    turn_deg: float = Field(
-        default=0.0, ge=-3600, le=3600, description="how far it is turned, counter-clockwise"
-    )
+    object: str
+    to: Point
+    turn_deg: float = Field(default=0.0, ge=-3600, le=3600)
 
     @property
     def home_change(self) -> HomeChange:
@@ -92,11 +104,16 @@ class Move(HomeIntervention):
 
 @register("intervention", "room")
 class SetRoomType(HomeIntervention):
-    """Change the type of a room: behaviors that go to a bedroom go there from then on."""
+    """Change the type of a room: behaviors that go to a bedroom go there from then on.
+
+    Attributes:
+        name: The room.
+        type: Its new type.
+    """
 
     subject: ClassVar[str] = "name"
-    name: str = Field(description="the room")
-    type: str = Field(description="its new type")
+    name: str
+    type: str
 
     @property
     def home_change(self) -> HomeChange:

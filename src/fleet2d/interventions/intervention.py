@@ -5,7 +5,6 @@ from datetime import timedelta
 from typing import Annotated, Any, ClassVar
 
 from pydantic import (
-    Field,
     GetJsonSchemaHandler,
     SerializationInfo,
     TypeAdapter,
@@ -56,11 +55,13 @@ class Intervention(Component):
 
 
 class Lasting(Intervention):
-    """Base of interventions with a duration; `begin` and `end` apply all that are active then."""
+    """Base of interventions with a duration; `begin` and `end` apply all that are active then.
 
-    duration: PositiveDuration | None = Field(
-        default=None, description="for how long; left out: until it is undone by `restore`"
-    )
+    Attributes:
+        duration: For how long; left out: until it is undone by `restore`.
+    """
+
+    duration: PositiveDuration | None = None
 
     @property
     def lasts(self) -> timedelta | None:

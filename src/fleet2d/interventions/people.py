@@ -17,9 +17,13 @@ from fleet2d.units import PositiveDuration
 
 
 class PersonIntervention(Intervention):
-    """Base of interventions on a person."""
+    """Base of interventions on a person.
 
-    entity: str = Field(description="the person")
+    Attributes:
+        entity: The person.
+    """
+
+    entity: str
 
     def check(self, world: World) -> None:
         """Refuse an unknown person."""
@@ -28,11 +32,13 @@ class PersonIntervention(Intervention):
 
 @register("intervention", "away")
 class Away(PersonIntervention):
-    """Send a person to the exit, and away until called home."""
+    """Send a person to the exit, and away until called home.
 
-    duration: PositiveDuration | None = Field(
-        default=None, description="for how long; left out: until called home or released"
-    )
+    Attributes:
+        duration: For how long; left out: until called home or released.
+    """
+
+    duration: PositiveDuration | None = None
 
     def begin(self, world: World) -> None:
         """Give the order."""
@@ -41,14 +47,15 @@ class Away(PersonIntervention):
 
 @register("intervention", "call_home")
 class CallHome(PersonIntervention):
-    """Call a person home, who comes in at the exit and stays until released."""
+    """Call a person home, who comes in at the exit and stays until released.
 
-    to: Place = Field(
-        default=("living_room", "any"), description="where to: a room, furniture, or a point"
-    )
-    duration: PositiveDuration | None = Field(
-        default=None, description="for how long it stays there; left out: until released"
-    )
+    Attributes:
+        to: Where to: a room, furniture, or a point.
+        duration: For how long it stays there; left out: until released.
+    """
+
+    to: Place = ("living_room", "any")
+    duration: PositiveDuration | None = None
 
     def check(self, world: World) -> None:
         """Refuse a place that doesn't exist or can't be reached."""
@@ -61,14 +68,15 @@ class CallHome(PersonIntervention):
 
 @register("intervention", "guest")
 class LetIn(PersonIntervention):
-    """Let a guest, a user with the behavior `guest`, come, stay for a while, and leave."""
+    """Let a guest, a user with the behavior `guest`, come, stay for a while, and leave.
 
-    to: Place = Field(
-        default=("living_room", "any"), description="where to: a room, furniture, or a point"
-    )
-    duration: PositiveDuration = Field(
-        default=timedelta(hours=2), description="for how long the guest stays there"
-    )
+    Attributes:
+        to: Where to: a room, furniture, or a point.
+        duration: For how long the guest stays there.
+    """
+
+    to: Place = ("living_room", "any")
+    duration: PositiveDuration = timedelta(hours=2)
 
     def check(self, world: World) -> None:
         """Refuse a user who is no guest, and an unknown place."""
@@ -87,15 +95,17 @@ class LetIn(PersonIntervention):
 
 @register("intervention", "activity")
 class StartActivity(PersonIntervention):
-    """Let a person do an activity at its place, sitting or lying as is usual."""
+    """Let a person do an activity at its place, sitting or lying as is usual.
 
-    what: str = Field(min_length=1, description="its name in the persona or agenda")
-    to: Place | None = Field(
-        default=None, description="the place; left out: where the person's own behavior does it"
-    )
-    duration: PositiveDuration | None = Field(
-        default=None, description="for how long; left out: until released"
-    )
+    Attributes:
+        what: Its name in the persona or agenda.
+        to: The place; left out: where the person's own behavior does it.
+        duration: For how long; left out: until released.
+    """
+
+    what: str = Field(min_length=1)
+    to: Place | None = None
+    duration: PositiveDuration | None = None
 
     def check(self, world: World) -> None:
         """Refuse an activity for which the person has no place."""

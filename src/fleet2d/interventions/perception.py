@@ -1,7 +1,5 @@
 """Interventions on what a robot perceives: suppress, mistake, inject."""
 
-from pydantic import Field
-
 from fleet2d.component import register
 from fleet2d.errors import PlacementError
 from fleet2d.interventions.bodies import heading_of
@@ -15,12 +13,15 @@ UNKNOWN = "unknown"
 
 
 class PerceptionIntervention(Lasting):
-    """Base of interventions on perception; they don't change the random draws of cameras."""
+    """Base of interventions on perception; they don't change the random draws of cameras.
 
-    entity: str = Field(description="the robot")
-    camera: str | None = Field(
-        default=None, description="the camera, by name where it has several; left out: all"
-    )
+    Attributes:
+        entity: The robot.
+        camera: The camera, by name where it has several; left out: all.
+    """
+
+    entity: str
+    camera: str | None = None
 
     @property
     def disturbance(self) -> Disturbance:
@@ -42,9 +43,13 @@ class PerceptionIntervention(Lasting):
 
 @register("intervention", "suppress")
 class Suppress(PerceptionIntervention):
-    """Let a robot miss a person who is in view."""
+    """Let a robot miss a person who is in view.
 
-    user: str = Field(description="the person")
+    Attributes:
+        user: The person.
+    """
+
+    user: str
 
     @property
     def disturbance(self) -> Disturbance:
@@ -59,10 +64,15 @@ class Suppress(PerceptionIntervention):
 
 @register("intervention", "mistake")
 class Mistake(PerceptionIntervention):
-    """Let a robot mistake a person whom it notices for another one."""
+    """Let a robot mistake a person whom it notices for another one.
 
-    user: str = Field(description="the person")
-    taken_for: str = Field(description="the other person, or 'unknown'")
+    Attributes:
+        user: The person.
+        taken_for: The other person, or 'unknown'.
+    """
+
+    user: str
+    taken_for: str
 
     @property
     def disturbance(self) -> Disturbance:
@@ -85,13 +95,16 @@ class Inject(PerceptionIntervention):
     """Let a robot perceive a person who isn't there, in every look, wherever it looks.
 
     In the table of observations it is a false positive: it has no true user.
+
+    Attributes:
+        user: The person that it perceives, or 'unknown'.
+        spot: The apparent place, [x, y] in metres.
+        heading_deg: The apparent heading, counter-clockwise from +x.
     """
 
-    user: str = Field(description="the person that it perceives, or 'unknown'")
-    spot: tuple[float, float] = Field(description="the apparent place, [x, y] in metres")
-    heading_deg: AngleDeg = Field(
-        default=0.0, description="the apparent heading, counter-clockwise from +x"
-    )
+    user: str
+    spot: tuple[float, float]
+    heading_deg: AngleDeg = 0.0
 
     @property
     def disturbance(self) -> Disturbance:

@@ -23,9 +23,13 @@ RESPONDERS = {"come": "come", "find": "find", "dock": "dock"}
 
 
 class RobotIntervention(Intervention):
-    """Base of interventions on a robot."""
+    """Base of interventions on a robot.
 
-    entity: str = Field(description="the robot")
+    Attributes:
+        entity: The robot.
+    """
+
+    entity: str
 
     def check(self, world: World) -> None:
         """Refuse an unknown robot."""
@@ -38,14 +42,18 @@ class Call(RobotIntervention):
 
     The first of its behaviors that responds follows the call: at once, or when the behaviors before
     it are idle. A later call replaces one that is still pending. Event: `called`.
+
+    Attributes:
+        to: Come there: behavior `come`.
+        find: Find this person: behavior `find`.
+        dock: Go to the charger: behavior `dock`.
+        command: A word that a behavior of your own responds to.
     """
 
-    to: Place | None = Field(default=None, description="come there: behavior `come`")
-    find: str | None = Field(default=None, description="find this person: behavior `find`")
-    dock: bool = Field(default=False, description="go to the charger: behavior `dock`")
-    command: str | None = Field(
-        default=None, min_length=1, description="a word that a behavior of your own responds to"
-    )
+    to: Place | None = None
+    find: str | None = None
+    dock: bool = False
+    command: str | None = Field(default=None, min_length=1)
 
     @model_validator(mode="after")
     def _is_one_command(self) -> Self:
@@ -84,9 +92,13 @@ class Call(RobotIntervention):
 
 @register("intervention", "battery")
 class SetBattery(RobotIntervention):
-    """Set the charge of a robot's battery."""
+    """Set the charge of a robot's battery.
 
-    charge: Share = Field(description="the charge from then on")
+    Attributes:
+        charge: The charge from then on.
+    """
+
+    charge: Share
 
     def check(self, world: World) -> None:
         """Refuse a robot without a battery."""
@@ -102,13 +114,17 @@ class SetBattery(RobotIntervention):
 
 
 class Switch(Lasting):
-    """Base of interventions that switch a camera or a behavior of a body."""
+    """Base of interventions that switch a camera or a behavior of a body.
 
-    entity: str = Field(description="the robot; for a behavior also a person")
-    camera: bool | str | None = Field(
-        default=None, description="its camera, by name where it has several; true: all"
-    )
-    behavior: str | None = Field(default=None, description="its behavior, by its type")
+    Attributes:
+        entity: The robot; for a behavior also a person.
+        camera: Its camera, by name where it has several; true: all.
+        behavior: Its behavior, by its type.
+    """
+
+    entity: str
+    camera: bool | str | None = None
+    behavior: str | None = None
 
     @model_validator(mode="after")
     def _has_one_subject(self) -> Self:
@@ -163,9 +179,13 @@ class SwitchOff(Switch):
 
 @register("intervention", "switch_on")
 class SwitchOn(Switch):
-    """Switch a camera or a behavior on again."""
+    """Switch a camera or a behavior on again.
 
-    duration: None = Field(default=None, description="none: it stays on")
+    Attributes:
+        duration: None: it stays on.
+    """
+
+    duration: None = None
 
     def begin(self, world: World) -> None:
         """Switch it on."""
@@ -187,19 +207,20 @@ class Fault(Lasting):
 
     With stuck wheels the robot can neither drive nor turn, and its behaviors don't decide. A dark
     camera sees nothing; with `detection` and `errs` it perceives with errors.
+
+    Attributes:
+        entity: The robot.
+        wheels: Whether its wheels are stuck.
+        dark: A camera that is dark, by name where it has several; true: all.
+        detection: Factor of the probability that a user in view is noticed.
+        errs: The errors of its cameras instead of the usual ones.
     """
 
-    entity: str = Field(description="the robot")
-    wheels: bool = Field(default=False, description="whether its wheels are stuck")
-    dark: bool | str = Field(
-        default=False, description="a camera that is dark, by name where it has several; true: all"
-    )
-    detection: Share = Field(
-        default=1.0, description="factor of the probability that a user in view is noticed"
-    )
-    errs: Perception | None = Field(
-        default=None, description="the errors of its cameras instead of the usual ones"
-    )
+    entity: str
+    wheels: bool = False
+    dark: bool | str = False
+    detection: Share = 1.0
+    errs: Perception | None = None
 
     @model_validator(mode="after")
     def _has_effect(self) -> Self:

@@ -5,7 +5,6 @@ from datetime import timedelta
 from typing import Annotated, Any, Self
 
 from pydantic import (
-    Field,
     SerializerFunctionWrapHandler,
     ValidationError,
     model_serializer,
@@ -29,6 +28,13 @@ class Entry(Settings):
     It happens at the first step that isn't before its time; or at the step after its event, or
     later by a delay.
 
+    Attributes:
+        at: The time.
+        on: Or the event: [user_seen, astro, ana], or its kind alone.
+        each: At every such time or event, not only at the first.
+        delay: How long after the event; at least a step.
+        act: What is done.
+
     Example:
         >>> entry = Entry(at="19:00", put="ana", to="kitchen")
         >>> entry.act.to
@@ -37,17 +43,11 @@ class Entry(Settings):
         {'at': '19:00', 'do': 'put', 'entity': 'ana', 'to': 'kitchen'}
     """
 
-    at: When | None = Field(default=None, description="the time")
-    on: On | None = Field(
-        default=None, description="or the event: [user_seen, astro, ana], or its kind alone"
-    )
-    each: bool = Field(
-        default=False, description="at every such time or event, not only at the first"
-    )
-    delay: Duration = Field(
-        default=timedelta(0), description="how long after the event; at least a step"
-    )
-    act: Annotated[Intervention, Verb()] = Field(description="what is done")
+    at: When | None = None
+    on: On | None = None
+    each: bool = False
+    delay: Duration = timedelta(0)
+    act: Annotated[Intervention, Verb()]
 
     @model_validator(mode="before")
     @classmethod

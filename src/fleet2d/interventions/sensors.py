@@ -2,8 +2,6 @@
 
 from typing import ClassVar
 
-from pydantic import Field
-
 from fleet2d.component import register
 from fleet2d.entities.objects.sensor import SensorFault
 from fleet2d.errors import ScenarioError
@@ -14,14 +12,16 @@ from fleet2d.problems import suggest
 
 @register("intervention", "stick")
 class Stick(Lasting):
-    """Let a sensor report a fixed state: a false alarm if it is short, a fault if it is long."""
+    """Let a sensor report a fixed state: a false alarm if it is short, a fault if it is long.
+
+    Attributes:
+        sensor: The sensor.
+        says: On: it is always triggered; off: never; silent: it reports nothing.
+    """
 
     subject: ClassVar[str] = "sensor"
-    sensor: str = Field(description="the sensor")
-    says: SensorFault = Field(
-        default="silent",
-        description="on: it is always triggered; off: never; silent: it reports nothing",
-    )
+    sensor: str
+    says: SensorFault = "silent"
 
     def check(self, world: World) -> None:
         """Refuse an unknown sensor."""
@@ -46,10 +46,14 @@ class Stick(Lasting):
 
 @register("intervention", "restore")
 class Restore(Intervention):
-    """End all active interventions on a robot, a sensor or an algorithm that have a duration."""
+    """End all active interventions on a robot, a sensor or an algorithm that have a duration.
+
+    Attributes:
+        name: The robot, sensor or algorithm.
+    """
 
     subject: ClassVar[str] = "name"
-    name: str = Field(description="the robot, sensor or algorithm")
+    name: str
 
     def check(self, world: World) -> None:
         """Refuse an unknown name."""

@@ -90,18 +90,19 @@ When = Annotated[
 class Trigger(Settings):
     """An event that triggers an intervention: ``[user_seen, astro, ana]``, or its kind alone.
 
+    Attributes:
+        event: Its kind, as in the table of events.
+        entity: The body, door or sensor that it happens to; left out: any.
+        detail: What else it says: the user that is seen, the activity; any.
+
     Example:
         >>> Trigger(event="user_seen", entity="astro").fits(Event(5, "astro", "user_seen", "ana"))
         True
     """
 
-    event: str = Field(min_length=1, description="its kind, as in the table of events")
-    entity: str | None = Field(
-        default=None, description="the body, door or sensor that it happens to; left out: any"
-    )
-    detail: str | None = Field(
-        default=None, description="what else it says: the user that is seen, the activity; any"
-    )
+    event: str = Field(min_length=1)
+    entity: str | None = None
+    detail: str | None = None
 
     def fits(self, event: Event) -> bool:
         """Whether an event triggers the intervention."""

@@ -14,14 +14,27 @@ Pair = tuple[float, float]
 
 
 class Match(Settings):
-    """One place in both frames."""
+    """One place in both frames.
 
-    log: Pair = Field(description="its coordinates in the log, in the log's units")
-    plan: Pair = Field(description="its coordinates in the floor plan [m]")
+    Attributes:
+        log: Its coordinates in the log, in the log's units.
+        plan: Its coordinates in the floor plan [m].
+    """
+
+    log: Pair
+    plan: Pair
 
 
 class Frame(Settings):
     """How the positions of a log lie in the floor plan: mirrored, scaled, turned, then moved.
+
+    Attributes:
+        scale: Metres in one unit of the log.
+        rotation_deg: Direction of the log's x axis in the plan, counter-clockwise.
+        flip_y: Whether the log's y axis is the other way, as in pictures.
+        origin: Where the log's (0, 0) is in the plan [m].
+        matches: Places in both frames, two or more, instead of scale, rotation and origin: the best
+            fit to them in the least squares.
 
     Example:
         >>> feet = Frame(scale=0.3048, rotation_deg=90, origin=(1, 2))
@@ -32,21 +45,11 @@ class Frame(Settings):
         [[-2.048, 5.048]]
     """
 
-    scale: float = Field(default=1.0, gt=0, description="metres in one unit of the log")
-    rotation_deg: AngleDeg = Field(
-        default=0.0, description="direction of the log's x axis in the plan, counter-clockwise"
-    )
-    flip_y: bool = Field(
-        default=False, description="whether the log's y axis is the other way, as in pictures"
-    )
-    origin: tuple[Length, Length] = Field(
-        default=(0.0, 0.0), description="where the log's (0, 0) is in the plan [m]"
-    )
-    matches: tuple[Match, ...] = Field(
-        default=(),
-        description="places in both frames, two or more, instead of scale, rotation and origin:"
-        " the best fit to them in the least squares",
-    )
+    scale: float = Field(default=1.0, gt=0)
+    rotation_deg: AngleDeg = 0.0
+    flip_y: bool = False
+    origin: tuple[Length, Length] = (0.0, 0.0)
+    matches: tuple[Match, ...] = ()
 
     @model_validator(mode="after")
     def _is_defined_in_one_way(self) -> Self:

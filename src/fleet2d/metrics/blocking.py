@@ -28,6 +28,9 @@ class Blocking(Metric):
     their steps. People walk as if there were no robot, so this is how often they would have had to
     change their path or stop. `asides`, for people who react to robots, is how often they stepped
     aside for it.
+
+    Attributes:
+        clearance: Distance between the centres [m].
     """
 
     units: ClassVar[Mapping[str, str]] = {
@@ -36,9 +39,7 @@ class Blocking(Metric):
         "asides": "a day",
     }
 
-    clearance: Length = Field(
-        default=0.4, gt=0, le=3, description="distance between the centres [m]"
-    )
+    clearance: Length = Field(default=0.4, gt=0, le=3)
 
     def start(self, home: "Home") -> None:
         """Begin counting."""

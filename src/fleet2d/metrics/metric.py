@@ -4,8 +4,6 @@ from collections.abc import Mapping, Set
 from datetime import timedelta
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from pydantic import Field
-
 from fleet2d.algorithms.history import History
 from fleet2d.component import Component
 from fleet2d.units import PositiveDuration
@@ -20,6 +18,10 @@ class Metric(Component):
 
     Like an algorithm it is updated after every full `period`, or `on` events, also those of users;
     the return value of `update` is stored. Unlike an algorithm it may read the poses of users.
+
+    Attributes:
+        period: How often it is updated.
+        on: Events that update it, instead of the period: those of the events table, and sensor.
     """
 
     kind: ClassVar[str] = "metric"
@@ -30,15 +32,9 @@ class Metric(Component):
     unit: ClassVar[str] = ""  # unit of its result, for people to read
     units: ClassVar[Mapping[str, str]] = {}  # units of single numbers, by name, where they differ
 
-    period: PositiveDuration = Field(
-        default=timedelta(days=1), description="how often it is updated"
-    )
+    period: PositiveDuration = timedelta(days=1)
 
-    on: tuple[str, ...] = Field(
-        default=(),
-        description="events that update it, instead of the period: those of the events table, and"
-        " sensor",
-    )
+    on: tuple[str, ...] = ()
 
     def reads(self) -> tuple[str, ...]:
         """Return the names of the algorithms that it measures, which the scenario must have."""

@@ -26,6 +26,11 @@ class ReachTime(Metric):
     time is the length of the shortest route of a body of `radius` to the free place nearest to the
     user, divided by `speed`, without turns and without people in the way; doors and furniture are
     as they are when the metric is updated. Calls without a route count as unreached only.
+
+    Attributes:
+        every: Time between two calls of a user.
+        speed: Driving speed that is assumed [m/s].
+        radius: The robot's radius [m].
     """
 
     units: ClassVar[Mapping[str, str]] = {
@@ -35,11 +40,9 @@ class ReachTime(Metric):
         "unreached": "calls",
     }
 
-    every: PositiveDuration = Field(
-        default=timedelta(minutes=10), description="time between two calls of a user"
-    )
-    speed: Speed = Field(default=0.6, gt=0, description="driving speed that is assumed [m/s]")
-    radius: Length = Field(default=0.15, gt=0, le=2, description="the robot's radius [m]")
+    every: PositiveDuration = timedelta(minutes=10)
+    speed: Speed = Field(default=0.6, gt=0)
+    radius: Length = Field(default=0.15, gt=0, le=2)
 
     def start(self, home: "Home") -> None:
         """Begin counting."""

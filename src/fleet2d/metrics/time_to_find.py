@@ -71,6 +71,11 @@ class TimeToFind(Metric):
 
     Of searches for users who were out: `out_told`: searches that ended by `not_at_home` / all, and
     `out_mean`: their mean duration [s]. Searches for anyone aren't counted.
+
+    Attributes:
+        deadline: Longest search that counts as a success.
+        sight: How far a robot recognizes somebody [m].
+        radius: The robot's radius [m].
     """
 
     units: ClassVar[Mapping[str, str]] = {
@@ -81,11 +86,9 @@ class TimeToFind(Metric):
         **dict.fromkeys(("false", "false_out"), "searches"),
     }
 
-    deadline: PositiveDuration = Field(
-        default=timedelta(minutes=10), description="longest search that counts as a success"
-    )
-    sight: Length = Field(default=4.5, gt=0, description="how far a robot recognizes somebody [m]")
-    radius: Length = Field(default=0.15, gt=0, le=2, description="the robot's radius [m]")
+    deadline: PositiveDuration = timedelta(minutes=10)
+    sight: Length = Field(default=4.5, gt=0)
+    radius: Length = Field(default=0.15, gt=0, le=2)
 
     def start(self, home: "Home") -> None:
         """Begin without searches."""

@@ -27,14 +27,16 @@ class Travel(Metric):
     A robot rests where its position doesn't change for `rest` or longer, turning or not. A
     relocation is a rest more than `apart` away from the previous rest. Metres are the sum of the
     moves from step to step.
+
+    Attributes:
+        rest: Shortest time at one place that is a rest.
+        apart: Distance between two places of rest [m].
     """
 
     units: ClassVar[Mapping[str, str]] = {"relocations": "a day", "metres": "m a day"}
 
-    rest: PositiveDuration = Field(
-        default=timedelta(minutes=1), description="shortest time at one place that is a rest"
-    )
-    apart: Length = Field(default=0.5, ge=0, description="distance between two places of rest [m]")
+    rest: PositiveDuration = timedelta(minutes=1)
+    apart: Length = Field(default=0.5, ge=0)
 
     def start(self, home: "Home") -> None:
         """Begin counting."""

@@ -5,7 +5,7 @@ from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import model_validator
 
 from fleet2d.component import Settings
 from fleet2d.document import read_document
@@ -29,23 +29,24 @@ class DurationLaw(Settings):
     """A law of durations: how long something takes.
 
     Short forms: ``30 min`` is a lognormal law of that mean, ``[20 min, 40 min]`` a uniform law.
+
+    Attributes:
+        law: Its shape.
+        mean: Its mean, before it is cut.
+        std: Its standard deviation; left out: 30 % of the mean.
+        at_least: Nothing shorter is drawn.
+        at_most: Nothing longer is drawn.
+        quantiles: Of law measured: quantiles at evenly spaced probabilities from 0 to 1.
     """
 
     law: Literal["lognormal", "gamma", "normal", "uniform", "exponential", "fixed", "measured"] = (
-        Field(default="lognormal", description="its shape")
+        "lognormal"
     )
-    mean: PositiveDuration = Field(
-        default=timedelta(minutes=30), description="its mean, before it is cut"
-    )
-    std: Duration | None = Field(
-        default=None, description="its standard deviation; left out: 30 % of the mean"
-    )
-    at_least: Duration | None = Field(default=None, description="nothing shorter is drawn")
-    at_most: Duration | None = Field(default=None, description="nothing longer is drawn")
-    quantiles: tuple[Duration, ...] = Field(
-        default=(),
-        description="of law measured: quantiles at evenly spaced probabilities from 0 to 1",
-    )
+    mean: PositiveDuration = timedelta(minutes=30)
+    std: Duration | None = None
+    at_least: Duration | None = None
+    at_most: Duration | None = None
+    quantiles: tuple[Duration, ...] = ()
 
     @model_validator(mode="before")
     @classmethod
@@ -98,47 +99,39 @@ AnyDurationLaw = Annotated[DurationLaw, SchemaForms("text", "number", "pair")]
 
 
 class Activity(Settings):
-    """Something that people do: where, how, how long, and how much they move meanwhile."""
+    """Something that people do: where, how, how long, and how much they move meanwhile.
 
-    rooms: tuple[str, ...] = Field(
-        default=("any",), description="rooms or kinds of rooms to try, in turn"
-    )
-    objects: tuple[str, ...] = Field(
-        default=(), description="kinds of furniture to use, tried in turn; none: a spot in the room"
-    )
-    posture: Literal["stand", "sit", "lie"] = Field(
-        default="stand", description="posture if there is no such furniture"
-    )
-    away: bool = Field(default=False, description="out of the home")
-    exclusive: bool = Field(
-        default=False, description="one member of a household at a time, as in a bathroom"
-    )
-    choose: Literal["own", "nearest", "each_time", "here"] = Field(
-        default="own",
-        description="which of several rooms: own: one of the first kind that exists, always the"
-        " same; nearest: the nearest of all listed kinds; each_time: one of all listed kinds, drawn"
-        " each time; here: the room that the person is in",
-    )
-    interruptible: bool = Field(
-        default=True, description="whether needs interrupt it; else they wait for its end"
-    )
-    takes: AnyDurationLaw = Field(default=DurationLaw(), description="how long it takes")
-    shifts: PositiveDuration | None = Field(
-        default=None, description="mean time between turns on the spot; left out: no turns"
-    )
-    moves: PositiveDuration | None = Field(
-        default=None, description="mean time between walks to another spot of the room"
-    )
-    fetches: PositiveDuration | None = Field(
-        default=None, description="mean time between short trips to another room and back"
-    )
-    fetches_from: tuple[str, ...] = Field(
-        default=("kitchen", "any"), description="rooms to try for such trips, in turn"
-    )
-    fetch_takes: AnyDurationLaw = Field(
-        default=DurationLaw(mean=timedelta(minutes=2)),
-        description="how long such a trip stays there",
-    )
+    Attributes:
+        rooms: Rooms or kinds of rooms to try, in turn.
+        objects: Kinds of furniture to use, tried in turn; none: a spot in the room.
+        posture: Posture if there is no such furniture.
+        away: Out of the home.
+        exclusive: One member of a household at a time, as in a bathroom.
+        choose: Which of several rooms: own: one of the first kind that exists, always the same;
+            nearest: the nearest of all listed kinds; each_time: one of all listed kinds, drawn each
+            time; here: the room that the person is in.
+        interruptible: Whether needs interrupt it; else they wait for its end.
+        takes: How long it takes.
+        shifts: Mean time between turns on the spot; left out: no turns.
+        moves: Mean time between walks to another spot of the room.
+        fetches: Mean time between short trips to another room and back.
+        fetches_from: Rooms to try for such trips, in turn.
+        fetch_takes: How long such a trip stays there.
+    """
+
+    rooms: tuple[str, ...] = ("any",)
+    objects: tuple[str, ...] = ()
+    posture: Literal["stand", "sit", "lie"] = "stand"
+    away: bool = False
+    exclusive: bool = False
+    choose: Literal["own", "nearest", "each_time", "here"] = "own"
+    interruptible: bool = True
+    takes: AnyDurationLaw = DurationLaw()
+    shifts: PositiveDuration | None = None
+    moves: PositiveDuration | None = None
+    fetches: PositiveDuration | None = None
+    fetches_from: tuple[str, ...] = ("kitchen", "any")
+    fetch_takes: AnyDurationLaw = DurationLaw(mean=timedelta(minutes=2))
 
 
 @cache

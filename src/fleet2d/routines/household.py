@@ -59,16 +59,22 @@ class JointActivity(Timing):
 
     It replaces a member's own task of that name. Members whose day has no room for it (at work,
     asleep) don't take part.
+
+    Attributes:
+        activity: The activity; left out: its own name.
+        who: Which members; left out: all.
+        on: Its days of the week.
+        dates: Further dates, and [first, last] ranges.
+        takes: How long; left out: as the activity.
+        probability: Its probability on each of those days.
     """
 
-    activity: str = Field(default="", description="the activity; left out: its own name")
-    who: tuple[str, ...] = Field(default=(), description="which members; left out: all")
-    on: OnDays | None = Field(default=None, description="its days of the week")
-    dates: Dates = Field(default=(), description="further dates, and [first, last] ranges")
-    takes: AnyDurationLaw | None = Field(
-        default=None, description="how long; left out: as the activity"
-    )
-    probability: Share = Field(default=1.0, description="its probability on each of those days")
+    activity: str = ""
+    who: tuple[str, ...] = ()
+    on: OnDays | None = None
+    dates: Dates = ()
+    takes: AnyDurationLaw | None = None
+    probability: Share = 1.0
 
     @model_validator(mode="after")
     def _has_a_time(self) -> Self:
@@ -80,29 +86,27 @@ class JointActivity(Timing):
 
 
 class Household(Settings):
-    """The members of a household, and what they do together."""
+    """The members of a household, and what they do together.
 
-    name: str = Field(default="home", min_length=1, description="the name of its random streams")
-    members: dict[str, AnyPersona] = Field(
-        min_length=1, description="the persona of each member, by the user's name"
-    )
-    couples: tuple[tuple[str, str], ...] = Field(
-        default=(), description="members who sleep in the same room and bed"
-    )
-    together: dict[str, Annotated[JointActivity, SchemaForms("text")]] = Field(
-        default_factory=dict, description="what several of them do together, by name"
-    )
-    away: tuple[AnyPeriod, ...] = Field(default=(), description="when nobody is at home")
-    trips: dict[str, tuple[AnyPeriod, ...]] = Field(
-        default_factory=dict, description="when some members are away, by name"
-    )
-    visits: dict[str, tuple[AnyPeriod, ...]] = Field(
-        default_factory=dict, description="members who are at home in these periods only, by name"
-    )
-    welcome: Share = Field(
-        default=0.0,
-        description="probability that members at leisure come to the door when one comes home",
-    )
+    Attributes:
+        name: The name of its random streams.
+        members: The persona of each member, by the user's name.
+        couples: Members who sleep in the same room and bed.
+        together: What several of them do together, by name.
+        away: When nobody is at home.
+        trips: When some members are away, by name.
+        visits: Members who are at home in these periods only, by name.
+        welcome: Probability that members at leisure come to the door when one comes home.
+    """
+
+    name: str = Field(default="home", min_length=1)
+    members: dict[str, AnyPersona] = Field(min_length=1)
+    couples: tuple[tuple[str, str], ...] = ()
+    together: dict[str, Annotated[JointActivity, SchemaForms("text")]] = Field(default_factory=dict)
+    away: tuple[AnyPeriod, ...] = ()
+    trips: dict[str, tuple[AnyPeriod, ...]] = Field(default_factory=dict)
+    visits: dict[str, tuple[AnyPeriod, ...]] = Field(default_factory=dict)
+    welcome: Share = 0.0
 
     @model_validator(mode="after")
     def _names_members(self) -> Self:

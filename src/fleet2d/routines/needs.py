@@ -24,36 +24,36 @@ class Need(Settings):
     """Something that builds up, and then interrupts an activity, which is resumed afterwards.
 
     Short form: ``2 h`` is a need with that mean time between two occurrences.
+
+    Attributes:
+        activity: The activity; left out: the name of the need.
+        every: Time awake between two occurrences.
+        asleep: Time asleep until it wakes the person; left out: it never does.
+        on_waking: Probability of being first on waking.
+        before_bed: Probability of being last before sleep.
+        before_leaving: Probability of being last before leaving home.
+        on_return: Probability of being first on coming home.
+        between: The times of day at which it occurs; left out: at any.
+        met_by: Activities that meet it, too: it builds up again after them.
+        takes: How long; left out: as the activity.
+        then: Activities that follow at once, with their probability.
+        patience: It waits for the end of an activity that ends within this time.
+        source: Where its numbers come from, for people to read.
     """
 
-    activity: str = Field(default="", description="the activity; left out: the name of the need")
-    every: AnyDurationLaw = Field(description="time awake between two occurrences")
-    asleep: AnyDurationLaw | None = Field(
-        default=None, description="time asleep until it wakes the person; left out: it never does"
-    )
-    on_waking: Share = Field(default=0.0, description="probability of being first on waking")
-    before_bed: Share = Field(default=0.0, description="probability of being last before sleep")
-    before_leaving: Share = Field(
-        default=0.0, description="probability of being last before leaving home"
-    )
-    on_return: Share = Field(default=0.0, description="probability of being first on coming home")
-    between: tuple[TimeOfDay, TimeOfDay] | None = Field(
-        default=None, description="the times of day at which it occurs; left out: at any"
-    )
-    met_by: tuple[str, ...] = Field(
-        default=(), description="activities that meet it, too: it builds up again after them"
-    )
-    takes: AnyDurationLaw | None = Field(
-        default=None, description="how long; left out: as the activity"
-    )
-    then: dict[str, Share] = Field(
-        default_factory=dict, description="activities that follow at once, with their probability"
-    )
-    patience: Duration = Field(
-        default=timedelta(minutes=10),
-        description="it waits for the end of an activity that ends within this time",
-    )
-    source: str = Field(default="", description="where its numbers come from, for people to read")
+    activity: str = ""
+    every: AnyDurationLaw
+    asleep: AnyDurationLaw | None = None
+    on_waking: Share = 0.0
+    before_bed: Share = 0.0
+    before_leaving: Share = 0.0
+    on_return: Share = 0.0
+    between: tuple[TimeOfDay, TimeOfDay] | None = None
+    met_by: tuple[str, ...] = ()
+    takes: AnyDurationLaw | None = None
+    then: dict[str, Share] = Field(default_factory=dict)
+    patience: Duration = timedelta(minutes=10)
+    source: str = ""
 
     @model_validator(mode="before")
     @classmethod
@@ -72,20 +72,22 @@ class Errand(Settings):
     """A short task between two activities: to fetch, put away or look at something.
 
     Short form: a number is its probability.
+
+    Attributes:
+        activity: The activity; left out: the name of the errand.
+        probability: Its probability at each such change of activity.
+        after: Activities after which it is done; left out: after any.
+        before: Activities before which it is done; left out: before any.
+        takes: How long; left out: as the activity.
+        source: Where its numbers come from, for people to read.
     """
 
-    activity: str = Field(default="", description="the activity; left out: the name of the errand")
-    probability: Share = Field(description="its probability at each such change of activity")
-    after: tuple[str, ...] = Field(
-        default=(), description="activities after which it is done; left out: after any"
-    )
-    before: tuple[str, ...] = Field(
-        default=(), description="activities before which it is done; left out: before any"
-    )
-    takes: AnyDurationLaw | None = Field(
-        default=None, description="how long; left out: as the activity"
-    )
-    source: str = Field(default="", description="where its numbers come from, for people to read")
+    activity: str = ""
+    probability: Share
+    after: tuple[str, ...] = ()
+    before: tuple[str, ...] = ()
+    takes: AnyDurationLaw | None = None
+    source: str = ""
 
     @model_validator(mode="before")
     @classmethod

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from datetime import datetime, timedelta
 from typing import Annotated, Any
 
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import BeforeValidator, model_validator
 
 from fleet2d.component import Settings
 from fleet2d.problems import problem
@@ -28,10 +28,15 @@ Moment = Annotated[datetime, BeforeValidator(_moment)]
 
 
 class Period(Settings):
-    """A period of time; short form: ``[2026-02-14, 2026-02-21T18:00]``."""
+    """A period of time; short form: ``[2026-02-14, 2026-02-21T18:00]``.
 
-    begins: Moment = Field(description="when it begins, local time")
-    ends: Moment = Field(description="when it is over")
+    Attributes:
+        begins: When it begins, local time.
+        ends: When it is over.
+    """
+
+    begins: Moment
+    ends: Moment
 
     @model_validator(mode="before")
     @classmethod

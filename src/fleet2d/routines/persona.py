@@ -46,16 +46,16 @@ class Timing(Settings):
     """When something begins: at about a time of day, always within a window.
 
     A window that ends before it begins lasts past midnight.
+
+    Attributes:
+        at: When it begins on average.
+        spread: Standard deviation of its begin.
+        between: The earliest and latest begin; left out: 2.5 standard deviations around `at`.
     """
 
-    at: TimeOfDay | None = Field(default=None, description="when it begins on average")
-    spread: Duration = Field(
-        default=timedelta(minutes=15), description="standard deviation of its begin"
-    )
-    between: tuple[TimeOfDay, TimeOfDay] | None = Field(
-        default=None,
-        description="the earliest and latest begin; left out: 2.5 standard deviations around `at`",
-    )
+    at: TimeOfDay | None = None
+    spread: Duration = timedelta(minutes=15)
+    between: tuple[TimeOfDay, TimeOfDay] | None = None
 
     @model_validator(mode="before")
     @classmethod
@@ -77,37 +77,50 @@ class Timing(Settings):
 
 
 class Wake(Timing):
-    """When the day begins."""
+    """When the day begins.
 
-    at: TimeOfDay = Field(default=timedelta(hours=7), description="mean time of waking")
+    Attributes:
+        at: Mean time of waking.
+    """
+
+    at: TimeOfDay = timedelta(hours=7)
 
 
 class Sleep(Timing):
-    """When the day ends: the person sleeps from then until waking."""
+    """When the day ends: the person sleeps from then until waking.
 
-    at: TimeOfDay = Field(default=timedelta(hours=23), description="mean time of going to bed")
-    at_least: Duration = Field(default=timedelta(hours=4), description="shortest sleep")
+    Attributes:
+        at: Mean time of going to bed.
+        at_least: Shortest sleep.
+    """
+
+    at: TimeOfDay = timedelta(hours=23)
+    at_least: Duration = timedelta(hours=4)
 
 
 class Task(Timing):
-    """Something to do in a day."""
+    """Something to do in a day.
 
-    activity: str = Field(default="", description="the activity; left out: the name of the task")
-    until: TimeOfDay | None = Field(default=None, description="its latest end")
-    takes: AnyDurationLaw | None = Field(
-        default=None, description="how long; left out: as the activity"
-    )
-    after: tuple[str, ...] = Field(
-        default=(),
-        description="tasks that come before it; without 'at' and 'between' it follows them at once,"
-        " and only on days that have one of them",
-    )
-    on_waking: bool = Field(default=False, description="it is the first thing of the day")
-    before_bed: bool = Field(default=False, description="it is done right before going to bed")
-    probability: Share = Field(default=1.0, description="its probability on each of the days")
-    fixed: bool = Field(
-        default=False, description="an appointment: it begins at `at` exactly, and isn't left out"
-    )
+    Attributes:
+        activity: The activity; left out: the name of the task.
+        until: Its latest end.
+        takes: How long; left out: as the activity.
+        after: Tasks that come before it; without 'at' and 'between' it follows them at once, and
+            only on days that have one of them.
+        on_waking: It is the first thing of the day.
+        before_bed: It is done right before going to bed.
+        probability: Its probability on each of the days.
+        fixed: An appointment: it begins at `at` exactly, and isn't left out.
+    """
+
+    activity: str = ""
+    until: TimeOfDay | None = None
+    takes: AnyDurationLaw | None = None
+    after: tuple[str, ...] = ()
+    on_waking: bool = False
+    before_bed: bool = False
+    probability: Share = 1.0
+    fixed: bool = False
 
     @model_validator(mode="after")
     def _has_one_time(self) -> Self:
@@ -122,14 +135,15 @@ class Task(Timing):
 
 
 class Pastime(Settings):
-    """An activity for the time between tasks."""
+    """An activity for the time between tasks.
 
-    weight: float = Field(
-        default=1.0, gt=0, description="how often it is chosen, relative to others"
-    )
-    between: tuple[TimeOfDay, TimeOfDay] | None = Field(
-        default=None, description="the times of day at which it may begin"
-    )
+    Attributes:
+        weight: How often it is chosen, relative to others.
+        between: The times of day at which it may begin.
+    """
+
+    weight: float = Field(default=1.0, gt=0)
+    between: tuple[TimeOfDay, TimeOfDay] | None = None
 
     @model_validator(mode="before")
     @classmethod
@@ -141,31 +155,26 @@ AnyPastime = Annotated[Pastime, SchemaForms("number")]
 
 
 class DayTemplate(Settings):
-    """The template of a kind of day."""
+    """The template of a kind of day.
 
-    on: OnDays | None = Field(
-        default=None, description="its days of the week; left out: only its `dates`"
-    )
-    dates: Dates = Field(
-        default=(), description="dates and [first, last] ranges on which it precedes all others"
-    )
-    wake: Annotated[Wake, SchemaForms("text")] = Field(
-        default=Wake(), description="when the day begins"
-    )
-    sleep: Annotated[Sleep, SchemaForms("text")] = Field(
-        default=Sleep(), description="when it ends"
-    )
-    do: dict[str, Annotated[Task, SchemaForms("text")]] = Field(
-        default_factory=dict, description="the tasks, by name"
-    )
-    leisure: dict[str, AnyPastime] | None = Field(
-        default=None, description="the pastimes; left out: those of the persona"
-    )
-    recorded: tuple[AnyRecordedDay, ...] = Field(
-        default=(),
-        description="recorded days, '07:00 wash, 07:20 work, …, 23:00 sleep, 31:00 end': new days"
-        " are drawn from them, instead of from `do` and `leisure`",
-    )
+    Attributes:
+        on: Its days of the week; left out: only its `dates`.
+        dates: Dates and [first, last] ranges on which it precedes all others.
+        wake: When the day begins.
+        sleep: When it ends.
+        do: The tasks, by name.
+        leisure: The pastimes; left out: those of the persona.
+        recorded: Recorded days, '07:00 wash, 07:20 work, …, 23:00 sleep, 31:00 end': new days are
+            drawn from them, instead of from `do` and `leisure`.
+    """
+
+    on: OnDays | None = None
+    dates: Dates = ()
+    wake: Annotated[Wake, SchemaForms("text")] = Wake()
+    sleep: Annotated[Sleep, SchemaForms("text")] = Sleep()
+    do: dict[str, Annotated[Task, SchemaForms("text")]] = Field(default_factory=dict)
+    leisure: dict[str, AnyPastime] | None = None
+    recorded: tuple[AnyRecordedDay, ...] = ()
 
     @model_validator(mode="before")
     @classmethod
@@ -207,33 +216,27 @@ def holds_on(dates: Dates, day: date) -> bool:
 
 
 class Persona(Settings):
-    """A person: walking speed, manners, activities, and the templates of the days."""
+    """A person: walking speed, manners, activities, and the templates of the days.
 
-    about: str = Field(default="", description="a description for people to read")
-    pace: float = Field(
-        default=1.0, ge=0.1, le=3, description="walking speed, as a multiple of the body's"
-    )
-    manners: Manners = Field(
-        default=Manners(),
-        description="how the person reacts to robots, with the behavior `reactions`",
-    )
-    activities: dict[str, Activity] = Field(
-        default_factory=dict, description="new activities, or changed ones of the catalogue"
-    )
-    leisure: dict[str, AnyPastime] = Field(
-        default_factory=lambda: {"rest": Pastime()},
-        description="what fills the time between the tasks of a day",
-    )
-    needs: dict[str, AnyNeed] = Field(
-        default_factory=lambda: dict(usual_needs()),
-        description="what builds up and interrupts a day, by name; left out: an adult's;"
-        " null: none",
-    )
-    errands: dict[str, AnyErrand] = Field(
-        default_factory=lambda: dict(usual_errands()),
-        description="short tasks between activities, by name; left out: an adult's; null: none",
-    )
-    days: dict[str, DayTemplate] = Field(min_length=1, description="the kinds of days, by name")
+    Attributes:
+        about: A description for people to read.
+        pace: Walking speed, as a multiple of the body's.
+        manners: How the person reacts to robots, with the behavior `reactions`.
+        activities: New activities, or changed ones of the catalogue.
+        leisure: What fills the time between the tasks of a day.
+        needs: What builds up and interrupts a day, by name; left out: an adult's; null: none.
+        errands: Short tasks between activities, by name; left out: an adult's; null: none.
+        days: The kinds of days, by name.
+    """
+
+    about: str = ""
+    pace: float = Field(default=1.0, ge=0.1, le=3)
+    manners: Manners = Manners()
+    activities: dict[str, Activity] = Field(default_factory=dict)
+    leisure: dict[str, AnyPastime] = Field(default_factory=lambda: {"rest": Pastime()})
+    needs: dict[str, AnyNeed] = Field(default_factory=lambda: dict(usual_needs()))
+    errands: dict[str, AnyErrand] = Field(default_factory=lambda: dict(usual_errands()))
+    days: dict[str, DayTemplate] = Field(min_length=1)
 
     @model_validator(mode="before")
     @classmethod
@@ -366,15 +369,10 @@ def bundled_names() -> list[str]:
 
 def merge(below: Any, above: Any) -> Any:
     """Return plain data changed by other plain data: mappings key by key, all else replaced."""
-    if isinstance(below, Mapping) and isinstance(above, Mapping):
-        keys = dict.fromkeys((*below, *above))
-        return {
-            key: merge(below[key], above[key])
-            if key in below and key in above
-            else (above if key in above else below)[key]
-            for key in keys
-        }
-    return above
+    if not (isinstance(below, Mapping) and isinstance(above, Mapping)):
+        return above
+    changed = {k: merge(below[k], value) if k in below else value for k, value in above.items()}
+    return {**below, **changed}
 
 
 _LOADED: dict[str, Persona] = {}  # bundled personas, by name

@@ -84,39 +84,26 @@ _NameAsType = BeforeValidator(_name_as_type)
 
 
 class SimulationSettings(Settings):
-    """When a run starts, how long it lasts, and how fast it goes."""
+    """When a run starts, how long it lasts, and how fast it goes.
 
-    start: Annotated[datetime, BeforeValidator(_parse_local_time)] = Field(
-        default=datetime(2026, 1, 5), description="The home's local time at step 0."
-    )
-    duration: Duration = Field(
-        description="Simulated time. A run stops at its last full step within it."
-    )
-    step: PositiveDuration = Field(
-        default=timedelta(seconds=1), description="The length of a step."
-    )
-    seed: int | None = Field(
-        default=None,
-        ge=0,
-        lt=2**63,
-        description="The seed of all random draws; null: one is drawn and stored.",
-    )
-    max_span: int | None = Field(
-        default=None,
-        ge=1,
-        description="The most steps that are computed at once. It changes no result.",
-    )
-    people_block: PositiveDuration | None = Field(
-        default=None,
-        description="How long a person or robot waits for another body in its way before going"
-        " round it; null: bodies don't block each other.",
-        examples=["3 s"],
-    )
-    speedup: float | None = Field(
-        default=None,
-        ge=0.001,
-        description="Run at this many times real time; null: as fast as possible.",
-    )
+    Attributes:
+        start: The home's local time at step 0.
+        duration: Simulated time. A run stops at its last full step within it.
+        step: The length of a step.
+        seed: The seed of all random draws; null: one is drawn and stored.
+        max_span: The most steps that are computed at once. It changes no result.
+        people_block: How long a person or robot waits for another body in its way before going
+            round it; null: bodies don't block each other.
+        speedup: Run at this many times real time; null: as fast as possible.
+    """
+
+    start: Annotated[datetime, BeforeValidator(_parse_local_time)] = datetime(2026, 1, 5)
+    duration: Duration
+    step: PositiveDuration = timedelta(seconds=1)
+    seed: int | None = Field(default=None, ge=0, lt=2**63)
+    max_span: int | None = Field(default=None, ge=1)
+    people_block: PositiveDuration | None = Field(default=None, examples=["3 s"])
+    speedup: float | None = Field(default=None, ge=0.001)
 
     @model_validator(mode="after")
     def _fits_the_calendar(self) -> Self:
@@ -147,44 +134,42 @@ class SimulationSettings(Settings):
 
 
 class Scenario(Settings):
-    """Everything that defines a run."""
+    """Everything that defines a run.
 
-    name: str | None = Field(default=None, description="The name of this scenario in reports.")
+    Attributes:
+        name: The name of this scenario in reports.
+        floorplan: The home's walls.
+        users: The people, by name.
+        robots: The robots, by name.
+        objects: Doors and sensors, by name.
+        changes: Changes of the home during the run, and when they happen.
+        script: Interventions on people, robots and the home, and when they happen.
+        sight: How to compute what is in view.
+        algorithms: The algorithms that run during the simulation, by name.
+        metrics: The metrics that are recorded, by name.
+        expect: What must hold over the run, by name.
+        artifacts: What a run stores.
+    """
+
+    name: str | None = None
     simulation: SimulationSettings
-    floorplan: Annotated[FloorPlanSource, OneOf("floorplan")] = Field(
-        description="The home's walls."
-    )
-    users: Annotated[dict[str, Annotated[User, ShortForm()]], _CheckNames] = Field(
-        default={}, description="The people, by name."
-    )
-    robots: Annotated[dict[str, Annotated[Robot, ShortForm()]], _CheckNames] = Field(
-        default={}, description="The robots, by name."
-    )
+    floorplan: Annotated[FloorPlanSource, OneOf("floorplan")]
+    users: Annotated[dict[str, Annotated[User, ShortForm()]], _CheckNames] = Field(default={})
+    robots: Annotated[dict[str, Annotated[Robot, ShortForm()]], _CheckNames] = Field(default={})
     objects: Annotated[dict[str, Annotated[HomeObject, OneOf("object")]], _CheckNames] = Field(
-        default={}, description="Doors and sensors, by name."
+        default={}
     )
-    changes: tuple[HomeChange, ...] = Field(
-        default=(), description="Changes of the home during the run, and when they happen."
-    )
-    script: tuple[Entry, ...] = Field(
-        default=(),
-        description="Interventions on people, robots and the home, and when they happen.",
-    )
-    sight: SightSettings = Field(
-        default=SightSettings(), description="How to compute what is in view."
-    )
+    changes: tuple[HomeChange, ...] = ()
+    script: tuple[Entry, ...] = ()
+    sight: SightSettings = SightSettings()
     algorithms: Annotated[
         dict[str, Annotated[Algorithm, OneOf("algorithm")]], _CheckNames, _NameAsType
-    ] = Field(default={}, description="The algorithms that run during the simulation, by name.")
+    ] = Field(default={})
     metrics: Annotated[dict[str, Annotated[Metric, OneOf("metric")]], _CheckNames, _NameAsType] = (
-        Field(default={}, description="The metrics that are recorded, by name.")
+        Field(default={})
     )
-    expect: Annotated[dict[str, ExpectationField], _CheckNames] = Field(
-        default={}, description="What must hold over the run, by name."
-    )
-    artifacts: ArtifactSettings = Field(
-        default=ArtifactSettings(), description="What a run stores."
-    )
+    expect: Annotated[dict[str, ExpectationField], _CheckNames] = Field(default={})
+    artifacts: ArtifactSettings = ArtifactSettings()
     _folder: Path = PrivateAttr(default_factory=Path.cwd)
     _document: Document = PrivateAttr(default_factory=Document)
 

@@ -216,7 +216,7 @@ def _describe(kind: str, name: str, cls: type[Settings]) -> ComponentDescription
                 key,
                 _type_of(value),
                 None if key in required else _default_text(value.get("default")),
-                cls.model_fields[key].description or "",
+                value.get("description", ""),
             )
             for key, value in properties.items()
         ),

@@ -27,17 +27,17 @@ MOST_POINTS = 32
 
 
 class Pan(Settings):
-    """Pan of a camera: it looks in each direction for some time, then in the next."""
+    """Pan of a camera: it looks in each direction for some time, then in the next.
+
+    Attributes:
+        headings_deg: Directions, one after the other, relative to its heading on the body.
+        dwell: How long it looks in each direction.
+    """
 
     headings_deg: tuple[AngleDeg, ...] = Field(
-        min_length=1,
-        max_length=64,
-        description="directions, one after the other, relative to its heading on the body",
-        examples=[[-45, 0, 45, 0]],
+        min_length=1, max_length=64, examples=[[-45, 0, 45, 0]]
     )
-    dwell: PositiveDuration = Field(
-        default=timedelta(seconds=5), description="how long it looks in each direction"
-    )
+    dwell: PositiveDuration = timedelta(seconds=5)
 
 
 class Lens(NamedTuple):
@@ -78,54 +78,35 @@ class Camera(Settings):
     wall touches the line between the camera and the centre. Ranges and offset are rounded to the
     lattice, the half angle to 1/8192 of a turn (0.044 degrees), headings to 1/4096. A camera that
     its offset puts into a wall sees nothing.
+
+    Attributes:
+        range: Nearest and farthest distance at which it sees [m].
+        angle_deg: Width of the field of view, centred on the heading.
+        detection: Probability that a user in view is noticed, in each look.
+        lost_after: A user not noticed for this long counts as lost (event user_lost): a multiple of
+            the step; left out: 5 s, or the next multiple above; with several cameras, the longest
+            counts.
+        offset: Where it is mounted: forward and left of the body's centre [m].
+        heading_deg: Where it looks, counter-clockwise from the body's heading.
+        pan: How it turns to and fro; null: it doesn't.
+        period: Time from look to look; null: one in every step.
+        latency: Time from a look until its detections are known.
+        body_points: Points on a circle of a user's radius that are looked at besides the centre:
+            one in view is enough; 0: only the centre counts.
+        perception: Its errors; null: the robot's `perception`.
     """
 
-    range: tuple[Length, Length] = Field(
-        default=(0.0, 4.5),
-        description="nearest and farthest distance at which it sees [m]",
-        examples=[[0.3, 4.5]],
-    )
-    angle_deg: AngleDeg = Field(
-        default=108.0,
-        gt=0,
-        le=360,
-        description="width of the field of view, centred on the heading",
-    )
-    detection: Share = Field(
-        default=1.0, description="probability that a user in view is noticed, in each look"
-    )
-    lost_after: Duration | None = Field(
-        default=None,
-        description="a user not noticed for this long counts as lost (event user_lost): a multiple"
-        " of the step; left out: 5 s, or the next multiple above; with several cameras, the longest"
-        " counts",
-        examples=["5 s"],
-    )
-    offset: tuple[Length, Length] = Field(
-        default=(0.0, 0.0),
-        description="where it is mounted: forward and left of the body's centre [m]",
-        examples=[[0.1, 0]],
-    )
-    heading_deg: AngleDeg = Field(
-        default=0.0, description="where it looks, counter-clockwise from the body's heading"
-    )
-    pan: Pan | None = Field(default=None, description="how it turns to and fro; null: it doesn't")
-    period: PositiveDuration | None = Field(
-        default=None, description="time from look to look; null: one in every step"
-    )
-    latency: Duration = Field(
-        default=timedelta(0), description="time from a look until its detections are known"
-    )
-    body_points: int = Field(
-        default=0,
-        ge=0,
-        le=MOST_POINTS,
-        description="points on a circle of a user's radius that are looked at besides the centre:"
-        " one in view is enough; 0: only the centre counts",
-    )
-    perception: Perception | None = Field(
-        default=None, description="its errors; null: the robot's `perception`"
-    )
+    range: tuple[Length, Length] = Field(default=(0.0, 4.5), examples=[[0.3, 4.5]])
+    angle_deg: AngleDeg = Field(default=108.0, gt=0, le=360)
+    detection: Share = 1.0
+    lost_after: Duration | None = Field(default=None, examples=["5 s"])
+    offset: tuple[Length, Length] = Field(default=(0.0, 0.0), examples=[[0.1, 0]])
+    heading_deg: AngleDeg = 0.0
+    pan: Pan | None = None
+    period: PositiveDuration | None = None
+    latency: Duration = timedelta(0)
+    body_points: int = Field(default=0, ge=0, le=MOST_POINTS)
+    perception: Perception | None = None
 
     @model_validator(mode="after")
     def _range_is_ordered(self) -> Self:

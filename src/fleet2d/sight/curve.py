@@ -30,6 +30,12 @@ class Curve(Settings):
     row and after the last), or ``{midpoint: 4, width: 0.5}``:
     top / (1 + exp((x - midpoint) / width)).
 
+    Attributes:
+        points: Rows [x, probability], ascending.
+        midpoint: Logistic: x at which it is half its top.
+        width: Logistic: scale of its decrease, to 27 % in one width.
+        top: Logistic: the probability far before the midpoint.
+
     Example:
         >>> curve = Curve.model_validate([[0, 1], [4, 0.5]])
         >>> [curve.at(x) for x in (-1, 0, 1, 9)]
@@ -38,18 +44,10 @@ class Curve(Settings):
         0.45
     """
 
-    points: tuple[tuple[float, Share], ...] = Field(
-        default=(),
-        description="rows [x, probability], ascending",
-        examples=[[[0, 1], [4, 0.6]]],
-    )
-    midpoint: float | None = Field(
-        default=None, description="logistic: x at which it is half its top"
-    )
-    width: float | None = Field(
-        default=None, gt=0, description="logistic: scale of its decrease, to 27 % in one width"
-    )
-    top: Share = Field(default=1.0, description="logistic: the probability far before the midpoint")
+    points: tuple[tuple[float, Share], ...] = Field(default=(), examples=[[[0, 1], [4, 0.6]]])
+    midpoint: float | None = None
+    width: float | None = Field(default=None, gt=0)
+    top: Share = 1.0
 
     @model_validator(mode="before")
     @classmethod
@@ -86,7 +84,7 @@ class Curve(Settings):
         """Add the short forms to the schema."""
         row = {"type": "array", "minItems": 2, "maxItems": 2}
         short = [{"type": "number"}, {"type": "string"}, {"type": "array", "items": row}]
-        return {"anyOf": [*short, handler(schema)]}
+        return {"anyOf": [*short, super().__get_pydantic_json_schema__(schema, handler)]}
 
     @property
     def reaches_below_zero(self) -> bool:

@@ -36,11 +36,12 @@ class Flashlight(FieldOfView):
 
     A point is in view if the centre of its cell is, so it is exact for the centres of cells, and
     up to half a cell elsewhere. A pose takes 1 to 2 kB with a range of 4.5 m and cells of 5 cm.
+
+    Attributes:
+        memory_mb: Memory for poses; the least recently used go first.
     """
 
-    memory_mb: float = Field(
-        default=64.0, gt=0, description="memory for poses; the least recently used go first"
-    )
+    memory_mb: float = Field(default=64.0, gt=0)
 
     def start(self, home: "Home") -> None:
         """Begin with an empty cache."""

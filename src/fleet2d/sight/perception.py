@@ -31,30 +31,26 @@ class Detection(Settings):
     """Probability that a user in view is noticed: the camera's `detection` times all these factors.
 
     A curve of `bearing` without negative angles holds for both sides.
+
+    Attributes:
+        distance: By the distance of the user's centre [m].
+        bearing: By the angle off the optical axis, left is positive [deg].
+        orientation: By the angle between where the user faces and the camera: 0 shows the face, 90
+            a side, 180 the back [deg].
+        posture: By posture: stand, sit, lie; 1 for those left out.
+        visible_share: By the share of the body's points in view; needs the camera's `body_points`.
+        light: By the time of day [hours], day after day.
+        memory: Time constant of misses: after it, the last random draw still holds with probability
+            1/e; 0: each look has a new draw.
     """
 
-    distance: Curve = Field(default=ALWAYS, description="by the distance of the user's centre [m]")
-    bearing: Curve = Field(
-        default=ALWAYS, description="by the angle off the optical axis, left is positive [deg]"
-    )
-    orientation: Curve = Field(
-        default=ALWAYS,
-        description="by the angle between where the user faces and the camera: 0 shows the face, 90"
-        " a side, 180 the back [deg]",
-    )
-    posture: dict[Posture, Share] = Field(
-        default={}, description="by posture: stand, sit, lie; 1 for those left out"
-    )
-    visible_share: Curve = Field(
-        default=ALWAYS,
-        description="by the share of the body's points in view; needs the camera's `body_points`",
-    )
-    light: Curve = Field(default=ALWAYS, description="by the time of day [hours], day after day")
-    memory: Duration = Field(
-        default=timedelta(0),
-        description="time constant of misses: after it, the last random draw still holds with"
-        " probability 1/e; 0: each look has a new draw",
-    )
+    distance: Curve = ALWAYS
+    bearing: Curve = ALWAYS
+    orientation: Curve = ALWAYS
+    posture: dict[Posture, Share] = Field(default={})
+    visible_share: Curve = ALWAYS
+    light: Curve = ALWAYS
+    memory: Duration = timedelta(0)
 
     @model_validator(mode="after")
     def _is_within_a_day(self) -> Self:
@@ -67,30 +63,31 @@ class Detection(Settings):
 
 
 class MistakenSpot(Settings):
-    """A place that is sometimes mistaken for a person: a coat rack, a screen, a mirror."""
+    """A place that is sometimes mistaken for a person: a coat rack, a screen, a mirror.
 
-    at: tuple[Length, Length] = Field(description="where it is [m]", examples=[[2.5, 1.0]])
-    per_hour: float = Field(ge=0, description="false positives per hour in which it is in view")
-    spread: Length = Field(
-        default=0.0,
-        ge=0,
-        le=10,
-        description="standard deviation of their positions, per axis [m]",
-    )
+    Attributes:
+        at: Where it is [m].
+        per_hour: False positives per hour in which it is in view.
+        spread: Standard deviation of their positions, per axis [m].
+    """
+
+    at: tuple[Length, Length] = Field(examples=[[2.5, 1.0]])
+    per_hour: float = Field(ge=0)
+    spread: Length = Field(default=0.0, ge=0, le=10)
 
 
 class FalsePositives(Settings):
-    """People that are perceived but aren't there, at random with a rate per time of looking."""
+    """People that are perceived but aren't there, at random with a rate per time of looking.
 
-    per_hour: float = Field(
-        default=0.0, ge=0, description="per hour of looking, uniform over what is in view"
-    )
-    spots: tuple[MistakenSpot, ...] = Field(
-        default=(), max_length=64, description="places with rates of their own"
-    )
-    looks_like: dict[str, Share] = Field(
-        default={}, description="which user one is mistaken for; the rest is not recognized"
-    )
+    Attributes:
+        per_hour: Per hour of looking, uniform over what is in view.
+        spots: Places with rates of their own.
+        looks_like: Which user one is mistaken for; the rest is not recognized.
+    """
+
+    per_hour: float = Field(default=0.0, ge=0)
+    spots: tuple[MistakenSpot, ...] = Field(default=(), max_length=64)
+    looks_like: dict[str, Share] = Field(default={})
 
     @model_validator(mode="after")
     def _is_a_share(self) -> Self:
@@ -99,23 +96,20 @@ class FalsePositives(Settings):
 
 
 class Identity(Settings):
-    """Identity of a noticed user: recognized, mistaken for another user, or not recognized."""
+    """Identity of a noticed user: recognized, mistaken for another user, or not recognized.
 
-    right: Curve | None = Field(
-        default=None, description="recognized, by distance [m]; null: whenever not mistaken"
-    )
-    mistaken: Curve = Field(
-        default=NEVER, description="mistaken for another user, by distance [m]; the rest is unknown"
-    )
-    confusion: dict[str, dict[str, Share]] = Field(
-        default={},
-        description="which user each user is mistaken for, if so; left out: all others equally",
-    )
-    per_track: bool = Field(
-        default=False,
-        description="an identity stays until the user isn't noticed for `lost_after`; otherwise"
-        " it is drawn anew in each look",
-    )
+    Attributes:
+        right: Recognized, by distance [m]; null: whenever not mistaken.
+        mistaken: Mistaken for another user, by distance [m]; the rest is unknown.
+        confusion: Which user each user is mistaken for, if so; left out: all others equally.
+        per_track: An identity stays until the user isn't noticed for `lost_after`; otherwise it is
+            drawn anew in each look.
+    """
+
+    right: Curve | None = None
+    mistaken: Curve = NEVER
+    confusion: dict[str, dict[str, Share]] = Field(default={})
+    per_track: bool = False
 
     @model_validator(mode="after")
     def _are_distributions(self) -> Self:
@@ -131,27 +125,25 @@ class Identity(Settings):
 
 
 class Attributes(Settings):
-    """Errors of position, heading, posture and activity; noise is bell-shaped, by its deviation."""
+    """Errors of position, heading, posture and activity; noise is bell-shaped, by its deviation.
 
-    range_noise: Length = Field(
-        default=0.0, ge=0, le=100, description="of the distance, whatever the distance [m]"
-    )
-    range_noise_share: Share = Field(
-        default=0.0, description="of the distance, as a share of it; both are added"
-    )
-    bearing_noise_deg: AngleDeg = Field(default=0.0, ge=0, le=90, description="of the bearing")
-    heading_noise_deg: AngleDeg = Field(
-        default=0.0, ge=0, le=180, description="of the heading in which the user is perceived"
-    )
-    posture: dict[Posture, dict[Posture, Share]] = Field(
-        default={},
-        description="probabilities of mistaking a posture for others; the rest is right",
-    )
+    Attributes:
+        range_noise: Of the distance, whatever the distance [m].
+        range_noise_share: Of the distance, as a share of it; both are added.
+        bearing_noise_deg: Of the bearing.
+        heading_noise_deg: Of the heading in which the user is perceived.
+        posture: Probabilities of mistaking a posture for others; the rest is right.
+        activity: Probabilities of mistaking an activity for others; the rest is right; null:
+            activities aren't perceived.
+    """
+
+    range_noise: Length = Field(default=0.0, ge=0, le=100)
+    range_noise_share: Share = 0.0
+    bearing_noise_deg: AngleDeg = Field(default=0.0, ge=0, le=90)
+    heading_noise_deg: AngleDeg = Field(default=0.0, ge=0, le=180)
+    posture: dict[Posture, dict[Posture, Share]] = Field(default={})
     activity: dict[str, dict[str, Share]] | None = Field(
-        default=None,
-        description="probabilities of mistaking an activity for others; the rest is right;"
-        " null: activities aren't perceived",
-        examples=[{"cook": {"breakfast": 0.2}}],
+        default=None, examples=[{"cook": {"breakfast": 0.2}}]
     )
 
     @model_validator(mode="after")
@@ -169,13 +161,16 @@ class Attributes(Settings):
 
 
 class Perception(Settings):
-    """Errors of a robot's perception; perfect by default."""
+    """Errors of a robot's perception; perfect by default.
 
-    detection: Detection = Field(default=Detection(), description="which users are noticed")
-    false_positives: FalsePositives = Field(
-        default=FalsePositives(), description="people who aren't there"
-    )
-    identity: Identity = Field(default=Identity(), description="which user one is recognized as")
-    attributes: Attributes = Field(
-        default=Attributes(), description="errors of position, heading, posture and activity"
-    )
+    Attributes:
+        detection: Which users are noticed.
+        false_positives: People who aren't there.
+        identity: Which user one is recognized as.
+        attributes: Errors of position, heading, posture and activity.
+    """
+
+    detection: Detection = Detection()
+    false_positives: FalsePositives = FalsePositives()
+    identity: Identity = Identity()
+    attributes: Attributes = Attributes()

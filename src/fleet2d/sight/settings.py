@@ -2,8 +2,6 @@
 
 from typing import Annotated
 
-from pydantic import Field
-
 from fleet2d.component import OneOf, Settings
 from fleet2d.sight.fov import FieldOfView
 from fleet2d.sight.line_of_sight import LineOfSight
@@ -11,20 +9,17 @@ from fleet2d.units import PositiveDuration
 
 
 class SightSettings(Settings):
-    """How a run computes what is in view."""
+    """How a run computes what is in view.
 
-    method: Annotated[FieldOfView, OneOf("sight")] = Field(
-        default=LineOfSight(),
-        description="method that decides whether somebody is in view: line_of_sight,"
-        " visibility_polygon, flashlight, or your own",
-    )
-    people_occlude: bool = Field(
-        default=False,
-        description="whether bodies hide people from cameras: a line of sight ends at any body that"
-        " it passes nearer than that body's radius",
-    )
-    seen_every: PositiveDuration | None = Field(
-        default=None,
-        description="how often the area in view is computed, for the layers of what robots have"
-        " seen and the exposure of rooms; null: in every step",
-    )
+    Attributes:
+        method: Method that decides whether somebody is in view: line_of_sight, visibility_polygon,
+            flashlight, or your own.
+        people_occlude: Whether bodies hide people from cameras: a line of sight ends at any body
+            that it passes nearer than that body's radius.
+        seen_every: How often the area in view is computed, for the layers of what robots have seen
+            and the exposure of rooms; null: in every step.
+    """
+
+    method: Annotated[FieldOfView, OneOf("sight")] = LineOfSight()
+    people_occlude: bool = False
+    seen_every: PositiveDuration | None = None

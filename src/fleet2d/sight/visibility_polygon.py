@@ -49,20 +49,17 @@ class VisibilityPolygon(FieldOfView):
 
     It is worthwhile where many points are tested from few places. A region takes 8 bytes a piece,
     about 200 bytes in a smooth plan and 1 kB in one traced from a sensor.
+
+    Attributes:
+        precompute: Visited: regions of the places that cameras look from; all: also of the centres
+            of all cells, before the run; file: these come from a file that processes share.
+        path: With precompute: file: the folder of the files; created if missing.
+        keep: Number of visited places whose regions are cached.
     """
 
-    precompute: Literal["visited", "all", "file"] = Field(
-        default="visited",
-        description="visited: regions of the places that cameras look from; all: also of the"
-        " centres of all cells, before the run; file: these come from a file that processes share",
-    )
-    path: Path | None = Field(
-        default=None,
-        description="with precompute: file: the folder of the files; created if missing",
-    )
-    keep: int = Field(
-        default=4096, ge=1, description="number of visited places whose regions are cached"
-    )
+    precompute: Literal["visited", "all", "file"] = "visited"
+    path: Path | None = None
+    keep: int = Field(default=4096, ge=1)
 
     @model_validator(mode="after")
     def _path_goes_with_file(self) -> Self:

@@ -3,72 +3,31 @@
 import itertools
 import math
 from collections.abc import Iterator, Mapping
-from pathlib import Path
-from typing import Annotated, Any, ClassVar, Self
+from typing import Annotated, Any, Self
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from fleet2d.component import Settings
 from fleet2d.errors import ScenarioError
-from fleet2d.paths import folder_of
 from fleet2d.problems import did_you_mean, problem
+from fleet2d.studies.axis import Axis
 from fleet2d.studies.choice import Choice, Label, key_path, label_values
 from fleet2d.studies.count import Count, check_count
+from fleet2d.studies.population_axes import FloorplansAxis, PersonasAxis, SyntheticAxis
 from fleet2d.studies.sampling import Method, Parameter, draw, rounded
-
-FLOORPLAN_SUFFIXES = (".json", ".geojson", ".yaml", ".yml")
-
-
-def _texts(value: Any) -> tuple[Any, ...]:
-    """Return a text or a list of texts as a tuple; each keeps the folder of its file."""
-    texts = (value,) if isinstance(value, str | Path) else value
-    if not isinstance(texts, list | tuple) or not all(isinstance(t, str | Path) for t in texts):
-        raise problem(f"found {value!r}; a text, or a list of texts, is wanted")
-    return tuple(texts)
-
-
-Texts = Annotated[Any, BeforeValidator(_texts)]
-
-
-class Axis(Settings):
-    """Base class of axes.
-
-    Attributes:
-        is_population: Whether its values are a sample of a population (homes, people); the
-            intervals of answers hold over populations.
-    """
-
-    is_population: ClassVar[bool] = False
-
-    when: dict[str, Any] = Field(
-        default={},
-        description="the axis applies only where other axes have these values: {robot: hangout};"
-        " a list: any of them",
-    )
-
-    def columns(self, name: str) -> tuple[str, ...]:
-        """Return the columns of its labels."""
-        return (name,)
-
-    def populations(self, name: str) -> tuple[str, ...]:
-        """Return its columns whose values are a sample of a population."""
-        return self.columns(name) if self.is_population else ()
-
-    def choices(self, name: str) -> list[Choice]:
-        """Return the label and the scenario changes of each value of the axis, in order.
-
-        Raises:
-            InputError: A file or a package is missing.
-        """
-        raise NotImplementedError
 
 
 class ValuesAxis(Axis):
-    """A list of values of one key, or of several keys that have the same value."""
+    """A list of values of one key, or of several keys that have the same value.
 
-    key: str | tuple[str, ...] = Field(description="the key path, or several")
-    values: tuple[Any, ...] = Field(min_length=1, description="the values")
-    labels: tuple[str, ...] = Field(default=(), description="what the values are called")
+    Attributes:
+        key: The key path, or several.
+        values: The values.
+        labels: What the values are called.
+    """
+
+    key: str | tuple[str, ...]
+    values: tuple[Any, ...] = Field(min_length=1)
+    labels: tuple[str, ...] = ()
 
     @model_validator(mode="after")
     def _as_many_labels(self) -> Self:
@@ -88,14 +47,23 @@ class ValuesAxis(Axis):
 
 
 class RangeAxis(Axis):
-    """Evenly spaced numbers of a range, by their step or their count."""
+    """Evenly spaced numbers of a range, by their step or their count.
 
-    key: str = Field(description="the key path")
-    range: tuple[float, float] = Field(description="first and last number")
-    step: float | None = Field(default=None, gt=0, description="from one to the next")
-    count: Count | None = Field(default=None, ge=2, description="how many, instead of a step")
-    log: bool = Field(default=False, description="with count: by a constant factor")
-    unit: str = Field(default="", description="written behind the number: d, cm, %")
+    Attributes:
+        key: The key path.
+        range: First and last number.
+        step: From one to the next.
+        count: How many, instead of a step.
+        log: With count: by a constant factor.
+        unit: Written behind the number: d, cm, %.
+    """
+
+    key: str
+    range: tuple[float, float]
+    step: float | None = Field(default=None, gt=0)
+    count: Count | None = Field(default=None, ge=2)
+    log: bool = False
+    unit: str = ""
 
     @model_validator(mode="after")
     def _step_or_count(self) -> Self:
@@ -139,14 +107,15 @@ class RangeAxis(Axis):
 
 
 class OptionsAxis(Axis):
-    """Named options, each a set of changes."""
+    """Named options, each a set of changes.
 
-    options: dict[str, dict[str, Any]] = Field(
-        min_length=1, description="by name: {key path: value, …}"
-    )
-    population: bool = Field(
-        default=False, description="they stand for a population, as homes and people do"
-    )
+    Attributes:
+        options: By name: {key path: value, …}.
+        population: They stand for a population, as homes and people do.
+    """
+
+    options: dict[str, dict[str, Any]] = Field(min_length=1)
+    population: bool = False
 
     def populations(self, name: str) -> tuple[str, ...]:
         """Return its column if its options are a sample of a population."""
@@ -160,108 +129,20 @@ class OptionsAxis(Axis):
         ]
 
 
-class FloorplansAxis(Axis):
-    """Floor plans: the files of a folder or a pattern, or a list of files."""
-
-    is_population: ClassVar[bool] = True
-
-    floorplans: Texts = Field(description="a folder, a pattern, or files")
-    settings: dict[str, Any] = Field(
-        default={}, description="further keys of the floor plan, such as furnish"
-    )
-
-    def choices(self, name: str) -> list[Choice]:
-        """Return a choice for each floor plan; its label is the name of its file.
-
-        Raises:
-            ScenarioError: There is no such file, or one is no floor plan.
-        """
-        files = self._files()
-        labels = [path.stem for path in files]
-        if len(set(labels)) < len(labels):
-            labels = [path.name for path in files]
-        return [
-            Choice({name: label}, ((("floorplan",), self._section(path)),))
-            for label, path in zip(labels, files, strict=True)
-        ]
-
-    def _files(self) -> list[Path]:
-        files: list[Path] = []
-        for pattern in self.floorplans:
-            path = folder_of(pattern) / Path(pattern).expanduser()
-            candidates = path.iterdir() if path.is_dir() else path.parent.glob(path.name)
-            plans = sorted(p for p in candidates if p.suffix.lower() in FLOORPLAN_SUFFIXES)
-            if not plans:
-                raise ScenarioError(
-                    f"no floor plan matches {pattern!r} in {folder_of(pattern)}: name a folder, a"
-                    f" pattern or a file that ends in {', '.join(FLOORPLAN_SUFFIXES)}"
-                )
-            files += plans
-        return files
-
-    def _section(self, path: Path) -> dict[str, Any]:
-        from fleet2d.floorplan.load import format_of_file
-
-        return {"type": format_of_file(path), "path": str(path.absolute()), **self.settings}
-
-
-class SyntheticAxis(Axis):
-    """Synthetic homes by their seeds."""
-
-    is_population: ClassVar[bool] = True
-
-    synthetic: Count | tuple[int, ...] = Field(
-        description="how many homes, from seed 0 on; or a list of seeds"
-    )
-    first: int = Field(default=0, ge=0, description="the first seed, where a number is given")
-    settings: dict[str, Any] = Field(
-        default={}, description="further keys of the homes, such as area_m2 and furnish"
-    )
-
-    def choices(self, name: str) -> list[Choice]:
-        """Return a choice for each home; its label is its seed."""
-        seeds = self.synthetic
-        if isinstance(seeds, int):
-            seeds = tuple(range(self.first, self.first + seeds))
-        return [
-            Choice(
-                {name: seed},
-                ((("floorplan",), {"type": "synthetic", "seed": seed, **self.settings}),),
-            )
-            for seed in seeds
-        ]
-
-
-class PersonasAxis(Axis):
-    """Personas of one user: the bundled ones, or files of your own."""
-
-    is_population: ClassVar[bool] = True
-
-    personas: Texts = Field(description="all, or a list of names and files")
-    user: str = Field(description="whose persona it is")
-
-    def choices(self, name: str) -> list[Choice]:
-        """Return a choice for each persona."""
-        from fleet2d.routines.persona import bundled_names
-
-        personas = bundled_names() if self.personas == ("all",) else self.personas
-        user = ("users", self.user)
-        return [
-            Choice(
-                {name: Path(persona).stem},
-                (((*user, "type"), "routine"), ((*user, "persona"), persona)),
-            )
-            for persona in personas
-        ]
-
-
 class SampleAxis(Axis):
-    """Random or Latin-hypercube samples of several parameters at once."""
+    """Random or Latin-hypercube samples of several parameters at once.
 
-    sample: dict[str, Parameter] = Field(min_length=1, description="the parameters, by column")
-    count: Count = Field(ge=1, description="how many samples")
-    method: Method = Field(default="latin_hypercube", description="latin_hypercube or random")
-    seed: int = Field(default=0, ge=0, description="of the samples")
+    Attributes:
+        sample: The parameters, by column.
+        count: How many samples.
+        method: Latin_hypercube or random.
+        seed: Of the samples.
+    """
+
+    sample: dict[str, Parameter] = Field(min_length=1)
+    count: Count = Field(ge=1)
+    method: Method = "latin_hypercube"
+    seed: int = Field(default=0, ge=0)
 
     def columns(self, name: str) -> tuple[str, ...]:
         """Return a column for each parameter."""
@@ -319,9 +200,13 @@ class _GroupAxis(Axis):
 
 
 class ZipAxis(_GroupAxis):
-    """Axes of equal length in step: the first choices together, the second ones, and so on."""
+    """Axes of equal length in step: the first choices together, the second ones, and so on.
 
-    zip: "dict[str, AnyAxis]" = Field(min_length=1, description="the axes, by name")
+    Attributes:
+        zip: The axes, by name.
+    """
+
+    zip: "dict[str, AnyAxis]" = Field(min_length=1)
 
     def axes(self) -> dict[str, Axis]:
         """Return the axes of the group."""
@@ -343,9 +228,13 @@ class ZipAxis(_GroupAxis):
 
 
 class GridAxis(_GroupAxis):
-    """All combinations of the values of axes, as of the axes of a study itself."""
+    """All combinations of the values of axes, as of the axes of a study itself.
 
-    grid: "dict[str, AnyAxis]" = Field(min_length=1, description="the axes, by name")
+    Attributes:
+        grid: The axes, by name.
+    """
+
+    grid: "dict[str, AnyAxis]" = Field(min_length=1)
 
     def axes(self) -> dict[str, Axis]:
         """Return the axes of the group."""

@@ -6,7 +6,7 @@ from typing import Any, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, model_validator
+from pydantic import model_validator
 
 from fleet2d.component import Settings
 from fleet2d.errors import InputError
@@ -17,15 +17,25 @@ DIGITS = 6  # significant digits of a sampled number, so that tables print the v
 
 
 class Parameter(Settings):
-    """One sampled or searched parameter: a range, or a list to choose from."""
+    """One sampled or searched parameter: a range, or a list to choose from.
 
-    key: str = Field(description="the key path that it sets")
-    low: float | None = Field(default=None, description="the smallest value")
-    high: float | None = Field(default=None, description="the largest value")
-    log: bool = Field(default=False, description="uniform in the logarithm")
-    integer: bool = Field(default=False, description="whole numbers only")
-    unit: str = Field(default="", description="written behind the number: d, cm, %")
-    choices: tuple[Any, ...] = Field(default=(), description="instead of a range: a list")
+    Attributes:
+        key: The key path that it sets.
+        low: The smallest value.
+        high: The largest value.
+        log: Uniform in the logarithm.
+        integer: Whole numbers only.
+        unit: Written behind the number: d, cm, %.
+        choices: Instead of a range: a list.
+    """
+
+    key: str
+    low: float | None = None
+    high: float | None = None
+    log: bool = False
+    integer: bool = False
+    unit: str = ""
+    choices: tuple[Any, ...] = ()
 
     @model_validator(mode="after")
     def _one_way(self) -> Self:

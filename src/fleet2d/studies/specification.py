@@ -32,34 +32,43 @@ RESERVED = (
 
 
 class ConditionalChange(Settings):
-    """A change for all variants that fulfil a condition."""
+    """A change for all variants that fulfil a condition.
 
-    when: dict[str, Any] = Field(default={}, description="values of axes; a list: any of them")
-    set: dict[str, Any] = Field(min_length=1, description="{key path: value, …}")
+    Attributes:
+        when: Values of axes; a list: any of them.
+        set: {key path: value, …}.
+    """
+
+    when: dict[str, Any] = Field(default={})
+    set: dict[str, Any] = Field(min_length=1)
 
 
 class Keep(Settings):
-    """What a study keeps of each run."""
+    """What a study keeps of each run.
 
-    metrics: tuple[str, ...] = Field(
-        default=("*",), description="names or patterns of numbers, such as ltp_error.*.tv"
-    )
-    tables: tuple[str, ...] = Field(default=(), description="tables of a run, by name")
+    Attributes:
+        metrics: Names or patterns of numbers, such as ltp_error.*.tv.
+        tables: Tables of a run, by name.
+    """
+
+    metrics: tuple[str, ...] = ("*",)
+    tables: tuple[str, ...] = ()
 
 
 class PairedComparison(Settings):
-    """A paired comparison that the report shows."""
+    """A paired comparison that the report shows.
 
-    metric: str = Field(description="a number, such as ltp_error.ana.tv")
-    against: dict[str, Any] = Field(
-        min_length=1, max_length=1, description="the axis, and the value that others are held to"
-    )
-    by: tuple[str, ...] | None = Field(
-        default=None, description="columns over which intervals go; left out: homes, people, seeds"
-    )
-    within: tuple[str, ...] = Field(
-        default=(), description="axes for whose values the comparison is made one by one"
-    )
+    Attributes:
+        metric: A number, such as ltp_error.ana.tv.
+        against: The axis, and the value that others are held to.
+        by: Columns over which intervals go; left out: homes, people, seeds.
+        within: Axes for whose values the comparison is made one by one.
+    """
+
+    metric: str
+    against: dict[str, Any] = Field(min_length=1, max_length=1)
+    by: tuple[str, ...] | None = None
+    within: tuple[str, ...] = ()
 
 
 def _numbers_or_count(value: Any) -> Any:
@@ -71,29 +80,33 @@ def _numbers_or_count(value: Any) -> Any:
 
 
 class StudyFile(Settings):
-    """A study: a base scenario, axes along which it varies, what to keep and to compare."""
+    """A study: a base scenario, axes along which it varies, what to keep and to compare.
 
-    name: str | None = Field(default=None, description="the name of the study in reports")
-    description: str = Field(default="", description="the question it answers, for the report")
-    base: Any = Field(
-        default=None,
-        description="the scenario: a file, bundled:NAME, or a mapping; left out: bundled:base",
-    )
-    axes: dict[str, AnyAxis] = Field(default={}, description="what varies, by name")
+    Attributes:
+        name: The name of the study in reports.
+        description: The question it answers, for the report.
+        base: The scenario: a file, bundled:NAME, or a mapping; left out: bundled:base.
+        axes: What varies, by name.
+        replicates: How many seeds, from 0 on, or a list; left out: the base's.
+        rules: Changes for some of the variants.
+        exclude: Combinations to leave out: {axis: value, …}.
+        keep: What of each run is kept.
+        compare: What the report compares.
+        tune: What `fleet2d tune` searches.
+    """
+
+    name: str | None = None
+    description: str = ""
+    base: Any = None
+    axes: dict[str, AnyAxis] = Field(default={})
     replicates: Annotated[
         tuple[Annotated[int, Field(ge=0, lt=2**63)], ...], BeforeValidator(_numbers_or_count)
-    ] = Field(default=(), description="how many seeds, from 0 on, or a list; left out: the base's")
-    rules: tuple[ConditionalChange, ...] = Field(
-        default=(), description="changes for some of the variants"
-    )
-    exclude: tuple[dict[str, Any], ...] = Field(
-        default=(), description="combinations to leave out: {axis: value, …}"
-    )
-    keep: Keep = Field(default=Keep(), description="what of each run is kept")
-    compare: tuple[PairedComparison, ...] = Field(
-        default=(), description="what the report compares"
-    )
-    tune: TuneSettings | None = Field(default=None, description="what `fleet2d tune` searches")
+    ] = ()
+    rules: tuple[ConditionalChange, ...] = ()
+    exclude: tuple[dict[str, Any], ...] = ()
+    keep: Keep = Keep()
+    compare: tuple[PairedComparison, ...] = ()
+    tune: TuneSettings | None = None
 
     @model_validator(mode="before")
     @classmethod

@@ -11,23 +11,23 @@ from fleet2d.units import PositiveDuration
 
 
 class TuneSettings(Settings):
-    """The searched parameters, the objectives, and the homes on which the results are judged."""
+    """The searched parameters, the objectives, and the homes on which the results are judged.
 
-    search: dict[str, Parameter] = Field(min_length=1, description="the parameters, by name")
-    objectives: dict[str, Literal["minimize", "maximize"]] = Field(
-        min_length=1, description="metrics such as ltp_error.ana.tv, each with the better direction"
-    )
-    trials: int = Field(default=40, ge=1, description="the number of settings to try")
-    held_out: dict[str, tuple[Any, ...]] = Field(
-        min_length=1,
-        max_length=1,
-        description="{axis: [values]}: unknown to the search, used only by the report",
-    )
-    prune_at: tuple[PositiveDuration, ...] = Field(
-        default=(),
-        description="simulated times at which poor trials end early; with one objective only",
-    )
-    seed: int = Field(default=0, ge=0, description="the seed of the search")
+    Attributes:
+        search: The parameters, by name.
+        objectives: Metrics such as ltp_error.ana.tv, each with the better direction.
+        trials: The number of settings to try.
+        held_out: {axis: [values]}: unknown to the search, used only by the report.
+        prune_at: Simulated times at which poor trials end early; with one objective only.
+        seed: The seed of the search.
+    """
+
+    search: dict[str, Parameter] = Field(min_length=1)
+    objectives: dict[str, Literal["minimize", "maximize"]] = Field(min_length=1)
+    trials: int = Field(default=40, ge=1)
+    held_out: dict[str, tuple[Any, ...]] = Field(min_length=1, max_length=1)
+    prune_at: tuple[PositiveDuration, ...] = ()
+    seed: int = Field(default=0, ge=0)
 
     @model_validator(mode="after")
     def _prunes_by_one_objective(self) -> Self:

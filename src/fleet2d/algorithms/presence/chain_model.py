@@ -165,15 +165,14 @@ class Filter(Model):
 
     It is right where lengths of stays are about geometric. It fails when routines depend on the
     time of day.
+
+    Attributes:
+        detection: Chance that somebody in view is perceived.
+        restless: Chance per bin that a person in a room changes patch, before it is learned.
     """
 
-    detection: Share = Field(
-        default=0.95, description="chance that somebody in view is perceived", gt=0, lt=1
-    )
-    restless: Share = Field(
-        default=0.05,
-        description="chance per bin that a person in a room changes patch, before it is learned",
-    )
+    detection: Share = Field(default=0.95, gt=0, lt=1)
+    restless: Share = 0.05
     stages: ClassVar[int] = 1
     negative: ClassVar[bool] = True
 
@@ -249,11 +248,12 @@ class RoutineModel(SemiMarkov):
     shares of time spent in each room at that hour (`fleet2d.algorithms.presence.habits`).
 
     It is right where days are similar. It fails where they aren't: it is too sure of the routine.
+
+    Attributes:
+        smoothing: Bins of average evidence added to each hour.
     """
 
-    smoothing: float = Field(
-        default=60, gt=0, description="bins of average evidence added to each hour"
-    )
+    smoothing: float = Field(default=60, gt=0)
 
     def _follow(self, user: int, bins: Bins) -> F64:
         habits, model = self.habits(user), self.learner.people[user].model

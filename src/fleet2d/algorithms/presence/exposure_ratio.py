@@ -36,11 +36,12 @@ class ExposureRatio(Estimator):
     It is right when the times at which a patch is watched don't depend on whether the user is
     there. It fails when the robot follows, approaches, or stays while it sees somebody: rooms that
     the robot leaves at once because nobody is there are watched too little.
+
+    Attributes:
+        detection: Chance that somebody in view is perceived.
     """
 
-    detection: Share = Field(
-        default=0.95, description="chance that somebody in view is perceived", gt=0
-    )
+    detection: Share = Field(default=0.95, gt=0)
 
     def begin(self, rooms: int, users: int, half_life: float | None = None) -> None:
         """Prepare for a run."""
@@ -146,14 +147,14 @@ class AuditOnly(ExposureRatio):
 
     It is right when the looks of audits don't depend on where the user is. It fails when audits
     begin because the user is lost; and it is noisy, as most sightings aren't used.
+
+    Attributes:
+        every: From one audit to the next, from midnight on.
+        length: Of an audit, from its beginning.
     """
 
-    every: PositiveDuration = Field(
-        default=timedelta(hours=2), description="from one audit to the next, from midnight on"
-    )
-    length: PositiveDuration = Field(
-        default=timedelta(minutes=15), description="of an audit, from its beginning"
-    )
+    every: PositiveDuration = timedelta(hours=2)
+    length: PositiveDuration = timedelta(minutes=15)
 
     @model_validator(mode="after")
     def _check_length(self) -> "AuditOnly":

@@ -51,13 +51,14 @@ class Fremen(Estimator):
     It is right where daily and weekly rhythms decide which rooms are likely, and looks are timed
     independently of the user. It fails, as the exposure ratio does, when the robot follows a user;
     and in the first days there are no periods yet.
+
+    Attributes:
+        detection: Chance that somebody in view is perceived.
     """
 
     has_interval: ClassVar[bool] = False
 
-    detection: Share = Field(
-        default=0.95, description="chance that somebody in view is perceived", gt=0
-    )
+    detection: Share = Field(default=0.95, gt=0)
 
     def width(self, rooms: int) -> int:
         """Return the number of columns of `sums`: seen and watched of each room, and bins."""

@@ -68,24 +68,18 @@ class Likelihood(Estimator):
 
     Anyone follows from all users, taken as independent, and from unknown people where they are
     seen; without users it is the chain of one person.
+
+    Attributes:
+        detection: Chance that somebody in view is perceived.
+        restless: Chance per bin that a person in a room changes patch, before it is learned.
+        stages: Of a stay; above 1 its length isn't geometric.
+        together: Largest number of consecutive bins with equal evidence that are merged.
     """
 
-    detection: Share = Field(
-        default=0.95, description="chance that somebody in view is perceived", gt=0, lt=1
-    )
-    restless: Share = Field(
-        default=0.05,
-        description="chance per bin that a person in a room changes patch, before it is learned",
-    )
-    stages: int = Field(
-        default=1, ge=1, le=4, description="of a stay; above 1 its length isn't geometric"
-    )
-    together: int = Field(
-        default=5,
-        ge=1,
-        le=60,
-        description="largest number of consecutive bins with equal evidence that are merged",
-    )
+    detection: Share = Field(default=0.95, gt=0, lt=1)
+    restless: Share = 0.05
+    stages: int = Field(default=1, ge=1, le=4)
+    together: int = Field(default=5, ge=1, le=60)
 
     def begin(self, rooms: int, users: int, half_life: float | None = None) -> None:
         """Prepare for a run."""

@@ -32,26 +32,22 @@ class LongTermPresence(Algorithm):
 
     Its output is a `Presence`: `share` is given at home, `with_away` of all time; with `by:
     hour_of_week` both are for the present hour of the week, and `at` returns other hours.
+
+    Attributes:
+        estimator: How it is estimated.
+        by: One estimate, or one for each hour of the week.
+        smoothing: Duration of average evidence added to each hour of the week.
+        half_life: After which evidence counts half; null: all counts alike.
+        interval: Coverage of the intervals it tells, as 0.9.
     """
 
     needs: ClassVar[Set[str]] = frozenset({"evidence"})
 
-    estimator: Annotated[Estimator, OneOf("presence_estimator")] = Field(
-        cast("Any", "exposure_ratio"), description="how it is estimated"
-    )
-    by: Literal["overall", "hour_of_week"] = Field(
-        default="overall", description="one estimate, or one for each hour of the week"
-    )
-    smoothing: PositiveDuration = Field(
-        default=timedelta(hours=1),
-        description="duration of average evidence added to each hour of the week",
-    )
-    half_life: PositiveDuration | None = Field(
-        default=None, description="after which evidence counts half; null: all counts alike"
-    )
-    interval: Share | None = Field(
-        default=None, gt=0, lt=1, description="coverage of the intervals it tells, as 0.9"
-    )
+    estimator: Annotated[Estimator, OneOf("presence_estimator")] = cast("Any", "exposure_ratio")
+    by: Literal["overall", "hour_of_week"] = "overall"
+    smoothing: PositiveDuration = timedelta(hours=1)
+    half_life: PositiveDuration | None = None
+    interval: Share | None = Field(default=None, gt=0, lt=1)
 
     @model_validator(mode="after")
     def _check_interval(self) -> "LongTermPresence":

@@ -93,11 +93,13 @@ class LastSeen(Model):
 
 @register("presence_model", "long_term")
 class LongTerm(Model):
-    """Long-term presence, regardless of recent sightings."""
+    """Long-term presence, regardless of recent sightings.
 
-    estimator: Annotated[Estimator, OneOf("presence_estimator")] = Field(
-        cast("Any", "likelihood"), description="how it is estimated"
-    )
+    Attributes:
+        estimator: How it is estimated.
+    """
+
+    estimator: Annotated[Estimator, OneOf("presence_estimator")] = cast("Any", "likelihood")
 
     def begin(self, rooms: int, users: int, day: int) -> None:
         """Prepare for a run."""
@@ -123,11 +125,13 @@ class LongTerm(Model):
 
 @register("presence_model", "hour_of_week")
 class HourOfWeek(LongTerm):
-    """Long-term presence of the hour of the week, regardless of recent sightings."""
+    """Long-term presence of the hour of the week, regardless of recent sightings.
 
-    smoothing: float = Field(
-        default=60, gt=0, description="bins of average evidence added to each hour"
-    )
+    Attributes:
+        smoothing: Bins of average evidence added to each hour.
+    """
+
+    smoothing: float = Field(default=60, gt=0)
 
     def observe(self, bins: Bins) -> tuple[F64, F64]:
         """Return the belief before these bins, for the hour of each of them."""

@@ -5,7 +5,6 @@ from datetime import datetime, timedelta
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, cast
 
 import numpy as np
-from pydantic import Field
 
 from fleet2d.algorithms.algorithm import Algorithm, Present
 from fleet2d.algorithms.history import History
@@ -29,16 +28,16 @@ class RealTimePresence(Algorithm):
 
     Its output is a `Presence` at the time of the update; `at` forecasts later times, as far as the
     model can. There is none until the first whole bin (a minute, or a step where that is longer).
+
+    Attributes:
+        period: How often it is updated.
+        model: How it is computed.
     """
 
     needs: ClassVar[Set[str]] = frozenset({"evidence"})
 
-    period: PositiveDuration = Field(
-        default=timedelta(minutes=5), description="how often it is updated"
-    )
-    model: Annotated[Model, OneOf("presence_model")] = Field(
-        cast("Any", "hmm"), description="how it is computed"
-    )
+    period: PositiveDuration = timedelta(minutes=5)
+    model: Annotated[Model, OneOf("presence_model")] = cast("Any", "hmm")
 
     def start(self, home: "Home") -> None:
         """Begin without evidence."""

@@ -3,7 +3,6 @@
 from typing import ClassVar
 
 import numpy as np
-from pydantic import Field
 
 from fleet2d.component import register
 from fleet2d.entities.objects.sensor import I64, Sensor, SensorView
@@ -12,9 +11,13 @@ from fleet2d.floorplan.home.home import Home
 
 @register("object", "contact_sensor")
 class ContactSensor(Sensor):
-    """Says OPEN while a door is open, and CLOSE when it shuts."""
+    """Says OPEN while a door is open, and CLOSE when it shuts.
 
-    of: str = Field(description="the name of the door, one of the scenario's objects")
+    Attributes:
+        of: The name of the door, one of the scenario's objects.
+    """
+
+    of: str
 
     words: ClassVar[tuple[str, str]] = ("OPEN", "CLOSE")
 

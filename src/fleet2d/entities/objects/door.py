@@ -16,11 +16,17 @@ from fleet2d.units import PositiveDuration, TimeOfDay
 
 
 class Turn(Settings):
-    """A change of a door at a time of day, every day."""
+    """A change of a door at a time of day, every day.
 
-    at: TimeOfDay = Field(description="when, every day")
-    open: bool | None = Field(default=None, description="open it, or shut it")
-    locked: bool | None = Field(default=None, description="lock it, or unlock it")
+    Attributes:
+        at: When, every day.
+        open: Open it, or shut it.
+        locked: Lock it, or unlock it.
+    """
+
+    at: TimeOfDay
+    open: bool | None = None
+    locked: bool | None = None
 
     @model_validator(mode="after")
     def _does_something(self) -> Self:
@@ -35,24 +41,22 @@ class Door(HomeObject):
 
     People open it as they come to it, unless it is locked; for bodies with `opens_doors: false`,
     such as robots, it is a wall. It never shuts on a body: it waits until the doorway is free.
+
+    Attributes:
+        doorway: Its doorway: by name, by a room that has one only, by 'room-room', or the one
+            nearest to a point [x, y] in metres.
+        open: Whether it stands open at first.
+        locked: Whether nobody can open it by hand at first.
+        closes_after: It shuts this long after somebody opened it or went through; left out: it
+            stays as it was left.
+        schedule: When it is opened, shut or locked, every day.
     """
 
-    doorway: str | Point = Field(
-        description="its doorway: by name, by a room that has one only, by 'room-room', or the one"
-        " nearest to a point [x, y] in metres",
-        examples=["bathroom_0", "kitchen_0-hallway_0", [4.0, 2.5]],
-    )
-    open: bool = Field(default=True, description="whether it stands open at first")
-    locked: bool = Field(default=False, description="whether nobody can open it by hand at first")
-    closes_after: PositiveDuration | None = Field(
-        default=None,
-        description="it shuts this long after somebody opened it or went through; left out: it"
-        " stays as it was left",
-        examples=["10 s"],
-    )
-    schedule: tuple[Turn, ...] = Field(
-        default=(), description="when it is opened, shut or locked, every day"
-    )
+    doorway: str | Point = Field(examples=["bathroom_0", "kitchen_0-hallway_0", [4.0, 2.5]])
+    open: bool = True
+    locked: bool = False
+    closes_after: PositiveDuration | None = Field(default=None, examples=["10 s"])
+    schedule: tuple[Turn, ...] = ()
 
     @model_validator(mode="after")
     def _opens_by_day(self) -> Self:

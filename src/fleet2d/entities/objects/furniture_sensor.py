@@ -2,20 +2,21 @@
 
 from datetime import timedelta
 
-from pydantic import Field
-
 from fleet2d.entities.objects.sensor import Sensor
 from fleet2d.floorplan.home.home import Home
 from fleet2d.units import Duration, micros
 
 
 class FurnitureSensor(Sensor):
-    """Base of sensors of an object of the floor plan, in whose room they are."""
+    """Base of sensors of an object of the floor plan, in whose room they are.
 
-    of: str = Field(description="the object of the floor plan that it is in, by name")
-    hold: Duration = Field(
-        default=timedelta(seconds=0), description="it goes off when nobody was there for this long"
-    )
+    Attributes:
+        of: The object of the floor plan that it is in, by name.
+        hold: It goes off when nobody was there for this long.
+    """
+
+    of: str
+    hold: Duration = timedelta(seconds=0)
 
     def start(self, home: Home, step_us: int) -> None:
         """Check that the object exists."""

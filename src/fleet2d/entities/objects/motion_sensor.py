@@ -20,20 +20,22 @@ class MotionSensor(Sensor):
     """Goes on when a person moves in its field of view past no wall, and off after a while.
 
     It doesn't notice people who stand, sit or lie still.
+
+    Attributes:
+        at: Where it hangs, [x, y] in metres.
+        heading_deg: Where it looks, counter-clockwise from +x.
+        angle_deg: Width of its field of view.
+        range: How far it sees.
+        hold: It goes off when nobody moved for this long.
+        robots: Whether robots trigger it, too.
     """
 
-    at: Point = Field(description="where it hangs, [x, y] in metres", examples=[[1.0, 2.5]])
-    heading_deg: AngleDeg = Field(
-        default=0.0, description="where it looks, counter-clockwise from +x"
-    )
-    angle_deg: AngleDeg = Field(
-        default=360.0, gt=0, le=360, description="width of its field of view"
-    )
-    range: PositiveLength = Field(default=6.0, description="how far it sees")
-    hold: Duration = Field(
-        default=timedelta(seconds=5), description="it goes off when nobody moved for this long"
-    )
-    robots: bool = Field(default=False, description="whether robots trigger it, too")
+    at: Point = Field(examples=[[1.0, 2.5]])
+    heading_deg: AngleDeg = 0.0
+    angle_deg: AngleDeg = Field(default=360.0, gt=0, le=360)
+    range: PositiveLength = 6.0
+    hold: Duration = timedelta(seconds=5)
+    robots: bool = False
 
     def start(self, home: Home, step_us: int) -> None:
         """Compute its position on the lattice."""

@@ -63,13 +63,12 @@ class Sensor(HomeObject):
 
     The readings follow from that: the sensor goes on with the first of those steps, and off after
     its `hold` without any.
+
+    Attributes:
+        room: The room that its readings name; left out: where it is.
     """
 
-    room: str | None = Field(
-        default=None,
-        min_length=1,
-        description="the room that its readings name; left out: where it is",
-    )
+    room: str | None = Field(default=None, min_length=1)
 
     # Names of its two states in the table of readings.
     words: ClassVar[tuple[str, str]] = ("ON", "OFF")

@@ -18,15 +18,16 @@ class SmartPlug(FurnitureSensor):
     """On while a person stays at a place from which a device is used: a stove, a desk, a TV.
 
     Passing by doesn't switch it on: the person has to stay on the spot for two steps.
+
+    Attributes:
+        of: The object of the floor plan that it feeds, by name.
+        reach: How near to such a place counts as using the device.
+        hold: It goes off when nobody used it for this long.
     """
 
-    of: str = Field(description="the object of the floor plan that it feeds, by name")
-    reach: Length = Field(
-        default=0.3, ge=0, description="how near to such a place counts as using the device"
-    )
-    hold: Duration = Field(
-        default=timedelta(minutes=1), description="it goes off when nobody used it for this long"
-    )
+    of: str
+    reach: Length = Field(default=0.3, ge=0)
+    hold: Duration = timedelta(minutes=1)
 
     def start(self, home: Home, step_us: int) -> None:
         """Check that the object exists, and can be used."""

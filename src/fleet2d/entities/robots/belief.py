@@ -66,15 +66,15 @@ def room_belief(now: Situation, source: str | None, user: str) -> RoomBelief:
 
 
 class BeliefBehavior(Behavior):
-    """Base of behaviors that depend on where a person is believed to be."""
+    """Base of behaviors that depend on where a person is believed to be.
 
-    user: str = Field(
-        default=ANYONE, min_length=1, description="the user to look for or to be near, or anyone"
-    )
-    source: str | None = Field(
-        default=None,
-        description="the algorithm that says where people are; left out: rooms count by their size",
-    )
+    Attributes:
+        user: The user to look for or to be near, or anyone.
+        source: The algorithm that says where people are; left out: rooms count by their size.
+    """
+
+    user: str = Field(default=ANYONE, min_length=1)
+    source: str | None = None
 
     def about(self) -> tuple[str, ...]:
         """Return the user that it depends on, if it is one by name."""

@@ -3,8 +3,6 @@
 from datetime import timedelta
 from typing import TYPE_CHECKING, ClassVar
 
-from pydantic import Field
-
 from fleet2d.component import register
 from fleet2d.entities.behavior import Behavior, Command, Situation
 from fleet2d.entities.furniture import stop_at
@@ -22,13 +20,16 @@ class Come(Behavior):
     It only acts on an intervention `call` with a place. In a room it stops at the point farthest
     from the walls. If a shut door is in the way, it waits and tries again. Event: `visits`, with
     the place.
+
+    Attributes:
+        stay: How long it waits there.
     """
 
     records: ClassVar[frozenset[str]] = frozenset({"visits"})
     answers: ClassVar[frozenset[str]] = frozenset({"come"})
     resumes: ClassVar[bool] = True
 
-    stay: Duration = Field(default=timedelta(minutes=10), description="how long it waits there")
+    stay: Duration = timedelta(minutes=10)
 
     def start(self, actor: "Actor") -> None:
         """Start without a command."""

@@ -3,7 +3,7 @@
 from datetime import datetime, timedelta
 from typing import TYPE_CHECKING, ClassVar, Self
 
-from pydantic import Field, model_validator
+from pydantic import model_validator
 
 from fleet2d.component import register
 from fleet2d.entities.behavior import Behavior, Situation
@@ -26,16 +26,19 @@ class Dock(Behavior):
     last behavior, it also sends a robot that has nothing else to do to the charger. On a command to
     dock, it goes to the charger at once, whatever the charge. Events: `docks` and `charged`, with
     the charge.
+
+    Attributes:
+        threshold: Charge at which it goes to the charger.
+        until: Charge with which it leaves the charger.
+        rest: Wait at the charger when there is nothing else to do.
     """
 
     records: ClassVar[frozenset[str]] = frozenset({"charged", "docks"})
     answers: ClassVar[frozenset[str]] = frozenset({"dock"})
 
-    threshold: Share = Field(default=0.2, description="charge at which it goes to the charger")
-    until: Share = Field(default=1.0, description="charge with which it leaves the charger")
-    rest: bool = Field(
-        default=False, description="wait at the charger when there is nothing else to do"
-    )
+    threshold: Share = 0.2
+    until: Share = 1.0
+    rest: bool = False
 
     @model_validator(mode="after")
     def _charges(self) -> Self:

@@ -41,15 +41,17 @@ class Explore(Behavior):
     floor is seen of all rooms that it could enter when the run began, or when no look shows enough
     new floor; from then on, later behaviors decide. If a shut door is in its way, they decide until
     the door is open. Events: `explores`, with the share seen, and `explored` at the end.
+
+    Attributes:
+        enough: Share of the floor to be seen.
+        reach: How near it goes to a frontier [m].
     """
 
     records: ClassVar[frozenset[str]] = frozenset({"explored", "explores"})
     needs: ClassVar[frozenset[str]] = frozenset({"explored"})
 
-    enough: Share = Field(default=0.98, description="share of the floor to be seen")
-    reach: Length = Field(
-        default=1.0, ge=0.1, le=5, description="how near it goes to a frontier [m]"
-    )
+    enough: Share = 0.98
+    reach: Length = Field(default=1.0, ge=0.1, le=5)
 
     def start(self, actor: "Actor") -> None:
         """Determine the floor to be seen, and the places from which it may be seen."""

@@ -65,6 +65,21 @@ class Find(BeliefBehavior):
     whom they mistake for the person. On a command to find somebody, the robot begins at once, or as
     soon as the behaviors before this one allow, and drops a search in progress. Events, with the
     person's name: `find_begins`, and one of `found`, `not_at_home` and `gave_up`.
+
+    Attributes:
+        policy: In which order it looks at the rooms.
+        at: Times of day at which it begins; without them and `every`: when it is called.
+        every: Or how much time lies between two searches, from the start on.
+        late: A search that can't begin within that time is left out.
+        deadline: After that it gives up.
+        out_at: Probability of being out at which it says that the person isn't at home, once it has
+            looked at every room that it can get to.
+        doubt: Share of the probabilities that counts rooms by their size only.
+        out: Probability that the person is out, as long as the source has no output.
+        memory: Age at which an empty look counts half, because people move.
+        views: The most places in a room from which it looks round.
+        distance: How far it stays from the person it found [m].
+        stay: How long it stays with the person it found.
     """
 
     records: ClassVar[frozenset[str]] = frozenset(
@@ -72,46 +87,18 @@ class Find(BeliefBehavior):
     )
     answers: ClassVar[frozenset[str]] = frozenset({"find"})
 
-    policy: Policy = Field(default="receding", description="in which order it looks at the rooms")
-    at: tuple[TimeOfDay, ...] = Field(
-        default=(),
-        description="times of day at which it begins; without them and `every`: when it is called",
-    )
-    every: PositiveDuration | None = Field(
-        default=None, description="or how much time lies between two searches, from the start on"
-    )
-    late: Duration = Field(
-        default=timedelta(minutes=30),
-        description="a search that can't begin within that time is left out",
-    )
-    deadline: PositiveDuration = Field(
-        default=timedelta(minutes=10), description="after that it gives up"
-    )
-    out_at: Share = Field(
-        default=0.9,
-        description="probability of being out at which it says that the person isn't at home, once"
-        " it has looked at every room that it can get to",
-    )
-    doubt: Share = Field(
-        default=0.1, description="share of the probabilities that counts rooms by their size only"
-    )
-    out: Share = Field(
-        default=0.5,
-        description="probability that the person is out, as long as the source has no output",
-    )
-    memory: Duration = Field(
-        default=timedelta(minutes=20),
-        description="age at which an empty look counts half, because people move",
-    )
-    views: int = Field(
-        default=2, ge=1, le=8, description="the most places in a room from which it looks round"
-    )
-    distance: Length = Field(
-        default=1.5, ge=0.3, le=10, description="how far it stays from the person it found [m]"
-    )
-    stay: Duration = Field(
-        default=timedelta(minutes=1), description="how long it stays with the person it found"
-    )
+    policy: Policy = "receding"
+    at: tuple[TimeOfDay, ...] = ()
+    every: PositiveDuration | None = None
+    late: Duration = timedelta(minutes=30)
+    deadline: PositiveDuration = timedelta(minutes=10)
+    out_at: Share = 0.9
+    doubt: Share = 0.1
+    out: Share = 0.5
+    memory: Duration = timedelta(minutes=20)
+    views: int = Field(default=2, ge=1, le=8)
+    distance: Length = Field(default=1.5, ge=0.3, le=10)
+    stay: Duration = timedelta(minutes=1)
 
     @model_validator(mode="after")
     def _begins(self) -> Self:

@@ -30,21 +30,21 @@ class Follow(Behavior):
     where the person was perceived last: it drives there and turns once. After that, later behaviors
     decide until the person comes into view again. Events: `follows`, `lost`, with the person's
     name.
+
+    Attributes:
+        user: User that it follows; left out: the first in view.
+        distance: How far behind it stays [m].
+        update: How often it looks where the person is.
+        longest: For how long it follows at most; 0: without end.
     """
 
     records: ClassVar[frozenset[str]] = frozenset({"follows", "lost"})
     listens: ClassVar[frozenset[str]] = frozenset({"user_seen"})
 
-    user: str = Field(
-        default="", min_length=0, description="user that it follows; left out: the first in view"
-    )
-    distance: Length = Field(default=1.5, ge=0.3, le=10, description="how far behind it stays [m]")
-    update: PositiveDuration = Field(
-        default=timedelta(seconds=2), description="how often it looks where the person is"
-    )
-    longest: Duration = Field(
-        default=timedelta(0), description="for how long it follows at most; 0: without end"
-    )
+    user: str = Field(default="", min_length=0)
+    distance: Length = Field(default=1.5, ge=0.3, le=10)
+    update: PositiveDuration = timedelta(seconds=2)
+    longest: Duration = timedelta(0)
 
     def about(self) -> tuple[str, ...]:
         """Return the user that it follows, if it is one by name."""

@@ -49,38 +49,34 @@ class Hangout(BeliefBehavior):
     If a person blocks its way and doesn't move, it stays where it is until the next period.
 
     Events: `relocates`, with the room it goes to, and `explores`, with the room it looks round in.
+
+    Attributes:
+        period: How often it decides where to stand.
+        near: What counts as near: the same room; a view of its seats; or time on foot.
+        tau: Time on foot at which nearness by `path` has fallen to 1/e.
+        blocking: Weight of the ways that it blocks.
+        personal_space: Weight of the nearest seat.
+        moving: Weight of the way to a place.
+        hysteresis: By how much another place must be better for it to move.
+        explore: Share of decisions in which it explores any room instead.
+        avoid: Rooms, or kinds of rooms if the home has them, that it stays out of.
+        quiet: Hours in which it doesn't move.
+        off_doors: How far from doorways it stands at least [m].
     """
 
     records: ClassVar[frozenset[str]] = frozenset({"explores", "relocates"})
 
-    period: PositiveDuration = Field(
-        default=timedelta(minutes=30), description="how often it decides where to stand"
-    )
-    near: Nearness = Field(
-        default="path",
-        description="what counts as near: the same room; a view of its seats; or time on foot",
-    )
-    tau: PositiveDuration = Field(
-        default=timedelta(seconds=10),
-        description="time on foot at which nearness by `path` has fallen to 1/e",
-    )
-    blocking: float = Field(default=1.0, ge=0, description="weight of the ways that it blocks")
-    personal_space: float = Field(default=0.5, ge=0, description="weight of the nearest seat")
-    moving: float = Field(default=0.05, ge=0, description="weight of the way to a place")
-    hysteresis: float = Field(
-        default=0.1, ge=0, description="by how much another place must be better for it to move"
-    )
-    explore: Share = Field(
-        default=0.1, description="share of decisions in which it explores any room instead"
-    )
-    avoid: tuple[str, ...] = Field(
-        default=(),
-        description="rooms, or kinds of rooms if the home has them, that it stays out of",
-    )
-    quiet: Hours = Field(default=(), description="hours in which it doesn't move")
-    off_doors: Length = Field(
-        default=0.8, ge=0, description="how far from doorways it stands at least [m]"
-    )
+    period: PositiveDuration = timedelta(minutes=30)
+    near: Nearness = "path"
+    tau: PositiveDuration = timedelta(seconds=10)
+    blocking: float = Field(default=1.0, ge=0)
+    personal_space: float = Field(default=0.5, ge=0)
+    moving: float = Field(default=0.05, ge=0)
+    hysteresis: float = Field(default=0.1, ge=0)
+    explore: Share = 0.1
+    avoid: tuple[str, ...] = ()
+    quiet: Hours = ()
+    off_doors: Length = Field(default=0.8, ge=0)
 
     def start(self, actor: "Actor") -> None:
         """Lay out the places, and rate them by what doesn't depend on where people are."""

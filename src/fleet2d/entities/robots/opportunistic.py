@@ -22,22 +22,23 @@ class Opportunistic(Behavior):
     The behavior that it interrupts goes on afterwards. It goes to where the person was perceived; a
     person who walks on in the meantime isn't followed. Events: `approaches`, `interacts`, with the
     name of the person as perceived, and `interaction_over`.
+
+    Attributes:
+        users: Users that it approaches; left out: everybody, recognized or not.
+        distance: How near it comes: 1.2 m ends personal space [m].
+        interaction: How long it interacts.
+        chance: Probability that it takes an opportunity.
+        again: How long it leaves the same person alone.
     """
 
     records: ClassVar[frozenset[str]] = frozenset({"approaches", "interaction_over", "interacts"})
     listens: ClassVar[frozenset[str]] = frozenset({"user_seen"})
 
-    users: tuple[str, ...] = Field(
-        default=(), description="users that it approaches; left out: everybody, recognized or not"
-    )
-    distance: Length = Field(
-        default=1.2, ge=0.3, le=10, description="how near it comes: 1.2 m ends personal space [m]"
-    )
-    interaction: Duration = Field(default=timedelta(minutes=1), description="how long it interacts")
-    chance: Share = Field(default=1.0, description="probability that it takes an opportunity")
-    again: Duration = Field(
-        default=timedelta(minutes=15), description="how long it leaves the same person alone"
-    )
+    users: tuple[str, ...] = ()
+    distance: Length = Field(default=1.2, ge=0.3, le=10)
+    interaction: Duration = timedelta(minutes=1)
+    chance: Share = 1.0
+    again: Duration = timedelta(minutes=15)
 
     def about(self) -> tuple[str, ...]:
         """Return the users that it approaches, if only some."""

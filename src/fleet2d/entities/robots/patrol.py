@@ -3,7 +3,7 @@
 from datetime import timedelta
 from typing import TYPE_CHECKING, ClassVar, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import model_validator
 
 from fleet2d.component import register
 from fleet2d.entities.behavior import Behavior, Situation
@@ -23,25 +23,22 @@ class Patrol(Behavior):
 
     In a room the robot stops at the point farthest from its walls. Stops behind a shut door are
     left out of a round.
+
+    Attributes:
+        rooms: The rooms of a round; all: every room that it can enter.
+        waypoints: Points [x, y] in metres to go to instead of rooms.
+        dwell: How long it stays at each stop.
+        order: Stops in the order given, or shuffled anew for each round.
+        look_around: Turn once on the spot on arriving at a stop.
     """
 
     resumes: ClassVar[bool] = True
 
-    rooms: Literal["all"] | tuple[Place, ...] = Field(
-        default="all", description="the rooms of a round; all: every room that it can enter"
-    )
-    waypoints: tuple[Point, ...] = Field(
-        default=(), description="points [x, y] in metres to go to instead of rooms"
-    )
-    dwell: Duration = Field(
-        default=timedelta(minutes=5), description="how long it stays at each stop"
-    )
-    order: Literal["fixed", "random"] = Field(
-        default="fixed", description="stops in the order given, or shuffled anew for each round"
-    )
-    look_around: bool = Field(
-        default=True, description="turn once on the spot on arriving at a stop"
-    )
+    rooms: Literal["all"] | tuple[Place, ...] = "all"
+    waypoints: tuple[Point, ...] = ()
+    dwell: Duration = timedelta(minutes=5)
+    order: Literal["fixed", "random"] = "fixed"
+    look_around: bool = True
 
     @model_validator(mode="after")
     def _goes_somewhere(self) -> Self:

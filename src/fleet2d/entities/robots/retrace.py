@@ -31,18 +31,19 @@ class Retrace(Behavior):
     other than `spacing` are thinned out. A point that the body can't get to is replaced by the
     nearest one that it can, if that is within `reach`. At the end of the path it starts again,
     after `cooldown`. Events: `retraces`, with the number of points, and `retraced`.
+
+    Attributes:
+        path: The map's JSON file.
+        spacing: Points of the path nearer than this are left out [m].
+        reach: A point farther than this from free space is left out [m].
     """
 
     records: ClassVar[frozenset[str]] = frozenset({"retraced", "retraces"})
     resumes: ClassVar[bool] = True
 
-    path: InputPath = Field(description="the map's JSON file")
-    spacing: Length = Field(
-        default=0.1, ge=0, description="points of the path nearer than this are left out [m]"
-    )
-    reach: Length = Field(
-        default=1.0, ge=0, description="a point farther than this from free space is left out [m]"
-    )
+    path: InputPath
+    spacing: Length = Field(default=0.1, ge=0)
+    reach: Length = Field(default=1.0, ge=0)
 
     def files(self) -> tuple["Path", ...]:
         """Return the files that it reads."""

@@ -22,16 +22,23 @@ if TYPE_CHECKING:
 
 
 class ScheduledVisit(Settings):
-    """One visit: when, where, and for how long."""
+    """One visit: when, where, and for how long.
 
-    at: TimeOfDay = Field(description="time of day at which the robot sets out")
-    place: Place = Field(description="where to: a room, a kind of room, or a point")
-    dwell: Duration = Field(default=timedelta(minutes=10), description="how long it stays there")
-    on: Days | Annotated[tuple[Days, ...], Field(min_length=1)] = Field(
-        default="daily", description="the days on which it is made"
-    )
-    look_around: bool = Field(default=True, description="turn once on the spot on arriving")
-    task: str = Field(default="", description="what is done there, for the events table")
+    Attributes:
+        at: Time of day at which the robot sets out.
+        place: Where to: a room, a kind of room, or a point.
+        dwell: How long it stays there.
+        on: The days on which it is made.
+        look_around: Turn once on the spot on arriving.
+        task: What is done there, for the events table.
+    """
+
+    at: TimeOfDay
+    place: Place
+    dwell: Duration = timedelta(minutes=10)
+    on: Days | Annotated[tuple[Days, ...], Field(min_length=1)] = "daily"
+    look_around: bool = True
+    task: str = ""
 
 
 @register("behavior", "scheduled")
@@ -42,15 +49,16 @@ class Scheduled(Behavior):
     no plan, no later than `late` after its time; a visit behind a shut door, once the door is open.
     In a room the robot stops at the point farthest from its walls. Events: `visits`, with the task,
     else the room, and `way_blocked`, with the room.
+
+    Attributes:
+        visits: The visits.
+        late: A visit that can't begin within that time is left out.
     """
 
     records: ClassVar[frozenset[str]] = frozenset({"visits", "way_blocked"})
 
-    visits: tuple[ScheduledVisit, ...] = Field(min_length=1, description="the visits")
-    late: Duration = Field(
-        default=timedelta(minutes=30),
-        description="a visit that can't begin within that time is left out",
-    )
+    visits: tuple[ScheduledVisit, ...] = Field(min_length=1)
+    late: Duration = timedelta(minutes=30)
 
     def start(self, actor: "Actor") -> None:
         """Find the stops."""

@@ -5,8 +5,6 @@ from dataclasses import dataclass
 from datetime import datetime, timedelta
 from typing import TYPE_CHECKING
 
-from pydantic import Field
-
 from fleet2d.entities.behavior import Behavior, Situation
 from fleet2d.entities.kinds import is_kind
 from fleet2d.entities.place import matching_rooms
@@ -57,12 +55,13 @@ class _Last:
 
 
 class Inhabitant(Behavior):
-    """Base of behaviors that do activities: a subclass implements `day`, the doings of a day."""
+    """Base of behaviors that do activities: a subclass implements `day`, the doings of a day.
 
-    small_moves: bool = Field(
-        default=True,
-        description="whether it turns, gets up and fetches things within an activity",
-    )
+    Attributes:
+        small_moves: Whether it turns, gets up and fetches things within an activity.
+    """
+
+    small_moves: bool = True
 
     def day(self, ordinal: int) -> Sequence[Doing]:
         """Return the doings of the day of a date's ordinal, until the next day begins."""

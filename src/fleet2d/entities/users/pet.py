@@ -27,25 +27,20 @@ class Pet(Behavior):
 
     The durations of naps and stops are drawn from their laws. The next spot is in the same room
     with probability `stays_in_room`, else in any room that it may enter.
+
+    Attributes:
+        rooms: Rooms and kinds of rooms that it may enter; none: all.
+        nap: How long it sleeps at a time.
+        stop: How long it stops at a spot while it roams.
+        spots: Least and most number of stops between two naps.
+        stays_in_room: How likely its next spot is in the same room.
     """
 
-    rooms: tuple[str, ...] = Field(
-        default=(), description="rooms and kinds of rooms that it may enter; none: all"
-    )
-    nap: AnyDurationLaw = Field(
-        default=DurationLaw(mean=timedelta(minutes=50), std=timedelta(minutes=40)),
-        description="how long it sleeps at a time",
-    )
-    stop: AnyDurationLaw = Field(
-        default=DurationLaw(mean=timedelta(seconds=40), std=timedelta(seconds=40)),
-        description="how long it stops at a spot while it roams",
-    )
-    spots: tuple[int, int] = Field(
-        default=(3, 12), description="least and most number of stops between two naps"
-    )
-    stays_in_room: float = Field(
-        default=0.6, ge=0, le=1, description="how likely its next spot is in the same room"
-    )
+    rooms: tuple[str, ...] = ()
+    nap: AnyDurationLaw = DurationLaw(mean=timedelta(minutes=50), std=timedelta(minutes=40))
+    stop: AnyDurationLaw = DurationLaw(mean=timedelta(seconds=40), std=timedelta(seconds=40))
+    spots: tuple[int, int] = (3, 12)
+    stays_in_room: float = Field(default=0.6, ge=0, le=1)
 
     @model_validator(mode="after")
     def _has_a_range(self) -> Self:

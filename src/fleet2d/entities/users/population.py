@@ -4,8 +4,6 @@ from collections.abc import Sequence
 from datetime import datetime, timedelta
 from typing import TYPE_CHECKING, Literal
 
-from pydantic import Field
-
 from fleet2d.component import register
 from fleet2d.entities.users.inhabitant import Inhabitant, rooms_at
 from fleet2d.entities.users.spots import Spots
@@ -30,17 +28,16 @@ class Population(Inhabitant):
     Among many such people, the share that does each activity at each hour is that of the survey,
     for weekdays and weekends. The durations of activities follow their means in the survey. A
     person has no habits: every day is drawn independently.
+
+    Attributes:
+        group: Group of people; any: drawn by the groups' shares of the people.
+        bodily_needs: Whether an adult's needs and errands interrupt what is done, which the survey
+            doesn't record: its shares count them as what they interrupt.
     """
 
-    group: Literal["any", "workers", "retired", "working_parents", "at_home"] = Field(
-        default="any", description="group of people; any: drawn by the groups' shares of the people"
-    )
+    group: Literal["any", "workers", "retired", "working_parents", "at_home"] = "any"
 
-    bodily_needs: bool = Field(
-        default=True,
-        description="whether an adult's needs and errands interrupt what is done, which the survey"
-        " doesn't record: its shares count them as what they interrupt",
-    )
+    bodily_needs: bool = True
 
     def start(self, actor: "Actor") -> None:
         """Draw the person's group, and find where the activities are done in the home."""

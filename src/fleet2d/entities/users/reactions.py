@@ -3,8 +3,6 @@
 from datetime import timedelta
 from typing import TYPE_CHECKING, ClassVar
 
-from pydantic import Field
-
 from fleet2d.component import register
 from fleet2d.entities.behavior import Attention, Behavior, SightEvent, Situation
 from fleet2d.entities.nearby import points_at_distance
@@ -41,13 +39,14 @@ class Reactions(Behavior):
 
     The probability of each reaction, and how near a robot has to be, are the person's manners:
     those given here, else those of the persona of a later `routine`, else the usual ones.
+
+    Attributes:
+        manners: How the person reacts; left out: as the persona does.
     """
 
     records: ClassVar[frozenset[str]] = frozenset({"reacts"})
 
-    manners: Manners | None = Field(
-        default=None, description="how the person reacts; left out: as the persona does"
-    )
+    manners: Manners | None = None
 
     def attention(self, actor: "Actor") -> Attention:
         """Determine the manners, which may be those of a persona, and return their distances."""

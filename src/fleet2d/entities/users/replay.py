@@ -61,53 +61,44 @@ class Replay(Behavior):
     When the log names a room, the body is in it at that step, as it left for it early enough. Where
     the log says nothing, nothing is invented: the body is away then, and the events `unknown` and
     `known` mark the gap.
+
+    Attributes:
+        path: The log, or the folder of a home's logs.
+        format: Its layout; auto looks.
+        id: The tag, where positions have several.
+        columns: The names of the columns of positions, as {x: east}.
+        time_zone: Of the home, where positions have times of a zone.
+        sort: Sort lines whose time runs backwards; else they are refused.
+        frame: How positions lie in the floor plan.
+        rooms: Which room or kind of room each room label of the log is here, or away, or door; null
+            leaves it out; labels that aren't listed go by their usual meaning.
+        day: Which day of the log is the first of the run: a number from 0, its date, or the first
+            of the same weekday.
+        gaps: In a gap: unknown: the body is away; hold: it stays and leaves in time; walk: it goes
+            at once.
+        gap: Silence longer than this is a gap; left out: 10 min between rooms, 1 min between
+            positions.
+        still: Silence in one room up to this is no gap: sleepers trip no sensor.
+        reach: A position farther than this from free space is left out.
+        fastest: Walks faster than this are reported as implausible [m/s].
     """
 
     records: ClassVar[frozenset[str]] = frozenset({"known", "replay", "unknown"})
 
-    path: InputFileOrFolder = Field(description="the log, or the folder of a home's logs")
-    format: Layout = Field(default="auto", description="its layout; auto looks")
-    id: str | None = Field(default=None, description="the tag, where positions have several")
-    columns: dict[str, str] = Field(
-        default={}, description="the names of the columns of positions, as {x: east}"
-    )
-    time_zone: str | None = Field(
-        default=None, description="of the home, where positions have times of a zone"
-    )
-    sort: bool = Field(
-        default=False, description="sort lines whose time runs backwards; else they are refused"
-    )
-    frame: Frame = Field(default=Frame(), description="how positions lie in the floor plan")
-    rooms: RoomMap = Field(
-        default={},
-        description="which room or kind of room each room label of the log is here, or away, or"
-        " door; null leaves it out; labels that aren't listed go by their usual meaning",
-    )
-    day: int | Literal["date", "weekday"] = Field(
-        default=0,
-        description="which day of the log is the first of the run: a number from 0, its date, or"
-        " the first of the same weekday",
-    )
-    gaps: Literal["unknown", "hold", "walk"] = Field(
-        default="unknown",
-        description="in a gap: unknown: the body is away; hold: it stays and leaves in time; walk:"
-        " it goes at once",
-    )
-    gap: PositiveDuration | None = Field(
-        default=None,
-        description="silence longer than this is a gap; left out: 10 min between rooms, 1 min"
-        " between positions",
-    )
-    still: Duration = Field(
-        default=timedelta(hours=12),
-        description="silence in one room up to this is no gap: sleepers trip no sensor",
-    )
-    reach: Length = Field(
-        default=1.0, ge=0, description="a position farther than this from free space is left out"
-    )
-    fastest: Speed = Field(
-        default=3.0, description="walks faster than this are reported as implausible [m/s]"
-    )
+    path: InputFileOrFolder
+    format: Layout = "auto"
+    id: str | None = None
+    columns: dict[str, str] = Field(default={})
+    time_zone: str | None = None
+    sort: bool = False
+    frame: Frame = Frame()
+    rooms: RoomMap = Field(default={})
+    day: int | Literal["date", "weekday"] = 0
+    gaps: Literal["unknown", "hold", "walk"] = "unknown"
+    gap: PositiveDuration | None = None
+    still: Duration = timedelta(hours=12)
+    reach: Length = Field(default=1.0, ge=0)
+    fastest: Speed = 3.0
 
     def files(self) -> tuple[Path, ...]:
         """Return the files that it reads."""

@@ -56,17 +56,18 @@ class RoomSampling(Behavior):
     through a room is taken off the next stays in it, so that the time in each of the given rooms,
     ways included, tends to its share of the time in all of them. Time on ways through other rooms
     is not compensated.
+
+    Attributes:
+        shares: How much of the time is spent in each room or kind of room, or 'away'; relative to
+            each other.
+        dwell: How long a visit takes.
     """
 
     shares: dict[str, float] = Field(
-        min_length=1,
-        description="how much of the time is spent in each room or kind of room, or 'away';"
-        " relative to each other",
-        examples=[{"living_room": 0.4, "bedroom": 0.4, "kitchen": 0.2}],
+        min_length=1, examples=[{"living_room": 0.4, "bedroom": 0.4, "kitchen": 0.2}]
     )
-    dwell: AnyDurationLaw = Field(
-        default=DurationLaw(law="gamma", mean=timedelta(minutes=30), std=timedelta(minutes=20)),
-        description="how long a visit takes",
+    dwell: AnyDurationLaw = DurationLaw(
+        law="gamma", mean=timedelta(minutes=30), std=timedelta(minutes=20)
     )
 
     @model_validator(mode="after")

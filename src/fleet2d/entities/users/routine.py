@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from datetime import datetime, timedelta
 from typing import TYPE_CHECKING, Self
 
-from pydantic import Field, model_validator
+from pydantic import model_validator
 
 from fleet2d.component import register
 from fleet2d.entities.users.inhabitant import Inhabitant, rooms_at
@@ -38,23 +38,19 @@ class Routine(Inhabitant):
     Every day is drawn independently and satisfies the persona's template. An activity is done at
     its furniture, else in its room; meanwhile the person turns, gets up and fetches things. Members
     of a household have the persona that it gives them, and common appointments.
+
+    Attributes:
+        persona: Who it is: a bundled name, a YAML file, or a mapping that may extend either; left
+            out: works_outside.
+        household: Who it lives with: a mapping or a YAML file, the same for all of its members.
+        away: When it is out of the home, on holiday.
+        visits: When it is in the home, if it is only a visitor.
     """
 
-    persona: AnyPersona | None = Field(
-        default=None,
-        description="who it is: a bundled name, a YAML file, or a mapping that may extend either;"
-        " left out: works_outside",
-    )
-    household: AnyHousehold | None = Field(
-        default=None,
-        description="who it lives with: a mapping or a YAML file, the same for all of its members",
-    )
-    away: tuple[AnyPeriod, ...] = Field(
-        default=(), description="when it is out of the home, on holiday"
-    )
-    visits: tuple[AnyPeriod, ...] = Field(
-        default=(), description="when it is in the home, if it is only a visitor"
-    )
+    persona: AnyPersona | None = None
+    household: AnyHousehold | None = None
+    away: tuple[AnyPeriod, ...] = ()
+    visits: tuple[AnyPeriod, ...] = ()
 
     @model_validator(mode="after")
     def _is_one_person(self) -> Self:

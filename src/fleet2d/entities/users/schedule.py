@@ -25,19 +25,21 @@ AWAY: tuple[()] = ()
 
 
 class Item(Settings):
-    """One entry of an agenda: when, where, and for how long."""
+    """One entry of an agenda: when, where, and for how long.
 
-    at: TimeOfDay | None = Field(
-        default=None, description="when it begins; left out: when the item before is over"
-    )
-    place: Place | None = Field(
-        default=None, description="where: a room, a kind of room, or a point"
-    )
-    away: bool = Field(default=False, description="out of the home instead of at a place")
-    dwell: Duration | None = Field(
-        default=None, description="how long it takes; left out: until the next item begins"
-    )
-    activity: str = Field(default="", description="what is done there, for the events table")
+    Attributes:
+        at: When it begins; left out: when the item before is over.
+        place: Where: a room, a kind of room, or a point.
+        away: Out of the home instead of at a place.
+        dwell: How long it takes; left out: until the next item begins.
+        activity: What is done there, for the events table.
+    """
+
+    at: TimeOfDay | None = None
+    place: Place | None = None
+    away: bool = False
+    dwell: Duration | None = None
+    activity: str = ""
 
     @model_validator(mode="after")
     def _is_somewhere(self) -> Self:
@@ -47,10 +49,15 @@ class Item(Settings):
 
 
 class Agenda(Settings):
-    """An agenda, and the days on which it holds."""
+    """An agenda, and the days on which it holds.
 
-    on: OnDays = Field(default="daily", description="the days on which it holds")
-    items: tuple[Item, ...] = Field(min_length=1, description="what happens, in order")
+    Attributes:
+        on: The days on which it holds.
+        items: What happens, in order.
+    """
+
+    on: OnDays = "daily"
+    items: tuple[Item, ...] = Field(min_length=1)
 
     @property
     def weekdays(self) -> set[int]:
@@ -79,15 +86,14 @@ class Schedule(Behavior):
     At an item's time the body walks to its place by the shortest path; in a room, to a spot drawn
     each time. When an item with a dwell is over and no other is due, it goes to the place `rest`. A
     later day of the list replaces an earlier one on the weekdays they share.
+
+    Attributes:
+        days: The agendas of the days of the week.
+        rest: Where it goes when an item is over and nothing is due.
     """
 
-    days: tuple[Agenda, ...] = Field(
-        min_length=1, description="the agendas of the days of the week"
-    )
-    rest: Place = Field(
-        default=("living_room", "any"),
-        description="where it goes when an item is over and nothing is due",
-    )
+    days: tuple[Agenda, ...] = Field(min_length=1)
+    rest: Place = ("living_room", "any")
 
     @model_validator(mode="after")
     def _days_are_possible(self) -> Self:

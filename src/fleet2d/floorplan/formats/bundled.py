@@ -3,8 +3,6 @@
 from pathlib import Path
 from typing import Literal
 
-from pydantic import Field
-
 from fleet2d.component import register
 from fleet2d.floorplan.formats.native import read_native
 from fleet2d.floorplan.plan import FloorPlan
@@ -21,7 +19,7 @@ class Bundled(FloorPlanSource):
         name: Which one.
     """
 
-    name: Literal["family_home"] = Field(default="family_home", description="which one")
+    name: Literal["family_home"] = "family_home"
 
     def load(self) -> FloorPlan:
         """Read the plan."""

@@ -34,17 +34,13 @@ class Image(OccupancySource):
 
     Attributes:
         path: The picture, PNG or PGM.
-        resolution: Side of a pixel, at most 1 m.
+        resolution: Side of a pixel: a drawing doesn't say how large the home is.
         threshold: Share of white below which a pixel is wall.
     """
 
-    path: InputPath = Field(description="the picture, PNG or PGM")
-    resolution: PositiveLength = Field(
-        le=MAX_CELL_M, description="side of a pixel: a drawing doesn't say how large the home is"
-    )
-    threshold: Share = Field(
-        default=THRESHOLD, description="share of white below which a pixel is wall"
-    )
+    path: InputPath
+    resolution: PositiveLength = Field(le=MAX_CELL_M)
+    threshold: Share = THRESHOLD
 
     @classmethod
     def usual_cell(cls, settings: Mapping[str, Any]) -> float:

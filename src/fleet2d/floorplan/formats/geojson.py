@@ -65,24 +65,13 @@ class GeoJson(FloorPlanSource):
         path: The plan's GeoJSON file.
         units: Units of its coordinates; auto determines them from the file.
         wall_m: Thickness of walls drawn as lines, and of those between rooms that touch.
-        level: The floor, by its id, name or ordinal; None for the one of ordinal 0.
+        level: Which floor, by id, name or ordinal; left out: that of ordinal 0.
     """
 
-    path: InputPath = Field(description="the plan's GeoJSON file")
-    units: Units = Field(
-        default="auto", description="units of its coordinates; auto determines them from the file"
-    )
-    wall_m: Length = Field(
-        default=WALL_M,
-        ge=0,
-        le=1,
-        description="thickness of walls drawn as lines, and of those between rooms that touch",
-    )
-    level: str | None = Field(
-        default=None,
-        coerce_numbers_to_str=True,
-        description="which floor, by id, name or ordinal; left out: that of ordinal 0",
-    )
+    path: InputPath
+    units: Units = "auto"
+    wall_m: Length = Field(default=WALL_M, ge=0, le=1)
+    level: str | None = Field(default=None, coerce_numbers_to_str=True)
 
     def load(self) -> FloorPlan:
         """Read the plan."""

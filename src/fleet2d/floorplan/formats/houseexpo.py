@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Annotated
 
 import shapely
-from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
+from pydantic import BaseModel, ConfigDict, TypeAdapter
 from shapely import Polygon
 from shapely.geometry import MultiPolygon
 
@@ -38,7 +38,7 @@ class HouseExpo(FloorPlanSource):
         path: The plan's JSON file.
     """
 
-    path: InputPath = Field(description="the plan's JSON file")
+    path: InputPath
 
     def load(self) -> FloorPlan:
         """Read the plan."""

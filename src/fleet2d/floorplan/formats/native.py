@@ -16,7 +16,6 @@ from typing import Any
 import numpy as np
 import shapely
 from numpy.typing import NDArray
-from pydantic import Field
 from shapely import Polygon
 
 from fleet2d.component import register
@@ -38,7 +37,7 @@ class Native(FloorPlanSource):
         path: The plan's JSON or YAML file.
     """
 
-    path: InputPath = Field(description="the plan's JSON or YAML file")
+    path: InputPath
 
     def load(self) -> FloorPlan:
         """Read the plan."""

@@ -35,10 +35,15 @@ VERSION = 1
 
 
 class AreaEntry(FileModel):
-    """An area: an outline and its holes."""
+    """An area: an outline and its holes.
 
-    outline: Ring = Field(description="corners, the first not repeated at the end")
-    holes: Listed[Ring] = Field(default_factory=list, description="outlines of its holes")
+    Attributes:
+        outline: Corners, the first not repeated at the end.
+        holes: Outlines of its holes.
+    """
+
+    outline: Ring
+    holes: Listed[Ring] = Field(default_factory=list)
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -90,17 +95,25 @@ Space = Annotated[Listed[AreaEntry], AfterValidator(_check_space)]
 
 
 class RoomEntry(FileModel):
-    """A room: its type, and where it is, by either `polygon` or `region`."""
+    """A room: its type, and where it is, by either `polygon` or `region`.
+
+    Attributes:
+        type: What it is used for, such as bedroom.
+        name: Its name; left out: its type and a number.
+        labels: Every type that it has.
+        polygon: Where it is.
+        region: Where it is, if in several parts.
+    """
 
     model_config = ConfigDict(
         json_schema_extra={"oneOf": [{"required": ["polygon"]}, {"required": ["region"]}]}
     )
 
-    type: Text = Field(description="what it is used for, such as bedroom")
-    name: Text | None = Field(default=None, description="its name; left out: its type and a number")
-    labels: Listed[Text] | None = Field(default=None, description="every type that it has")
-    polygon: Area | None = Field(default=None, description="where it is")
-    region: Space | None = Field(default=None, description="where it is, if in several parts")
+    type: Text
+    name: Text | None = None
+    labels: Listed[Text] | None = None
+    polygon: Area | None = None
+    region: Space | None = None
 
     @model_validator(mode="after")
     def _check_place(self) -> Self:
@@ -118,12 +131,17 @@ class RoomEntry(FileModel):
 
 
 class DoorwayEntry(FileModel):
-    """A passage between two rooms, as a line across it."""
+    """A passage between two rooms, as a line across it.
+
+    Attributes:
+        name: Its name; left out: those of its rooms.
+        leaf: Whether a door hangs in it.
+    """
 
     start: Point
     end: Point
-    name: Text | None = Field(default=None, description="its name; left out: those of its rooms")
-    leaf: bool = Field(default=True, description="whether a door hangs in it")
+    name: Text | None = None
+    leaf: bool = True
 
     def to_line(self) -> DoorLine:
         """Return the doorway as a line of the plan."""
@@ -131,23 +149,32 @@ class DoorwayEntry(FileModel):
 
 
 class UseEntry(FileModel):
-    """A place to use an object from."""
+    """A place to use an object from.
+
+    Attributes:
+        heading: Direction that the person faces.
+        approach: Place from which one steps there.
+    """
 
     x: Coordinate
     y: Coordinate
-    heading: Coordinate = Field(description="direction that the person faces")
+    heading: Coordinate
     posture: Posture = "stand"
-    approach: Point | None = Field(default=None, description="place from which one steps there")
+    approach: Point | None = None
 
 
 class ObjectUse(FileModel):
-    """How an object is used."""
+    """How an object is used.
 
-    blocks: Blocks = Field(
-        default="path", description="what can't pass: nothing, bodies, or bodies and sight"
-    )
-    heading: Coordinate = Field(default=0.0, description="direction of its front")
-    uses: Listed[UseEntry] = Field(default_factory=list, description="places to use it from")
+    Attributes:
+        blocks: What can't pass: nothing, bodies, or bodies and sight.
+        heading: Direction of its front.
+        uses: Places to use it from.
+    """
+
+    blocks: Blocks = "path"
+    heading: Coordinate = 0.0
+    uses: Listed[UseEntry] = Field(default_factory=list)
 
     def use_places(self) -> tuple[UsePlace, ...]:
         """Return the places to use it from."""
@@ -155,11 +182,16 @@ class ObjectUse(FileModel):
 
 
 class ObjectEntry(ObjectUse):
-    """A piece of furniture or a device, stored separately from the walls."""
+    """A piece of furniture or a device, stored separately from the walls.
 
-    type: Text = Field(description="what it is, such as bed")
+    Attributes:
+        type: What it is, such as bed.
+        name: Its name; left out: its type and a number.
+    """
+
+    type: Text
     footprint: Area
-    name: Text | None = Field(default=None, description="its name; left out: its type and a number")
+    name: Text | None = None
 
     def to_object(self) -> PlacedObject:
         """Return the object as one of the plan."""
@@ -174,28 +206,29 @@ class ObjectEntry(ObjectUse):
 
 
 class PlanFile(FileModel):
-    """A home. Lengths are in metres, angles in radians counter-clockwise from +x."""
+    """A home. Lengths are in metres, angles in radians counter-clockwise from +x.
+
+    Attributes:
+        name: Name of the plan; left out: of its file.
+        free: The parts of the free space between the walls.
+        rooms: Its rooms; space of none is the room unknown_0.
+        doorways: Passages between rooms; left out: the walls are searched.
+        objects: Furniture and devices, which are separate from the walls.
+        no_go: Areas that robots keep out of.
+        entrance: A place just inside the front door.
+    """
 
     model_config = ConfigDict(title="Fleet2D floor plan")
 
     format: Literal["fleet2d-floorplan"]
     version: Literal[1]
-    name: Text | None = Field(default=None, description="name of the plan; left out: of its file")
-    free: Space = Field(
-        description="the parts of the free space between the walls",
-        json_schema_extra={"minItems": 1},
-    )
-    rooms: Listed[RoomEntry] | None = Field(
-        default=None, description="its rooms; space of none is the room unknown_0"
-    )
-    doorways: Listed[DoorwayEntry] | None = Field(
-        default=None, description="passages between rooms; left out: the walls are searched"
-    )
-    objects: Listed[ObjectEntry] = Field(
-        default_factory=list, description="furniture and devices, which are separate from the walls"
-    )
-    no_go: Listed[Area] = Field(default_factory=list, description="areas that robots keep out of")
-    entrance: Point | None = Field(default=None, description="a place just inside the front door")
+    name: Text | None = None
+    free: Space = Field(json_schema_extra={"minItems": 1})
+    rooms: Listed[RoomEntry] | None = None
+    doorways: Listed[DoorwayEntry] | None = None
+    objects: Listed[ObjectEntry] = Field(default_factory=list)
+    no_go: Listed[Area] = Field(default_factory=list)
+    entrance: Point | None = None
 
 
 PLAN_FILE = TypeAdapter(PlanFile)

@@ -34,16 +34,8 @@ class OccupancySource(PixelSource):
             and gaps in walls; 0 keeps all that is connected.
     """
 
-    speck_area_m2: float = Field(
-        default=SPECK_AREA_M2,
-        ge=0,
-        description="smaller groups of pixels with free ones all round become free; 0 keeps all",
-    )
-    ray_width: Length = Field(
-        default=RAY_WIDTH_M,
-        ge=0,
-        description="free space narrower than this doesn't lead on; 0 keeps all that is connected",
-    )
+    speck_area_m2: float = Field(default=SPECK_AREA_M2, ge=0)
+    ray_width: Length = Field(default=RAY_WIDTH_M, ge=0)
 
     @property
     def cleaning(self) -> dict[str, float]:

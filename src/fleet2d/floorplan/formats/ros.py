@@ -48,16 +48,11 @@ class Ros(OccupancySource):
 
     Attributes:
         path: The map's YAML file; it names the image.
-        simplify: How far straightened walls may be from the sides of the map's pixels; 0 keeps
-            the walls exact.
+        simplify: How far straightened walls may be from the map's pixels; 0: exact walls.
     """
 
-    path: InputPath = Field(description="the map's YAML file; it names the image")
-    simplify: Length = Field(
-        default=0.0,
-        ge=0,
-        description="how far straightened walls may be from the map's pixels; 0: exact walls",
-    )
+    path: InputPath
+    simplify: Length = Field(default=0.0, ge=0)
 
     @classmethod
     def usual_cell(cls, settings: Mapping[str, Any]) -> float:

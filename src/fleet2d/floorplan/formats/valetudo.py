@@ -13,7 +13,6 @@ import numpy as np
 import shapely
 import shapely.affinity
 from numpy.typing import NDArray
-from pydantic import Field
 from shapely import LineString, MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
@@ -63,12 +62,8 @@ class Valetudo(PixelSource):
             (`keep_out`), walls (`wall`), or nothing (`ignore`).
     """
 
-    path: InputPath = Field(description="the map's JSON file")
-    no_go: NoGo = Field(
-        default="keep_out",
-        description="no-go areas and virtual walls: robots keep_out of them, they are a wall, or"
-        " ignore them",
-    )
+    path: InputPath
+    no_go: NoGo = "keep_out"
 
     @classmethod
     def usual_cell(cls, settings: Mapping[str, Any]) -> float:

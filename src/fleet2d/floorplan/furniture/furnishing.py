@@ -23,33 +23,35 @@ WALL_TOLERANCE_M = 0.02
 
 
 class Furnishing(Settings):
-    """How a home is furnished by rule, see `fleet2d.floorplan.furniture.furnish.furnish`."""
+    """How a home is furnished by rule, see `fleet2d.floorplan.furniture.furnish.furnish`.
 
-    seed: int = Field(default=0, ge=0, description="which of the many ways to furnish the home")
-    density: float = Field(
-        default=1.0, ge=0, le=10, description="how likely optional pieces are; 0: none of them"
-    )
+    Attributes:
+        seed: Which of the many ways to furnish the home.
+        density: How likely optional pieces are; 0: none of them.
+    """
+
+    seed: int = Field(default=0, ge=0)
+    density: float = Field(default=1.0, ge=0, le=10)
 
 
 class FurniturePiece(Settings):
-    """A piece of furniture at a place in the home."""
+    """A piece of furniture at a place in the home.
 
-    type: str = Field(description="what it is, such as 'bed'", examples=["sofa"])
-    at: tuple[Length, Length] = Field(description="its middle [x, y] [m]", examples=[[2.5, 1.0]])
-    heading_deg: AngleDeg = Field(
-        default=90.0, description="where its front faces, counter-clockwise from +x"
-    )
-    size: tuple[PositiveLength, PositiveLength] | None = Field(
-        default=None,
-        description="its width and depth [m]; left out: the middle of what is usual",
-        examples=[[1.6, 2.0]],
-    )
-    name: str | None = Field(
-        default=None, min_length=1, description="its name; left out: its type and a number"
-    )
-    blocks: Blocks | None = Field(
-        default=None, description="what can't pass it; left out: what is usual for its type"
-    )
+    Attributes:
+        type: What it is, such as 'bed'.
+        at: Its middle [x, y] [m].
+        heading_deg: Where its front faces, counter-clockwise from +x.
+        size: Its width and depth [m]; left out: the middle of what is usual.
+        name: Its name; left out: its type and a number.
+        blocks: What can't pass it; left out: what is usual for its type.
+    """
+
+    type: str = Field(examples=["sofa"])
+    at: tuple[Length, Length] = Field(examples=[[2.5, 1.0]])
+    heading_deg: AngleDeg = 90.0
+    size: tuple[PositiveLength, PositiveLength] | None = Field(default=None, examples=[[1.6, 2.0]])
+    name: str | None = Field(default=None, min_length=1)
+    blocks: Blocks | None = None
 
     @model_validator(mode="after")
     def _check_type(self) -> Self:

@@ -61,6 +61,18 @@ Moment = Annotated[
 class HomeChange(Settings):
     """One change of the home: exactly one of open, shut, lock, unlock, move and room.
 
+    Attributes:
+        at: When; left out by an algorithm or a script: now.
+        open: The door that is opened.
+        shut: The door that is shut.
+        lock: The door that is locked.
+        unlock: The door that is unlocked.
+        move: The piece of furniture that is moved.
+        to: New place of its middle, [x, y] in metres.
+        turn_deg: Angle by which it is turned, counter-clockwise.
+        room: The room whose use changes.
+        type: What the room is used for from then on.
+
     Example:
         >>> HomeChange(shut="bath_door").verb
         'shut'
@@ -68,20 +80,16 @@ class HomeChange(Settings):
         datetime.timedelta(days=2)
     """
 
-    at: Moment | None = Field(
-        default=None, description="when; left out by an algorithm or a script: now"
-    )
-    open: str | None = Field(default=None, description="the door that is opened")
-    shut: str | None = Field(default=None, description="the door that is shut")
-    lock: str | None = Field(default=None, description="the door that is locked")
-    unlock: str | None = Field(default=None, description="the door that is unlocked")
-    move: str | None = Field(default=None, description="the piece of furniture that is moved")
-    to: Point | None = Field(default=None, description="new place of its middle, [x, y] in metres")
-    turn_deg: float = Field(
-        default=0.0, description="angle by which it is turned, counter-clockwise", ge=-3600, le=3600
-    )
-    room: str | None = Field(default=None, description="the room whose use changes")
-    type: str | None = Field(default=None, description="what the room is used for from then on")
+    at: Moment | None = None
+    open: str | None = None
+    shut: str | None = None
+    lock: str | None = None
+    unlock: str | None = None
+    move: str | None = None
+    to: Point | None = None
+    turn_deg: float = Field(default=0.0, ge=-3600, le=3600)
+    room: str | None = None
+    type: str | None = None
 
     @model_validator(mode="after")
     def _is_one_change(self) -> Self:

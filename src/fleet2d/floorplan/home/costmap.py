@@ -29,26 +29,18 @@ class CostmapSettings(Settings):
 
     A cost of 100 % counts a cell double. Robots take the cheapest route, which without a costmap is
     the shortest.
+
+    Attributes:
+        clearance: Distance from walls and furniture from which on no cost is added.
+        wall_cost: Cost beside a wall or furniture [%]; less farther away.
+        no_go: How routes treat the floor plan's no-go areas.
+        no_go_cost: Cost of a no-go area with no_go: cost [%].
     """
 
-    clearance: Length = Field(
-        default=0.5,
-        ge=0,
-        le=5,
-        description="distance from walls and furniture from which on no cost is added",
-    )
-    wall_cost: int = Field(
-        default=200,
-        ge=0,
-        le=MOST_COST,
-        description="cost beside a wall or furniture [%]; less farther away",
-    )
-    no_go: Literal["forbid", "cost", "ignore"] = Field(
-        default="forbid", description="how routes treat the floor plan's no-go areas"
-    )
-    no_go_cost: int = Field(
-        default=500, ge=0, le=MOST_COST, description="cost of a no-go area with no_go: cost [%]"
-    )
+    clearance: Length = Field(default=0.5, ge=0, le=5)
+    wall_cost: int = Field(default=200, ge=0, le=MOST_COST)
+    no_go: Literal["forbid", "cost", "ignore"] = "forbid"
+    no_go_cost: int = Field(default=500, ge=0, le=MOST_COST)
 
 
 def costs_of(

@@ -8,7 +8,7 @@ from typing import Any, Literal, Self, get_args
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, model_validator
+from pydantic import model_validator
 
 from fleet2d.component import Settings
 from fleet2d.errors import ComponentError
@@ -29,16 +29,23 @@ _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*(\.[A-Za-z][A-Za-z0-9_-]*)?")
 
 
 class LayerSettings(Settings):
-    """A layer of the floor plan: type and unit of its values, and when it is stored."""
+    """A layer of the floor plan: type and unit of its values, and when it is stored.
 
-    dtype: LayerType = Field(default="float", description="type of the values")
-    fill: float = Field(default=0.0, description="initial value of every cell")
-    unit: str = Field(default="", description="unit of the values")
-    description: str = Field(default="", description="one line for a reader of the file")
-    store: bool = Field(default=True, description="whether a run stores it at its end")
-    every: PositiveDuration | None = Field(
-        default=None, description="how often it is stored besides; null: only at the end"
-    )
+    Attributes:
+        dtype: Type of the values.
+        fill: Initial value of every cell.
+        unit: Unit of the values.
+        description: One line for a reader of the file.
+        store: Whether a run stores it at its end.
+        every: How often it is stored besides; null: only at the end.
+    """
+
+    dtype: LayerType = "float"
+    fill: float = 0.0
+    unit: str = ""
+    description: str = ""
+    store: bool = True
+    every: PositiveDuration | None = None
 
     @model_validator(mode="after")
     def _fill_fits(self) -> Self:

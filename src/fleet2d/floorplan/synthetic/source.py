@@ -26,14 +26,14 @@ class Synthetic(FloorPlanSource):
 
     Attributes:
         seed: Which of the homes.
-        area_m2: Area of its free space, 30 to 450 m².
+        area_m2: Free space, 30 to 450 m2.
         bedrooms: How many, 1 to 8.
         bathrooms: How many, 1 to 6.
         garage: Whether it has one.
         outline: The shape of the home.
-        open_plan: Whether living room, dining room and kitchen are open to each other.
-        corridor_width: Clear width of hallways, 0.9 m to 2 m.
-        door_width: Width of doors between rooms, 0.7 m to 1.2 m.
+        open_plan: Whether living, dining and kitchen are open to each other.
+        corridor_width: Clear width of hallways, 0.9 m to 2 m, rounded to 5 cm.
+        door_width: Of doors between rooms, 0.7 m to 1.2 m, rounded to 5 cm.
 
     Example:
         >>> plan = Synthetic(seed=7, area_m2=120, bedrooms=3).load()
@@ -41,27 +41,15 @@ class Synthetic(FloorPlanSource):
         (3, 'kitchen')
     """
 
-    seed: int = Field(default=0, ge=0, description="which of the homes")
-    area_m2: float | None = Field(
-        default=None, ge=SMALLEST_M2, le=LARGEST_M2, description="free space, 30 to 450 m2"
-    )
-    bedrooms: int | None = Field(
-        default=None, ge=1, le=MAX_ROOMS_OF_A_KIND, description="how many, 1 to 8"
-    )
-    bathrooms: int | None = Field(default=None, ge=1, le=6, description="how many, 1 to 6")
-    garage: bool | None = Field(default=None, description="whether it has one")
-    outline: Literal["rectangle", "L", "T", "U"] | None = Field(
-        default=None, description="the shape of the home"
-    )
-    open_plan: bool | None = Field(
-        default=None, description="whether living, dining and kitchen are open to each other"
-    )
-    corridor_width: Length | None = Field(
-        default=None, description="clear width of hallways, 0.9 m to 2 m, rounded to 5 cm"
-    )
-    door_width: Length | None = Field(
-        default=None, description="of doors between rooms, 0.7 m to 1.2 m, rounded to 5 cm"
-    )
+    seed: int = Field(default=0, ge=0)
+    area_m2: float | None = Field(default=None, ge=SMALLEST_M2, le=LARGEST_M2)
+    bedrooms: int | None = Field(default=None, ge=1, le=MAX_ROOMS_OF_A_KIND)
+    bathrooms: int | None = Field(default=None, ge=1, le=6)
+    garage: bool | None = None
+    outline: Literal["rectangle", "L", "T", "U"] | None = None
+    open_plan: bool | None = None
+    corridor_width: Length | None = None
+    door_width: Length | None = None
 
     @model_validator(mode="after")
     def _check(self) -> Self:

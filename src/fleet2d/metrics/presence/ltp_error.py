@@ -47,13 +47,14 @@ class LongTermMetric(Metric):
 
     The truth is the time that each user really was in each room, from the beginning of the run, or
     in the last `window`, up to now: not what the user's routine plans.
+
+    Attributes:
+        of: The algorithm whose presence is measured.
+        window: Time over which the truth is counted, in whole periods; null: the whole run.
     """
 
-    of: str = Field(description="the algorithm whose presence is measured")
-    window: PositiveDuration | None = Field(
-        default=None,
-        description="time over which the truth is counted, in whole periods; null: the whole run",
-    )
+    of: str
+    window: PositiveDuration | None = None
 
     def reads(self) -> tuple[str, ...]:
         """Return the name of the algorithm that it measures."""
@@ -103,6 +104,11 @@ class LtpError(LongTermMetric):
     The result has the values at the end; `flips`, the number of updates that changed the likeliest
     room at home; and `burn_in_day`: the first day n, from 1, from whose end on tv was at most
     `burn_in`, left out if there is none. Users who were never at home are left out.
+
+    Attributes:
+        given: Which shares are compared.
+        alpha: By which KL is smoothed.
+        burn_in: Total variation at which burn-in ends.
     """
 
     unit: ClassVar[str] = "at the end"
@@ -113,11 +119,9 @@ class LtpError(LongTermMetric):
         "burn_in_day": "day from which tv is small",
     }
 
-    given: Literal["home", "away", "hour_of_week"] = Field(
-        default="home", description="which shares are compared"
-    )
-    alpha: float = Field(default=1e-3, gt=0, le=1, description="by which KL is smoothed")
-    burn_in: Share = Field(default=0.1, description="total variation at which burn-in ends")
+    given: Literal["home", "away", "hour_of_week"] = "home"
+    alpha: float = Field(default=1e-3, gt=0, le=1)
+    burn_in: Share = 0.1
 
     def start(self, home: "Home") -> None:
         """Begin counting."""

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
 
 from fleet2d.algorithms.evidence import steps_of_bin
 from fleet2d.algorithms.history import History
@@ -99,6 +98,12 @@ class RtpScore(Metric):
     Its period must be that of the algorithm. Stored per period and user: bins and sums of scores
     by class of gaps. The result has the means over the run, per user. Minutes of a day depend on
     each other: for confidence intervals compare runs, or days, not minutes.
+
+    Attributes:
+        of: The algorithm whose presence is scored.
+        period: How often it is updated; that of the algorithm.
+        given_home: Whether only bins at home count.
+        reference: Another algorithm, by which the skill is measured, too.
     """
 
     unit: ClassVar[str] = "all gaps"
@@ -110,14 +115,10 @@ class RtpScore(Metric):
         "reference_skill": "1 best, 0 like the reference",
     }
 
-    of: str = Field(description="the algorithm whose presence is scored")
-    period: PositiveDuration = Field(
-        default=timedelta(minutes=5), description="how often it is updated; that of the algorithm"
-    )
-    given_home: bool = Field(default=False, description="whether only bins at home count")
-    reference: str | None = Field(
-        default=None, description="another algorithm, by which the skill is measured, too"
-    )
+    of: str
+    period: PositiveDuration = timedelta(minutes=5)
+    given_home: bool = False
+    reference: str | None = None
 
     def reads(self) -> tuple[str, ...]:
         """Return the name of the scored algorithm, and of the reference if there is one."""

@@ -1,0 +1,71 @@
+"""Descriptions of fields: taken from docstrings, also those of base classes."""
+
+from typing import Any
+
+from pydantic import Field
+
+from fleet2d.component import Settings, components
+from fleet2d.descriptions import descriptions, summary
+
+
+class Lamp(Settings):
+    """A lamp.
+
+    It hangs.
+
+    Attributes:
+        power, most: Its power: what it takes
+            on two lines [W].
+        color: Its color.
+
+    Raises:
+        OSError: None of its fields.
+    """
+
+    power: float = 1.0
+    most: float = 2.0
+    color: str = Field(default="red", description="in pictures")
+
+
+class Torch(Lamp):
+    """A torch.
+
+    Attributes:
+        most: Its maximum.
+    """
+
+    battery: int = 3
+
+
+def properties_of(cls: type[Settings]) -> dict[str, Any]:
+    return {
+        name: schema.get("description")
+        for name, schema in cls.model_json_schema()["properties"].items()
+    }
+
+
+def test_descriptions_are_those_of_the_class_and_its_bases() -> None:
+    assert descriptions(Torch) == {
+        "power": "Its power: what it takes on two lines [W].",
+        "most": "Its maximum.",
+        "color": "Its color.",
+    }
+
+
+def test_summary_ends_before_the_first_section() -> None:
+    assert summary(Lamp) == "A lamp.\n\nIt hangs."
+
+
+def test_schema_has_them_but_for_fields_with_a_description_of_their_own() -> None:
+    assert properties_of(Torch) == {
+        "power": "Its power: what it takes on two lines [W].",
+        "most": "Its maximum.",
+        "color": "in pictures",
+        "battery": None,
+    }
+    assert Lamp.model_json_schema()["description"] == "A lamp.\n\nIt hangs."
+
+
+def test_settings_of_algorithms_are_described() -> None:
+    for name, cls in components("algorithm").items():
+        assert [name, []] == [name, [key for key, text in properties_of(cls).items() if not text]]
