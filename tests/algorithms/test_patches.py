@@ -49,6 +49,17 @@ def test_whole_rooms_are_patches_by_themselves(shared_data: Path) -> None:
         assert [room.cells for room in plan.rooms] == patches.cells.tolist()
 
 
+def test_rooms_that_nothing_joins_are_on_islands_of_their_own(shared_data: Path) -> None:
+    expo = shared_data / "houseexpo"
+    plan = fleet2d.load_floorplan(next(expo.glob("69c2ebf7*.json")))
+    island = patches_of(plan).island
+    assert island is not None
+    apart = [room.name for room in plan.rooms if island[room.index] != island[0]]
+    assert ["bedroom_2", "unknown_2"] == apart
+    assert whole_rooms(plan).island is not None
+    assert all(patches_of(plan).island is None for plan in plans(shared_data))
+
+
 class Tell(Algorithm):
     """Puts out by how much evidence by patches differs from that by rooms."""
 

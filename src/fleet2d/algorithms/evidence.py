@@ -101,6 +101,8 @@ class Parts(NamedTuple):
             of the bin; with several robots, that of the robot that saw most of it.
         sightings: Where users were perceived, by patches.
         shown_parts: uint8 (bins, patches), `shown` times 255; None: not computed yet.
+        island: int64 (rooms,), which part of the home holds each room, where nothing joins the
+            parts; None: it has one part.
     """
 
     room: NDArray[np.int64]
@@ -109,6 +111,7 @@ class Parts(NamedTuple):
     shown: NDArray[np.float64]
     sightings: SightingCounts
     shown_parts: NDArray[np.uint8] | None = None
+    island: I64 | None = None
 
     @property
     def seen(self) -> I64:
@@ -194,7 +197,13 @@ def gather(
     shape = (bins, users + 1, count)
     counts = list_sightings(sightings.step - first, user, patch, bin_steps, *shape)
     parts = Parts(
-        patches.room, patches.cells, by_patch, shown, SightingCounts(*counts, shape), shown_parts
+        patches.room,
+        patches.cells,
+        by_patch,
+        shown,
+        SightingCounts(*counts, shape),
+        shown_parts,
+        patches.island,
     )
     in_rooms = count_seen(in_room, first, bins, bin_steps, users, len(patches.first))
     return Evidence(first, bin_steps, watched, in_rooms, parts)

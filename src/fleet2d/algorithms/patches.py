@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from fleet2d.algorithms.observations import NOWHERE
 from fleet2d.floorplan.cache import read_only
+from fleet2d.kernels.mesh import label_triangles, rasterize_cells
 
 if TYPE_CHECKING:
     from fleet2d.floorplan.plan import FloorPlan
@@ -26,11 +27,14 @@ class Patches:
         of_cell: int16 (rows, columns), the patch of each cell; NOWHERE outside rooms.
         room: int64 (patches,), ascending, the room of each patch; each room has at least one.
         cells: int64 (patches,), number of cells of each patch.
+        island: int64 (rooms,), which part of the free space holds each room, where nothing joins
+            the parts; None: it is in one part.
     """
 
     of_cell: NDArray[np.int16]
     room: NDArray[np.int64]
     cells: NDArray[np.int64]
+    island: NDArray[np.int64] | None = None
 
     @cached_property
     def first(self) -> NDArray[np.int64]:
@@ -48,7 +52,7 @@ def whole_rooms(plan: "FloorPlan") -> Patches:
     """Return each room as one patch."""
     rooms, count = plan.room_of_cell, len(plan.rooms)
     cells = np.bincount(rooms[rooms != NOWHERE], minlength=count)
-    return Patches(rooms, read_only(np.arange(count)), read_only(cells))
+    return Patches(rooms, read_only(np.arange(count)), read_only(cells), islands(plan))
 
 
 def patches_of(plan: "FloorPlan") -> Patches:
@@ -81,7 +85,32 @@ def patches_of(plan: "FloorPlan") -> Patches:
     of_cell = np.full(rooms.shape, NOWHERE, np.int16)
     of_cell[row, column] = number[box]
     room = np.repeat(np.arange(count), boxes)[is_patch]
-    return Patches(read_only(of_cell), read_only(room), read_only(cells[is_patch]))
+    cells = read_only(cells[is_patch])
+    return Patches(read_only(of_cell), read_only(room), cells, islands(plan))
+
+
+def islands(plan: "FloorPlan") -> NDArray[np.int64] | None:
+    """Return the part of the free space that holds each room: int64 (rooms,).
+
+    Rooms with floor in the same part, and parts with floor in the same room, count as one. None if
+    the free space is in one part.
+
+    Example:
+        >>> import fleet2d
+        >>> print(islands(fleet2d.load_floorplan()))
+        None
+    """
+    if len(plan.polygons) == 1:
+        return None
+    triangle = rasterize_cells(plan.mesh, plan.lattice.rows, plan.lattice.columns)
+    part = np.where(triangle >= 0, label_triangles(plan.mesh.neighbors)[triangle], NOWHERE)
+    is_floor = (plan.room_of_cell != NOWHERE) & (part != NOWHERE)
+    pairs = np.unique(np.stack([plan.room_of_cell, part], axis=-1)[is_floor], axis=0)
+    island = np.arange(len(plan.rooms))
+    for number in np.unique(pairs[:, 1]):
+        rooms = pairs[pairs[:, 1] == number, 0]
+        island[np.isin(island, island[rooms])] = island[rooms].min()
+    return read_only(island)
 
 
 def _divide(

@@ -5,6 +5,8 @@ import pytest
 from tests.algorithms.presence.worlds import (
     DAY,
     DETECTION,
+    F64,
+    I64,
     MONDAY,
     any_evidence,
     bins_of,
@@ -18,8 +20,9 @@ from tests.algorithms.presence.worlds import (
     transitions,
 )
 
+from fleet2d.algorithms.evidence import Evidence
 from fleet2d.algorithms.presence.anyone import unknown_seen, with_anyone
-from fleet2d.algorithms.presence.counts import joined
+from fleet2d.algorithms.presence.counts import Bins, joined
 from fleet2d.algorithms.presence.exposure_ratio import AuditOnly, ExposureRatio
 from fleet2d.algorithms.presence.likelihood import Likelihood
 from fleet2d.algorithms.presence.sighting_share import SightingShare
@@ -166,3 +169,63 @@ def test_intervals_contain_the_truth_at_least_as_often_as_stated() -> None:
         wide.append(high[0] - low[0])
     assert np.mean(held) > 0.8
     assert np.mean(wide) < 0.15
+
+
+def two_of_four(t: int, at: int, sees: bool, sightings: I64, random: np.random.Generator) -> int:
+    """Ten bins in one of the first two rooms, then another of them at random."""
+    return int(random.integers(2)) if t % 10 == 0 else at
+
+
+def with_islands(bins: Bins, island: list[int]) -> Bins:
+    """The same evidence in a home whose rooms are in these parts."""
+    return bins._replace(by_patch=bins.parts._replace(island=np.array(island)))
+
+
+def a_week_of_two_rooms(seed: int, island: list[int] | None) -> tuple[Likelihood, F64, float]:
+    """Learn of a person who uses two rooms of four; return also the truth, and the error."""
+    where = person(7 * DAY, 2, seed)
+    where[where == 2] = 4
+    bins, estimator = bins_of(evidence(where, 4, two_of_four, seed)), Likelihood()
+    estimator.begin(4, 1)
+    for part in pieces(bins if island is None else with_islands(bins, island), 240):
+        estimator.observe(part)
+    truth = np.append(shares_at_home(where, 4), np.mean(where == 4))
+    share = estimator.presence(["u0"], MONDAY).share("u0")
+    return estimator, truth, total_variation(truth[:4], share)
+
+
+def test_time_out_of_sight_is_away_if_nothing_joins_the_other_rooms() -> None:
+    """Rooms that no robot can look into look like away, so that each got as much time as away."""
+    for seed in (0, 1, 2):
+        apart, truth, error = a_week_of_two_rooms(seed, [0, 0, 2, 3])
+        home, away = apart.presence(["u0"], MONDAY).share("u0"), truth[4]
+        assert [0, 0] == home[2:].tolist()
+        assert away == pytest.approx(apart.presence(["u0"], MONDAY).away("u0"), abs=0.03)
+        assert error < 0.04
+        unknown, _, _ = a_week_of_two_rooms(seed, None)
+        at_large = unknown.presence(["u0"], MONDAY)
+        assert at_large.with_away("u0")[2] == pytest.approx(at_large.away("u0"), rel=1e-6)
+
+
+def test_intervals_hold_the_time_that_may_be_in_rooms_never_watched() -> None:
+    for seed in (0, 1, 2):
+        estimator, truth, _ = a_week_of_two_rooms(seed, [0, 0, 0, 0])
+        low, high = estimator.interval(np.uint64(0), 0.9)
+        assert ((low[0] <= truth) & (truth <= high[0])).all()
+        assert (high[0, 2:] > 0.9 * truth[4]).all()
+        apart = a_week_of_two_rooms(seed, [0, 0, 2, 3])[0].interval(np.uint64(0), 0.9)
+        assert [0, 0] == apart[1][0, 2:4].tolist()
+        assert apart[1][0, 4] - apart[0][0, 4] < high[0, 4] - low[0, 4]
+
+
+def test_a_part_of_the_home_counts_from_when_a_robot_looks_into_it() -> None:
+    """Later a robot is carried to the other part, and the person, too."""
+    where = np.repeat([0, 2], 2 * DAY)
+    watched = np.eye(4)[where]
+    seen = np.repeat((watched > 0).astype(np.int64)[:, None], 2, axis=1)
+    bins = with_islands(bins_of(Evidence(0, 1, watched, seen)), [0, 0, 2, 2])
+    estimator = Likelihood()
+    estimator.begin(4, 1)
+    for part in pieces(bins, 360):
+        estimator.observe(part)
+    assert np.abs(estimator.presence(["u0"], MONDAY).share("u0") - [0.5, 0, 0.5, 0]).max() < 0.02

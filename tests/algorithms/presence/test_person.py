@@ -28,7 +28,7 @@ def expected(seed: int, stages: int) -> tuple[Any, Moments, Any]:
     of = case(seed, stages, 6, longest=1)
     of.shown[:] = -1
     prior, future = of.now.sum(axis=0), np.random.default_rng(seed).random((stages, PATCHES))
-    moments = StateLayout(ROOM, np.ones(PATCHES), PLACES - 1, stages).no_moments()
+    moments = StateLayout(ROOM, np.ones(PATCHES), PLACES - 1, stages, np.ones(PLACES)).no_moments()
     smooth(of.model, of.stretches, prior, future, moments)
     steps, weights = twin(of)
     ahead = [by_state(np.stack([future, future]))]
@@ -65,7 +65,7 @@ def test_expected_exits_and_time_equal_pairs_of_states(seed: int, stages: int) -
 
 
 def test_before_anything_is_learned_all_is_as_likely_and_stays_last_two_hours() -> None:
-    layout = StateLayout(ROOM, np.array([0.5, 0.5, 1, 0.2, 0.3, 0.5, 1]), 3, 1)
+    layout = StateLayout(ROOM, np.array([0.5, 0.5, 1, 0.2, 0.3, 0.5, 1]), 3, 1, np.ones(4))
     model = model_of(layout.no_moments(), layout, PRIOR)
     assert [1 - 1 / STAY] * 4 == pytest.approx(model.stay.tolist())
     assert [0, 1 / 3, 1 / 3, 1 / 3, 0] == pytest.approx(model.follow[0].tolist())
@@ -74,7 +74,7 @@ def test_before_anything_is_learned_all_is_as_likely_and_stays_last_two_hours() 
 
 
 def test_transitions_are_counts_by_time_plus_one_prior_event() -> None:
-    layout = StateLayout(ROOM, np.array([0.5, 0.5, 1, 0.2, 0.3, 0.5, 1]), 3, 1)
+    layout = StateLayout(ROOM, np.array([0.5, 0.5, 1, 0.2, 0.3, 0.5, 1]), 3, 1, np.ones(4))
     moments = layout.no_moments()
     moments.time[0], moments.exits[0, 1], moments.exits[0, 3] = 880.0, 6.0, 3.0
     moments.arrivals[:2], moments.moves[0], moments.rests[0] = (3.0, 7.0), 9.0, 971.0

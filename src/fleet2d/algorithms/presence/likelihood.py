@@ -66,6 +66,10 @@ class Likelihood(Estimator):
     patches that are never watched (the prior decides: such time mostly counts as away), users who
     are hardly ever recognized.
 
+    A person is never in a part of the home that nothing joins with what robots have looked into:
+    evidence can't distinguish such rooms from away. In rooms that robots could look into, but never
+    did, the prior decides; their intervals, and that of away, hold all of that time.
+
     Anyone follows from all users, taken as independent, and from unknown people where they are
     seen; without users it is the chain of one person.
 
@@ -90,6 +94,8 @@ class Likelihood(Estimator):
         self.days: list[DayEvidence] = []  # the days that are revisited, without their views
         self.hours: list[F64] = []  # the sums by hour of these days
         self.turn = 0  # index of the day that was revisited last
+        self.is_watched = np.zeros(rooms, bool)  # whether a robot has looked into the room
+        self.island: I64 | None = None  # as in `Parts`
 
     def width(self, rooms: int) -> int:
         """Return the number of columns of `sums`: p and p (1 - p) of each place, and bins."""
@@ -132,7 +138,28 @@ class Likelihood(Estimator):
         quantile = round(NormalDist().inv_cdf((1 + level) / 2), 6)
         half = quantile * np.sqrt(4 * variance) / bins
         low = np.where(share - half < 1 / bins, 0.0, share - half)
-        return low, np.minimum(share + half, 1)
+        return self._with_hidden_time(low, np.minimum(share + half, 1), half * bins)
+
+    def _with_hidden_time(self, low: F64, high: F64, error: F64) -> tuple[F64, F64]:
+        """Widen intervals where rooms were never watched: that time may be away, or the reverse.
+
+        Args:
+            low: Lower ends of the shares, float64 (users + 1, rooms + 1).
+            high: Upper ends.
+            error: Half the width of the interval of each place's time [bins].
+        """
+        is_hidden = ~self.is_watched
+        if not (self.is_watched.any() and (is_hidden & self._possible_rooms).any()):
+            return low, high
+        time = np.maximum(self.counts.total[:, : self.rooms + 1], 0)
+        is_hidden = np.append(is_hidden, True)
+        at_home = np.maximum(time[:, :-1].sum(axis=1, keepdims=True), 1)
+        unseen = time[:, is_hidden].sum(axis=1, keepdims=True)
+        seen = np.maximum(time[:, ~is_hidden].sum(axis=1, keepdims=True), 1)
+        most_unseen = unseen + error[:, is_hidden].sum(axis=1, keepdims=True)
+        low = np.where(is_hidden, 0.0, low * at_home / (seen + unseen))
+        high = np.where(is_hidden, most_unseen / (seen + unseen), high * at_home / seen)
+        return low, np.minimum(high, 1)
 
     def observe(self, bins: Bins) -> None:
         """Process the next bins of evidence."""
@@ -148,6 +175,7 @@ class Likelihood(Estimator):
         """Add evidence of one day, which is learned from when the next day begins."""
         if not self.people:
             self._create_people(bins)
+        self._look_into(bins)
         part = DayEvidence.of(bins)
         if part.number != self.counts.today:
             if self.parts:
@@ -166,6 +194,24 @@ class Likelihood(Estimator):
                     f" patches of {self.rooms} rooms: it is from another home, other users, another"
                     " estimator, or one with other stages"
                 )
+
+    def _look_into(self, bins: Bins) -> None:
+        """Note which rooms were watched, and let people be in the parts of the home they are in."""
+        is_watched = self.is_watched | bins.watched.any(axis=0)
+        if np.array_equal(is_watched, self.is_watched):
+            return
+        before, self.is_watched = self._possible_rooms, is_watched
+        self.island = bins.parts.island
+        if not np.array_equal(self._possible_rooms, before):
+            for person in self.people:
+                person.confine(np.append(self._possible_rooms, True).astype(np.float64))
+
+    @property
+    def _possible_rooms(self) -> NDArray[np.bool_]:
+        """The rooms that are joined with those that robots have looked into: bool (rooms,)."""
+        if self.island is None or not self.is_watched.any():
+            return np.ones(self.rooms, bool)
+        return np.isin(self.island, self.island[self.is_watched])
 
     def _by_hour(self, places: list[StretchPlaces], day: "DayEvidence") -> tuple[I64, F64]:
         """Return the hours of the bins, as ordinal * 24 + hour, and the sums of each hour.

@@ -28,12 +28,14 @@ class StateLayout(NamedTuple):
         spread: float64 (patches + 1,), the share of each patch in the floor of its room.
         rooms: Number of rooms.
         stages: Number of stages of a stay.
+        possible: float64 (rooms + 1,), 1 for the places where the person may be, 0 for the others.
     """
 
     room: I64
     spread: F64
     rooms: int
     stages: int
+    possible: F64
 
     @classmethod
     def of(cls, bins: Bins, stages: int) -> Self:
@@ -42,12 +44,13 @@ class StateLayout(NamedTuple):
         rooms = bins.watched.shape[1]
         floor = np.maximum(cells, 1)
         spread = np.append(floor / np.bincount(room, floor, minlength=rooms)[room], 1.0)
-        return cls(np.append(room, rooms), spread, rooms, stages)
+        return cls(np.append(room, rooms), spread, rooms, stages, np.ones(rooms + 1))
 
     @property
     def anywhere(self) -> F64:
         """The uninformed distribution, equal for rooms and away: (stages, patches + 1)."""
-        return np.tile(self.spread / ((self.rooms + 1) * self.stages), (self.stages, 1))
+        spread = self.spread * self.possible[self.room]
+        return np.tile(spread / (self.possible.sum() * self.stages), (self.stages, 1))
 
     def unknown_view(self) -> I64:
         """Return -1, for unknown, as the part of each patch in view: int64 (patches + 1,)."""
@@ -89,7 +92,7 @@ def model_of(moments: Moments, layout: StateLayout, prior: Prior) -> StayModel:
     lengths = np.linspace(SHORT, LONG, stages) if stages > 1 else np.array([STAY])
     ends = moments.exits.sum(axis=1)
     stay = 1 - (ends + 1) / (moments.time + np.tile(lengths, places))
-    entered = moments.exits[:, :places].sum(axis=0) + 1 / places
+    entered = moments.exits[:, :places].sum(axis=0) + layout.possible / layout.possible.sum()
     others = np.tile(entered, (places, 1))
     np.fill_diagonal(others, 0.0)
     others = np.repeat(others / others.sum(axis=1, keepdims=True), stages, axis=0)
@@ -158,6 +161,17 @@ class Person:
         self.now = self.day_start = layout.anywhere
         self.ones = np.ones_like(self.now)
         self.days: list[PersonDay] = []
+
+    def confine(self, possible: F64) -> None:
+        """Let the person be in some places only: float64 (rooms + 1,), as `possible`."""
+        self.layout = self.layout._replace(possible=possible)
+        self.model = model_of(self.total, self.layout, self.prior)
+        self.now, self.day_start = self._within(self.now), self._within(self.day_start)
+
+    def _within(self, places: F64) -> F64:
+        """Return a distribution without the places where the person can't be."""
+        rest = places * self.layout.possible[self.layout.room]
+        return rest / rest.sum() if rest.any() else self.layout.anywhere
 
     @property
     def length_of_stay(self) -> F64:
