@@ -111,7 +111,7 @@ private:
         }
         weigh_sightings(stretches_, t, likely, in_view_, hidden_);
 
-        const View<const u8> view = stretches_.shown[t];
+        const View<const u8> view = stretches_.shown(t);
         const View<const bool> visible = filtered_.visible[t + 1];
         for (i64 stage = 0; stage < stages_; ++stage) {
             const View<const f64> in_view = in_view_[stage], hidden = hidden_[stage];

@@ -108,7 +108,7 @@ private:
     // Whether the person may be in view in a room after a stretch.
     bool becomes_visible(i64 t, i64 room) const {
         const auto [begin, end] = model_.patches_of(room);
-        const View<const u8> shown = stretches_.shown[t];
+        const View<const u8> shown = stretches_.shown(t);
         for (i64 p = begin; p < end; ++p) {
             if (shown[p] > 0) return true;
         }
@@ -160,7 +160,7 @@ private:
         const View<const f64> was_in_view = in_view[stage], was_hidden = hidden[stage];
         const View<const f64> last_in_view = in_view[earlier], last_hidden = hidden[earlier];
         const View<f64> now_in_view = filtered_.in_view[t + 1][stage], now_hidden = filtered_.hidden[t + 1][stage];
-        const View<const u8> view = stretches_.shown[t];
+        const View<const u8> view = stretches_.shown(t);
         const View<const bool> same = filtered_.same[t];
         const View<const f64> likely = filtered_.likely[t];
         const auto [begin, end] = model_.patches_of(room);
@@ -239,14 +239,16 @@ void begin(const StayModel& model, View<const f64, 3> now, Filtered& filtered) {
 }
 
 // Set whether the part of each patch in view is the same as before.
-void compare_views(View<const u8, 2> shown, View<const i64> shown_before, View<bool, 2> same) {
+void compare_views(const Stretches& stretches, View<const i64> shown_before, View<bool, 2> same) {
     for (i64 t = 0; t < same.size(); ++t) {
-        const View<const u8> now = shown[t];
+        const View<const u8> now = stretches.shown(t);
         const View<bool> row = same[t];
         if (t == 0) {
             for (i64 p = 0; p < row.size(); ++p) row[p] = now[p] == shown_before[p];
+        } else if (stretches.view[t] == stretches.view[t - 1]) {
+            std::fill(row.begin(), row.end(), true);
         } else {
-            const View<const u8> before = shown[t - 1];
+            const View<const u8> before = stretches.shown(t - 1);
             for (i64 p = 0; p < row.size(); ++p) row[p] = now[p] == before[p];
         }
     }
@@ -258,7 +260,7 @@ void weigh_sightings(const Stretches& stretches, i64 t, View<const f64> likely, 
                      View<f64, 2> hidden) {
     for (i64 i = stretches.begin[t]; i < stretches.begin[t + 1]; ++i) {
         const i64 p = stretches.patch[i];
-        const bool shown = stretches.shown(t, p) > 0;
+        const bool shown = stretches.shown(t)[p] > 0;
         const View<f64, 2> states = shown ? in_view : hidden;
         const f64 factor = 1.0 + stretches.share[i] / likely[shown ? 0 : 1];
         for (i64 stage = 0; stage < states.size(); ++stage) states(stage, p) *= factor;
@@ -278,7 +280,7 @@ Filtered filter_stays(const StayModel& model, const Stretches& stretches, View<c
     filtered.scale = Array<f64>::empty({count});
     filtered.same = Array<bool, 2>::empty({count, patches});
     begin(model, now, filtered);
-    compare_views(stretches.shown, shown, filtered.same);
+    compare_views(stretches, shown, filtered.same);
     ForwardPass pass(model, stretches, filtered);
     for (i64 t = 0; t < count; ++t) pass.step(t);
     return filtered;
@@ -297,7 +299,7 @@ Array<f64, 2> follow(const StayModel& model, const Stretches& stretches, View<f6
         std::copy(in_view.begin(), in_view.end(), now[0][stage].begin());
         std::copy(hidden.begin(), hidden.end(), now[1][stage].begin());
     }
-    const View<const u8> last = stretches.shown[count - 1];
+    const View<const u8> last = stretches.shown(count - 1);
     std::copy(last.begin(), last.end(), shown.begin());
     return places;
 }
@@ -313,15 +315,14 @@ struct Sighting {
     i64 patches() const { return end - begin; }
 };
 
-// Whether two bins can be merged: with the same view and the same sighting.
-bool alike(View<const u8> shown, Sighting sighting, View<const u8> shown_before, Sighting before) {
-    return sighting.patches() < 2 && before.patches() < 2 && sighting.patch == before.patch &&
-           std::equal(shown.begin(), shown.end(), shown_before.begin());
+// Whether two bins can be merged: with the same sighting.
+bool alike(Sighting sighting, Sighting before) {
+    return sighting.patches() < 2 && before.patches() < 2 && sighting.patch == before.patch;
 }
 
 }  // namespace
 
-OwnedStretches merge_bins(View<const i64> minute, View<const u8, 2> shown, const PatchCounts& seen, i64 longest) {
+OwnedStretches merge_bins(View<const i64> minute, View<const i64> view, const PatchCounts& seen, i64 longest) {
     struct Opening {
         i64 bin;  // the first of a stretch
         Sighting sighting;
@@ -329,13 +330,13 @@ OwnedStretches merge_bins(View<const i64> minute, View<const u8, 2> shown, const
     std::vector<Opening> openings;
     Sighting before;
     i64 sightings = 0;
-    const i64 bins = shown.size(), patches = shown.shape[1];
+    const i64 bins = view.size();
     for (i64 t = 0; t < bins; ++t) {
         Sighting now{before.end, before.end, -1};
         for (; now.end < seen.bin.size() && seen.bin[now.end] == t; ++now.end) now.patch = seen.patch[now.end];
         const bool goes_on = t > 0 && t - openings.back().bin < longest &&
                              floor_div(minute[openings.back().bin], 60) == floor_div(minute[t], 60) &&
-                             alike(shown[t], now, shown[t - 1], before);
+                             view[t] == view[t - 1] && alike(now, before);
         if (!goes_on) {
             openings.push_back({t, now});
             sightings += now.patches();
@@ -346,8 +347,7 @@ OwnedStretches merge_bins(View<const i64> minute, View<const u8, 2> shown, const
     const i64 count = static_cast<i64>(openings.size());
     OwnedStretches result;
     result.bins = Array<i64>::empty({count});
-    result.hour = Array<i64>::empty({count});
-    result.shown = Array<u8, 2>::zeros({count, patches + 1});
+    result.view = Array<i64>::empty({count});
     result.begin = Array<i64>::zeros({count + 1});
     result.patch = Array<i64>::empty({sightings});
     result.share = Array<f64>::empty({sightings});
@@ -359,8 +359,7 @@ OwnedStretches merge_bins(View<const i64> minute, View<const u8, 2> shown, const
     }
     for (i64 i = 0; i < count; ++i) {
         const auto [bin, sighting] = openings[static_cast<std::size_t>(i)];
-        result.hour[i] = floor_div(minute[bin], 60);
-        std::copy(shown[bin].begin(), shown[bin].end(), result.shown[i].begin());
+        result.view[i] = view[bin];
         f64 total = 0.0;
         for (i64 k = sighting.begin; k < sighting.end; ++k) total += static_cast<f64>(seen.steps[k]);
         for (i64 k = sighting.begin; k < sighting.end; ++k) {

@@ -19,13 +19,14 @@ inline constexpr f64 NEVER_SURE = 1e-12;  // least chance that a person in view 
 // Evidence of one user, with equal consecutive bins merged.
 struct Stretches {
     View<const i64> bins;     // (stretches,) number of bins
-    View<const i64> hour;     // (stretches,) hour of the day
-    View<const u8, 2> shown;  // (stretches, patches) part of each patch in view, in 1/255; 0 for away
+    View<const i64> view;     // (stretches,) the row of `views`
+    View<const u8, 2> views;  // (views, patches) part of each patch in view, in 1/255; 0 for away
     View<const i64> begin;    // (stretches + 1,) where each stretch's sightings begin in `patch` and `share`
     View<const i64> patch;    // (sightings,) where the user was perceived
     View<const f64> share;    // (sightings,) share of the steps with a sighting
 
     i64 size() const { return bins.size(); }
+    View<const u8> shown(i64 t) const { return views[view[t]]; }
 };
 
 // The part of a patch in view, from 0 to 1.
@@ -94,11 +95,10 @@ Array<f64, 2> follow(const StayModel& model, const Stretches& stretches, View<f6
 void weigh_sightings(const Stretches& stretches, i64 t, View<const f64> likely, View<f64, 2> in_view,
                      View<f64, 2> hidden);
 
-// Stretches that own their arrays.
+// Stretches that own their arrays, without the views.
 struct OwnedStretches {
     Array<i64> bins;
-    Array<i64> hour;
-    Array<u8, 2> shown;
+    Array<i64> view;
     Array<i64> begin;
     Array<i64> patch;
     Array<f64> share;
@@ -114,7 +114,7 @@ struct PatchCounts {
 // Merge at most `longest` consecutive bins with the same view and the same sightings.
 //
 // Bins in which the user was perceived in several patches aren't merged, and no stretch crosses an hour. `minute`
-// (bins,) is the time since midnight; `shown` (bins, patches) as in Stretches, without away.
-OwnedStretches merge_bins(View<const i64> minute, View<const u8, 2> shown, const PatchCounts& seen, i64 longest);
+// (bins,) is the time since midnight; `view` (bins,) the number of the view, the same only if nothing changed.
+OwnedStretches merge_bins(View<const i64> minute, View<const i64> view, const PatchCounts& seen, i64 longest);
 
 }  // namespace fleet2d

@@ -221,7 +221,7 @@ def model() -> StayModel:
 def stretches() -> Stretches:
     shown = np.array([[255, 0, 30, 0], [255, 0, 30, 0], [0, 0, 255, 0]], np.uint8)
     begin, patch = np.array([0, 1, 1, 2]), np.array([0, 2])
-    return Stretches(np.array([1, 2, 1]), np.zeros(3, np.int64), shown, begin, patch, np.ones(2))
+    return Stretches(np.array([1, 2, 1]), np.arange(3), shown, begin, patch, np.ones(2))
 
 
 def moments() -> Moments:
@@ -406,7 +406,7 @@ CALLS: dict[str, Args] = {
     ),
     "merge_bins": lambda: (
         np.arange(5),
-        np.zeros((5, 3), np.uint8),
+        np.zeros(5, np.int64),
         np.arange(3),
         np.arange(3),
         np.ones(3, np.int64),

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from tests.reference import presence as slow
 
 from fleet2d.algorithms.presence.chain_model import steps_of
+from fleet2d.algorithms.presence.day_evidence import distinct
 from fleet2d.kernels.presence import advance
 from fleet2d.kernels.smoothing import smooth
 from fleet2d.kernels.stays import Moments, StayModel, Stretches, follow
@@ -54,7 +55,7 @@ def case(seed: int, stages: int, count: int, longest: int, sizes: tuple[int, ...
         seen[t, patch] = random.dirichlet(np.ones(len(patch)))
     begin = np.append(0, (seen > 0).sum(axis=1).cumsum())
     stretches = Stretches(
-        random.integers(1, longest + 1, count), np.zeros(count, np.int64), shown, begin,
+        random.integers(1, longest + 1, count), *distinct(shown), begin,
         np.nonzero(seen)[1], seen[seen > 0],
     )  # fmt: skip
     now = random.random((2, stages, patches))
@@ -152,10 +153,10 @@ def test_evidence_in_pieces_is_followed_as_at_once(cut: int) -> None:
     whole = follow(of.model, of.stretches, whole_now, whole_shown)
     now, shown, places = of.now.copy(), of.shown.copy(), []
     for a, b in ((0, cut), (cut, 7)):
-        bins, hour, view, begin, patch, share = of.stretches
+        bins, view, views, begin, patch, share = of.stretches
         here = slice(begin[a], begin[b])
         part = Stretches(
-            bins[a:b], hour[a:b], view[a:b], begin[a : b + 1] - begin[a], patch[here], share[here]
+            bins[a:b], view[a:b], views, begin[a : b + 1] - begin[a], patch[here], share[here]
         )
         places.append(follow(of.model, part, now, shown))
     assert np.abs(whole - np.concatenate(places)).max() < 1e-14
@@ -167,7 +168,7 @@ def test_evidence_in_pieces_is_followed_as_at_once(cut: int) -> None:
 def test_without_evidence_stages_follow_each_other_by_their_steps(stages: int) -> None:
     of = case(9, stages, 6, 1)
     blind = of.stretches._replace(
-        shown=np.zeros_like(of.stretches.shown), begin=np.zeros(7, np.int64)
+        views=np.zeros_like(of.stretches.views), begin=np.zeros(7, np.int64)
     )
     steps = steps_of(of.model)
     assert np.abs(steps.sum(axis=1) - 1).max() < 1e-12

@@ -9,19 +9,18 @@ void bind_stays(nb::module_& m) {
 
     m.def(
         "merge_bins",
-        [](View<const i64> minute, View<const u8, 2> shown, View<const i64> bin, View<const i64> patch,
+        [](View<const i64> minute, View<const i64> view, View<const i64> bin, View<const i64> patch,
            View<const i64> steps, i64 longest) {
-            require(minute.size() == shown.size(), "minute must be (bins,), shown (bins, patches)");
+            require(minute.size() == view.size(), "minute and view must be (bins,)");
             require(bin.size() == patch.size() && bin.size() == steps.size(),
                     "bin, patch and steps must have one length");
-            require(all_in_range(bin, 0, shown.size()) && all_in_range(patch, 0, shown.shape[1]) &&
-                        std::is_sorted(bin.begin(), bin.end()),
-                    "bin must ascend and hold numbers of bins, patch numbers of patches");
-            OwnedStretches result = merge_bins(minute, shown, {bin, patch, steps}, longest);
-            return std::tuple(std::move(result.bins), std::move(result.hour), std::move(result.shown),
-                              std::move(result.begin), std::move(result.patch), std::move(result.share));
+            require(all_in_range(bin, 0, view.size()) && std::is_sorted(bin.begin(), bin.end()),
+                    "bin must ascend and hold numbers of bins");
+            OwnedStretches result = merge_bins(minute, view, {bin, patch, steps}, longest);
+            return std::tuple(std::move(result.bins), std::move(result.view), std::move(result.begin),
+                              std::move(result.patch), std::move(result.share));
         },
-        "minute"_a, "shown"_a, "bin"_a, "patch"_a, "steps"_a, "longest"_a, Unlocked(),
+        "minute"_a, "view"_a, "bin"_a, "patch"_a, "steps"_a, "longest"_a, Unlocked(),
         "Merge bins with equal evidence; see `fleet2d.kernels.stays`.");
     m.def(
         "follow",

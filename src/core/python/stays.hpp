@@ -9,7 +9,7 @@ namespace fleet2d {
 template <>
 struct border::Fields<Stretches> {
     static constexpr auto name = nb::detail::const_name("tuple[typing.Any, ...]");
-    static constexpr auto members = std::tuple(&Stretches::bins, &Stretches::hour, &Stretches::shown, &Stretches::begin,
+    static constexpr auto members = std::tuple(&Stretches::bins, &Stretches::view, &Stretches::views, &Stretches::begin,
                                                &Stretches::patch, &Stretches::share);
 };
 
@@ -30,9 +30,10 @@ inline void check_stays(const StayModel& model, const Stretches& stretches) {
     require(model.first.size() == rooms + 1 && model.first[0] == 0 && model.first[rooms] == patches &&
                 std::is_sorted(model.first.begin(), model.first.end()),
             "first must be (rooms + 1,), ascending from 0 to the number of patches");
-    require(stretches.hour.size() == count && stretches.shown.size() == count && stretches.shown.shape[1] == patches &&
+    require(stretches.view.size() == count && stretches.views.shape[1] == patches &&
                 stretches.begin.size() == count + 1 && stretches.patch.size() == stretches.share.size(),
             "stretches must be of one length and of the patches of spread, begin one longer, patch as long as share");
+    require(all_in_range(stretches.view, 0, stretches.views.size()), "view must hold numbers of views");
     require(all_in_range(stretches.bins, 1, i64{1} << 31), "bins must be 1 or more");
     require(all_in_range(stretches.begin, 0, stretches.patch.size() + 1), "begin must hold numbers of sightings");
     require(all_in_range(stretches.patch, 0, patches), "patch must hold numbers of patches");

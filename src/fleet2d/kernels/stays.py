@@ -24,20 +24,25 @@ class Stretches(NamedTuple):
 
     Attributes:
         bins: int64 (stretches,), number of bins of each stretch.
-        hour: int64 (stretches,), hour of the day.
-        shown: uint8 (stretches, patches), the part of each patch in view, in 1/255; 0 for away,
-            the last patch.
+        view: int64 (stretches,), the row of `views`.
+        views: uint8 (views, patches), the part of each patch in view, in 1/255; 0 for away, the
+            last patch. The stretches of all users share it.
         begin: int64 (stretches + 1,), offsets of each stretch's sightings in `patch` and `share`.
         patch: int64 (sightings,), where the user was perceived.
         share: float64 (sightings,), share of the steps with a sighting.
     """
 
     bins: I64
-    hour: I64
-    shown: U8
+    view: I64
+    views: U8
     begin: I64
     patch: I64
     share: F64
+
+    @property
+    def shown(self) -> U8:
+        """The part of each patch in view in each stretch: uint8 (stretches, patches)."""
+        return self.views[self.view]
 
 
 class StayModel(NamedTuple):
@@ -83,7 +88,7 @@ class Moments(NamedTuple):
 
 
 def merge_bins(
-    minute: I64, shown: U8, seen_bin: I64, patch: I64, steps: I64, longest: int
+    minute: I64, view: I64, views: U8, seen: tuple[I64, I64, I64], longest: int
 ) -> Stretches:
     """Merge consecutive bins with the same view and the same sightings.
 
@@ -92,13 +97,14 @@ def merge_bins(
     Args:
         minute: int64 (bins,), begin of each bin [minutes since midnight]; no stretch crosses an
             hour.
-        shown: uint8 (bins, patches), as in Stretches, without away.
-        seen_bin: int64 (sightings,), the bin of each sighting, ascending.
-        patch: int64 (sightings,), where the user was perceived, ascending within each bin.
-        steps: int64 (sightings,), the number of steps with a sighting in that bin and patch.
+        view: int64 (bins,), the row of `views`; consecutive bins with the same view have the same.
+        views: uint8 (views, patches), as in Stretches.
+        seen: Where the user was perceived: the bin of each sighting, int64 (sightings,), ascending;
+            the patch, ascending within each bin; and the number of steps with a sighting there.
         longest: Largest number of bins in a stretch.
 
     Raises:
-        ValueError: The arrays have different numbers of bins or patches.
+        ValueError: The arrays have different numbers of bins or sightings.
     """
-    return Stretches(*_core.merge_bins(minute, shown, seen_bin, patch, steps, longest))
+    bins, view, begin, patch, share = _core.merge_bins(minute, view, *seen, longest)
+    return Stretches(bins, view, views, begin, patch, share)

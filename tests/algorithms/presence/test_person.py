@@ -9,16 +9,16 @@ from tests.kernels.test_stays import PATCHES, PLACES, ROOM, by_state, case, twin
 
 from fleet2d.algorithms.evidence import Evidence, Parts, SightingCounts
 from fleet2d.algorithms.presence.counts import Bins, in_time
+from fleet2d.algorithms.presence.day_evidence import DayEvidence, distinct
 from fleet2d.algorithms.presence.person import (
     STAY,
     Person,
     Prior,
     StateLayout,
     model_of,
-    stretches_of,
 )
 from fleet2d.kernels.smoothing import smooth
-from fleet2d.kernels.stays import Moments, merge_bins
+from fleet2d.kernels.stays import Moments, Stretches, merge_bins
 
 PRIOR = Prior(0.9, 0.05)
 
@@ -97,17 +97,21 @@ def bins_of(shown: Any, seen: Any, start: int = 0) -> Bins:
     return in_time(Evidence(start * 10, 10, by_room, in_rooms, parts), MONDAY, 6_000_000)
 
 
+def stretches_of(bins: Bins, longest: int) -> Stretches:
+    return DayEvidence.of(bins).stretches(0, longest)
+
+
 def test_equal_bins_are_merged_within_an_hour() -> None:
     shown = [[0, 1, 0]] * 6 + [[0, 1, 0.5]] * 2
     seen = [[0, 0, 0]] * 2 + [[0, 7, 0]] * 2 + [[0, 3, 3]] * 2 + [[0, 0, 0]] * 2
-    merged = stretches_of(bins_of(shown, seen, start=57), 0, longest=5)
+    merged = stretches_of(bins_of(shown, seen, start=57), longest=5)
     assert [2, 1, 1, 1, 1, 2] == merged.bins.tolist()  # the hour ends after three
-    assert [0, 0, 1, 1, 1, 1] == merged.hour.tolist()
+    assert [0, 0, 0, 0, 0, 1] == merged.view.tolist()
     assert [0, 0, 1, 2, 4, 6, 6] == merged.begin.tolist()
     assert [1, 1, 1, 2, 1, 2] == merged.patch.tolist()
     assert [1, 1, 0.5, 0.5, 0.5, 0.5] == merged.share.tolist()
     assert [0, 255, 128, 0] == merged.shown[-1].tolist()
-    assert [1] * 8 == stretches_of(bins_of(shown, seen), 0, longest=1).bins.tolist()
+    assert [1] * 8 == stretches_of(bins_of(shown, seen), longest=1).bins.tolist()
 
 
 def test_where_somebody_unknown_was_seen_nothing_is_watched_in_vain() -> None:
@@ -115,7 +119,7 @@ def test_where_somebody_unknown_was_seen_nothing_is_watched_in_vain() -> None:
     assert bins.by_patch is not None
     seen = np.array([[[0, 0, 0], [0, 0, 4]]])  # anybody, but not the user
     bins = bins._replace(by_patch=bins.by_patch._replace(sightings=SightingCounts.of(seen)))
-    assert [255, 255, 0, 0] == stretches_of(bins, 0, longest=1).shown[0].tolist()
+    assert [255, 255, 0, 0] == stretches_of(bins, longest=1).shown[0].tolist()
 
 
 def test_a_user_never_seen_in_a_watched_patch_may_be_in_the_other() -> None:
@@ -123,12 +127,12 @@ def test_a_user_never_seen_in_a_watched_patch_may_be_in_the_other() -> None:
     prior, seen = Prior(0.9, 1e-6), [[0, 0, 0]] * 600
     bins = bins_of([[1, 0, 1]] * 600, seen)
     person = Person(StateLayout.of(bins, 1), prior)
-    places = person.end_day(stretches_of(bins, 0, longest=5)).by_bin
+    places = person.end_day(stretches_of(bins, longest=5)).by_bin
     assert places[300, 0] > 0.1
     assert places[300, 1] < 0.01
     hidden = bins_of([[0.5, 0, 1]] * 600, seen)
     person = Person(StateLayout.of(hidden, 1), prior)
-    again = person.end_day(stretches_of(hidden, 0, longest=5)).by_bin
+    again = person.end_day(stretches_of(hidden, longest=5)).by_bin
     assert places[300, 0] + 0.02 < again[300, 0]
 
 
@@ -139,11 +143,12 @@ def test_revisited_days_count_once() -> None:
     seen = (np.eye(3)[looks] * (random.random((3 * 1440, 1)) < 0.3) * 5).astype(int)
     bins = bins_of(shown, seen)
     person = Person(StateLayout.of(bins, 2), PRIOR)
-    for day in range(3):
-        person.end_day(stretches_of(bins.part(day * 1440, (day + 1) * 1440), 0, longest=1))
+    days = [stretches_of(bins.part(day * 1440, (day + 1) * 1440), longest=1) for day in range(3)]
+    for stretches in days:
+        person.end_day(stretches)
     for _ in range(20):
         for day in (2, 1, 0):
-            person.revisit(day, 1.0)
+            person.revisit(day, 1.0, days[day])
     for total, parts in zip(
         person.total, zip(*(day.moments for day in person.days), strict=True), strict=True
     ):
@@ -156,11 +161,13 @@ def test_merging_bins_loses_nothing() -> None:
         random = np.random.default_rng(seed)
         shown = random.choice([0, 255], (90, 3), p=[0.9, 0.1]).astype(np.uint8)
         seen = random.choice([0, 3], (90, 3), p=[0.95, 0.05]).astype(np.int64)
-        merged = merge_bins(np.arange(90), shown, *np.nonzero(seen), seen[seen > 0], 4)
+        view, views = distinct(shown)
+        sightings = (*np.nonzero(seen), seen[seen > 0])
+        merged = merge_bins(np.arange(90), view, views, sightings, 4)
         assert 90 == merged.bins.sum()
         assert merged.bins.max() <= 4
         at = np.repeat(np.arange(len(merged.bins)), merged.bins)
-        assert np.array_equal(merged.shown[at, :3], shown)
+        assert np.array_equal(merged.shown[at], shown)
         rebuilt = np.zeros((len(merged.bins), 3))
         stretch = np.repeat(np.arange(len(merged.bins)), np.diff(merged.begin))
         rebuilt[stretch, merged.patch] = merged.share

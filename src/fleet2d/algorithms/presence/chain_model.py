@@ -12,11 +12,12 @@ from pydantic import Field
 from fleet2d.algorithms.presence.anyone import unknown_seen, with_anyone
 from fleet2d.algorithms.presence.belief import BeliefSeries, Presence
 from fleet2d.algorithms.presence.counts import Bins
+from fleet2d.algorithms.presence.day_evidence import DayEvidence, by_day
 from fleet2d.algorithms.presence.estimator import F64, normalized
 from fleet2d.algorithms.presence.habits import Habits
-from fleet2d.algorithms.presence.likelihood import Likelihood, by_day
+from fleet2d.algorithms.presence.likelihood import Likelihood
 from fleet2d.algorithms.presence.model import Model
-from fleet2d.algorithms.presence.person import Person, stretches_of
+from fleet2d.algorithms.presence.person import Person
 from fleet2d.component import register
 from fleet2d.kernels.presence import advance
 from fleet2d.kernels.stays import StayModel, Stretches, follow
@@ -193,16 +194,16 @@ class Filter(Model):
         return home, away
 
     def _observe_day(self, bins: Bins) -> tuple[F64, F64]:
-        self.learner.add(bins)
+        day = self.learner.add(bins)
         people = self.learner.people
         self.followers = self.followers or [Follower(person) for person in people]
-        places = [self._follow(user, bins) for user in range(len(people))]
+        places = [self._follow(user, day) for user in range(len(people))]
         return split(places, self.users, bins)
 
-    def _follow(self, user: int, bins: Bins) -> F64:
-        stretches = stretches_of(bins, user, 1)
+    def _follow(self, user: int, day: DayEvidence) -> F64:
+        stretches = day.stretches(user, 1)
         if not self.negative:
-            stretches = stretches._replace(shown=np.zeros_like(stretches.shown))
+            stretches = stretches._replace(views=np.zeros_like(stretches.views))
         return self.followers[user].follow(self.learner.people[user].model, stretches)
 
     def habits(self, user: int) -> Habits | None:
@@ -255,14 +256,14 @@ class RoutineModel(SemiMarkov):
 
     smoothing: float = Field(default=60, gt=0)
 
-    def _follow(self, user: int, bins: Bins) -> F64:
+    def _follow(self, user: int, day: DayEvidence) -> F64:
         habits, model = self.habits(user), self.learner.people[user].model
-        hours = bins.day * 24 + bins.minute // 60
+        hours = day.minute // 60
         ends = [0, *(np.flatnonzero(np.diff(hours)) + 1).tolist(), len(hours)]
         places = []
-        for part in (bins.part(a, b) for a, b in pairwise(ends)):
-            at_hour = habits.at(model, int(part.day[0] - 1) % 7, int(part.minute[0]) // 60)
-            places.append(self.followers[user].follow(at_hour, stretches_of(part, user, 1)))
+        for part in (day.part(a, b) for a, b in pairwise(ends)):
+            at_hour = habits.at(model, (day.number - 1) % 7, int(part.minute[0]) // 60)
+            places.append(self.followers[user].follow(at_hour, part.stretches(user, 1)))
         return np.concatenate(places)
 
     def habits(self, user: int) -> Habits:

@@ -1,29 +1,25 @@
 """Full likelihood: stays as a hidden Markov chain, for which empty views are evidence, too."""
 
-from collections.abc import Mapping, Sequence
-from itertools import pairwise
+from collections.abc import Mapping
 from statistics import NormalDist
-from typing import Any, NamedTuple, Self
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from fleet2d.algorithms.evidence import SightingCounts
-from fleet2d.algorithms.presence.anyone import unknown_seen
 from fleet2d.algorithms.presence.counts import Bins
+from fleet2d.algorithms.presence.day_evidence import DayEvidence, by_day
 from fleet2d.algorithms.presence.estimator import F64, FEWEST_DAYS, Estimator, normalized
 from fleet2d.algorithms.presence.person import (
     Person,
     Prior,
     StateLayout,
     StretchPlaces,
-    watched_patches,
 )
 from fleet2d.component import register
 from fleet2d.errors import ComponentError
 from fleet2d.kernels.evidence import sum_places
-from fleet2d.kernels.stays import Stretches, merge_bins
 from fleet2d.units import Share
 
 I64 = NDArray[np.int64]
@@ -91,7 +87,7 @@ class Likelihood(Estimator):
         self.people: list[Person] = []
         self.learned: Mapping[str, Any] = {}
         self.parts: list[DayEvidence] = []  # the parts of the present day
-        self.days: list[DayEvidence] = []  # the days that are revisited, without their views
+        self.days: list[DayEvidence] = []  # the days that are revisited
         self.hours: list[F64] = []  # the sums by hour of these days
         self.turn = 0  # index of the day that was revisited last
         self.is_watched = np.zeros(rooms, bool)  # whether a robot has looked into the room
@@ -171,7 +167,7 @@ class Likelihood(Estimator):
             ]
             self.counts.add_hours(*self._by_hour(places, part))
 
-    def add(self, bins: Bins) -> "DayEvidence":
+    def add(self, bins: Bins) -> DayEvidence:
         """Add evidence of one day, which is learned from when the next day begins."""
         if not self.people:
             self._create_people(bins)
@@ -213,7 +209,7 @@ class Likelihood(Estimator):
             return np.ones(self.rooms, bool)
         return np.isin(self.island, self.island[self.is_watched])
 
-    def _by_hour(self, places: list[StretchPlaces], day: "DayEvidence") -> tuple[I64, F64]:
+    def _by_hour(self, places: list[StretchPlaces], day: DayEvidence) -> tuple[I64, F64]:
         """Return the hours of the bins, as ordinal * 24 + hour, and the sums of each hour.
 
         The sums are those of p, p (1 - p), and 1: float64 (hours, users + 1, width).
@@ -223,7 +219,7 @@ class Likelihood(Estimator):
         sums = sum_places(places, day.unknown, self.users, first)
         return day.number * 24 + hour[first], sums
 
-    def _whole_day(self, places: list[StretchPlaces], day: "DayEvidence") -> F64:
+    def _whole_day(self, places: list[StretchPlaces], day: DayEvidence) -> F64:
         """Return the sums of each hour of a day: float64 (24, users + 1, width)."""
         hours, sums = self._by_hour(places, day)
         by_hour = np.zeros((24, *sums.shape[1:]))
@@ -239,7 +235,7 @@ class Likelihood(Estimator):
         ]
         self.counts.hours = self._whole_day(places, day)
         self.hours.append(self.counts.hours)
-        self.days.append(day._replace(watched=None, sightings=None))
+        self.days.append(day)
         for _ in range(REVISITS):
             self.turn = (self.turn - 1) % len(self.days)
             self._revisit(self.turn)
@@ -253,7 +249,10 @@ class Likelihood(Estimator):
         """Smooth a day with the present model, and replace its sums."""
         day = self.days[number]
         weight = self.counts.faded(self.counts.today - day.number)
-        places = [person.revisit(number, weight) for person in self.people]
+        places = [
+            person.revisit(number, weight, day.stretches(user, self.together))
+            for user, person in enumerate(self.people)
+        ]
         hours = self._whole_day(places, day)
         self.counts.put(day.number, self.hours[number], hours)
         self.hours[number] = hours
@@ -267,52 +266,3 @@ class Likelihood(Estimator):
         """Restore what `remember` returned; called after `begin`."""
         super().recall(learned, today)
         self.learned = learned.get("stays", {})
-
-
-class DayEvidence(NamedTuple):
-    """Evidence of one day, or of a part of it, as the chains of users need it.
-
-    Attributes:
-        number: The day, as `date.toordinal` counts.
-        minute: int64 (bins,), begin of each bin [minutes since midnight].
-        unknown: bool (bins, rooms), where an unknown person was perceived.
-        watched: uint8 (bins, patches), from `watched_patches`; None after the day was learned from.
-        sightings: Where users were perceived; None after the day was learned from.
-    """
-
-    number: int
-    minute: I64
-    unknown: NDArray[np.bool_]
-    watched: NDArray[np.uint8] | None
-    sightings: SightingCounts | None
-
-    @classmethod
-    def of(cls, bins: Bins) -> Self:
-        """Return the evidence of bins of one day."""
-        number, watched = int(bins.day[0]), watched_patches(bins)
-        return cls(number, bins.minute, unknown_seen(bins), watched, bins.parts.sightings)
-
-    @classmethod
-    def joined(cls, parts: Sequence[Self]) -> Self:
-        """Return consecutive parts of a day as one."""
-        if len(parts) == 1:
-            return parts[0]
-        return cls(
-            parts[0].number,
-            np.concatenate([part.minute for part in parts]),
-            np.concatenate([part.unknown for part in parts]),
-            np.concatenate([part.watched for part in parts if part.watched is not None]),
-            SightingCounts.joined([part.sightings for part in parts if part.sightings]),
-        )
-
-    def stretches(self, user: int, longest: int) -> Stretches:
-        """Return the evidence of one user, with runs of identical consecutive bins merged."""
-        assert self.watched is not None
-        assert self.sightings is not None
-        return merge_bins(self.minute, self.watched, *self.sightings.of_user(user), longest)
-
-
-def by_day(bins: Bins) -> list[Bins]:
-    """Split evidence into days."""
-    ends = [*(np.flatnonzero(np.diff(bins.day)) + 1).tolist(), len(bins.day)]
-    return [bins.part(a, b) for a, b in pairwise([0, *ends]) if a < b]

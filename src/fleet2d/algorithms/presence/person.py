@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from fleet2d.algorithms.presence.counts import Bins
 from fleet2d.kernels.smoothing import smooth
-from fleet2d.kernels.stays import WHOLE_PATCH, Moments, StayModel, Stretches, follow, merge_bins
+from fleet2d.kernels.stays import Moments, StayModel, Stretches, follow
 
 F64 = NDArray[np.float64]
 I64 = NDArray[np.int64]
@@ -127,17 +127,15 @@ class StretchPlaces(NamedTuple):
 
 @dataclass
 class PersonDay:
-    """The evidence of one day of a person, and the statistics learned from it.
+    """The messages to one day of a person, and the statistics learned from it.
 
     Attributes:
-        stretches: The evidence.
         start: float64 (stages, patches), the distribution before the day.
         backward: float64 (stages, patches), the backward message from later days: the likelihood
             of their evidence given each state.
         moments: The expected sufficient statistics of the day.
     """
 
-    stretches: Stretches
     start: F64
     backward: F64
     moments: Moments
@@ -192,10 +190,10 @@ class Person:
     def end_day(self, stretches: Stretches) -> StretchPlaces:
         """Smooth the finished day as a whole, and learn from it."""
         moments = self.layout.no_moments()
-        self.days.append(PersonDay(stretches, self.day_start, self.ones, moments))
-        return self.revisit(len(self.days) - 1, 1.0)
+        self.days.append(PersonDay(self.day_start, self.ones, moments))
+        return self.revisit(len(self.days) - 1, 1.0, stretches)
 
-    def revisit(self, number: int, weight: float) -> StretchPlaces:
+    def revisit(self, number: int, weight: float, stretches: Stretches) -> StretchPlaces:
         """Smooth a day with the present model, and update the model by the difference.
 
         The day before and the next day get new boundary messages, which they use when they are
@@ -204,9 +202,10 @@ class Person:
         Args:
             number: Index of the day in `days`.
             weight: Weight of the day.
+            stretches: The evidence of the day.
         """
         day, moments = self.days[number], self.layout.no_moments()
-        places, end, begin = smooth(self.model, day.stretches, day.start, day.backward, moments)
+        places, end, begin = smooth(self.model, stretches, day.start, day.backward, moments)
         if number > 0:
             self.days[number - 1].backward = begin
         if number + 1 < len(self.days):
@@ -221,7 +220,7 @@ class Person:
         )
         day.moments = moments
         self.model = model_of(self.total, self.layout, self.prior)
-        return StretchPlaces(places, day.stretches.bins)
+        return StretchPlaces(places, stretches.bins)
 
     def fade(self, weight: float) -> None:
         """Multiply the moments learned so far by a weight."""
@@ -244,33 +243,3 @@ class Person:
         self.total = Moments(**{name: np.array(part, np.float64) for name, part in arrays.items()})
         self.model = model_of(self.total, self.layout, self.prior)
         return True
-
-
-def watched_patches(bins: Bins) -> NDArray[np.uint8]:
-    """Return how much of each patch was watched, 0 to WHOLE_PATCH: uint8 (bins, patches).
-
-    A patch in which an unknown person was perceived, who may be any user, counts as unwatched.
-    """
-    shown = bins.parts.shown_parts
-    if shown is None:
-        whole = np.minimum(bins.parts.shown, 1) * WHOLE_PATCH
-        shown = np.rint(whole).astype(np.uint8)
-    sightings = bins.parts.sightings
-    if sightings.shape[1] > 1:
-        shown = np.where(sightings.unknown, np.uint8(0), shown)
-    return shown
-
-
-def stretches_of(
-    bins: Bins, user: int, longest: int, watched: NDArray[np.uint8] | None = None
-) -> Stretches:
-    """Return the evidence of one user, with runs of identical consecutive bins merged.
-
-    Args:
-        bins: The evidence.
-        user: Row of the user; the last row is anybody.
-        longest: Largest number of bins in a stretch.
-        watched: `watched_patches` of these bins, the same for all users; None: it is computed.
-    """
-    watched = watched_patches(bins) if watched is None else watched
-    return merge_bins(bins.minute, watched, *bins.parts.sightings.of_user(user), longest)
