@@ -298,8 +298,8 @@ def test_one_of_places_nested_errors() -> None:
         "your own is written 'package.module:Class'",
         "others.1.type": "'type' is needed to tell which gadget this is: fan, lamp",
         "others.2.watts": "Input should be greater than 0",
-        "others.3": "found 3; a mapping with 'type', or a type's name, is wanted",
-        "others.4": f"found {Shelf}; a mapping with 'type', or a type's name, is wanted",
+        "others.3": "expected a mapping with 'type', or the name of a type, got 3",
+        "others.4": f"expected a mapping with 'type', or the name of a type, got {Shelf}",
     }
 
 
@@ -307,4 +307,4 @@ def test_one_of_refuses_an_instance_of_another_kind() -> None:
     class Stranger(Component):
         kind: ClassVar[str] = "stranger"
 
-    assert errors(Shelf, {"top": Stranger()}) == {"top": "found a Stranger; a gadget is wanted"}
+    assert errors(Shelf, {"top": Stranger()}) == {"top": "expected a gadget, got a Stranger"}

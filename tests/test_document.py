@@ -87,7 +87,7 @@ def test_places_are_lines(tmp_path: Path) -> None:
         (b"? [a]\n: 1", "home.yaml:1: a key must be plain text"),
         (b"a: *b", "home.yaml:1: not valid YAML: found undefined alias 'b'"),
         (b"a: !mine 3", "home.yaml:1: the tag '!mine' can't be used here"),
-        (b"a: !!int x", "home.yaml:1: 'x' is no int that can be read"),
+        (b"a: !!int x", "home.yaml:1: 'x' is not a valid int"),
         (b"a: 1\n---\nb: 2", "home.yaml:2: not valid YAML: a scenario is one document: remove the line '---'"),
         (b"a: \x01", "home.yaml: not valid YAML: unacceptable character"),
         (b"[" * 5000, "home.yaml: it has at least 65 lists in lists, and at most 64 are read"),

@@ -48,7 +48,7 @@ def test_short_form_equals_long_form() -> None:
 
 def test_short_form_errors_name_keys_as_written() -> None:
     assert errors(SHORT, {"type": "lamp", "radius": "x", "watts": 0, "radiu": 1}) == {
-        "radius": "found 'x'; a length is wanted: a number in m, or like '0.2 m', '20 cm', '5 mm'",
+        "radius": "expected a length, got 'x': write a number in m, or like '0.2 m', '20 cm', '5 mm'",
         "watts": "Input should be greater than 0",
         "radiu": "unknown key 'radiu': did you mean 'radius'? "
         "Allowed here: cell, radius, warm_up, watts",

@@ -95,21 +95,21 @@ def test_duration_dumps_in_the_largest_unit_that_divides_it(written: object, dum
         ("1 parsec", "unknown unit 'parsec' in '1 parsec': a duration is written like '30 s', "
                      "'5 min', '1 h', '14 d'"),
         ({"fortnights": 1}, "unknown unit 'fortnights' in"),
-        ("fast", "found 'fast'; a duration is wanted: a number in s, or like '30 s'"),
-        ("", "found ''; a duration is wanted"),
-        ("5 3", "found '5 3'; a duration is wanted"),
-        ("1 h 30", "found '1 h 30'; a duration is wanted"),
-        (True, "found True; a duration is wanted"),
-        (None, "found None; a duration is wanted"),
-        ({}, "found {}; a duration is wanted"),
-        ({"days": "3"}, "found {'days': '3'}; a duration is wanted"),
-        (-1, "found -1 s; a duration can't be negative"),
-        (timedelta(-1), "a duration can't be negative"),
-        (1e-7, "found 1e-07; the shortest duration is 1 microsecond"),
-        ("1e300 s", "found '1e300 s'; 1000 years is the longest duration"),
-        (timedelta.max, "1000 years is the longest duration"),
-        (float("nan"), "found nan; a duration is a finite number"),
-        (float("inf"), "found inf; a duration is a finite number"),
+        ("fast", "expected a duration, got 'fast': write a number in s, or like '30 s'"),
+        ("", "expected a duration, got ''"),
+        ("5 3", "expected a duration, got '5 3'"),
+        ("1 h 30", "expected a duration, got '1 h 30'"),
+        (True, "expected a duration, got True"),
+        (None, "expected a duration, got None"),
+        ({}, "expected a duration, got {}"),
+        ({"days": "3"}, "expected a duration, got {'days': '3'}"),
+        (-1, "expected a duration of 0 or more, got -1 s"),
+        (timedelta(-1), "expected a duration of 0 or more"),
+        (1e-7, "expected a duration of 1 microsecond or longer, got 1e-07"),
+        ("1e300 s", "expected a duration of at most 1000 years, got '1e300 s'"),
+        (timedelta.max, "expected a duration of at most 1000 years"),
+        (float("nan"), "expected a duration, a finite number, got nan"),
+        (float("inf"), "expected a duration, a finite number, got inf"),
     ],
 )  # fmt: skip
 def test_duration_says_what_is_wrong(written: object, said: str) -> None:
@@ -117,11 +117,11 @@ def test_duration_says_what_is_wrong(written: object, said: str) -> None:
 
 
 def test_huge_exponent_is_refused_before_it_fills_the_memory() -> None:
-    assert "a length is wanted" in message(Length, "1e999999999 m")
+    assert "expected a length" in message(Length, "1e999999999 m")
 
 
 def test_positive_duration_refuses_zero() -> None:
-    assert "found 0 s; a duration longer than 0 is wanted" == message(PositiveDuration, 0)
+    assert "expected a duration longer than 0, got 0 s" == message(PositiveDuration, 0)
 
 
 @pytest.mark.parametrize(
@@ -151,14 +151,14 @@ def test_quantity_is_read_in_its_base_unit(type_: Any, written: object, number: 
     ("type_", "written", "said"),
     [
         (Length, "3 ft", "unknown unit 'ft' in '3 ft': a length is written like '0.2 m'"),
-        (Length, float("nan"), "found nan; a length is a finite number"),
-        (Length, "1e400", "found '1e400'; a length is a finite number"),
-        (PositiveLength, 0, "found 0; a length above 0 is wanted"),
-        (Speed, -1, "found -1; a speed is 0 or more"),
-        (Speed, "fast", "found 'fast'; a speed is wanted: a number in m/s, or like '0.6 m/s'"),
-        (TurnRateDeg, -1, "found -1; a turn rate is 0 or more"),
-        (Share, 1.5, "found 1.5; a share is 0 to 1, or '0 %' to '100 %'"),
-        (Share, "95", "found 95; a share is 0 to 1"),
+        (Length, float("nan"), "expected a length, a finite number, got nan"),
+        (Length, "1e400", "expected a length, a finite number, got '1e400'"),
+        (PositiveLength, 0, "expected a length above 0, got 0"),
+        (Speed, -1, "expected a speed of 0 or more, got -1"),
+        (Speed, "fast", "expected a speed, got 'fast': write a number in m/s, or like '0.6 m/s'"),
+        (TurnRateDeg, -1, "expected a turn rate of 0 or more, got -1"),
+        (Share, 1.5, "expected a share from 0 to 1, or from '0 %' to '100 %', got 1.5"),
+        (Share, "95", "expected a share from 0 to 1"),
     ],
 )
 def test_quantity_says_what_is_wrong(type_: Any, written: object, said: str) -> None:
@@ -182,7 +182,7 @@ def test_time_of_day_is_the_time_since_midnight(
 
 @pytest.mark.parametrize("written", ["24:01", "25:00", "7", "07:60", 450, "noon", None, "07:30 pm"])
 def test_time_of_day_refuses_what_no_clock_shows(written: object) -> None:
-    assert "a time of day is" in message(TimeOfDay, written)
+    assert "expected a time of day" in message(TimeOfDay, written)
 
 
 @pytest.mark.parametrize(
@@ -214,7 +214,7 @@ def test_path_starts_from_the_current_folder_otherwise(
 def test_path_that_is_no_file_is_refused(tmp_path: Path) -> None:
     assert f"no such file: {tmp_path / 'x'}" == message(InputPath, Text("x", tmp_path))
     assert f"a folder, not a file: {tmp_path}" == message(InputPath, tmp_path)
-    assert "found 3; the path of a file is wanted" == message(InputPath, 3)
+    assert "expected the path of a file, got 3" == message(InputPath, 3)
 
 
 def test_text_keeps_its_folder_in_copies() -> None:
@@ -225,7 +225,9 @@ def test_text_keeps_its_folder_in_copies() -> None:
 
 @pytest.mark.parametrize("duration", [timedelta(0), timedelta(seconds=3), timedelta(seconds=1)])
 def test_no_multiple_of_the_step_is_refused(duration: timedelta) -> None:
-    with pytest.raises(ScenarioError, match=r"^period is \d s, which is no multiple of .* \(2 s\)"):
+    with pytest.raises(
+        ScenarioError, match=r"^period is \d s, which is not a multiple of .* \(2 s\)"
+    ):
         whole_steps(duration, 2_000_000, "period")
 
 

@@ -49,7 +49,7 @@ that is as it should be, set FLEET2D_MAX_DEPTH=100 in the environment
         if not text:
             return self.usual
         if not (text.isascii() and text.isdigit() and len(text) < 19 and int(text) > 0):
-            raise InputError(f"{self.variable} is {text[:40]!r}: a whole number above 0 is wanted")
+            raise InputError(f"{self.variable}: expected a whole number above 0, got {text[:40]!r}")
         return int(text)
 
     def check(
@@ -68,9 +68,8 @@ that is as it should be, set FLEET2D_MAX_DEPTH=100 in the environment
         """
         if amount > self.most:
             raise error(
-                f"{what} has {least}{amount} {self.noun}, and at most {self.most} are read; if that"
-                f" is as it should be, set {self.variable}={amount * (2 if least else 1)} in the"
-                " environment"
+                f"{what} has {least}{amount} {self.noun}, and at most {self.most} are read; to read"
+                f" more, set {self.variable}={amount * (2 if least else 1)} in the environment"
             )
 
 

@@ -74,6 +74,6 @@ def next_time(text: str, now: datetime) -> datetime:
     try:
         at = time.fromisoformat(text)
     except ValueError:
-        raise InputError(f"{text!r} is no time of day: write it like 19:00") from None
+        raise InputError(f"expected a time of day like 19:00, got {text!r}") from None
     moment = datetime.combine(now.date(), at)
     return moment if moment >= now else moment + timedelta(days=1)

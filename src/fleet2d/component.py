@@ -80,7 +80,7 @@ class Settings(Described):
 
     @classmethod
     def _explain(cls, line: InitErrorDetails, data: Any) -> InitErrorDetails:
-        """Return an error with the list of known keys, or an example of the list that is wanted."""
+        """Return an error with the list of known keys, or an example of the expected list."""
         kind, (key, *inner_keys) = line["type"], line["loc"] or ("",)
         if kind == "extra_forbidden" and not inner_keys:
             line["type"] = unknown_key(key, cls.model_fields)
@@ -89,7 +89,7 @@ class Settings(Described):
             example = _example(cls, str(key))
             if example and isinstance(data, Mapping):
                 line["type"] = problem(
-                    f"found {shown(data.get(key))}; a list is wanted, like {example}"
+                    f"expected a list like {example}, got {shown(data.get(key))}"
                 )
                 line["loc"] = (key,)
         return line
@@ -113,7 +113,7 @@ def _refuse_booleans(data: Mapping[Any, Any], fields: Mapping[str, FieldInfo]) -
     for key, value in data.items():
         if isinstance(value, bool) and key in fields and fields[key].annotation in _NUMBERS:
             text = str(value).lower()
-            raise problem_at((key,), f"found {text}; a number is wanted", value)
+            raise problem_at((key,), f"expected a number, got {text}", value)
 
 
 def _example(cls: type[Settings], key: str) -> str:
@@ -329,12 +329,12 @@ class OneOf(Codec):
         """Return the component that a mapping describes."""
         if isinstance(value, Component):
             if value.kind != self.kind:
-                raise problem(f"found a {type(value).__name__}; a {self.kind} is wanted")
+                raise problem(f"expected a {self.kind}, got a {type(value).__name__}")
             return value
         if isinstance(value, str):
             value = {"type": value}
         if not isinstance(value, Mapping):
-            raise problem(f"found {value!r}; a mapping with 'type', or a type's name, is wanted")
+            raise problem(f"expected a mapping with 'type', or the name of a type, got {value!r}")
         fields = dict(value)
         name = fields.pop("type", None)
         try:

@@ -38,7 +38,7 @@ def folder_of(text: object) -> Path:
 def _existing(value: object, *, is_folder_allowed: bool = False) -> Path:
     kind = "file or folder" if is_folder_allowed else "file"
     if not isinstance(value, str | Path) or not str(value):
-        raise problem(f"found {shown(value)}; the path of a {kind} is wanted")
+        raise problem(f"expected the path of a {kind}, got {shown(value)}")
     path = (folder_of(value) / Path(value).expanduser()).resolve()
     if not (path.is_file() or (is_folder_allowed and path.is_dir())):
         reason = "a folder, not a file" if path.is_dir() else f"no such {kind}"

@@ -86,7 +86,7 @@ class Quantity:
             if part is None or (not part[2] and part.span() != (0, len(text))):
                 raise self._unreadable(text)
             if len(part[1]) > MOST_DIGITS:
-                raise problem(f"found {shown(text)}; a number has {MOST_DIGITS} digits at most")
+                raise problem(f"expected at most {MOST_DIGITS} digits in a row, got {shown(text)}")
             total += Fraction(part[1]) * (self._unit(part[2], text) if part[2] else 1)
             position = part.end()
         return total
@@ -98,9 +98,9 @@ class Quantity:
             # By repr, 0.1 is one tenth, not the nearest binary fraction.
             exact = value if isinstance(value, Decimal) else Decimal(repr(float(value)))
         except OverflowError:
-            raise problem(f"found {shown(value)}; {self.name} is a finite number") from None
+            raise problem(f"expected {self.name}, a finite number, got {shown(value)}") from None
         if not exact.is_finite() or exact.adjusted() > MOST_DIGITS:
-            raise problem(f"found {shown(value)}; {self.name} is a finite number")
+            raise problem(f"expected {self.name}, a finite number, got {shown(value)}")
         return Fraction(exact)
 
     def _unit(self, unit: object, source: object) -> Fraction:
@@ -113,7 +113,7 @@ class Quantity:
         return factor
 
     def _unreadable(self, value: object) -> PydanticCustomError:
-        return problem(f"found {shown(value)}; {self.name} is wanted: {self._forms()}")
+        return problem(f"expected {self.name}, got {shown(value)}: write {self._forms()}")
 
     def _forms(self) -> str:
         unit = f" in {self.base}" if self.base else ""
@@ -220,7 +220,7 @@ def whole_steps(
     steps, rest = divmod(micros(duration), step_us)
     if rest or steps < 1:
         raise error(
-            f"{key} is {format_duration(duration)}, which is no multiple of simulation.step"
+            f"{key} is {format_duration(duration)}, which is not a multiple of simulation.step"
             f" ({step_us / 1e6:g} s): choose a multiple"
         )
     return steps
@@ -239,14 +239,14 @@ def parse_duration(value: object) -> timedelta:
         seconds = DURATION.parse(value)
         count = round(seconds * 10**6)
         if seconds and not count:
-            raise problem(f"found {shown(value)}; the shortest duration is 1 microsecond")
+            raise problem(f"expected a duration of 1 microsecond or longer, got {shown(value)}")
         if abs(count) > micros(LONGEST_DURATION):
-            raise problem(f"found {shown(value)}; 1000 years is the longest duration")
+            raise problem(f"expected a duration of at most 1000 years, got {shown(value)}")
         value = timedelta(microseconds=count)
     if value < timedelta(0):
-        raise problem(f"found {format_duration(value)}; a duration can't be negative")
+        raise problem(f"expected a duration of 0 or more, got {format_duration(value)}")
     if value > LONGEST_DURATION:
-        raise problem(f"found {format_duration(value)}; 1000 years is the longest duration")
+        raise problem(f"expected a duration of at most 1000 years, got {format_duration(value)}")
     return value
 
 
@@ -284,9 +284,9 @@ def parse_time_of_day(value: object) -> timedelta:
         count = (int(match[1]) * 3600 + int(match[2]) * 60 + seconds) * 10**6
         value = timedelta(microseconds=int(count))
     elif not isinstance(value, timedelta):
-        raise problem(f"found {shown(value)}; a time of day is wanted, like '07:30' or '22:15:30'")
+        raise problem(f"expected a time of day like '07:30' or '22:15:30', got {shown(value)}")
     if not timedelta(0) <= value <= timedelta(days=1):
-        raise problem(f"found {format_time_of_day(value)}; a time of day is 00:00 to 24:00")
+        raise problem(f"expected a time of day up to 24:00, got {format_time_of_day(value)}")
     return value
 
 
@@ -308,16 +308,18 @@ def _to_float(quantity: Quantity) -> BeforeValidator:
         try:
             return float(quantity.parse(value))
         except OverflowError:
-            raise problem(f"found {shown(value)}; {quantity.name} is a finite number") from None
+            raise problem(
+                f"expected {quantity.name}, a finite number, got {shown(value)}"
+            ) from None
 
     return BeforeValidator(parse)
 
 
-def _limit(is_valid: Callable[[Any], bool], rule: str) -> AfterValidator:
+def _limit(is_valid: Callable[[Any], bool], expected: str) -> AfterValidator:
     def check(value: Any) -> Any:
         if not is_valid(value):
             text = format_duration(value) if isinstance(value, timedelta) else f"{value:g}"
-            raise problem(f"found {text}; {rule}")
+            raise problem(f"expected {expected}, got {text}")
         return value
 
     return AfterValidator(check)
@@ -342,20 +344,20 @@ Duration = Annotated[
 """A length of time, 0 or more, exact to the microsecond; a timedelta in Python."""
 
 PositiveDuration = Annotated[
-    Duration, _limit(lambda value: value > timedelta(0), "a duration longer than 0 is wanted")
+    Duration, _limit(lambda value: value > timedelta(0), "a duration longer than 0")
 ]
 """A :data:`Duration` above 0."""
 
 Length = Annotated[float, _to_float(LENGTH), LENGTH.schema()]
 """A length or a coordinate [m]."""
 
-PositiveLength = Annotated[Length, _limit(lambda value: value > 0, "a length above 0 is wanted")]
+PositiveLength = Annotated[Length, _limit(lambda value: value > 0, "a length above 0")]
 """A :data:`Length` above 0."""
 
 Speed = Annotated[
     float,
     _to_float(SPEED),
-    _limit(lambda value: value >= 0, "a speed is 0 or more"),
+    _limit(lambda value: value >= 0, "a speed of 0 or more"),
     SPEED.schema(),
 ]
 """A speed, 0 or more [m/s]."""
@@ -366,7 +368,7 @@ AngleDeg = Annotated[float, _to_float(ANGLE), ANGLE.schema()]
 TurnRateDeg = Annotated[
     float,
     _to_float(TURN_RATE),
-    _limit(lambda value: value >= 0, "a turn rate is 0 or more"),
+    _limit(lambda value: value >= 0, "a turn rate of 0 or more"),
     TURN_RATE.schema(),
 ]
 """How fast a body turns, 0 or more [degrees/s]."""
@@ -374,7 +376,7 @@ TurnRateDeg = Annotated[
 Share = Annotated[
     float,
     _to_float(SHARE),
-    _limit(lambda value: 0 <= value <= 1, "a share is 0 to 1, or '0 %' to '100 %'"),
+    _limit(lambda value: 0 <= value <= 1, "a share from 0 to 1, or from '0 %' to '100 %'"),
     SHARE.schema(),
 ]
 """A probability or a part of a whole, 0 to 1."""

@@ -109,7 +109,7 @@ def _composed(loader: Any) -> yaml.Node | None:
         node: yaml.Node | None = loader.get_single_node()
         return node
     except RecursionError:
-        raise yaml.YAMLError("it has lists in lists without end") from None
+        raise yaml.YAMLError("it is nested too deeply") from None
     finally:
         loader.dispose()
 
@@ -196,7 +196,7 @@ class TreeWalk:
             return self._scalars.construct_object(node)
         except (ValueError, LookupError, TypeError, AttributeError, OverflowError):
             size = f" of {len(node.value)} characters" if len(node.value) > len(text) else ""
-            raise NodeError(node, f"{text!r}{size} is no {kind} that can be read") from None
+            raise NodeError(node, f"{text!r}{size} is not a valid {kind}") from None
 
     def pairs(self, node: yaml.MappingNode) -> list[Pair]:
         """Return the keys and values of a mapping, those that it merges from others ('<<') first.

@@ -98,7 +98,7 @@ def test_learned_state_of_another_home_is_refused(tmp_path: Path) -> None:
 def test_a_file_that_is_none_is_refused_in_plain_words(tmp_path: Path, text: str) -> None:
     path = tmp_path / "mine.npz"
     path.write_text(text)
-    with pytest.raises(InputError, match="not what an algorithm has learned"):
+    with pytest.raises(InputError, match="is not a file of learned state"):
         run(content("Counts", learned=str(path)))
 
 

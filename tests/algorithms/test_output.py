@@ -50,5 +50,5 @@ def test_scalars_and_lists_become_columns_of_their_kind(value: Any, kind: str) -
     "value", [np.zeros((2, 2)), None, object(), {"a": 1}, [None, 1], ["a", 1.5, None], 1j]
 )
 def test_unknown_columns_are_refused(value: Any) -> None:
-    with pytest.raises(ComponentError, match=r"algorithms\.a put out 'x'"):
+    with pytest.raises(ComponentError, match=r"algorithms\.a returned 'x'"):
         to_columns({"x": value}, [], "algorithms.a")

@@ -62,8 +62,8 @@ def test_plain_has_words_for_what_models_hold() -> None:
     [
         ("", "is damaged"),
         ('{"format": 1, "status": "comp', "is damaged"),
-        ("[]", "does not say its format"),
-        ("{}", "does not say its format"),
+        ("[]", "has no key 'format'"),
+        ("{}", "has no key 'format'"),
         ('{"format": 1, "status": "complete"}', "lacks digest"),
         ('{"format": 99}', "written by a later Fleet2D"),
         ("\x00\xff", "is damaged"),

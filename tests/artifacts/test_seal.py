@@ -148,7 +148,7 @@ def test_an_unfinished_run_has_nothing_to_compare_with(tmp_path: Path) -> None:
     Manifest().write(tmp_path)
     with pytest.raises(ArtifactError, match="no digest"):
         verify_run(tmp_path)
-    with pytest.raises(RunDirectoryError, match="no directory"):
+    with pytest.raises(RunDirectoryError, match="not a directory"):
         verify_run(tmp_path / "nothing")
 
 
@@ -198,11 +198,11 @@ def test_an_edited_manifest_is_refused_with_the_field(
 @pytest.mark.parametrize(
     ("text", "word"),
     [
-        ('{"format": 2, "format": 2}', "'format' is there twice"),
-        ('{"format": 2, "steps": NaN}', "NaN is no number"),
+        ('{"format": 2, "format": 2}', "'format' is given twice"),
+        ('{"format": 2, "steps": NaN}', "NaN is not a number"),
         ('{"format": 2, "steps": 1e999}', "1e999 is too large"),
         ("[" * 100_000, "nested too deeply"),
-        ('{"format": true}', "does not say its format"),
+        ('{"format": true}', "has no key 'format'"),
         ('{"format": ' + "9" * 5000 + "}", "damaged"),
     ],
 )
@@ -214,7 +214,7 @@ def test_a_strange_text_is_refused(tmp_path: Path, text: str, word: str) -> None
 
 def test_a_pipe_is_no_manifest(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "manifest.json")
-    with pytest.raises(RunDirectoryError, match="is no file"):
+    with pytest.raises(RunDirectoryError, match="is not a file"):
         open_run(tmp_path)
 
 

@@ -180,7 +180,7 @@ def test_directory_that_holds_something_is_refused(tmp_path: Path) -> None:
 def test_file_in_the_way_is_refused(tmp_path: Path, below: str) -> None:
     (tmp_path / "file").write_text("mine")
 
-    with pytest.raises(RunDirectoryError, match="is no directory"):
+    with pytest.raises(RunDirectoryError, match="is not a directory"):
         opened(tmp_path / "file" / below)
     assert "mine" == (tmp_path / "file").read_text()
 

@@ -234,7 +234,7 @@ def test_a_picture_of_the_smallest_log_is_drawn_and_one_of_another_kind_refused(
 
 def test_a_file_that_is_no_text_is_an_error(tmp_path: Path) -> None:
     (tmp_path / "log.csv").write_bytes(b"\xff\xfed\x00")
-    with pytest.raises(InputError, match="no text in UTF-8"):
+    with pytest.raises(InputError, match="not text in UTF-8"):
         read_log(tmp_path / "log.csv")
 
 

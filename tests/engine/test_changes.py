@@ -358,7 +358,7 @@ def test_homes_without_doors_pay_nothing() -> None:
     ("sections", "message"),
     [
         ({"changes": [{"at": "1 s", "shut": "dor"}]}, r"changes\.0: there is no door 'dor'"),
-        ({"changes": [{"shut": "door"}]}, r"changes\.0: there is no 'at'"),
+        ({"changes": [{"shut": "door"}]}, r"changes\.0: the key 'at' is missing"),
         ({"changes": [{"at": "1 s"}]}, "exactly one of open, shut, lock, unlock, move, room"),
         ({"changes": [{"at": "1 s", "move": "cart"}]}, "'move' and 'to' go together"),
         ({"changes": [{"at": "1 s", "move": "cart", "to": [99, 9]}]}, "is not in the home"),
@@ -381,7 +381,7 @@ def test_homes_without_doors_pay_nothing() -> None:
                     "d": {"type": "door", "doorway": "kitchen_0", "schedule": [{"at": "9:00"}]}
                 }
             },
-            "say 'open' or 'locked'",
+            "give 'open' or 'locked'",
         ),
     ],
 )

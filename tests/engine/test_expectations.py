@@ -348,10 +348,10 @@ WRONG = {
     "never(battery(ana) < 10 %)": "no robot with a battery 'ana'",
     "eventually(moving(ana), within=2 h)": "2 h is beyond the run, which goes on for 12 min",
     "alway(moving(ana))": "no 'alway': did you mean 'always'",
-    "moving(ana)": "doesn't say when",
+    "moving(ana)": "has no time operator",
     "always(distance(ana, astro))": "compare it",
     "always(moving(ana)": "can't be read",
-    "never(during(25:00-26:00))": "a time of day is 00:00 to 24:00",
+    "never(during(25:00-26:00))": "a time of day up to 24:00",
     "always(__import__(os))": "there is no '__import__'",
 }
 

@@ -149,10 +149,10 @@ MINE = f"{__name__}:"
 ALGORITHMS = {
     "raises": ["KeyError: 'kitchen'", "in update: return unknown_key(); ", "in unknown_key: "],
     "not a number": ["'n'", "not finite"],
-    "negative": ["at least 0"],
-    "sum": ["presence of 'ana' is no distribution", "sum to 1.1"],
+    "negative": ["0 or more"],
+    "sum": ["presence of 'ana' is not a distribution", "sum to 1.1"],
     "algorithm": ["'lpt'", "did you mean 'ltp'?", "There are: ltp, rtp, mine"],
-    "silent": ["'rtp'", "has put out nothing so far"],
+    "silent": ["'rtp'", "has no output yet"],
     "user": ["'an'", "There are: ana, anyone"],
     "body": ["'astor'", "no such body", "astro"],
     "truth": ["'ana'", "only metrics know"],
@@ -166,7 +166,7 @@ CASES = [
       for how, words in ALGORITHMS.items()),
     *(({"algorithms": {"mine": {"type": "ltp", "estimator": {"type": f"{MINE}FailsEstimator", "how": how}}}},
        "algorithms.mine", words)
-      for how, words in {"raises": ["KeyError"], "not a number": ["no distribution", "nan"]}.items()),
+      for how, words in {"raises": ["KeyError"], "not a number": ["not a distribution", "nan"]}.items()),
     *(({"algorithms": {"mine": {"type": "rtp", "period": "1 h", "model": {"type": f"{MINE}FailsModel", "how": how}}}},
        "algorithms.mine", words)
       for how, words in {

@@ -387,7 +387,7 @@ def test_whole_numbers_where_fractions_came_first_are_stored() -> None:
 
 def test_other_columns_than_before_are_refused() -> None:
     update = lambda h, s: {"x": 1} if h.end == 60 else {"x": 1, "y": 2}  # noqa: E731
-    with pytest.raises(ComponentError, match=r"algorithms\.a put out x, y, but x before"):
+    with pytest.raises(ComponentError, match=r"algorithms\.a returned x, y, but x before"):
         fleet2d.run(watched("2 min", algorithms={"a": algorithm(update, period=60)}))
 
 
@@ -431,8 +431,8 @@ def test_outputs_may_be_left_unstored() -> None:
         (lambda s: fleet2d.RoomDistribution([float("nan")] * 6), ["finite"]),
         (lambda s: fleet2d.RoomDistribution([-1] * 6), ["at least 0"]),
         (lambda s: {"x": [1, 2], "y": [1, 2, 3]}, ["different lengths", "'x': 2", "'y': 3"]),
-        (lambda s: 3, ["put out 3"]),
-        (lambda s: {}, ["put out {}"]),
+        (lambda s: 3, ["returned 3"]),
+        (lambda s: {}, ["returned {}"]),
         (lambda s: {"x": None}, ["'x'"]),
         (lambda s: {"x": {"a": 1}}, ["'x'"]),
         (lambda s: {"x": np.zeros((2, 2))}, ["x"]),

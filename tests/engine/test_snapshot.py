@@ -351,7 +351,7 @@ def test_a_file_that_is_not_there_is_an_error_in_words(tmp_path: Path, name: str
 def test_a_foreign_file_is_refused_in_plain_words(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "other"
     path.write_bytes(content)
-    with pytest.raises(ArtifactError, match="other is no saved simulation"):
+    with pytest.raises(ArtifactError, match="other is not a saved simulation"):
         Simulation.load(path)
 
 
@@ -367,7 +367,7 @@ def test_a_damaged_file_is_refused_wherever_it_is_damaged(tmp_path: Path) -> Non
         damaged = bytearray(whole)
         damaged[place] ^= 1 << draws.randrange(8)
         path.write_bytes(damaged)
-        with pytest.raises(ArtifactError, match=r"is damaged|is no saved simulation"):
+        with pytest.raises(ArtifactError, match=r"is damaged|is not a saved simulation"):
             Simulation.load(path)
     for length in [
         1,
@@ -376,7 +376,7 @@ def test_a_damaged_file_is_refused_wherever_it_is_damaged(tmp_path: Path) -> Non
         *(draws.randrange(len(whole)) for _ in range(50)),
     ]:
         path.write_bytes(whole[:length])
-        with pytest.raises(ArtifactError, match=r"is damaged|is no saved simulation"):
+        with pytest.raises(ArtifactError, match=r"is damaged|is not a saved simulation"):
             Simulation.load(path)
     path.write_bytes(whole + b"more")
     with pytest.raises(ArtifactError, match="is damaged"):
@@ -409,7 +409,7 @@ def test_a_file_of_another_version_says_which(tmp_path: Path) -> None:
     ids=repr,
 )
 def test_a_header_that_says_nothing_is_refused_in_plain_words(first: Any) -> None:
-    with pytest.raises(ArtifactError, match=r"is no saved simulation"):
+    with pytest.raises(ArtifactError, match=r"is not a saved simulation"):
         Simulation.load(file_of(first, b""))
 
 
@@ -418,7 +418,7 @@ def test_a_header_that_says_nothing_is_refused_in_plain_words(first: Any) -> Non
     [b"", b"garbage", pickle.dumps(None), pickle.dumps([1, 2]), pickle.dumps({"a": np.float64})],
 )
 def test_a_file_without_a_state_is_refused_in_plain_words(body: bytes) -> None:
-    with pytest.raises(ArtifactError, match=r"no state of a run|no part of a state"):
+    with pytest.raises(ArtifactError, match=r"no state of a run|can't be part of a state"):
         Simulation.load(file_of(header(), body))
 
 
@@ -481,7 +481,7 @@ def test_a_file_that_refers_to_what_is_no_part_of_a_state_is_refused(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     assert not may_refer(module, name) or "." in name or module.startswith("fleet2d")
-    with pytest.raises(ArtifactError, match=r"no part of a state|no state of a run"):
+    with pytest.raises(ArtifactError, match=r"can't be part of a state|no state of a run"):
         Simulation.load(file_of(header(), named(module, name)))
     assert [] == list(tmp_path.iterdir())
 
@@ -493,7 +493,7 @@ def test_a_file_that_calls_os_system_is_refused_and_nothing_is_called(
     for function, argument in ((os.system, "touch made"), (subprocess.Popen, ["touch", "made"])):
         body = pickle.dumps(Calls(function, argument))
         with pytest.raises(
-            ArtifactError, match=r"refers to (posix|os|subprocess)\.\w+, which is no"
+            ArtifactError, match=r"refers to (posix|os|subprocess)\.\w+, which can't be"
         ):
             Simulation.load(file_of(header(), body))
     assert [] == list(tmp_path.iterdir())

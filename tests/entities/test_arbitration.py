@@ -184,10 +184,10 @@ def test_the_next_begin_is_after_the_moment() -> None:
     ("when", "words"),
     [
         ("8-22", "time of day"),
-        ("always", "hours are wanted"),
+        ("always", "expected hours"),
         ("someday 08:00-09:00", "unknown day 'someday'"),
         ("08:00-08:00", "different times"),
-        ([7], "hours are wanted"),
+        ([7], "expected hours"),
     ],
 )
 def test_hours_that_can_not_be_read_are_refused(when: Any, words: str) -> None:

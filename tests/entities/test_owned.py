@@ -65,7 +65,7 @@ def test_it_is_written_as_it_was() -> None:
     [
         ({"object": "bed", "of": "anna"}, "no user 'anna'.*did you mean 'ana'"),
         ({"object": "bedd", "of": "ana"}, "did you mean 'bed'"),
-        ({"object": "bed"}, "a place is wanted"),
+        ({"object": "bed"}, "expected a place"),
     ],
 )
 def test_what_is_not_there_is_refused_with_the_nearest_name(place: Any, words: str) -> None:

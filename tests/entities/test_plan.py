@@ -338,7 +338,7 @@ def returns_the_same_plan_again() -> Decide:
         (lambda now: "kitchen", ["decide() returned 'kitchen'", "plan or None"]),
         (lambda now: now.plan().go_to("attic"), ["step 0", "no room 'attic'", "kitchen_0"]),
         (lambda now: now.plan().go_to([10.0, 1.0]), ["can't be reached"]),
-        (lambda now: now.plan().go_to(3), ["step 0", "a place is wanted"]),
+        (lambda now: now.plan().go_to(3), ["step 0", "expected a place"]),
         (lambda now: now.plan().stay(timedelta(seconds=-1)), ["can't stay for"]),
         (lambda now: now.plan().stay().go_to("kitchen"), ["can't go on"]),
         (lambda now: now.plan().stay().stay(timedelta(1)), ["can't go on"]),

@@ -105,7 +105,7 @@ def test_a_guest_comes_stays_and_leaves() -> None:
     assert "kitchen_0" == room(run, "gina")
     run.advance(420)
     assert run.state["gina"]["away"]
-    with pytest.raises(ScenarioError, match="ana is no guest"):
+    with pytest.raises(ScenarioError, match="ana is not a guest"):
         run.guest("ana")
 
 

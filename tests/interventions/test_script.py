@@ -39,9 +39,9 @@ def test_an_entry_is_read_as_it_is_written_in_short_and_in_long(content: dict[st
 @pytest.mark.parametrize(
     ("content", "words"),
     [
-        ({"at": "1 h"}, "doesn't say what is done"),
+        ({"at": "1 h"}, "the key of the intervention is missing"),
         ({"at": "1 h", "holdd": "ana"}, "did you mean 'hold'"),
-        ({"at": "1 h", "hold": "ana", "put": "ana"}, "hold and put are given"),
+        ({"at": "1 h", "hold": "ana", "put": "ana"}, "exactly one of hold and put"),
         ({"at": "1 h", "do": "holdd", "entity": "ana"}, "do: there is no intervention 'holdd'"),
         ({"at": "1 h", "do": "os:system"}, "no intervention 'os:system'"),
         ({"at": "1 h", "hold": "ana", "entity": "ben"}, "leave out 'entity'"),

@@ -75,7 +75,7 @@ def test_composition_leaves_its_source_as_it_was() -> None:
 @pytest.mark.parametrize(
     ("override", "message"),
     [
-        ("seed", "override 'seed': there is no '=' in it; write key.path=value"),
+        ("seed", "override 'seed': expected key.path=value, but there is no '='"),
         ("=4", "override '=4': a part of its key is empty"),
         ("a..b=4", "override 'a..b=4': a part of its key is empty"),
         ("a=", "override 'a=': no value; write a=null to delete an entry"),
@@ -173,7 +173,7 @@ def test_cycle_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None
     ("extends", "message"),
     [
         ("gone.yaml", "home.yaml:1: extends: there is no file"),
-        ("3", "home.yaml:1: extends: found 3; the path of a YAML file is wanted"),
+        ("3", "home.yaml:1: extends: expected the path of a YAML file, got 3"),
         ("bundled:bse", "home.yaml:1: extends: no scenario 'bse' is bundled: did you mean 'base'?"),
     ],
 )

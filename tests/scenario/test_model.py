@@ -131,31 +131,31 @@ def test_keywords_are_simulation_settings_and_sections(home: Path) -> None:
     [
         (["simulation.step=2 h", "simulation.duration=1 h"],
          "simulation.duration: 1 h is shorter than one step, 2 h"),
-        (["simulation.start=2026-01-05T00:00:00Z"], "simulation.start: found 2026-01-05T00:00:00+00"
-         ":00; a local time without a time zone is wanted"),
+        (["simulation.start=2026-01-05T00:00:00Z"], "simulation.start: expected a local time without"
+         " a time zone, since a simulated day has 24 hours, got 2026-01-05T00:00:00+00:00"),
         (["simulation.start=20260105"],
-         "simulation.start: found 20260105; a date and time is wanted"),
-        (["simulation.start=2026-02-31"], "simulation.start: found '2026-02-31'; a date and time"),
-        (["simulation.seed=-1"], "simulation.seed: found -1; 0 or more is wanted"),
-        (["simulation.max_span=0"], "simulation.max_span: found 0; 1 or more is wanted"),
-        (["simulation.speedup=0"], "simulation.speedup: found 0; 0.001 or more is wanted"),
-        (["simulation.speedup=.inf"], "simulation.speedup: found inf; a finite number is wanted"),
+         "simulation.start: expected a date and time like 2026-01-05T08:00, got 20260105"),
+        (["simulation.start=2026-02-31"], "simulation.start: expected a date and time like "),
+        (["simulation.seed=-1"], "simulation.seed: expected 0 or more, got -1"),
+        (["simulation.max_span=0"], "simulation.max_span: expected 1 or more, got 0"),
+        (["simulation.speedup=0"], "simulation.speedup: expected 0.001 or more, got 0"),
+        (["simulation.speedup=.inf"], "simulation.speedup: expected a finite number, got inf"),
         (["users.9x=drift"], "users.9x: the name '9x' must be letters"),
         (["robots.ana=drift"], "robots.ana: there is a user named 'ana' already"),
         (["floorplan=null"], "floorplan: missing, and has no default"),
         (["floorplan.path=gone.json"], "floorplan.path: no such file"),
         (["users.ana.sped=1"], "users.ana.sped: unknown key 'sped': did you mean 'speed'? Allowed "
          "here: camera, color, "),
-        (["users.ana.stops=hall"], "users.ana.stops: found 'hall'; a list is wanted"),
-        (["users.ana.speed=fast"], "users.ana.speed: found 'fast'; a speed is wanted: a number in"),
+        (["users.ana.stops=hall"], "users.ana.stops: expected a list, got 'hall'"),
+        (["users.ana.speed=fast"], "users.ana.speed: expected a speed, got 'fast': write a number in"),
         (["users.ana.type=wander"], "users.ana.type: there is no behavior 'wander'"),
         (["users.ben.behaviors.1.dwell=1 parsec"],
          "users.ben.behaviors.1.dwell: unknown unit 'parsec' in '1 parsec'"),
-        (["algorithms.count.margin=2"], "algorithms.count.margin: found 2; a share is 0 to 1"),
+        (["algorithms.count.margin=2"], "algorithms.count.margin: expected a share from 0 to"),
         (["algorithms.calm.inner.type=own:Gone"], "algorithms.calm.inner.type: can't import"),
         (["algorithms.calm.inner=count"], None),
         (["metrics.other={of: count}"], "metrics.other: there is no metric 'other'"),
-        (["artifacts.events=maybe"], "artifacts.events: found 'maybe'; true or false is wanted"),
+        (["artifacts.events=maybe"], "artifacts.events: expected true or false, got 'maybe'"),
         (["sumulation.seed=1"], "sumulation: unknown key 'sumulation': did you mean 'simulation'?"),
     ],
 )  # fmt: skip
@@ -172,7 +172,7 @@ def test_all_errors_of_a_file_are_told_with_their_lines(home: Path) -> None:
     home.write_text(HOME.replace("30 cm", "wide").replace("margin: 95 %", "margn: 1"))
 
     assert said("homes/home.yaml").splitlines() == [
-        "homes/home.yaml:4: users.ana.radius: found 'wide'; a length is wanted: a number in m, or "
+        "homes/home.yaml:4: users.ana.radius: expected a length, got 'wide': write a number in m, or "
         "like '0.2 m', '20 cm', '5 mm'",
         "homes/home.yaml:9: algorithms.count.margn: unknown key 'margn': did you mean 'margin'? "
         "Allowed here: margin",

@@ -147,7 +147,7 @@ def test_a_grid_within_an_axis_combines_all() -> None:
     [
         ({"key": SPEED}, "exactly one of values"),
         ({"key": SPEED, "vals": [1]}, "did you mean 'values'"),
-        ({"key": SPEED, "values": [1], "range": [0, 1]}, "found values and range"),
+        ({"key": SPEED, "values": [1], "range": [0, 1]}, "got values and range"),
         ({"key": SPEED, "values": []}, "at least 1"),
         ({"key": SPEED, "values": [1], "labels": ["a", "b"]}, "2 labels for 1 values"),
         ({"key": SPEED, "range": [0, 1]}, "give step, or count"),

@@ -59,9 +59,9 @@ def test_populations_are_homes_people_and_seeds(tmp_path: Path) -> None:
         ("\naxes:\n  speed: [1, 2]\n", r"study.yaml:3: axes.speed: a bare list is for an axis"),
         ("axes:\n  speed: {key: a.b, valeus: [1]}\n", r"axes.speed: .*did you mean 'values'"),
         ("axes:\n  seed: {key: a.b, values: [1]}\n", r"an axis can't be called 'seed'"),
-        ("replicates: 0\n", r"study.yaml:1: replicates: found 0"),
+        ("replicates: 0\n", r"study.yaml:1: replicates: expected 1 or more replicates, got 0"),
         ("base: hme.yaml\n", r"study.yaml:1: base: there is no file"),
-        ("base: 3\n", r"base: found 3; a scenario's file"),
+        ("base: 3\n", r"base: expected the file of a scenario"),
         (
             "axes: {a: {key: a.b, values: [1]}}\nexclude: [{b: 1}]\n",
             r"exclude.0.b: there is no axis 'b'",

@@ -93,7 +93,7 @@ def test_without_a_failure_the_smallest_margin_is_reported(folder: Path) -> None
         (["flat.yaml", "--over", "axis.yaml"], "no such file"),
         (["flat.yaml", "--over", "robots.astro.speed={low: 2, high: 1}"], "low below high"),
         (["bundled:base", "--over", OVER], "has no expectations"),
-        (["flat.yaml", "--over", OVER, "--budget", "soon"], "--budget soon"),
+        (["flat.yaml", "--over", OVER, "--budget", "soon"], "--budget: expected"),
         (["test_flat.py::test_come", "--over", OVER], "did you mean 'test_comes'"),
         (["test_flat.py::test_more", "--over", OVER], "other arguments (tmp_path)"),
         (["flat.yaml", "--over", OVER, "--out", "flat.yaml"], "exists already"),
@@ -137,5 +137,5 @@ def test_axes_come_from_files_and_texts(folder: Path) -> None:
 
 @pytest.mark.parametrize("text", ["0", "-1", "1.5", "12345678", ""])
 def test_a_budget_is_a_number_or_a_time(text: str) -> None:
-    with pytest.raises(InputError, match="a number of runs is wanted"):
+    with pytest.raises(InputError, match="expected a number of runs"):
         command.parse_budget(text)

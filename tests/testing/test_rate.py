@@ -29,10 +29,10 @@ def test_error_rates_of_ten_thousand_decisions_are_as_stated(seeds: int, holds: 
     test = rate_test(seeds, holds)
     noise = 4 * np.sqrt(0.05 * 0.95 / DECISIONS)
     refusals_of_truth = 1 - decisions(test, holds, 1).mean()
-    acceptances_of_untruth = decisions(test, test.told_from, 2).mean()
+    acceptances_of_untruth = decisions(test, test.alternative, 2).mean()
     assert refusals_of_truth <= test.error + noise
     assert acceptances_of_untruth <= test.error + noise
-    assert decisions(test, test.told_from - 0.02, 3).mean() < acceptances_of_untruth + noise
+    assert decisions(test, test.alternative - 0.02, 3).mean() < acceptances_of_untruth + noise
 
 
 @pytest.mark.parametrize("error", [0.01, 0.05, 0.2])
@@ -40,8 +40,8 @@ def test_error_rates_of_ten_thousand_decisions_are_as_stated(seeds: int, holds: 
 def test_exact_error_rates_are_as_stated(seeds: int, holds: float, error: float) -> None:
     test = rate_test(seeds, holds, error)
     assert 1 - test.acceptance(holds) <= error + 1e-12
-    assert test.acceptance(test.told_from) <= error + 1e-12
-    assert test.told_from < test.holds
+    assert test.acceptance(test.alternative) <= error + 1e-12
+    assert test.alternative < test.holds
 
 
 @pytest.mark.parametrize("rate", [0.95, 0.6])
@@ -69,7 +69,7 @@ def test_clear_rates_stop_early() -> None:
 
 
 def test_more_seeds_tell_nearer_rates() -> None:
-    rates = [rate_test(seeds, 0.95).told_from for seeds in (20, 50, 100, 300)]
+    rates = [rate_test(seeds, 0.95).alternative for seeds in (20, 50, 100, 300)]
     assert sorted(rates) == rates
 
 

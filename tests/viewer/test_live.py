@@ -178,7 +178,7 @@ def test_impossible_order_is_refused_with_a_reason(
     ],
 )
 def test_what_is_no_order_is_refused(body: bytes) -> None:
-    with pytest.raises(InputError, match="no valid order"):
+    with pytest.raises(InputError, match="not a valid order"):
         read_order(body)
 
 

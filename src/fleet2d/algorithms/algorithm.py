@@ -1,4 +1,4 @@
-"""Algorithms: components that learn from the history of a run and put out results."""
+"""Algorithms: components that learn from the history of a run, with an output at each update."""
 
 from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass

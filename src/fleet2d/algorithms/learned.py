@@ -55,8 +55,8 @@ def load_learned(path: Path) -> dict[str, Any]:
         raise
     except Exception as error:  # noqa: BLE001 - a damaged archive raises almost anything
         raise InputError(
-            f"{path}: this is not what an algorithm has learned ({one_line(error, 100)}); give a"
-            " file .npz of the folder learned/ of a run"
+            f"{path} is not a file of learned state ({one_line(error, 100)}): give a .npz file of"
+            " the folder learned/ of a run"
         ) from None
     return state
 
@@ -143,7 +143,7 @@ def _flat(state: Mapping[str, Any], above: str, where: str) -> Iterator[tuple[st
         path = f"{above}{name}"
         if SEPARATOR in str(name) or not name:
             raise ComponentError(
-                f"{where} remembers {name!r}: a name without {SEPARATOR!r} is wanted"
+                f"{where}: remember() returned the name {name!r}: names can't contain {SEPARATOR!r}"
             )
         if isinstance(value, Mapping):
             yield from _flat(value, f"{path}{SEPARATOR}", where)
@@ -151,7 +151,7 @@ def _flat(state: Mapping[str, Any], above: str, where: str) -> Iterator[tuple[st
         array = np.asarray(value)
         if array.dtype.kind not in "biufU":
             raise ComponentError(
-                f"{where} remembers {path!r}, which is a {type(value).__name__}: arrays, numbers"
-                " and texts can be kept. Write remember() and recall() for the rest"
+                f"{where}: remember() returned {path!r}, a {type(value).__name__}: only arrays,"
+                " numbers and texts can be stored; write remember() and recall() that convert it"
             )
         yield path, array

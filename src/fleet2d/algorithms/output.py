@@ -49,11 +49,11 @@ class RoomDistribution:
         values = np.array(weights, dtype=np.float64)
         if values.ndim != 1 or not len(values):
             raise ComponentError(
-                f"a room distribution has one weight per room; found shape {values.shape}"
+                f"a room distribution needs one weight per room, got shape {values.shape}"
             )
         if not (np.isfinite(values).all() and (values >= 0).all()):
             raise ComponentError(
-                f"a room distribution needs finite weights of at least 0; found {values}"
+                f"a room distribution needs finite weights of 0 or more, got {values}"
             )
         total = values.sum()
         self.share: NDArray[np.float64] = (
@@ -94,8 +94,7 @@ class Outputs(Mapping[str, Any]):
             return self._newest[name]
         if name in self._known:
             raise ComponentError(
-                f"{name!r} has put out nothing so far: ask by outputs.get({name!r}), which is None"
-                " until then"
+                f"{name!r} has no output yet: use outputs.get({name!r}), which is None until then"
             )
         raise ComponentError(f"there is no algorithm {name!r}{suggest(name, self._known)}")
 
@@ -136,7 +135,7 @@ def to_columns(output: Any, rooms: Sequence[str], where: str) -> dict[str, NDArr
     if isinstance(output, RoomDistribution):
         if len(output.share) != len(rooms):
             raise ComponentError(
-                f"{where} put out {len(output.share)} shares, but the home has {len(rooms)} rooms"
+                f"{where} returned {len(output.share)} shares, but the home has {len(rooms)} rooms"
             )
         return {"room": np.array(rooms, dtype=object), "share": output.share}
     if isinstance(output, HomeChanges):
@@ -145,8 +144,8 @@ def to_columns(output: Any, rooms: Sequence[str], where: str) -> dict[str, NDArr
         output = output.to_columns(rooms)
     if not isinstance(output, Mapping) or not output:
         raise ComponentError(
-            f"{where} put out {output!r}; a RoomDistribution, or a mapping of names to numbers"
-            " or to arrays of one length, is wanted"
+            f"{where} returned {output!r}, expected a RoomDistribution, or a mapping of names to"
+            " numbers or to arrays of one length"
         )
     columns = {
         str(name): _column(np.atleast_1d(np.asarray(value))) for name, value in output.items()
@@ -155,17 +154,17 @@ def to_columns(output: Any, rooms: Sequence[str], where: str) -> dict[str, NDArr
         _check_column(name, values, where)
     lengths = {name: len(values) for name, values in columns.items()}
     if len(set(lengths.values())) > 1:
-        raise ComponentError(f"{where} put out arrays of different lengths: {lengths}")
+        raise ComponentError(f"{where} returned arrays of different lengths: {lengths}")
     return columns
 
 
 def _check_column(name: str, values: NDArray[Any], where: str) -> None:
     if name in RESERVED:
-        raise ComponentError(f"{where} put out {name!r}, a column that every table has: rename it")
+        raise ComponentError(f"{where} returned {name!r}, a column that every table has: rename it")
     if values.ndim != 1:
         raise ComponentError(
-            f"{where} put out {name!r} of shape {values.shape}; a number or an array of one"
-            " dimension is wanted"
+            f"{where} returned {name!r} of shape {values.shape}, expected a number or an array of"
+            " one dimension"
         )
     is_text = values.dtype.kind == "O" and all(
         issubclass(cls, str) for cls in set(map(type, values.tolist()))
@@ -173,10 +172,10 @@ def _check_column(name: str, values: NDArray[Any], where: str) -> None:
     if values.dtype.kind not in "biuf" and not is_text:
         example = values.tolist()[0] if values.dtype.kind == "O" else values.dtype
         raise ComponentError(
-            f"{where} put out {name!r} with {example}; numbers or strings are wanted"
+            f"{where} returned {name!r} with {example}, expected numbers or strings"
         )
     if values.dtype.kind == "f" and not np.isfinite(values).all():
-        raise ComponentError(f"{where} put out {name!r} with a value that is not finite: {values}")
+        raise ComponentError(f"{where} returned {name!r} with a value that is not finite: {values}")
 
 
 def _column(values: NDArray[Any]) -> NDArray[Any]:

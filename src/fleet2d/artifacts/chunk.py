@@ -41,7 +41,7 @@ class Dictionary(dict[str | None, int]):
     def __missing__(self, word: str | None) -> int:
         """Enter a new word."""
         if not isinstance(word, str):
-            raise ArtifactError(f"{word!r} is no string")
+            raise ArtifactError(f"expected text, got {word!r}")
         self[word] = code = len(self) - (None in self)
         return code
 

@@ -31,7 +31,7 @@ def check_run_directory(directory: Path) -> None:
             nearest = nearest.parent
         if not nearest.is_dir():
             raise RunDirectoryError(
-                f"{directory} can't be a run directory, for {nearest} is no directory: "
+                f"{directory} can't be a run directory, because {nearest} is not a directory: "
                 "choose another --out or remove it"
             )
         _check_writable(directory, nearest)

@@ -187,11 +187,11 @@ class Manifest(BaseModel):
         path = directory / FILE_NAME
         try:
             if not is_regular(path):
-                raise RunDirectoryError(f"{path} is no file: give the directory of a run")
+                raise RunDirectoryError(f"{path} is not a file: give the directory of a run")
             content = json_of(path, read_bytes(path, FILE_BYTES, RunDirectoryError))
         except FileNotFoundError as error:
             raise RunDirectoryError(
-                f"{directory} is no run directory, for it has no {FILE_NAME}: "
+                f"{directory} is not a run directory, because it has no {FILE_NAME}: "
                 "give the directory that `fleet2d run --out` wrote"
             ) from error
         except OSError as error:
@@ -210,7 +210,7 @@ class Manifest(BaseModel):
             RunDirectoryError: It is not valid; the message says what is wrong.
         """
         if not isinstance(content, dict) or type(content.get("format")) is not int:
-            raise _damaged(path, "it does not say its format")
+            raise _damaged(path, "it has no key 'format'")
         if content["format"] > FORMAT:
             raise RunDirectoryError(
                 f"{path} was written by a later Fleet2D (format {content['format']}, this one "
@@ -266,11 +266,11 @@ def _problems(error: ValidationError) -> str:
         key = ".".join(map(str, line["loc"]))
         if line["type"] == "extra_forbidden":
             known = Manifest.model_fields if len(line["loc"]) == 1 else ()
-            lines.append(f"{key} is no field of a manifest{did_you_mean(key, known)}"[:200])
+            lines.append(f"{key} is not a field of a manifest{did_you_mean(key, known)}"[:200])
             continue
         value = repr(line["input"])
         value = value if len(value) <= _MOST_CHARACTERS else f"{value[:_MOST_CHARACTERS]}…"
-        lines.append(f"{key}: {line['msg']}, found {value}"[:300])
+        lines.append(f"{key}: {line['msg']}, got {value}"[:300])
     more = error.error_count() - len(lines)
     return "; ".join([*lines, *([f"and {more} more"] if more > 0 else [])]).replace(".;", ";")
 

@@ -89,11 +89,13 @@ def verify_run(directory: Path | str) -> Verification:
     """
     root = Path(directory)
     if not root.is_dir():
-        raise RunDirectoryError(f"{root} is no directory: give one that `fleet2d run --out` wrote")
+        raise RunDirectoryError(
+            f"{root} is not a directory: give one that `fleet2d run --out` wrote"
+        )
     manifest = Manifest.read(root)
     if manifest.digest is None:
         raise ArtifactError(
-            f"{root} has no digest, for its status is {manifest.status}: there is nothing to"
+            f"{root} has no digest, because its status is {manifest.status}: there is nothing to"
             " compare with; `fleet2d resume` continues the run"
         )
     if manifest.seal is None:
@@ -112,7 +114,7 @@ def verify_run(directory: Path | str) -> Verification:
 
 
 def foreign_files(root: Path, run_files: set[str]) -> list[str]:
-    """Return the files of a run directory that are no part of the run.
+    """Return the files of a run directory that are not part of the run.
 
     Raises:
         OSError: The directory can't be read.
@@ -158,7 +160,7 @@ def _differing_fields(root: Path, text: bytes, seal: Seal) -> dict[str, str]:
     if _digest_of(seal.fields, seal.files) != seal.digest:
         differing[f"{FILE_NAME}: seal"] = "was changed"
     elif not differing and text != canonical(content).encode():
-        differing[FILE_NAME] = "is written in another way"
+        differing[FILE_NAME] = "is formatted differently"
     return differing
 
 
@@ -193,7 +195,7 @@ def _difference(path: Path, record: FileRecord) -> str:
     """Return how a file differs from what was sealed; empty if it doesn't."""
     try:
         if path.is_symlink() or not is_regular(path):
-            return "is no file any more"
+            return "is not a file any more"
         if path.stat().st_size != record.bytes:
             return f"has {path.stat().st_size} bytes, {record.bytes} were stored"
         return "" if _file_record(path) == record else "was changed"

@@ -26,7 +26,7 @@ class ArtifactSettings(Settings):
             step can be rebuilt.
         observations: Store every observation that a robot makes.
         events: Store events: a user seen or lost, an arrival, a change of activity.
-        outputs: Store what algorithms and metrics put out, one table each.
+        outputs: Store the outputs of algorithms and metrics, one table each.
         learned: Store what each algorithm has learned at the end, learned/NAME.npz: another run can
             start from it.
         checkpoint: Write the state of the run this often in simulated time, so that `fleet2d

@@ -18,7 +18,7 @@ def read_json(text: bytes) -> Any:
         {'steps': 3}
         >>> read_json(b'{"steps": 3, "steps": 4}')
         Traceback (most recent call last):
-        ValueError: the key 'steps' is there twice
+        ValueError: the key 'steps' is given twice
     """
     try:
         return json.loads(
@@ -36,12 +36,12 @@ def _unique_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     if len(content) < len(pairs):
         keys = [key for key, _ in pairs]
         repeated_key = next(key for key in keys if keys.count(key) > 1)
-        raise ValueError(f"the key {repeated_key[:60]!r} is there twice")
+        raise ValueError(f"the key {repeated_key[:60]!r} is given twice")
     return content
 
 
 def _refuse_constant(word: str) -> NoReturn:
-    raise ValueError(f"{word} is no number")
+    raise ValueError(f"{word} is not a number")
 
 
 def _finite_float(text: str) -> float:

@@ -69,14 +69,14 @@ def read_log(path: Path) -> DetectionLog:
             rows = [(reader.line_num, row) for row in islice(reader, LOG_ROWS.most + 1)]
         LOG_ROWS.check(len(rows), path, least="at least ")
     except UnicodeDecodeError:
-        raise InputError(f"{path} is no text in UTF-8: save it as a CSV file in UTF-8") from None
+        raise InputError(f"{path} is not text in UTF-8: save it as a CSV file in UTF-8") from None
     except (OSError, csv.Error) as error:
         why = getattr(error, "strerror", None) or error
         raise InputError(f"{path} can't be read: {why}") from None
     _check_columns(path, columns)
     table = _LogTable(path, columns, rows)
     if len(rows) < LEAST_ROWS:
-        raise InputError(f"{path} has {len(rows)} rows: a fit needs {LEAST_ROWS} at the least")
+        raise InputError(f"{path} has {len(rows)} rows: a fit needs at least {LEAST_ROWS}")
     has_identity = table.has("identity") and table.has("true_identity")
     log = DetectionLog(
         path,
@@ -144,7 +144,7 @@ class _LogTable:
                 values[i] = read(text)
             except ValueError as error:
                 raise InputError(
-                    f"{self.path}:{line}: {name} is {one_line(text)!r}; {error} is wanted"
+                    f"{self.path}:{line}: {name}: expected {error}, got {one_line(text)!r}"
                 ) from None
         return values
 

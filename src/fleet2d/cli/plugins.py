@@ -68,4 +68,4 @@ def converter() -> Callable[[Path, Path], list[str]]:
         with suppress(ModuleNotFoundError):
             convert: Callable[[Path, Path], list[str]] = entry.load()
             return convert
-    raise InputError("this file is no floor plan, and no converter for it is installed")
+    raise InputError("this file is not a floor plan, and no converter for it is installed")

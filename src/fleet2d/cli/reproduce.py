@@ -23,5 +23,5 @@ def reproduce(
     if result.same:
         typer.echo(f"reproduced: digest {result.digest}")
         return
-    typer.echo(f"not reproduced: {', '.join(result.differing)} came out different", err=True)
+    typer.echo(f"not reproduced: {', '.join(result.differing)} differ", err=True)
     raise typer.Exit(1)

@@ -16,7 +16,7 @@ def verify(
     for note in result.notes:
         typer.echo(f"note: {note}")
     for name in result.foreign:
-        typer.echo(f"note: {name} is no part of the run")
+        typer.echo(f"note: {name} is not part of the run")
     for name, difference in result.differing.items():
         typer.echo(f"{name} {difference}", err=True)
     if result.differing:

@@ -100,7 +100,9 @@ class Changes:
             ScenarioError: It has no time, or names something unknown.
         """
         if change.at is None:
-            raise ScenarioError(f"changes.{index}: there is no 'at': say when it happens")
+            raise ScenarioError(
+                f"changes.{index}: the key 'at' is missing: give the time of the change"
+            )
         try:
             self.check_names(change)
         except ScenarioError as error:

@@ -65,7 +65,7 @@ class Checkpoint:
         except ArtifactError as error:
             raise UnusableCheckpointError(str(error)) from error
         except (KeyError, TypeError, ValueError, RunDirectoryError) as error:
-            raise UnusableCheckpointError(f"{path} is no checkpoint of a run") from error
+            raise UnusableCheckpointError(f"{path} is not a checkpoint of a run") from error
         if (stored.scenario, stored.seed) != (manifest.scenario, manifest.seed):
             raise UnusableCheckpointError(f"{path} is of another scenario or seed")
         return cls(commit, stored, (setup_s, simulate_s, save_s), body)

@@ -134,7 +134,10 @@ class Steering(Verbs):
             return
         steps = operator.index(steps)
         if steps < 0:
-            raise InputError(f"advance({steps}): time only goes forward; branch a copy instead")
+            raise InputError(
+                f"advance({steps}): the number of steps must be 0 or more; to go back, keep a copy"
+                " of an earlier step"
+            )
         self._run_to(min(self.clock.steps, self.step + steps))
 
     def run_until(
@@ -183,7 +186,7 @@ class Steering(Verbs):
 
     def _step_of(self, when: int | str | datetime | timedelta | None) -> int:
         if when is None:
-            raise InputError("run_until(): say a time, or event=…")
+            raise InputError("run_until(): give a time, or event=…")
         if isinstance(when, str):
             when = next_time(when, self.time)
         if isinstance(when, datetime):

@@ -39,13 +39,13 @@ def changed_inputs(manifest: Manifest) -> list[str]:
         try:
             if not is_regular(path):
                 raise RunDirectoryError(
-                    f"the run read {path}, which is no file now: put the file back"
+                    f"the run read {path}, which is not a file any more: restore it"
                 )
             if input_record(path).sha256 != record.sha256:
                 changed_paths.append(record.path)
         except (OSError, ValueError) as error:
             raise RunDirectoryError(
-                f"the run read {path}, which is gone or can't be read: put it back"
+                f"the run read {path}, which is missing or can't be read: restore it"
             ) from error
     return changed_paths
 

@@ -39,7 +39,9 @@ class Judging(Steering):
             True
         """
         if self._run is not None or self.done:
-            raise InputError("the run is over: expect something of a new one, or judge(…) this run")
+            raise InputError(
+                "the run is finished: add expectations before its end, or call judge(…) on the run"
+            )
         if isinstance(expectation, str):
             expectation = parse_expectation(expectation)
         self._state.settle(self.step)

@@ -291,7 +291,7 @@ def check_result(result: Any, where: str = "result()") -> Any:
     if isinstance(result, float) and not math.isfinite(result):
         raise ComponentError(f"{where} is {result}: leave out values that are undefined")
     if not isinstance(result, bool | int | float | str):
-        raise ComponentError(f"{where} is {result!r}; numbers and texts are wanted")
+        raise ComponentError(f"{where} is {result!r}: return numbers and texts only")
     return result
 
 
@@ -302,13 +302,13 @@ def _check_kinds(learner: Learner, kinds: Mapping[str, Kind]) -> None:
     """Refuse columns that don't fit the table of the first output."""
     if kinds.keys() != learner.kinds.keys():
         raise ComponentError(
-            f"{learner.path} put out {', '.join(kinds)}, but {', '.join(learner.kinds)} before: the"
-            " names must be the same each time"
+            f"{learner.path} returned {', '.join(kinds)}, but {', '.join(learner.kinds)} before:"
+            " the names must be the same each time"
         )
     for name, kind in kinds.items():
         if kind != learner.kinds[name] and (kind, learner.kinds[name]) != ("int64", "float64"):
             raise ComponentError(
-                f"{learner.path} put out {name!r} as {kind}, but as {learner.kinds[name]} before:"
+                f"{learner.path} returned {name!r} as {kind}, but as {learner.kinds[name]} before:"
                 " the first output fixes what a column holds (0.0 for fractions, not 0)"
             )
 
@@ -319,8 +319,8 @@ def _check_reads(metrics: Mapping[str, Metric], algorithms: Mapping[str, Algorit
         for algorithm in metric.reads():
             if algorithm not in algorithms:
                 raise ScenarioError(
-                    f"metrics.{name} measures {algorithm!r}, which is no algorithm of the scenario"
-                    f"{suggest(algorithm, algorithms)}"
+                    f"metrics.{name} measures {algorithm!r}, which is not an algorithm of the"
+                    f" scenario{suggest(algorithm, algorithms)}"
                 )
 
 
@@ -334,7 +334,7 @@ def update_order(algorithms: Mapping[str, Algorithm]) -> list[str]:
         for source in algorithm.reads:
             if source not in algorithms:
                 raise ScenarioError(
-                    f"algorithms.{name}.reads names {source!r}, which is no algorithm of the"
+                    f"algorithms.{name}.reads names {source!r}, which is not an algorithm of the"
                     f" scenario{suggest(source, algorithms)}"
                 )
     sorter = TopologicalSorter({name: algorithm.reads for name, algorithm in algorithms.items()})

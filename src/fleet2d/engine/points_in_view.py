@@ -76,8 +76,8 @@ def _answers(
     flags: object = method.sees(home, x, y, heading, reach, points)  # a user's own may be wrong
     if not isinstance(flags, np.ndarray) or flags.dtype != bool or flags.shape != (len(points),):
         raise ComponentError(
-            f"{type(method).__name__} answered {flags!r} for {len(points)} points: an array with a"
-            " bool for each is wanted"
+            f"{type(method).__name__} returned {flags!r}, expected a bool array of shape"
+            f" ({len(points)},), a value for each point"
         )
     in_view = flags.reshape(len(queries), -1)
     bits: NDArray[np.uint64] = np.uint64(1) << np.arange(in_view.shape[1], dtype=np.uint64)

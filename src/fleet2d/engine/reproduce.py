@@ -83,7 +83,7 @@ def reproduce_trusting(directory: str | Path, trust: Trust) -> Reproduction:
         f"{name} in {directory} {change} after the run" for name, change in seal.differing.items()
     ]
     causes += seal.notes
-    causes += [f"{name} in {directory} is no part of the run" for name in seal.foreign]
+    causes += [f"{name} in {directory} is not part of the run" for name in seal.foreign]
     with tempfile.TemporaryDirectory() as folder:
         with restrict(trust):
             new = _simulation(content, Path(folder) / "run").run()

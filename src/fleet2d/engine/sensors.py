@@ -169,5 +169,6 @@ def _door(name: str, door: str, doors: Sequence[str]) -> int:
     if door in doors:
         return list(doors).index(door)
     raise ScenarioError(
-        f"objects.{name}.of names {door!r}, which is no door of the scenario{suggest(door, doors)}"
+        f"objects.{name}.of names {door!r}, which is not a door of the"
+        f" scenario{suggest(door, doors)}"
     )

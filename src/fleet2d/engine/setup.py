@@ -179,7 +179,7 @@ def _check_reads(scenario: Scenario, actors: list[DecidingActor]) -> None:
         for name in (name for behavior in actor.behaviors for name in behavior.reads()):
             if name not in scenario.algorithms:
                 raise ScenarioError(
-                    f"{actor.path} reads {name!r}, which is no algorithm of the scenario"
+                    f"{actor.path} reads {name!r}, which is not an algorithm of the scenario"
                     f"{suggest(name, scenario.algorithms)}"
                 )
 

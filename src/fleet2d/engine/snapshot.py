@@ -184,14 +184,14 @@ def open_snapshot(path: str | Path | BinaryIO) -> tuple[dict[str, Any], BinaryIO
     digest, _, rest = rest.partition(b"\n")
     first, _, body = rest.partition(b"\n")
     if magic != MAGIC:
-        raise ArtifactError(f"{path} is no saved simulation")
+        raise ArtifactError(f"{path} is not a saved simulation")
     if hashlib.sha256(first + body).hexdigest().encode() != digest:
         raise ArtifactError(f"{path} is damaged: its content is not what was written")
     try:
         header: dict[str, Any] = json.loads(first)
         _ = [header[key] for key in ("fleet2d", "scenario", "seed", "wall_s")]
     except (ValueError, TypeError, KeyError):
-        raise ArtifactError(f"{path} is no saved simulation") from None
+        raise ArtifactError(f"{path} is not a saved simulation") from None
     if header["fleet2d"] != __version__:
         raise ArtifactError(
             f"{path} was written by Fleet2D {header['fleet2d']}, and this is {__version__}: only"
@@ -271,7 +271,9 @@ class _StateReader(pickle.Unpickler):
             top, dot, rest = public_name(module).partition(".")
             module = self._packages.get(top, top) + dot + rest
         if not may_refer(module, name, self._packages):
-            raise ArtifactError(f"the file refers to {module}.{name}, which is no part of a state")
+            raise ArtifactError(
+                f"the file refers to {module}.{name}, which can't be part of a state"
+            )
         value = super().find_class(module, name)
         is_allowed = name in _ALLOWED.get(module, ()) or module == arrays.__name__
         # Only a class that the module defines: a class that it imports could be any.
@@ -280,7 +282,9 @@ class _StateReader(pickle.Unpickler):
             name,
         )
         if not is_allowed and not is_own:
-            raise ArtifactError(f"the file refers to {module}.{name}, which is no part of a state")
+            raise ArtifactError(
+                f"the file refers to {module}.{name}, which can't be part of a state"
+            )
         return value
 
 

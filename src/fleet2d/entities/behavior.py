@@ -161,7 +161,7 @@ class Behavior(Component):
 
     Attributes:
         when: The hours in which it may decide; left out: at all times.
-        cooldown: How long it isn't asked again after its plan has ended.
+        cooldown: Time after the end of its plan during which it makes no new one.
         preempts: Whether it may interrupt behaviors after it; else it waits.
 
     Example:

@@ -114,7 +114,7 @@ class DecidingActor(Actor):
             plan = plan.stay(PAUSE) if self.behaviors else plan.stay()
         if not isinstance(plan, Plan):
             raise ComponentError(
-                f"{self.path}: decide() returned {plan!r}; a plan or None is wanted"
+                f"{self.path}: decide() returned {plan!r}, expected a plan or None"
             )
         if plan.began != (step, self.state):
             raise ComponentError(

@@ -37,7 +37,7 @@ class GivesWay(Settings):
     Attributes:
         distance: It comes no nearer on its own, from body to body [m].
         patience: How long it waits before it goes round, by 0.1 m where there is no more room.
-        gives_up: How long it waits where there is no way round: then it leaves out that stop.
+        gives_up: How long it waits where there is no way round before it skips the stop.
     """
 
     distance: Length = Field(default=0.4, ge=0, le=3)

@@ -58,12 +58,12 @@ def parse_span(value: object) -> HoursSpan:
     words = value.split() if isinstance(value, str) else []
     if not 1 <= len(words) <= 2 or words[-1].count("-") != 1:
         raise problem(
-            f"found {shown(value)}; hours are wanted, like '08:00-22:00', 'weekdays 9:00-17:00' or"
-            " 'monday,friday 22:00-06:00'"
+            f"expected hours, got {shown(value)}: write them like '08:00-22:00',"
+            " 'weekdays 9:00-17:00' or 'monday,friday 22:00-06:00'"
         )
     begin, end = (parse_time_of_day(text) for text in words[-1].split("-"))
     if begin == end:
-        raise problem(f"found {shown(value)}; hours begin and end at different times")
+        raise problem(f"hours must begin and end at different times, got {shown(value)}")
     days = sorted(weekdays_of((words[0] if words[1:] else "daily").split(",")))
     names = "" if len(words) == 1 else f"{words[0]} "
     text = f"{names}{format_time_of_day(begin)}-{format_time_of_day(end)}"

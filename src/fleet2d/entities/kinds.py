@@ -46,9 +46,12 @@ def available_places(
             missing.append(" or ".join(map(str, place)))
             last_error = error
     if last_error is not None and not available and needed:
-        raise PlacementError(f"{key}: nothing is left of it in this home: {last_error}") from None
+        raise PlacementError(f"{key}: this home has none of these places: {last_error}") from None
     if missing:
-        body.notes.append(f"{key}: left out, for this home has none to go to: {', '.join(missing)}")
+        names = ", ".join(missing)
+        body.notes.append(
+            f"{key}: left out, because this home has none that can be reached: {names}"
+        )
     return available
 
 

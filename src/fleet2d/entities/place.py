@@ -43,7 +43,7 @@ def parse_place(value: object) -> RoomChoice | Point:
             if abs(x) < 1e6 and abs(y) < 1e6:  # NaN fails this, too
                 return x, y
     raise problem(
-        f"found {value!r}; a place is wanted: a room, kind of room or piece of furniture like"
+        f"expected a place, got {value!r}: give a room, kind of room or piece of furniture like"
         " 'kitchen' or 'sofa', that of a person like {object: bed, of: ana},"
         " a list of them to try in turn like [dining_room, kitchen, any], or a point [x, y] in"
         " metres"

@@ -228,7 +228,7 @@ def truth(value: F64) -> F64:
 def _checked(other: object, sign: str) -> Expectation:
     if not isinstance(other, Expectation):
         raise InputError(
-            f"{sign} {other!r}: an expectation is wanted; put comparisons in brackets, as in"
+            f"{sign}: expected an expectation, got {other!r}; put comparisons in brackets, as in"
             ' (distance("ana", "astro") > 0.5) & moving("astro")'
         )
     return other

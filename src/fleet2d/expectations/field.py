@@ -38,7 +38,7 @@ def read_expectation(value: Any) -> Expectation:
     except InputError as error:
         raise problem(str(error)) from None
     raise problem(
-        f"found {value!r}; an expectation is wanted, like always(distance(ana, astro) > 0.5 m)"
+        f"expected an expectation like always(distance(ana, astro) > 0.5 m), got {value!r}"
     )
 
 
@@ -50,7 +50,7 @@ def _read_mapping(value: Mapping[str, Any]) -> Expectation:
     operators = [key for key in OPERATORS if key in value]
     if len(operators) != 1:
         raise InputError(
-            f"one of {', '.join(OPERATORS)} is wanted, found {', '.join(operators) or 'none'}"
+            f"expected exactly one of {', '.join(OPERATORS)}, got {', '.join(operators) or 'none'}"
         )
     operator = operators[0]
     if operator == "at_most":
@@ -107,7 +107,7 @@ def _part(value: Mapping[str, Any], key: str) -> Expectation:
     if isinstance(text, Expectation):
         return text
     if not isinstance(text, str):
-        raise problem_at((key,), f"found {text!r}; text is wanted, like moving(astro)")
+        raise problem_at((key,), f"expected text like moving(astro), got {text!r}")
     try:
         return parse_expectation(text)
     except InputError as error:
@@ -117,7 +117,7 @@ def _part(value: Mapping[str, Any], key: str) -> Expectation:
 def _refuse(value: Mapping[str, Any], operator: str, *keys: str) -> None:
     for key in keys:
         if key in value:
-            raise problem_at((key,), f"{key!r} doesn't go with {operator}")
+            raise problem_at((key,), f"{key!r} can't be combined with {operator}")
 
 
 ExpectationField = Annotated[

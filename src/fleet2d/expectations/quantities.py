@@ -43,7 +43,7 @@ class DistanceSignal(Signal):
             names = [*scene.bodies, *scene.rooms, *scene.things]
             scene.check_name("body, room or object", self.other, names, self)
         if self.other == self.body:
-            raise scene.error(f"{self}: a body is no distance from itself")
+            raise scene.error(f"{self}: give two different bodies")
 
     def __str__(self) -> str:
         """Return the text that `parse_expectation` reads back."""
@@ -105,7 +105,7 @@ class OutputSignal(Signal):
         scene.check_name("algorithm", self.path.split(".")[0], scene.algorithms, self)
         if "." not in self.path:
             raise scene.error(
-                f'{self}: say which number of it, such as output("{self.path}.kitchen")'
+                f'{self}: select a number of the output, such as output("{self.path}.kitchen")'
             )
 
     def __str__(self) -> str:

@@ -81,7 +81,7 @@ def _limit(signal: Signal, limit: object) -> float:
             return float(limit)
     except PydanticCustomError as error:
         raise InputError(f"{signal} is compared: {error}") from None
-    raise InputError(f"{signal} is compared with {limit!r}: a number is wanted")
+    raise InputError(f"{signal} is compared with {limit!r}, expected a number")
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,7 +157,7 @@ class WordSignal(Measurement):
         """Expect the signal to be one of several words."""
         for word in words:
             if not isinstance(word, str):
-                raise InputError(f"{self} is compared with {word!r}: a name is wanted")
+                raise InputError(f"{self} is compared with {word!r}, expected a name")
         return WordComparison(self, tuple(map(str, words)))
 
     def check_word(self, word: str, scene: Scene) -> None:

@@ -71,7 +71,7 @@ class Verdict:
 
     def _by_how_much(self) -> str:
         if self.occasions == 0:
-            return ", for its trigger never happened"
+            return ", because its trigger never happened"
         parts = []
         if math.isfinite(self.robustness):
             parts.append(f"by {amount(self.robustness, self.unit)}")
@@ -191,8 +191,8 @@ def check_judged(expectation: object) -> Expectation:
         )
     if not expectation.is_judged:
         raise InputError(
-            f"{expectation} doesn't say when: write always(…), never(…), eventually(…), at_end(…),"
-            " until(…), after(…) or at_most(…)"
+            f"{expectation} has no time operator: write always(…), never(…), eventually(…),"
+            " at_end(…), until(…), after(…) or at_most(…)"
         )
     return expectation
 

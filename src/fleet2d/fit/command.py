@@ -67,12 +67,12 @@ def fit_routine(
     from fleet2d.logs.read import read_log
 
     if layout not in ("auto", "casas", "uci_adl", "homer"):
-        raise LogError(f"--format is {layout!r}; a log to fit is casas, uci_adl or homer")
+        raise LogError(f"--format: expected auto, casas, uci_adl or homer, got {layout!r}")
     if model not in ("recorded", "laws"):
-        raise LogError(f"--model is {model!r}; recorded or laws is wanted")
+        raise LogError(f"--model: expected recorded or laws, got {model!r}")
     log = read_log(path, layout, sort=sort)  # type: ignore[arg-type]
     if not isinstance(log, ActivityLog):
-        raise LogError(f"{path} is a log of positions; a persona is fitted to one of rooms")
+        raise LogError(f"{path} is a log of positions: a persona is fitted to a log of rooms")
     timeline = read_timeline(log)
     days = find_days(timeline)
     validation = validate(timeline, seed=seed, model=model)  # type: ignore[arg-type]

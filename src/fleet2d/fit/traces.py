@@ -35,7 +35,7 @@ def trace_of_log(path: Path) -> RoomTrace:
     """
     log = read_log(path)
     if not isinstance(log, ActivityLog):
-        raise LogError(f"{path} is a log of positions; one of rooms is wanted")
+        raise LogError(f"{path} is a log of positions: give a log of rooms")
     states, seconds = read_seconds(log)
     kinds = tuple(sorted({state.place for state in states}))
     index = np.array([kinds.index(state.place) for state in states] + [-1], np.int16)

@@ -46,7 +46,9 @@ def load_floorplan(
     if path.suffix.lower() in IMAGES and path.is_file():
         return _load_image(path, resolution, cell)
     if resolution is not None:
-        raise FloorPlanError(f"{plan} is no picture: its file says how large things are in it")
+        raise FloorPlanError(
+            f"{plan} is not a picture: leave out --resolution, because the file contains lengths"
+        )
     if str(plan) in names:
         return read_native(HOMES / f"{plan}.json", usual)
     seed = SYNTHETIC.fullmatch(str(plan))
@@ -116,7 +118,7 @@ def _unknown_format(path: Path) -> FloorPlanError:
     from fleet2d.floorplan.formats.valetudo_file import MAP_CLASS
 
     return FloorPlanError(
-        f"{path} is no floor plan that Fleet2D knows: it has neither `verts` (HouseExpo) nor"
+        f"{path} is not a floor plan that Fleet2D can read: it has neither `verts` (HouseExpo) nor"
         f' "format": "{FORMAT}", "__class": "{MAP_CLASS}" or "type": "{COLLECTION}" (GeoJSON)'
     )
 

@@ -40,9 +40,7 @@ def save_floorplan(plan: FloorPlan, path: str | Path) -> None:
     elif suffix in YAML:
         text = _yaml(native_document(plan), path)
     else:
-        raise FloorPlanError(
-            f"a floor plan is written as .json, .yaml or .geojson, and {path} is none of them"
-        )
+        raise FloorPlanError(f"{path}: a floor plan is written as .json, .yaml or .geojson")
     _write_new(path, text)
 
 

@@ -46,7 +46,7 @@ class FloorPlanSource(Component):
         furniture: Pieces to place in the home.
         furnish: Furnish rooms without furniture by rule, by their types.
         layers: Named arrays with a value for each cell; explored, first_seen, last_seen and
-            time_since_seen are kept by the run, for each robot with a camera.
+            time_since_seen are maintained by the run, for each robot with a camera.
         costmap: Costs that routes of robots pay; null: they take the shortest.
     """
 

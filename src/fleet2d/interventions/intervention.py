@@ -113,7 +113,7 @@ class Verb(Codec):
         if isinstance(value, Intervention):
             return value
         if not isinstance(value, Mapping):
-            raise problem(f"found {value!r}; a mapping like {{put: ana, to: kitchen}} is wanted")
+            raise problem(f"expected a mapping like {{put: ana, to: kitchen}}, got {value!r}")
         fields = dict(value)
         if "do" in fields:
             return _of_name(fields.pop("do")).model_validate(fields, context=info.context)
@@ -156,7 +156,7 @@ def _from_short_form(
 ) -> Intervention:
     """Return an intervention whose subject follows its verb; errors name the verb."""
     if cls.subject in fields and cls.subject != verb:
-        raise problem(f"'{verb}' says which {cls.subject} it is: leave out '{cls.subject}'")
+        raise problem(f"'{verb}' already names the {cls.subject}: leave out '{cls.subject}'")
 
     def move(line: InitErrorDetails) -> InitErrorDetails:
         if line["loc"][:1] == (cls.subject,):
@@ -174,10 +174,10 @@ def _not_one_verb(
     keys: list[str], fields: Mapping[str, Any], classes: Mapping[str, type[Component]]
 ) -> Exception:
     if keys:
-        return problem(f"{' and '.join(keys)} are given: one in each entry is wanted")
+        return problem(f"give exactly one of {' and '.join(keys)} in each entry")
     hints = [did_you_mean(key, classes) for key in fields]
     hint = next((text for text in hints if text.endswith("?")), ".")
-    return problem(f"it doesn't say what is done{hint} There are: {', '.join(classes)}")
+    return problem(f"the key of the intervention is missing{hint} There are: {', '.join(classes)}")
 
 
 _ADAPTER: TypeAdapter[Intervention] = TypeAdapter(Annotated[Intervention, Verb()])

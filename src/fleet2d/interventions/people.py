@@ -83,7 +83,7 @@ class LetIn(PersonIntervention):
         actor = user(world, self.entity)
         if not any(isinstance(behavior, Guest) for behavior in actor.behaviors):
             raise ScenarioError(
-                f"{self.entity} is no guest: a guest is a user with that behavior, like users:"
+                f"{self.entity} is not a guest: a guest is a user with that behavior, like users:"
                 " {gina: guest}; use call_home for people who live here"
             )
         check_reach(actor, self.to)

@@ -225,7 +225,7 @@ class Fault(Lasting):
     @model_validator(mode="after")
     def _has_effect(self) -> Self:
         if not (self.wheels or self.dark or self.detection < 1 or self.errs):
-            raise problem("nothing fails: say 'wheels', 'dark', 'detection' or 'errs'")
+            raise problem("nothing fails: give 'wheels', 'dark', 'detection' or 'errs'")
         return self
 
     @property

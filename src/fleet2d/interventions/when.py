@@ -54,7 +54,7 @@ def parse_when(value: object) -> datetime | timedelta | ClockTime:
     if not 1 <= len(words) <= 2 or ":" not in words[-1] or "-" in words[-1]:
         if isinstance(value, str) and not value.strip()[:1].isdigit():
             raise problem(
-                f"found {shown(value)}; a time is wanted, like '19:00', 'monday 07:30',"
+                f"expected a time, got {shown(value)}: write it like '19:00', 'monday 07:30',"
                 " '2026-01-07T14:00', or '2 h' from the start"
             )
         return parse_moment(value)
@@ -120,8 +120,8 @@ def _as_mapping(value: Any) -> Any:
         return dict(zip(Trigger.model_fields, value, strict=False))
     if not isinstance(value, Mapping | Trigger):
         raise problem(
-            f"found {shown(value)}; an event is wanted: its kind, who it happens to, and what else"
-            " it says, like [user_seen, astro, ana]"
+            f"expected an event, got {shown(value)}: give its kind, the entity that it happens"
+            " to, and its detail, like [user_seen, astro, ana]"
         )
     return value
 

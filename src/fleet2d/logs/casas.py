@@ -34,8 +34,8 @@ def read_casas(path: Path, *, sort: bool = False) -> ActivityLog:
         match = LINE.fullmatch(text)
         if match is None:
             raise LogError(
-                f"{path}, line {number}: found {one_line(text)!r} where date, time, room, sensor,"
-                " ON or OFF, and activity are wanted"
+                f"{path}, line {number}: expected date, time, room, sensor, ON or OFF, and"
+                f" activity, got {one_line(text)!r}"
             )
         day, time, room, _, value, activity = match.groups()
         moment = parse_time(f"{day} {time}", path, number)

@@ -117,7 +117,9 @@ def _agenda(match: re.Match[str], path: Path, line: int) -> _ScriptedActivity:
     begin = int(match[2]) * 60 + int(match[3])
     end = (int(match[4] or 0) * 24 + int(match[5])) * 60 + int(match[6])
     if begin >= 24 * 60 or int(match[5]) > 24:
-        raise LogError(f"{path}, line {line}: a day has 24 hours, found {one_line(match[0])!r}")
+        raise LogError(
+            f"{path}, line {line}: expected a time within 24 hours, got {one_line(match[0])!r}"
+        )
     if end < begin:
         raise LogError(f"{path}, line {line}: it ends before it begins, {one_line(match[0])!r}")
     return _ScriptedActivity(match[1], begin * MINUTE_US, end * MINUTE_US, line)

@@ -121,7 +121,7 @@ def _table(path: Path) -> pa.Table:
         FIXES.check(table.num_rows, path, LogError)
         _ = table.column_names
     except UnicodeDecodeError:
-        raise LogError(f"{path}, line 1: the names of its columns are no text in UTF-8") from None
+        raise LogError(f"{path}, line 1: the names of its columns are not text in UTF-8") from None
     except (pa.ArrowException, OSError) as error:
         raise LogError(f"{path} can't be read: {one_line(error, 200)}") from error
     return table
@@ -132,7 +132,7 @@ def _columns(table: pa.Table, overrides: Mapping[str, str], path: Path) -> dict[
     named = dict(overrides)
     for quantity, name in named.items():
         if quantity not in NAMES:
-            raise LogError(f"columns: {quantity!r} is none of {', '.join(NAMES)}")
+            raise LogError(f"columns: unknown key {quantity!r}; allowed here: {', '.join(NAMES)}")
         if name not in table.column_names:
             raise LogError(f"{path} has no column {name!r}{did_you_mean(name, table.column_names)}")
     lower = {name.strip().lower(): name for name in reversed(table.column_names)}
@@ -162,7 +162,9 @@ def _of_tag(
     tags = pc.cast(table[column], pa.string())
     known = sorted(str(name) for name in pc.unique(tags).to_pylist())
     if tag is None and len(known) > 1:
-        raise LogError(f"{path} holds {len(known)} ids: {', '.join(known[:10])}; say which by 'id'")
+        raise LogError(
+            f"{path} holds {len(known)} ids: {', '.join(known[:10])}: select one by 'id'"
+        )
     name = known[0] if tag is None else tag
     if name not in known:
         raise LogError(
@@ -187,8 +189,8 @@ def _numbers(table: pa.Table, name: str, path: Path, line: I64) -> NDArray[np.fl
                 float(text or "nan")
             except ValueError:
                 raise LogError(
-                    f"{path}, line {at}: found {one_line(text)!r} in column {name!r}, where a"
-                    " number is wanted"
+                    f"{path}, line {at}: expected a number in column {name!r}, got"
+                    f" {one_line(text)!r}"
                 ) from None
         column = pc.cast(pc.if_else(pc.equal(column, ""), "nan", column), pa.float64())
     try:
@@ -217,7 +219,7 @@ def _times(column: pa.ChunkedArray, path: Path, line: I64) -> tuple[I64, bool, b
     if pa.types.is_integer(kind) or pa.types.is_floating(kind):
         values, has_date = _scale_numbers(column.to_numpy(), path, line)
         return values, has_date, has_date
-    raise LogError(f"{path}: the times are {kind}; text, timestamps or numbers are wanted")
+    raise LogError(f"{path}: expected times as text, timestamps or numbers, got {kind}")
 
 
 def _check_times(time_us: I64, path: Path, line: I64, *, has_date: bool) -> None:
@@ -227,8 +229,8 @@ def _check_times(time_us: I64, path: Path, line: I64, *, has_date: bool) -> None
     if len(wrong):
         expected = "a time from 1900 to 2199" if has_date else "seconds since the log began"
         raise LogError(
-            f"{path}, line {line[wrong[0]]}: its time is out of all bounds ({len(wrong)} such"
-            f" lines): {expected} is wanted"
+            f"{path}, line {line[wrong[0]]}: the time is out of range ({len(wrong)} such lines):"
+            f" expected {expected}"
         )
     days = int(time_us.max() - time_us.min()) // DAY_US + 1
     LOG_DAYS.check(days, path, LogError)
@@ -256,7 +258,7 @@ def _scale_numbers(numbers: NDArray[Any], path: Path, line: I64) -> tuple[I64, b
     """Return numeric times [us], and whether they count from 1970."""
     wrong = np.flatnonzero(~(np.abs(numbers.astype(np.float64)) < MOST_NUMBER))
     if len(wrong):
-        raise LogError(f"{path}, line {line[wrong[0]]}: its time is no number, or far too large")
+        raise LogError(f"{path}, line {line[wrong[0]]}: its time is not a number, or out of range")
     size = float(np.max(np.abs(numbers.astype(np.float64))))
     if size >= 1e17:
         return (numbers // 1000).astype(np.int64), True

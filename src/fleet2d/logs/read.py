@@ -84,5 +84,5 @@ def _recognize(path: Path) -> Layout:
     if path.suffix.lower() == ".csv":
         return "positions"
     raise LogError(
-        f"{path} is of no known layout; say which by 'format': casas, uci_adl, homer or positions"
+        f"{path} has no known layout: give 'format' (casas, uci_adl, homer or positions)"
     )

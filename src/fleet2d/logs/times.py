@@ -24,15 +24,15 @@ def parse_time(text: str, path: Path, line: int) -> datetime:
     match = _TIME.fullmatch(text.strip())
     if match is None:
         raise LogError(
-            f"{path}, line {line}: found {one_line(text)!r} where a time like"
-            " '2011-06-15 01:03:39' is wanted"
+            f"{path}, line {line}: expected a time like '2011-06-15 01:03:39', got"
+            f" {one_line(text)!r}"
         )
     year, month, day, hour, minute = (int(match[i]) for i in range(1, 6))
     micros = int((match[7] or "").ljust(6, "0")[:6])
     try:
         return datetime(year, month, day, hour, minute, int(match[6] or 0), micros)
     except ValueError as error:
-        raise LogError(f"{path}, line {line}: {one_line(text)!r} is no time: {error}") from None
+        raise LogError(f"{path}, line {line}: {one_line(text)!r} is not a time: {error}") from None
 
 
 def since(first_day: date, moment: datetime) -> int:

@@ -83,8 +83,8 @@ def _rows(path: Path) -> list[_Row]:
         match = LINE.fullmatch(text)
         if match is None or not match[3].strip():
             raise LogError(
-                f"{path}, line {number}: found {one_line(text)!r} where a start time, an end time"
-                " and an activity, or a sensor, its type and its place, are wanted"
+                f"{path}, line {number}: expected a start time, an end time, and an activity or a"
+                f" sensor with its type and place, got {one_line(text)!r}"
             )
         begin, end = (parse_time(" ".join(match[i].split()), path, number) for i in (1, 2))
         rows.append(_Row(begin, end, match[3].strip(), number))

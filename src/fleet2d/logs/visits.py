@@ -17,7 +17,7 @@ class VisitRule(NamedTuple):
         begin_us: The moment of the log that is step 0 [us].
         steps: The number of steps.
         gap_us: A longer silence between two rooms is a gap [us].
-        still_us: A silence in one room up to this long is no gap: sleepers trip no sensor [us].
+        still_us: A silence in one room up to this long is not a gap, as of sleepers [us].
         unknown: Whether the position in a gap is unknown; else the last visit lasts through it.
         door_us: A longer silence at the front door means that the person is out [us].
     """

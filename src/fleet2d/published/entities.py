@@ -34,10 +34,10 @@ def convert_users(reader: ConfigReader, step: timedelta) -> tuple[dict[str, Any]
     if isinstance(names, str):
         names = names.split(",")
     if not isinstance(names, list | None) or not all(isinstance(n, str) for n in names or []):
-        raise reader.wrong(keys, f"found {shown(names)}; names with commas between them are wanted")
+        raise reader.wrong(keys, f"expected names separated by commas, got {shown(names)}")
     old_names = dict.fromkeys(stripped for name in names or [] if (stripped := name.strip()))
     if not old_names:
-        reader.remark(keys, "nobody is named; the scenario has no users")
+        reader.remark(keys, "no names; the scenario has no users")
     users: dict[str, Any] = {}
     paths: dict[str, Keys] = {}
     for old_name in old_names:
@@ -66,7 +66,7 @@ def body_keys(reader: ConfigReader, keys: Keys) -> Keys:
         raise reader.wrong(keys, f"its type is {kind!r}, and it has no section of that name")
     if kind != "base":
         reader.remark(
-            (*keys, "type"), f"{kind} is no type of the published Fleet2D: read as if it were base"
+            (*keys, "type"), f"{kind} is not a type of the published Fleet2D: read as base"
         )
     return (*keys, kind)
 
@@ -128,8 +128,8 @@ def _speed(reader: ConfigReader, keys: Keys, step_s: Fraction) -> float | None:
     if speed > _FASTEST_M_S:
         raise reader.wrong(
             keys,
-            f"{stride:g} m in a step of {float(step_s):g} s is {speed:g} m/s; {_FASTEST_M_S} m/s at"
-            " most is wanted",
+            f"{stride:g} m in a step of {float(step_s):g} s is {speed:g} m/s, more than the"
+            f" limit of {_FASTEST_M_S} m/s",
         )
     reader.remark(
         keys,
@@ -190,8 +190,8 @@ def _range(reader: ConfigReader, keys: Keys) -> list[float]:
     if near >= far:
         raise reader.wrong(
             keys,
-            f"the camera would see from {near:g} m to {far:g} m; a farthest distance beyond the"
-            " nearest is wanted",
+            f"the camera would see from {near:g} m to {far:g} m: the farthest distance must be"
+            " beyond the nearest",
         )
     present = [(*keys, limit) for limit in limits if reader.get((*keys, limit)) is not None]
     if present:

@@ -69,7 +69,7 @@ class ConfigReader:
             if data is None:
                 return None
             if not isinstance(data, Mapping):
-                raise self.wrong(keys[:depth], f"found {shown(data)}; a mapping of keys is wanted")
+                raise self.wrong(keys[:depth], f"expected a mapping of keys, got {shown(data)}")
             self._touched.add(keys[: depth + 1])
             data = data.get(key)
         if whole:
@@ -89,7 +89,7 @@ class ConfigReader:
         expected += f", {most:g} at most" if most < math.inf else ""
         is_number = isinstance(value, int | float) and not isinstance(value, bool)
         if not is_number or not (abs(value) < _HUGE and above < value <= most and value >= least):
-            raise self.wrong(keys, f"found {shown(value)}; {expected} is wanted")
+            raise self.wrong(keys, f"expected {expected}, got {shown(value)}")
         return float(value)
 
     def integer(self, keys: Keys, least: int, below: int = 2**63) -> int | None:
@@ -99,7 +99,7 @@ class ConfigReader:
             return None
         if isinstance(value, bool) or not isinstance(value, int) or not least <= value < below:
             raise self.wrong(
-                keys, f"found {shown(value)}; a whole number from {least} on is wanted"
+                keys, f"expected a whole number of {least} or more, got {shown(value)}"
             )
         return value
 
@@ -107,7 +107,7 @@ class ConfigReader:
         """Return a text; None if it is missing or empty."""
         value = self.get(keys)
         if value is not None and not isinstance(value, str):
-            raise self.wrong(keys, f"found {shown(value)}; text is wanted")
+            raise self.wrong(keys, f"expected text, got {shown(value)}")
         return str(value) if value else None
 
     def boolean(self, keys: Keys) -> bool | None:
@@ -115,7 +115,7 @@ class ConfigReader:
         value = self.get(keys)
         value = _BOOLEANS.get(value.lower(), value) if isinstance(value, str) else value
         if value is not None and not isinstance(value, bool):
-            raise self.wrong(keys, f"found {shown(value)}; true or false is wanted")
+            raise self.wrong(keys, f"expected true or false, got {shown(value)}")
         return value
 
     def duration(self, keys: Keys) -> timedelta | None:
@@ -124,7 +124,9 @@ class ConfigReader:
         if value is None:
             return None
         if not isinstance(value, Mapping) or not value.keys() <= _UNITS:
-            raise self.wrong(keys, f"a mapping of {', '.join(sorted(_UNITS))} is wanted")
+            raise self.wrong(
+                keys, f"expected a mapping of {', '.join(sorted(_UNITS))}, got {shown(value)}"
+            )
         try:
             return parse_duration(dict(value) or 0)
         except PydanticCustomError as error:

@@ -30,7 +30,7 @@ def read_step(reader: ConfigReader) -> timedelta:
         reader.remark(keys, "missing; the step is 1 s")
         return timedelta(seconds=1)
     if not step:
-        raise reader.wrong(keys, "found 0; a step longer than 0 is wanted")
+        raise reader.wrong(keys, "expected a step longer than 0, got 0")
     return step
 
 
@@ -48,8 +48,8 @@ def convert_simulation(reader: ConfigReader, step: timedelta) -> dict[str, Any]:
     if duration % step:
         reader.remark(
             duration_keys,
-            f"{format_duration(duration)} is no multiple of delta, {format_duration(step)}: there,"
-            " a run went one step beyond it; here it ends with the last full step within it",
+            f"{format_duration(duration)} is not a multiple of delta, {format_duration(step)}:"
+            " there, a run went one step beyond it; here it ends with the last full step within it",
         )
     start = _start(reader)
     result: dict[str, Any] = {"start": start.isoformat()} if start else {}
@@ -87,7 +87,7 @@ def _start(reader: ConfigReader) -> datetime | None:
         value = datetime.combine(value, time())
     if not isinstance(value, datetime):
         raise reader.wrong(
-            keys, f"found {shown(value)}; a date and time is wanted, like 2026-01-05 08:00:00"
+            keys, f"expected a date and time like 2026-01-05 08:00:00, got {shown(value)}"
         )
     if value.tzinfo is not None:
         reader.remark(
@@ -160,12 +160,13 @@ def convert_floorplan(
     kind = reader.get(("floorplan", "type"))
     if kind != "he":
         raise reader.wrong(
-            ("floorplan", "type"), f"found {shown(kind)}; only he (HouseExpo) can be converted"
+            ("floorplan", "type"),
+            f"expected he (HouseExpo), the only type that is converted, got {shown(kind)}",
         )
     path_keys = (*_PLAN, "json_fpath")
     old_path = reader.text(path_keys)
     if old_path is None:
-        raise reader.wrong(path_keys, "missing; the path of a HouseExpo JSON file is wanted")
+        raise reader.wrong(path_keys, "missing: give the path of a HouseExpo JSON file")
     # Paths there are relative to the top of its repository, some folders above the configuration.
     folders = dict.fromkeys([old.absolute().parent, Path.cwd(), *old.absolute().parents])
     file = next((p.resolve() for f in folders if (p := f / old_path).is_file()), None)

@@ -55,7 +55,7 @@ class DurationLaw(Settings):
             return {"mean": data}
         if isinstance(data, list | tuple):
             if len(data) != 2:
-                raise problem(f"found {data}; a range of durations is wanted, [20 min, 40 min]")
+                raise problem(f"expected a range of durations like [20 min, 40 min], got {data}")
             return {"law": "uniform", "at_least": data[0], "at_most": data[1]}
         return data
 

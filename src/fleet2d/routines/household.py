@@ -147,7 +147,7 @@ def read_household(value: object) -> Any:
     path = folder_of(value) / Path(value).expanduser()
     if not str(value) or not path.is_file():
         raise problem(
-            f"found {shown(value)}; a household is wanted: a mapping with 'members', or a YAML file"
+            f"expected a household (a mapping with 'members', or a YAML file), got {shown(value)}"
         )
     try:
         return read_document(path).data

@@ -126,7 +126,9 @@ class Task(Timing):
     def _has_one_time(self) -> Self:
         timed = self.at is not None or self.between is not None
         if timed + self.on_waking + self.before_bed > 1:
-            raise problem("give a time ('at', 'between'), or on_waking, or before_bed: one of them")
+            raise problem(
+                "give exactly one of a time ('at' or 'between'), 'on_waking' and 'before_bed'"
+            )
         if self.fixed and self.at is None:
             raise problem("a fixed appointment needs 'at'")
         if self.fixed and self.between is not None:
@@ -336,7 +338,7 @@ def read_persona(value: object, chain: tuple[str, ...] = ()) -> Any:
         return merge(below, {key: v for key, v in value.items() if key != "extends"})
     if not isinstance(value, str | Path) or not str(value):
         raise problem(
-            f"found {shown(value)}; a persona is wanted: one of {', '.join(bundled_names())}, a"
+            f"expected a persona, got {shown(value)}: give one of {', '.join(bundled_names())}, a"
             " YAML file, or a mapping like {extends: retired, pace: 0.8}"
         )
     if str(value) in bundled_names():

@@ -52,14 +52,14 @@ def parse_day(value: Any) -> RecordedDay:
     if isinstance(value, RecordedDay):
         return value
     if not isinstance(value, str):
-        raise problem(f"found {value!r}; a recorded day is wanted, '07:00 wash, …, 30:45 end'")
+        raise problem(f"expected a recorded day like '07:00 wash, …, 30:45 end', got {value!r}")
     times, names = [], []
     for entry in value.split(","):
         time, _, name = entry.strip().partition(" ")
         hours, colon, minutes = time.partition(":")
         if not (colon and hours.isdigit() and minutes.isdigit() and name):
             raise problem(
-                f"found {entry.strip()!r}; a time and an activity are wanted, '07:00 wash'"
+                f"expected a time and an activity like '07:00 wash', got {entry.strip()!r}"
             )
         times.append(int(hours) * 3600 + int(minutes) * 60)
         names.append(name.strip())

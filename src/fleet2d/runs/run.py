@@ -136,7 +136,7 @@ class Run:
             if not isinstance(cell, int | float) or isinstance(cell, bool) or not 0 < cell < 10:
                 raise ArtifactError(
                     f"{self.directory}/{FILE_NAME}: scenario.floorplan.cell should be the size of"
-                    f" a cell [m], found {str(cell)[:60]}"
+                    f" a cell [m], but is {str(cell)[:60]}"
                 )
             self._plan = read_native(path, cell)
         return self._plan
@@ -256,8 +256,8 @@ class Run:
         """
         if self.digest is None:
             raise ArtifactError(
-                f"{self.directory or 'the run'} has no digest, for its status is {self.status}: "
-                "there is nothing to compare with"
+                f"{self.directory or 'the run'} has no digest, because its status is {self.status}:"
+                " there is nothing to compare with"
             )
         digests = {name: table["digest"] for name, table in self.manifest["tables"].items()}
         changes = changed_tables(digests, self._digest_of)

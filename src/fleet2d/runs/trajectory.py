@@ -78,7 +78,7 @@ def rebuild_path(run: "Run", plan: FloorPlan, entity: str, every: timedelta) -> 
     clock = Clock(datetime.fromisoformat(manifest["start"]), manifest["step_us"], manifest["steps"])
     if not isinstance(every, timedelta):
         raise ArtifactError(
-            f"every is {every!r}: a timedelta is wanted, as in every=timedelta(seconds=10)"
+            f"every: expected a timedelta like timedelta(seconds=10), got {every!r}"
         )
     stride = whole_steps(every, clock.step_us, "every", ArtifactError)
     if "key_frames" not in run.tables:

@@ -118,7 +118,7 @@ def _load(
     try:
         for parent in parents:
             if not isinstance(parent, str):
-                raise ScenarioError(f"found {parent}; the path of a YAML file is wanted")
+                raise ScenarioError(f"expected the path of a YAML file, got {parent}")
             result = merge(result, _load(str(parent), folder, chain))
     except ScenarioError as error:
         place = document.place(("extends",))
@@ -140,7 +140,7 @@ def _read_override(text: str) -> Document:
     keys = tuple(key.strip().split("."))
     place = f"override {(text if len(text) <= 100 else one_line(text, 100))!r}"
     if not equals:
-        raise ScenarioError(f"{place}: there is no '=' in it; write key.path=value")
+        raise ScenarioError(f"{place}: expected key.path=value, but there is no '='")
     if not all(keys):
         raise ScenarioError(f"{place}: a part of its key is empty")
     # '#d62728' is a colour, not a comment, although it is not quoted within the value.

@@ -1,4 +1,4 @@
-"""Messages about wrong scenarios: where, what was found, and what is wanted."""
+"""Messages about wrong scenarios: where the value is, what is expected, and what it is."""
 
 import re
 from collections.abc import Mapping
@@ -28,16 +28,16 @@ _EXPECTED = {
     "dict": "a mapping of keys",
     "model": "a mapping of keys",
     "mapping": "a mapping of keys",
-    "datetime": "a date and time, like 2026-01-05 or 2026-01-05T08:00,",
-    "date": "a date, like 2026-01-05,",
+    "datetime": "a date and time, like 2026-01-05 or 2026-01-05T08:00",
+    "date": "a date, like 2026-01-05",
     "literal_error": "{expected}",
     "enum": "{expected}",
     "greater_than_equal": "{ge} or more",
     "greater_than": "more than {gt}",
     "less_than_equal": "{le} or less",
     "less_than": "less than {lt}",
-    "too_short": "a list of at least {min_length}",
-    "too_long": "a list of at most {max_length}",
+    "too_short": "a list of length {min_length} or more",
+    "too_long": "a list of length {max_length} or less",
 }
 """The expected value, by the beginning of pydantic's name for the error; the first match counts."""
 
@@ -51,7 +51,7 @@ def explain(error: ValidationError, document: Document) -> ScenarioError:
     ...     SimulationSettings.model_validate(document.data)
     ... except ValidationError as error:
     ...     print(explain(error, document))
-    home.yaml:3: seed: found 'x'; a whole number is wanted
+    home.yaml:3: seed: expected a whole number, got 'x'
     """
     problems: dict[tuple[str, str], list[ErrorDetails]] = {}
     groups: set[str] = set()
@@ -102,9 +102,9 @@ def describe(*lines: ErrorDetails) -> str:
         *first, last = dict.fromkeys(expected)
         joint = ", or " if any("," in text for text in first) else " or "
         hint = did_you_mean(value, choices) if choices else ""
-        hint = hint if hint.endswith("?") else ";"
-        alternatives = joint.join([*(text.rstrip(",") for text in first), last])
-        texts.insert(0, f"found {_quote(value)}{hint} {alternatives} is wanted")
+        hint = hint if hint.endswith("?") else ""
+        alternatives = joint.join([*first, last])
+        texts.insert(0, f"expected {alternatives}, got {_quote(value)}{hint}")
     return "; or ".join(dict.fromkeys(texts))
 
 

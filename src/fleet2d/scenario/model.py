@@ -41,17 +41,15 @@ _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,99}")
 def _parse_local_time(value: Any) -> Any:
     """Refuse what pydantic would read as seconds since 1970, and time zones."""
     if not isinstance(value, str | date):
-        raise problem(f"found {value}; a date and time is wanted, like 2026-01-05T08:00")
+        raise problem(f"expected a date and time like 2026-01-05T08:00, got {value}")
     try:
         moment = datetime.fromisoformat(value) if isinstance(value, str) else value
     except ValueError:
-        raise problem(
-            f"found '{value}'; a date and time is wanted, like 2026-01-05T08:00"
-        ) from None
+        raise problem(f"expected a date and time like 2026-01-05T08:00, got '{value}'") from None
     if isinstance(moment, datetime) and moment.tzinfo is not None:
         raise problem(
-            f"found {moment.isoformat()}; a local time without a time zone is wanted: a simulated"
-            " day has 24 hours"
+            "expected a local time without a time zone, since a simulated day has 24 hours, got"
+            f" {moment.isoformat()}"
         )
     return moment
 
@@ -109,7 +107,7 @@ class SimulationSettings(Settings):
     def _fits_the_calendar(self) -> Self:
         # Agendas look a week back and a day ahead.
         if not 1900 <= self.start.year <= 7900:
-            raise problem_at(("start",), f"found {self.start}; a year from 1900 to 7900 is wanted")
+            raise problem_at(("start",), f"expected a year from 1900 to 7900, got {self.start}")
         return self
 
     @model_validator(mode="after")
@@ -240,7 +238,7 @@ def load_scenario(
 
     Raises:
         ScenarioError: the scenario is not valid; a line per problem says what is wrong, where it
-            is written, and what is wanted.
+            is written, and what is expected.
     """
     folder = Path.cwd()
     if isinstance(source, str) and "=" in source and not _is_path(source):

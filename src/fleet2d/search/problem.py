@@ -106,7 +106,7 @@ def search_problem(
     for name, expected in shapes.items():
         shape = getattr(problem, name).shape
         if shape != expected:
-            raise ValueError(f"{name} has shape {shape}; with {count} sites, {expected} is wanted")
+            raise ValueError(f"{name} has shape {shape}, expected {expected} for {count} sites")
     for name, values in problem._asdict().items():
         if not (np.isfinite(values).all() and (values >= 0).all()):
             raise ValueError(f"{name} has a value that is negative or not finite: {values}")

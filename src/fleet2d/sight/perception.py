@@ -57,7 +57,7 @@ class Detection(Settings):
         for hour, _ in self.light.points:
             if not 0 <= hour <= 24:
                 raise problem_at(
-                    ("light",), f"{hour:g} is no time of day: 0 to 24 hours are wanted"
+                    ("light",), f"expected an hour of the day from 0 to 24, got {hour:g}"
                 )
         return self
 
@@ -116,7 +116,7 @@ class Identity(Settings):
         for user, others in self.confusion.items():
             if user in others:
                 raise problem_at(
-                    ("confusion", user), f"{user!r} can't be mistaken for {user!r}: that is right"
+                    ("confusion", user), f"{user!r} can't be mistaken for itself: leave it out"
                 )
             total = sum(others.values())
             if abs(total - 1) > SUM_ERROR:
@@ -155,7 +155,9 @@ class Attributes(Settings):
         for key, confusion in confusions.items():
             for true, others in confusion.items():
                 if true in others:
-                    raise problem_at((key, true), f"what isn't confused is {true!r}: leave it out")
+                    raise problem_at(
+                        (key, true), f"{true!r} can't be mistaken for itself: leave it out"
+                    )
                 _check_sum((key, true), sum(others.values()))
         return self
 

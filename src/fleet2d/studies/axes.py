@@ -71,7 +71,7 @@ class RangeAxis(Axis):
         if (self.step is None) == (self.count is None):
             raise problem("give step, or count")
         if not first < last:
-            raise problem(f"found {first:g} to {last:g}; the first must be below the last")
+            raise problem(f"the first number, {first:g}, must be below the last, {last:g}")
         if self.step is not None:
             check_count((last - first) / self.step)
         if self.log and (first <= 0 or self.count is None):
@@ -265,13 +265,13 @@ def _axis_of(value: Any) -> Any:
     if isinstance(value, Axis):
         return value
     if not isinstance(value, Mapping):
-        raise problem(f"found {value!r}; an axis is wanted: {{key: PATH, values: […]}}")
+        raise problem(f"expected an axis like {{key: PATH, values: […]}}, got {value!r}")
     kinds = [kind for kind in KINDS if kind in value]
     if len(kinds) != 1:
         unknown = next((key for key in value if key not in ("key", "when")), "")
         hint = did_you_mean(unknown, KINDS) if not kinds else "."
         keys = " and ".join(kinds) or ", ".join(map(repr, value)) or "nothing"
-        raise problem(f"found {keys}; exactly one of {', '.join(KINDS)} is wanted{hint}")
+        raise problem(f"expected exactly one of {', '.join(KINDS)}, got {keys}{hint}")
     return KINDS[kinds[0]].model_validate(value)
 
 

@@ -41,7 +41,7 @@ def key_path(text: str) -> Keys:
     """
     keys = tuple(part.strip() for part in text.split("."))
     if not all(keys):
-        raise ScenarioError(f"found {text!r}; a key path is wanted, like robots.astro.speed")
+        raise ScenarioError(f"expected a key path like robots.astro.speed, got {text!r}")
     return keys
 
 

@@ -18,8 +18,8 @@ def check_count(count: Number) -> Number:
     """
     if count > VARIANTS.most:
         raise problem(
-            f"more than {VARIANTS.most:,} values are too many for one study; if that is as it"
-            f" should be, set {VARIANTS.variable} in the environment"
+            f"more than {VARIANTS.most:,} values are too many for one study; to allow more, set"
+            f" {VARIANTS.variable} in the environment"
         )
     return count
 

@@ -19,7 +19,7 @@ def _texts(value: Any) -> tuple[Any, ...]:
     """Return a text or a list of texts as a tuple; each keeps the folder of its file."""
     texts = (value,) if isinstance(value, str | Path) else value
     if not isinstance(texts, list | tuple) or not all(isinstance(t, str | Path) for t in texts):
-        raise problem(f"found {value!r}; a text, or a list of texts, is wanted")
+        raise problem(f"expected a text or a list of texts, got {value!r}")
     return tuple(texts)
 
 

@@ -74,7 +74,7 @@ class PairedComparison(Settings):
 def _numbers_or_count(value: Any) -> Any:
     if isinstance(value, int) and not isinstance(value, bool):
         if value < 1:
-            raise problem(f"found {one_line(value)}; 1 or more replicates are wanted")
+            raise problem(f"expected 1 or more replicates, got {one_line(value)}")
         return tuple(range(check_count(value)))
     return value
 
@@ -123,7 +123,10 @@ class StudyFile(Settings):
         for name, axis in self.axes.items():
             for column in axis.columns(name):
                 if column in (SEED, *RESERVED):
-                    message = f"an axis can't be called {column!r}, for results have such a column"
+                    message = (
+                        f"an axis can't be called {column!r}, because results have a column of that"
+                        " name"
+                    )
                     raise problem_at(("axes", name), message)
                 if column in owners:
                     message = f"the axis {owners[column]!r} has a column {column!r}, too"
@@ -248,7 +251,7 @@ def _base(base: Any, document: Document) -> Document:
         if base is None or (isinstance(base, str) and base.startswith("bundled:")):
             return compose(base)
         if not isinstance(base, str | Path):
-            raise ScenarioError(f"found {base!r}; a scenario's file or a mapping is wanted")
+            raise ScenarioError(f"expected the file of a scenario or a mapping, got {base!r}")
         return compose(os.path.relpath(folder_of(base) / Path(base).expanduser()))
     except ScenarioError as error:
         place = document.place(("base",))

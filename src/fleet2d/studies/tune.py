@@ -90,7 +90,7 @@ def tune(
     check_settings(job, training[0][0])
     directory = StudyDirectory(folder)
     if directory.storage.folder is None:
-        raise InputError(f"{folder} is no local folder: the storage of Optuna needs one")
+        raise InputError(f"{folder} is not a local folder, which the storage of Optuna needs")
     with directory.locked():
         study = _open_optuna(directory.storage.folder / TRIALS, specification.name, settings)
         _search(study, job, training, settings, executor, observer)

@@ -186,7 +186,7 @@ def trial(
     """
     numbers = range(seeds) if isinstance(seeds, int) else seeds or ()
     if isinstance(seeds, int) and seeds < 1:
-        raise InputError(f"seeds={seeds}: 1 or more seeds are wanted")
+        raise InputError(f"seeds={seeds}: expected 1 or more seeds")
 
     def decorate(function: Test) -> Test:
         source = _beside(function, scenario)

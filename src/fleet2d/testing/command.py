@@ -95,7 +95,7 @@ def parse_budget(text: str) -> tuple[int, float | None]:
         return UNLIMITED_TRIES, parse_duration(text).total_seconds()
     except (PydanticCustomError, ValueError):
         raise InputError(
-            f"--budget {text}: a number of runs is wanted, like 200, or a time, like '5 min'"
+            f"--budget: expected a number of runs like 200, or a time like '5 min', got {text!r}"
         ) from None
 
 

@@ -27,10 +27,8 @@ class RateTest:
     Attributes:
         seeds: Largest number of seeds.
         holds: The claimed rate, above 0 and up to 1.
-        error: Largest probability of refusing a true claim, and of accepting a rate of
-            `told_from`.
-        told_from: The largest rate that the test distinguishes from the claimed one with that
-            error.
+        error: Largest probability of refusing a true claim, and of accepting the alternative.
+        alternative: The largest rate that is refused with a probability of at least 1 - `error`.
         accept: int64 (seeds + 1,), the most failures with which the claim is accepted, by number of
             seeds so far; -1 where it can't be accepted yet.
         refuse: int64 (seeds + 1,), the fewest failures with which the claim is refused.
@@ -44,7 +42,7 @@ class RateTest:
     seeds: int
     holds: float
     error: float
-    told_from: float
+    alternative: float
     accept: NDArray[np.int64]
     refuse: NDArray[np.int64]
 
@@ -76,11 +74,11 @@ def rate_test(seeds: int, holds: float = 1.0, error: float = 0.05) -> RateTest:
         InputError: A number is out of range.
     """
     if not 1 <= seeds <= MOST_SEEDS:
-        raise InputError(f"seeds={seeds}: 1 to {MOST_SEEDS:,} seeds are wanted")
+        raise InputError(f"seeds={seeds}: expected 1 to {MOST_SEEDS:,} seeds")
     if not 0 < holds <= 1:
-        raise InputError(f"holds={holds}: a rate above 0 and up to 1 is wanted, such as 0.95")
+        raise InputError(f"holds={holds}: expected a rate above 0 and up to 1, such as 0.95")
     if not 0 < error < 0.5:
-        raise InputError(f"error={error}: a rate above 0 and below 0.5 is wanted, such as 0.05")
+        raise InputError(f"error={error}: expected a rate above 0 and below 0.5, such as 0.05")
     if holds == 1:
         accept = np.full(seeds + 1, -1)
         accept[seeds] = 0
@@ -95,7 +93,7 @@ def rate_test(seeds: int, holds: float = 1.0, error: float = 0.05) -> RateTest:
             low, best = middle, test
         else:
             high = middle
-    if best.told_from == 0:
+    if best.alternative == 0:
         fewest = math.floor(math.log(error) / math.log(1 - holds)) + 1
         raise InputError(
             f"seeds={seeds} is too few to test holds={holds:g} with an error of {error:g}: take"

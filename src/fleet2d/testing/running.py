@@ -59,12 +59,12 @@ class ClaimResult:
         if rate.seeds == 1:
             return "held" if self.holds else "failed"
         if rate.holds == 1:
-            return f"{held}; every one was to hold" if failures else held
+            return f"{held}; all of them must hold" if failures else held
         verb = "accepted" if self.holds else "refused"
         return (
             f"{held}: {percent(rate.holds)} {verb} after {number} of at most {rate.seeds}"
-            f" (errs in {percent(rate.error)}; tells {percent(rate.holds)} from"
-            f" {percent(rate.told_from)})"
+            f" (error {percent(rate.error)}; distinguishes {percent(rate.holds)} from"
+            f" {percent(rate.alternative)})"
         )
 
 

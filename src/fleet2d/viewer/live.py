@@ -252,7 +252,7 @@ def read_order(body: bytes) -> LiveOrder:
     Raises:
         InputError: The body is no order.
     """
-    refusal = InputError("the request is no valid order")
+    refusal = InputError("the request is not a valid order")
     try:
         content: Any = json.loads(body) if len(body) <= MOST_BODY else None
         value, x, y = (float(content[key]) for key in ("value", "x", "y"))

@@ -67,7 +67,7 @@ class PageServer:
         self._server = uvicorn.Server(config)
 
     def show(self, *, open_browser: bool, announce: Callable[[str], None]) -> None:
-        """Announce the address of the page, open it in a browser if wanted, serve until Ctrl-C."""
+        """Announce the address of the page, open a browser if requested, serve until Ctrl-C."""
         announce(self.address)
         if open_browser:
             webbrowser.open(self.address)

@@ -50,9 +50,9 @@ def test_presence_of_an_unknown_user_is_refused_by_name() -> None:
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"home": np.array([[0.75, 0.5], [0.5, 0.5]])}, "'ana' is no distribution.*1.25"),
-        ({"home": np.array([[0.5, 0.5], [np.nan, 0.5]])}, "'anyone' is no distribution.*nan"),
-        ({"home": np.array([[1.5, -0.5], [0.5, 0.5]])}, "'ana' is no distribution"),
+        ({"home": np.array([[0.75, 0.5], [0.5, 0.5]])}, "'ana' is not a distribution.*1.25"),
+        ({"home": np.array([[0.5, 0.5], [np.nan, 0.5]])}, "'anyone' is not a distribution.*nan"),
+        ({"home": np.array([[1.5, -0.5], [0.5, 0.5]])}, "'ana' is not a distribution"),
         ({"away": np.array([0.5, np.nan])}, "'anyone'.*away nan"),
         ({"away": np.array([-0.1, 0.5])}, "'ana'.*away -0.1"),
         ({"away": np.array([0.5])}, "shapes"),

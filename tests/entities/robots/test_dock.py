@@ -78,7 +78,7 @@ def test_without_a_battery_nothing_changes() -> None:
         ({"driving": 0}, {}, "longer than 0"),
         ({"charger": "storage"}, {}, "can't be reached"),
         ({"charger": [5.05, 1.0]}, {}, "wall"),
-        ({"charge": 2}, {}, "share is 0 to 1"),
+        ({"charge": 2}, {}, "expected a share from 0 to 1"),
         ({}, {"threshold": 0.9, "until": 0.5}, "'until' must be above 'threshold'"),
         ({"capacity": 3}, {}, "unknown key 'capacity'"),
     ],

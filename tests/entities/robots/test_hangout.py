@@ -169,10 +169,10 @@ def test_turning_it_off_leaves_the_life_of_people_as_it_was(ana: Any) -> None:
     [
         ({"avoid": ["bathrom"]}, "no room 'bathrom'"),
         ({"avoid": ["any"]}, "no place to hang out"),
-        ({"quiet": "22:00"}, "hours are wanted"),
+        ({"quiet": "22:00"}, "expected hours"),
         ({"quiet": "workdays 22:00-23:00"}, "unknown day 'workdays'"),
         ({"near": "far"}, "near"),
-        ({"explore": 1.5}, "share is 0 to 1"),
+        ({"explore": 1.5}, "expected a share from 0 to 1"),
         ({"blocking": -1}, "blocking"),
         ({"source": "ltp"}, "reads 'ltp'"),
         ({"user": "anna"}, "there is no user 'anna'"),

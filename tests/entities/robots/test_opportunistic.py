@@ -72,9 +72,9 @@ def test_a_robot_without_a_camera_is_refused() -> None:
 @pytest.mark.parametrize(
     ("fields", "words"),
     [
-        ({"chance": 2}, "a share is 0 to 1"),
+        ({"chance": 2}, "a share from 0 to 1"),
         ({"distance": 0.1}, "distance"),
-        ({"interaction": "-1 s"}, "negative"),
+        ({"interaction": "-1 s"}, "0 or more"),
     ],
 )
 def test_bad_settings_are_refused(fields: dict[str, Any], words: str) -> None:

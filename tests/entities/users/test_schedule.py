@@ -311,7 +311,9 @@ def test_days_that_are_none_are_refused(on: Any) -> None:
 def test_an_unreachable_kind_of_rest_is_left_out_with_a_note() -> None:
     item = {"at": "08:00", "place": "kitchen", "dwell": "1 h"}
     actor = fleet2d.Simulation(one(agenda(item), rest="storage")).actors["ana"]
-    assert ["schedule.days: left out, for this home has none to go to: storage"] == actor.notes
+    assert [
+        "schedule.days: left out, because this home has none that can be reached: storage"
+    ] == actor.notes
     assert "kitchen_0" in {room.name for room in actor.reachable_rooms()}
 
 

@@ -144,5 +144,5 @@ def test_load_floorplan_of_a_picture_asks_for_its_scale(tmp_path: Path) -> None:
     assert read_image(path, 0.05) == load_floorplan(path, resolution=0.05)
     with pytest.raises(FloorPlanError, match="give the metres per pixel as resolution"):
         load_floorplan(path)
-    with pytest.raises(FloorPlanError, match="family_home is no picture"):
+    with pytest.raises(FloorPlanError, match="family_home is not a picture"):
         load_floorplan("family_home", resolution=0.05)

@@ -329,7 +329,7 @@ def test_one_floor_is_taken(tmp_path: Path, level: str | None, room: str) -> Non
     plan = read(tmp_path, *FLOORS, units="m", level=level)
 
     assert [room] == [plan_room.name for plan_room in plan.rooms]
-    other = {"Down": "G was taken, and not Upstairs", "Up": "Upstairs was taken, and not G"}[room]
+    other = {"Down": "G is used, not Upstairs", "Up": "Upstairs is used, not G"}[room]
     assert (f"of its levels, {other}",) == plan.notes
 
 
@@ -450,9 +450,12 @@ def test_scale_of_cells_is_chosen(tmp_path: Path) -> None:
         (feature({"type": "Polygon"}, "room"), "coordinates is null: a list"),
         (feature({"type": "Polygon", "coordinates": []}, "room"), "is empty"),
         (feature({"type": "Polygon", "coordinates": [[[0, 0], [1, 1]]]}, "room"), "2 different"),
-        (feature(box(0, 0, float("nan"), 1), "room"), r"\[1\] is \[NaN, 0\]: NaN is no coordinate"),
-        (feature(box(0, 0, 10**400, 1), "room"), "is no coordinate"),
-        (feature(box(0, 0, True, 1), "room"), "true is no coordinate"),
+        (
+            feature(box(0, 0, float("nan"), 1), "room"),
+            r"\[1\] is \[NaN, 0\]: NaN is not a coordinate",
+        ),
+        (feature(box(0, 0, 10**400, 1), "room"), "is not a coordinate"),
+        (feature(box(0, 0, True, 1), "room"), "true is not a coordinate"),
         (feature(line((1, 1), (1, 1)), "door"), "1 different points: at least 2"),
         (feature(box(1, 1, 2, 2), "object", blocks="air"), "one of nothing, path, sight"),
         (feature(box(1, 1, 2, 2), "object", uses=3), r"properties\.uses is 3: a list"),

@@ -85,7 +85,7 @@ def test_every_box_of_every_plan_is_a_room_or_a_note(sample: list[Path]) -> None
                 boxes.setdefault(tuple(box), set()).add(category.lower())
         plan = read_houseexpo(path)
         labelled = [room for room in plan.rooms if room.labels]
-        lost = [note for note in plan.notes if "it is no room" in note or "one room" in note]
+        lost = [note for note in plan.notes if "it is not a room" in note or "one room" in note]
         assert len(boxes) == len(labelled) + len(lost), path.name
         for room in labelled:
             assert 0.7 < max(
@@ -297,7 +297,7 @@ NAN, INFINITY = float("nan"), float("inf")
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        ({"walls": []}, "no HouseExpo plan: it has no key `verts`"),
+        ({"walls": []}, "not a HouseExpo plan: it has no key `verts`"),
         ({"format": "fleet2d-floorplan"}, "Fleet2D's own format: use type native"),
         ([1, 2], "holds a list: a floor plan is a JSON object"),
         (7, "holds a single value"),

@@ -103,12 +103,12 @@ def test_boxes_that_make_no_room_are_notes_with_the_reason() -> None:
 
     assert {"office_0", "unknown_0"} == set(areas(plan))
     assert [
-        "the region gym from (7.00, 1.00) to (12.00, 4.00) m covers too little free space: it is no"
+        "the region gym from (7.00, 1.00) to (12.00, 4.00) m covers too little free space: it is not a"
         " room",
-        "the region storage from (20.00, 20.00) to (22.00, 22.00) m covers no free space: it is no"
+        "the region storage from (20.00, 20.00) to (22.00, 22.00) m covers no free space: it is not a"
         " room",
         "the region aeration from (2.00, 1.00) to (2.10, 4.00) m covers too little free space: it"
-        " is no room",
+        " is not a room",
     ] == list(plan.notes)
 
 

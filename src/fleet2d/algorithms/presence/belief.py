@@ -89,14 +89,14 @@ class Presence:
         rows = len(self.users) + 1
         if self._home.ndim != 2 or self._home.shape[0] != rows or self._away.shape != (rows,):
             raise ComponentError(
-                f"presence of {rows - 1} users and anyone needs {rows} rows of shares and as many"
-                f" numbers of away; found shapes {self._home.shape} and {self._away.shape}"
+                f"presence of {rows - 1} users and anyone needs shares of shape ({rows}, rooms) and"
+                f" away of shape ({rows},), got {self._home.shape} and {self._away.shape}"
             )
         is_valid = are_distributions(self._home, self._away)
         if not is_valid.all():
             row = int(np.argmin(is_valid))
             raise ComponentError(
-                f"presence of {self.names[row]!r} is no distribution: shares"
+                f"presence of {self.names[row]!r} is not a distribution: shares"
                 f" {self._home[row].tolist()}, which sum to {self._home[row].sum():g}, away"
                 f" {self._away[row]:g}"
             )

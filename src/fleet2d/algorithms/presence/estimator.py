@@ -70,8 +70,8 @@ class Estimator(Component):
         expected = (len(bins.day), self.users + 1, self.width(self.rooms))
         if sums.shape != expected:
             raise ComponentError(
-                f"{type(self).__name__}.sums returned an array of shape {sums.shape}, but"
-                f" {expected} is wanted: bins, users + 1, and width({self.rooms})"
+                f"{type(self).__name__}.sums returned an array of shape {sums.shape}, expected"
+                f" {expected}: bins, users + 1, and width({self.rooms})"
                 f"{_source_line(type(self))}"
             )
         self.counts.add(bins.day, bins.minute, sums)

@@ -99,8 +99,8 @@ class ExposureRatio(Estimator):
 
 def _foreign(patches: int, rooms: int) -> ComponentError:
     return ComponentError(
-        f"what was learned is of {patches} patches of {rooms} rooms, which aren't those here: it is"
-        " from another home"
+        f"the learned state has {patches} patches in {rooms} rooms, unlike this home: it is from"
+        " another home"
     )
 
 

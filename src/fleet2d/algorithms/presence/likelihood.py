@@ -186,7 +186,7 @@ class Likelihood(Estimator):
         for i, person in enumerate(self.people):
             if self.learned and not person.recall(self.learned.get(str(i), {})):
                 raise ComponentError(
-                    f"what was learned doesn't fit {self.stages} stages in {len(layout.room) - 1}"
+                    f"the learned state doesn't fit {self.stages} stages in {len(layout.room) - 1}"
                     f" patches of {self.rooms} rooms: it is from another home, other users, another"
                     " estimator, or one with other stages"
                 )

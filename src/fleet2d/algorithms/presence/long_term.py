@@ -38,7 +38,7 @@ class LongTermPresence(Algorithm):
         by: One estimate, or one for each hour of the week.
         smoothing: Duration of average evidence added to each hour of the week.
         half_life: After which evidence counts half; null: all counts alike.
-        interval: Coverage of the intervals it tells, as 0.9.
+        interval: Coverage of its intervals, such as 0.9.
     """
 
     needs: ClassVar[Set[str]] = frozenset({"evidence"})

@@ -85,8 +85,8 @@ class RealTimePresence(Algorithm):
         if shapes != expected:
             raise ComponentError(
                 f"the model {self.model.type_name} returned arrays of shapes {shapes[0]} and"
-                f" {shapes[1]} for {bins} bins, {users - 1} users and anyone, and {self.rooms}"
-                f" rooms; {expected[0]} (rooms, given at home) and {expected[1]} (away) are wanted"
+                f" {shapes[1]}, expected {expected[0]} (rooms, given at home) and {expected[1]}"
+                f" (away) for {bins} bins, {users - 1} users and anyone, and {self.rooms} rooms"
             )
         is_valid = are_distributions(home, away)
         if not is_valid.all():

@@ -31,7 +31,7 @@ class Turn(Settings):
     @model_validator(mode="after")
     def _does_something(self) -> Self:
         if self.open is None and self.locked is None:
-            raise problem("nothing happens then: say 'open' or 'locked', true or false")
+            raise problem("nothing happens then: give 'open' or 'locked', true or false")
         return self
 
 

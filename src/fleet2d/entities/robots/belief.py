@@ -59,8 +59,8 @@ def room_belief(now: Situation, source: str | None, user: str) -> RoomBelief:
     rooms = len(now.home.rooms)
     if share is None or np.shape(share) != (rooms,):
         raise ComponentError(
-            f"the output of {source!r} says nothing of where people are: a presence algorithm, or a"
-            f" RoomDistribution over the {rooms} rooms, is wanted"
+            f"the output of {source!r} has no room probabilities: name a presence algorithm, or"
+            f" one whose output is a RoomDistribution over the {rooms} rooms"
         )
     return RoomBelief(np.asarray(share, np.float64), float(away))
 

@@ -123,7 +123,9 @@ class Inhabitant(Behavior):
         impossible = [n for n, s in self.settings.items() if not (s.rooms or s.activity.away)]
         for name in impossible:
             rooms = " or ".join(self.settings[name].activity.rooms)
-            actor.notes.append(f"activities.{name}.rooms: left out, for this home has no {rooms}")
+            actor.notes.append(
+                f"activities.{name}.rooms: left out, because this home has no {rooms}"
+            )
             self.settings[name] = self.settings[REST]
 
     def decide(self, now: Situation) -> Plan:

@@ -46,7 +46,7 @@ class Pet(Behavior):
     def _has_a_range(self) -> Self:
         least, most = self.spots
         if not 0 <= least <= most:
-            raise problem(f"found spots {list(self.spots)}; [least, most] is wanted, like [3, 12]")
+            raise problem(f"spots: expected [least, most] like [3, 12], got {list(self.spots)}")
         return self
 
     def start(self, actor: "Actor") -> None:

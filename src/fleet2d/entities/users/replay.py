@@ -78,7 +78,7 @@ class Replay(Behavior):
             at once.
         gap: Silence longer than this is a gap; left out: 10 min between rooms, 1 min between
             positions.
-        still: Silence in one room up to this is no gap: sleepers trip no sensor.
+        still: Silence in one room up to this length is not a gap: sleepers trigger no sensor.
         reach: A position farther than this from free space is left out.
         fastest: Walks faster than this are reported as implausible [m/s].
     """

@@ -73,7 +73,7 @@ class Routine(Inhabitant):
             members = list(self.household.members)
             if actor.name not in members:
                 raise PlacementError(
-                    f"{actor.path}: it is no member of its household"
+                    f"{actor.path}: it is not a member of its household"
                     f"{suggest(actor.name, members, 'Its members are')}"
                 )
             first = actor.clock.start.toordinal() - 1

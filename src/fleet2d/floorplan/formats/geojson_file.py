@@ -216,7 +216,7 @@ def _on_one_floor(
         chosen = matches[0]
     others = ", ".join(names_of[name][-1] for name in levels if name != chosen)
     if others:
-        notes.append(f"of its levels, {names_of[chosen][-1]} was taken, and not {others}")
+        notes.append(f"of its levels, {names_of[chosen][-1]} is used, not {others}")
     return [feature for feature in features if feature.level in (None, chosen)]
 
 
@@ -254,7 +254,7 @@ def _position(value: object, where: str) -> tuple[float, float]:
         is_number = isinstance(number, int | float) and not isinstance(number, bool)
         if not is_number or not abs(number) <= FARTHEST:
             wrong = shown_value(number)
-            raise FloorPlanError(f"{where} is {shown_value(value)}: {wrong} is no coordinate")
+            raise FloorPlanError(f"{where} is {shown_value(value)}: {wrong} is not a coordinate")
     return clean_coordinate(value[0]), clean_coordinate(value[1])
 
 

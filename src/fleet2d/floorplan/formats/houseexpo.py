@@ -62,7 +62,7 @@ def read_houseexpo(path: Path, cell: float = 0.05) -> FloorPlan:
     content = read_json(path)
     if "verts" not in content:
         hint = " (it is in Fleet2D's own format: use type native)" if "format" in content else ""
-        raise FloorPlanError(f"{path} is no HouseExpo plan: it has no key `verts`{hint}")
+        raise FloorPlanError(f"{path} is not a HouseExpo plan: it has no key `verts`{hint}")
     name = content.get("id")
     with in_file(path):
         house = validate(_HOUSE_FILE, content)

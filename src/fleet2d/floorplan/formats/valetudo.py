@@ -311,7 +311,7 @@ def _note_entities(content: dict[str, Any], notes: list[str]) -> None:
         metres = sum(float(np.linalg.norm(np.diff(p, axis=0), axis=1).sum()) for p in pieces)
         notes.append(
             f"the vacuum's recorded path is {metres:.1f} m long, {points} points, in pieces:"
-            f" {len(pieces)}; it is no part of the plan"
+            f" {len(pieces)}; it is not part of the plan"
         )
     counts = Counter(str(entity.get("type")) for entity, _ in objects_in(content, "entities"))
     for kind in ("path", "charger_location", "robot_position", "no_go_area", "virtual_wall"):

@@ -210,8 +210,8 @@ def _whole_numbers(
     values = validate(_PIXELS, layer.get(key) or [], f"{where}.{key}")
     if len(values) % group:
         raise FloorPlanError(
-            f"{where}.{key} has {len(values)} numbers, which is no multiple of {group} ({what}): it"
-            " is cut off"
+            f"{where}.{key} has {len(values)} numbers, which is not a multiple of {group} ({what}):"
+            " it is cut off"
         )
     return np.array(values, np.int64).reshape(-1, group)
 

@@ -22,12 +22,12 @@ def parse_moment(value: Any) -> datetime | timedelta:
     if moment is None:
         return parse_duration(value)
     if moment.tzinfo is not None:
-        raise problem("the clock on the home's wall is wanted, without a time zone")
+        raise problem("expected a local time of the home, without a time zone")
     return moment
 
 
 def _local_time(value: Any) -> datetime | None:
-    """Return a date and time, or None where the value is none."""
+    """Return the date and time that a value is, or None if it is something else."""
     if isinstance(value, datetime):
         return value
     if isinstance(value, date):
@@ -96,7 +96,7 @@ class HomeChange(Settings):
         verbs = [verb for verb in VERBS if getattr(self, verb) is not None]
         if len(verbs) != 1:
             listed = " and ".join(verbs) or "nothing"
-            raise problem(f"{listed} is given: give exactly one of {', '.join(VERBS)}")
+            raise problem(f"give exactly one of {', '.join(VERBS)}, got {listed}")
         for verb, further in (("move", "to"), ("room", "type")):
             if (verbs[0] == verb) != (getattr(self, further) is not None):
                 raise problem(f"'{verb}' and '{further}' go together")

@@ -50,7 +50,7 @@ class LayerSettings(Settings):
     @model_validator(mode="after")
     def _fill_fits(self) -> Self:
         if not holds(np.dtype(self.dtype), self.fill):
-            raise problem_at(("fill",), f"found {self.fill:g}, which no {self.dtype} can be")
+            raise problem_at(("fill",), f"{self.fill:g} is not a value of {self.dtype}")
         if self.every is not None and not self.store:
             raise problem_at(("every",), "the layer isn't stored: leave out 'every' or 'store'")
         return self
@@ -155,7 +155,7 @@ class Layer:
 
     def _check_writable(self) -> None:
         if self._source is not None:
-            raise ComponentError(f"the layer {self.name} is kept by the run itself: only read it")
+            raise ComponentError(f"the layer {self.name} is maintained by the run: it is read-only")
 
     def _cell(self, x: float, y: float) -> tuple[int, int]:
         lattice = self._plan.lattice

@@ -173,7 +173,7 @@ def label_rooms(
     boxes = [cells_in(free, region.shape) for region in merged]
     labels = label_chambers(chambers, boxes, passages.is_opening, lattice.cell)
     notes = [
-        dropped_note(lattice, merged[box], f"{reason}: it is no room")
+        dropped_note(lattice, merged[box], f"{reason}: it is not a room")
         for box, reason in labels.dropped.items()
     ]
     notes += _merge_labels(merged, labels.merged)

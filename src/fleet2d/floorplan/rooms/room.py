@@ -135,11 +135,11 @@ def _room(
 def dropped_note(
     lattice: Lattice,
     region: Region,
-    reason: str = "has no free cell that isn't a smaller room's: it is no room",
+    reason: str = "has no free cell that isn't in a smaller room: it is not a room",
 ) -> str:
     """Return the sentence which says that a region is no room, and why."""
     name = region.name or " and ".join(region.types) or UNKNOWN
     if region.shape.is_empty:
-        return f"the region {name} is empty: it is no room"
+        return f"the region {name} is empty: it is not a room"
     (x0, y0), (x1, y1) = lattice.to_metres(np.reshape(region.shape.bounds, (2, 2))).tolist()
     return f"the region {name} from ({x0:.2f}, {y0:.2f}) to ({x1:.2f}, {y1:.2f}) m {reason}"

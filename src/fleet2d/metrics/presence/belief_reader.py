@@ -34,7 +34,7 @@ def presence_of(name: str, state: "Present") -> Presence | None:
         home = np.tile(output.share, (rows, 1))
         return Presence(state.users, home, np.zeros(rows), state.time)
     raise ComponentError(
-        f"algorithms.{name} put out a {type(output).__name__}; this metric measures presence:"
+        f"algorithms.{name} returned a {type(output).__name__}; this metric measures presence:"
         " a Presence or a RoomDistribution"
     )
 
