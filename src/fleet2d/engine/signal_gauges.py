@@ -79,10 +79,7 @@ class InViewGauge(SwitchGauge):
 
 def gauge_of(signal: Measurement, state: State, step_us: int) -> Gauge:
     """Return a gauge that measures a signal from the present step on."""
-    for kind, make in _MAKERS.items():
-        if type(signal) is kind:
-            return make(signal, state, step_us)
-    raise AssertionError(f"{signal} can't be measured")
+    return _MAKERS[type(signal)](signal, state, step_us)
 
 
 def row_of(state: State, name: str) -> int:

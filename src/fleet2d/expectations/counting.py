@@ -49,7 +49,6 @@ class Count(Signal):
     per: str | None = None
 
     unit = "times"
-    __hash__ = object.__hash__
 
     def parts(self) -> Iterator[Expectation]:
         """Yield the expectation that is counted."""

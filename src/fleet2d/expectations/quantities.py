@@ -2,9 +2,8 @@
 
 from dataclasses import dataclass
 
-from fleet2d.expectations.formatting import call_text
 from fleet2d.expectations.scene import Scene
-from fleet2d.expectations.signals import Signal
+from fleet2d.expectations.signals import BODY, Signal
 from fleet2d.units import LENGTH, SHARE, SPEED
 
 Place = str | tuple[float, float]
@@ -22,9 +21,9 @@ class DistanceSignal(Signal):
     body: str
     other: Place
 
+    word = "distance"
     unit = "m"
     quantity = LENGTH
-    __hash__ = object.__hash__
 
     def __post_init__(self) -> None:
         if not isinstance(self.other, str):
@@ -45,10 +44,6 @@ class DistanceSignal(Signal):
         if self.other == self.body:
             raise scene.error(f"{self}: give two different bodies")
 
-    def __str__(self) -> str:
-        """Return the text that `parse_expectation` reads back."""
-        return call_text("distance", self.body, self.other)
-
 
 @dataclass(frozen=True, eq=False)
 class SpeedSignal(Signal):
@@ -56,17 +51,10 @@ class SpeedSignal(Signal):
 
     body: str
 
+    word = "speed"
+    of = BODY
     unit = "m/s"
     quantity = SPEED
-    __hash__ = object.__hash__
-
-    def check(self, scene: Scene) -> None:
-        """Refuse an unknown body."""
-        scene.check_body(self.body, self)
-
-    def __str__(self) -> str:
-        """Return the text that `parse_expectation` reads back."""
-        return call_text("speed", self.body)
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,17 +63,10 @@ class BatterySignal(Signal):
 
     robot: str
 
-    quantity = SHARE
+    word = "battery"
+    of = ("robot with a battery", "batteries")
     unit = "share"
-    __hash__ = object.__hash__
-
-    def check(self, scene: Scene) -> None:
-        """Refuse a robot without a battery."""
-        scene.check_name("robot with a battery", self.robot, scene.batteries, self)
-
-    def __str__(self) -> str:
-        """Return the text that `parse_expectation` reads back."""
-        return call_text("battery", self.robot)
+    quantity = SHARE
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +79,7 @@ class OutputSignal(Signal):
 
     path: str
 
-    __hash__ = object.__hash__
+    word = "output"
 
     def check(self, scene: Scene) -> None:
         """Refuse an unknown algorithm."""
@@ -107,10 +88,6 @@ class OutputSignal(Signal):
             raise scene.error(
                 f'{self}: select a number of the output, such as output("{self.path}.kitchen")'
             )
-
-    def __str__(self) -> str:
-        """Return the text that `parse_expectation` reads back."""
-        return call_text("output", self.path)
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,12 +100,8 @@ class MetricSignal(Signal):
 
     path: str
 
-    __hash__ = object.__hash__
+    word = "metric"
 
     def check(self, scene: Scene) -> None:
         """Refuse an unknown metric."""
         scene.check_name("metric", self.path.split(".")[0], scene.metrics, self)
-
-    def __str__(self) -> str:
-        """Return the text that `parse_expectation` reads back."""
-        return call_text("metric", self.path)

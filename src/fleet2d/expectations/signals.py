@@ -1,8 +1,8 @@
 """Signals: what is measured of a run at each step, as numbers, words or truth values."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
-from typing import ClassVar
+from dataclasses import dataclass, fields
+from typing import Any, ClassVar
 
 import numpy as np
 from pydantic_core import PydanticCustomError
@@ -15,14 +15,25 @@ from fleet2d.expectations.expectation import (
     RunSignals,
     truth,
 )
-from fleet2d.expectations.formatting import argument_text, number_text
+from fleet2d.expectations.formatting import argument_text, call_text, number_text
 from fleet2d.expectations.scene import Scene
 from fleet2d.expectations.trace import F64, Trace
 from fleet2d.units import Quantity
 
+BODY = ("user or robot", "bodies")
 
+
+@dataclass(frozen=True, eq=False)
 class Measurement:
-    """Base of what is measured during a run; signals of the same text are the same signal."""
+    """Base of what is measured during a run; signals of the same text are the same signal.
+
+    Attributes:
+        word: Its word in texts. Its first field is its first argument there.
+        of: What the first field names, as a noun for messages, and as an attribute of `Scene`.
+    """
+
+    word: ClassVar[str]
+    of: ClassVar[tuple[str, str]]
 
     def trace(self, run: RunSignals) -> Trace:
         """Return its values from the first judged step on."""
@@ -34,6 +45,15 @@ class Measurement:
         Raises:
             ScenarioError: A name is unknown, or the signal can never be measured.
         """
+        noun, known = self.of
+        scene.check_name(noun, self._arguments()[0], getattr(scene, known), self)
+
+    def _arguments(self) -> tuple[Any, ...]:
+        return tuple(getattr(self, field.name) for field in fields(self))
+
+    def __str__(self) -> str:
+        """Return the text that `parse_expectation` reads back."""
+        return call_text(self.word, *self._arguments())
 
 
 @dataclass(frozen=True, eq=False)

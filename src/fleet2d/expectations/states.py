@@ -3,14 +3,13 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 from datetime import timedelta
-from typing import ClassVar
 
 import numpy as np
 
 from fleet2d.expectations.expectation import RunSignals
 from fleet2d.expectations.formatting import call_text
 from fleet2d.expectations.scene import Scene
-from fleet2d.expectations.signals import Condition, Measurement, WordSignal
+from fleet2d.expectations.signals import BODY, Condition, Measurement, WordSignal
 from fleet2d.expectations.trace import I64, Trace
 from fleet2d.problems import did_you_mean
 
@@ -21,19 +20,12 @@ class RoomSignal(WordSignal):
 
     body: str
 
-    __hash__ = object.__hash__
-
-    def check(self, scene: Scene) -> None:
-        """Refuse an unknown body."""
-        scene.check_body(self.body, self)
+    word = "room"
+    of = BODY
 
     def check_word(self, word: str, scene: Scene) -> None:
         """Refuse an unknown room."""
         scene.check_name("room", word, scene.rooms, self)
-
-    def __str__(self) -> str:
-        """Return the text that `parse_expectation` reads back."""
-        return call_text("room", self.body)
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,15 +34,8 @@ class ActivitySignal(WordSignal):
 
     user: str
 
-    __hash__ = object.__hash__
-
-    def check(self, scene: Scene) -> None:
-        """Refuse an unknown user."""
-        scene.check_name("user", self.user, scene.users, self)
-
-    def __str__(self) -> str:
-        """Return the text that `parse_expectation` reads back."""
-        return call_text("activity", self.user)
+    word = "activity"
+    of = ("user", "users")
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,15 +44,7 @@ class BodyCondition(Condition):
 
     body: str
 
-    word: ClassVar[str]
-
-    def check(self, scene: Scene) -> None:
-        """Refuse an unknown body."""
-        scene.check_body(self.body, self)
-
-    def __str__(self) -> str:
-        """Return the text that `parse_expectation` reads back."""
-        return call_text(self.word, self.body)
+    of = BODY
 
 
 class IsMoving(BodyCondition):
@@ -93,8 +70,6 @@ class CameraCondition(Condition):
 
     body: str
     by: str
-
-    word: ClassVar[str]
 
     def check(self, scene: Scene) -> None:
         """Refuse an owner without a camera, and a body that the camera never looks at."""
@@ -140,13 +115,8 @@ class IsOpen(Condition):
 
     name: str
 
-    def check(self, scene: Scene) -> None:
-        """Refuse an unknown door."""
-        scene.check_name("door", self.name, scene.doors, self)
-
-    def __str__(self) -> str:
-        """Return the text that `parse_expectation` reads back."""
-        return call_text("door", self.name)
+    word = "door"
+    of = ("door", "doors")
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,13 +125,8 @@ class IsOn(Condition):
 
     name: str
 
-    def check(self, scene: Scene) -> None:
-        """Refuse an unknown sensor."""
-        scene.check_name("sensor", self.name, scene.sensors, self)
-
-    def __str__(self) -> str:
-        """Return the text that `parse_expectation` reads back."""
-        return call_text("sensor", self.name)
+    word = "sensor"
+    of = ("sensor", "sensors")
 
 
 @dataclass(frozen=True, eq=False)
@@ -215,6 +180,9 @@ class IsDuring(Condition):
     def measures(self) -> Iterator[Measurement]:
         """Yield nothing: it follows from the clock."""
         yield from ()
+
+    def check(self, scene: Scene) -> None:
+        """Accept every run."""
 
     def trace(self, run: RunSignals) -> Trace:
         """Return 1 where the time is within these hours, 0 elsewhere."""

@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 from datetime import timedelta
+from typing import ClassVar
 
 import numpy as np
 
@@ -49,6 +50,12 @@ class WindowedExpectation(Temporal, UnaryExpectation):
 
     within: timedelta | None = None
 
+    word: ClassVar[str]
+
+    def __str__(self) -> str:
+        """Return the text that `parse_expectation` reads back."""
+        return call_text(self.word, self.part, within=self.within)
+
     def check(self, scene: Scene) -> None:
         """Refuse a time beyond the run."""
         scene.check_within(self.within, self)
@@ -63,6 +70,8 @@ class WindowedExpectation(Temporal, UnaryExpectation):
 class Always(WindowedExpectation):
     """That `part` holds at every step."""
 
+    word = "always"
+
     def robustness(self, run: RunSignals, high: bool) -> Trace:
         """Return the least robustness of the part over the window from each step on."""
         bounded, steps = self.within is not None, _steps(self.within, run)
@@ -74,13 +83,11 @@ class Always(WindowedExpectation):
         part = self.part.robustness(run, True)
         return violations_of(part.until(self.last(run) + 1))
 
-    def __str__(self) -> str:
-        """Return the text that `parse_expectation` reads back."""
-        return call_text("always", self.part, within=self.within)
-
 
 class Never(WindowedExpectation):
     """That `part` holds at no step."""
+
+    word = "never"
 
     def robustness(self, run: RunSignals, high: bool) -> Trace:
         """Return minus the greatest robustness of the part over the window from each step on."""
@@ -90,13 +97,11 @@ class Never(WindowedExpectation):
         """Return the stretches in which the part holds."""
         return Always(~self.part, self.within).violations(run)
 
-    def __str__(self) -> str:
-        """Return the text that `parse_expectation` reads back."""
-        return call_text("never", self.part, within=self.within)
-
 
 class Eventually(WindowedExpectation):
     """That `part` holds at some step."""
+
+    word = "eventually"
 
     def robustness(self, run: RunSignals, high: bool) -> Trace:
         """Return the greatest robustness of the part over the window from each step on."""
@@ -113,10 +118,6 @@ class Eventually(WindowedExpectation):
     def spans(self, run: RunSignals) -> I64:
         """Return the stretches in which the part holds: int64 (n, 2), first and last step."""
         return np.array(spells(self.part.robustness(run, False)), np.int64).reshape(-1, 2)
-
-    def __str__(self) -> str:
-        """Return the text that `parse_expectation` reads back."""
-        return call_text("eventually", self.part, within=self.within)
 
 
 @dataclass(frozen=True, eq=False)
