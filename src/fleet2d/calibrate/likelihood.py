@@ -14,13 +14,11 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from fleet2d.errors import InputError
+from fleet2d.extras import extra
 
-try:
+with extra("calibrate", "calibration needs scipy"):
     from scipy.optimize import brentq
     from scipy.stats import binomtest
-except ImportError:
-    raise InputError('calibration needs scipy: pip install "fleet2d[calibrate]"') from None
 
 F64 = NDArray[np.float64]
 

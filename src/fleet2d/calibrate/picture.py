@@ -8,14 +8,12 @@ from numpy.typing import NDArray
 from fleet2d.calibrate.likelihood import wilson
 from fleet2d.calibrate.log import recognized
 from fleet2d.calibrate.perception import Calibration, ProbabilityGroup
-from fleet2d.errors import InputError
+from fleet2d.extras import extra
 from fleet2d.view.floorplan import check_picture, drawing_style, save_figure
 
-try:
+with extra("viz", "drawing needs matplotlib"):
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-except ImportError:
-    raise InputError('drawing needs matplotlib: pip install "fleet2d[viz]"') from None
 
 F64 = NDArray[np.float64]
 Flags = NDArray[np.bool_]

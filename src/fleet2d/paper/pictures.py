@@ -6,19 +6,17 @@ from typing import Any
 
 import numpy as np
 
-from fleet2d.errors import InputError
+from fleet2d.extras import extra
 from fleet2d.metrics.presence.rtp_score import GAPS
 from fleet2d.paper import feedback, ltp_gap, rtp_gap, speed
 from fleet2d.paper.months import interval
 from fleet2d.paper.result import Result
 from fleet2d.view.floorplan import check_picture, drawing_style, save_figure
 
-try:
+with extra("viz", "drawing needs matplotlib"):
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from matplotlib.ticker import MaxNLocator
-except ImportError:
-    raise InputError('drawing needs matplotlib: pip install "fleet2d[viz]"') from None
 
 DPI = 150
 SIZE = (8.4, 4.4)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fleet2d.errors import InputError
+from fleet2d.extras import extra
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -67,11 +67,9 @@ class LiveView:
         Raises:
             InputError: matplotlib is missing.
         """
-        try:
+        with extra("viz", "drawing needs matplotlib"):
             from matplotlib.backends.backend_agg import FigureCanvasAgg
             from matplotlib.figure import Figure
-        except ImportError:
-            raise InputError('drawing needs matplotlib: pip install "fleet2d[viz]"') from None
         from fleet2d.view.floorplan import figure_size, floorplan_axes
 
         self.simulation = simulation

@@ -5,15 +5,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fleet2d.errors import InputError
+from fleet2d.extras import extra
 from fleet2d.studies.intervals import estimate
 from fleet2d.studies.timeseries import DAY, VALUE
 
-try:
+with extra("viz", "drawing needs matplotlib"):
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-except ImportError:
-    raise InputError('drawing needs matplotlib: pip install "fleet2d[viz]"') from None
 
 if TYPE_CHECKING:
     import polars as pl

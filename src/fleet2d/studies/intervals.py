@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fleet2d.errors import InputError
+from fleet2d.extras import extra
 
 F64 = NDArray[np.float64]
 LEVEL = 0.95
@@ -213,8 +213,6 @@ def _normal_quantile(level: float) -> float:
 
 
 def _student_quantile(freedom: float, level: float) -> float:
-    try:
+    with extra("study", "intervals need scipy"):
         from scipy.stats import t
-    except ImportError:
-        raise InputError('intervals need scipy: pip install "fleet2d[study]"') from None
     return float(t.ppf((1 + level) / 2, freedom))

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from fleet2d.errors import InputError
+from fleet2d.extras import extra
 from fleet2d.studies.execution import AHEAD, MOST_STARTS, Event, Finished, Lost, retry
 from fleet2d.studies.jobs import WorkerJob
 from fleet2d.studies.record import WorkerTask
@@ -204,8 +205,6 @@ def _join(ray: Any, address: str | None) -> None:
 
 
 def _ray() -> Any:
-    try:
+    with extra("ray", "this needs Ray"):
         import ray
-    except ImportError:
-        raise InputError('this needs Ray: pip install "fleet2d[ray]"') from None
     return ray

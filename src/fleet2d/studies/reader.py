@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 from fleet2d.errors import ArtifactError, InputError
+from fleet2d.extras import extra
 from fleet2d.problems import did_you_mean, suggest
 from fleet2d.studies import answers
 from fleet2d.studies.catalogue import stored_scenario
@@ -191,10 +192,8 @@ class Study:
         Raises:
             InputError: DuckDB is not installed.
         """
-        try:
+        with extra("study", "this needs DuckDB"):
             import duckdb
-        except ImportError:
-            raise InputError('this needs DuckDB: pip install "fleet2d[study]"') from None
         connection = duckdb.connect()
         connection.register("variants", self.arrow_variants)
         for table in self.tables:
@@ -335,8 +334,6 @@ def open_study(location: str | Path) -> Study:
 
 
 def _polars() -> Any:
-    try:
+    with extra("study", "this needs polars"):
         import polars as pl
-    except ImportError:
-        raise InputError('this needs polars: pip install "fleet2d[study]"') from None
     return pl

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from pydantic import model_validator
 
 from fleet2d.component import Settings
-from fleet2d.errors import InputError
+from fleet2d.extras import extra
 from fleet2d.problems import problem
 
 Method = Literal["random", "latin_hypercube"]
@@ -92,10 +92,8 @@ def shares(method: Method, count: int, dimensions: int, seed: int) -> NDArray[np
     generator = np.random.Generator(np.random.Philox(seed))
     if method == "random":
         return generator.random((count, dimensions))
-    try:
+    with extra("study", "a Latin hypercube needs scipy"):
         from scipy.stats import qmc
-    except ImportError:
-        raise InputError('a Latin hypercube needs scipy: pip install "fleet2d[study]"') from None
     points: NDArray[np.float64] = qmc.LatinHypercube(dimensions, rng=generator).random(count)
     return points
 

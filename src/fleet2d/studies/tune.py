@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
 from fleet2d.errors import InputError, ScenarioError
+from fleet2d.extras import extra
 from fleet2d.studies.axes import OptionsAxis
 from fleet2d.studies.design import matches
 from fleet2d.studies.directory import StudyDirectory
@@ -152,12 +153,10 @@ def _open_optuna(path: Path, name: str, settings: TuneSettings) -> "optuna.Study
     Raises:
         InputError: Optuna is not installed, or the storage belongs to another search.
     """
-    try:
+    with extra("tune", "this needs Optuna"):
         import optuna
         from optuna.storages import JournalStorage
         from optuna.storages.journal import JournalFileBackend
-    except ImportError:
-        raise InputError('this needs Optuna: pip install "fleet2d[tune]"') from None
     optuna.logging.set_verbosity(optuna.logging.ERROR)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from fleet2d.document import Document
 from fleet2d.errors import InputError
+from fleet2d.extras import extra
 from fleet2d.problems import suggest
 from fleet2d.studies.engine import describe_error
 from fleet2d.studies.execution import Executor, Lost
@@ -235,10 +236,8 @@ class FailureSearch:
 
 
 def _optuna(seed: int, startup: int) -> "optuna.Study":
-    try:
+    with extra("tune", "this needs Optuna"):
         import optuna
-    except ImportError:
-        raise InputError('this needs Optuna: pip install "fleet2d[tune]"') from None
     optuna.logging.set_verbosity(optuna.logging.ERROR)
     sampler = optuna.samplers.TPESampler(
         seed=seed, n_startup_trials=startup, n_ei_candidates=CANDIDATES, constant_liar=True

@@ -18,6 +18,7 @@ from matplotlib.text import Text
 from numpy.typing import NDArray
 
 from fleet2d.errors import InputError
+from fleet2d.extras import extra
 from fleet2d.runs.run import Run
 from fleet2d.view.floorplan import drawing_style, figure_size
 from fleet2d.view.theme import apply_theme
@@ -154,10 +155,8 @@ def _frames(
 def _write_mp4(
     path: Path, frames: Iterator[tuple[int, Pixels]], total: int, rate: Fraction
 ) -> None:
-    try:
+    with extra("film", "an MP4 film needs PyAV"):
         import av
-    except ImportError:
-        raise InputError('an MP4 film needs PyAV: pip install "fleet2d[film]"') from None
     with av.open(str(path), "w", options={"movflags": "faststart"}) as container:
         stream: Any = None
         frame: Any = None

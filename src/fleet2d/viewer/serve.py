@@ -8,12 +8,11 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from fleet2d.errors import InputError
+from fleet2d.extras import extra
 
-try:
+with extra("view", "watching needs a server"):
     import starlette  # noqa: F401 - the server needs it, too
     import uvicorn
-except ImportError:
-    raise InputError('watching needs a server: pip install "fleet2d[view]"') from None
 
 from fleet2d.viewer.guard import new_token
 from fleet2d.viewer.page_data import PageData

@@ -2,16 +2,14 @@
 
 from pathlib import Path
 
-from fleet2d.errors import InputError
+from fleet2d.extras import extra
 from fleet2d.runs.run import Run
 from fleet2d.viewer.export import embedded_run, html_of
 from fleet2d.viewer.page_data import PageData
 
-try:
+with extra("view", "a widget needs anywidget"):
     import anywidget
     import traitlets
-except ImportError:
-    raise InputError('a widget needs anywidget: pip install "fleet2d[view]"') from None
 
 
 class RunWidget(anywidget.AnyWidget):  # type: ignore[misc]
