@@ -41,6 +41,14 @@ Moment Legs::walk(Moment now, View<const i64, 2> route, f64 speed, f64 turn_rate
     return {last[0], last[1], last[2], last[3], now.away};
 }
 
+Moment Legs::settle(Moment now, Point at, i64 heading, f64 speed, f64 turn_rate) {
+    if (now.x != at.x || now.y != at.y) {
+        const i64 route[] = {now.x, now.y, at.x, at.y};
+        now = walk(now, {route, {2, 2}}, speed, turn_rate);
+    }
+    return turn(now, turn_between(now.heading, heading), turn_rate);
+}
+
 Array<i64, 2> Legs::rows() const {
     auto result = Array<i64, 2>::empty({size(), 5});
     i64* row = result.data();

@@ -20,6 +20,8 @@ constexpr i64 previous_edge(i64 k) { return k > 0 ? k - 1 : 2; }
 
 struct Point {
     i64 x, y;
+
+    bool operator==(const Point&) const = default;
 };
 
 // What lies beyond an edge of a triangle: how a walk from triangle to triangle goes on. Edges are numbered

@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "random.hpp"
 #include "sight.hpp"
 
 namespace fleet2d {
@@ -177,6 +178,26 @@ Array<i64, 2> find_route(const Mesh& mesh, const RouteGraph& graph, Point start,
     }
     const i64 last = search.run();
     return rows_of(last < 0 ? std::vector<Point>{} : search.path(start, last));
+}
+
+std::size_t KnownRoutes::Hash::operator()(const Ends& ends) const {
+    const auto pair = [](Point at) { return static_cast<u64>(at.x) << 32 | static_cast<u64>(at.y); };
+    return random_bits(pair(ends.start), pair(ends.goal));
+}
+
+std::shared_ptr<const Array<i64, 2>> KnownRoutes::find(const Mesh& mesh, const RouteGraph& graph, Point start,
+                                                       Point goal) {
+    const Ends ends{start, goal};
+    {
+        const std::lock_guard lock(mutex_);
+        const auto known = routes_.find(ends);
+        if (known != routes_.end()) return known->second;
+    }
+    auto route = std::make_shared<const Array<i64, 2>>(find_route(mesh, graph, start, goal));
+    const std::lock_guard lock(mutex_);
+    if (routes_.size() >= MOST) routes_.clear();
+    routes_.emplace(ends, route);
+    return route;
 }
 
 }  // namespace fleet2d

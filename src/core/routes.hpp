@@ -6,6 +6,10 @@
 // floats (sums of correctly rounded square roots, the same on every machine).
 #pragma once
 
+#include <memory>
+#include <mutex>
+#include <unordered_map>
+
 #include "mesh.hpp"
 
 namespace fleet2d {
@@ -39,5 +43,24 @@ RouteGraph build_route_graph(const Mesh& mesh, const Corners& corners);
 // outside the space. Both ends are strictly inside: a goal on the border is not seen by the last corner.
 // Ties go to the lower node: nodes are sorted by position, so the path depends on the walls only.
 Array<i64, 2> find_route(const Mesh& mesh, const RouteGraph& graph, Point start, Point goal);
+
+// The routes that were found last: bodies go the same ways day after day. Threads may share it.
+class KnownRoutes {
+public:
+    // As `find_route`.
+    std::shared_ptr<const Array<i64, 2>> find(const Mesh& mesh, const RouteGraph& graph, Point start, Point goal);
+
+private:
+    static constexpr std::size_t MOST = 1 << 16;  // of about 200 bytes each; then it begins anew
+    struct Ends {
+        Point start, goal;
+        bool operator==(const Ends&) const = default;
+    };
+    struct Hash {
+        std::size_t operator()(const Ends& ends) const;
+    };
+    std::mutex mutex_;
+    std::unordered_map<Ends, std::shared_ptr<const Array<i64, 2>>, Hash> routes_;
+};
 
 }  // namespace fleet2d

@@ -1141,6 +1141,22 @@ class Legs:
             time, x, y, heading and away at the end.
         """
 
+    def go(self, time: int, x: int, y: int, heading: int, routes: Routes, to_x: int, to_y: int, speed: float, turn_rate: float) -> tuple[int, int, int, int, int] | None:
+        """
+        Walk the shortest way to a point, at home.
+
+        Returns:
+            time, x, y, heading and away at the end; None if no way leads there, or an end isn't strictly inside.
+        """
+
+    def settle(self, time: int, x: int, y: int, heading: int, at_x: int, at_y: int, at_heading: int, speed: float, turn_rate: float) -> tuple[int, int, int, int, int]:
+        """
+        Walk straight to a point, and turn to a heading there, at home.
+
+        Returns:
+            time, x, y, heading and away at the end.
+        """
+
     def rows(self) -> numpy.typing.NDArray[numpy.int64]:
         """Return all breakpoints: int64 (n, 5)."""
 

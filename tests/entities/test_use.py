@@ -10,6 +10,7 @@ import fleet2d
 from fleet2d import Behavior, ComponentError, Situation
 from fleet2d.entities.plan import Plan
 from fleet2d.floorplan.formats.native import native_document
+from fleet2d.floorplan.home.space import Space
 from fleet2d.floorplan.objects import PlacedObject, UsePlace
 from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
 
@@ -112,3 +113,11 @@ def test_object_without_a_place_is_refused(tmp_path: Any) -> None:
 def test_unknown_object_is_refused_with_those_there_are(tmp_path: Any) -> None:
     with pytest.raises(ComponentError, match=r"no object 'bad': did you mean 'bed'\?.*bed, rug"):
         simulation(tmp_path, thing="bad").run()
+
+
+def test_ways_of_one_step_equal_those_of_several(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where a body may pay costs, the core doesn't find the way: the plan is the same."""
+    quick = fleet2d.run(None, "simulation.duration=1 d", seed=4)
+    monkeypatch.setattr(Space, "shortest", None)
+
+    assert quick.digest == fleet2d.run(None, "simulation.duration=1 d", seed=4).digest

@@ -6,12 +6,17 @@ from math import ceil
 
 import numpy as np
 import pytest
+import shapely
+from tests.homes import home_of
+from tests.kernels.test_routes import routes_of
 
 from fleet2d.kernels.headings import TURN, turn_between
 from fleet2d.kernels.motion import Legs, time_route
 from fleet2d.kernels.random import Bits, StepDraws
 
 SPEED, TURN_RATE = 768.0, 1023.7
+# With a pillar, and less than the places that the tests go to.
+ROOM = shapely.box(0, 0, 3600, 3600) - shapely.box(1600, 1600, 2200, 2200)
 
 
 class InLists:
@@ -43,6 +48,11 @@ class InLists:
             next_us = self.now[0] + waits[bits.take(3)]
         return next_us
 
+    def settle(self, x: int, y: int, heading: int) -> None:
+        if [x, y] != self.now[1:3]:
+            self.walk(np.array([self.now[1:3], [x, y]]))
+        self.turn(turn_between(self.now[3], heading))
+
     def walk(self, route: np.ndarray) -> None:
         timed = time_route(route, self.now[0], self.now[3], SPEED, TURN_RATE)
         self.rows += [[*row, 0] for row in timed[1:].tolist()]
@@ -51,10 +61,11 @@ class InLists:
 @pytest.mark.parametrize("seed", range(8))
 def test_legs_equal_lists(seed: int) -> None:
     random, legs, twin = np.random.default_rng(seed), Legs(), InLists()
+    routes = routes_of(home_of([ROOM]))
     legs.mark(*twin.now)
     waits = random.integers(0, 10**7, 8)
     bits, twin_bits = (Bits(StepDraws(7, seed)) for _ in range(2))
-    for what in random.integers(0, 5, 80).tolist():
+    for what in random.integers(0, 7, 80).tolist():
         time, x, y, heading, away = now = twin.now
         if what == 0:
             twin.rows.append([time + int(random.integers(0, 10**9)), x, y, heading, away])
@@ -73,6 +84,19 @@ def test_legs_equal_lists(seed: int) -> None:
             next_us = twin.turn_aside(facing, begin, until, waits.tolist(), twin_bits)
             after = legs.turn_aside(tuple(now), TURN_RATE, facing, (begin, until), 10, waits, bits)
             assert (*twin.now[::3], next_us) == after
+        elif what == 4:
+            place = random.choice([x, *random.integers(0, 4000, 2)], 2).tolist()
+            twin.settle(*place, towards := int(random.integers(TURN)))
+            after = legs.settle(time, x, y, heading, *place, towards, SPEED, TURN_RATE)
+            assert twin.now == list(after)
+        elif what == 5:
+            goal = random.integers(1, 4000, 2).tolist()
+            after = legs.go(time, x, y, heading, routes, *goal, SPEED, TURN_RATE)
+            inside = all(ROOM.contains(shapely.Point(point)) for point in ((x, y), goal))
+            assert inside == (after is not None)
+            if inside:
+                twin.walk(routes.find(x, y, *goal))
+                assert twin.now == list(after)
         else:
             block = np.array([[time + 10, 3, 4, 5, 1], [time + 20, 6, 7, 8, 0]])
             legs.add(block)
@@ -107,5 +131,13 @@ def test_wrong_numbers_are_refused() -> None:
         legs.turn(0, 0, 0, 0, 0, 5, 0.0)
     with pytest.raises(ValueError, match="route"):
         legs.walk(0, 0, np.zeros((0, 2), np.int64), 1.0, 1.0)
+    with pytest.raises(ValueError, match="speed"):
+        legs.settle(0, 0, 0, 0, 9, 9, 0, 0.0, 1.0)
+    with pytest.raises(ValueError, match="pose"):
+        legs.settle(0, 0, 0, 0, 2**40, 9, 0, 1.0, 1.0)
+    routes = routes_of(home_of([ROOM]))
+    with pytest.raises(ValueError, match="speed"):
+        legs.go(0, 33, 33, 0, routes, 99, 99, -1.0, 1.0)
+    assert legs.go(0, 33, 33, 0, routes, 2**40, 9, 1.0, 1.0) is None
 
     assert len(legs) == 0

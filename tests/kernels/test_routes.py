@@ -153,6 +153,17 @@ def test_find_route_without_corners_is_straight() -> None:
     assert [[33, 33], [601, 97]] == path.tolist()
 
 
+def test_find_route_again_returns_an_array_of_its_own() -> None:
+    routes = routes_of(home_of([shapely.box(0, 0, 640, 640)]))
+
+    first = routes.find(33, 33, 601, 97)
+    assert first is not None
+    first[:] = 0
+
+    assert [[33, 33], [601, 97]] == np.asarray(routes.find(33, 33, 601, 97)).tolist()
+    assert [[33, 33], [601, 99]] == np.asarray(routes.find(33, 33, 601, 99)).tolist()
+
+
 def test_find_route_to_its_start_has_length_0() -> None:
     home = home_of([shapely.box(0, 0, 640, 640)])
 

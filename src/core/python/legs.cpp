@@ -1,10 +1,14 @@
 #include "../legs.hpp"
 
+#include <nanobind/stl/optional.h>
+
 #include <bit>
 
+#include "../sight.hpp"
 #include "arrays.hpp"
 #include "motion.hpp"
 #include "random.hpp"
+#include "routes.hpp"
 #include "subjects.hpp"
 
 namespace fleet2d {
@@ -27,6 +31,10 @@ void add_checked(Legs& legs, View<const i64, 2> rows) {
     for (i64 i = 0; i < rows.size(); ++i) {
         legs.mark(checked(rows(i, 0), rows(i, 1), rows(i, 2), rows(i, 3), rows(i, 4)));
     }
+}
+
+void check_rates(f64 speed, f64 turn_rate) {
+    require(speed > 0 && turn_rate > 0, "speed and turn_rate must be above 0");
 }
 
 Row plain(const Moment& now) { return {now.time, now.x, now.y, now.heading, now.away}; }
@@ -95,11 +103,43 @@ Returns:
             [](Legs& self, i64 time, i64 heading, View<const i64, 2> route, f64 speed, f64 turn_rate) {
                 require(route.size() > 0 && route.shape[1] == 2, "route must be (n, 2), one point or more");
                 require(all_in_range(route, -MOST, MOST), "route must be within 2**29 of 0");
-                require(speed > 0 && turn_rate > 0, "speed and turn_rate must be above 0");
+                check_rates(speed, turn_rate);
                 return plain(self.walk(checked(time, 0, 0, heading, 0), route, speed, turn_rate));
             },
             "time"_a, "heading"_a, "route"_a, "speed"_a, "turn_rate"_a,
             R"(Turn towards each leg of a route (n, 2) and walk it, at home, as `time_route` does.
+
+Returns:
+    time, x, y, heading and away at the end.)")
+        .def(
+            "go",
+            [](Legs& self, i64 time, i64 x, i64 y, i64 heading, Routes& routes, i64 to_x, i64 to_y, f64 speed,
+               f64 turn_rate) -> std::optional<Row> {
+                const Moment now = checked(time, x, y, heading, 0);
+                check_rates(speed, turn_rate);
+                if (!strictly_inside(routes.mesh(), x, y) || !strictly_inside(routes.mesh(), to_x, to_y)) return {};
+                const auto route = [&] {
+                    const nb::gil_scoped_release unlocked;
+                    return routes.find({x, y}, {to_x, to_y});
+                }();
+                if (route->size() == 0) return {};
+                return plain(self.walk(now, *route, speed, turn_rate));
+            },
+            "time"_a, "x"_a, "y"_a, "heading"_a, "routes"_a, "to_x"_a, "to_y"_a, "speed"_a, "turn_rate"_a,
+            R"(Walk the shortest way to a point, at home.
+
+Returns:
+    time, x, y, heading and away at the end; None if no way leads there, or an end isn't strictly inside.)")
+        .def(
+            "settle",
+            [](Legs& self, i64 time, i64 x, i64 y, i64 heading, i64 at_x, i64 at_y, i64 at_heading, f64 speed,
+               f64 turn_rate) {
+                checked(time, at_x, at_y, at_heading, 0);
+                check_rates(speed, turn_rate);
+                return plain(self.settle(checked(time, x, y, heading, 0), {at_x, at_y}, at_heading, speed, turn_rate));
+            },
+            "time"_a, "x"_a, "y"_a, "heading"_a, "at_x"_a, "at_y"_a, "at_heading"_a, "speed"_a, "turn_rate"_a,
+            R"(Walk straight to a point, and turn to a heading there, at home.
 
 Returns:
     time, x, y, heading and away at the end.)")

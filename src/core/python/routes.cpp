@@ -1,8 +1,7 @@
-#include "../routes.hpp"
+#include "routes.hpp"
 
 #include <nanobind/stl/optional.h>
 
-#include "mesh.hpp"
 #include "subjects.hpp"
 
 namespace fleet2d {
@@ -13,48 +12,36 @@ struct border::Fields<Corners> {
     static constexpr auto members = std::tuple(&Corners::vertex, &Corners::before, &Corners::after, &Corners::simple);
 };
 
+Routes::Routes(nb::handle_t<OwnedMesh> mesh, const Corners& corners)
+    : owner_(nb::borrow(mesh)), mesh_(nb::cast<const OwnedMesh&>(mesh).mesh()) {
+    const i64 nodes = corners.vertex.size();
+    require(corners.before.shape == std::array{nodes, i64{2}} && corners.after.shape == corners.before.shape &&
+                corners.simple.size() == nodes,
+            "vertex and simple must be (nodes,), before and after (nodes, 2)");
+    require(all_in_range(corners.vertex, 0, mesh_.vertex_count()), "vertex must hold numbers of vertices");
+    require(all_in_range(corners.before, 0, LIMIT + 1) && all_in_range(corners.after, 0, LIMIT + 1),
+            "before and after must be in 0 to 2**20");
+    for (i64 node = 1; node < nodes; ++node) {
+        require(corners.vertex[node - 1] < corners.vertex[node], "vertex must ascend");
+    }
+    graph_ = build_route_graph(mesh_, corners);
+}
+
 namespace {
-
-// A route graph that owns its arrays, and holds on to its mesh. It never changes, so threads may share it.
-class Routes {
-public:
-    // Raises ValueError: the corners aren't what `Corners` says.
-    Routes(nb::handle_t<OwnedMesh> mesh, const Corners& corners)
-        : owner_(nb::borrow(mesh)), mesh_(nb::cast<const OwnedMesh&>(mesh).mesh()) {
-        const i64 nodes = corners.vertex.size();
-        require(corners.before.shape == std::array{nodes, i64{2}} && corners.after.shape == corners.before.shape &&
-                    corners.simple.size() == nodes,
-                "vertex and simple must be (nodes,), before and after (nodes, 2)");
-        require(all_in_range(corners.vertex, 0, mesh_.vertex_count()), "vertex must hold numbers of vertices");
-        require(all_in_range(corners.before, 0, LIMIT + 1) && all_in_range(corners.after, 0, LIMIT + 1),
-                "before and after must be in 0 to 2**20");
-        for (i64 node = 1; node < nodes; ++node) {
-            require(corners.vertex[node - 1] < corners.vertex[node], "vertex must ascend");
-        }
-        graph_ = build_route_graph(mesh_, corners);
-    }
-
-    std::optional<Array<i64, 2>> find(i64 ax, i64 ay, i64 bx, i64 by) const {
-        Array<i64, 2> points = find_route(mesh_, graph_, {ax, ay}, {bx, by});
-        if (points.size() == 0) return std::nullopt;
-        return points;
-    }
-
-    nb::object mesh() const { return owner_; }
-    const RouteGraph& graph() const { return graph_; }
-
-private:
-    nb::object owner_;  // of the arrays of mesh_
-    Mesh mesh_;
-    RouteGraph graph_;
-};
 
 // What `__getstate__` returns, and `__init__` takes: the mesh and the corners.
 auto state_of(nb::handle_t<Routes> self) {
     const Routes& routes = nb::cast<const Routes&>(self);
     const auto [vertex, before, after, simple] = routes.graph().corners();
-    return nb::make_tuple(routes.mesh(), nb::make_tuple(border::borrowed(vertex, self), border::borrowed(before, self),
-                                                        border::borrowed(after, self), border::borrowed(simple, self)));
+    return nb::make_tuple(routes.owner(),
+                          nb::make_tuple(border::borrowed(vertex, self), border::borrowed(before, self),
+                                         border::borrowed(after, self), border::borrowed(simple, self)));
+}
+
+std::optional<Array<i64, 2>> find(Routes& self, i64 ax, i64 ay, i64 bx, i64 by) {
+    const auto points = self.find({ax, ay}, {bx, by});
+    if (points->size() == 0) return std::nullopt;
+    return Array<i64, 2>::copy_of(*points);
 }
 
 template <auto Member>
@@ -76,7 +63,7 @@ Args:
 Raises:
     ValueError: The corners have another shape, or are none of the mesh.)")
         .def(nb::init<nb::handle_t<OwnedMesh>, const Corners&>(), "mesh"_a, "corners"_a)
-        .def("find", &Routes::find, "ax"_a, "ay"_a, "bx"_a, "by"_a, Unlocked(),
+        .def("find", &find, "ax"_a, "ay"_a, "bx"_a, "by"_a, Unlocked(),
              R"(Return the shortest path from (ax, ay) to (bx, by), int64 (n, 2); None where there is none.
 
 Both ends are strictly inside the space: a goal on its border is not seen by the last corner. Ties go

@@ -15,6 +15,7 @@ from fleet2d.engine.state import State
 from fleet2d.engine.world import EngineWorld
 from fleet2d.entities.decisions import DecidingActor
 from fleet2d.entities.plan import Plan
+from fleet2d.entities.plan_data import data_of
 from fleet2d.errors import InputError, ScenarioError
 from fleet2d.events import Event, EventKind, Listener
 from fleet2d.floorplan.home.change import HomeChange
@@ -327,7 +328,7 @@ class Steering(Verbs):
         row = list(self.actors).index(self._body(name).name)
         if row not in self._state.driven:
             raise InputError(f"{name} isn't driven, it decides itself: call drive({name!r}) first")
-        self.intervene(Decide(entity=name, plan=plan.data()))
+        self.intervene(Decide(entity=name, plan=data_of(plan)))
 
     def _take_decisions(self, plans: Mapping[str, Plan]) -> None:
         """Follow plans from outside up to the next step at which a driven body has to decide."""

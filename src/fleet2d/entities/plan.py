@@ -1,8 +1,8 @@
 """Plans: the timed paths that behaviors return, followed until they are over or interrupted."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from datetime import datetime, timedelta
-from typing import TYPE_CHECKING, Any, NamedTuple, Self
+from typing import TYPE_CHECKING, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,7 @@ from fleet2d.errors import ComponentError, NoWayError
 from fleet2d.events import KINDS
 from fleet2d.floorplan.home.space import straight_way
 from fleet2d.floorplan.objects import POSTURES, PlacedObject, Posture
-from fleet2d.kernels.headings import TURN, turn_between
+from fleet2d.kernels.headings import TURN
 from fleet2d.kernels.motion import Breakpoints, Legs, WalkRule
 from fleet2d.problems import did_you_mean
 from fleet2d.units import LONGEST_DURATION, micros
@@ -116,8 +116,10 @@ class Plan:
         """
         self.come_home()
         self._check_goes_on()
-        body = self._body
         self._get_up()
+        if route is None and self._go_shortest(x, y):
+            return self
+        body = self._body
         if route is None:
             route = body.space.route((self.x, self.y), (x, y))
         if route is None:
@@ -125,6 +127,23 @@ class Plan:
             raise NoWayError(f"{body.path}: there is no way to {at} for a body of its radius")
         self._walk(route)
         return self
+
+    def _go_shortest(self, x: int, y: int) -> bool:
+        """Walk to a lattice point, if a shortest route between points in the space is all it takes.
+
+        Returns:
+            Whether it does; `go_to_point` does the rest in more steps.
+        """
+        body = self._body
+        routes = body.space.shortest
+        if routes is None:
+            return False
+        end = self.legs.go(
+            self.time_us, self.x, self.y, self.heading, routes, x, y, body.speed, body.turn_rate
+        )
+        if end is not None:
+            self.time_us, self.x, self.y, self.heading, _ = end
+        return end is not None
 
     def _walk(self, route: I64) -> None:
         body = self._body
@@ -149,8 +168,19 @@ class Plan:
         at = self._body.place_at(thing, place)
         if self.away or (self.x, self.y) != (at.x, at.y):
             self.go_to_point(*at.approach)
-            self._step_to(at.x, at.y)
-        self._turn(turn_between(self.heading, at.heading))
+        self._check_goes_on()
+        body = self._body
+        self.time_us, self.x, self.y, self.heading, _ = self.legs.settle(
+            self.time_us,
+            self.x,
+            self.y,
+            self.heading,
+            at.x,
+            at.y,
+            at.heading,
+            body.speed,
+            body.turn_rate,
+        )
         self.take(at.posture)
         return self.note("uses", at.name)
 
@@ -358,36 +388,6 @@ class Plan:
         if self._motion is None:
             self._motion = Track(Breakpoints(*self.legs.track()), self.step_us)
         return self._motion
-
-    def data(self) -> dict[str, Any]:
-        """Return the plan as numbers and texts, from which `of` makes the same plan again."""
-        motion = self.finish()
-        walk: list[Any] | None = list(motion.rule) if isinstance(motion, RandomWalk) else None
-        return {
-            "rows": self.legs.rows().tolist(),
-            "walk": None if walk is None else [int(number) for number in walk],
-            "notes": [list(note) for note in self.notes],
-            "interrupts": sorted(self.interrupts),
-            "asks_us": self.asks_us,
-            "endless": self.endless,
-            "postures": [list(change) for change in self.postures],
-        }
-
-    @classmethod
-    def of(cls, body: "Body", step: int, data: Mapping[str, Any]) -> Self:
-        """Return the plan that `data` describes, for a body to follow from a step on."""
-        plan = cls(body, step)
-        if data["walk"] is not None:
-            key, *numbers = data["walk"]
-            return plan.meander(WalkRule(np.uint64(key), *numbers))
-        plan.legs = Legs()
-        plan.legs.add(np.array(data["rows"], np.int64).reshape(-1, 5))
-        plan.time_us, plan.x, plan.y, plan.heading, plan.away = data["rows"][-1]
-        plan.notes = [Note(*note) for note in data["notes"]]
-        plan.interrupts, plan.asks_us = frozenset(data["interrupts"]), data["asks_us"]
-        plan.endless = data["endless"]
-        plan.postures = [(time, code) for time, code in data["postures"]]
-        return plan
 
     def _check_goes_on(self) -> None:
         if self.endless:

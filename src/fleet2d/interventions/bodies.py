@@ -8,7 +8,7 @@ from fleet2d.entities.actor import Actor
 from fleet2d.entities.furniture import furniture_of
 from fleet2d.entities.motion import Pose
 from fleet2d.entities.place import Place, Point, RoomChoice, is_point, matching_rooms
-from fleet2d.entities.plan import Plan
+from fleet2d.entities.plan_data import plan_of
 from fleet2d.errors import PlacementError
 from fleet2d.interventions.intervention import Intervention, body
 from fleet2d.interventions.world import World
@@ -147,7 +147,7 @@ class Decide(BodyIntervention):
     """Give a plan to an externally controlled body.
 
     Attributes:
-        plan: The plan, as Plan.data() returns it.
+        plan: The plan, as `data_of` returns it.
     """
 
     plan: dict[str, Any]
@@ -155,7 +155,7 @@ class Decide(BodyIntervention):
     def begin(self, world: World) -> None:
         """Let the body follow the plan from the present step on."""
         actor = body(world, self.entity)
-        actor.choose(Plan.of(actor, world.step, self.plan))
+        actor.choose(plan_of(actor, world.step, self.plan))
         actor.decide_anew(world.step)
 
 

@@ -125,6 +125,11 @@ class CostedSpace(Space):
         """Pickle it by the arguments that it was made from."""
         return CostedSpace, (self.base, self._original_cost)
 
+    @property
+    def shortest(self) -> None:
+        """None: routes are the cheapest."""
+        return None
+
     def part_at(self, x: int, y: int) -> int:
         """Return the connected part of a lattice point; -1 where the body can't be or go."""
         row, column = y // SUB, x // SUB

@@ -120,6 +120,11 @@ class Space:
         """The corners of the space and the legs between them, built at their first use."""
         return Routes(self.mesh, self._corners())
 
+    @property
+    def shortest(self) -> Routes | None:
+        """The routes between points strictly inside; None: other than the shortest ones are."""
+        return self.routes
+
     def part_at(self, x: int, y: int) -> int:
         """Return the connected part of a lattice point strictly inside the space, else -1."""
         if not strictly_inside(self.mesh, x, y):

@@ -1,0 +1,33 @@
+// Routes as Python holds them.
+#pragma once
+
+#include <memory>
+
+#include "../routes.hpp"
+#include "mesh.hpp"
+
+namespace fleet2d {
+
+// A route graph that owns its arrays, holds on to its mesh, and knows the routes found last. Threads may share it.
+class Routes {
+public:
+    // Raises ValueError: the corners aren't what `Corners` says.
+    Routes(nb::handle_t<OwnedMesh> mesh, const Corners& corners);
+
+    // The shortest path, (points, 2); empty where there is none. Both ends are strictly inside the space.
+    std::shared_ptr<const Array<i64, 2>> find(Point start, Point goal) {
+        return known_.find(mesh_, graph_, start, goal);
+    }
+
+    nb::object owner() const { return owner_; }
+    const Mesh& mesh() const { return mesh_; }
+    const RouteGraph& graph() const { return graph_; }
+
+private:
+    nb::object owner_;  // of the arrays of mesh_
+    Mesh mesh_;
+    RouteGraph graph_;
+    KnownRoutes known_;
+};
+
+}  // namespace fleet2d
