@@ -285,7 +285,7 @@ def test_seen_area_at_some_steps_is_that_of_these_steps() -> None:
             "layers.explored.every is .* multiple",
         ),
         ({"floorplan": {"layers": {"dust": {"every": "0.5 s"}}}}, "layers.dust.every"),
-        ({"sight": {"seen_every": "1.5 s"}}, "sight.seen_every is .* no multiple"),
+        ({"sight": {"seen_every": "1.5 s"}}, "sight.seen_every is .* not a multiple"),
         (
             {"metrics": {"more": {"type": f"{HERE}:NeedsMore"}}},
             "NeedsMore needs 'exposed': did you mean",

@@ -216,7 +216,7 @@ def test_a_camera_that_its_offset_puts_into_a_wall_sees_nothing() -> None:
     [
         ({"camera": {}, "cameras": {"a": {}}}, ["robots.r.cameras", "'camera' or 'cameras'"]),
         ({"camera": {"period": "10 s"}}, ["period", "10 s is longer than lost_after"]),
-        ({"camera": {"period": "1.5 s"}}, ["robots.r", "no multiple of simulation.step"]),
+        ({"camera": {"period": "1.5 s"}}, ["robots.r", "not a multiple of simulation.step"]),
         ({"camera": {"pan": {"headings_deg": []}}}, ["pan.headings_deg"]),
         (
             {"perception": {"detection": {"distance": [[2, 1], [1, 0]]}}},

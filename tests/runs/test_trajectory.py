@@ -189,8 +189,8 @@ def test_run_that_was_cut_short_is_rebuilt(bodies: str, steps: int) -> None:
     ("entity", "every", "message"),
     [
         ("bob", 60.0, "there is no 'bob'"),
-        ("ana", 0.5, "no multiple of simulation.step"),
-        ("ana", 0.0, "no multiple of simulation.step"),
+        ("ana", 0.5, "not a multiple of simulation.step"),
+        ("ana", 0.0, "not a multiple of simulation.step"),
     ],
 )
 def test_what_can_not_be_rebuilt_is_told(entity: str, every: float, message: str) -> None:

@@ -12,10 +12,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from fleet2d.engine.basis import Basis
 from fleet2d.engine.bodies import Bodies
 from fleet2d.entities.behavior import SightEvent, Situation
 from fleet2d.entities.blocking import plan_after_a_step, plan_around
-from fleet2d.entities.decisions import DecidingActor
 from fleet2d.entities.plan import Note, Plan
 from fleet2d.events import Event
 from fleet2d.units import micros
@@ -68,14 +68,11 @@ class BlockedWays:
         rows: Their rows among the bodies; empty if bodies don't block each other.
     """
 
-    def __init__(
-        self,
-        users: Sequence[DecidingActor],
-        robots: Sequence[DecidingActor],
-        patience: timedelta | None,
-    ) -> None:
+    def __init__(self, basis: Basis) -> None:
+        """Follow the bodies if the scenario says how long one waits for another."""
         self.next_step = 0
-        self._actors, self._users = [*users, *robots], len(users)
+        self._actors, self._users = basis.actors, basis.bodies.users
+        patience = basis.scenario.simulation.people_block
         self._patience_us = 0 if patience is None else micros(patience)
         self._radii = np.array([actor.entity.radius for actor in self._actors])
         self._waits = [Wait()] * len(self._actors)

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from fleet2d.algorithms.activities import ActivitySense
 from fleet2d.blame import blame
+from fleet2d.engine.basis import Basis
 from fleet2d.engine.bodies import Bodies, poses_of
 from fleet2d.engine.disturbances import (
     carry_over,
@@ -45,7 +46,6 @@ from fleet2d.sight.disturbance import Disturbance
 from fleet2d.sight.fov import FieldOfView
 from fleet2d.sight.line_of_sight import LineOfSight
 from fleet2d.sight.perception import Perception
-from fleet2d.sight.settings import SightSettings
 from fleet2d.sight.tables import TableContext, error_tables, is_perfect, stack_lenses
 from fleet2d.streams import stream_key
 
@@ -378,13 +378,13 @@ class _Look(NamedTuple):
     old_memory: list[I64]
 
 
-def open_cameras(
-    actors: Sequence[Actor], users: int, sight: SightSettings
-) -> tuple[list[Cameras], list[Cameras]]:
+def open_cameras(basis: Basis) -> tuple[list[Cameras], list[Cameras]]:
     """Return the cameras of users and those of robots; none without both users and robots."""
+    actors, users = basis.actors, basis.bodies.users
     if not 0 < users < len(actors):
         return [], []
-    home, method, radii = actors[0].home, sight.method.model_copy(), None
+    home, sight = basis.home, basis.scenario.sight
+    method, radii = sight.method.model_copy(), None
     with blame("sight.method", None):
         method.start(home)
     if sight.people_occlude:

@@ -6,7 +6,7 @@ hold for all bodies in it.
 """
 
 import heapq
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from datetime import datetime, timedelta
 from typing import NamedTuple
 
@@ -14,17 +14,17 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from fleet2d.clock import Clock, midnight_of
+from fleet2d.clock import midnight_of
+from fleet2d.engine.basis import Basis
 from fleet2d.engine.door_crossings import crossings, way_ahead
 from fleet2d.entities.actor import Actor
 from fleet2d.entities.motion import Track
 from fleet2d.entities.objects.door import Door, how_to_hang_a_door
-from fleet2d.entities.objects.home_object import HomeObject
 from fleet2d.errors import ComponentError, PlacementError, ScenarioError
 from fleet2d.events import HOME, Event, EventKind
 from fleet2d.floorplan.arrangement import move_object
 from fleet2d.floorplan.home.change import HomeChange
-from fleet2d.floorplan.home.home import Home, lattice_footprint
+from fleet2d.floorplan.home.home import lattice_footprint
 from fleet2d.floorplan.home.space import grow_shape
 from fleet2d.floorplan.rooms.vocabulary import PRIORITY, usual_type
 from fleet2d.problems import suggest
@@ -70,13 +70,9 @@ class Changes:
         names: Their names.
     """
 
-    def __init__(
-        self,
-        objects: Mapping[str, HomeObject],
-        home: Home,
-        clock: Clock,
-    ) -> None:
-        self.home, self.clock = home, clock
+    def __init__(self, basis: Basis) -> None:
+        self.home, self.clock = basis.home, basis.clock
+        objects = basis.scenario.objects
         self.doors = {name: item for name, item in objects.items() if isinstance(item, Door)}
         self.names = list(self.doors)
         self._used_us = [-1] * len(self.names)

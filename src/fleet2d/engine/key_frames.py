@@ -5,13 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from fleet2d.artifacts.store import RunStore
-from fleet2d.clock import Clock
-from fleet2d.engine.bodies import Bodies
+from fleet2d.engine.basis import Basis
 from fleet2d.engine.ordering import in_order
-from fleet2d.entities.actor import Actor
 from fleet2d.entities.motion import Track
-from fleet2d.floorplan.home.home import Home
 from fleet2d.kernels.headings import in_radians
 from fleet2d.kernels.motion import Breakpoints
 from fleet2d.runs.key_kinds import PLANNED, TRACK, WALK
@@ -23,35 +19,22 @@ WALK_KEY_US = 3_600_000_000
 class KeyFrames:
     """Collects the key frames of a run."""
 
-    def __init__(
-        self,
-        store: RunStore,
-        clock: Clock,
-        home: Home,
-        actors: Sequence[Actor],
-        bodies: Bodies,
-        changes: bool,
-    ) -> None:
-        """Start without key frames.
-
-        Args:
-            store: The store for the rows.
-            clock: The clock of the run.
-            home: The home.
-            actors: Users, then robots.
-            bodies: Their poses.
-            changes: Whether walls may change during the run.
-        """
-        self._store, self._clock, self._home = store, clock, home
-        self._actors, self._bodies = actors, bodies
+    def __init__(self, basis: Basis) -> None:
+        """Start without key frames."""
+        self._store, self._clock, self._home = basis.store, basis.clock, basis.home
+        self._actors, self._bodies = basis.actors, basis.bodies
         # A random walk is rebuilt by repeating it between the same walls; where these may change,
         # each of its steps is a key frame.
-        self._walk_kind = TRACK if changes else WALK
-        self._walk_every = 1 if changes else max(1, WALK_KEY_US // clock.step_us)
+        self._walk_kind, self._walk_every = WALK, max(1, WALK_KEY_US // basis.clock.step_us)
+        if basis.may_change:
+            self._walk_kind, self._walk_every = TRACK, 1
         # Collected breakpoints of the present plan; the plan before the first has none.
-        self._emitted = [2] * len(actors)
-        self._complete_until = [-1] * len(actors)  # the end of the last plan, if it was reached
-        self._walked = [1] * len(actors)  # the step before which a random walk is collected
+        count = len(basis.actors)
+        self._emitted = [2] * count
+        self._complete_until = [-1] * len(
+            basis.actors
+        )  # the end of the last plan, if it was reached
+        self._walked = [1] * count  # the step before which a random walk is collected
         self._moved: set[int] = set()  # bodies that were put elsewhere since their last plan
         self._blocks: list[NDArray[np.int64]] = []
         self._rows = 0

@@ -1,6 +1,6 @@
 """The layers of a run: those of what robots have seen, and when each layer is stored."""
 
-from collections.abc import Sequence, Set
+from collections.abc import Set
 from dataclasses import dataclass
 from datetime import timedelta
 from typing import Any, Literal
@@ -13,12 +13,9 @@ from fleet2d.algorithms.evidence import steps_of_bin
 from fleet2d.algorithms.log import Log
 from fleet2d.algorithms.patches import Patches, patches_of, whole_rooms
 from fleet2d.artifacts.layers import layer_rows, layer_table
-from fleet2d.artifacts.store import RunStore
-from fleet2d.clock import Clock
 from fleet2d.component import Component
-from fleet2d.engine.bodies import Bodies
+from fleet2d.engine.basis import Basis
 from fleet2d.engine.seen_area import SeenArea
-from fleet2d.entities.actor import Actor
 from fleet2d.entities.entity import Robot
 from fleet2d.errors import ComponentError
 from fleet2d.floorplan.home.costmap import CostmapSettings, costs_of
@@ -55,30 +52,15 @@ class LayerBook:
         areas: The area that each robot with a camera has seen; empty if no component needs it.
     """
 
-    def __init__(
-        self,
-        scenario: Scenario,
-        home: Home,
-        actors: Sequence[Actor],
-        bodies: Bodies,
-        store: RunStore,
-        clock: Clock,
-    ) -> None:
+    def __init__(self, basis: Basis) -> None:
         """Add the layers of what robots have seen to the home, if they are needed.
-
-        Args:
-            scenario: The scenario.
-            home: The home, which the layers are added to.
-            actors: All bodies, in the order of their rows.
-            bodies: Their poses.
-            store: The store for the tables of layers.
-            clock: The steps of the run.
 
         Raises:
             ScenarioError: A period is no multiple of the step.
             ComponentError: A component has an unknown need.
         """
-        self._home, self._store, self._clock = home, store, clock
+        self._home, self._store, self._clock = basis.home, basis.store, basis.clock
+        scenario = basis.scenario
         self._stored_at: dict[str, int] = {}
         self._robots, self._first_robot = len(scenario.robots), len(scenario.users)
         learners = {
@@ -86,14 +68,14 @@ class LayerBook:
             **{f"metrics.{name}": learner for name, learner in scenario.metrics.items()},
         }
         needs = {need for path, learner in learners.items() for need in _needs_of(path, learner)}
-        behaviors = [behavior for actor in actors for behavior in actor.behaviors]
+        behaviors = [behavior for actor in basis.actors for behavior in actor.behaviors]
         needs |= {need for behavior in behaviors for need in behavior.needs}
         names = {*needs, *(name for name in scenario.floorplan.layers if name in SEEN_LAYERS)}
         self._exposes = "exposure" in needs
-        self._bin_steps = steps_of_bin(clock.step_us) if "evidence" in needs else 0
+        self._bin_steps = steps_of_bin(self._clock.step_us) if "evidence" in needs else 0
         self._logged_bins = 0
-        self._patches = _patches(home, "patches" if self._bin_steps else "rooms")
-        self.areas = self._open_areas(scenario, actors, bodies, names) if names else []
+        self._patches = _patches(basis.home, "patches" if self._bin_steps else "rooms")
+        self.areas = self._open_areas(basis, names) if names else []
         self._add_seen_layers(scenario, needs)
         self.next_due(0)
 
@@ -134,23 +116,21 @@ class LayerBook:
             if layer.store and end > 0 and self._stored_at.get(layer.name) != end - 1:
                 self._put(layer, end - 1)
 
-    def _open_areas(
-        self, scenario: Scenario, actors: Sequence[Actor], bodies: Bodies, names: Set[str]
-    ) -> list[SeenArea]:
+    def _open_areas(self, basis: Basis, names: Set[str]) -> list[SeenArea]:
         """Return the area that each robot with a camera has seen, before the first step."""
-        every = self._multiple(scenario.sight.seen_every, "sight.seen_every") or 1
+        every = self._multiple(basis.scenario.sight.seen_every, "sight.seen_every") or 1
         keeps_last = bool({"last_seen", "time_since_seen"} & names)
         return [
             SeenArea(
                 actor,
                 row,
                 self._patches,
-                bodies,
+                basis.bodies,
                 every=every,
                 keeps_last=keeps_last,
                 bin_steps=self._bin_steps,
             )
-            for row, actor in enumerate(actors)
+            for row, actor in enumerate(basis.actors)
             if isinstance(actor.entity, Robot) and actor.entity.eyes
         ]
 

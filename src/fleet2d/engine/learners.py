@@ -15,13 +15,11 @@ from fleet2d.algorithms.algorithm import Algorithm, Present
 from fleet2d.algorithms.history import History, Log
 from fleet2d.algorithms.learned import load_learned, save_learned
 from fleet2d.algorithms.output import FROZEN, WITHHELD, Outputs, to_columns
-from fleet2d.artifacts.store import RunStore
 from fleet2d.artifacts.table import Column, Kind, TableSpec
 from fleet2d.blame import blame
-from fleet2d.clock import Clock
+from fleet2d.engine.basis import Basis
 from fleet2d.errors import ComponentError, ScenarioError
 from fleet2d.events import HOME, Event
-from fleet2d.floorplan.home.home import Home
 from fleet2d.metrics.metric import Metric
 from fleet2d.problems import suggest
 from fleet2d.units import micros, whole_steps
@@ -80,18 +78,11 @@ class Learners:
         replaced: Outputs that all but metrics read instead, by name; WITHHELD for none.
     """
 
-    def __init__(
-        self,
-        algorithms: Mapping[str, Algorithm],
-        metrics: Mapping[str, Metric],
-        home: Home,
-        clock: Clock,
-        seed: int,
-        names: tuple[Sequence[str], Sequence[str]],
-        store: RunStore | None,
-    ) -> None:
-        self.home, self.clock, self.seed, self.store = home, clock, seed, store
-        self.users, self.robots = tuple(names[0]), tuple(names[1])
+    def __init__(self, basis: Basis) -> None:
+        self.home, self.clock, self.seed = basis.home, basis.clock, basis.seed
+        self.store = basis.store if basis.scenario.artifacts.outputs else None
+        algorithms, metrics = basis.scenario.algorithms, basis.scenario.metrics
+        self.users, self.robots = tuple(basis.scenario.users), tuple(basis.scenario.robots)
         self.outputs: dict[str, Any] = {}
         self.fresh: dict[str, Any] = {}
         self.replaced: dict[str, Any] = {}
@@ -102,7 +93,7 @@ class Learners:
             self._add(name, f"algorithms.{name}", algorithms[name])
         for name, metric in metrics.items():
             self._add(name, f"metrics.{name}", metric)
-        self._room_names = [room.name for room in home.rooms]
+        self._room_names = [room.name for room in basis.home.rooms]
         self._due = self._earliest_due()
         self.awaited = frozenset(event for learner in self.all for event in learner.component.on)
 

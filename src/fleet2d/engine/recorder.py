@@ -14,18 +14,13 @@ from numpy.typing import NDArray
 from fleet2d.algorithms.activities import Activities
 from fleet2d.algorithms.log import SensorRow
 from fleet2d.algorithms.observations import NearestRooms, Observations, Rows, truth
-from fleet2d.artifacts.settings import ArtifactSettings
-from fleet2d.artifacts.store import RunStore
-from fleet2d.clock import Clock
-from fleet2d.engine.bodies import Bodies
+from fleet2d.engine.basis import Basis
 from fleet2d.engine.cameras import Cameras
 from fleet2d.engine.key_frames import KeyFrames
 from fleet2d.engine.samples import Samples
 from fleet2d.engine.sensors import Sensors
 from fleet2d.engine.tables import camera_names
-from fleet2d.entities.actor import Actor
 from fleet2d.events import HOME, Event, EventKind
-from fleet2d.floorplan.home.home import Home
 
 # Events whose detail is a user, who has a column of their own.
 OF_USERS = frozenset({EventKind.USER_LOST, EventKind.USER_SEEN})
@@ -51,46 +46,26 @@ class Recorder:
         wall_s: Wall time of storing [s].
     """
 
-    def __init__(  # noqa: PLR0913 - the parts of a run that it records, by name
-        self,
-        store: RunStore,
-        settings: ArtifactSettings,
-        clock: Clock,
-        home: Home,
-        actors: Sequence[Actor],
-        bodies: Bodies,
-        objects: Sequence[str] = (),
-        *,
-        changes: bool = False,
-        cameras: Sequence[Cameras] = (),
-        sensors: Sensors | None = None,
-    ) -> None:
+    def __init__(self, basis: Basis, cameras: Sequence[Cameras], sensors: Sensors) -> None:
         """Prepare to record.
 
         Args:
-            store: The store for the rows.
-            settings: Which tables are stored, and how finely.
-            clock: The clock of the run.
-            home: The home.
-            actors: Users, then robots.
-            bodies: Their poses.
-            objects: The names of the home's objects.
-            changes: Whether walls may change during the run.
+            basis: The basis of the run.
             cameras: The cameras of robots.
             sensors: The sensors of the home.
         """
-        self.store, self.clock, self.home, self.bodies = store, clock, home, bodies
-        self._tables = set(store.names)
-        self._samples = Samples(store, settings, clock, home)
-        self._keys = KeyFrames(store, clock, home, actors, bodies, changes)
-        self.activities = activities_of(cameras, bodies.users)
-        names = [actor.name for actor in actors]
-        self._users = {name: row for row, name in enumerate(names[: bodies.users])}
-        self._rows = {name: row for row, name in enumerate([*names, *objects])} | {HOME: -1}
+        self.store, self.clock = basis.store, basis.clock
+        self.home, self.bodies = basis.home, basis.bodies
+        self._tables = set(basis.store.names)
+        self._samples, self._keys = Samples(basis), KeyFrames(basis)
+        self.activities = activities_of(cameras, basis.bodies.users)
+        self._users = {actor.name: row for row, actor in enumerate(basis.users)}
+        entities = [*(actor.name for actor in basis.actors), *basis.scenario.objects]
+        self._rows = {name: row for row, name in enumerate(entities)} | {HOME: -1}
         self._events: list[Event] = []
         self._observations: list[NDArray[np.int64]] = []
         self._sensors, self._readings = sensors, list[SensorRow]()
-        self._rooms = NearestRooms(home.plan)
+        self._rooms = NearestRooms(basis.home.plan)
         self._camera_codes = _codes_of(cameras)
         self._count = 0  # observations and readings
         self.wall_s = 0.0
@@ -224,7 +199,7 @@ class Recorder:
         )
 
     def _store_readings(self) -> None:
-        if not self._readings or self._sensors is None:
+        if not self._readings:
             return
         step, sensor, on, activity = zip(*self._readings, strict=True)
         self._readings = []

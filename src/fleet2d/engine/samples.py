@@ -4,11 +4,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fleet2d.artifacts.settings import ArtifactSettings
-from fleet2d.artifacts.store import RunStore
 from fleet2d.clock import Clock
+from fleet2d.engine.basis import Basis
 from fleet2d.engine.bodies import Bodies
 from fleet2d.engine.ordering import in_order
-from fleet2d.floorplan.home.home import Home
 from fleet2d.kernels.headings import in_radians
 from fleet2d.kernels.mesh import SUB
 from fleet2d.units import whole_steps
@@ -21,16 +20,14 @@ class Samples:
         count: Number of rows that are not stored yet.
     """
 
-    def __init__(
-        self, store: RunStore, settings: ArtifactSettings, clock: Clock, home: Home
-    ) -> None:
+    def __init__(self, basis: Basis) -> None:
         """Start without rows.
 
         Raises:
             ScenarioError: The interval between samples is not a multiple of the step.
         """
-        self._store, self._clock, self._home = store, clock, home
-        self._every = _steps_between(settings, clock)
+        self._store, self._clock, self._home = basis.store, basis.clock, basis.home
+        self._every = _steps_between(basis.scenario.artifacts, basis.clock)
         self._blocks: list[NDArray[np.int64]] = []
         self.count = 0
 

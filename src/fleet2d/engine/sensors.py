@@ -1,7 +1,7 @@
 """The sensors of a run: their readings, and the activities at that time."""
 
 from bisect import bisect_right
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from copy import copy
 from operator import itemgetter
 
@@ -9,11 +9,10 @@ import numpy as np
 
 from fleet2d.algorithms.log import SensorRow
 from fleet2d.blame import blame
-from fleet2d.clock import Clock
+from fleet2d.engine.basis import Basis
 from fleet2d.engine.bodies import Bodies, PoseBlock
 from fleet2d.entities.behavior import SightEvent
 from fleet2d.entities.objects.contact_sensor import ContactSensor
-from fleet2d.entities.objects.home_object import HomeObject
 from fleet2d.entities.objects.sensor import (
     Sensor,
     SensorFault,
@@ -24,7 +23,6 @@ from fleet2d.entities.objects.sensor import (
 )
 from fleet2d.errors import ScenarioError
 from fleet2d.events import Event, EventKind
-from fleet2d.floorplan.home.home import Home
 from fleet2d.problems import suggest
 
 
@@ -40,34 +38,28 @@ class Sensors:
         awaited: Whether an algorithm waits for readings.
     """
 
-    def __init__(
-        self,
-        objects: Mapping[str, HomeObject],
-        doors: Sequence[str],
-        home: Home,
-        clock: Clock,
-        users: Sequence[str],
-    ) -> None:
-        self.home, self.users = home, len(users)
+    def __init__(self, basis: Basis, doors: Sequence[str]) -> None:
+        home, step_us = basis.home, basis.clock.step_us
+        self.home, self.users = home, basis.bodies.users
         self.next_step = 0
         self.stuck: dict[str, SensorFault] = {}
         self.awaited = False
         self._rows: list[SensorRow] = []
         self.sensors: list[Sensor] = []
         self.names: list[str] = []
-        for name, item in objects.items():
+        for name, item in basis.scenario.objects.items():
             if isinstance(item, Sensor):
                 sensor = item.model_copy(deep=True)
                 if isinstance(sensor, ContactSensor):
                     sensor.watch(_door(name, sensor.of, doors))
-                sensor.start(home, clock.step_us)
+                sensor.start(home, step_us)
                 self.names.append(name)
                 self.sensors.append(sensor)
         self.rooms = [sensor.room or sensor.place(home) for sensor in self.sensors]
         self.words = [sensor.words for sensor in self.sensors]
-        self._states = [SensorState(sensor.hold_us() // clock.step_us) for sensor in self.sensors]
+        self._states = [SensorState(sensor.hold_us() // step_us) for sensor in self.sensors]
         self._last_poses: tuple[np.ndarray, ...] | None = None
-        self._activities: dict[str, list[tuple[int, str]]] = {user: [] for user in users}
+        self._activities: dict[str, list[tuple[int, str]]] = {user.name: [] for user in basis.users}
 
     @property
     def on(self) -> dict[str, bool]:

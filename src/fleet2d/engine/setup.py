@@ -1,12 +1,12 @@
 """Setting up a run from a scenario: its home, bodies, cameras, sensors, algorithms and tables."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any
 
 from fleet2d.algorithms.log import Log
 from fleet2d.artifacts.store import RunStore
 from fleet2d.clock import Clock
+from fleet2d.engine.basis import Basis
 from fleet2d.engine.blocking import BlockedWays
 from fleet2d.engine.bodies import Bodies
 from fleet2d.engine.cameras import Cameras, open_cameras
@@ -21,13 +21,12 @@ from fleet2d.engine.recorder import Recorder, activities_of
 from fleet2d.engine.script import schedule
 from fleet2d.engine.sensors import Sensors
 from fleet2d.engine.state import InView, State
-from fleet2d.engine.tables import camera_names, sensor_table, table_specs
+from fleet2d.engine.tables import table_specs
 from fleet2d.entities.decisions import DecidingActor
 from fleet2d.entities.objects.door import Door
 from fleet2d.errors import PlacementError, ScenarioError
 from fleet2d.events import EventKind, EventStream
 from fleet2d.floorplan.home.home import Home
-from fleet2d.interventions.home import HomeIntervention
 from fleet2d.interventions.robots import causes_errors
 from fleet2d.problems import suggest
 from fleet2d.scenario.model import Scenario
@@ -39,55 +38,35 @@ def set_up(scenario: Scenario, clock: Clock, seed: int, store: RunStore) -> Stat
     Raises:
         InputError: The floor plan or a place in the scenario is wrong, or a name is unknown.
     """
-    home = _furnished_home(scenario)
-    people: dict[str, DecidingActor | None] = dict.fromkeys(scenario.users)
-    users = _actors(scenario, "users", home, clock, seed, people)
-    robots = _actors(scenario, "robots", home, clock, seed, people)
-    actors = [*users, *robots]
-    bodies = Bodies(len(users), len(robots), clock.step_us)
-    for row, actor in enumerate(actors):
-        bodies.hold(row, actor.state)
-        actor.join(bodies, row)
-    gazes, cameras = open_cameras(actors, len(users), scenario.sight)
-    _check_reads(scenario, actors)
+    basis = _basis(scenario, clock, seed, store)
+    gazes, cameras = open_cameras(basis)
+    _check_reads(scenario, basis.actors)
     for group in cameras:
         if any(causes_errors(entry.act, group.owner.name) for entry in scenario.script):
             group.prepare_to_err()
-    encounters, clearance = Encounters(users, robots), Clearance(users, robots)
-    blocking = BlockedWays(users, robots, scenario.simulation.people_block)
-    changes = Changes(scenario.objects, home, clock)
+    changes = Changes(basis)
     for index, change in enumerate(scenario.changes):
         with _locate_errors(scenario, f"changes.{index}"):
             changes.declare(index, change)
     with _locate_errors(scenario, "objects"):
-        sensors = Sensors(scenario.objects, changes.names, home, clock, list(scenario.users))
-    _add_tables(store, scenario, home, cameras, sensors)
-    recorder = Recorder(
-        store,
-        scenario.artifacts,
-        clock,
-        home,
-        actors,
-        bodies,
-        list(scenario.objects),
-        changes=_may_change(scenario),
-        cameras=cameras,
-        sensors=sensors,
-    )
-    layers = LayerBook(scenario, home, actors, bodies, store, clock)
-    learners = _learners(scenario, home, clock, seed, store)
+        sensors = Sensors(basis, changes.names)
+    activities = activities_of(cameras, basis.bodies.users)
+    for spec in table_specs(basis, cameras, sensors, activities=activities.are_perceived):
+        store.add_table(spec)
+    recorder = Recorder(basis, cameras, sensors)
+    layers, learners = LayerBook(basis), Learners(basis)
     for group in [*gazes, *cameras]:
         group.awaited = learners.awaited
     sensors.awaited = EventKind.SENSOR in learners.awaited
-    log = _log(home, actors, bodies, cameras, recorder) if learners.all else None
+    log = _log(basis, cameras, recorder) if learners.all else None
     state = State(
-        bodies=bodies,
-        actors=actors,
-        home=home,
+        bodies=basis.bodies,
+        actors=basis.actors,
+        home=basis.home,
         changes=changes,
-        clearance=clearance,
-        blocking=blocking,
-        encounters=encounters,
+        clearance=Clearance(basis.users, basis.robots),
+        blocking=BlockedWays(basis),
+        encounters=Encounters(basis.users, basis.robots),
         sensors=sensors,
         gazes=gazes,
         cameras=cameras,
@@ -110,6 +89,26 @@ def set_up(scenario: Scenario, clock: Clock, seed: int, store: RunStore) -> Stat
         with _locate_errors(scenario, f"expect.{name}"):
             expect(state, scenario, clock, name, expectation, 0)
     return state
+
+
+def _basis(scenario: Scenario, clock: Clock, seed: int, store: RunStore) -> Basis:
+    """Return the basis of a run: its home, and the bodies in it."""
+    home = _furnished_home(scenario)
+    people: dict[str, DecidingActor | None] = dict.fromkeys(scenario.users)
+    actors = []
+    for bucket, entities in (("users", scenario.users), ("robots", scenario.robots)):
+        for name, entity in entities.items():
+            path = f"{bucket}.{name}"
+            with _locate_errors(scenario, path):
+                actor = DecidingActor(name, path, entity, home, clock, seed, people=people)
+            actors.append(actor)
+            if name in people:
+                people[name] = actor
+    bodies = Bodies(len(scenario.users), len(scenario.robots), clock.step_us)
+    for row, actor in enumerate(actors):
+        bodies.hold(row, actor.state)
+        actor.join(bodies, row)
+    return Basis(scenario, clock, seed, store, home, actors, bodies)
 
 
 def _furnished_home(scenario: Scenario) -> Home:
@@ -153,26 +152,6 @@ def _prefix_errors(path: str) -> Iterator[None]:
         raise type(error)(f"{path}: {error}") from error
 
 
-def _actors(
-    scenario: Scenario,
-    bucket: str,
-    home: Home,
-    clock: Clock,
-    seed: int,
-    people: dict[str, DecidingActor | None],
-) -> list[DecidingActor]:
-    """Return the users or the robots, and enter the users in `people`."""
-    entities: Mapping[str, Any] = getattr(scenario, bucket)
-    actors = []
-    for name, entity in entities.items():
-        path = f"{bucket}.{name}"
-        with _locate_errors(scenario, path):
-            actors.append(DecidingActor(name, path, entity, home, clock, seed, people=people))
-        if name in people:
-            people[name] = actors[-1]
-    return actors
-
-
 def _check_reads(scenario: Scenario, actors: list[DecidingActor]) -> None:
     """Refuse behaviors that read an unknown algorithm."""
     for actor in actors:
@@ -184,52 +163,9 @@ def _check_reads(scenario: Scenario, actors: list[DecidingActor]) -> None:
                 )
 
 
-def _may_change(scenario: Scenario) -> bool:
-    """Whether the home may change during the run."""
-    moves = any(isinstance(entry.act, HomeIntervention) for entry in scenario.script)
-    return bool(scenario.objects or scenario.changes or moves)
-
-
-def _add_tables(
-    store: RunStore, scenario: Scenario, home: Home, cameras: list[Cameras], sensors: Sensors
-) -> None:
-    users, robots = list(scenario.users), list(scenario.robots)
-    specs = table_specs(
-        users,
-        robots,
-        [room.name for room in home.rooms],
-        scenario.artifacts,
-        list(scenario.objects),
-        changes=_may_change(scenario),
-        cameras=camera_names(cameras),
-        activities=activities_of(cameras, len(users)).are_perceived,
-    )
-    if sensors.names:
-        specs.append(sensor_table(sensors))
-    for spec in specs:
-        store.add_table(spec)
-
-
-def _learners(scenario: Scenario, home: Home, clock: Clock, seed: int, store: RunStore) -> Learners:
-    return Learners(
-        scenario.algorithms,
-        scenario.metrics,
-        home,
-        clock,
-        seed,
-        (list(scenario.users), list(scenario.robots)),
-        store if scenario.artifacts.outputs else None,
-    )
-
-
-def _log(
-    home: Home,
-    actors: list[DecidingActor],
-    bodies: Bodies,
-    cameras: list[Cameras],
-    recorder: Recorder,
-) -> Log:
-    log = Log(home, [actor.name for actor in actors], bodies, recorder.activities)
+def _log(basis: Basis, cameras: list[Cameras], recorder: Recorder) -> Log:
+    names = [actor.name for actor in basis.actors]
+    log = Log(basis.home, names, basis.bodies, recorder.activities)
     log.cameras = [(group.index, name) for group in cameras for name in group.names]
     log.beliefs = {c.owner.name: c.drift.believed for c in cameras if c.drift is not None}
     return log

@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-from fleet2d.artifacts.settings import ArtifactSettings
 from fleet2d.artifacts.table import Column, TableSpec
+from fleet2d.engine.basis import Basis
 from fleet2d.engine.cameras import Cameras
 from fleet2d.engine.sensors import Sensors
 from fleet2d.runs.key_kinds import KEY_KINDS
@@ -18,19 +18,21 @@ HEADING = Column("heading", "float64", "rad", description="counter-clockwise fro
 
 
 def table_specs(
-    users: Sequence[str],
-    robots: Sequence[str],
-    rooms: Sequence[str],
-    settings: ArtifactSettings,
-    objects: Sequence[str] = (),
-    *,
-    changes: bool = False,
-    cameras: Sequence[str] = (),
-    activities: bool = False,
+    basis: Basis, cameras: Sequence[Cameras], sensors: Sensors, *, activities: bool
 ) -> list[TableSpec]:
-    """Return the tables that a run stores; `cameras` are from camera_names()."""
+    """Return the tables that a run stores.
+
+    Args:
+        basis: The basis of the run.
+        cameras: The cameras of robots.
+        sensors: The sensors of the home.
+        activities: Whether robots perceive activities.
+    """
+    scenario, settings = basis.scenario, basis.scenario.artifacts
+    users, robots = tuple(scenario.users), tuple(scenario.robots)
+    rooms = tuple(room.name for room in basis.home.rooms)
     entity = Column("entity", "category", categories=(*users, *robots))
-    room = Column("room", "category", nullable=True, categories=tuple(rooms))
+    room = Column("room", "category", nullable=True, categories=rooms)
     specs = []
     if settings.trajectories != "off":
         columns = (STEP, TIME, entity, X, Y, HEADING, room, _away("x, y and room are missing"))
@@ -40,19 +42,21 @@ def table_specs(
         columns = (STEP, TIME, entity, kind, X, Y, HEADING, _away("x and y are where it left"))
         specs.append(TableSpec("key_frames", columns))
     if settings.observations and users and robots:
-        specs.append(_observation_table(users, robots, room, cameras, activities))
+        specs.append(_observation_table(users, robots, room, camera_names(cameras), activities))
     if settings.events:
         event, detail = Column("event", "category"), Column("detail", "string")
-        user = Column("user", "category", nullable=True, categories=tuple(users))
+        user = Column("user", "category", nullable=True, categories=users)
         user_columns = (user,) if users else ()
         entities = entity
-        if changes:
+        if basis.may_change:
             text = "what did it, or what it happened to; none: the home itself"
-            names = (*users, *robots, *objects)
+            names = (*users, *robots, *scenario.objects)
             entities = Column(
                 "entity", "category", categories=names, nullable=True, description=text
             )
         specs.append(TableSpec("events", (STEP, TIME, entities, event, *user_columns, detail)))
+    if sensors.names:
+        specs.append(_sensor_table(sensors))
     return specs
 
 
@@ -96,7 +100,7 @@ def _observation_table(
     return TableSpec("observations", tuple(columns))
 
 
-def sensor_table(sensors: Sensors) -> TableSpec:
+def _sensor_table(sensors: Sensors) -> TableSpec:
     """Return the table of the readings of sensors, in the layout of the CASAS smart homes."""
     sensor = Column("sensor", "category", categories=tuple(sensors.names))
     room, state = Column("room", "category"), Column("state", "category")
