@@ -19,7 +19,7 @@ export interface DoorFacts {
   locked: boolean;
 }
 
-/** A piece of furniture: its outline [m], and what it blocks: nothing, path or sight. */
+/** A piece of furniture: its outline [m], and whether it blocks nothing, paths or sight. */
 export interface ObjectFacts {
   name: string;
   type: string;
@@ -27,7 +27,7 @@ export interface ObjectFacts {
   blocks: string;
 }
 
-/** A home: outlines in metres, cells as runs of equal rooms. `free` lists polygons, each an outline and its holes. `room_cells` are pairs (room, number of cells), row by row from the lowest; -1 is no room. `place_cells` are the same for places in cells that a wall cuts. */
+/** A home: outlines in metres, cells as runs of equal rooms. `free` lists polygons, each an outline and its holes. `room_cells` are pairs (room, number of cells), row by row from the lowest; -1 is not a room. `place_cells` are the same for places in cells that a wall cuts. */
 export interface HomeFacts {
   name: string;
   cell: number;

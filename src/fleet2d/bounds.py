@@ -43,7 +43,7 @@ that is as it should be, set FLEET2D_MAX_DEPTH=100 in the environment
         """The present bound.
 
         Raises:
-            InputError: The variable is no whole number above 0.
+            InputError: The variable is not a whole number above 0.
         """
         text = os.environ.get(self.variable, "")
         if not text:

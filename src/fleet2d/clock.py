@@ -65,7 +65,7 @@ def next_time(text: str, now: datetime) -> datetime:
     """Return the next moment at a time of day, which may be the present one.
 
     Raises:
-        InputError: It is no time of day.
+        InputError: It is not a time of day.
 
     Example:
         >>> next_time("19:00", datetime(2026, 1, 5, 20)).isoformat()

@@ -39,7 +39,7 @@ class FloorPlanError(InputError):
 
 
 class PlacementError(InputError):
-    """An entity can't stand or go at the place that it was sent to."""
+    """An entity can't stand at a place, or can't get there."""
 
 
 class ComponentError(Fleet2DError):

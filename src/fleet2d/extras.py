@@ -8,7 +8,7 @@ from fleet2d.errors import InputError
 
 @contextmanager
 def extra(name: str, need: str) -> Iterator[None]:
-    """Say what to install if the imports in the block fail.
+    """Explain what to install if the imports in the block fail.
 
     Args:
         name: The extra of Fleet2D that has the package, such as study.

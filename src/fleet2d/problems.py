@@ -57,7 +57,7 @@ def rewrite(
         kind, context = line["type"], line.get("ctx", {})
         details = InitErrorDetails(type=kind, loc=line["loc"], input=line["input"], ctx=context)
         if kind not in _PYDANTIC_ERRORS:
-            # The message comes last: braces within it are no placeholders.
+            # The message comes last: braces within it are not placeholders.
             context = {key: context[key] for key in context if key != "message"}
             details["type"] = PydanticCustomError(
                 kind, "{message}", {**context, "message": line["msg"]}

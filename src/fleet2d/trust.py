@@ -159,7 +159,7 @@ def code_of(scenario: object) -> dict[Path, list[str]]:
         try:
             files = files_of((folder_of(name) / (parent + slash)).resolve(), module)
         except (OSError, ValueError):
-            continue  # it is no path: the import will fail
+            continue  # it is not a path: the import will fail
         for file in files:
             code.setdefault(file, []).append(key)
     return code

@@ -212,7 +212,7 @@ def whole_steps(
         error: The type of the exception.
 
     Raises:
-        ScenarioError: It is no multiple, or 0; an exception of the type `error`.
+        ScenarioError: It is not a multiple, or 0; an exception of the type `error`.
 
     >>> whole_steps(timedelta(minutes=1), 500_000, "period")
     120

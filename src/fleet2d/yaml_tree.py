@@ -90,7 +90,7 @@ def compose(text: str) -> yaml.Node | None:
     """Return the tree of nodes of a YAML text, None if it is empty.
 
     Raises:
-        yaml.YAMLError: It is no YAML.
+        yaml.YAMLError: It is not YAML.
         InputError: It is beyond a bound.
     """
     longest = max(map(len, text.splitlines()), default=0)
@@ -134,7 +134,7 @@ def parse(text: str) -> Any:
     """Return a YAML text as plain data.
 
     Raises:
-        yaml.YAMLError: It is no YAML.
+        yaml.YAMLError: It is not YAML.
         InputError: It is beyond a bound, or a value in it can't be read.
 
     Example:
@@ -202,7 +202,7 @@ class TreeWalk:
         """Return the keys and values of a mapping, those that it merges from others ('<<') first.
 
         Raises:
-            NodeError: A key is no text or is there twice, or a merged value is no mapping.
+            NodeError: A key is not text or is there twice, or a merged value is not a mapping.
         """
         return list(self._pairs_of(node).values())
 

@@ -125,9 +125,9 @@ def test_rounding_that_would_change_the_area_is_refused(monkeypatch: pytest.Monk
     """Known failure 7: an area that doesn't survive rounding is an error, not a surprise."""
     # No known outline snaps so badly, so snapping is replaced.
     import fleet2d.floorplan.geometry.free_space as module
-    from fleet2d.floorplan.geometry.mesh import Snapped
+    from fleet2d.floorplan.geometry.mesh import SnappedPolygon
 
-    half = Snapped([shapely.box(0, 0, 2560, 6400)], -(2560.0 * 6400), 46080.0)
+    half = SnappedPolygon([shapely.box(0, 0, 2560, 6400)], -(2560.0 * 6400), 46080.0)
     monkeypatch.setattr(module, "snap_polygon", lambda _: half)
     outline = shapely.box(0.0003, 0, 4, 5)
 

@@ -192,7 +192,7 @@ def test_waiting_is_filled_with_what_the_hour_allows() -> None:
         ({"cook": {"after": ["lunch"]}, "lunch": {"after": ["cook"]}}, ["wait for each other", "cook", "lunch"]),
         ({"cook": {"at": "12:00", "between": ["13:00", "14:00"]}}, ["12:00", "13:00", "14:00"]),
         ({"cook": {"fixed": True}}, ["at"]),
-        ({"cook": {"at": "12:00", "before_bed": True}}, ["one of them"]),
+        ({"cook": {"at": "12:00", "before_bed": True}}, ["exactly one of"]),
         (
             {"work": {"at": "08:00", "takes": {"law": "fixed", "mean": "12 h"}}, "school": {"at": "09:00"}},
             ["work", "12 h", "'school' has to begin by 09:37"],

@@ -1,4 +1,4 @@
-/** What algorithms believe: shares per room, as they were put out. */
+/** What algorithms believe: shares per room, as in their outputs. */
 
 import type { Home } from "./home";
 import type { Table } from "./parquet";

@@ -45,7 +45,7 @@ function BeliefsOf({ run, title }: { run: Run; title: string }) {
       </label>
       <p class="hint">
         {comparison.sinceUs < 0
-          ? "Nothing was put out yet."
+          ? "No output yet."
           : `Bars: believed since ${run.clock.text(comparison.sinceUs)}. Lines: share of the time until now, of rooms at home. ● is there now.`}
       </p>
       <table class="bars">

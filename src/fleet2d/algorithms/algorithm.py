@@ -62,7 +62,7 @@ class Algorithm(Component):
         on: Events that update it, instead of the period: user_seen, user_lost, sensor, or what a
             robot's plan notes.
         reads: Algorithms whose output it uses; they are updated before it.
-        learned: What it starts from: a file of the folder learned/ of another run.
+        learned: Learned state to start from: a file of the folder learned/ of another run.
 
     Example:
         >>> import numpy as np
@@ -97,7 +97,7 @@ class Algorithm(Component):
     def remember(self) -> Mapping[str, Any]:
         """Return the learned state: arrays, numbers and texts, in mappings of any depth.
 
-        By default that is all run state: the attributes that are no configuration.
+        By default that is all run state: the attributes that are not configuration.
         """
         return run_state(self)
 

@@ -69,7 +69,7 @@ def _plain(value: Any, name: str) -> NDArray[Any]:
 
 
 def run_state(component: Any) -> dict[str, Any]:
-    """Return the attributes of a component that are no configuration."""
+    """Return the attributes of a component that are not configuration."""
     fields = type(component).model_fields
     return {name: value for name, value in vars(component).items() if name not in fields}
 

@@ -208,7 +208,7 @@ def last_commit(path: Path) -> Commit | None:
     """Return the last commit of a journal; None if there is no journal, or none in it.
 
     Raises:
-        ArtifactError: The file can't be read, or is no journal.
+        ArtifactError: The file can't be read, or is not a journal.
     """
     commit = None
     for kind, description, _, end in _frames(path):

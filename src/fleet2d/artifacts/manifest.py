@@ -37,7 +37,7 @@ Status = Literal["running", "complete", "interrupted", "failed"]
 
 
 def _check_time(text: str) -> str:
-    """Refuse text that is no local time."""
+    """Refuse text that is not a local time."""
     if text:
         dt.datetime.fromisoformat(text)
     return text
@@ -237,7 +237,7 @@ def json_of(path: Path, text: bytes) -> Any:
     """Return the text of a manifest as plain JSON data.
 
     Raises:
-        RunDirectoryError: It is no JSON.
+        RunDirectoryError: It is not JSON.
     """
     try:
         return read_json(text)

@@ -1,7 +1,7 @@
 """The seal of a run: one digest of all that it stored, and the comparison with it.
 
-A seal is no signature: after a change anybody can seal the run again, with another digest. Keep the
-digest elsewhere to notice that, too.
+A seal is not a signature: after a change anybody can seal the run again, with another digest. Keep
+the digest elsewhere to notice that, too.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ class Verification:
 
     Attributes:
         differing: How files and fields of the manifest differ from what was stored, by name.
-        foreign: Files in the directory that are no part of the run.
+        foreign: Files in the directory that are not part of the run.
         notes: Remarks about what could not be compared.
         digest: The seal's digest; None for a run that has none.
     """

@@ -11,7 +11,7 @@ def read_json(text: bytes) -> Any:
     """Return the content of a JSON text.
 
     Raises:
-        ValueError: It is no JSON, or is nested too deeply.
+        ValueError: It is not JSON, or is nested too deeply.
 
     Example:
         >>> read_json(b'{"steps": 3}')

@@ -16,7 +16,7 @@ def show_diary(name: str | None, out: Path | None, days: int, seed: int) -> list
         seed: The seed of the days.
 
     Raises:
-        InputError: There is no such persona, or the file is no persona.
+        InputError: There is no such persona, or the file is not a persona.
     """
     from pydantic import TypeAdapter, ValidationError
 

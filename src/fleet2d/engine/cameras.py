@@ -111,7 +111,7 @@ class Cameras:
             radii: Radii of all bodies, if they hide each other [lattice units].
 
         Raises:
-            ScenarioError: A period is no multiple of the step, or an unknown body is named.
+            ScenarioError: A period is not a multiple of the step, or an unknown body is named.
         """
         self.owner, self.row = actors[row], row
         # Lines of sight are compiled into the look.

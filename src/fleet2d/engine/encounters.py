@@ -169,7 +169,7 @@ class Encounters:
 
     Attributes:
         pairs: The pairs.
-        next_step: The first step that is not taken in.
+        next_step: The first step that is not processed.
     """
 
     def __init__(self, users: Sequence[DecidingActor], robots: Sequence[DecidingActor]) -> None:

@@ -4,7 +4,7 @@ from datetime import timedelta
 from typing import Any
 
 from fleet2d.clock import Clock
-from fleet2d.engine.expectations import Expecting
+from fleet2d.engine.expectations import RunExpectations
 from fleet2d.engine.gauges import Gauge
 from fleet2d.engine.signal_gauges import gauge_of
 from fleet2d.engine.state import State
@@ -35,16 +35,16 @@ def expect(
     expectation.check(
         scene_of(state, scenario, (clock.steps - since) * clock.step_us * MICROSECOND)
     )
-    if state.expecting is None:
-        state.expecting = Expecting(clock)
-        state.events.sinks.append(state.expecting)
-    if name in state.expecting.entries:
+    if state.expectations is None:
+        state.expectations = RunExpectations(clock)
+        state.events.sinks.append(state.expectations)
+    if name in state.expectations.entries:
         raise InputError(f"{name!r} is expected already: give this another name")
 
     def gauge(signal: Measurement) -> Gauge:
         return gauge_of(signal, state, clock.step_us)
 
-    state.expecting.add(name, expectation, since, state.settled, gauge)
+    state.expectations.add(name, expectation, since, state.settled, gauge)
 
 
 def scene_of(state: State, scenario: Scenario, remaining: timedelta) -> Scene:

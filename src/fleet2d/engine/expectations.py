@@ -30,7 +30,7 @@ class ActiveExpectation:
     since: int
 
 
-class Expecting:
+class RunExpectations:
     """The expectations of a run, and the gauges that measure their signals.
 
     Attributes:

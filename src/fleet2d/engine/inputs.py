@@ -31,7 +31,7 @@ def changed_inputs(manifest: Manifest) -> list[str]:
     """Return the files that a run read and whose content has changed since.
 
     Raises:
-        RunDirectoryError: One is missing, or is no file.
+        RunDirectoryError: One is missing, or is not a file.
     """
     changed_paths = []
     for record in manifest.inputs:

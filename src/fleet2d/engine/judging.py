@@ -54,11 +54,11 @@ class Judging(Steering):
 
         A verdict that can't change any more is `decided`; a test may end then.
         """
-        if self._state.expecting is None:
+        if self._state.expectations is None:
             return {}
         if self._run is None:
             self._state.settle(self.step)
-        return self._state.expecting.verdicts(ended=self.done)
+        return self._state.expectations.verdicts(ended=self.done)
 
     def judge(self, expectation: Expectation | str, name: str = "") -> Verdict:
         """Return the verdict on an expectation from the step on at which it was first requested.
@@ -69,8 +69,8 @@ class Judging(Steering):
         if isinstance(expectation, str):
             expectation = parse_expectation(expectation)
         name = name or str(expectation)
-        expecting = self._state.expecting
-        if expecting is None or name not in expecting.entries:
+        expectations = self._state.expectations
+        if expectations is None or name not in expectations.entries:
             self.expect(expectation, name)
         verdict = self.verdicts().get(name)
         if verdict is None:
@@ -82,11 +82,11 @@ class Judging(Steering):
 
     def _store_verdicts(self, results: Mapping[str, Any], status: Status) -> None:
         """Store the verdicts on all expectations."""
-        expecting = self._state.expecting
-        if expecting is not None and status != "failed":
+        expectations = self._state.expectations
+        if expectations is not None and status != "failed":
             store = self._state.store
             ended = status == "complete"
-            store.manifest.expectations = expecting.finish(results, store, ended=ended)
+            store.manifest.expectations = expectations.finish(results, store, ended=ended)
 
     def _expect_again(self, expectations: Mapping[str, Mapping[str, Any]]) -> None:
         """Add the expectations of a stored run that are not in its scenario."""

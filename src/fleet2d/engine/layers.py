@@ -56,7 +56,7 @@ class LayerBook:
         """Add the layers of what robots have seen to the home, if they are needed.
 
         Raises:
-            ScenarioError: A period is no multiple of the step.
+            ScenarioError: A period is not a multiple of the step.
             ComponentError: A component has an unknown need.
         """
         self._home, self._store, self._clock = basis.home, basis.store, basis.clock

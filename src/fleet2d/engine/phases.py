@@ -23,7 +23,7 @@ class Span:
     Attributes:
         first: The step at which decisions are due.
         end: The step before which it ends at the latest.
-        settles: Whether all watchers take it in now, or later with other spans.
+        settles: Whether all watchers process it now, or later with other spans.
     """
 
     first: int
@@ -96,7 +96,7 @@ def _mind_bodies(state: State, row: int, step: int, *, begins: bool) -> bool:
         state: The state.
         row: The row of the body.
         step: The present step.
-        begins: Whether it begins with a plan just now.
+        begins: Whether it begins a new plan at this step.
     """
     actor, blocking = state.actors[row], state.blocking
     other = blocking.in_way(state.bodies, row)
@@ -146,7 +146,7 @@ def watch(state: State, span: Span) -> None:
 
 
 def record(state: State, span: Span) -> None:
-    """Let watchers take in this span and earlier ones, if something is due after it."""
+    """Let watchers process this span and earlier ones, if something is due after it."""
     due = (state.learners.next_due(), state.layers.next_due(span.first))
     span.settles = (
         state.max_span is not None
@@ -173,8 +173,8 @@ def _update(state: State, log: Log, end: int) -> None:
     if learners.next_due() == end or any(event.event in awaited for event in events):
         state.count_looks()
         learners.update(end, log, events)
-        if state.expecting is not None:
-            state.expecting.learned(end, learners)
+        if state.expectations is not None:
+            state.expectations.learned(end, learners)
         for name, output in learners.fresh.items():
             if isinstance(output, HomeChanges) and name not in learners.replaced:
                 for change in output.changes:

@@ -174,7 +174,7 @@ def open_snapshot(path: str | Path | BinaryIO) -> tuple[dict[str, Any], BinaryIO
     """Return the header of a snapshot, and the state after it for `read_state`.
 
     Raises:
-        ArtifactError: It is no snapshot, is damaged, or is of another version of Fleet2D.
+        ArtifactError: It is not a snapshot, is damaged, or is of another version of Fleet2D.
     """
     try:
         content = Path(path).read_bytes() if isinstance(path, str | Path) else path.read()

@@ -18,7 +18,7 @@ from fleet2d.engine.cameras import Cameras
 from fleet2d.engine.changes import Changes
 from fleet2d.engine.clearance import Clearance
 from fleet2d.engine.encounters import Encounters
-from fleet2d.engine.expectations import Expecting
+from fleet2d.engine.expectations import RunExpectations
 from fleet2d.engine.gauges import Block
 from fleet2d.engine.interventions import Interventions
 from fleet2d.engine.layers import LayerBook
@@ -33,7 +33,7 @@ from fleet2d.floorplan.home.home import Home
 from fleet2d.kernels.look import SIGHTING
 from fleet2d.kernels.look import STEP as STEP_COLUMN
 
-# The most steps that watchers take in together: fewer if there are many bodies.
+# The most steps that watchers process together: fewer if there are many bodies.
 MOST_STEPS = 1 << 16
 LEAST_STEPS = 1 << 12
 MOST_POSES = 1 << 21
@@ -50,7 +50,7 @@ class State:
         changes: The changes of the home.
         watchers: All followers of the bodies, in their order.
         clearance, blocking, encounters, sensors: Some of the watchers.
-        gazes: The cameras of users: what users see.
+        gazes: The cameras of users.
         cameras: The cameras of robots.
         layers: What robots have seen of the home, and when layers are stored.
         learners: Algorithms and metrics, what they have learned, and their outputs.
@@ -65,7 +65,7 @@ class State:
         driven: Rows of the bodies that are driven from outside.
         requested: Event kinds that end a span because a caller waits for them.
         awaited: Event kinds that end a span: `requested`, and those that interventions wait for.
-        expecting: The expectations of the run; None if there are none.
+        expectations: The expectations of the run; None if there are none.
         notes_emitted: Number of notes of each body's present plan that have happened.
     """
 
@@ -93,7 +93,7 @@ class State:
     driven: set[int] = field(default_factory=set)
     requested: frozenset[str] = frozenset()
     awaited: frozenset[str] = frozenset()
-    expecting: Expecting | None = None
+    expectations: RunExpectations | None = None
     notes_emitted: list[int] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -111,7 +111,7 @@ class State:
 
     @property
     def capacity(self) -> int:
-        """The most steps that watchers take in together."""
+        """The most steps that watchers process together."""
         return max(LEAST_STEPS, min(MOST_STEPS, MOST_POSES // max(1, len(self.actors))))
 
     # Decisions of scripts
@@ -141,8 +141,8 @@ class State:
         self.notes_emitted[row] = 0
         self.emit_notes(row, step)
         self.recorder.after_plan(row, step)
-        if self.expecting is not None:
-            self.expecting.begin_plan(self.actors[row])
+        if self.expectations is not None:
+            self.expectations.begin_plan(self.actors[row])
 
     def emit_notes(self, row: int, step: int) -> None:
         """Emit the notes of a body's plan up to a step as events."""
@@ -174,7 +174,7 @@ class State:
     # Watching
 
     def take(self, watcher: Watcher, end: int) -> Sequence[Event]:
-        """Let a watcher take in the steps up to `end` - 1; return its events."""
+        """Let a watcher process the steps up to `end` - 1; return its events."""
         if watcher.next_step >= end:
             return ()
         events = watcher.take(self.bodies, end)
@@ -188,7 +188,7 @@ class State:
             self.bodies.ask_at[row] = self.bodies.step
 
     def settle(self, end: int) -> None:
-        """Let all watchers take in the steps up to `end` - 1, and record them."""
+        """Let all watchers process the steps up to `end` - 1, and record them."""
         first = self.settled
         if first >= end:
             return
@@ -200,9 +200,9 @@ class State:
         if EventKind.SENSOR in self.awaited:
             self.interventions.take_events(self.sensors.events_of(readings))
         self.recorder.take(first, end, observations, readings)
-        if self.expecting is not None:
+        if self.expectations is not None:
             names = self.sensors.names
-            self.expecting.take(
+            self.expectations.take(
                 Block(first, end, self.bodies, self.home, observations, readings, names)
             )
         if self.log is not None:

@@ -12,10 +12,10 @@ class Watcher(Protocol):
     """A follower of the bodies from span to span.
 
     A span is a block of steps without decisions. A watcher that may have to end one looks ahead in
-    `limit`; all others take in many spans at once.
+    `limit`; all others process many spans at once.
 
     Attributes:
-        next_step: The first step that it has not taken in.
+        next_step: The first step that it has not processed.
     """
 
     next_step: int

@@ -1,4 +1,4 @@
-"""Behaviors: the base class of what decides where a body goes next, and what it knows then."""
+"""Behaviors: their base class, and the situation in which they decide where a body goes next."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field

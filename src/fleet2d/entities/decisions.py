@@ -25,7 +25,7 @@ class DecidingActor(Actor):
 
     Attributes:
         arbiter: Asks its behaviors.
-        order: What it does in place of its behaviors; None: nothing.
+        order: The order that decides in place of its behaviors; None: there is none.
         is_stuck: Whether it can't move, whatever its behaviors or an order want.
         passes_until: Before that step it goes round people, and may come near without touching.
     """

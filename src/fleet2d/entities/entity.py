@@ -24,7 +24,8 @@ class Entity(BodySettings):
     behavior, of that type, with all keys that aren't the body's own.
 
     Attributes:
-        behaviors: What decides where it goes: the first that has a plan; none: it stays still.
+        behaviors: The behaviors that decide where it goes: the first that has a plan is followed;
+            none: it stays still.
     """
 
     behaviors: tuple[Annotated[Behavior, OneOf("behavior")], ...] = ()
@@ -35,7 +36,7 @@ class User(Entity):
 
     Attributes:
         opens_doors: Opens doors in the way; else a shut door is a wall to it.
-        camera: What the user could see: with it, robots that come into view are events.
+        camera: The user's field of view; with it, robots that come into view are events.
     """
 
     opens_doors: bool = True
@@ -62,12 +63,12 @@ class Robot(Entity):
         radius: Radius of the body [m].
         speed: Driving speed [m/s].
         turn_rate_deg: How fast it turns on the spot [deg/s].
-        camera: What it sees with; null: it is blind, or has `cameras`.
+        camera: Its only camera; null: it is blind, or has `cameras`.
         cameras: Several cameras, by name, in place of `camera`; their order doesn't matter.
         perception: How its cameras err, unless they say so themselves; null: they don't.
-        battery: What it drives on, for the behavior dock; null: its charge never ends.
+        battery: Its battery, for the behavior dock; null: its charge never ends.
         gives_way: How it keeps clear of people; null: it drives on, and people go round it.
-        localization: How wrong it is about where it is; null: it always knows.
+        localization: The error of its estimate of its own pose; null: there is none.
     """
 
     radius: Length = Field(default=0.15, gt=0, le=2)

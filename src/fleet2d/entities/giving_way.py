@@ -35,7 +35,7 @@ class GivesWay(Settings):
     """Keep clear of people: wait before them, in doorways as elsewhere; go round, or give up.
 
     Attributes:
-        distance: It comes no nearer on its own, from body to body [m].
+        distance: Gap between the bodies below which it doesn't drive nearer [m].
         patience: How long it waits before it goes round, by 0.1 m where there is no more room.
         gives_up: How long it waits where there is no way round before it skips the stop.
     """

@@ -34,12 +34,12 @@ class Localization(Settings):
     and is corrected at fixed intervals. The people that the robot sees are misplaced by it, too.
 
     Attributes:
-        drift: Standard deviation per axis a minute after [m].
-        drift_deg: Likewise of its heading [deg].
+        drift: Standard deviation per axis, a minute after a correction [m].
+        drift_deg: Standard deviation of the heading, a minute after a correction [deg].
         jump: Standard deviation per axis of a jump [m].
         jumps_per_hour: How often the error jumps.
         corrected_every: Time from correction to correction.
-        left: Standard deviation per axis after a correction [m].
+        left: Standard deviation per axis that remains after a correction [m].
     """
 
     drift: Length = Field(default=0.0, ge=0, le=10)

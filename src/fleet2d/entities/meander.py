@@ -32,7 +32,7 @@ class Meander(Behavior):
 
     Attributes:
         turn_std_deg: Standard deviation of the turn in one second [deg/sqrt(s)].
-        at_walls: Where a wall is in the way: turn by any angle, or sway until it isn't.
+        at_walls: At a wall: turn by any angle, or by small ones until the way is free.
     """
 
     turn_std_deg: AngleDeg = Field(default=15.0, ge=0, le=36000)

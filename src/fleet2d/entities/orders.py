@@ -1,4 +1,4 @@
-"""Orders: what a body does in place of its behaviors, until it is released.
+"""Orders: actions that a body does in place of its behaviors, until it is released.
 
 A body has one order at a time. Nothing interrupts it, but a robot still gives way and its battery
 still runs down. An order ends after its duration, with the next order, or on release.
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 class Order(Protocol):
-    """What a body does in place of its behaviors."""
+    """Base of orders, which decide in place of a body's behaviors."""
 
     def decide(self, now: "Situation") -> Plan | None:
         """Return what to do from now on; None: it is over."""

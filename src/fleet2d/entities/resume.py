@@ -102,7 +102,7 @@ def next_stop(body: "Body", track: Breakpoints, broken_us: int) -> int | None:
     at = max(int(np.searchsorted(time, broken_us, side="right")) - 1, 0)
     for i in range(at, len(time) - 1):
         still = x[i] == x[i + 1] and y[i] == y[i + 1] and time[i + 1] > broken_us
-        # A turn at a corner, on the border of the space, is no stop.
+        # A turn at a corner, on the border of the space, is not a stop.
         if still and body.space.part_at(int(x[i]), int(y[i])) == body.part:
             return i
     return None

@@ -1,4 +1,4 @@
-"""How long a condition has held, and how often it has begun."""
+"""Conditions on how long a condition has held, and on how often it has begun."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ from fleet2d.expectations.trace import I64, Trace, joined
 
 @dataclass(frozen=True, eq=False)
 class HoldsFor(UnaryExpectation):
-    """That `part` has held for at least `duration` up to this step."""
+    """The condition that `part` has held for at least `duration` up to this step."""
 
     duration: timedelta
 
@@ -43,7 +43,7 @@ PERIODS = {"hour": timedelta(hours=1), "day": timedelta(days=1), "week": timedel
 
 @dataclass(frozen=True, eq=False)
 class Count(Signal):
-    """How often `part` has begun so far in the present hour, day or week, or in the whole run."""
+    """The number of times that `part` has begun in the present hour, day or week, or in the run."""
 
     part: Expectation
     per: str | None = None
@@ -74,7 +74,7 @@ class Count(Signal):
 
 
 class AtMost(Always):
-    """That `part` begins at most `times` times: each hour, day or week, or in the whole run."""
+    """The expectation that `part` begins at most `times` times: each hour, day, week, or in all."""
 
     def __init__(self, times: int, part: Expectation, per: str | None) -> None:
         super().__init__(SignalComparison(Count(part, per), "<=", float(times)))

@@ -107,7 +107,7 @@ class Expectation(ABC):
 
     @property
     def is_judged(self) -> bool:
-        """Whether it says when it must hold, so that a run as a whole can be judged by it."""
+        """Whether it has a time operator, so that a run as a whole can be judged by it."""
         return any(part.is_judged for part in self.parts())
 
     def __and__(self, other: "Expectation") -> "Expectation":
@@ -148,7 +148,7 @@ class UnaryExpectation(Expectation):
 
 @dataclass(frozen=True, eq=False)
 class Not(UnaryExpectation):
-    """That a condition doesn't hold."""
+    """The negation of a condition."""
 
     is_call = False
 
@@ -185,7 +185,7 @@ class _BinaryExpectation(Expectation):
 
 
 class And(_BinaryExpectation):
-    """That both parts hold."""
+    """The conjunction of two parts: both hold."""
 
     word = "and"
 
@@ -196,7 +196,7 @@ class And(_BinaryExpectation):
 
 
 class Or(_BinaryExpectation):
-    """That one part holds, or both."""
+    """The disjunction of two parts: one holds, or both."""
 
     word = "or"
 

@@ -1,4 +1,4 @@
-"""The fields of a scenario that hold expectations: text, or a mapping of when to what."""
+"""Fields of a scenario that hold expectations: text, or a mapping from operators to conditions."""
 
 from collections.abc import Mapping
 from typing import Annotated, Any

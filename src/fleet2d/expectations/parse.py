@@ -51,7 +51,7 @@ def parse_expectation(text: str) -> Expectation:
     """Read an expectation, or a part of one.
 
     Raises:
-        InputError: The text is no expectation; the message has the nearest word.
+        InputError: The text is not an expectation; the message has the nearest word.
 
     Example:
         >>> print(parse_expectation("always(distance(ana, astro) > 50 cm)"))

@@ -12,7 +12,7 @@ Place = str | tuple[float, float]
 
 @dataclass(frozen=True, eq=False)
 class DistanceSignal(Signal):
-    """How far two bodies are apart, or a body from a room, an object or a point [m].
+    """The distance of a body from another, a room, an object or a point [m].
 
     It is measured from the centre of a body to the nearest point of a room or object: 0 inside.
     Infinite while a body is away from home.
@@ -47,7 +47,7 @@ class DistanceSignal(Signal):
 
 @dataclass(frozen=True, eq=False)
 class SpeedSignal(Signal):
-    """SpeedSignal of a body: the distance from its position at the step before, per step [m/s]."""
+    """The speed of a body: the distance from its position at the step before, per step [m/s]."""
 
     body: str
 

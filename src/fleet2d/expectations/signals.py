@@ -106,7 +106,7 @@ def _limit(signal: Signal, limit: object) -> float:
 
 @dataclass(frozen=True, eq=False)
 class SignalComparison(Expectation):
-    """That a signal is on one side of a limit; its robustness is the distance from the limit."""
+    """A comparison of a signal with a limit; its robustness is the distance from the limit."""
 
     signal: Signal
     sign: str
@@ -186,7 +186,7 @@ class WordSignal(Measurement):
 
 @dataclass(frozen=True, eq=False)
 class WordComparison(Expectation):
-    """That a signal has one of several words."""
+    """The condition that a signal has one of several words."""
 
     signal: WordSignal
     words: tuple[str, ...]

@@ -1,4 +1,4 @@
-"""When a condition must hold: always, never, eventually, at the end, until, after a trigger."""
+"""Temporal operators: always, never, eventually, at the end, until, after a trigger."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -26,7 +26,7 @@ class Temporal(Expectation):
 
     @property
     def is_judged(self) -> bool:
-        """True: it says when."""
+        """True: it has a time operator."""
         return True
 
     def violations(self, run: RunSignals) -> list[Violation]:
@@ -68,7 +68,7 @@ class WindowedExpectation(Temporal, UnaryExpectation):
 
 
 class Always(WindowedExpectation):
-    """That `part` holds at every step."""
+    """The expectation that `part` holds at every step."""
 
     word = "always"
 
@@ -85,7 +85,7 @@ class Always(WindowedExpectation):
 
 
 class Never(WindowedExpectation):
-    """That `part` holds at no step."""
+    """The expectation that `part` holds at no step."""
 
     word = "never"
 
@@ -99,7 +99,7 @@ class Never(WindowedExpectation):
 
 
 class Eventually(WindowedExpectation):
-    """That `part` holds at some step."""
+    """The expectation that `part` holds at some step."""
 
     word = "eventually"
 
@@ -122,7 +122,7 @@ class Eventually(WindowedExpectation):
 
 @dataclass(frozen=True, eq=False)
 class AtEnd(Temporal, UnaryExpectation):
-    """That `part` holds at the last step of the run."""
+    """The expectation that `part` holds at the last step of the run."""
 
     def robustness(self, run: RunSignals, high: bool) -> Trace:
         """Return the robustness of the part at the last step."""
@@ -143,7 +143,7 @@ class AtEnd(Temporal, UnaryExpectation):
 
 @dataclass(frozen=True, eq=False)
 class Until(Temporal):
-    """That `hold` holds at every step until `goal` holds, and that `goal` does hold."""
+    """The expectation that `hold` holds until `goal` holds, and that `goal` does hold."""
 
     hold: Expectation
     goal: Expectation
@@ -193,7 +193,7 @@ class Until(Temporal):
 
 @dataclass(frozen=True, eq=False)
 class After(Temporal):
-    """That each time `trigger` begins, `part` holds at once, or at some step in time."""
+    """The expectation that whenever `trigger` begins, `part` holds at once, or in time."""
 
     trigger: Expectation
     part: Expectation

@@ -179,10 +179,10 @@ def _violations(expectation: Expectation, run: RunSignals) -> list[Violation]:
 
 
 def check_judged(expectation: object) -> Expectation:
-    """Return an expectation that says when it must hold.
+    """Return the expectation if it has a time operator.
 
     Raises:
-        InputError: It doesn't, or it is no expectation.
+        InputError: It doesn't, or it is not an expectation.
     """
     if not isinstance(expectation, Expectation):
         raise InputError(

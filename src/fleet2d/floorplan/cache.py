@@ -1,4 +1,4 @@
-"""What the runs of one process share: homes that are read and worked out only once."""
+"""Caches that the runs of one process share: homes are read and computed only once."""
 
 from collections import OrderedDict
 from collections.abc import Callable, Hashable

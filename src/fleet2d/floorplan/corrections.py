@@ -29,8 +29,8 @@ class RoomCorrection(Settings):
     Attributes:
         at: A place in the room [x, y] [m].
         polygon: Corners of a room that takes this space from others.
-        name: Its name; left out: as it is, or by its type.
-        type: What it is used for; left out: as it is, or room.
+        name: Its name; left out: unchanged, or numbered by its type.
+        type: Its type, such as bedroom; left out: unchanged, or room.
 
     Example:
         >>> RoomCorrection(at=(2, 1), type="Kitchen").type

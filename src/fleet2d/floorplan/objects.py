@@ -37,9 +37,9 @@ class PlacedObject:
 
     Attributes:
         name: Unique in the plan, such as `bed_0`; empty to be numbered by type.
-        type: What it is, such as `bed`.
+        type: Its type, such as `bed`.
         footprint: The floor that it covers [m].
-        blocks: What can't pass it: nothing (a rug), bodies (`path`, a table), or bodies and sight
+        blocks: Whether it blocks nothing (a rug), bodies (`path`, a table), or bodies and sight
             (`sight`, a wardrobe).
         uses: Places to use it from.
         heading: Direction of its front [rad], counter-clockwise from +x: of a sofa into the room,

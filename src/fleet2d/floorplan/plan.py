@@ -45,7 +45,7 @@ class FloorPlan:
 
     Attributes:
         name: Its name.
-        source: Where it comes from, for people to read; not part of the content.
+        source: Its source, for readers; not part of the content.
         lattice: The cells that cover it.
         polygons: Free space [lattice], even integer coordinates, counter-clockwise outside.
         mesh: The same free space in triangles [lattice].
@@ -108,7 +108,7 @@ class FloorPlan:
             free: The free space between the walls [m].
             regions: The labels of rooms; their order numbers the rooms.
             cell: Side of a cell [m].
-            source: Where the plan comes from.
+            source: The source of the plan, for readers.
             entrance: A place just inside the front door [m].
             doorways: Lines across passages [m]; one that stands in no passage is noted and left
                 out. None to search the walls for doorways.

@@ -70,7 +70,7 @@ class FloorPlanSource(Component):
         """Read the floor plan.
 
         Raises:
-            FloorPlanError: The file can't be read, or is no home.
+            FloorPlanError: The file can't be read, or is not a home.
         """
 
     def plan(self) -> FloorPlan:
@@ -79,7 +79,7 @@ class FloorPlanSource(Component):
         A process reads a home only once, as long as its files and settings stay the same.
 
         Raises:
-            FloorPlanError: The file can't be read, is no home, or a piece doesn't fit into it.
+            FloorPlanError: The file can't be read, is not a home, or a piece doesn't fit into it.
         """
         key = self._cache_key()
         return self._read() if key is None else _PLANS.get(key, self._read)

@@ -21,7 +21,8 @@ class Reset(Intervention):
 
     Attributes:
         algorithm: The algorithm.
-        learned: A file of the folder learned/ of another run; left out: nothing.
+        learned: Learned state to load, a file of the folder learned/ of another run; left out: the
+            algorithm starts without any.
     """
 
     subject: ClassVar[str] = "algorithm"
@@ -46,9 +47,9 @@ class Replace(Lasting):
     Attributes:
         algorithm: The algorithm.
         rooms: Weights of rooms; 0 for those left out.
-        values: Or numbers and texts by name, for an output that is a mapping.
-        frozen: Or its output at that step.
-        withheld: Or no output, as before the first one.
+        values: Numbers and texts by name, for an output that is a mapping.
+        frozen: Whether its output at that step remains.
+        withheld: Whether there is no output, as before the first one.
     """
 
     subject: ClassVar[str] = "algorithm"

@@ -38,7 +38,7 @@ class Put(BodyIntervention):
     is drawn at random; at furniture it is the point from which the furniture is used.
 
     Attributes:
-        to: Where: a room, furniture, or a point.
+        to: The place: a room, furniture, or a point.
         heading_deg: Its heading, counter-clockwise from +x; left out: as before.
     """
 
@@ -81,9 +81,9 @@ class Send(BodyIntervention):
     block the way, the body waits and tries again.
 
     Attributes:
-        to: Where to: a room, furniture, or a point.
+        to: The destination: a room, furniture, or a point.
         heading_deg: Its heading there, counter-clockwise from +x; left out: ahead.
-        duration: For how long it stays there; left out: until it is released.
+        duration: How long it stays there; left out: until it is released.
     """
 
     to: Place
@@ -105,7 +105,7 @@ class HoldStill(BodyIntervention):
     """Let a body stand still where it is, until it is released.
 
     Attributes:
-        duration: For how long; left out: until it is released.
+        duration: How long it stands still; left out: until it is released.
     """
 
     duration: PositiveDuration | None = None

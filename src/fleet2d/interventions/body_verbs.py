@@ -137,7 +137,7 @@ class BodyVerbs(ABC):
         """Let a guest, a user with the behavior `guest`, come, stay for a duration, and leave.
 
         Raises:
-            ScenarioError: There is no such person, or the person is no guest.
+            ScenarioError: There is no such person, or the person is not a guest.
             PlacementError: There is no such place, or it can't be reached.
         """
         self._do(people.LetIn, entity=name, to=to, duration=duration)

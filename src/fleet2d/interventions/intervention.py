@@ -58,7 +58,7 @@ class Lasting(Intervention):
     """Base of interventions with a duration; `begin` and `end` apply all that are active then.
 
     Attributes:
-        duration: For how long; left out: until it is undone by `restore`.
+        duration: How long it lasts; left out: until it is undone by `restore`.
     """
 
     duration: PositiveDuration | None = None

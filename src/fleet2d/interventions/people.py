@@ -35,7 +35,7 @@ class Away(PersonIntervention):
     """Send a person to the exit, and away until called home.
 
     Attributes:
-        duration: For how long; left out: until called home or released.
+        duration: How long the person is away; left out: until called home or released.
     """
 
     duration: PositiveDuration | None = None
@@ -50,8 +50,8 @@ class CallHome(PersonIntervention):
     """Call a person home, who comes in at the exit and stays until released.
 
     Attributes:
-        to: Where to: a room, furniture, or a point.
-        duration: For how long it stays there; left out: until released.
+        to: The destination: a room, furniture, or a point.
+        duration: How long the person stays there; left out: until released.
     """
 
     to: Place = ("living_room", "any")
@@ -71,15 +71,15 @@ class LetIn(PersonIntervention):
     """Let a guest, a user with the behavior `guest`, come, stay for a while, and leave.
 
     Attributes:
-        to: Where to: a room, furniture, or a point.
-        duration: For how long the guest stays there.
+        to: The destination: a room, furniture, or a point.
+        duration: How long the guest stays there.
     """
 
     to: Place = ("living_room", "any")
     duration: PositiveDuration = timedelta(hours=2)
 
     def check(self, world: World) -> None:
-        """Refuse a user who is no guest, and an unknown place."""
+        """Refuse a user who is not a guest, and an unknown place."""
         actor = user(world, self.entity)
         if not any(isinstance(behavior, Guest) for behavior in actor.behaviors):
             raise ScenarioError(
@@ -98,9 +98,9 @@ class StartActivity(PersonIntervention):
     """Let a person do an activity at its place, sitting or lying as is usual.
 
     Attributes:
-        what: Its name in the persona or agenda.
+        what: The name of the activity in the persona or agenda.
         to: The place; left out: where the person's own behavior does it.
-        duration: For how long; left out: until released.
+        duration: How long the person does it; left out: until released.
     """
 
     what: str = Field(min_length=1)

@@ -44,9 +44,9 @@ class Call(RobotIntervention):
     it are idle. A later call replaces one that is still pending. Event: `called`.
 
     Attributes:
-        to: Come there: behavior `come`.
-        find: Find this person: behavior `find`.
-        dock: Go to the charger: behavior `dock`.
+        to: A place to come to, by the behavior `come`.
+        find: A person to find, by the behavior `find`.
+        dock: Whether to go to the charger, by the behavior `dock`.
         command: A word that a behavior of your own responds to.
     """
 
@@ -182,7 +182,7 @@ class SwitchOn(Switch):
     """Switch a camera or a behavior on again.
 
     Attributes:
-        duration: None: it stays on.
+        duration: Not used: it stays on.
     """
 
     duration: None = None

@@ -30,10 +30,10 @@ class Entry(Settings):
 
     Attributes:
         at: The time.
-        on: Or the event: [user_seen, astro, ana], or its kind alone.
-        each: At every such time or event, not only at the first.
-        delay: How long after the event; at least a step.
-        act: What is done.
+        on: The event instead of a time: [user_seen, astro, ana], or its kind alone.
+        each: Whether it happens at every such time or event, not only at the first.
+        delay: Time from the event to the intervention; at least a step.
+        act: The intervention.
 
     Example:
         >>> entry = Entry(at="19:00", put="ana", to="kitchen")

@@ -16,7 +16,7 @@ class Stick(Lasting):
 
     Attributes:
         sensor: The sensor.
-        says: On: it is always triggered; off: never; silent: it reports nothing.
+        says: The state: on, always triggered; off, never triggered; silent, it reports nothing.
     """
 
     subject: ClassVar[str] = "sensor"

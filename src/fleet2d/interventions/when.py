@@ -93,7 +93,7 @@ class Trigger(Settings):
     Attributes:
         event: Its kind, as in the table of events.
         entity: The body, door or sensor that it happens to; left out: any.
-        detail: What else it says: the user that is seen, the activity; any.
+        detail: Its detail: the user that is seen, the activity; left out: any.
 
     Example:
         >>> Trigger(event="user_seen", entity="astro").fits(Event(5, "astro", "user_seen", "ana"))

@@ -144,7 +144,7 @@ def _readings(block: _ScriptedActivity, rooms: list[tuple[int, str]]) -> list[Re
     for first, last, named_room, line in pieces:
         room = named_room or room
         if last == first:
-            continue  # without a duration, it is no reading
+            continue  # without a duration, it is not a reading
         if readings and readings[-1].room == room:
             readings[-1] = readings[-1]._replace(end_us=last)
         elif room:

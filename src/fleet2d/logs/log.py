@@ -27,7 +27,7 @@ def log_lines(path: Path) -> Iterator[tuple[int, str]]:
     """Yield the number and the stripped text of each line of a log that isn't blank.
 
     Raises:
-        LogError: The file can't be read, is no text file, or is beyond a bound.
+        LogError: The file can't be read, is not a text file, or is beyond a bound.
     """
     try:
         check_file(path, LOG_BYTES, LogError)

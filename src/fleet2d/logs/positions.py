@@ -67,7 +67,7 @@ def read_positions(
         sort: Put fixes in order of time instead of refusing times that run backwards.
 
     Raises:
-        LogError: A column or the tag is missing, a value is no number, or times run backwards.
+        LogError: A column or the tag is missing, a value is not a number, or times run backwards.
     """
     table = _table(path)
     named = _columns(table, columns or {}, path)

@@ -15,7 +15,7 @@ def parse_time(text: str, path: Path, line: int) -> datetime:
     """Read a local time like '2011-06-15 01:03:39.14962', exact to the microsecond.
 
     Raises:
-        LogError: The text is no time, or there is no such day or hour.
+        LogError: The text is not a time, or there is no such day or hour.
 
     Example:
         >>> parse_time("2011-06-15 01:03:39.14962", Path("log"), 1).isoformat()

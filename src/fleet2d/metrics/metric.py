@@ -29,7 +29,7 @@ class Metric(Component):
     looks_back: ClassVar[timedelta] = timedelta(0)
     # What has to be computed for it: exposure, explored, first_seen, last_seen …
     needs: ClassVar[Set[str]] = frozenset()
-    unit: ClassVar[str] = ""  # unit of its result, for people to read
+    unit: ClassVar[str] = ""  # unit of its result, for readers
     units: ClassVar[Mapping[str, str]] = {}  # units of single numbers, by name, where they differ
 
     period: PositiveDuration = timedelta(days=1)

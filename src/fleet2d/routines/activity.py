@@ -36,7 +36,7 @@ class DurationLaw(Settings):
         std: Its standard deviation; left out: 30 % of the mean.
         at_least: Nothing shorter is drawn.
         at_most: Nothing longer is drawn.
-        quantiles: Of law measured: quantiles at evenly spaced probabilities from 0 to 1.
+        quantiles: For the law `measured`: quantiles at evenly spaced probabilities from 0 to 1.
     """
 
     law: Literal["lognormal", "gamma", "normal", "uniform", "exponential", "fixed", "measured"] = (
@@ -105,11 +105,11 @@ class Activity(Settings):
         rooms: Rooms or kinds of rooms to try, in turn.
         objects: Kinds of furniture to use, tried in turn; none: a spot in the room.
         posture: Posture if there is no such furniture.
-        away: Out of the home.
-        exclusive: One member of a household at a time, as in a bathroom.
-        choose: Which of several rooms: own: one of the first kind that exists, always the same;
-            nearest: the nearest of all listed kinds; each_time: one of all listed kinds, drawn each
-            time; here: the room that the person is in.
+        away: Whether it is done out of the home.
+        exclusive: Whether only one member of a household does it at a time, as in a bathroom.
+        choose: The choice among several rooms: own: one of the first kind that exists, always the
+            same; nearest: the nearest of all listed kinds; each_time: one of all listed kinds,
+            drawn each time; here: the room that the person is in.
         interruptible: Whether needs interrupt it; else they wait for its end.
         takes: How long it takes.
         shifts: Mean time between turns on the spot; left out: no turns.

@@ -62,10 +62,10 @@ class JointActivity(Timing):
 
     Attributes:
         activity: The activity; left out: its own name.
-        who: Which members; left out: all.
+        who: The members; left out: all.
         on: Its days of the week.
         dates: Further dates, and [first, last] ranges.
-        takes: How long; left out: as the activity.
+        takes: Its duration; left out: that of the activity.
         probability: Its probability on each of those days.
     """
 
@@ -86,15 +86,15 @@ class JointActivity(Timing):
 
 
 class Household(Settings):
-    """The members of a household, and what they do together.
+    """The members of a household, and their joint activities.
 
     Attributes:
         name: The name of its random streams.
         members: The persona of each member, by the user's name.
         couples: Members who sleep in the same room and bed.
-        together: What several of them do together, by name.
-        away: When nobody is at home.
-        trips: When some members are away, by name.
+        together: Their joint activities, by name.
+        away: Periods in which nobody is at home.
+        trips: Periods in which some members are away, by name.
         visits: Members who are at home in these periods only, by name.
         welcome: Probability that members at leisure come to the door when one comes home.
     """

@@ -15,16 +15,16 @@ class Manners(Settings):
     A person who lies, is out of the home, or has no line of sight to a robot doesn't notice it.
 
     Attributes:
-        notices: How near a robot is when it is noticed [m].
+        notices: Distance at which a robot is noticed [m].
         turns: Probability of turning to it then.
         looks: How long the person looks at it.
-        in_the_way: How near a robot that drives up is in the way [m].
+        in_the_way: Distance at which a robot that drives up is in the way [m].
         steps_aside: Probability of stepping aside then, if the person stands.
-        too_close: How near is too close [m].
+        too_close: Distance below which a robot is too close [m].
         patience: How long a robot may stand too close.
         leaves: Probability of leaving for another room after that.
         leaves_for: How long the person stays there.
-        hears: From how far its call is heard [m].
+        hears: Distance at which its call is heard [m].
         comes: Probability of coming when it calls.
         comes_for: How long the person stays with it.
         stops: Probability that a person who left or came doesn't resume the activity.

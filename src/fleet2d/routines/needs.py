@@ -29,16 +29,16 @@ class Need(Settings):
         activity: The activity; left out: the name of the need.
         every: Time awake between two occurrences.
         asleep: Time asleep until it wakes the person; left out: it never does.
-        on_waking: Probability of being first on waking.
-        before_bed: Probability of being last before sleep.
-        before_leaving: Probability of being last before leaving home.
-        on_return: Probability of being first on coming home.
+        on_waking: Probability that it is met first on waking.
+        before_bed: Probability that it is met last before sleep.
+        before_leaving: Probability that it is met last before leaving home.
+        on_return: Probability that it is met first on coming home.
         between: The times of day at which it occurs; left out: at any.
         met_by: Activities that meet it, too: it builds up again after them.
-        takes: How long; left out: as the activity.
+        takes: Its duration; left out: that of the activity.
         then: Activities that follow at once, with their probability.
         patience: It waits for the end of an activity that ends within this time.
-        source: Where its numbers come from, for people to read.
+        source: The source of its numbers, for readers.
     """
 
     activity: str = ""
@@ -78,8 +78,8 @@ class Errand(Settings):
         probability: Its probability at each such change of activity.
         after: Activities after which it is done; left out: after any.
         before: Activities before which it is done; left out: before any.
-        takes: How long; left out: as the activity.
-        source: Where its numbers come from, for people to read.
+        takes: Its duration; left out: that of the activity.
+        source: The source of its numbers, for readers.
     """
 
     activity: str = ""

@@ -104,11 +104,11 @@ class Task(Timing):
     Attributes:
         activity: The activity; left out: the name of the task.
         until: Its latest end.
-        takes: How long; left out: as the activity.
+        takes: Its duration; left out: that of the activity.
         after: Tasks that come before it; without 'at' and 'between' it follows them at once, and
             only on days that have one of them.
-        on_waking: It is the first thing of the day.
-        before_bed: It is done right before going to bed.
+        on_waking: Whether it is the first thing of the day.
+        before_bed: Whether it is done right before going to bed.
         probability: Its probability on each of the days.
         fixed: An appointment: it begins at `at` exactly, and isn't left out.
     """
@@ -225,9 +225,9 @@ class Persona(Settings):
         pace: Walking speed, as a multiple of the body's.
         manners: How the person reacts to robots, with the behavior `reactions`.
         activities: New activities, or changed ones of the catalogue.
-        leisure: What fills the time between the tasks of a day.
-        needs: What builds up and interrupts a day, by name; left out: an adult's; null: none.
-        errands: Short tasks between activities, by name; left out: an adult's; null: none.
+        leisure: The pastimes between the tasks of a day.
+        needs: Needs that interrupt a day, by name; left out: those of an adult; null: none.
+        errands: Short tasks between activities, by name; left out: those of an adult; null: none.
         days: The kinds of days, by name.
     """
 

@@ -72,7 +72,7 @@ def rebuild_path(run: "Run", plan: FloorPlan, entity: str, every: timedelta) -> 
 
     Raises:
         ArtifactError: The run stored no key frames or damaged ones, there is no such body, or
-            `every` is no multiple of the step.
+            `every` is not a multiple of the step.
     """
     manifest = run.manifest
     clock = Clock(datetime.fromisoformat(manifest["start"]), manifest["step_us"], manifest["steps"])

@@ -142,11 +142,11 @@ class Scenario(Settings):
         objects: Doors and sensors, by name.
         changes: Changes of the home during the run, and when they happen.
         script: Interventions on people, robots and the home, and when they happen.
-        sight: How to compute what is in view.
+        sight: The method that computes what is in view.
         algorithms: The algorithms that run during the simulation, by name.
         metrics: The metrics that are recorded, by name.
-        expect: What must hold over the run, by name.
-        artifacts: What a run stores.
+        expect: The expectations that must hold over the run, by name.
+        artifacts: The tables and files that a run stores.
     """
 
     name: str | None = None

@@ -87,8 +87,8 @@ class Camera(Settings):
             the step; left out: 5 s, or the next multiple above; with several cameras, the longest
             counts.
         offset: Where it is mounted: forward and left of the body's centre [m].
-        heading_deg: Where it looks, counter-clockwise from the body's heading.
-        pan: How it turns to and fro; null: it doesn't.
+        heading_deg: The direction in which it looks, counter-clockwise from the body's heading.
+        pan: The directions between which it turns; null: its direction is fixed.
         period: Time from look to look; null: one in every step.
         latency: Time from a look until its detections are known.
         body_points: Points on a circle of a user's radius that are looked at besides the centre:
@@ -136,12 +136,12 @@ class Camera(Settings):
         """Convert the camera to integer units: lattice units, parts of a turn, and steps.
 
         Raises:
-            ValueError: The period, or a given `lost_after`, is no multiple of the step.
+            ValueError: The period, or a given `lost_after`, is not a multiple of the step.
         """
         lost_us = micros(USUAL_PATIENCE if self.lost_after is None else self.lost_after)
         if lost_us % step_us and self.lost_after is not None:
             raise ValueError(
-                f"lost_after is {format_duration(self.lost_after)}, which is no multiple of"
+                f"lost_after is {format_duration(self.lost_after)}, which is not a multiple of"
                 f" simulation.step ({step_us / 1e6:g} s): it would act as"
                 f" {-(-lost_us // step_us) * step_us / 1e6:g} s; choose a multiple"
             )

@@ -33,13 +33,14 @@ class Detection(Settings):
     A curve of `bearing` without negative angles holds for both sides.
 
     Attributes:
-        distance: By the distance of the user's centre [m].
-        bearing: By the angle off the optical axis, left is positive [deg].
-        orientation: By the angle between where the user faces and the camera: 0 shows the face, 90
-            a side, 180 the back [deg].
-        posture: By posture: stand, sit, lie; 1 for those left out.
-        visible_share: By the share of the body's points in view; needs the camera's `body_points`.
-        light: By the time of day [hours], day after day.
+        distance: Factor by the distance of the user's centre [m].
+        bearing: Factor by the angle off the optical axis, left is positive [deg].
+        orientation: Factor by the angle between the user's heading and the direction to the camera:
+            0 shows the face, 90 a side, 180 the back [deg].
+        posture: Factor by posture: stand, sit, lie; 1 for those left out.
+        visible_share: Factor by the share of the body's points in view; needs the camera's
+            `body_points`.
+        light: Factor by the time of day [hours], the same every day.
         memory: Time constant of misses: after it, the last random draw still holds with probability
             1/e; 0: each look has a new draw.
     """
@@ -80,9 +81,9 @@ class FalsePositives(Settings):
     """People that are perceived but aren't there, at random with a rate per time of looking.
 
     Attributes:
-        per_hour: Per hour of looking, uniform over what is in view.
+        per_hour: Rate per hour of looking, uniform over what is in view.
         spots: Places with rates of their own.
-        looks_like: Which user one is mistaken for; the rest is not recognized.
+        looks_like: Probability of being recognized as each user; the rest is not recognized.
     """
 
     per_hour: float = Field(default=0.0, ge=0)
@@ -99,9 +100,11 @@ class Identity(Settings):
     """Identity of a noticed user: recognized, mistaken for another user, or not recognized.
 
     Attributes:
-        right: Recognized, by distance [m]; null: whenever not mistaken.
-        mistaken: Mistaken for another user, by distance [m]; the rest is unknown.
-        confusion: Which user each user is mistaken for, if so; left out: all others equally.
+        right: Probability of being recognized, by distance [m]; null: whenever not mistaken.
+        mistaken: Probability of being mistaken for another user, by distance [m]; the rest is
+            unknown.
+        confusion: For each user, the shares of users that it is mistaken for; left out: all others
+            equally.
         per_track: An identity stays until the user isn't noticed for `lost_after`; otherwise it is
             drawn anew in each look.
     """
@@ -128,10 +131,10 @@ class Attributes(Settings):
     """Errors of position, heading, posture and activity; noise is bell-shaped, by its deviation.
 
     Attributes:
-        range_noise: Of the distance, whatever the distance [m].
-        range_noise_share: Of the distance, as a share of it; both are added.
-        bearing_noise_deg: Of the bearing.
-        heading_noise_deg: Of the heading in which the user is perceived.
+        range_noise: Deviation of the distance, the same at all distances [m].
+        range_noise_share: Deviation of the distance, as a share of it; both are added.
+        bearing_noise_deg: Deviation of the bearing.
+        heading_noise_deg: Deviation of the perceived heading of the user.
         posture: Probabilities of mistaking a posture for others; the rest is right.
         activity: Probabilities of mistaking an activity for others; the rest is right; null:
             activities aren't perceived.
@@ -166,9 +169,9 @@ class Perception(Settings):
     """Errors of a robot's perception; perfect by default.
 
     Attributes:
-        detection: Which users are noticed.
-        false_positives: People who aren't there.
-        identity: Which user one is recognized as.
+        detection: Probability of noticing users.
+        false_positives: Rates of people that are perceived but aren't there.
+        identity: Recognition of users.
         attributes: Errors of position, heading, posture and activity.
     """
 

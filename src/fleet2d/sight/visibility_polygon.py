@@ -51,9 +51,10 @@ class VisibilityPolygon(FieldOfView):
     about 200 bytes in a smooth plan and 1 kB in one traced from a sensor.
 
     Attributes:
-        precompute: Visited: regions of the places that cameras look from; all: also of the centres
-            of all cells, before the run; file: these come from a file that processes share.
-        path: With precompute: file: the folder of the files; created if missing.
+        precompute: The regions to compute: `visited`: of the places that cameras look from; `all`:
+            also of the centres of all cells, before the run; `file`: the same, from a file that
+            processes share.
+        path: The folder of the files, with `precompute: file`; created if missing.
         keep: Number of visited places whose regions are cached.
     """
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeVar
 from fleet2d.errors import ComponentError, InputError
 from fleet2d.studies.catalogue import Changed
 from fleet2d.studies.driver import RunOptions, check_study, run_study
-from fleet2d.studies.execution import Executor, Lost, SerialExecutor, cores
+from fleet2d.studies.execution import Executor, LostTask, SerialExecutor, cores
 from fleet2d.studies.jobs import FunctionJob
 from fleet2d.studies.local import LocalExecutor
 from fleet2d.studies.progress import observing
@@ -103,7 +103,7 @@ def map_runs(
     events = make_executor(executor, workers).run(job, tasks)
     try:
         for event in events:
-            if isinstance(event, Lost):
+            if isinstance(event, LostTask):
                 raise ComponentError(f"scenario {event.task.index}: {event.reason}")
             succeeded, value = pickle.loads(event.payload)  # noqa: S301 - from our own workers
             if not succeeded:

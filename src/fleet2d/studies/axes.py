@@ -52,10 +52,10 @@ class RangeAxis(Axis):
     Attributes:
         key: The key path.
         range: First and last number.
-        step: From one to the next.
-        count: How many, instead of a step.
-        log: With count: by a constant factor.
-        unit: Written behind the number: d, cm, %.
+        step: Difference between consecutive numbers.
+        count: The number of values, instead of a step.
+        log: With `count`: whether consecutive numbers differ by a constant factor.
+        unit: The unit to write after the number: d, cm, %.
     """
 
     key: str
@@ -110,8 +110,8 @@ class OptionsAxis(Axis):
     """Named options, each a set of changes.
 
     Attributes:
-        options: By name: {key path: value, …}.
-        population: They stand for a population, as homes and people do.
+        options: The options by name, each {key path: value, …}.
+        population: Whether the options are a sample of a population, as homes and people are.
     """
 
     options: dict[str, dict[str, Any]] = Field(min_length=1)
@@ -134,9 +134,9 @@ class SampleAxis(Axis):
 
     Attributes:
         sample: The parameters, by column.
-        count: How many samples.
-        method: Latin_hypercube or random.
-        seed: Of the samples.
+        count: The number of samples.
+        method: The sampling method, `latin_hypercube` or `random`.
+        seed: The seed of the samples.
     """
 
     sample: dict[str, Parameter] = Field(min_length=1)

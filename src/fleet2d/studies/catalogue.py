@@ -52,7 +52,7 @@ class ScenarioFile:
 
 
 @dataclass(frozen=True)
-class Reconciled:
+class ReconciledPlan:
     """A plan matched with the stored variants of a study.
 
     Attributes:
@@ -71,7 +71,7 @@ def reconcile(
     directory: StudyDirectory,
     finished: Iterable[int],
     changed: Changed | None,
-) -> Reconciled:
+) -> ReconciledPlan:
     """Number the variants of a plan as in the stored study; new variants get new numbers.
 
     Args:
@@ -86,7 +86,7 @@ def reconcile(
     try:
         stored_rows = directory.read_table(PLAN, PLAN_COLUMNS[:3]).to_pylist()
     except FileNotFoundError:
-        return Reconciled(plan, len(plan.variants), 0)
+        return ReconciledPlan(plan, len(plan.variants), 0)
     numbers = {row["identity"]: row[VARIANT] for row in stored_rows}
     present = {variant.identity for variant in plan.variants}
     with_results = set(finished)
@@ -112,7 +112,9 @@ def reconcile(
             variants.append(replace(variant, number=next_number))
             next_number += 1
     new_variants = sum(variant.identity not in numbers for variant in variants)
-    return Reconciled(StudyPlan(plan.design, tuple(variants)), new_variants, len(stale) - reused)
+    return ReconciledPlan(
+        StudyPlan(plan.design, tuple(variants)), new_variants, len(stale) - reused
+    )
 
 
 def _refusal(location: str, recomputed: int, stale: int) -> str:

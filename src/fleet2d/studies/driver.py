@@ -10,7 +10,7 @@ from typing import Any
 from fleet2d.errors import ArtifactError
 from fleet2d.studies.catalogue import (
     Changed,
-    Reconciled,
+    ReconciledPlan,
     ScenarioFile,
     reconcile,
     write_catalogue,
@@ -18,7 +18,7 @@ from fleet2d.studies.catalogue import (
 from fleet2d.studies.design import build_design
 from fleet2d.studies.directory import VARIANTS, Meta, StudyDirectory
 from fleet2d.studies.engine import VariantOutcome
-from fleet2d.studies.execution import Event, Executor, Lost
+from fleet2d.studies.execution import Event, Executor, LostTask
 from fleet2d.studies.identity import code_version
 from fleet2d.studies.jobs import StudyJob
 from fleet2d.studies.journal import Journal
@@ -147,7 +147,7 @@ def run_study(
 
 
 def _record(event: Event) -> VariantRecord:
-    if isinstance(event, Lost):
+    if isinstance(event, LostTask):
         return record_of(event.task, VariantOutcome("failed", error=event.reason), event.attempts)
     record = VariantRecord.decode(event.payload)
     return VariantRecord({**record.header, "attempts": event.attempts}, record.body)
@@ -227,7 +227,7 @@ def _write_plan(directory: StudyDirectory, checked: CheckedStudy, plan: StudyPla
         raise ArtifactError(f"the study can't be described: {error}") from error
 
 
-def _describe(reconciled: Reconciled, directory: StudyDirectory, observer: Observer) -> None:
+def _describe(reconciled: ReconciledPlan, directory: StudyDirectory, observer: Observer) -> None:
     if 0 < reconciled.new < len(reconciled.plan.variants):
         observer.on_note(f"{reconciled.new} variants are new in {directory.location}")
     if reconciled.set_aside:

@@ -15,7 +15,7 @@ MOST_STARTS = 3  # of workers that end before they are ready
 
 
 @dataclass(frozen=True)
-class Finished:
+class FinishedTask:
     """A finished task with its results as bytes."""
 
     task: WorkerTask
@@ -24,7 +24,7 @@ class Finished:
 
 
 @dataclass(frozen=True)
-class Lost:
+class LostTask:
     """A task without results, as its worker died in each attempt; with the reason."""
 
     task: WorkerTask
@@ -32,7 +32,7 @@ class Lost:
     attempts: int
 
 
-Event = Finished | Lost
+Event = FinishedTask | LostTask
 
 
 class Executor(Protocol):
@@ -56,18 +56,18 @@ class SerialExecutor:
     def run(self, job: WorkerJob, tasks: TaskSchedule) -> Generator[Event]:
         """Yield an event for each task."""
         while (task := tasks.take(self)) is not None:
-            yield Finished(task, job(task), 1)
+            yield FinishedTask(task, job(task), 1)
 
 
 def retry(
     task: WorkerTask, attempts: dict[int, int], tasks: TaskSchedule, reason: str
-) -> Lost | None:
+) -> LostTask | None:
     """Schedule a task again whose worker died; after some attempts return it as lost."""
     attempts[task.number] = attempts.get(task.number, 0) + 1
     if attempts[task.number] < MOST_ATTEMPTS:
         tasks.put_back(task)
         return None
-    return Lost(task, f"{reason} in each of {MOST_ATTEMPTS} attempts", MOST_ATTEMPTS)
+    return LostTask(task, f"{reason} in each of {MOST_ATTEMPTS} attempts", MOST_ATTEMPTS)
 
 
 def cores() -> int:

@@ -1,4 +1,4 @@
-"""What workers do with tasks: run variants of a study, or scenarios for a function."""
+"""Jobs of workers: run variants of a study, or scenarios for a function."""
 
 import pickle
 from collections.abc import Callable, Sequence

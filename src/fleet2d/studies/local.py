@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from fleet2d.errors import InputError
-from fleet2d.studies.execution import AHEAD, MOST_STARTS, Event, Finished, Lost, retry
+from fleet2d.studies.execution import AHEAD, MOST_STARTS, Event, FinishedTask, LostTask, retry
 from fleet2d.studies.jobs import WorkerJob
 from fleet2d.studies.pipe import receive, send
 from fleet2d.studies.record import WorkerTask
@@ -149,14 +149,14 @@ class LocalExecutor:
         payload: bytes,
         rss_mb: float,
         attempts: dict[int, int],
-    ) -> Finished:
+    ) -> FinishedTask:
         worker.tasks.popleft()
         worker.is_full = rss_mb > self._limit_mb
-        return Finished(task, payload, attempts.get(task.number, 0) + 1)
+        return FinishedTask(task, payload, attempts.get(task.number, 0) + 1)
 
     def _replace(
         self, worker: _Worker, job: WorkerJob, tasks: TaskSchedule, attempts: dict[int, int]
-    ) -> Iterator[Lost]:
+    ) -> Iterator[LostTask]:
         """Replace a worker that has ended; the task that it was running is run again."""
         code = worker.close()
         self._crew.remove(worker)

@@ -9,7 +9,7 @@ from fleet2d.problems import suggest
 from fleet2d.scenario.model import Scenario
 from fleet2d.studies.choice import Label
 from fleet2d.studies.design import SWITCHES, Design
-from fleet2d.studies.execution import Executor, Lost, SerialExecutor
+from fleet2d.studies.execution import Executor, LostTask, SerialExecutor
 from fleet2d.studies.identity import (
     FileHashes,
     content_hash,
@@ -151,7 +151,7 @@ def check_setups(
         for done, event in enumerate(events):
             if on_progress is not None:
                 on_progress(done + 1, len(tasks))
-            text = event.reason if isinstance(event, Lost) else event.payload.decode()
+            text = event.reason if isinstance(event, LostTask) else event.payload.decode()
             if text:
                 problems[event.task.index] = f"{plan.design.describe(event.task.index)}: {text}"
             if len(problems) == MOST_PROBLEMS:

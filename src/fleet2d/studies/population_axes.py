@@ -43,7 +43,7 @@ class FloorplansAxis(Axis):
         """Return a choice for each floor plan; its label is the name of its file.
 
         Raises:
-            ScenarioError: There is no such file, or one is no floor plan.
+            ScenarioError: There is no such file, or one is not a floor plan.
         """
         files = self._files()
         labels = [path.stem for path in files]
@@ -78,8 +78,8 @@ class SyntheticAxis(Axis):
     """Synthetic homes by their seeds.
 
     Attributes:
-        synthetic: How many homes, from seed 0 on; or a list of seeds.
-        first: The first seed, where a number is given.
+        synthetic: The number of homes, from seed 0 on; or a list of seeds.
+        first: The first seed, if `synthetic` is a number.
         settings: Further keys of the homes, such as area_m2 and furnish.
     """
 
@@ -107,8 +107,8 @@ class PersonasAxis(Axis):
     """Personas of one user: the bundled ones, or files of your own.
 
     Attributes:
-        personas: All, or a list of names and files.
-        user: Whose persona it is.
+        personas: `all`, or a list of names and files.
+        user: The name of the user who has the persona.
     """
 
     is_population: ClassVar[bool] = True

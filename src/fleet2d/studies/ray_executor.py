@@ -11,7 +11,7 @@ from typing import Any
 
 from fleet2d.errors import InputError
 from fleet2d.extras import extra
-from fleet2d.studies.execution import AHEAD, MOST_STARTS, Event, Finished, Lost, retry
+from fleet2d.studies.execution import AHEAD, MOST_STARTS, Event, FinishedTask, LostTask, retry
 from fleet2d.studies.jobs import WorkerJob
 from fleet2d.studies.record import WorkerTask
 from fleet2d.studies.schedule import TaskSchedule
@@ -136,7 +136,7 @@ class RayExecutor:
         except self._ray.exceptions.RayActorError as error:
             yield from self._replace(actor, task, tasks, attempts, error)
         else:
-            yield Finished(task, payload, attempts.get(task.number, 0) + 1)
+            yield FinishedTask(task, payload, attempts.get(task.number, 0) + 1)
 
     def _replace(
         self,
@@ -145,7 +145,7 @@ class RayExecutor:
         tasks: TaskSchedule,
         attempts: dict[int, int],
         error: Exception,
-    ) -> Generator[Lost]:
+    ) -> Generator[LostTask]:
         """Drop a worker that has ended; its tasks are run elsewhere."""
         self._crew.remove(actor)
         tasks.leave(actor.number)

@@ -23,10 +23,10 @@ class Parameter(Settings):
         key: The key path that it sets.
         low: The smallest value.
         high: The largest value.
-        log: Uniform in the logarithm.
-        integer: Whole numbers only.
-        unit: Written behind the number: d, cm, %.
-        choices: Instead of a range: a list.
+        log: Whether values are uniform in the logarithm.
+        integer: Whether values are whole numbers.
+        unit: The unit to write after the number: d, cm, %.
+        choices: A list to choose from, instead of a range.
     """
 
     key: str

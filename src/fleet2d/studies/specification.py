@@ -60,9 +60,9 @@ class PairedComparison(Settings):
 
     Attributes:
         metric: A number, such as ltp_error.ana.tv.
-        against: The axis, and the value that others are held to.
-        by: Columns over which intervals go; left out: homes, people, seeds.
-        within: Axes for whose values the comparison is made one by one.
+        against: The axis and its reference value.
+        by: The columns whose values are the units of intervals; left out: homes, people, seeds.
+        within: Axes with a separate comparison for each of their values.
     """
 
     metric: str
@@ -86,13 +86,13 @@ class StudyFile(Settings):
         name: The name of the study in reports.
         description: The question it answers, for the report.
         base: The scenario: a file, bundled:NAME, or a mapping; left out: bundled:base.
-        axes: What varies, by name.
-        replicates: How many seeds, from 0 on, or a list; left out: the base's.
+        axes: The axes along which scenarios vary, by name.
+        replicates: The number of seeds, from 0 on, or a list; left out: the seed of the base.
         rules: Changes for some of the variants.
         exclude: Combinations to leave out: {axis: value, …}.
-        keep: What of each run is kept.
-        compare: What the report compares.
-        tune: What `fleet2d tune` searches.
+        keep: The metrics and tables to keep of each run.
+        compare: The comparisons that the report shows.
+        tune: The search of `fleet2d tune`.
     """
 
     name: str | None = None

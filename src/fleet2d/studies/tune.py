@@ -12,7 +12,7 @@ from fleet2d.studies.axes import OptionsAxis
 from fleet2d.studies.design import matches
 from fleet2d.studies.directory import StudyDirectory
 from fleet2d.studies.driver import CheckedStudy, RunOptions, check_study, run_study
-from fleet2d.studies.execution import Executor, Lost
+from fleet2d.studies.execution import Executor, LostTask
 from fleet2d.studies.reader import Study, open_study
 from fleet2d.studies.sampling import rounded
 from fleet2d.studies.specification import PairedComparison, Specification, read_specification
@@ -129,7 +129,7 @@ def _search(
         for event in events:
             task = event.task
             assert isinstance(task, TrialTask)
-            if isinstance(event, Lost):
+            if isinstance(event, LostTask):
                 objectives, error = None, event.reason
             else:
                 objectives, error = pickle.loads(event.payload)  # noqa: S301 - from our own workers

@@ -19,7 +19,7 @@ MOST_SEEDS_SHOWN = 8
 
 @dataclass(frozen=True)
 class FailureFolder:
-    """Where the artifacts of a failing test go.
+    """The folder for the artifacts of a failing test.
 
     Attributes:
         parent: The folder for all tests.

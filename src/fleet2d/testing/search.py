@@ -16,7 +16,7 @@ from fleet2d.errors import InputError
 from fleet2d.extras import extra
 from fleet2d.problems import suggest
 from fleet2d.studies.engine import describe_error
-from fleet2d.studies.execution import Executor, Lost
+from fleet2d.studies.execution import Executor, LostTask
 from fleet2d.studies.record import WorkerTask
 from fleet2d.studies.schedule import TaskSchedule
 from fleet2d.testing.claim import ATTRIBUTE, Claim, Variant
@@ -197,7 +197,9 @@ class FailureSearch:
             for event in events:
                 assert isinstance(event.task, TryTask)
                 margin, error = (
-                    (None, event.reason) if isinstance(event, Lost) else pickle.loads(event.payload)  # noqa: S301 - by this program's workers
+                    (None, event.reason)
+                    if isinstance(event, LostTask)
+                    else pickle.loads(event.payload)  # noqa: S301 - by this program's workers
                 )
                 self._add(event.task, margin, error)
                 if observer is not None:

@@ -142,7 +142,7 @@ def _without_entry(variant: Variant, section: str, name: str) -> Variant | None:
 
 
 def _edited(variant: Variant, **sections: Any) -> Variant | None:
-    """Return a variant with some keys changed; None if that is no valid scenario."""
+    """Return a variant with some keys changed; None if that is not a valid scenario."""
     content = variant.scenario.resolved()
     for name, value in sections.items():
         content[name] = {**content[name], **value} if name == "simulation" else value

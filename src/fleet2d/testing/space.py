@@ -77,7 +77,7 @@ class SearchSpace:
         """Return the scenario of a point.
 
         Raises:
-            InputError: It is no valid scenario, or its home can't be built.
+            InputError: It is not a valid scenario, or its home can't be built.
         """
         changes = [(("simulation", "seed"), seed), *self.changes(point)]
         source = self.text(point)

@@ -51,8 +51,8 @@ class Trial(Simulation):
     @property
     def expected(self) -> list[str]:
         """The names of the expectations."""
-        expecting = self._state.expecting
-        return [] if expecting is None else list(expecting.entries)
+        expectations = self._state.expectations
+        return [] if expectations is None else list(expectations.entries)
 
     def conclude(self) -> "tuple[ExpectationResult, ...]":
         """Simulate until all expectations are decided, and return their results."""

@@ -61,8 +61,8 @@ def draw_layer(run: Run, name: str, path: Path, step: int | None = None) -> None
 def layer_on_axes(plan: FloorPlan, values: NDArray[Any], axes: Axes) -> ScalarMappable | None:
     """Draw the values of a layer over a floor plan; return their colours for a colour bar.
 
-    Cells that aren't free or have no value are left out: NaN is no value, and in a layer of steps
-    -1 is none.
+    Cells that aren't free or have no value are left out: NaN means no value, and
+    so does -1 in a layer of steps.
 
     Args:
         plan: The floor plan, already drawn.

@@ -31,7 +31,7 @@ class DoorFacts(TypedDict):
 
 
 class ObjectFacts(TypedDict):
-    """A piece of furniture: its outline [m], and what it blocks: nothing, path or sight."""
+    """A piece of furniture: its outline [m], and whether it blocks nothing, paths or sight."""
 
     name: str
     type: str
@@ -43,7 +43,7 @@ class HomeFacts(TypedDict):
     """A home: outlines in metres, cells as runs of equal rooms.
 
     `free` lists polygons, each an outline and its holes. `room_cells` are pairs (room, number of
-    cells), row by row from the lowest; -1 is no room. `place_cells` are the same for places in
+    cells), row by row from the lowest; -1 is not a room. `place_cells` are the same for places in
     cells that a wall cuts.
     """
 

@@ -54,7 +54,7 @@ def write_film(
         end: The step before which to end.
         speed: Simulated time over the time of the film.
         height: The height of the film [pixels].
-        on_progress: Called now and then with the number of apply_theme frames, and of all frames.
+        on_progress: Called now and then with the number of finished frames, and of all frames.
 
     Raises:
         InputError: The file name has another suffix, a number is out of range, or the file can't be

@@ -250,7 +250,7 @@ def read_order(body: bytes) -> LiveOrder:
     """Return the order in the body of a request.
 
     Raises:
-        InputError: The body is no order.
+        InputError: The body is not an order.
     """
     refusal = InputError("the request is not a valid order")
     try:

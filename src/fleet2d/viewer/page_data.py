@@ -99,7 +99,7 @@ class PageData:
         return self._temporary_file(name, lambda: self.run.tables[name])
 
     def _temporary_file(self, name: str, table: Any) -> Path:
-        """Return a temporary file of a table that is no file of a run directory."""
+        """Return a temporary file of a table that is not a file of a run directory."""
         if self._folder is None:
             self._folder = Path(tempfile.mkdtemp(prefix="fleet2d-view-"))
             weakref.finalize(self, shutil.rmtree, self._folder, ignore_errors=True)

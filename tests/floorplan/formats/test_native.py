@@ -218,7 +218,7 @@ def test_load_floorplan_tells_formats_by_content(tmp_path: Path) -> None:
 
 
 def test_load_floorplan_refuses_what_it_does_not_know(tmp_path: Path) -> None:
-    with pytest.raises(FloorPlanError, match="no floor plan that Fleet2D knows"):
+    with pytest.raises(FloorPlanError, match="not a floor plan that Fleet2D can read"):
         load_floorplan(write(tmp_path, {"walls": 3}))
     with pytest.raises(FloorPlanError, match="did you mean 'family_home'"):
         load_floorplan("family-home")

@@ -149,8 +149,8 @@ class AuditOnly(ExposureRatio):
     begin because the user is lost; and it is noisy, as most sightings aren't used.
 
     Attributes:
-        every: From one audit to the next, from midnight on.
-        length: Of an audit, from its beginning.
+        every: Time from the begin of one audit to the next, counted from midnight.
+        length: Duration of an audit.
     """
 
     every: PositiveDuration = timedelta(hours=2)

@@ -72,7 +72,7 @@ class Likelihood(Estimator):
     Attributes:
         detection: Chance that somebody in view is perceived.
         restless: Chance per bin that a person in a room changes patch, before it is learned.
-        stages: Of a stay; above 1 its length isn't geometric.
+        stages: Number of stages of a stay; above 1 its length isn't geometric.
         together: Largest number of consecutive bins with equal evidence that are merged.
     """
 

@@ -34,10 +34,10 @@ class LongTermPresence(Algorithm):
     hour_of_week` both are for the present hour of the week, and `at` returns other hours.
 
     Attributes:
-        estimator: How it is estimated.
+        estimator: The estimator of the shares.
         by: One estimate, or one for each hour of the week.
         smoothing: Duration of average evidence added to each hour of the week.
-        half_life: After which evidence counts half; null: all counts alike.
+        half_life: Age at which evidence counts half; null: all evidence counts alike.
         interval: Coverage of its intervals, such as 0.9.
     """
 

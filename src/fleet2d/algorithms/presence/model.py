@@ -96,7 +96,7 @@ class LongTerm(Model):
     """Long-term presence, regardless of recent sightings.
 
     Attributes:
-        estimator: How it is estimated.
+        estimator: The estimator of long-term presence.
     """
 
     estimator: Annotated[Estimator, OneOf("presence_estimator")] = cast("Any", "likelihood")

@@ -31,7 +31,7 @@ class RealTimePresence(Algorithm):
 
     Attributes:
         period: How often it is updated.
-        model: How it is computed.
+        model: The model that computes it.
     """
 
     needs: ClassVar[Set[str]] = frozenset({"evidence"})

@@ -11,7 +11,7 @@ from fleet2d.floorplan.home.home import Home
 
 @register("object", "contact_sensor")
 class ContactSensor(Sensor):
-    """Says OPEN while a door is open, and CLOSE when it shuts.
+    """A sensor that reports OPEN when a door opens, and CLOSE when it shuts.
 
     Attributes:
         of: The name of the door, one of the scenario's objects.

@@ -17,7 +17,7 @@ from fleet2d.units import AngleDeg, Duration, PositiveLength, micros
 
 @register("object", "motion_sensor")
 class MotionSensor(Sensor):
-    """Goes on when a person moves in its field of view past no wall, and off after a while.
+    """A sensor that is on while a person moves in view, with no wall between, and a while longer.
 
     It doesn't notice people who stand, sit or lie still.
 

@@ -11,7 +11,7 @@ from fleet2d.floorplan.home.home import Home
 
 @register("object", "occupancy_sensor")
 class OccupancySensor(FurnitureSensor):
-    """On while somebody is on a bed, a sofa or a chair."""
+    """A sensor that is on while somebody is on a bed, a sofa or a chair."""
 
     def sense(self, view: SensorView, home: Home) -> tuple[I64, I64]:
         """Return the steps in which the middle of a person is over the object."""

@@ -15,7 +15,7 @@ from fleet2d.units import Duration, Length
 
 @register("object", "smart_plug")
 class SmartPlug(FurnitureSensor):
-    """On while a person stays at a place from which a device is used: a stove, a desk, a TV.
+    """A plug that is on while a person stays where its device is used: a stove, a desk, a TV.
 
     Passing by doesn't switch it on: the person has to stay on the spot for two steps.
 

@@ -70,7 +70,8 @@ class BeliefBehavior(Behavior):
 
     Attributes:
         user: The user to look for or to be near, or anyone.
-        source: The algorithm that says where people are; left out: rooms count by their size.
+        source: The algorithm with probabilities of where people are; left out: the probability of a
+            room is proportional to its area.
     """
 
     user: str = Field(default=ANYONE, min_length=1)

@@ -69,12 +69,12 @@ class Find(BeliefBehavior):
     Attributes:
         policy: In which order it looks at the rooms.
         at: Times of day at which it begins; without them and `every`: when it is called.
-        every: Or how much time lies between two searches, from the start on.
-        late: A search that can't begin within that time is left out.
-        deadline: After that it gives up.
-        out_at: Probability of being out at which it says that the person isn't at home, once it has
-            looked at every room that it can get to.
-        doubt: Share of the probabilities that counts rooms by their size only.
+        every: Interval between two searches, from the start on, instead of `at`.
+        late: A search that can't begin within this time is left out.
+        deadline: Duration of a search after which it gives up.
+        out_at: Probability of being out from which the person counts as not at home, once the robot
+            has looked into every room that it can get to.
+        doubt: Weight of a prior proportional to the areas of rooms, beside that of the source.
         out: Probability that the person is out, as long as the source has no output.
         memory: Age at which an empty look counts half, because people move.
         views: The most places in a room from which it looks round.

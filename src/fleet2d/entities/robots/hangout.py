@@ -52,11 +52,11 @@ class Hangout(BeliefBehavior):
 
     Attributes:
         period: How often it decides where to stand.
-        near: What counts as near: the same room; a view of its seats; or time on foot.
-        tau: Time on foot at which nearness by `path` has fallen to 1/e.
-        blocking: Weight of the ways that it blocks.
-        personal_space: Weight of the nearest seat.
-        moving: Weight of the way to a place.
+        near: The measure of nearness: the same room; a view of its seats; or travel time.
+        tau: Travel time at which nearness by `path` has fallen to 1/e.
+        blocking: Weight of blocking people's ways.
+        personal_space: Weight of being near a seat.
+        moving: Weight of the travel time to a place.
         hysteresis: By how much another place must be better for it to move.
         explore: Share of decisions in which it explores any room instead.
         avoid: Rooms, or kinds of rooms if the home has them, that it stays out of.

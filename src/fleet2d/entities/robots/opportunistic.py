@@ -25,10 +25,10 @@ class Opportunistic(Behavior):
 
     Attributes:
         users: Users that it approaches; left out: everybody, recognized or not.
-        distance: How near it comes: 1.2 m ends personal space [m].
+        distance: How near it comes [m]; personal space ends at 1.2 m.
         interaction: How long it interacts.
         chance: Probability that it takes an opportunity.
-        again: How long it leaves the same person alone.
+        again: Least time between two approaches to the same person.
     """
 
     records: ClassVar[frozenset[str]] = frozenset({"approaches", "interaction_over", "interacts"})

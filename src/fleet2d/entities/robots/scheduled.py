@@ -26,11 +26,11 @@ class ScheduledVisit(Settings):
 
     Attributes:
         at: Time of day at which the robot sets out.
-        place: Where to: a room, a kind of room, or a point.
+        place: The destination: a room, a kind of room, or a point.
         dwell: How long it stays there.
         on: The days on which it is made.
         look_around: Turn once on the spot on arriving.
-        task: What is done there, for the events table.
+        task: The task that is done there, for the events table.
     """
 
     at: TimeOfDay
@@ -52,7 +52,7 @@ class Scheduled(Behavior):
 
     Attributes:
         visits: The visits.
-        late: A visit that can't begin within that time is left out.
+        late: A visit that can't begin within this time is left out.
     """
 
     records: ClassVar[frozenset[str]] = frozenset({"visits", "way_blocked"})

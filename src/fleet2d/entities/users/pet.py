@@ -33,7 +33,7 @@ class Pet(Behavior):
         nap: How long it sleeps at a time.
         stop: How long it stops at a spot while it roams.
         spots: Least and most number of stops between two naps.
-        stays_in_room: How likely its next spot is in the same room.
+        stays_in_room: Probability that its next spot is in the same room.
     """
 
     rooms: tuple[str, ...] = ()

@@ -35,13 +35,13 @@ DIRECTIONS = 16
 
 @register("behavior", "reactions")
 class Reactions(Behavior):
-    """React to robots: turn to them, step aside, come, leave; to be put before other behaviors.
+    """React to robots: turn to them, step aside, come, leave; list it before other behaviors.
 
     The probability of each reaction, and how near a robot has to be, are the person's manners:
     those given here, else those of the persona of a later `routine`, else the usual ones.
 
     Attributes:
-        manners: How the person reacts; left out: as the persona does.
+        manners: The manners; left out: those of the persona.
     """
 
     records: ClassVar[frozenset[str]] = frozenset({"reacts"})

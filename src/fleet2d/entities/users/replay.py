@@ -64,16 +64,16 @@ class Replay(Behavior):
 
     Attributes:
         path: The log, or the folder of a home's logs.
-        format: Its layout; auto looks.
-        id: The tag, where positions have several.
+        format: The layout of the log; auto: recognized by its content.
+        id: The tag to follow, if a log of positions has several.
         columns: The names of the columns of positions, as {x: east}.
-        time_zone: Of the home, where positions have times of a zone.
+        time_zone: The time zone of the home, if the times of positions have one.
         sort: Sort lines whose time runs backwards; else they are refused.
-        frame: How positions lie in the floor plan.
-        rooms: Which room or kind of room each room label of the log is here, or away, or door; null
-            leaves it out; labels that aren't listed go by their usual meaning.
-        day: Which day of the log is the first of the run: a number from 0, its date, or the first
-            of the same weekday.
+        frame: The transform from the positions of the log to the floor plan.
+        rooms: The room or kind of room of this home for each room label of the log, or away, or
+            door; null leaves it out; labels that aren't listed have their usual meaning.
+        day: The day of the log that is the first of the run: a number from 0, its date, or the
+            first of the same weekday.
         gaps: In a gap: unknown: the body is away; hold: it stays and leaves in time; walk: it goes
             at once.
         gap: Silence longer than this is a gap; left out: 10 min between rooms, 1 min between

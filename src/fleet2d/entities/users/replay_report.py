@@ -1,4 +1,4 @@
-"""Reports of replays: how a log was interpreted, in lines for people."""
+"""Reports of replays: how a log was interpreted, as lines of text."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING

@@ -40,9 +40,10 @@ class Routine(Inhabitant):
     of a household have the persona that it gives them, and common appointments.
 
     Attributes:
-        persona: Who it is: a bundled name, a YAML file, or a mapping that may extend either; left
+        persona: The persona: a bundled name, a YAML file, or a mapping that may extend either; left
             out: works_outside.
-        household: Who it lives with: a mapping or a YAML file, the same for all of its members.
+        household: The household it belongs to: a mapping or a YAML file, the same for all of its
+            members.
         away: When it is out of the home, on holiday.
         visits: When it is in the home, if it is only a visitor.
     """

@@ -29,10 +29,10 @@ class Item(Settings):
 
     Attributes:
         at: When it begins; left out: when the item before is over.
-        place: Where: a room, a kind of room, or a point.
-        away: Out of the home instead of at a place.
+        place: The place: a room, a kind of room, or a point.
+        away: Whether it is out of the home instead of at a place.
         dwell: How long it takes; left out: until the next item begins.
-        activity: What is done there, for the events table.
+        activity: The activity that is done there, for the events table.
     """
 
     at: TimeOfDay | None = None
@@ -53,7 +53,7 @@ class Agenda(Settings):
 
     Attributes:
         on: The days on which it holds.
-        items: What happens, in order.
+        items: Its items, in order.
     """
 
     on: OnDays = "daily"

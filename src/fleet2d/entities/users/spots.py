@@ -66,7 +66,7 @@ class Spots:
         self._version = -1  # of the home, when the spots were chosen
 
     def __getstate__(self) -> dict[str, object]:
-        """Leave out what is found again."""
+        """Leave out caches, which are computed again."""
         return {**self.__dict__, "_of_room": {}, "_at_furniture": {}}
 
     def reachable(self, rooms: list["Room"]) -> list["Room"]:

@@ -16,7 +16,7 @@ class Bundled(FloorPlanSource):
     """A home that comes with Fleet2D.
 
     Attributes:
-        name: Which one.
+        name: The name of the home.
     """
 
     name: Literal["family_home"] = "family_home"

@@ -34,7 +34,7 @@ class Image(OccupancySource):
 
     Attributes:
         path: The picture, PNG or PGM.
-        resolution: Side of a pixel: a drawing doesn't say how large the home is.
+        resolution: Side of a pixel, as a drawing has no scale.
         threshold: Share of white below which a pixel is wall.
     """
 

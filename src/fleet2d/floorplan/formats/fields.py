@@ -145,7 +145,7 @@ def _json_head(value: object, depth: int) -> str:
 
 
 def list_of(items: str) -> BeforeValidator:
-    """Return a validator that refuses what is no list, and says what it is a list of."""
+    """Return a validator that refuses what is not a list, and says what it is a list of."""
 
     def check(value: object) -> object:
         if not isinstance(value, list):

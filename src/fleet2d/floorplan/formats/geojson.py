@@ -65,7 +65,7 @@ class GeoJson(FloorPlanSource):
         path: The plan's GeoJSON file.
         units: Units of its coordinates; auto determines them from the file.
         wall_m: Thickness of walls drawn as lines, and of those between rooms that touch.
-        level: Which floor, by id, name or ordinal; left out: that of ordinal 0.
+        level: The floor, by id, name or ordinal; left out: the one of ordinal 0.
     """
 
     path: InputPath

@@ -57,7 +57,7 @@ class AreaEntry(FileModel):
 
 
 class _CornersAlone:
-    """Says in the JSON Schema that an area without holes may be written as its corners alone."""
+    """Adds to the JSON Schema that an area without holes may be written as its corners alone."""
 
     def __get_pydantic_json_schema__(
         self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
@@ -98,11 +98,11 @@ class RoomEntry(FileModel):
     """A room: its type, and where it is, by either `polygon` or `region`.
 
     Attributes:
-        type: What it is used for, such as bedroom.
+        type: Its type, such as bedroom.
         name: Its name; left out: its type and a number.
         labels: Every type that it has.
-        polygon: Where it is.
-        region: Where it is, if in several parts.
+        polygon: Its outline.
+        region: Its parts, if it has several or holes.
     """
 
     model_config = ConfigDict(
@@ -167,7 +167,7 @@ class ObjectUse(FileModel):
     """How an object is used.
 
     Attributes:
-        blocks: What can't pass: nothing, bodies, or bodies and sight.
+        blocks: Whether it blocks nothing, bodies, or bodies and sight.
         heading: Direction of its front.
         uses: Places to use it from.
     """
@@ -185,7 +185,7 @@ class ObjectEntry(ObjectUse):
     """A piece of furniture or a device, stored separately from the walls.
 
     Attributes:
-        type: What it is, such as bed.
+        type: Its type, such as bed.
         name: Its name; left out: its type and a number.
     """
 

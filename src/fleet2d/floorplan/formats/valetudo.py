@@ -58,7 +58,7 @@ class Valetudo(PixelSource):
 
     Attributes:
         path: The map's JSON file.
-        no_go: What becomes of no-go areas and virtual walls: areas that robots keep out of
+        no_go: Meaning of no-go areas and virtual walls: areas that robots keep out of
             (`keep_out`), walls (`wall`), or nothing (`ignore`).
     """
 
@@ -84,7 +84,7 @@ def read_valetudo(path: Path, cell: float | None = None, *, no_go: NoGo = "keep_
     Args:
         path: The JSON file.
         cell: Side of a grid cell [m]; None for the side of the map's pixels.
-        no_go: What becomes of no-go areas and virtual walls: `FloorPlan.no_go` (`keep_out`), walls
+        no_go: Meaning of no-go areas and virtual walls: `FloorPlan.no_go` (`keep_out`), walls
             at the pixels that they touch (`wall`), or nothing (`ignore`).
 
     Raises:

@@ -47,10 +47,10 @@ class Furniture:
         type: Its name, as scenarios and files spell it.
         width: Least and largest extent from left to right [m].
         depth: Least and largest extent from back to front [m].
-        blocks: What can't pass: nothing, bodies (`path`), or bodies and sight (`sight`).
+        blocks: Whether it blocks nothing, bodies (`path`), or bodies and sight (`sight`).
         wall: Whether its back stands against a wall.
         front_m: Depth of the floor before it that stays empty [m].
-        uses: Where to use it from.
+        uses: The places to use it from.
     """
 
     type: str
@@ -153,10 +153,10 @@ def stand_furniture(
     Args:
         kind: Its type in the catalogue.
         at: The middle of its footprint (x, y) [m].
-        heading: Where its front faces, headings (4096 to a turn) counter-clockwise from +x.
+        heading: The direction of its front, headings (4096 to a turn) counter-clockwise from +x.
         size: Its width and depth [m]; None for the middle of its type's ranges.
         name: Its name; empty to be numbered by type.
-        blocks: What can't pass; None for its type's usual.
+        blocks: As `Furniture.blocks`; None for what is usual for its type.
 
     Raises:
         FloorPlanError: There is no such type.

@@ -57,7 +57,7 @@ def furnish(plan: FloorPlan, seed: int = 0, density: float = 1.0) -> FloorPlan:
 
     Args:
         plan: The home.
-        seed: Which of the many ways to furnish it.
+        seed: The seed of the choice and the places of pieces.
         density: Factor for the probability of optional pieces, 0 to 10.
 
     Raises:

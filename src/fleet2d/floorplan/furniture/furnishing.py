@@ -26,8 +26,8 @@ class Furnishing(Settings):
     """How a home is furnished by rule, see `fleet2d.floorplan.furniture.furnish.furnish`.
 
     Attributes:
-        seed: Which of the many ways to furnish the home.
-        density: How likely optional pieces are; 0: none of them.
+        seed: The seed of the choice and the places of pieces.
+        density: Factor of the probability of optional pieces; 0: none of them.
     """
 
     seed: int = Field(default=0, ge=0)
@@ -38,12 +38,13 @@ class FurniturePiece(Settings):
     """A piece of furniture at a place in the home.
 
     Attributes:
-        type: What it is, such as 'bed'.
+        type: The type of furniture, such as 'bed'.
         at: Its middle [x, y] [m].
-        heading_deg: Where its front faces, counter-clockwise from +x.
+        heading_deg: The direction of its front, counter-clockwise from +x.
         size: Its width and depth [m]; left out: the middle of what is usual.
         name: Its name; left out: its type and a number.
-        blocks: What can't pass it; left out: what is usual for its type.
+        blocks: Whether it blocks nothing, bodies (`path`), or bodies and sight (`sight`); left out:
+            what is usual for its type.
     """
 
     type: str = Field(examples=["sofa"])

@@ -8,7 +8,7 @@ from shapely import MultiPolygon, Polygon
 
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.geometry.lattice import Lattice
-from fleet2d.floorplan.geometry.mesh import GRID, Snapped, snap_polygon
+from fleet2d.floorplan.geometry.mesh import GRID, SnappedPolygon, snap_polygon
 
 # Number of parts of which a note lists the areas.
 PARTS_LISTED = 5
@@ -65,7 +65,7 @@ def canonical_order(polygons: Sequence[Polygon]) -> list[Polygon]:
     return sorted(normal.tolist(), key=lambda p: shapely.get_coordinates(p).tolist())
 
 
-def _on_walls(free: Polygon | MultiPolygon, units_per_m: float) -> Snapped:
+def _on_walls(free: Polygon | MultiPolygon, units_per_m: float) -> SnappedPolygon:
     """Snap free space [m] to even lattice units; free space that is there already stays as it is.
 
     Snapping is not idempotent, as a wall that moves may come near another corner, but a stored plan
@@ -76,7 +76,7 @@ def _on_walls(free: Polygon | MultiPolygon, units_per_m: float) -> Snapped:
     moved = np.abs(shapely.get_coordinates(even) - shapely.get_coordinates(exact)).max()
     if moved < LATTICE_TOLERANCE and even.is_valid:
         parts = shapely.get_parts(even)
-        return Snapped(parts.tolist(), even.area - exact.area, GRID * exact.length)
+        return SnappedPolygon(parts.tolist(), even.area - exact.area, GRID * exact.length)
     return snap_polygon(exact)
 
 

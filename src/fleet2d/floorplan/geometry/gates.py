@@ -15,7 +15,7 @@ I64 = NDArray[np.int64]
 class Gates:
     """A mesh in which some segments are edges, so that shutting one changes only two numbers.
 
-    The triangles on the two sides of a shut gate are no neighbors: every kernel sees a wall without
+    The triangles on both sides of a shut gate are not neighbors: every kernel sees a wall without
     thickness.
 
     Attributes:

@@ -18,7 +18,7 @@ GRID = 2
 Int64 = npt.NDArray[np.int64]
 
 
-class Snapped(NamedTuple):
+class SnappedPolygon(NamedTuple):
     """A polygon moved onto the wall lattice.
 
     Attributes:
@@ -32,7 +32,7 @@ class Snapped(NamedTuple):
     tolerance: float
 
 
-def snap_polygon(polygon: Polygon | MultiPolygon) -> Snapped:
+def snap_polygon(polygon: Polygon | MultiPolygon) -> SnappedPolygon:
     """Move a polygon in lattice units onto even coordinates, and drop what collapses to nothing.
 
     Parts thinner than the lattice vanish, and a part that is joined by less than that becomes a
@@ -52,7 +52,7 @@ def snap_polygon(polygon: Polygon | MultiPolygon) -> Snapped:
     parts = [part for part in shapely.get_parts(snapped) if part.area > 0]
     parts = [shapely.orient_polygons(part) for part in parts]
     area_change = sum(part.area for part in parts) - polygon.area
-    return Snapped(parts, area_change, GRID * polygon.length)
+    return SnappedPolygon(parts, area_change, GRID * polygon.length)
 
 
 def build_mesh(

@@ -62,7 +62,7 @@ class HomeChange(Settings):
     """One change of the home: exactly one of open, shut, lock, unlock, move and room.
 
     Attributes:
-        at: When; left out by an algorithm or a script: now.
+        at: Time of the change; left out by an algorithm or a script: now.
         open: The door that is opened.
         shut: The door that is shut.
         lock: The door that is locked.
@@ -71,7 +71,7 @@ class HomeChange(Settings):
         to: New place of its middle, [x, y] in metres.
         turn_deg: Angle by which it is turned, counter-clockwise.
         room: The room whose use changes.
-        type: What the room is used for from then on.
+        type: The type of the room from then on.
 
     Example:
         >>> HomeChange(shut="bath_door").verb

@@ -1,4 +1,4 @@
-"""The check-up of a floor plan: what is wrong or odd with it, and where."""
+"""The check-up of a floor plan: findings that are wrong or odd, and their places."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace

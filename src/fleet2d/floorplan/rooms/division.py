@@ -162,7 +162,7 @@ def label_rooms(
     Args:
         lattice: The plan's lattice.
         free: Free cells, bool (rows, columns).
-        regions: What the file says, in the file's order.
+        regions: The labelled regions, in the order of the file.
         chambers: The free space, cut at passages.
         passages: The passages at which it was cut.
 

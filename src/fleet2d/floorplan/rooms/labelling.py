@@ -58,7 +58,7 @@ class ChamberLabels:
             a room that no box claims; -1 where not free. int32 (rows, columns).
         rests: Number of rooms that no box claims.
         merged: For each box the box that gets its labels: itself, or one that covers it.
-        dropped: For each box that is no room the reason; by box.
+        dropped: For each box that is not a room the reason; by box.
     """
 
     of_cell: I32

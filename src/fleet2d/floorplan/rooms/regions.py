@@ -22,8 +22,8 @@ class LabelledRegion:
     """A part of a floor plan that a file gives a name to.
 
     Attributes:
-        labels: What the file calls it, as spelled there; none for a region of unknown use.
-        shape: Where it is [m]; it may reach over walls and over other regions.
+        labels: Its labels, as spelled in the file; none for a region of unknown use.
+        shape: Its outline [m]; it may reach over walls and over other regions.
         name: Name of the room, or None to be numbered by type (`bedroom_0`).
         type: Type of the room, or None for the one of its labels that leads.
     """
@@ -45,7 +45,7 @@ class Region:
 
     Attributes:
         types: Its labels as room types, each once.
-        shape: Where it is [lattice], even coordinates; empty for one that is only cells.
+        shape: Its outline [lattice], even coordinates; empty for one that is only cells.
         name: Name of the room, or None to be numbered by type.
         own_type: Type of the room, or None for the one of its types that leads.
     """
@@ -57,7 +57,7 @@ class Region:
 
     @property
     def type(self) -> str:
-        """What the room is used for."""
+        """The type of the room."""
         return self.own_type or leading_type(self.types)
 
 

@@ -25,7 +25,7 @@ class Room:
     Attributes:
         index: Its number in the plan, the value of its cells in `FloorPlan.room_of_cell`.
         name: Unique in the plan, such as `bedroom_0`.
-        type: What it is used for, such as `bedroom`.
+        type: Its type, such as `bedroom`.
         labels: Every type that the file gives it, in file order; empty for space without a label.
         cells: Number of cells.
         area_m2: Area of the cells [m²].
@@ -55,11 +55,11 @@ def assign_rooms(
     Args:
         lattice: The plan's lattice.
         free: Free cells, bool (rows, columns).
-        regions: What the file says, in the file's order.
+        regions: The labelled regions, in the order of the file.
 
     Returns:
         The room of each cell, int16 (rows, columns), -1 where not free; the rooms in the file's
-        order; and a sentence for each region that is no room.
+        order; and a sentence for each region that is not a room.
 
     Raises:
         FloorPlanError: Two regions ask for the same name.
@@ -137,7 +137,7 @@ def dropped_note(
     region: Region,
     reason: str = "has no free cell that isn't in a smaller room: it is not a room",
 ) -> str:
-    """Return the sentence which says that a region is no room, and why."""
+    """Return the sentence which says that a region is not a room, and why."""
     name = region.name or " and ".join(region.types) or UNKNOWN
     if region.shape.is_empty:
         return f"the region {name} is empty: it is not a room"

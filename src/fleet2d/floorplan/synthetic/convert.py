@@ -18,9 +18,9 @@ def floor_plan(house: House, name: str, cell: float, source: str) -> FloorPlan:
 
     Args:
         house: The home.
-        name: What to call it.
+        name: The name of the plan.
         cell: Side of a grid cell [m].
-        source: Where it comes from.
+        source: The source of the plan, for readers.
     """
     spaces = [_clear(box) for box in house.boxes]
     through = [_hole(gap) for gap in [*house.gaps, house.front_door]]

@@ -43,7 +43,7 @@ _FRONT = ("entryway", "hallway", "living_room", "dining_room", "kitchen")
 
 @dataclass(frozen=True)
 class Style:
-    """How a home is built, where a user says so; None leaves it to the generator.
+    """The user's request for the shape of a home; None where it is left to the generator.
 
     Attributes:
         outline: `rectangle`, `L`, `T` or `U`.
@@ -63,7 +63,7 @@ class House:
     """A generated home, on a grid of 5 cm.
 
     Attributes:
-        wishes: What was requested, with everything decided.
+        wishes: The request, with everything decided.
         briefs: Its rooms.
         boxes: The rectangles that they are made of [units].
         gaps: The passages through inner walls.
@@ -91,9 +91,9 @@ def generate(seed: int, wishes: Wishes, style: Style) -> House:
     """Generate the home of a seed.
 
     Args:
-        seed: Which home.
-        wishes: What rooms it is to have.
-        style: How it is to be built.
+        seed: The seed of the home.
+        wishes: The request for its rooms.
+        style: The request for its shape.
 
     Raises:
         FloorPlanError: No home was found that meets the request.
@@ -145,7 +145,7 @@ def _ease(number: int) -> float:
 def _judge(
     layout: RoomLayout, widths: Widths, outline: str | None, ease: float
 ) -> _Candidate | None:
-    """Return the layout with its links and its cost, or None if it is no home."""
+    """Return the layout with its links and its cost, or None if it is not a home."""
     shape = shape_cost(layout, ease)
     if shape is None or boxes_overlap(layout.boxes):
         return None

@@ -23,8 +23,8 @@ class RoomLayout:
     """A home's rooms, placed.
 
     Attributes:
-        briefs: What the rooms are, hallways included.
-        boxes: Where they are [units]; a room may have several.
+        briefs: The rooms, hallways included.
+        boxes: The places of the rooms [units]; a room may have several.
     """
 
     briefs: list[Brief]

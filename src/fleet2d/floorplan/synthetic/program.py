@@ -1,4 +1,4 @@
-"""What rooms a home has and how large they should be, before anything is placed."""
+"""The program of a home: its rooms and their areas, before anything is placed."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -86,12 +86,12 @@ class Brief:
 
 @dataclass(frozen=True)
 class Wishes:
-    """What a user requests; None where it is left to the generator.
+    """The user's request for a home; None where it is left to the generator.
 
     Attributes:
         area_m2: Area of the free space.
-        bedrooms: How many.
-        bathrooms: How many.
+        bedrooms: Number of bedrooms.
+        bathrooms: Number of bathrooms.
         garage: Whether there is one.
     """
 

@@ -1,4 +1,4 @@
-"""What a layout is requested for, and whether its rooms can come to fit."""
+"""The request for a layout, and whether its rooms can fit at another scale."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -78,9 +78,9 @@ class Mouth(NamedTuple):
 
     Attributes:
         upright: Whether that side runs along y.
-        at: Where it is [units].
-        low: Where the corridor begins along it [units].
-        high: Where it ends [units].
+        at: The coordinate of that side [units].
+        low: The begin of the corridor along it [units].
+        high: The end of the corridor along it [units].
     """
 
     upright: bool
@@ -98,7 +98,7 @@ def choose_squarest(
     """Return the rooms of that tree in which they are least slender; of equals, the first.
 
     Args:
-        trees: What to choose from.
+        trees: The trees to choose from.
         areas: Gross areas of the rooms [units²].
         sides: The rectangle (x0, y0, x1, y1) [units].
         mouths: Corridors that a wall should not end in.

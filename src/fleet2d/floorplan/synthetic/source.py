@@ -25,15 +25,15 @@ class Synthetic(FloorPlanSource):
     """A generated home; the same configuration is the same home on every machine.
 
     Attributes:
-        seed: Which of the homes.
+        seed: The seed of the home.
         area_m2: Free space, 30 to 450 m2.
-        bedrooms: How many, 1 to 8.
-        bathrooms: How many, 1 to 6.
+        bedrooms: Number of bedrooms, 1 to 8.
+        bathrooms: Number of bathrooms, 1 to 6.
         garage: Whether it has one.
         outline: The shape of the home.
         open_plan: Whether living, dining and kitchen are open to each other.
         corridor_width: Clear width of hallways, 0.9 m to 2 m, rounded to 5 cm.
-        door_width: Of doors between rooms, 0.7 m to 1.2 m, rounded to 5 cm.
+        door_width: Width of doors between rooms, 0.7 m to 1.2 m, rounded to 5 cm.
 
     Example:
         >>> plan = Synthetic(seed=7, area_m2=120, bedrooms=3).load()

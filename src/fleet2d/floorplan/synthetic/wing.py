@@ -15,7 +15,7 @@ REACH = 25
 
 @dataclass(frozen=True)
 class Wing:
-    """What a wing is made of; it starts at x = 0, its corridor at y = 0.
+    """The strips and corridor of a wing; it starts at x = 0, its corridor at y = 0.
 
     Attributes:
         front: The strip below the corridor.
@@ -80,8 +80,8 @@ class PlacedWing:
     Attributes:
         boxes: The rooms.
         length: How far it reaches along x [units].
-        low: Where its front is, along y [units].
-        high: Where its back is [units].
+        low: The y of its front [units].
+        high: The y of its back [units].
     """
 
     boxes: list[Box]

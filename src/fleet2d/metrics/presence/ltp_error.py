@@ -106,8 +106,8 @@ class LtpError(LongTermMetric):
     `burn_in`, left out if there is none. Users who were never at home are left out.
 
     Attributes:
-        given: Which shares are compared.
-        alpha: By which KL is smoothed.
+        given: The shares that are compared.
+        alpha: Smoothing of the estimate for KL.
         burn_in: Total variation at which burn-in ends.
     """
 

@@ -101,9 +101,9 @@ class RtpScore(Metric):
 
     Attributes:
         of: The algorithm whose presence is scored.
-        period: How often it is updated; that of the algorithm.
+        period: How often it is updated: the period of the algorithm.
         given_home: Whether only bins at home count.
-        reference: Another algorithm, by which the skill is measured, too.
+        reference: Another algorithm to which the skill is relative, too.
     """
 
     unit: ClassVar[str] = "all gaps"

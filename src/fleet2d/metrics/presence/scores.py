@@ -45,7 +45,7 @@ def top_k(probability: F64, truth: I64, k: int) -> F64:
     """Return 1 for each forecast whose k likeliest places include the truth, 0 for others.
 
     With equally likely places it is the probability that the truth is included if ties are broken
-    at random: 1/2 for one of two equal places. The mean is the accuracy. It is no proper score:
+    at random: 1/2 for one of two equal places. The mean is the accuracy. It is not a proper score:
     read it together with one.
 
     Example:
