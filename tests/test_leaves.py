@@ -15,7 +15,8 @@ from typer.testing import CliRunner
 
 import fleet2d
 from fleet2d import _core
-from fleet2d.cli import app, plugins
+from fleet2d.cli import plugins
+from fleet2d.cli.commands import app
 
 SOURCE = Path(fleet2d.__file__).parent
 LEAVES = {
@@ -30,7 +31,7 @@ LEAVES = {
 REST = """
 import sys
 import fleet2d
-from fleet2d.cli import app
+from fleet2d.cli.commands import app
 from fleet2d.component import PACKAGES, components
 
 for kind in PACKAGES:

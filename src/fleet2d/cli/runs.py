@@ -14,6 +14,7 @@ from fleet2d.arguments import file_name, split
 from fleet2d.cli.summary import print_summary, summary_of
 from fleet2d.cli.watchdog import watched
 from fleet2d.errors import InputError, RunDirectoryError
+from fleet2d.garbage import rare_collections
 from fleet2d.trust_options import TrustFiles, TrustFolders, restrict_to
 
 if TYPE_CHECKING:
@@ -45,12 +46,15 @@ def run(
 
 
 def _set_up(arguments: list[str] | None, seed: int | None, out: Path | None) -> "Simulation":
-    from fleet2d.engine.simulation import Simulation
-    from fleet2d.scenario.model import load_scenario
+    with rare_collections():
+        from fleet2d.engine.simulation import Simulation
+        from fleet2d.scenario.model import load_scenario
+
+        gc.freeze()
 
     scenario, overrides = split(arguments)
     settings = {} if seed is None else {"seed": seed}
-    with watched():
+    with watched(), rare_collections():
         loaded = load_scenario(scenario, *overrides, **settings)
         name = loaded.name or (Path(scenario).stem if scenario else "run")
         directory = out or _fresh_directory(name)

@@ -4,8 +4,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from fleet2d.engine.garbage import free_bodies
 from fleet2d.engine.simulation import Simulation
+from fleet2d.garbage import free_bodies
 from fleet2d.runs.run import Run
 from fleet2d.scenario.model import Scenario
 

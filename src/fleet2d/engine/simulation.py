@@ -13,7 +13,6 @@ from fleet2d.artifacts.manifest import Status
 from fleet2d.artifacts.store import RunStore
 from fleet2d.clock import Clock
 from fleet2d.engine.checkpoint import Checkpoint, CheckpointWriter
-from fleet2d.engine.garbage import rare_collections
 from fleet2d.engine.interventions import is_from_outside
 from fleet2d.engine.judging import Judging
 from fleet2d.engine.lifecycle import (
@@ -35,6 +34,7 @@ from fleet2d.engine.snapshot import (
 )
 from fleet2d.engine.state import State
 from fleet2d.errors import ArtifactError, InputError
+from fleet2d.garbage import rare_collections
 from fleet2d.runs.run import LEARNED_NAME, Run, run_of
 from fleet2d.scenario.model import Scenario, load_scenario
 

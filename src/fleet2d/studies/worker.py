@@ -10,6 +10,7 @@ import threading
 import traceback
 from typing import IO, Any
 
+from fleet2d.garbage import rare_collections
 from fleet2d.studies.pipe import receive, send
 
 READY, RESULT, BROKEN = "ready", "result", "broken"
@@ -25,7 +26,8 @@ def main() -> None:
     try:
         folder, sys.path[:] = receive(stream)
         os.chdir(folder)
-        job = receive(stream)
+        with rare_collections():  # of the modules that the job needs
+            job = receive(stream)
     except BaseException:  # noqa: BLE001 - imports may raise anything
         send(answers, (BROKEN, traceback.format_exc()))
         return

@@ -7,9 +7,9 @@ import pytest
 from tests.scenes import scenario
 
 import fleet2d
-from fleet2d.engine.garbage import OBJECTS, rare_collections
 from fleet2d.entities.actor import Actor
 from fleet2d.entities.plan import Plan
+from fleet2d.garbage import OBJECTS, rare_collections
 
 PATROL = {"astro": {"type": "patrol", "dwell": "1 min"}}
 
