@@ -164,6 +164,10 @@ class Lives:
 
     A day depends on the one before: a member who is up all night may use the bathroom when others
     get up.
+
+    Attributes:
+        household: The household.
+        first: The ordinal of the first day.
     """
 
     def __init__(
@@ -190,7 +194,7 @@ class Lives:
             for name in household.members
         }
         self._cache: dict[int, Mapping[str, Sequence[Doing]]] = {}
-        self._first = self._next = first
+        self.first = self._next = first
 
     def day(self, ordinal: int) -> Mapping[str, Sequence[Doing]]:
         """Return the doings of each member on the day of a date's ordinal.
@@ -198,13 +202,13 @@ class Lives:
         Raises:
             ValueError: It is before the first day.
         """
-        if ordinal < self._first:
+        if ordinal < self.first:
             raise ValueError(
-                f"day {ordinal} is before the first day of the household, {self._first}"
+                f"day {ordinal} is before the first day of the household, {self.first}"
             )
         if ordinal < self._next and ordinal not in self._cache:  # draw all days again
             self._cache.clear()
-            self._next = self._first
+            self._next = self.first
         while self._next <= ordinal:
             self._cache.pop(self._next - CACHED_DAYS, None)
             self._cache[self._next] = self._draw(self._next)
@@ -228,7 +232,7 @@ class Lives:
         return [
             (doing.begin + shift, doing.end + shift)
             for day, shift in ((ordinal - 1, -DAY_S), (ordinal, 0), (ordinal + 1, DAY_S))
-            if day >= self._first
+            if day >= self.first
             for name, doings in self.day(day).items()
             for doing in doings
             if name != member and doing.room in (ANY_ROOM, room) and self._is_exclusive(name, doing)
@@ -238,7 +242,8 @@ class Lives:
         own = self.household.members[name].activities
         return doing.activity in self._rooms[name] or find_activity(doing.activity, own).exclusive
 
-    def _is_out(self, name: str, doing: Doing) -> bool:
+    def is_out(self, name: str, doing: Doing) -> bool:
+        """Tell whether a member is out of the home for a doing."""
         return find_activity(doing.activity, self.household.members[name].activities).away
 
     def _draw(self, ordinal: int) -> Mapping[str, Sequence[Doing]]:
@@ -289,7 +294,7 @@ class Lives:
         result = dict(days)
         for member, doings in days.items():
             for absence, return_home in pairwise(doings):
-                comes_home = self._is_out(member, absence) and not self._is_out(member, return_home)
+                comes_home = self.is_out(member, absence) and not self.is_out(member, return_home)
                 if not comes_home or absence.end - absence.begin < LONG_GONE_S:
                     continue
                 for name in result:
@@ -303,7 +308,7 @@ class Lives:
         for i, doing in enumerate(day):
             end = at + WELCOME_S
             if doing.begin <= at < doing.end:
-                is_busy = doing.task or doing.activity == SLEEP or self._is_out(name, doing)
+                is_busy = doing.task or doing.activity == SLEEP or self.is_out(name, doing)
                 is_busy = is_busy or self._is_exclusive(name, doing)
                 if is_busy or doing.end - end < NO_GAP_S:
                     return day

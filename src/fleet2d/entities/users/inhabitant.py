@@ -186,7 +186,7 @@ class Inhabitant(Behavior):
         last = self.last
         if which == last.given_up:
             doing = doing._replace(activity=REST)
-        setting = self._at_present(self._in_its_room(doing))
+        setting = self.seated(self._at_present(self._in_its_room(doing)), which)
         if not (setting.rooms or setting.activity.away):
             if plan.time_us <= plan.began[0] * self.clock.step_us:
                 plan.note("way_blocked", doing.activity).stay_until(end_us)
@@ -213,6 +213,10 @@ class Inhabitant(Behavior):
         last.doing = which
         plan.stay_until(end_us)
         return True
+
+    def seated(self, setting: Setting, which: tuple[int, int]) -> Setting:
+        """Return the setting with only the places at furniture that it has for the doing."""
+        return setting
 
     def _at_present(self, setting: Setting) -> Setting:
         """Return the setting of an activity, without the rooms that shut doors block at present."""

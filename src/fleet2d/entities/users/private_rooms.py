@@ -20,8 +20,7 @@ def private_rooms(household: Household, home: "Home") -> MemberRooms:
     Activities that are done only in such rooms, like laundry in the bathroom, count as exclusive,
     too. If the home has none of the rooms of an activity, the activity has no entry.
     """
-    space = home.space(USUAL_RADIUS, opens_doors=True)
-    reachable = [room for room in home.rooms if len(space.cells(room.index, 0))]
+    reachable = usual_rooms(home)
     rooms = {
         name: {
             activity: [room.index for room in _rooms_of(fields, reachable)]
@@ -44,6 +43,12 @@ def private_rooms(household: Household, home: "Home") -> MemberRooms:
         }
         for name, own in rooms.items()
     }
+
+
+def usual_rooms(home: "Home") -> "list[Room]":
+    """Return the rooms that members of a household can get to, the same for all of them."""
+    space = home.space(USUAL_RADIUS, opens_doors=True)
+    return [room for room in home.rooms if len(space.cells(room.index, 0))]
 
 
 def _rooms_of(activity: "Activity", reachable: "list[Room]") -> "list[Room]":

@@ -9,7 +9,8 @@ from pydantic import model_validator
 from fleet2d.component import register
 from fleet2d.entities.users.inhabitant import Inhabitant, rooms_at
 from fleet2d.entities.users.private_rooms import private_rooms
-from fleet2d.entities.users.setting import SECOND_US
+from fleet2d.entities.users.seating import Seating
+from fleet2d.entities.users.setting import SECOND_US, Setting
 from fleet2d.entities.users.spots import Spots
 from fleet2d.errors import PlacementError
 from fleet2d.problems import problem, suggest
@@ -77,14 +78,27 @@ class Routine(Inhabitant):
                     f"{actor.path}: it is not a member of its household"
                     f"{suggest(actor.name, members, 'Its members are')}"
                 )
-            first = actor.clock.start.toordinal() - 1
-            rooms = private_rooms(self.household, actor.home)
-            self.lives = Lives(self.household, actor.seed, first, rooms)
+            self._join_household(actor)
             spots = Spots(actor, members.index(actor.name), len(members))
             sleeps_in = self.household.bedrooms()[actor.name]
             side = self.household.side_of_bed(actor.name)
         actor.speed *= self.resolved_persona.pace
         self.settle(actor, self._activities(), spots, sleeps_in, side)
+
+    def _join_household(self, actor: "Actor") -> None:
+        """Share the days and places of the members, or prepare them if it is the first of them."""
+        assert self.household is not None
+        bodies = (body for body in actor.people.values() if body is not None)
+        behaviors = (each for body in bodies for each in getattr(body, "behaviors", ()))
+        for other in behaviors:
+            if isinstance(other, Routine) and other.household == self.household:
+                self.lives: Lives = other.lives
+                self.seating: Seating = other.seating
+                return
+        first = actor.clock.start.toordinal() - 1
+        rooms = private_rooms(self.household, actor.home)
+        self.lives = Lives(self.household, actor.seed, first, rooms)
+        self.seating = Seating(actor, self.lives)
 
     @property
     def resolved_persona(self) -> Persona:
@@ -141,6 +155,15 @@ class Routine(Inhabitant):
             ):
                 return None
         return begins_us - begin_us
+
+    def seated(self, setting: Setting, which: tuple[int, int]) -> Setting:
+        """Return the setting with the place that the member of a household has for the doing."""
+        if self.household is None or not setting.seats:
+            return setting
+        places = self.seating.places(*which, self.spots.rank)
+        if places is None or not all(self.spots.can_reach(seat) for seat in places):
+            return setting
+        return setting._replace(seats=list(places))
 
     def _with_absences(self, day: Sequence[Doing], ordinal: int) -> Sequence[Doing]:
         if not self.away and not self.visits:

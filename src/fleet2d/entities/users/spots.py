@@ -1,7 +1,7 @@
 """Spots: points in rooms where people stand, distinct for the members of a household."""
 
 import math
-from collections.abc import Hashable, Sequence, Set
+from collections.abc import Callable, Hashable, Sequence, Set
 from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 from fleet2d.streams import Draws
@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from fleet2d.entities.actor import Actor
     from fleet2d.entities.place import Point
     from fleet2d.entities.plan import Plan
+    from fleet2d.floorplan.home.home import Home
     from fleet2d.floorplan.objects import UsePlace
     from fleet2d.floorplan.plan import Room
 
@@ -102,7 +103,7 @@ class Spots:
             grid = self._actor.home.cached(
                 ("spots", space, part, room.index, self.members), lambda: self._grid(room)
             )
-            own = _part_of(grid, self.rank, self.members)
+            own = part_of(grid, self.rank, self.members)
             draws = Draws(self._actor.stream(f"spots of {room.name}"), 0)
             self._of_room[room.index] = draws.shuffled(own)[:HABITUAL]
         return self._of_room[room.index]
@@ -143,18 +144,13 @@ class Spots:
     def _find_seats(
         self, kinds: Sequence[str], indices: Set[int], posture: str, share: tuple[int, int]
     ) -> list[Seat]:
-        home, (rank, members) = self._actor.home, share
-        seats: list[Seat] = []
-        for kind in kinds:
-            for thing in (thing for thing in home.objects if thing.type == kind):
-                room = home.room_of(thing)
-                if room is not None and room.index in indices:
-                    usable = [i for i, use in enumerate(thing.uses) if self._can_reach(use)]
-                    fit = [i for i in usable if thing.uses[i].posture == posture]
-                    seats += [Seat(thing.name, i) for i in fit or usable]
-            if len(seats) >= members:
-                break
-        return list(_part_of(seats, rank, members)) if seats else []
+        rank, members = share
+        seats = seats_at(self._actor.home, kinds, indices, posture, members, self._can_reach)
+        return list(part_of(seats, rank, members)) if seats else []
+
+    def can_reach(self, seat: Seat) -> bool:
+        """Tell whether the body can get to a place at furniture at present."""
+        return self._can_reach(self._actor.home.object(seat.thing).uses[seat.place])
 
     def _can_reach(self, use: "UsePlace") -> bool:
         """Tell whether the body can get to a place at furniture, or close enough to use it."""
@@ -175,6 +171,37 @@ class Spots:
         return (Spot(*actor.middle(room)),)
 
 
-def _part_of(things: Sequence[T], rank: int, members: int) -> Sequence[T]:
+def seats_at(
+    home: "Home",
+    kinds: Sequence[str],
+    indices: Set[int],
+    posture: str,
+    wanted: int,
+    can_reach: "Callable[[UsePlace], bool] | None" = None,
+) -> list[Seat]:
+    """Return the places at the furniture in some rooms.
+
+    Args:
+        home: The home.
+        kinds: Types of furniture, to try in turn until there are `wanted` places.
+        indices: The numbers of the rooms.
+        posture: If a piece has places for this posture, only those of its places are used.
+        wanted: The number of bodies that share the places.
+        can_reach: Tells whether a place can be used; None: all can.
+    """
+    seats: list[Seat] = []
+    for kind in kinds:
+        for thing in (thing for thing in home.objects if thing.type == kind):
+            room = home.room_of(thing)
+            if room is not None and room.index in indices:
+                usable = [i for i, use in enumerate(thing.uses) if not can_reach or can_reach(use)]
+                fit = [i for i in usable if thing.uses[i].posture == posture]
+                seats += [Seat(thing.name, i) for i in fit or usable]
+        if len(seats) >= wanted:
+            break
+    return seats
+
+
+def part_of(things: Sequence[T], rank: int, members: int) -> Sequence[T]:
     """Return the things of one of several members who divide them; at least one."""
     return things[rank % members :: members] or [things[rank % len(things)]]
