@@ -5,7 +5,6 @@ it, and they would overlap before the next step. The body that moves decides at 
 moves, so the result doesn't depend on spans.
 """
 
-from collections.abc import Iterable, Sequence
 from datetime import timedelta
 from typing import NamedTuple
 
@@ -14,10 +13,10 @@ from numpy.typing import NDArray
 
 from fleet2d.engine.basis import Basis
 from fleet2d.engine.bodies import Bodies
-from fleet2d.entities.behavior import SightEvent, Situation
+from fleet2d.engine.watcher import Watcher
+from fleet2d.entities.behavior import Situation
 from fleet2d.entities.blocking import plan_after_a_step, plan_around
 from fleet2d.entities.plan import Note, Plan
-from fleet2d.events import Event
 from fleet2d.units import micros
 
 # Time for which a body ignores another one that it goes round or squeezes past.
@@ -61,7 +60,7 @@ class PoseColumns(NamedTuple):
     away: NDArray[np.uint8]
 
 
-class BlockedWays:
+class BlockedWays(Watcher):
     """The bodies of a run that block each other's way.
 
     Attributes:
@@ -70,7 +69,6 @@ class BlockedWays:
 
     def __init__(self, basis: Basis) -> None:
         """Follow the bodies if the scenario says how long one waits for another."""
-        self.next_step = 0
         self._actors, self._users = basis.actors, basis.bodies.users
         patience = basis.scenario.simulation.people_block
         self._patience_us = 0 if patience is None else micros(patience)
@@ -93,15 +91,6 @@ class BlockedWays:
             meeting = self._first_meeting(poses, row, first, np.arange(1, end - first))
             end = end if meeting is None else first + meeting[0]
         return end
-
-    def take(self, bodies: Bodies, end: int) -> Sequence[Event]:
-        """Advance to a step."""
-        self.next_step = end
-        return ()
-
-    def interruptions(self, events: Sequence[Event]) -> Iterable[tuple[int, SightEvent]]:
-        """Return nothing: it is checked at every decision."""
-        return ()
 
     def in_way(self, bodies: Bodies, row: int) -> int | None:
         """Return the row of the body into which one would walk next; None if its way is free."""

@@ -19,6 +19,7 @@ from fleet2d.engine.disturbances import (
     worsen,
 )
 from fleet2d.engine.points_in_view import points_seen
+from fleet2d.engine.watcher import Watcher
 from fleet2d.entities.actor import Actor
 from fleet2d.entities.behavior import SightEvent
 from fleet2d.entities.localization import Drift, Localization
@@ -72,7 +73,7 @@ I64 = NDArray[np.int64]
 NOTHING: I64 = np.zeros((0, SIGHTING), np.int64)
 
 
-class Cameras:
+class Cameras(Watcher):
     """The cameras of one body. Robots look at users; a user who has a camera looks at robots.
 
     Attributes:
@@ -127,7 +128,6 @@ class Cameras:
         self.memory = self._set_up()
         self.perceived = np.zeros((len(self.others) + 1, 2), np.int64)
         self.awaited: Set[str] = frozenset()
-        self.next_step = 0
         # Places of the owner in the last steps, for looks whose detections become known later.
         self._trace = np.zeros((0, 2), np.int64)
         self._sightings: list[I64] = []  # not collected yet

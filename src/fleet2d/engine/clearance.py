@@ -6,17 +6,16 @@ people, if the bodies would touch. It decides at that step, before it moves, so 
 depend on spans.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fleet2d.engine.bodies import Bodies, poses_of
-from fleet2d.entities.behavior import SightEvent
+from fleet2d.engine.watcher import Watcher
 from fleet2d.entities.decisions import DecidingActor
 from fleet2d.entities.entity import Robot
 from fleet2d.entities.giving_way import TOUCHING, Surroundings
-from fleet2d.events import Event
 from fleet2d.kernels.mesh import locate
 from fleet2d.kernels.motion import Poses
 from fleet2d.kernels.sight import line_of_sight
@@ -24,7 +23,7 @@ from fleet2d.kernels.sight import line_of_sight
 I64 = NDArray[np.int64]
 
 
-class Clearance:
+class Clearance(Watcher):
     """The robots of a run that give way.
 
     Attributes:
@@ -32,7 +31,6 @@ class Clearance:
     """
 
     def __init__(self, users: Sequence[DecidingActor], robots: Sequence[DecidingActor]) -> None:
-        self.next_step = 0
         self._users = users
         self.robots = {
             len(users) + i: robot
@@ -77,15 +75,6 @@ class Clearance:
         if waiting is None or waiting.look_from(step) != step:
             return False
         return not waiting.surroundings.is_as(self.surroundings(self.robots[row]))
-
-    def take(self, bodies: Bodies, end: int) -> Sequence[Event]:
-        """Advance to a step."""
-        self.next_step = end
-        return ()
-
-    def interruptions(self, events: Sequence[Event]) -> Iterable[tuple[int, SightEvent]]:
-        """Return nothing: it is checked at every decision."""
-        return ()
 
     def in_way(self, bodies: Bodies, row: int) -> DecidingActor | None:
         """Return the person at whom a robot would drive next, if people stay where they are."""

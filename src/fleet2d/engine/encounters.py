@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fleet2d.engine.bodies import Bodies, PoseBlock
+from fleet2d.engine.watcher import Watcher
 from fleet2d.entities.behavior import Attention, SightEvent
 from fleet2d.entities.decisions import DecidingActor
 from fleet2d.events import Event, EventKind
@@ -164,7 +165,7 @@ class Pair:
         return _first(self._close_run() == self.attention.patience)
 
 
-class Encounters:
+class Encounters(Watcher):
     """All pairs of a person who reacts to robots and a robot.
 
     Attributes:
@@ -180,7 +181,6 @@ class Encounters:
             if user.attention is not None
             for robot_row, robot in self._robots
         ]
-        self.next_step = 0
         self._calls: list[tuple[int, int, str]] = []  # at the ends of plans: step, row, user
         self._ahead: list[Encounter] = []
         self._last: list[tuple[int, DecidingActor, SightEvent]] = []

@@ -1,14 +1,14 @@
 """The seen area of a robot: the cells that its cameras have had in view, and when."""
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fleet2d.algorithms.patches import Patches
 from fleet2d.engine.bodies import Bodies
+from fleet2d.engine.watcher import Watcher
 from fleet2d.entities.actor import Actor
-from fleet2d.entities.behavior import SightEvent
 from fleet2d.entities.entity import Robot
 from fleet2d.events import Event
 from fleet2d.kernels.mesh import Mesh
@@ -24,7 +24,7 @@ LONGEST = 1 << 16
 I64 = NDArray[np.int64]
 
 
-class SeenArea:
+class SeenArea(Watcher):
     """The cells that the cameras of one robot have had in view since the start.
 
     A cell is in view at a step if its centre is: not too near or far, within the angle, and no wall
@@ -60,7 +60,7 @@ class SeenArea:
         """
         assert isinstance(robot.entity, Robot)
         self.robot, self.row, self.every, self._patches = robot, row, every, patches
-        self._bodies, self.next_step = bodies, 0
+        self._bodies = bodies
         plan = robot.home.plan
         lattice, step_us = plan.lattice, robot.clock.step_us
         lenses = [c.lens(lattice.units_per_m, step_us) for c in robot.entity.eyes.values()]
@@ -106,15 +106,6 @@ class SeenArea:
         self._lenses = self._open_lenses._replace(near_squared=np.where(is_dark, far + 1, near))
         self._set_walls(self.robot.home.walls)
 
-    @property
-    def waits(self) -> bool:
-        """False: nothing that is seen ends a span."""
-        return False
-
-    def limit(self, bodies: Bodies, end: int) -> int:
-        """Return `end`."""
-        return end
-
     def take(self, bodies: Bodies, end: int) -> Sequence[Event]:
         """Look from the robot's poses in the steps from `next_step` to `end` - 1."""
         walls = self.robot.home.walls
@@ -133,10 +124,6 @@ class SeenArea:
     def catch_up(self) -> None:
         """Look up to the present step."""
         self.take(self._bodies, self._bodies.step)
-
-    def interruptions(self, events: Sequence[Event]) -> Iterable[tuple[int, SightEvent]]:
-        """Return nothing: no plan waits for seen cells."""
-        return ()
 
     def _collect_bins(self, begin: int) -> None:
         """Collect the bins of the steps from `begin` to the present one."""

@@ -11,7 +11,7 @@ from fleet2d.algorithms.log import SensorRow
 from fleet2d.blame import blame
 from fleet2d.engine.basis import Basis
 from fleet2d.engine.bodies import Bodies, PoseBlock
-from fleet2d.entities.behavior import SightEvent
+from fleet2d.engine.watcher import Watcher
 from fleet2d.entities.objects.contact_sensor import ContactSensor
 from fleet2d.entities.objects.sensor import (
     Sensor,
@@ -26,7 +26,7 @@ from fleet2d.events import Event, EventKind
 from fleet2d.problems import suggest
 
 
-class Sensors:
+class Sensors(Watcher):
     """All sensors of a scenario.
 
     Attributes:
@@ -41,7 +41,6 @@ class Sensors:
     def __init__(self, basis: Basis, doors: Sequence[str]) -> None:
         home, step_us = basis.home, basis.clock.step_us
         self.home, self.users = home, basis.bodies.users
-        self.next_step = 0
         self.stuck: dict[str, SensorFault] = {}
         self.awaited = False
         self._rows: list[SensorRow] = []
@@ -112,10 +111,6 @@ class Sensors:
             steps, users = steps[:0], users[:0]
         readings = state.read(steps, users, end)
         return [] if fault == "silent" else readings
-
-    def interruptions(self, events: Sequence[Event]) -> Iterable[tuple[int, SightEvent]]:
-        """Return nothing: no plan waits for a sensor."""
-        return ()
 
     def collect(self) -> list[SensorRow]:
         """Return the readings since the last call, by step and sensor."""
