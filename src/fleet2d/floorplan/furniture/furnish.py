@@ -34,14 +34,14 @@ class FurnitureRule:
 
     Attributes:
         type: The type of the piece; a room that has one gets no other.
-        groups: Makes groups with the piece, the best first.
+        groups: Makes groups with the piece, the best first; None: the piece alone.
         least_m2: Smallest area of a room that gets it [m²].
         chance: Probability [%].
         unless: Types of rooms that make the piece unnecessary if the home has one.
     """
 
     type: str
-    groups: GroupMaker
+    groups: GroupMaker | None = None
     least_m2: float = 0.0
     chance: int = 100
     unless: tuple[str, ...] = ()
@@ -95,7 +95,7 @@ def _furnish_room(
     first = len(interior.objects)
     for rule in rules:
         is_drawn = draws.below(100) < (100 if rule.chance == 100 else rule.chance * density)
-        groups = rule.groups(draws)
+        groups = rule.groups(draws) if rule.groups else _alone(rule.type, draws)
         present = {thing.type for thing in interior.objects[first:]}
         is_needless = any(kind in kinds and kind not in labels for kind in rule.unless)
         if not is_drawn or rule.type in present or is_needless or room.area_m2 < rule.least_m2:
@@ -176,10 +176,6 @@ def _row(kinds: tuple[str, ...], draws: Draws) -> FurnitureGroup:
     deepest = max(piece.depth for piece in pieces)
     front = max(FURNITURE[kind].front_m for kind in kinds)
     return FurnitureGroup(at, deepest, tuple(pieces), front=front)
-
-
-def _of(kind: str) -> GroupMaker:
-    return lambda draws: _alone(kind, draws)
 
 
 def _bed(kind: str, side: float) -> GroupMaker:
@@ -301,22 +297,16 @@ def _mirror(group: FurnitureGroup) -> FurnitureGroup:
 
 
 _SLEEP = (
-    FurnitureRule("wardrobe", _of("wardrobe"), least_m2=6),
+    FurnitureRule("wardrobe", least_m2=6),
     FurnitureRule("desk", _desk, least_m2=11, chance=35, unless=("office",)),
-    FurnitureRule("dresser", _of("dresser"), least_m2=12, chance=50),
-    FurnitureRule("bookshelf", _of("bookshelf"), least_m2=14, chance=30),
+    FurnitureRule("dresser", least_m2=12, chance=50),
+    FurnitureRule("bookshelf", least_m2=14, chance=30),
 )
-_WASH = (
-    FurnitureRule("toilet", _of("toilet")),
-    FurnitureRule("washbasin", _of("washbasin")),
-)
-_STORE = (
-    FurnitureRule("shelf", _of("shelf")),
-    FurnitureRule("dresser", _of("dresser"), least_m2=5, chance=60),
-)
+_WASH = (FurnitureRule("toilet"), FurnitureRule("washbasin"))
+_STORE = (FurnitureRule("shelf"), FurnitureRule("dresser", least_m2=5, chance=60))
 _ENTER = (
-    FurnitureRule("shoe_rack", _of("shoe_rack"), least_m2=3, chance=80),
-    FurnitureRule("bench", _of("bench"), least_m2=7, chance=40),
+    FurnitureRule("shoe_rack", least_m2=3, chance=80),
+    FurnitureRule("bench", least_m2=7, chance=40),
 )
 
 RULES = MappingProxyType(
@@ -327,7 +317,7 @@ RULES = MappingProxyType(
             FurnitureRule("single_bed", _bed("single_bed", 0.5), least_m2=4),
             FurnitureRule("desk", _desk, least_m2=8),
             *_SLEEP[:1],
-            FurnitureRule("bookshelf", _of("bookshelf"), least_m2=10, chance=60),
+            FurnitureRule("bookshelf", least_m2=10, chance=60),
         ),
         "living_room": (
             FurnitureRule("sofa", _cinema, least_m2=30),
@@ -335,61 +325,46 @@ RULES = MappingProxyType(
             FurnitureRule(
                 "table", _dining(4), least_m2=18, chance=80, unless=("dining_room", "kitchen")
             ),
-            FurnitureRule("bookshelf", _of("bookshelf"), least_m2=14, chance=70),
-            FurnitureRule("dresser", _of("dresser"), least_m2=20, chance=60),
+            FurnitureRule("bookshelf", least_m2=14, chance=70),
+            FurnitureRule("dresser", least_m2=20, chance=60),
         ),
         "dining_room": (
             FurnitureRule("table", _dining(6), least_m2=5),
-            FurnitureRule("dresser", _of("dresser"), least_m2=12, chance=60),
+            FurnitureRule("dresser", least_m2=12, chance=60),
         ),
         "kitchen": (
             FurnitureRule("stove", _kitchen),
-            FurnitureRule("fridge", _of("fridge")),
-            FurnitureRule("sink", _of("sink")),
-            FurnitureRule("stove", _of("stove")),
+            FurnitureRule("fridge"),
+            FurnitureRule("sink"),
+            FurnitureRule("stove"),
             FurnitureRule("table", _dining(4), least_m2=12, unless=("dining_room",)),
         ),
         "bathroom": (
             *_WASH,
-            FurnitureRule("bathtub", _of("bathtub"), least_m2=5.5, chance=60),
-            FurnitureRule("shower", _of("shower"), least_m2=2.5),
-            FurnitureRule(
-                "washing_machine", _of("washing_machine"), least_m2=5, unless=("laundry",)
-            ),
+            FurnitureRule("bathtub", least_m2=5.5, chance=60),
+            FurnitureRule("shower", least_m2=2.5),
+            FurnitureRule("washing_machine", least_m2=5, unless=("laundry",)),
         ),
         "toilet": _WASH,
         "office": (
             FurnitureRule("desk", _desk, least_m2=3),
-            FurnitureRule("bookshelf", _of("bookshelf"), least_m2=6),
-            FurnitureRule("armchair", _of("armchair"), least_m2=12, chance=50),
+            FurnitureRule("bookshelf", least_m2=6),
+            FurnitureRule("armchair", least_m2=12, chance=50),
         ),
         "laundry": (
-            FurnitureRule("washing_machine", _of("washing_machine")),
-            FurnitureRule("sink", _of("sink"), least_m2=4),
-            FurnitureRule("shelf", _of("shelf"), least_m2=4, chance=70),
+            FurnitureRule("washing_machine"),
+            FurnitureRule("sink", least_m2=4),
+            FurnitureRule("shelf", least_m2=4, chance=70),
         ),
-        "gym": (
-            FurnitureRule("treadmill", _of("treadmill"), least_m2=6),
-            FurnitureRule("bench", _of("bench"), least_m2=8),
-        ),
-        "garage": (
-            FurnitureRule("workbench", _of("workbench"), least_m2=10),
-            FurnitureRule("shelf", _of("shelf"), least_m2=10),
-        ),
+        "gym": (FurnitureRule("treadmill", least_m2=6), FurnitureRule("bench", least_m2=8)),
+        "garage": (FurnitureRule("workbench", least_m2=10), FurnitureRule("shelf", least_m2=10)),
         "storage": _STORE,
         "boiler_room": _STORE[:1],
-        "wardrobe": (
-            FurnitureRule("wardrobe", _of("wardrobe")),
-            FurnitureRule("dresser", _of("dresser"), least_m2=5),
-        ),
+        "wardrobe": (FurnitureRule("wardrobe"), FurnitureRule("dresser", least_m2=5)),
         "entryway": _ENTER,
         "lobby": _ENTER,
-        "hallway": (
-            FurnitureRule(
-                "shoe_rack", _of("shoe_rack"), least_m2=5, chance=50, unless=("entryway",)
-            ),
-        ),
-        "hall": (FurnitureRule("bench", _of("bench"), least_m2=8, chance=50),),
+        "hallway": (FurnitureRule("shoe_rack", least_m2=5, chance=50, unless=("entryway",)),),
+        "hall": (FurnitureRule("bench", least_m2=8, chance=50),),
     }
 )
 """The rules of each type of room, in order; other types get no furniture."""
