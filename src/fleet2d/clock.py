@@ -42,10 +42,7 @@ class Clock:
 
     def moments(self, elapsed_us: NDArray[np.int64]) -> NDArray[np.datetime64]:
         """Return the local times of moments given in microseconds since the start."""
-        times: NDArray[np.datetime64] = np.datetime64(self.start, "us") + elapsed_us.astype(
-            "m8[us]"
-        )
-        return times
+        return np.datetime64(self.start, "us") + elapsed_us.astype("m8[us]")
 
     def elapsed(self, moment: datetime) -> int:
         """Return the microseconds from the start to a local time; negative before the start."""

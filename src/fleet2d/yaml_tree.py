@@ -106,8 +106,7 @@ def compose(text: str) -> yaml.Node | None:
 
 def _composed(loader: Any) -> yaml.Node | None:
     try:
-        node: yaml.Node | None = loader.get_single_node()
-        return node
+        return loader.get_single_node()
     except RecursionError:
         raise yaml.YAMLError("it is nested too deeply") from None
     finally:

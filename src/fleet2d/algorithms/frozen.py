@@ -15,7 +15,7 @@ def frozen(value: T) -> T:
         >>> frozen((counts, "x"))[0].flags.writeable, counts.flags.writeable
         (False, True)
     """
-    return _frozen(value)  # type: ignore[no-any-return]
+    return _frozen(value)
 
 
 def _frozen(value: Any) -> Any:

@@ -111,8 +111,7 @@ class BodyPoses:
         """Index of the room of each run."""
         runs = self._runs
         room = rooms_at(self._home.plan.room_of_place, runs.x, runs.y)
-        rooms: NDArray[np.int16] = np.where(runs.away != 0, np.int16(NOWHERE), room)
-        return rooms
+        return np.where(runs.away != 0, np.int16(NOWHERE), room)
 
     @cached_property
     def visits(self) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int16]]:

@@ -162,8 +162,7 @@ class Manifest(BaseModel):
 
     def content(self) -> dict[str, Any]:
         """Return the manifest as plain JSON data."""
-        content: dict[str, Any] = plain(self.model_dump())
-        return content
+        return plain(self.model_dump())
 
     def to_json(self) -> str:
         """Return the text of the file: sorted keys, no NaN."""

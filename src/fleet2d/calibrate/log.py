@@ -103,8 +103,7 @@ def recognized(log: DetectionLog) -> NDArray[np.bool_]:
     """Return for each detection of a log with identities whether the person was recognized."""
     assert log.identity is not None
     assert log.true_identity is not None
-    right: NDArray[np.bool_] = np.equal(log.true_identity, log.identity)[log.detected]
-    return right
+    return np.equal(log.true_identity, log.identity)[log.detected]
 
 
 def _check_columns(path: Path, columns: list[str]) -> None:
@@ -164,8 +163,7 @@ class _LogTable:
                 degrees = (
                     self.column(f"{name}_{unit}", _angle_up_to(MOST_DEGREES / factor)) * factor
                 )
-                size: F64 = np.abs((degrees + 180) % 360 - 180)
-                return size
+                return np.abs((degrees + 180) % 360 - 180)
         if self.has(name):
             raise InputError(
                 f"{self.path}: the unit of the column {name!r} is unknown: call it {name}_deg or"

@@ -66,6 +66,5 @@ def converter() -> Callable[[Path, Path], list[str]]:
     """
     for entry in _entry_points("fleet2d.converter"):
         with suppress(ModuleNotFoundError):
-            convert: Callable[[Path, Path], list[str]] = entry.load()
-            return convert
+            return entry.load()
     raise InputError("this file is not a floor plan, and no converter for it is installed")

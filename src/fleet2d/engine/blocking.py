@@ -165,8 +165,7 @@ class BlockedWays(Watcher):
     def _reach(self, row: int, others: I64) -> I64:
         """Return the distances at which a body touches others [lattice units], int64 (n,)."""
         units_per_m = self._actors[row].home.plan.lattice.units_per_m
-        reach: I64 = ((self._radii[row] + self._radii[others]) * units_per_m).astype(np.int64)
-        return reach
+        return ((self._radii[row] + self._radii[others]) * units_per_m).astype(np.int64)
 
 
 def _approach(x: I64, y: I64, row: int, others: I64, columns: I64, reach: I64) -> Bool:
@@ -195,5 +194,4 @@ def _approach(x: I64, y: I64, row: int, others: I64, columns: I64, reach: I64) -
     beside = (away_x * vy - away_y * vx).astype(np.float64)
     passes = beside * beside < near.astype(np.float64) * way.astype(np.float64)
     nearer: Bool = (towards > 0) & (away_x * dx + away_y * dy > 0)
-    overlaps: Bool = nearer & np.where(towards < way, passes, ends)
-    return overlaps
+    return nearer & np.where(towards < way, passes, ends)

@@ -124,8 +124,7 @@ class Bodies:
 
     def due(self, step: int) -> Sequence[int]:
         """Return the rows of the bodies that decide at a step."""
-        rows: list[int] = np.flatnonzero(self.ask_at <= step).tolist()
-        return rows
+        return np.flatnonzero(self.ask_at <= step).tolist()
 
     def forget(self, before: int) -> None:
         """Drop the poses at steps earlier than `before`."""

@@ -246,8 +246,7 @@ class Cameras(Watcher):
     @property
     def counts(self) -> I64:
         """How often each camera had each user in view, and noticed them: (cameras, users, 2)."""
-        counts: I64 = self.memory.about[..., [About.IN_VIEW.value, About.NOTICED.value]]
-        return counts
+        return self.memory.about[..., [About.IN_VIEW.value, About.NOTICED.value]]
 
     @property
     def in_view(self) -> dict[str, tuple[float, float]]:

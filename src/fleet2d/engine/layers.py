@@ -182,8 +182,7 @@ class _Cells:
     name: str
 
     def __call__(self) -> NDArray[Any]:
-        values: NDArray[Any] = getattr(self.area, self.name)()
-        return values
+        return getattr(self.area, self.name)()
 
 
 def _with_storage(cells: LayerSettings, storage: LayerSettings) -> LayerSettings:

@@ -170,8 +170,7 @@ class Recorder:
         )
         for index, names in self._camera_codes.items():
             codes[index, : len(names)] = names
-        camera_codes: NDArray[np.int32] = codes[robot, camera]
-        return camera_codes
+        return codes[robot, camera]
 
     def _store_events(self) -> None:
         if not self._events:

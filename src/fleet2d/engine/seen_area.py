@@ -162,8 +162,7 @@ class SeenArea(Watcher):
     def explored(self) -> NDArray[np.bool_]:
         """Return which cells were ever in view, bool (rows, columns)."""
         self.catch_up()
-        is_explored: NDArray[np.bool_] = self._record.first != NEVER
-        return is_explored
+        return self._record.first != NEVER
 
     def first_seen(self) -> I64:
         """Return the first step with each cell in view, int64 (rows, columns); -1: never."""
@@ -180,5 +179,4 @@ class SeenArea(Watcher):
         """Return the time since each cell was in view [s], float64 (rows, columns), NaN: never."""
         last = self.last_seen()
         steps = np.where(last == NEVER, np.nan, self.next_step - 1 - last)
-        elapsed: NDArray[np.float64] = steps * (self.robot.clock.step_us / 1e6)
-        return elapsed
+        return steps * (self.robot.clock.step_us / 1e6)

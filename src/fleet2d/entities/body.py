@@ -310,8 +310,7 @@ class Body:
         short: list[float] = lattice.to_metres(point).round(2).tolist()
         if self.space.part_at(*lattice.point_at(short)) == self.part:
             return short
-        exact: list[float] = lattice.to_metres(point).round(4).tolist()
-        return exact
+        return lattice.to_metres(point).round(4).tolist()
 
     def _has_any(self, names: RoomChoice | Point) -> bool:
         """Tell whether the home has such furniture, or a reachable room of such a name or kind."""

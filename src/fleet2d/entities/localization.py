@@ -194,5 +194,4 @@ def _noise(deviation: float) -> int:
 
 def _after(speed: I64, elapsed_us: I64) -> I64:
     """Return a drift [per minute] after some time; milliseconds keep products within 64 bits."""
-    drifted: I64 = speed * (elapsed_us // 1000) // (MINUTE_US // 1000)
-    return drifted
+    return speed * (elapsed_us // 1000) // (MINUTE_US // 1000)

@@ -77,8 +77,7 @@ def _whole(value: Mapping[str, Any], operator: str) -> Expectation:
                 ("until",), f"'until' can only be combined with 'always', not with {operator!r}"
             )
         return vocabulary.until(part, _part(value, "until"), within=within)
-    expectation: Expectation = getattr(vocabulary, operator)(part, within=within)
-    return expectation
+    return getattr(vocabulary, operator)(part, within=within)
 
 
 def _condition(value: Mapping[str, Any], operator: str) -> Expectation:

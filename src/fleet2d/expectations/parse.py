@@ -125,8 +125,7 @@ class _Reader:
         if joint is None:
             raise self._foreign(node)
         nodes = node.values if isinstance(node, ast.BoolOp) else [node.left, node.right]
-        joined: Expectation = reduce(joint, map(self.expectation, nodes))
-        return joined
+        return reduce(joint, map(self.expectation, nodes))
 
     def _argument(self, node: ast.expr) -> Any:
         """Read a name, a path, a number, a text or a list."""
@@ -186,5 +185,4 @@ class _Reader:
                 f"{ast.unparse(node)}: a signal is compared with a number, or room(…) and"
                 " activity(…) by == with a name"
             )
-        comparison: Expectation = compare(left, right)
-        return comparison
+        return compare(left, right)

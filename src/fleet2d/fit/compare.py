@@ -55,8 +55,7 @@ def distances(real: I16, other: I16, count: int) -> Distances:
 def shares(labels: I16, count: int) -> Floats:
     """Return the share of each label in the known time, float64 (count,)."""
     known = labels[labels >= 0]
-    result: Floats = np.bincount(known, minlength=count) / max(len(known), 1)
-    return result
+    return np.bincount(known, minlength=count) / max(len(known), 1)
 
 
 def by_hour(labels: I16, count: int) -> Floats:

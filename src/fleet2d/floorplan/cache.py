@@ -38,8 +38,7 @@ class Cache:
         with self._lock:
             if key in self._values:
                 self._values.move_to_end(key)
-                value: T = self._values[key]
-                return value
+                return self._values[key]
         new = make()
         with self._lock:
             value = self._values.setdefault(key, new)

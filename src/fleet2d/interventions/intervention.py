@@ -165,7 +165,7 @@ def _from_short_form(
 
     try:
         long = {cls.subject: fields.pop(verb), **fields}
-        return cls.model_validate(long, context=info.context)  # type: ignore[no-any-return]
+        return cls.model_validate(long, context=info.context)
     except ValidationError as error:
         raise rewrite(error, move) from None
 
@@ -206,8 +206,7 @@ def dump_intervention(act: Intervention) -> dict[str, Any]:
         >>> dump_intervention(parse_intervention({"put": "ana", "to": "kitchen"}))
         {'do': 'put', 'entity': 'ana', 'to': 'kitchen'}
     """
-    content: dict[str, Any] = _ADAPTER.dump_python(act, mode="json", exclude_defaults=True)
-    return content
+    return _ADAPTER.dump_python(act, mode="json", exclude_defaults=True)
 
 
 def refusal(prefix: str, error: ValidationError) -> ScenarioError:

@@ -197,8 +197,7 @@ def _numbers(table: pa.Table, name: str, path: Path, line: I64) -> NDArray[np.fl
         numbers = pc.fill_null(pc.cast(column, pa.float64()), float("nan"))
     except pa.ArrowException:
         raise LogError(f"{path}: column {name!r} holds {column.type}, not numbers") from None
-    out: NDArray[np.float64] = numbers.to_numpy().astype(np.float64)
-    return out
+    return numbers.to_numpy().astype(np.float64)
 
 
 def _times(column: pa.ChunkedArray, path: Path, line: I64) -> tuple[I64, bool, bool]:

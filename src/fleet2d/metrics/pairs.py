@@ -37,8 +37,7 @@ class RobotUserPair(NamedTuple):
     @property
     def at_home(self) -> Bool:
         """Whether both are at home at each step: bool (steps,)."""
-        home: Bool = ~(self.robot_poses.away | self.user_poses.away)
-        return home
+        return ~(self.robot_poses.away | self.user_poses.away)
 
     @property
     def distance(self) -> NDArray[np.float64]:

@@ -123,8 +123,7 @@ class TimeToFind(Metric):
         moves = np.diff(xy, axis=0, prepend=[self.last.get(robot, tuple(xy[0].tolist()))])
         self.last[robot] = history.poses(robot).at(-1)
         lengths = np.sqrt((moves * moves).sum(axis=1))
-        metres: NDArray[np.float64] = self.driven.get(robot, 0.0) + np.cumsum(lengths)
-        return metres
+        return self.driven.get(robot, 0.0) + np.cumsum(lengths)
 
     def _begin(
         self, history: History, state: "Present", event: Event, metres: float

@@ -198,8 +198,7 @@ def run_once(overrides: tuple[str, ...]) -> dict[str, Any]:
         )
     if process.returncode:
         return {"failed": process.stderr.strip().removeprefix("error: ")}
-    result: dict[str, Any] = json.loads(process.stdout)
-    return result
+    return json.loads(process.stdout)
 
 
 def _draw_once(series: FrameSeries) -> dict[str, float]:

@@ -119,8 +119,7 @@ class LiveView:
             if not state[name]["away"]:
                 body.center = (state[name]["x"], state[name]["y"])
                 self._axes.draw_artist(body)
-        pixels: NDArray[np.uint8] = np.asarray(self._canvas.buffer_rgba())
-        return pixels
+        return np.asarray(self._canvas.buffer_rgba())
 
     def _outline(self, name: str, x: float, y: float, heading: float) -> "NDArray[np.float64]":
         """Return the outline of the largest visible part, float64 (n, 2) [m]."""
@@ -137,8 +136,7 @@ class LiveView:
         if not parts:
             return np.zeros((3, 2))
         largest = max(parts, key=lambda part: float(part.area))
-        outline: NDArray[np.float64] = shapely.get_coordinates(largest.exterior)
-        return outline
+        return shapely.get_coordinates(largest.exterior)
 
 
 def time_frames(series: FrameSeries) -> dict[str, float]:

@@ -131,10 +131,9 @@ def _move_starts(
 
 
 def _dump(data: Mapping[str, Any]) -> str:
-    dumped: str = yaml.safe_dump(
+    return yaml.safe_dump(
         data, sort_keys=False, default_flow_style=None, allow_unicode=True, width=100
     )
-    return dumped
 
 
 def _header(old: Path, remarks: list[str]) -> str:

@@ -84,8 +84,7 @@ class SurveyGroup(NamedTuple):
 @cache
 def table() -> dict[str, Any]:
     """Return the survey's numbers."""
-    numbers: dict[str, Any] = json.loads(TABLE.read_text(encoding="utf-8"))
-    return numbers
+    return json.loads(TABLE.read_text(encoding="utf-8"))
 
 
 def groups() -> list[str]:

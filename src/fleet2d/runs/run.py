@@ -172,8 +172,7 @@ class Run:
                 isn't complete.
             ArtifactError: The run can't be reproduced: its tables differ from the stored ones.
         """
-        verdict: Verdict = judges().judge_again(self, expectation, name)
-        return verdict
+        return judges().judge_again(self, expectation, name)
 
     def draw(self, at: str | int | None = None, ax: Any = None, theme: str = "light") -> Any:
         """Draw the run, or one moment of it; needs the extra `viz`.

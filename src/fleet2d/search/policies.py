@@ -136,8 +136,7 @@ def after_empty_looks(
     """
     has_look = np.isfinite(age)
     weight = memory / np.maximum(memory + np.where(has_look, age, 0.0), 1e-9)
-    belief: NDArray[np.float64] = prior * (1 - detect * np.where(has_look, weight, 0.0))
-    return belief
+    return prior * (1 - detect * np.where(has_look, weight, 0.0))
 
 
 def _step_by_step(problem: SearchProblem, worth: Callable[[float, float], float]) -> list[int]:

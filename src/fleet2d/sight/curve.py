@@ -102,17 +102,13 @@ class Curve(Settings):
     def _shares(self, at: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the probabilities at many x, the same on every machine: float64 (n,)."""
         if self.midpoint is not None and self.width is not None:
-            logistic: NDArray[np.float64] = self.top / (
-                1 + exponential((at - self.midpoint) / self.width)
-            )
-            return logistic
+            return self.top / (1 + exponential((at - self.midpoint) / self.width))
         x, y = np.array(self.points).T
         after = np.minimum(np.searchsorted(x, at, side="right"), len(x) - 1)
         before = np.maximum(after - 1, 0)
         width = np.where(after > before, x[after] - x[before], 1.0)
         fraction = np.clip(at - x[before], 0.0, width) / width
-        shares: NDArray[np.float64] = y[before] + (y[after] - y[before]) * fraction
-        return shares
+        return y[before] + (y[after] - y[before]) * fraction
 
     def around_the_clock(self) -> "Curve":
         """Return the curve repeated over hours -24 to 48, so that midnight is interpolated, too."""
@@ -156,8 +152,7 @@ def exponential(x: NDArray[np.float64]) -> NDArray[np.float64]:
     value = np.ones_like(x)
     for term in range(TERMS, 0, -1):
         value = 1 + rest * value / term
-    powers: NDArray[np.float64] = np.ldexp(value, doublings.astype(np.int32))
-    return powers
+    return np.ldexp(value, doublings.astype(np.int32))
 
 
 def _exp(x: Decimal) -> Decimal:

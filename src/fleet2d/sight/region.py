@@ -96,5 +96,4 @@ class VisibleRegion:
         lattice_points = self._lattice.to_lattice(points)
         flat = np.ascontiguousarray(lattice_points.reshape(-1, 2))
         is_inside = region_contains_points(self._mesh, *self.eye, self.right, self.wall, flat)
-        visible: npt.NDArray[np.bool_] = is_inside.reshape(lattice_points.shape[:-1])
-        return visible
+        return is_inside.reshape(lattice_points.shape[:-1])

@@ -159,8 +159,7 @@ def pickled(function: Callable[..., Any]) -> bytes:
             f"{function!r} can't be sent to other processes: put it into a module, or"
             ' pip install "fleet2d[study]"'
         ) from None
-    data: bytes = cloudpickle.dumps(function)
-    return data
+    return cloudpickle.dumps(function)
 
 
 def _resolve(scenario: Any) -> Any:

@@ -183,8 +183,7 @@ def _analyse(data: F64, codes: Mapping[str, NDArray[np.int64]]) -> tuple[Spread,
 
 
 def _unit_means(data: F64, numbers: NDArray[np.int64]) -> F64:
-    sums: F64 = np.bincount(numbers, data) / np.bincount(numbers)
-    return sums
+    return np.bincount(numbers, data) / np.bincount(numbers)
 
 
 def _resampled_means(data: F64, codes: list[NDArray[np.int64]], resamples: int) -> F64:

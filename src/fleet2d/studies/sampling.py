@@ -94,8 +94,7 @@ def shares(method: Method, count: int, dimensions: int, seed: int) -> NDArray[np
         return generator.random((count, dimensions))
     with extra("study", "a Latin hypercube needs scipy"):
         from scipy.stats import qmc
-    points: NDArray[np.float64] = qmc.LatinHypercube(dimensions, rng=generator).random(count)
-    return points
+    return qmc.LatinHypercube(dimensions, rng=generator).random(count)
 
 
 def draw(

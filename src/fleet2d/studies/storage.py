@@ -92,8 +92,7 @@ class Storage:
             info = self.filesystem.get_file_info(self.path(name))
         except OSError as error:
             raise self._unreachable(error) from error
-        size: int | None = info.size
-        return size
+        return info.size
 
     def read(self, name: str) -> bytes:
         """Return the content of a file.

@@ -101,8 +101,7 @@ def drawing_style() -> AbstractContextManager[Any]:
     """Return the context for drawing in the style of Fleet2D, whatever the user's settings."""
     style = {**mpl.rcParamsDefault, "svg.hashsalt": "fleet2d", "font.family": "DejaVu Sans"}
     style.pop("backend")
-    context: AbstractContextManager[Any] = mpl.rc_context(style)
-    return context
+    return mpl.rc_context(style)
 
 
 def save_figure(figure: Figure, path: Path) -> None:

@@ -108,8 +108,7 @@ def opacity(time: F64, free: NDArray[np.bool_]) -> F64:
     if mean <= 0:
         return np.zeros_like(time)
     ratio = time / mean
-    opaque: F64 = SOLID * ratio / (ratio + HALF)
-    return opaque
+    return SOLID * ratio / (ratio + HALF)
 
 
 def draw_paths(trace: BodyTrace, axes: Axes) -> None:
@@ -125,8 +124,7 @@ def draw_paths(trace: BodyTrace, axes: Axes) -> None:
 
 def places_of(spots: F64) -> F64:
     """Return the places of sightings rounded to 0.1 m, each once: float64 (n, 2) [m]."""
-    places: F64 = np.unique(np.rint(spots * 10), axis=0) / 10
-    return places
+    return np.unique(np.rint(spots * 10), axis=0) / 10
 
 
 def draw_sightings(places: F64, color: str, axes: Axes) -> None:

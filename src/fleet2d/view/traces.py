@@ -158,8 +158,7 @@ def _legs_between(xy: F64, away: NDArray[np.bool_]) -> F64:
     """Return the legs between positions, without those from and to an absence: (n, 2, 2) [m]."""
     legs = np.stack([xy[:-1], xy[1:]], axis=1)
     home = ~away.astype(bool)
-    moves: F64 = legs[(legs[:, 0] != legs[:, 1]).any(axis=1) & home[:-1] & home[1:]]
-    return moves
+    return legs[(legs[:, 0] != legs[:, 1]).any(axis=1) & home[:-1] & home[1:]]
 
 
 def _no_legs() -> F64:

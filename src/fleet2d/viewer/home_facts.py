@@ -81,8 +81,7 @@ def runs_of(cells: NDArray[np.int16]) -> list[int]:
     flat = cells.ravel()
     ends = np.append(np.flatnonzero(np.diff(flat)) + 1, len(flat))
     pairs = np.stack([flat[ends - 1].astype(np.int64), np.diff(ends, prepend=0)], axis=1)
-    runs: list[int] = pairs.ravel().tolist()
-    return runs
+    return pairs.ravel().tolist()
 
 
 def points(coordinates: NDArray[Any]) -> list[Point]:

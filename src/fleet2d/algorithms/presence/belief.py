@@ -124,8 +124,7 @@ class Presence:
 
     def share(self, user: str = ANYONE) -> F64:
         """Return the probability of each room, given at home: float64 (rooms,), sums to one."""
-        share: F64 = self._home[self.row(user)]
-        return share
+        return self._home[self.row(user)]
 
     def away(self, user: str = ANYONE) -> float:
         """Return the probability that a user is away, or that nobody is at home."""
@@ -203,8 +202,7 @@ def are_distributions(home: F64, away: F64) -> NDArray[np.bool_]:
         [True, False, False]
     """
     is_share = (np.abs(home.sum(axis=-1) - 1) <= SUM_ERROR) & (home >= 0).all(axis=-1)
-    is_valid: NDArray[np.bool_] = is_share & (away >= 0) & (away <= 1)
-    return is_valid
+    return is_share & (away >= 0) & (away <= 1)
 
 
 class WeeklyPresence(Presence):
@@ -237,8 +235,7 @@ class WeeklyPresence(Presence):
     def by_hour_of_week(self, user: str = ANYONE) -> F64:
         """Return `share` at each hour of the week from Monday 00:00: float64 (168, rooms)."""
         slots = np.arange(HOURS) * len(self._week[1]) // HOURS
-        shares: F64 = self._week[0][slots, self.row(user)]
-        return shares
+        return self._week[0][slots, self.row(user)]
 
 
 def slot_of_week(time: datetime, slots: int = HOURS) -> int:

@@ -44,8 +44,7 @@ class PersonForecast(NamedTuple):
     @property
     def places(self) -> F64:
         """The probability of each place: float64 (1, rooms + 1)."""
-        places: F64 = self.now.reshape(1, len(self.model.first) - 1, -1).sum(axis=2)
-        return places
+        return self.now.reshape(1, len(self.model.first) - 1, -1).sum(axis=2)
 
     def after(self, bins: int, time: datetime, bin_us: int) -> "PersonForecast":
         """Return the forecast for `bins` bins later than `time`."""

@@ -220,8 +220,7 @@ class DayCounts:
     @property
     def total(self) -> F64:
         """The weighted sum of all days: float64 (*shape)."""
-        total: F64 = self.finished + self.hours.sum(axis=0)
-        return total
+        return self.finished + self.hours.sum(axis=0)
 
     @property
     def by_hour_of_week(self) -> F64:
@@ -236,8 +235,7 @@ class DayCounts:
     def weighted_days(self) -> F64:
         """The sums of the finished days times their weights: float64 (days, *shape)."""
         weights = np.array([self.faded(self.today - day) for day in self.days])
-        weighted: F64 = self.by_day * weights.reshape(-1, *(1 for _ in self.shape))
-        return weighted
+        return self.by_day * weights.reshape(-1, *(1 for _ in self.shape))
 
     def remember(self) -> dict[str, NDArray[np.generic]]:
         """Return everything as arrays."""

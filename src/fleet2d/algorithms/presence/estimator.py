@@ -95,8 +95,7 @@ class Estimator(Component):
         """Return the sums of each hour of the week plus `smoothing` bins of average evidence."""
         total = self.counts.total
         bins = np.maximum(total[..., -1:], 1)
-        week: F64 = self.counts.by_hour_of_week + smoothing / bins * total
-        return week
+        return self.counts.by_hour_of_week + smoothing / bins * total
 
     def interval(self, key: np.uint64, level: float) -> tuple[F64, F64]:
         """Return intervals for the shares, by resampling whole days.

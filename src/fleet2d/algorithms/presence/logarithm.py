@@ -26,5 +26,4 @@ def natural_log(values: ArrayLike) -> F64:
     square, series = s * s, np.zeros_like(s)
     for k in range(TERMS, -1, -1):
         series = series * square + 1 / (2 * k + 1)
-    logarithm: F64 = e * LN_2 + 2 * s * series
-    return logarithm
+    return e * LN_2 + 2 * s * series

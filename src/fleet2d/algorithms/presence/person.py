@@ -177,8 +177,7 @@ class Person:
         places = self.layout.rooms + 1
         time = self.total.time.reshape(places, -1).sum(axis=1)
         ends = self.total.exits[:, :places].reshape(places, -1).sum(axis=1)
-        length: F64 = (time + STAY) / (ends + 1)
-        return length
+        return (time + STAY) / (ends + 1)
 
     def follow(self, stretches: Stretches) -> StretchPlaces:
         """Filter over the next stretches; return P(room | evidence up to the stretch)."""

@@ -88,5 +88,4 @@ class MotionSensor(Sensor):
         right, left = middle - half, middle + half
         from_right = half_sine(right + quarter) * dy - half_sine(right) * dx >= 0
         to_left = half_sine(left) * dx - half_sine(left + quarter) * dy >= 0
-        both: Mask = from_right & to_left if half <= quarter else from_right | to_left
-        return both
+        return from_right & to_left if half <= quarter else from_right | to_left

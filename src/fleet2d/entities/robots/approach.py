@@ -117,8 +117,7 @@ def _is_free(actor: "Actor", point: NDArray[np.int64]) -> bool:
 def _legs(route: NDArray[np.int64]) -> list[float]:
     """Return the lengths of the legs of a route [lattice]."""
     legs = np.diff(route, axis=0)
-    lengths: list[float] = np.sqrt((legs * legs).sum(axis=1).astype(np.float64)).tolist()
-    return lengths
+    return np.sqrt((legs * legs).sum(axis=1).astype(np.float64)).tolist()
 
 
 def _distance(one: object, other: object) -> float:

@@ -26,8 +26,7 @@ class RoomBelief(NamedTuple):
     @property
     def joint(self) -> NDArray[np.float64]:
         """Probability of each room, float64 (rooms,); sums to 1 - away."""
-        joint: NDArray[np.float64] = self.share * (1 - self.away)
-        return joint
+        return self.share * (1 - self.away)
 
 
 def room_belief(now: Situation, source: str | None, user: str) -> RoomBelief:

@@ -144,5 +144,4 @@ def _beside(mask: Bool) -> Bool:
     padded = np.pad(mask, 1)
     rows, columns = mask.shape
     shifted = [padded[r : r + rows, c : c + columns] for r in range(3) for c in range(3)]
-    beside: Bool = np.logical_or.reduce(shifted)
-    return beside
+    return np.logical_or.reduce(shifted)

@@ -125,8 +125,7 @@ class HangoutPlaces:
         return np.ascontiguousarray(cells[:, ::-1] * SUB + CELL_CENTRE)
 
     def _same_room(self, room: "Room") -> F64:
-        same: F64 = (self.room == room.index).astype(np.float64)
-        return same
+        return (self.room == room.index).astype(np.float64)
 
     def _view(self, room: "Room") -> F64:
         walls, reach = self._actor.home.walls, sight_range(self._actor)
@@ -173,8 +172,7 @@ class HangoutPlaces:
         seats = plan.lattice.to_lattice(uses)
         gaps = ((self.points[:, None] - seats[None]) ** 2).sum(axis=2).min(axis=1)
         metres = np.sqrt(gaps.astype(np.float64)) / plan.lattice.units_per_m
-        inside: F64 = np.maximum(0.0, 1 - metres / PERSONAL)
-        return inside
+        return np.maximum(0.0, 1 - metres / PERSONAL)
 
 
 def decay(x: F64) -> F64:
@@ -191,5 +189,4 @@ def decay(x: F64) -> F64:
     growth = 1 + y * (1 + y / 2 * (1 + y / 3 * (1 + y / 4)))
     for _ in range(10):
         growth = growth * growth
-    values: F64 = np.where(np.isfinite(x), 1 / growth, 0.0)
-    return values
+    return np.where(np.isfinite(x), 1 / growth, 0.0)

@@ -165,5 +165,4 @@ def cell_polygons(mask: NDArray[np.bool_]) -> list[Polygon]:
     row, first = np.nonzero(edges == 1)
     _, end = np.nonzero(edges == -1)
     corners = np.stack([first, row, end, row + 1]).astype(np.float64) * UNITS_PER_CELL
-    polygons: list[Polygon] = shapely.get_parts(shapely.union_all(shapely.box(*corners))).tolist()
-    return polygons
+    return shapely.get_parts(shapely.union_all(shapely.box(*corners))).tolist()

@@ -66,8 +66,7 @@ class OccupancyMap:
         cosine, sine = self.turn
         x, y = xy[..., 0] * self.pixel, xy[..., 1] * self.pixel
         turned = np.stack([x * cosine - y * sine, x * sine + y * cosine], axis=-1)
-        places: NDArray[np.float64] = turned + np.array(self.origin)
-        return places
+        return turned + np.array(self.origin)
 
     def crop(self) -> "OccupancyMap":
         """Return the part around the free pixels, with a margin of one pixel if the map has it."""
@@ -172,8 +171,7 @@ def _home(free: Mask, pixel: float, ray_width: float) -> Mask:
     depth = np.zeros(int(part.max()) + 2, np.int32)  # its last entry serves -1
     np.maximum.at(depth, part[narrow], steps[narrow])
     leads_on = depth > across
-    home: Mask = (steps >= 0) & (~leads_on[part] | (steps < reach))
-    return home
+    return (steps >= 0) & (~leads_on[part] | (steps < reach))
 
 
 def _left_out(raw: OccupancyMap, free: Mask, home: Mask, ray_width: float) -> list[str]:

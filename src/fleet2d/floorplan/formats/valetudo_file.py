@@ -95,8 +95,7 @@ class PixelBox:
         row, column = runs[:, 1] - self.row, runs[:, 0] - self.column
         np.add.at(steps, (row, column), 1)
         np.add.at(steps, (row, column + runs[:, 2]), -1)
-        mask: Mask = np.cumsum(steps, axis=1)[:, :-1] > 0
-        return mask
+        return np.cumsum(steps, axis=1)[:, :-1] > 0
 
 
 def check_map(content: dict[str, Any]) -> dict[str, Any]:

@@ -260,8 +260,7 @@ def largest_part(mask: Bool, within: Bool | None = None) -> Bool:
     """Return the connected part of a mask with the most cells, of those `within` if given."""
     part = label_parts(np.ascontiguousarray(mask), False)
     sizes = np.bincount(part[mask if within is None else mask & within], minlength=1)
-    largest: Bool = mask & (part == int(np.argmax(sizes)))
-    return largest
+    return mask & (part == int(np.argmax(sizes)))
 
 
 def count_cells(cell: float, metres: float) -> int:
@@ -280,15 +279,13 @@ def _sums(mask: Bool) -> Int:
 def _in_box(sums: Int, rows: Int, columns: Int, high: int, wide: int) -> Int:
     """Return how many cells of a mask are in the boxes that begin at some cells."""
     right, top = columns + wide, rows + high
-    out: Int = sums[top, right] - sums[rows, right] - sums[top, columns] + sums[rows, columns]
-    return out
+    return sums[top, right] - sums[rows, right] - sums[top, columns] + sums[rows, columns]
 
 
 def _count(mask: Bool, high: int, wide: int) -> Int:
     """Return how many cells of the mask are in the rectangle that begins at each cell."""
     sums = _sums(mask)
-    out: Int = sums[high:, wide:] - sums[:-high, wide:] - sums[high:, :-wide] + sums[:-high, :-wide]
-    return out
+    return sums[high:, wide:] - sums[:-high, wide:] - sums[high:, :-wide] + sums[:-high, :-wide]
 
 
 def cells_after(mask: Bool, reach: int, axis: int) -> Bool:

@@ -143,8 +143,7 @@ class Lattice:
 
     def to_metres(self, xy: ArrayLike) -> NDArray[np.float64]:
         """Return lattice points (…, 2) in metres, float64 of the same shape."""
-        metres: NDArray[np.float64] = (np.asarray(xy) + self._origin_units) / self.units_per_m
-        return metres
+        return (np.asarray(xy) + self._origin_units) / self.units_per_m
 
     def cell_of(self, x: int, y: int) -> tuple[int, int]:
         """Return (row, column) of the cell that holds a lattice point."""

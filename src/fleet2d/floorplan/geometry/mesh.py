@@ -130,8 +130,7 @@ def _rings(polygons: Sequence[Polygon], width: int, height: int) -> list[list[In
 
 def _keys(points: Int64) -> Int64:
     """Return one number per point that sorts like (x, y)."""
-    keys: Int64 = points[..., 0] * (2 * COORDINATE_LIMIT) + points[..., 1]
-    return keys
+    return points[..., 0] * (2 * COORDINATE_LIMIT) + points[..., 1]
 
 
 def _drop_flat_vertices(polygons: list[list[Int64]]) -> list[list[Int64]]:
@@ -143,8 +142,7 @@ def _drop_flat_vertices(polygons: list[list[Int64]]) -> list[list[Int64]]:
     def straighten(ring: Int64) -> Int64:
         before, after = np.roll(ring, 1, axis=0) - ring, np.roll(ring, -1, axis=0) - ring
         bends = before[:, 0] * after[:, 1] != before[:, 1] * after[:, 0]
-        corners: Int64 = ring[bends | np.isin(_keys(ring), touching)]
-        return corners
+        return ring[bends | np.isin(_keys(ring), touching)]
 
     return [[straighten(ring) for ring in rings] for rings in polygons]
 
@@ -170,8 +168,7 @@ def _split_at(polygons: list[list[Int64]], vertices: Int64) -> list[list[Int64]]
         between = on_line & (distances > 0) & (distances < (along * along).sum(axis=1))
         inserted = np.flatnonzero(between)
         order = inserted[np.lexsort((distances[inserted], wall[inserted]))]
-        result: Int64 = np.insert(ring, wall[order] + 1, vertices[near[order]], axis=0)
-        return result
+        return np.insert(ring, wall[order] + 1, vertices[near[order]], axis=0)
 
     return [[split(ring) for ring in rings] for rings in polygons]
 
@@ -207,14 +204,12 @@ def _triangulate(polygons: list[list[Int64]]) -> Int64:
     corners: Int64 = exact.astype(np.int64)
     areas = _doubled_areas(corners)
     corners[areas < 0] = corners[areas < 0][:, ::-1]
-    solid: Int64 = corners[areas != 0]
-    return solid
+    return corners[areas != 0]
 
 
 def _cross_products(starts: Int64, ends: Int64) -> Int64:
     """Return the cross products of points; over a closed ring they add up to twice its area."""
-    products: Int64 = starts[:, 0] * ends[:, 1] - starts[:, 1] * ends[:, 0]
-    return products
+    return starts[:, 0] * ends[:, 1] - starts[:, 1] * ends[:, 0]
 
 
 def _doubled_areas(corners: Int64) -> Int64:
@@ -243,5 +238,4 @@ def _neighbors(triangles: Int64, vertex_count: int, walls: Int64) -> npt.NDArray
     if (ordered[1:] == ordered[:-1]).any() or not np.array_equal(np.sort(edges[~shared]), walls):
         return None
     across = np.where(shared, order[position] // 3, WALL)
-    neighbors: npt.NDArray[np.int32] = across.reshape(-1, 3).astype(np.int32)
-    return neighbors
+    return across.reshape(-1, 3).astype(np.int32)

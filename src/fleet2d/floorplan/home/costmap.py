@@ -221,8 +221,7 @@ def closed_cells_around(
     if not closed[row, column]:
         return None
     part = label_parts(closed, diagonal=False)
-    mask: NDArray[np.bool_] = part == part[row, column]
-    return mask
+    return part == part[row, column]
 
 
 def _nearest(

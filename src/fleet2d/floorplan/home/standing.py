@@ -178,5 +178,4 @@ def _is_convex(footprint: Polygon) -> bool:
 def _triangles(footprint: Polygon) -> list[Polygon]:
     """Return a footprint as convex pieces."""
     parts = shapely.get_parts(shapely.constrained_delaunay_triangles(footprint))
-    pieces: list[Polygon] = parts.tolist()
-    return pieces
+    return parts.tolist()

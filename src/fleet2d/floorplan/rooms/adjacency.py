@@ -104,12 +104,8 @@ def _crosses(
         origin: NDArray[np.int64], direction: NDArray[np.int64], point: NDArray[np.int64]
     ) -> NDArray[np.int64]:
         gap = point - origin
-        turn: NDArray[np.int64] = np.sign(
-            direction[..., 0] * gap[..., 1] - direction[..., 1] * gap[..., 0]
-        )
-        return turn
+        return np.sign(direction[..., 0] * gap[..., 1] - direction[..., 1] * gap[..., 0])
 
     meets_line = side(start, along, first) * side(start, along, first + step) <= 0
     meets_segment = side(first, step, start) * side(first, step, start + along) <= 0
-    both: NDArray[np.bool_] = meets_line & meets_segment
-    return both
+    return meets_line & meets_segment

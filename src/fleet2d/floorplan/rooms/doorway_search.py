@@ -162,14 +162,12 @@ def _ends_well(walls: _Walls, corner: NDArray[np.intp], other: F64) -> NDArray[n
 def _of_width(lines: I64, units_per_m: float) -> I64:
     length2 = _length2(lines)
     low, high = (MIN_DOOR_M * units_per_m) ** 2, (MAX_OPENING_M * units_per_m) ** 2
-    fitting: I64 = lines[(length2 >= low) & (length2 <= high)]
-    return fitting
+    return lines[(length2 >= low) & (length2 <= high)]
 
 
 def _length2(lines: I64) -> I64:
     span: I64 = lines[:, 2:] - lines[:, :2]
-    total: I64 = (span * span).sum(axis=1)
-    return total
+    return (span * span).sum(axis=1)
 
 
 def _shortest_first(lines: I64) -> I64:
@@ -182,8 +180,7 @@ def _shortest_first(lines: I64) -> I64:
     rank = np.arange(len(sorted_keys)) - np.searchsorted(sorted_keys, sorted_keys)
     is_short = np.empty(len(ordered), np.bool_)
     is_short[by_corner] = rank < PER_CORNER
-    result: I64 = ordered[is_short]
-    return result
+    return ordered[is_short]
 
 
 def _all_free(mesh: Mesh, lines: I64) -> NDArray[np.bool_]:
@@ -248,8 +245,7 @@ def _in_a_wall(mesh: Mesh, walls: _Walls, lines: I64, units_per_m: float) -> NDA
 
 def _keys(points: I64) -> I64:
     """Return one number per point."""
-    keys: I64 = points[:, 0] * 2**21 + points[:, 1]
-    return keys
+    return points[:, 0] * 2**21 + points[:, 1]
 
 
 def _one_of_each(lines: I64, units_per_m: float) -> list[int]:

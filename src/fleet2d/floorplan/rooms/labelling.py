@@ -156,8 +156,7 @@ def _overlaps(frame: I64, frames: I64) -> NDArray[np.float64]:
     low, high = np.maximum(frame[:2], frames[:, :2]), np.minimum(frame[2:], frames[:, 2:])
     common = np.clip(high - low, 0, None).prod(axis=1)
     areas = (frames[:, 2:] - frames[:, :2]).prod(axis=1)
-    both: NDArray[np.float64] = common / ((frame[2:] - frame[:2]).prod() + areas - common)
-    return both
+    return common / ((frame[2:] - frame[:2]).prod() + areas - common)
 
 
 def _blocks(

@@ -179,8 +179,7 @@ def _middle_lines(corners: Vector, along: Vector) -> list[tuple[Place, Place]]:
 
 def _normal(start: Vector, end: Vector) -> Vector:
     along = end - start
-    unit: Vector = np.array([-along[1], along[0]]) / np.sqrt(along @ along)
-    return unit
+    return np.array([-along[1], along[0]]) / np.sqrt(along @ along)
 
 
 def _ends(start: Vector, end: Vector) -> tuple[Place, Place]:

@@ -51,5 +51,4 @@ def segment_rooms(chambers: Chambers, is_opening: Sequence[bool], cell: float) -
     roots = sorted(set(owner.tolist()), key=lambda root: (-areas[root], root))
     number = np.full(chambers.count + 1, -1, np.int64)  # its last entry serves -1
     number[:-1] = [roots.index(root) for root in owner.tolist()]
-    rooms: NDArray[np.int64] = number[chambers.of_cell]
-    return rooms
+    return number[chambers.of_cell]

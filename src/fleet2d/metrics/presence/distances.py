@@ -25,8 +25,7 @@ def total_variation(truth: F64, estimate: F64) -> F64:
         >>> float(total_variation(np.array([0.5, 0.5]), np.array([0.75, 0.25])))
         0.25
     """
-    distance: F64 = np.abs(truth - estimate).sum(axis=-1) / 2
-    return distance
+    return np.abs(truth - estimate).sum(axis=-1) / 2
 
 
 def kl_divergence(truth: F64, estimate: F64, alpha: float = 1e-3) -> F64:
@@ -59,14 +58,12 @@ def jensen_shannon(truth: F64, estimate: F64) -> F64:
 def _relative_entropy(p: F64, q: F64) -> F64:
     is_positive = p > 0
     ratio = np.where(is_positive, p, 1) / np.where(is_positive, q, 1)
-    entropy: F64 = (p * natural_log(ratio)).sum(axis=-1)
-    return entropy
+    return (p * natural_log(ratio)).sum(axis=-1)
 
 
 def room_gaps(truth: F64, estimate: F64) -> F64:
     """Return |p - q| of each room."""
-    gaps: F64 = np.abs(truth - estimate)
-    return gaps
+    return np.abs(truth - estimate)
 
 
 def earth_mover(truth: F64, estimate: F64, cost: F64) -> float:
@@ -190,5 +187,4 @@ def rank_correlation(truth: F64, estimate: F64) -> F64:
     true = np.sign(truth[..., :, None] - truth[..., None, :])
     signs = true * np.sign(estimate[..., :, None] - estimate[..., None, :])
     pairs, balance = np.abs(true).sum(axis=(-2, -1)), signs.sum(axis=(-2, -1))
-    correlation: F64 = np.where(pairs > 0, balance / np.maximum(pairs, 1), 1.0)
-    return correlation
+    return np.where(pairs > 0, balance / np.maximum(pairs, 1), 1.0)

@@ -26,8 +26,7 @@ def log_loss(probability: F64, truth: I64, least: float = LEAST) -> F64:
         >>> log_loss(np.array([[0.5, 0.5], [1.0, 0.0]]), np.array([0, 1])).round(3).tolist()
         [0.693, 13.816]
     """
-    loss: F64 = -natural_log(np.maximum(_of(probability, truth), least))
-    return loss
+    return -natural_log(np.maximum(_of(probability, truth), least))
 
 
 def brier_score(probability: F64, truth: I64) -> F64:
@@ -37,8 +36,7 @@ def brier_score(probability: F64, truth: I64) -> F64:
         >>> brier_score(np.array([[0.5, 0.5], [1.0, 0.0]]), np.array([0, 1])).tolist()
         [0.5, 2.0]
     """
-    score: F64 = (probability * probability).sum(axis=1) - 2 * _of(probability, truth) + 1
-    return score
+    return (probability * probability).sum(axis=1) - 2 * _of(probability, truth) + 1
 
 
 def top_k(probability: F64, truth: I64, k: int) -> F64:
@@ -56,8 +54,7 @@ def top_k(probability: F64, truth: I64, k: int) -> F64:
     """
     true = _of(probability, truth)[:, np.newaxis]
     above, equal = (probability > true).sum(axis=1), (probability == true).sum(axis=1)
-    accuracy: F64 = np.clip((k - above) / equal, 0, 1)
-    return accuracy
+    return np.clip((k - above) / equal, 0, 1)
 
 
 def groups_of(values: F64, masses: int = MASSES) -> I64:
@@ -71,8 +68,7 @@ def groups_of(values: F64, masses: int = MASSES) -> I64:
     """
     order = np.sort(values)
     first, last = (np.searchsorted(order, values, side) for side in ("left", "right"))
-    group: I64 = (first + last - 1) // 2 * masses // max(len(values), 1)
-    return group
+    return (first + last - 1) // 2 * masses // max(len(values), 1)
 
 
 def calibration_error(probability: F64, truth: I64, masses: int = MASSES) -> float:
@@ -208,5 +204,4 @@ def skill(score: float, reference: float) -> float:
 
 
 def _of(values: NDArray[Any], truth: I64) -> NDArray[Any]:
-    chosen: NDArray[Any] = values[np.arange(len(truth)), truth]
-    return chosen
+    return values[np.arange(len(truth)), truth]
