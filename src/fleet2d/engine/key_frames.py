@@ -70,9 +70,16 @@ class KeyFrames:
             self._blocks.append(_key(step, row, self._walk_kind, moment, actor.state))
         self.pass_by(row, step)
 
-    def move_body(self, row: int) -> None:
-        """Begin the next plan of a body with a key frame, as it doesn't continue the last one."""
+    def move_body(self, row: int, step: int) -> None:
+        """Begin the next plan of a body with a key frame, as it doesn't continue the last one.
+
+        A random walk ends with a key frame of its own, where the body was before it is moved.
+        """
         self._moved.add(row)
+        actor = self._actors[row]
+        if self._walk_kind == WALK and not isinstance(actor.motion, Track):
+            self._walk_on(row, step)
+            self._blocks.append(_key(step, row, WALK, step * self._clock.step_us, actor.state))
 
     def pass_by(self, row: int, step: int) -> None:
         """Collect the breakpoints of the present plan that are reached up to a step."""

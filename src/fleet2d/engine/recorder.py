@@ -80,9 +80,9 @@ class Recorder:
         if "key_frames" in self._tables:
             self._keys.begin_plan(row, step)
 
-    def move_body(self, row: int) -> None:
-        """Note that a body was put elsewhere, so that its next plan begins with a key frame."""
-        self._keys.move_body(row)
+    def move_body(self, row: int, step: int) -> None:
+        """Note that a body is put elsewhere, so that its next plan begins with a key frame."""
+        self._keys.move_body(row, step)
 
     def take_events(self, events: Sequence[Event]) -> None:
         """Collect events."""

@@ -104,8 +104,8 @@ class EngineWorld:
 
     def move(self, actor: DecidingActor, pose: Pose, part: int) -> None:
         """Put a body at a pose in a part of its space, where it decides anew."""
+        self._state.recorder.move_body(actor.row, self.step)
         actor.state, actor.part = pose, part
-        self._state.recorder.move_body(actor.row)
         actor.decide_anew(self.step)
 
     def drive(self, actor: DecidingActor) -> None:
