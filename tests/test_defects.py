@@ -122,7 +122,7 @@ def test_two_people_who_react_and_a_robot_that_gives_way_take_no_minutes(
         monkeypatch.setattr(owner, method, counting)
 
     counted(Plan, "go_to_point", "legs")
-    counted(WaitForPeople, "go_on", "looks")
+    counted(WaitForPeople, "continued", "looks")
     people = {"ana": "retired", "ben": "works_from_home"}
     users = {
         name: {"behaviors": [{"type": "reactions"}, {"type": "routine", "persona": persona}]}

@@ -1,4 +1,4 @@
-"""How the code is laid out: sizes of modules, circles of imports, and the map for newcomers."""
+"""How the code is laid out: sizes of modules, circles of imports, class names, and the map."""
 
 import ast
 import re
@@ -98,3 +98,13 @@ def test_files_that_contributing_names_are_there() -> None:
     assert len(names) > 40
     places = [ROOT, ROOT / "src" / "fleet2d"]
     assert [] == [name for name in names if not any((place / name).exists() for place in places)]
+
+
+def test_no_two_classes_have_the_same_name() -> None:
+    places: dict[str, list[str]] = {}
+    for module, path in MODULES.items():
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ClassDef):
+                places.setdefault(node.name.lstrip("_"), []).append(module)
+
+    assert {} == {name: modules for name, modules in places.items() if len(modules) > 1}

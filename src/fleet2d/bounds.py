@@ -53,13 +53,18 @@ that is as it should be, set FLEET2D_MAX_DEPTH=100 in the environment
         return int(text)
 
     def check(
-        self, amount: int, what: object, error: type[Fleet2DError] = InputError, *, least: str = ""
+        self,
+        amount: int,
+        subject: object,
+        error: type[Fleet2DError] = InputError,
+        *,
+        least: str = (""),
     ) -> None:
         """Refuse an amount beyond the bound.
 
         Args:
             amount: The amount.
-            what: The file or object that has it, for the message.
+            subject: The file or object that has it, for the message.
             error: The type of the error.
             least: Text before an amount that was not counted to its end, such as "more than ".
 
@@ -68,8 +73,8 @@ that is as it should be, set FLEET2D_MAX_DEPTH=100 in the environment
         """
         if amount > self.most:
             raise error(
-                f"{what} has {least}{amount} {self.noun}, and at most {self.most} are read; to read"
-                f" more, set {self.variable}={amount * (2 if least else 1)} in the environment"
+                f"{subject} has {least}{amount} {self.noun}, and at most {self.most} are read; to"
+                f" read more, set {self.variable}={amount * (2 if least else 1)} in the environment"
             )
 
 

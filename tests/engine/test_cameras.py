@@ -146,14 +146,14 @@ def test_a_run_without_users_or_without_robots_has_no_cameras() -> None:
     for content in (scenario(robots={"r": {}}), scenario(users={"ana": {"camera": {}}})):
         state = fleet2d.Simulation(content)._state
         assert not state.cameras
-        assert not state.gazes
+        assert not state.user_cameras
 
 
 def test_users_with_cameras_look_at_robots_and_robots_at_users() -> None:
     content = everything("1 min")
     content["users"]["ben"]["camera"] = {"angle_deg": 180}
     state = fleet2d.Simulation(content)._state
-    (gaze,) = state.gazes
+    (gaze,) = state.user_cameras
     assert ["ben", 1, 1] == [gaze.owner.name, gaze.row, gaze.index]
     assert ["astro", "bolt", "curio", "drift", "ego"] == [actor.name for actor in gaze.others]
     assert [(2, 0), (3, 1), (4, 2), (5, 3)] == [(c.row, c.index) for c in state.cameras]

@@ -145,17 +145,17 @@ class History:
         self._check_needs("evidence")
         return frozen(self.log.evidence(self.first, self.end, self.log.users))
 
-    def _check_needs(self, what: str) -> None:
-        if what not in self.needs:
+    def _check_needs(self, need: str) -> None:
+        if need not in self.needs:
             raise ComponentError(
-                f"{what} was requested, but is only computed for components that declare it: write"
-                f" needs = {{{what!r}}} in the class of the component"
+                f"{need} was requested, but is only computed for components that declare it: write"
+                f" needs = {{{need!r}}} in the class of the component"
             )
 
-    def _check_metric(self, what: str) -> None:
+    def _check_metric(self, need: str) -> None:
         if self.visible != frozenset(self.log.index):
             raise ComponentError(
-                f"'{what}' is ground truth: algorithms can't read it, only metrics can"
+                f"'{need}' is ground truth: algorithms can't read it, only metrics can"
             )
 
     def poses(self, name: str) -> BodyPoses:

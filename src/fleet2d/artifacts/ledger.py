@@ -31,13 +31,13 @@ class Ledger:
 
     Attributes:
         folder: The path of that folder.
-        journal: All rows so far; set by `begin` and `go_on`.
+        journal: All rows so far; set by `begin` and `resume`.
     """
 
     journal: JournalWriter
 
     def __init__(self, directory: Path) -> None:
-        """Create no file yet: `begin` and `go_on` do."""
+        """Create no file yet: `begin` and `resume` do."""
         self.directory, self.folder = directory, directory / FOLDER
         self._lock: RunLock | None = None
         self._has_journal = False
@@ -70,7 +70,7 @@ class Ledger:
             (self.folder / name).unlink(missing_ok=True)
         self._set_journal(JournalWriter(self.folder / JOURNAL_NAME))
 
-    def go_on(self, commit: Commit | None) -> Iterator[LoggedRows]:
+    def resume(self, commit: Commit | None) -> Iterator[LoggedRows]:
         """Truncate the journal after a commit, and yield the rows before it.
 
         Raises:

@@ -134,7 +134,7 @@ class RunStore:
             self.manifest.write(self._root)
             for path in (*self._root.glob("*.parquet"), *self._root.glob(f"*.parquet{PARTIAL}")):
                 path.unlink()  # the journal has all of their rows
-            for entry in ledger.go_on(commit):
+            for entry in ledger.resume(commit):
                 self.add_table(entry.spec)
                 table = self._tables[entry.spec.name]
                 for name, words in entry.words.items():
@@ -353,15 +353,15 @@ class RunStore:
             raise self._failure
 
     @contextmanager
-    def _writing(self, what: str, entry: TableWriter | None = None) -> Iterator[None]:
-        """End the run and mark it as failed if a write fails; `what` names the file."""
+    def _writing(self, subject: str, entry: TableWriter | None = None) -> Iterator[None]:
+        """End the run and mark it as failed if a write fails; `subject` names the file."""
         try:
             yield
         except OSError as error:
-            reason = f"{what} can't be written ({error.strerror or error})"
+            reason = f"{subject} can't be written ({error.strerror or error})"
             advice = "Run again with another --out"
             if is_disk_full(error):
-                reason = f"the disk is full: {what} can't be written"
+                reason = f"the disk is full: {subject} can't be written"
                 advice = (
                     f"Free some space and continue by `fleet2d resume {self.directory}`, or store"
                     " less (`artifacts:` in the scenario) and run again with another --out"

@@ -112,13 +112,13 @@ class BlockedWays(Watcher):
         actor = self._actors[row]
         others = [a for a in self._actors if a.row != row and not a.state.away]
         reach = self._reach(row, np.array([a.row for a in others], np.int64))
-        here = np.array([a.state[:2] for a in others], np.int64).reshape(-1, 2)
-        clear = np.column_stack([here, reach + int(lattice.cell * lattice.units_per_m)])
+        positions = np.array([a.state[:2] for a in others], np.int64).reshape(-1, 2)
+        clear = np.column_stack([positions, reach + int(lattice.cell * lattice.units_per_m)])
         step, step_us, wait = now.step, actor.clock.step_us, self._waits[row]
         since = wait.since if wait.until == step else step
         # Of two who wait for each other, the later one in the scenario waits twice as long.
         patience_us = self._patience_us * (
-            2 if other < row and self._minds(other, row, step) else 1
+            2 if other < row and self._avoids(other, row, step) else 1
         )
         if (step - since) * step_us < patience_us:
             first = since == step
@@ -134,7 +134,7 @@ class BlockedWays(Watcher):
             plan.interrupts = actor.arbiter.own
         return plan
 
-    def _minds(self, row: int, other: int, step: int) -> bool:
+    def _avoids(self, row: int, other: int, step: int) -> bool:
         """Whether a body waits for another one at a step, or is about to pass it."""
         pairs = (self._waits[row], self._passes[row])
         return any(pair.blocker == other and pair.until > step for pair in pairs)

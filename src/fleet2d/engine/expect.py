@@ -65,7 +65,8 @@ def scene_of(state: State, scenario: Scenario, remaining: timedelta) -> Scene:
         metrics=list(scenario.metrics),
         batteries=[actor.name for actor in state.actors if actor.charge is not None],
         cameras={
-            c.owner.name: [other.name for other in c.others] for c in [*state.gazes, *state.cameras]
+            c.owner.name: [other.name for other in c.others]
+            for c in [*state.user_cameras, *state.cameras]
         },
         behaviors=behaviors,
         records=[kind for a in state.actors for b in a.behaviors for kind in b.records],

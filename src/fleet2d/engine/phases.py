@@ -83,13 +83,13 @@ def decide(state: State, span: Span) -> None:
             state.bodies.follow(row, actor.plan)
         begins = due or in_way is not None
         if row in blocking.rows:
-            begins |= _mind_bodies(state, row, step, begins=begins)
+            begins |= _yield_to_bodies(state, row, step, begins=begins)
         if begins:
             state.changes.expect(row, actor)
             state.begin_plan(row, step)
 
 
-def _mind_bodies(state: State, row: int, step: int, *, begins: bool) -> bool:
+def _yield_to_bodies(state: State, row: int, step: int, *, begins: bool) -> bool:
     """Let a body wait for another one in its way, or go round it; return whether it does.
 
     Args:

@@ -58,9 +58,9 @@ class Samples:
         self._blocks, self.count = [], 0
         step, entity, x, y, heading, away = rows.T
         plan = self._home.plan
-        gone = away.astype(bool)
+        is_away = away.astype(bool)
         xy = plan.lattice.to_metres(rows[:, 2:4])
-        xy[gone] = np.nan
+        xy[is_away] = np.nan
         room = plan.room_of_place[y // SUB, x // SUB].astype(np.int32)
         self._store.append(
             "trajectories",
@@ -70,8 +70,8 @@ class Samples:
             x=xy[:, 0],
             y=xy[:, 1],
             heading=in_radians(heading),
-            room=np.where(gone, np.int32(-1), room),
-            away=gone,
+            room=np.where(is_away, np.int32(-1), room),
+            away=is_away,
         )
 
 

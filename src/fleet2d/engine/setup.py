@@ -39,7 +39,7 @@ def set_up(scenario: Scenario, clock: Clock, seed: int, store: RunStore) -> Stat
         InputError: The floor plan or a place in the scenario is wrong, or a name is unknown.
     """
     basis = _basis(scenario, clock, seed, store)
-    gazes, cameras = open_cameras(basis)
+    user_cameras, cameras = open_cameras(basis)
     _check_reads(scenario, basis.actors)
     for group in cameras:
         if any(causes_errors(entry.act, group.owner.name) for entry in scenario.script):
@@ -55,7 +55,7 @@ def set_up(scenario: Scenario, clock: Clock, seed: int, store: RunStore) -> Stat
         store.add_table(spec)
     recorder = Recorder(basis, cameras, sensors)
     layers, learners = LayerBook(basis), Learners(basis)
-    for group in [*gazes, *cameras]:
+    for group in [*user_cameras, *cameras]:
         group.awaited = learners.awaited
     sensors.awaited = EventKind.SENSOR in learners.awaited
     log = _log(basis, cameras, recorder) if learners.all else None
@@ -68,7 +68,7 @@ def set_up(scenario: Scenario, clock: Clock, seed: int, store: RunStore) -> Stat
         blocking=BlockedWays(basis),
         encounters=Encounters(basis.users, basis.robots),
         sensors=sensors,
-        gazes=gazes,
+        user_cameras=user_cameras,
         cameras=cameras,
         layers=layers,
         learners=learners,
@@ -79,7 +79,7 @@ def set_up(scenario: Scenario, clock: Clock, seed: int, store: RunStore) -> Stat
         interventions=Interventions(clock),
         max_span=scenario.simulation.max_span,
     )
-    for group in [*gazes, *cameras]:
+    for group in [*user_cameras, *cameras]:
         group.owner.in_view = InView(state, group)
     for index, entry in enumerate(scenario.script):
         path = f"script.{index}"

@@ -136,7 +136,7 @@ def _seen_gauge(signal: states.IsSeen, state: State, _: int) -> Gauge:
 
 
 def _cameras_of(state: State, name: str) -> Cameras:
-    return next(c for c in [*state.gazes, *state.cameras] if c.owner.name == name)
+    return next(c for c in [*state.user_cameras, *state.cameras] if c.owner.name == name)
 
 
 def _perceived(signal: states.IsPerceived, state: State, _: int) -> Gauge:

@@ -107,7 +107,7 @@ class Simulation(Judging):
         outside = [dict(record) for record in interventions if is_from_outside(record)]
         self._state.interventions.repeat(outside)
         self._pace: Pace | None = None
-        self._stopping = self._broken = False
+        self._is_stopping = self._has_failed = False
         self._run: Run | None = None  # set when it is finished
         describe_start(self._store.manifest, self.scenario, self.seed, self.clock, self.home.plan)
         store.manifest.interventions = outside
@@ -267,7 +267,7 @@ class Simulation(Judging):
         try:
             self._run_to(self.clock.steps, on_progress)
         except BaseException as error:
-            if isinstance(error, KeyboardInterrupt) and not self._broken:
+            if isinstance(error, KeyboardInterrupt) and not self._has_failed:
                 self.finish("interrupted")
             else:
                 self._fail(error)
@@ -278,8 +278,8 @@ class Simulation(Judging):
         """Close the run at the present step and return it for reading."""
         if self._run is not None:
             return self._run
-        if status == "complete" and (self._broken or not self.done):
-            status = "failed" if self._broken else "interrupted"
+        if status == "complete" and (self._has_failed or not self.done):
+            status = "failed" if self._has_failed else "interrupted"
         began = time.perf_counter()
         if status == "interrupted" and self._keeper is not None:
             self._keeper.checkpoint(self._state)
@@ -336,28 +336,28 @@ class Simulation(Judging):
             try:
                 self._spans(end, on_progress, spans)
             except BaseException:
-                self._broken = True
+                self._has_failed = True
                 raise
             finally:
                 save_s = self._state.recorder.wall_s - save_s
                 self._simulate_s += time.perf_counter() - began - save_s
                 self._save_s += save_s
                 self._began = None
-        if self._stopping:
-            self._stopping = False
+        if self._is_stopping:
+            self._is_stopping = False
             raise KeyboardInterrupt
 
     def _check_not_over(self) -> None:
         if self._run is not None:
             raise InputError("the run is finished: set up a new Simulation")
-        if self._broken:
+        if self._has_failed:
             raise InputError("the run failed in the middle of a span and can't be continued")
 
     def _spans(
         self, end: int, on_progress: Callable[[Self], None] | None, spans: int | None
     ) -> None:
         reported, state = time.perf_counter(), self._state
-        while self.step < end and not self._stopping and spans != 0:
+        while self.step < end and not self._is_stopping and spans != 0:
             most = self._pace.steps(self.clock.step_us) if self._pace else end
             span = Span(self.step, min(end, self.step + most))
             for phase in PHASES:
@@ -365,7 +365,7 @@ class Simulation(Judging):
             if self._keeper is not None:
                 self._keeper.after_span(state)
             if self._pace:
-                self._pace.hold(self.step * self.clock.step_us / 1e6, lambda: self._stopping)
+                self._pace.hold(self.step * self.clock.step_us / 1e6, lambda: self._is_stopping)
             if on_progress and time.perf_counter() - reported > 0.1:
                 on_progress(self)
                 reported = time.perf_counter()
@@ -379,7 +379,7 @@ class Simulation(Judging):
 
     def _stop(self) -> None:
         """End the run after the present span, so that all tables end at the same step."""
-        self._stopping = True
+        self._is_stopping = True
 
     def _fail(self, error: BaseException) -> None:
         """Close the run as failed, so that it can be read up to the failure."""

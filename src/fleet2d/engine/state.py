@@ -50,7 +50,7 @@ class State:
         changes: The changes of the home.
         watchers: All followers of the bodies, in their order.
         clearance, blocking, encounters, sensors: Some of the watchers.
-        gazes: The cameras of users.
+        user_cameras: The cameras of users.
         cameras: The cameras of robots.
         layers: What robots have seen of the home, and when layers are stored.
         learners: Algorithms and metrics, what they have learned, and their outputs.
@@ -77,7 +77,7 @@ class State:
     blocking: BlockedWays
     encounters: Encounters
     sensors: Sensors
-    gazes: list[Cameras]
+    user_cameras: list[Cameras]
     cameras: list[Cameras]
     layers: LayerBook
     learners: Learners
@@ -101,7 +101,7 @@ class State:
         self.watchers = [
             self.clearance,
             self.blocking,
-            *self.gazes,
+            *self.user_cameras,
             *self.cameras,
             self.encounters,
             self.sensors,
@@ -120,7 +120,7 @@ class State:
         """Let spans end at events of these kinds, besides those that components wait for."""
         self.requested, self.awaited = kinds, kinds | self.interventions.kinds
         awaited = self.awaited | self.learners.awaited
-        for cameras in [*self.gazes, *self.cameras]:
+        for cameras in [*self.user_cameras, *self.cameras]:
             cameras.awaited = awaited
         self.sensors.awaited = EventKind.SENSOR in awaited
 
@@ -227,8 +227,8 @@ class State:
     def _observations(self) -> NDArray[np.int64]:
         """Return the sightings of all robots, in order of step and robot."""
         blocks = [cameras.collect() for cameras in self.cameras]
-        for gaze in self.gazes:
-            gaze.collect()
+        for cameras in self.user_cameras:
+            cameras.collect()
         ends = np.cumsum([0, *map(len, blocks)])
         rows = np.empty((ends[-1], OBSERVATION), np.int64)
         index: Any = slice(None)  # of each sighting among the rows

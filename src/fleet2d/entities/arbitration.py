@@ -34,7 +34,7 @@ class Arbiter:
         self.wake_step: int | None = None
         self._cool_at: dict[int, datetime] = {}  # when the cooldown of each is over
         # By behavior: the plan to resume, the step of its interruption, and its own interrupts.
-        self._broken: dict[int, tuple[Plan, int, frozenset[str]]] = {}
+        self._interrupted: dict[int, tuple[Plan, int, frozenset[str]]] = {}
         self.own: frozenset[str] = frozenset()
         self.off: frozenset[int] = frozenset()
         # Events at which only behaviors before the active one are asked.
@@ -74,7 +74,7 @@ class Arbiter:
             self._cool_down(self.active, now)
         for number, behavior in enumerate(self.behaviors):
             if not self._may_decide(number, now):
-                self._broken.pop(number, None)
+                self._interrupted.pop(number, None)
                 continue
             chosen = self._resumed(number, now) or ask(behavior, now)
             if chosen is not None:
@@ -154,7 +154,7 @@ class Arbiter:
             return
         is_interrupted = number is not None and number < last and not plan.is_over(now.step)
         if is_interrupted and self.behaviors[last].resumes:
-            self._broken[last] = plan, now.step, self.own
+            self._interrupted[last] = plan, now.step, self.own
         else:
             self._cool_down(last, now)
 
@@ -166,10 +166,10 @@ class Arbiter:
 
     def _resumed(self, number: int, now: Situation) -> Plan | None:
         """Return the rest of the interrupted plan of a behavior, if there is one."""
-        if number not in self._broken:
+        if number not in self._interrupted:
             return None
-        broken, step, interrupts = self._broken.pop(number)
-        plan = resumed(now.actor, now.plan(), broken, step)
+        interrupted, step, interrupts = self._interrupted.pop(number)
+        plan = resumed(now.actor, now.plan(), interrupted, step)
         if plan is not None:
             plan.interrupts = interrupts
         return plan

@@ -22,26 +22,26 @@ if TYPE_CHECKING:
 I64 = NDArray[np.int64]
 
 
-def plan_after_a_step(now: "Situation", broken: Plan, notes: Sequence[Note] = ()) -> Plan:
+def plan_after_a_step(now: "Situation", interrupted: Plan, notes: Sequence[Note] = ()) -> Plan:
     """Return a plan that stands for a step, and then continues the present one.
 
     A random walk isn't continued: the behavior is asked again.
 
     Args:
         now: The situation.
-        broken: The present plan.
+        interrupted: The present plan.
         notes: Rows for the events table at the stop.
     """
-    begin_us, step_us = now.step * broken.step_us, broken.step_us
-    plan, motion = now.plan().stay_until(begin_us + step_us), broken.finish()
+    begin_us, step_us = now.step * interrupted.step_us, interrupted.step_us
+    plan, motion = now.plan().stay_until(begin_us + step_us), interrupted.finish()
     plan.notes += notes
     if isinstance(motion, Track):
         first = int(np.searchsorted(motion.breakpoints.time, begin_us, side="right"))
-        _continue(plan, broken, begin_us, begin_us, _rows(motion.breakpoints)[first:])
+        _continue(plan, interrupted, begin_us, begin_us, _rows(motion.breakpoints)[first:])
     return plan
 
 
-def plan_around(now: "Situation", broken: Plan, bodies: I64) -> Plan | None:
+def plan_around(now: "Situation", interrupted: Plan, bodies: I64) -> Plan | None:
     """Return the rest of the present plan, by a way round other bodies to its next stop.
 
     If a body stands at that stop, and it is the last one, it stops beside it in the room. A body on
@@ -49,13 +49,13 @@ def plan_around(now: "Situation", broken: Plan, bodies: I64) -> Plan | None:
 
     Args:
         now: The situation.
-        broken: The present plan.
+        interrupted: The present plan.
         bodies: x and y of other bodies, and the distance to keep [lattice], int64 (n, 3).
 
     Returns:
         The plan; None if there is no way round.
     """
-    motion, actor, begin_us = broken.finish(), now.actor, now.step * broken.step_us
+    motion, actor, begin_us = interrupted.finish(), now.actor, now.step * interrupted.step_us
     if not isinstance(motion, Track):
         return now.plan().turn_by(0.5)
     stop = next_stop(actor, motion.breakpoints, begin_us)
@@ -64,7 +64,7 @@ def plan_around(now: "Situation", broken: Plan, bodies: I64) -> Plan | None:
     rows, detour = _rows(motion.breakpoints), RoutesAround(actor, bodies)
     goal, rest = (int(rows[stop, 1]), int(rows[stop, 2])), rows[stop + 1 :]
     if detour.cost[goal[1] // SUB, goal[0] // SUB] < 0:
-        if (rest[:, 1:3] != rows[stop, 1:3]).any() or rest[:, 4].any() or broken.postures:
+        if (rest[:, 1:3] != rows[stop, 1:3]).any() or rest[:, 4].any() or interrupted.postures:
             return None
         beside = _beside(actor, goal, detour)
         if beside is None:
@@ -80,11 +80,11 @@ def plan_around(now: "Situation", broken: Plan, bodies: I64) -> Plan | None:
     plan.go_to_point(*goal, route=route)
     heading = heading_at(motion.breakpoints, stop, since_us)
     plan.turn_by(turn_between(plan.heading, heading) / TURN)
-    _continue(plan.stay_until(since_us), broken, begin_us, since_us, rest)
+    _continue(plan.stay_until(since_us), interrupted, begin_us, since_us, rest)
     return plan
 
 
-def _continue(plan: Plan, broken: Plan, begin_us: int, since_us: int, rest: I64) -> None:
+def _continue(plan: Plan, interrupted: Plan, begin_us: int, since_us: int, rest: I64) -> None:
     """Continue a plan with the part of another one after a moment, delayed.
 
     The first rest that is long enough is shortened by the delay, so that the body is on time again
@@ -93,7 +93,7 @@ def _continue(plan: Plan, broken: Plan, begin_us: int, since_us: int, rest: I64)
     Args:
         plan: A plan that ends where the other one is at that moment; the delay is from that moment
             to its end.
-        broken: The other plan.
+        interrupted: The other plan.
         begin_us: The moment up to which the other plan was followed; its later rows are copied.
         since_us: The moment.
         rest: The breakpoints of the other plan after the moment, int64 (n, 5).
@@ -111,17 +111,17 @@ def _continue(plan: Plan, broken: Plan, begin_us: int, since_us: int, rest: I64)
     shifted[:, 0] = np.where(times <= edge, times + later, np.maximum(times, edge + later))
     plan.notes += [
         Note(delayed(max(note.time_us, since_us)), note.event, note.detail)
-        for note in broken.notes
+        for note in interrupted.notes
         if note.time_us > begin_us
     ]
     plan.postures += [
         (delayed(max(time_us, since_us)), code)
-        for time_us, code in broken.postures
+        for time_us, code in interrupted.postures
         if time_us > begin_us
     ]
-    plan.posture = broken.posture
-    plan.follow(shifted).endless = broken.endless
-    plan.asks_us, plan.root = broken.asks_us, broken.root
+    plan.posture = interrupted.posture
+    plan.follow(shifted).endless = interrupted.endless
+    plan.asks_us, plan.root = interrupted.asks_us, interrupted.root
 
 
 def _rows(track: Breakpoints) -> I64:

@@ -103,7 +103,7 @@ class DecidingActor(Actor):
         if waiting is not None:
             self._waited = waiting.since, waiting.look_before(step) + self._just_waited
         if plan is None and waiting is not None and not now.events:
-            plan = waiting.go_on(now)
+            plan = waiting.continued(now)
         with blame(self.path, step):
             if plan is None and self.order is not None:
                 plan = self._ask_behavior(self.order, now)

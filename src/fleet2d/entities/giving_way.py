@@ -73,7 +73,7 @@ class WaitForPeople:
     result in any case, and `Clearance` ends it at an earlier look if somebody moves.
 
     Attributes:
-        broken: The plan that it was following.
+        interrupted: The plan that it was following.
         step: The step at which it stopped following it.
         since: The step at which it first stopped in front of a person.
         interrupts: The events that interrupt that plan.
@@ -82,15 +82,15 @@ class WaitForPeople:
 
     def __init__(
         self,
-        broken: Plan,
+        interrupted: Plan,
         step: int,
         since: int,
         interrupts: frozenset[str],
         surroundings: Surroundings,
     ) -> None:
-        self.broken, self.step, self.since = broken, step, since
+        self.interrupted, self.step, self.since = interrupted, step, since
         self.interrupts, self.surroundings = interrupts, surroundings
-        self._step_us = broken.step_us
+        self._step_us = interrupted.step_us
 
     def look_from(self, step: int) -> int:
         """Return the first step from `step` on at which it looks."""
@@ -123,15 +123,15 @@ class WaitForPeople:
         if self._waited(now.step) >= patience:  # it has already looked for a way round
             patience = max(patience, micros(gives_way.gives_up))
         # At its first look it may still turn towards its next leg.
-        while self.broken.began[0] == now.step and self._waited(look) < patience:
+        while self.interrupted.began[0] == now.step and self._waited(look) < patience:
             look = self._look_after(look)
         plan.stay_until(look * self._step_us)
         plan.interrupts = self.interrupts
         return plan
 
-    def go_on(self, now: "Situation") -> Plan | None:
+    def continued(self, now: "Situation") -> Plan | None:
         """Return the rest of the plan; None if nothing is left."""
-        return self._with_interrupts(resumed(now.actor, now.plan(), self.broken, self.step))
+        return self._with_interrupts(resumed(now.actor, now.plan(), self.interrupted, self.step))
 
     def go_round(self, now: "Situation", people: I64, distance: float) -> Plan | None:
         """Return the rest of the plan by a way that keeps clear of people; None without such a way.
@@ -145,7 +145,7 @@ class WaitForPeople:
         for gap in (max(distance, PASSING) + lattice.cell, PASSING):
             around = people + np.array([0, 0, int(gap * lattice.units_per_m)], np.int64)
             plan, detour = self._stand_for_a_step(now), RoutesAround(actor, around)
-            rest = resumed(actor, plan, self.broken, self.step, detour)
+            rest = resumed(actor, plan, self.interrupted, self.step, detour)
             if rest is not None:
                 return self._with_interrupts(rest)
         return None
@@ -153,7 +153,9 @@ class WaitForPeople:
     def leave_out(self, now: "Situation", person: str) -> Plan | None:
         """Return the plan without the stop that it can't get to; None if that was the last."""
         plan = self._stand_for_a_step(now).note("gives_up", person)
-        return self._with_interrupts(without_next_stop(now.actor, plan, self.broken, self.step))
+        return self._with_interrupts(
+            without_next_stop(now.actor, plan, self.interrupted, self.step)
+        )
 
     def give_up(self, now: "Situation", person: str) -> Plan:
         """Stand for a step, after which the behaviors are asked again."""

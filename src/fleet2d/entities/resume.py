@@ -19,7 +19,7 @@ Detour = Callable[[tuple[int, int], tuple[int, int]], NDArray[np.int64] | None]
 
 
 def resumed(
-    body: "Body", plan: Plan, broken: Plan, step: int, detour: Detour | None = None
+    body: "Body", plan: Plan, interrupted: Plan, step: int, detour: Detour | None = None
 ) -> Plan | None:
     """Fill a plan with the rest of one that was interrupted.
 
@@ -29,23 +29,23 @@ def resumed(
     Args:
         body: The body.
         plan: An empty plan that begins at the present step.
-        broken: The plan that was interrupted.
+        interrupted: The plan that was interrupted.
         step: The step at which it was interrupted.
         detour: Returns a route between two lattice points, or None; left out: the shortest route.
 
     Returns:
         The plan; None if nothing is left to do, or no way leads there at present.
     """
-    return _rest(body, plan, broken, step * body.clock.step_us, detour)
+    return _rest(body, plan, interrupted, step * body.clock.step_us, detour)
 
 
-def without_next_stop(body: "Body", plan: Plan, broken: Plan, step: int) -> Plan | None:
+def without_next_stop(body: "Body", plan: Plan, interrupted: Plan, step: int) -> Plan | None:
     """Fill a plan with the rest of one that was interrupted, without its next stop.
 
     Returns:
         The plan; None if there is no later stop, or no way leads to it at present.
     """
-    motion = broken.finish()
+    motion = interrupted.finish()
     if not isinstance(motion, Track):
         return None
     x, y, time = motion.breakpoints.x, motion.breakpoints.y, motion.breakpoints.time
@@ -55,24 +55,24 @@ def without_next_stop(body: "Body", plan: Plan, broken: Plan, step: int) -> Plan
     leaves = np.flatnonzero((x[stop:] != x[stop]) | (y[stop:] != y[stop]))
     if not len(leaves):
         return None
-    rest = _rest(body, plan, broken, int(time[stop + leaves[0]]), None)
+    rest = _rest(body, plan, interrupted, int(time[stop + leaves[0]]), None)
     if rest is not None:
         rest.root = rest  # a plan of its own: one stop of the interrupted one is missing
     return rest
 
 
 def _rest(
-    body: "Body", plan: Plan, broken: Plan, broken_us: int, detour: Detour | None
+    body: "Body", plan: Plan, interrupted: Plan, interrupted_us: int, detour: Detour | None
 ) -> Plan | None:
     """Fill a plan with the part of another one that comes after a moment."""
-    motion = broken.finish()
-    if not isinstance(motion, Track) or broken.postures or plan.away:
+    motion = interrupted.finish()
+    if not isinstance(motion, Track) or interrupted.postures or plan.away:
         return None
     track = motion.breakpoints
-    stop = next_stop(body, track, broken_us)
+    stop = next_stop(body, track, interrupted_us)
     if stop is None or track.away[stop:].any():
         return None
-    goes_on_us = max(int(track.time[stop]), broken_us)
+    goes_on_us = max(int(track.time[stop]), interrupted_us)
     goal = int(track.x[stop]), int(track.y[stop])
     route = detour((plan.x, plan.y), goal) if detour else None
     if detour and route is None:
@@ -86,22 +86,22 @@ def _rest(
     # Rows that were planned for the way there are written on arrival.
     plan.notes += [
         Note(max(n.time_us, goes_on_us) + later, n.event, n.detail)
-        for n in broken.notes
-        if n.time_us > broken_us
+        for n in interrupted.notes
+        if n.time_us > interrupted_us
     ]
     rest = np.stack([column[stop + 1 :].astype(np.int64) for column in track], axis=-1)
     rest[:, 0] += later
-    plan.follow(rest).endless = broken.endless
-    plan.asks_us, plan.root = broken.asks_us, broken.root
+    plan.follow(rest).endless = interrupted.endless
+    plan.asks_us, plan.root = interrupted.asks_us, interrupted.root
     return plan
 
 
-def next_stop(body: "Body", track: Breakpoints, broken_us: int) -> int | None:
+def next_stop(body: "Body", track: Breakpoints, interrupted_us: int) -> int | None:
     """Return the index of the breakpoint at which the body next stands still; None: no such."""
     x, y, time = track.x, track.y, track.time
-    at = max(int(np.searchsorted(time, broken_us, side="right")) - 1, 0)
+    at = max(int(np.searchsorted(time, interrupted_us, side="right")) - 1, 0)
     for i in range(at, len(time) - 1):
-        still = x[i] == x[i + 1] and y[i] == y[i + 1] and time[i + 1] > broken_us
+        still = x[i] == x[i + 1] and y[i] == y[i + 1] and time[i + 1] > interrupted_us
         # A turn at a corner, on the border of the space, is not a stop.
         if still and body.space.part_at(int(x[i]), int(y[i])) == body.part:
             return i

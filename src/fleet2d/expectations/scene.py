@@ -70,7 +70,7 @@ class Scene:
         """Return an error with a message."""
         return ScenarioError(message)
 
-    def check_name(self, what: str, name: str, known: Iterable[str], of: object) -> None:
+    def check_name(self, noun: str, name: str, known: Iterable[str], of: object) -> None:
         """Refuse an unknown name.
 
         Raises:
@@ -78,7 +78,7 @@ class Scene:
         """
         names = list(dict.fromkeys(known))
         if name not in names:
-            raise self.error(f"{of}: there is no {what} {name!r}{suggest(name, names)}")
+            raise self.error(f"{of}: there is no {noun} {name!r}{suggest(name, names)}")
 
     def check_body(self, name: str, of: object) -> None:
         """Refuse a name that is neither a user's nor a robot's.

@@ -182,8 +182,8 @@ class Until(Temporal):
         value = self.robustness(run, True).at(run.first)
         if value > 0:
             return []
-        broken = spells(self.hold.robustness(run, True).map(np.negative))
-        last = min([self.last(run), *(first for first, _ in broken)])
+        failures = spells(self.hold.robustness(run, True).map(np.negative))
+        last = min([self.last(run), *(first for first, _ in failures)])
         return [Violation(run.first, last, value, last)]
 
     def __str__(self) -> str:

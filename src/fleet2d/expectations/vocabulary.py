@@ -185,11 +185,11 @@ def during(hours: str, *, days: str | None = None) -> Expectation:
         raise InputError(f"during: {error}") from None
 
 
-def _time(value: Time | None, what: str) -> timedelta | None:
+def _time(value: Time | None, name: str) -> timedelta | None:
     try:
         return None if value is None else parse_duration(value)
     except PydanticCustomError as error:
-        raise InputError(f"{what}: {error}") from None
+        raise InputError(f"{name}: {error}") from None
 
 
 def _part(expectation: object, word: str) -> Expectation:

@@ -38,7 +38,7 @@ def find_named(
     raise error(f"{owner} has no {noun} {name!r}{suggest(name, names, f'Its {noun}s are')}")
 
 
-def number_names(names: Sequence[str | None], types: Sequence[str], what: str) -> list[str]:
+def number_names(names: Sequence[str | None], types: Sequence[str], noun: str) -> list[str]:
     """Return a name for each thing: its own if it isn't empty, or its type and a number.
 
     Raises:
@@ -51,7 +51,7 @@ def number_names(names: Sequence[str | None], types: Sequence[str], what: str) -
     own = Counter(name for name in names if name)
     twice = [name for name, uses in own.items() if uses > 1]
     if twice:
-        raise FloorPlanError(f"two {what}s are named {twice[0]!r}: give each {what} its own name")
+        raise FloorPlanError(f"two {noun}s are named {twice[0]!r}: give each {noun} its own name")
     numbers: defaultdict[str, count[int]] = defaultdict(count)
     return [
         name or next(new for k in numbers[kind] if (new := f"{kind}_{k}") not in own)
@@ -59,7 +59,7 @@ def number_names(names: Sequence[str | None], types: Sequence[str], what: str) -
     ]
 
 
-def distinct_names(names: Sequence[str | None], what: str, notes: list[str]) -> list[str | None]:
+def distinct_names(names: Sequence[str | None], plural: str, notes: list[str]) -> list[str | None]:
     """Return names with a number added to those that occur before, and add a note for each.
 
     Example:
@@ -74,7 +74,7 @@ def distinct_names(names: Sequence[str | None], what: str, notes: list[str]) -> 
         if name is not None and name in used:
             candidates = (f"{name} {k}" for k in numbers[name])
             unique = next(new for new in candidates if new not in used and new not in names)
-            notes.append(f"several {what} are called {name}: one of them is {unique} here")
+            notes.append(f"several {plural} are called {name}: one of them is {unique} here")
         used |= {unique} if unique is not None else set()
         distinct.append(unique)
     return distinct

@@ -146,8 +146,8 @@ def verdict(difference: MeanEstimate, reference: str) -> str:
     units = difference.spread.units
     if math.isnan(difference.low):
         return "one pair only: no interval; run the study with more seeds and homes"
-    few = [f"{n} values of {level}" for level, n in units.items() if n < FEW_UNITS]
-    caution = f"; few replicates: {', '.join(few)}" if few else ""
+    scarce = [f"{n} values of {level}" for level, n in units.items() if n < FEW_UNITS]
+    caution = f"; few replicates: {', '.join(scarce)}" if scarce else ""
     if difference.low == difference.high == 0:
         return f"the same as {reference} in every pair"
     if difference.is_clear:

@@ -143,18 +143,18 @@ def _write_files(scratch: Path, name: str, journal: "Journal") -> dict[str, Path
     )
     files = {f"{RESULTS}/{name}.parquet": results}
     with ExitStack() as stack:
-        writers: dict[str, _TableWriter] = {}
+        writers: dict[str, _PartFileWriter] = {}
         for i, (table, schema) in enumerate(schemas.items()):
             local = scratch / f"{name}-table-{i}"
             files[f"{TABLES}/{table}/{name}.parquet"] = local
-            writers[table] = stack.enter_context(_TableWriter(local, schema))
+            writers[table] = stack.enter_context(_PartFileWriter(local, schema))
         for number in numbers:
             for table, rows in tables_of(journal.read(number)).items():
                 writers[table].write(number, rows)
     return files
 
 
-class _TableWriter:
+class _PartFileWriter:
     """Writes one Parquet file of a table. A row group holds the rows of one or more variants."""
 
     def __init__(self, path: Path, schema: "pa.Schema") -> None:
@@ -171,7 +171,7 @@ class _TableWriter:
         if sum(table.num_rows for table in self._buffer) >= ROWS_A_GROUP:
             self._flush()
 
-    def __enter__(self) -> "_TableWriter":
+    def __enter__(self) -> "_PartFileWriter":
         return self
 
     def __exit__(self, *_: object) -> None:

@@ -22,7 +22,7 @@ _numbers = itertools.count()
 
 
 @dataclass(eq=False)
-class _Actor:
+class _WorkerActor:
     """A worker on the cluster, as the driver knows it.
 
     Attributes:
@@ -63,7 +63,7 @@ class RayExecutor:
         if not self._was_joined:
             _join(self._ray, address)
         self._most = workers
-        self._crew: list[_Actor] = []
+        self._crew: list[_WorkerActor] = []
         self._failed_starts = 0
 
     @property
@@ -107,7 +107,7 @@ class RayExecutor:
                 self._crew.remove(actor)
         for _ in range(min(cores, len(self._crew) + len(tasks)) - len(self._crew)):
             handle = _worker_class(self._ray).remote([job_reference])
-            self._crew.append(_Actor(handle, handle.is_up.remote()))
+            self._crew.append(_WorkerActor(handle, handle.is_up.remote()))
         for actor in self._crew:
             while actor.is_ready and len(actor.tasks) < AHEAD:
                 task = tasks.take(actor.number)
@@ -115,7 +115,7 @@ class RayExecutor:
                     break
                 actor.tasks.append((task, actor.handle.run.remote(task)))
 
-    def _begin(self, actor: _Actor) -> None:
+    def _begin(self, actor: _WorkerActor) -> None:
         """Mark a worker as ready, or drop it if its set-up failed."""
         try:
             self._ray.get(actor.start)
@@ -127,7 +127,7 @@ class RayExecutor:
                 raise InputError(f"workers end before they are ready: {error}") from error
 
     def _take(
-        self, actor: _Actor, tasks: TaskSchedule, attempts: dict[int, int]
+        self, actor: _WorkerActor, tasks: TaskSchedule, attempts: dict[int, int]
     ) -> Generator[Event]:
         """Yield the event of the first task of a worker."""
         task, reference = actor.tasks.popleft()
@@ -140,7 +140,7 @@ class RayExecutor:
 
     def _replace(
         self,
-        actor: _Actor,
+        actor: _WorkerActor,
         running: WorkerTask,
         tasks: TaskSchedule,
         attempts: dict[int, int],

@@ -21,7 +21,7 @@ FAILURE_FOUND = 1
 
 
 def falsify(
-    what: Annotated[
+    target: Annotated[
         str,
         typer.Argument(
             metavar="SCENARIO.yaml|TEST.py::NAME",
@@ -55,8 +55,8 @@ def falsify(
     if out.exists():
         raise RunDirectoryError(f"{out} exists already: name another file by --out")
     tries, seconds = parse_budget(budget)
-    subject = subject_of(what)
-    _check_expects(subject, what)
+    subject = subject_of(target)
+    _check_expects(subject, target)
     space = read_space(parse_over(over))
     space.check(subject.base, subject.folder)
     job = TryJob(subject, space)
@@ -68,7 +68,7 @@ def falsify(
     if failure is None:
         _print_no_failure(search, job)
         return
-    for line in describe_failure(failure, job, what, out):
+    for line in describe_failure(failure, job, target, out):
         if not quiet:
             typer.echo(line)
     raise typer.Exit(FAILURE_FOUND)
@@ -99,7 +99,7 @@ def parse_budget(text: str) -> tuple[int, float | None]:
         ) from None
 
 
-def subject_of(what: str) -> "Subject":
+def subject_of(target: str) -> "Subject":
     """Return the subject of a search.
 
     Raises:
@@ -108,7 +108,7 @@ def subject_of(what: str) -> "Subject":
     from fleet2d.scenario.compose import compose
     from fleet2d.testing.search import Subject, claimed_test
 
-    path, separator, name = what.partition("::")
+    path, separator, name = target.partition("::")
     if separator:
         _, claim = claimed_test(Path(path), name)
         scenario = claim.scenario
@@ -116,34 +116,34 @@ def subject_of(what: str) -> "Subject":
     return Subject(compose(path), Path(path).absolute().parent)
 
 
-def _check_expects(subject: "Subject", what: str) -> None:
+def _check_expects(subject: "Subject", target: str) -> None:
     from fleet2d.scenario.model import scenario_of
 
     if subject.test is None and not scenario_of(subject.base, subject.folder).expect:
-        raise InputError(f"{what} has no expectations: add a section `expect`, or name a test")
+        raise InputError(f"{target} has no expectations: add a section `expect`, or name a test")
     subject.body()
 
 
-def describe_failure(failure: "FailingPoint", job: "TryJob", what: str, out: Path) -> list[str]:
+def describe_failure(failure: "FailingPoint", job: "TryJob", target: str, out: Path) -> list[str]:
     """Write the failing scenario, and its run beside it; return the lines of a report."""
     from fleet2d.testing.failure import describe_trial
 
     trial = job.run(failure.point, failure.seed)
     command = f"fleet2d test {out}"
     if job.subject.test is not None:
-        command = f"pytest {what} --fleet2d-scenario {out}"
+        command = f"pytest {target} --fleet2d-scenario {out}"
     point = job.space.text(failure.point)
     lines = [f"fails at try {failure.number}: {point}, seed {failure.seed}"]
     folder = out.with_suffix("")
     folder.mkdir(parents=True, exist_ok=True)
     lines += describe_trial(trial, job.subject.body(), folder, SHRINK_TRIES, command)
     reason = trial.failures[0].text.splitlines()[0]
-    out.write_text(_scenario_text(failure, job, what, out, reason), encoding="utf-8")
+    out.write_text(_scenario_text(failure, job, target, out, reason), encoding="utf-8")
     return [*lines, "", f"written: {out}"]
 
 
 def _scenario_text(
-    failure: "FailingPoint", job: "TryJob", what: str, out: Path, reason: str
+    failure: "FailingPoint", job: "TryJob", target: str, out: Path, reason: str
 ) -> str:
     """Return the YAML of a failing scenario: the file that it extends, and the changes."""
     from fleet2d.document import Document
@@ -152,7 +152,7 @@ def _scenario_text(
     content = Document()
     for keys, value in [(("simulation", "seed"), failure.seed), *job.space.changes(failure.point)]:
         content = merge(content, assignment(keys, value, ""))
-    source = what.partition("::")[0]
+    source = target.partition("::")[0]
     data: dict[str, Any]
     if job.subject.test is None:
         data = {"extends": os.path.relpath(source, out.parent), **content.data}
@@ -162,7 +162,7 @@ def _scenario_text(
         )
         data = scenario.resolved()
     body = yaml.safe_dump(_plain(data), sort_keys=False, allow_unicode=True)
-    return f"# This scenario fails, according to fleet2d falsify {what}: {reason}\n{body}"
+    return f"# This scenario fails, according to fleet2d falsify {target}: {reason}\n{body}"
 
 
 def _plain(value: Any) -> Any:

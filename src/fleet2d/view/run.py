@@ -69,7 +69,7 @@ WIDE_SEPARATOR = "   ·   "
 
 
 @dataclass(frozen=True)
-class Observations:
+class PlottedObservations:
     """The observations of the users in the picture; all arrays have one row for each."""
 
     step: NDArray[np.int64]
@@ -342,11 +342,11 @@ class _Picture:
         return f"{metres / 1000:.1f} km a day" if metres >= 1000 else f"{metres:.0f} m a day"
 
 
-def _observations(run: Run, users: list[str]) -> Observations:
+def _observations(run: Run, users: list[str]) -> PlottedObservations:
     """Return the observations of some users."""
     if "observations" not in run.tables:
         none = np.zeros(0, np.int64)
-        return Observations(none, none.astype(str), none.astype(str), np.zeros((0, 2)))
+        return PlottedObservations(none, none.astype(str), none.astype(str), np.zeros((0, 2)))
     table = run.tables["observations"]
     robot, user = (
         np.array([*names, ""])[code]
@@ -354,7 +354,7 @@ def _observations(run: Run, users: list[str]) -> Observations:
     )
     rows = np.isin(user, users)
     xy = np.stack([table["x"].to_numpy(), table["y"].to_numpy()], axis=1)
-    return Observations(table["step"].to_numpy()[rows], robot[rows], user[rows], xy[rows])
+    return PlottedObservations(table["step"].to_numpy()[rows], robot[rows], user[rows], xy[rows])
 
 
 def _notes_by_bodies(traces: list[BodyTrace]) -> Iterator[str]:

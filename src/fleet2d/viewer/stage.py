@@ -101,7 +101,7 @@ class Stage:
             self._axes.add_collection(lines, autolim=False)
         self._clock, self._away = self._write_head(axes)
         self._cursor = None if self._strip is None else self._fill_strip(self._strip)
-        self._observations = _Observations(self._part)
+        self._observations = _ObservationsByStep(self._part)
         self._scene: object = None
 
     @property
@@ -280,7 +280,7 @@ class Stage:
         return lines
 
 
-class _Observations:
+class _ObservationsByStep:
     """The observations of robots, by step."""
 
     def __init__(self, part: Run) -> None:

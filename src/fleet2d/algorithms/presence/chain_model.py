@@ -105,11 +105,11 @@ def split(places: list[F64], users: int, bins: Bins | None) -> tuple[F64, F64]:
         users: Number of users; without users there is one person, of anyone.
         bins: The evidence, in which unknown people may be seen; None: no unknown people.
     """
-    everybody = places[0][:, np.newaxis]
+    rows = places[0][:, np.newaxis]
     if users:
-        nobody = np.zeros((len(places[0]), places[0].shape[1] - 1), bool)
-        everybody = with_anyone(places, nobody if bins is None else unknown_seen(bins))
-    return normalized(np.maximum(everybody[..., :-1], 0)), np.clip(everybody[..., -1], 0, 1)
+        no_unknown = np.zeros((len(places[0]), places[0].shape[1] - 1), bool)
+        rows = with_anyone(places, no_unknown if bins is None else unknown_seen(bins))
+    return normalized(np.maximum(rows[..., :-1], 0)), np.clip(rows[..., -1], 0, 1)
 
 
 class Follower:

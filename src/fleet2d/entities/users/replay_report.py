@@ -25,8 +25,8 @@ def report_rooms(
     lines = [_head(log, len(log.readings), "readings"), *log.notes]
     for label, count in sorted(log.rooms.items()):
         choice = mapped[label]
-        what = "left out" if choice is None else f"taken for {choice[0]}"
-        lines.append(f"{label}: {what}, {count} readings")
+        meaning = "left out" if choice is None else f"taken for {choice[0]}"
+        lines.append(f"{label}: {meaning}, {count} readings")
     if logged.overruled:
         lines.append(
             f"{logged.overruled} readings yield to later ones of another room in their step"
@@ -74,7 +74,7 @@ def report_fixes(
     return tuple(lines)
 
 
-def _head(log: ActivityLog | PositionLog, count: int, what: str) -> str:
+def _head(log: ActivityLog | PositionLog, count: int, noun: str) -> str:
     since = f" from {log.first_day}" if log.first_day else ""
     days = f"{log.days} day{'' if log.days == 1 else 's'}"
-    return f"{log.path.name}, layout {log.layout}: {count} {what} of {days}{since}"
+    return f"{log.path.name}, layout {log.layout}: {count} {noun} of {days}{since}"

@@ -116,7 +116,7 @@ def read_geojson(
 
 
 @dataclass
-class _Door:
+class _DrawnDoor:
     """A doorway of the file, and its passage through the wall."""
 
     feature: Feature
@@ -139,7 +139,7 @@ class _Draft:
         self.notes = notes
         self.rooms = [_areas([room]) for room in self._of("room")]
         self.free = self._free(wall_m)
-        self.doors: list[_Door] = []
+        self.doors: list[_DrawnDoor] = []
         self.ways_out: list[Passage] = []
         self._cut_doors()
 
@@ -211,7 +211,7 @@ class _Draft:
                 out = next((p for p in passages if p), None)
                 name = feature.text("name") or feature.where
                 if through:
-                    self.doors.append(_Door(feature, through))
+                    self.doors.append(_DrawnDoor(feature, through))
                     cuts += [through.opening] if through.halves else []
                 elif out:
                     self.ways_out.append(out)

@@ -172,12 +172,12 @@ def _free_pixels(layers: list[PixelLayer], box: PixelBox, notes: list[str]) -> M
             floor[window] |= part.paint(layer.runs)
         if layer.kind == "segment":
             segments_at[window] += part.paint(layer.runs)
-    for both, what in (
+    for both, reason in (
         (floor & wall, "floor and wall: they count as wall"),
         (segments_at > 1, "in several segments: they belong to the smallest of those"),
     ):
         if both.any():
-            notes.append(f"{np.count_nonzero(both)} pixels are {what}")
+            notes.append(f"{np.count_nonzero(both)} pixels are {reason}")
     return floor & ~wall
 
 
@@ -225,7 +225,7 @@ def _no_go_areas(
     """Return the areas that robots keep out of [m]; no-go areas as walls change `free` instead."""
     pixel_m = pixel_side(content)
     areas: list[Polygon] = []
-    for kind, what in (("no_go_area", "no-go areas"), ("virtual_wall", "virtual walls")):
+    for kind, noun in (("no_go_area", "no-go areas"), ("virtual_wall", "virtual walls")):
         shapes = []
         for entity, where in entities_of(content, kind):
             shape = _no_go_shape(read_points(entity, where) / pixel_m, kind)
@@ -244,7 +244,7 @@ def _no_go_areas(
                 _remove_pixels(shape, free, box)
             area = (before - np.count_nonzero(free)) * pixel_m**2
             effect = f"obstacles on {area:.2f} m2 of floor"
-        notes.append(f"{what} in the map: {len(shapes)}, {effect}")
+        notes.append(f"{noun} in the map: {len(shapes)}, {effect}")
     return areas
 
 

@@ -164,16 +164,16 @@ def read_layers(content: dict[str, Any], notes: list[str]) -> list[PixelLayer]:
             continue
         runs = _runs(layer, where)
         name, is_named = _segment_name(layer, len(layers))
-        what = f"the segment {name}" if kind == "segment" else f"the layer {where}, {kind},"
+        subject = f"the segment {name}" if kind == "segment" else f"the layer {where}, {kind},"
         if not len(runs):
-            notes.append(f"{what} has no pixels: ignored")
+            notes.append(f"{subject} has no pixels: ignored")
             continue
         dimensions = layer.get("dimensions")
         stated = dimensions.get("pixelCount") if isinstance(dimensions, dict) else None
         pixels = int(np.count_nonzero(PixelBox.around(runs).paint(runs)))
         if stated is not None and stated != pixels:
             notes.append(
-                f"{what} has {pixels} pixels, though its pixelCount says {shown_value(stated)}"
+                f"{subject} has {pixels} pixels, though its pixelCount says {shown_value(stated)}"
             )
         layers.append(PixelLayer(kind, name, is_named, runs))
     if all(layer.kind == "wall" for layer in layers):
@@ -203,14 +203,14 @@ def _runs(layer: dict[str, Any], where: str) -> NDArray[np.int64]:
 
 
 def _whole_numbers(
-    layer: dict[str, Any], key: str, group: int, what: str, where: str
+    layer: dict[str, Any], key: str, group: int, meaning: str, where: str
 ) -> NDArray[np.int64]:
     """Return a flat list of whole numbers in groups, int64 (n, group)."""
     values = validate(_PIXELS, layer.get(key) or [], f"{where}.{key}")
     if len(values) % group:
         raise FloorPlanError(
-            f"{where}.{key} has {len(values)} numbers, which is not a multiple of {group} ({what}):"
-            " it is cut off"
+            f"{where}.{key} has {len(values)} numbers, which is not a multiple of {group}"
+            f" ({meaning}): it is cut off"
         )
     return np.array(values, np.int64).reshape(-1, group)
 

@@ -329,10 +329,10 @@ def _corner(
     nearest = int(np.argmin((rows - rows.mean()) ** 2 + (columns - columns.mean()) ** 2))
     cell = plan.lattice.cell_centre(int(rows[nearest]), int(columns[nearest]))
     x, y = plan.lattice.to_metres(cell).tolist()
-    what = f"{len(rows) * plan.lattice.cell**2:.1f} m2 of {room.name}, at ({x:.2f}, {y:.2f}) m"
-    text = f"{body} can't get to {what}"
+    corner = f"{len(rows) * plan.lattice.cell**2:.1f} m2 of {room.name}, at ({x:.2f}, {y:.2f}) m"
+    text = f"{body} can't get to {corner}"
     if empty is not None and empty.part_of_cell[rows[nearest], columns[nearest]] == 0:
-        text = f"furniture keeps {body} out of {what}"
+        text = f"furniture keeps {body} out of {corner}"
     return Finding("room", "wrong", text, (x, y))
 
 

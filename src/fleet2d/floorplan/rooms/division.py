@@ -209,8 +209,8 @@ def _merge_labels(regions: list[Region], into: Mapping[int, int]) -> list[str]:
         if other != box:
             types = tuple(dict.fromkeys(regions[other].types + regions[box].types))
             regions[other] = replace(regions[other], types=types)
-            what, with_what = (" and ".join(regions[k].types) for k in (box, other))
-            notes.append(f"a region {what} lies under smaller ones: it is one room, {with_what}")
+            names, all_names = (" and ".join(regions[k].types) for k in (box, other))
+            notes.append(f"a region {names} lies under smaller ones: it is one room, {all_names}")
     return notes
 
 
