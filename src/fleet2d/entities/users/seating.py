@@ -30,7 +30,7 @@ Places = Mapping[tuple[int, int], Seat | None]
 """The place of each member's doing, by the numbers of both; None: others have all places."""
 
 
-class Claim(NamedTuple):
+class SeatClaim(NamedTuple):
     """A time in which a member wants a place at furniture.
 
     Attributes:
@@ -132,12 +132,12 @@ class Seating:
         taken = self._taken.get(self._spot[seat], ())
         return all(end <= time[0] or begin >= time[1] for begin, end in taken)
 
-    def _by_preference(self, claim: Claim, ordinal: int) -> Sequence[Seat]:
+    def _by_preference(self, claim: SeatClaim, ordinal: int) -> Sequence[Seat]:
         address = ordinal * DOINGS_A_DAY + claim.doings[0]
         first = Draws(self._keys[claim.rank], address).below(claim.own)
         return (claim.seats[first], *claim.seats[:first], *claim.seats[first + 1 :])
 
-    def _claims(self, ordinal: int) -> Iterator[Claim]:
+    def _claims(self, ordinal: int) -> Iterator[SeatClaim]:
         """Yield the claims of all members on a day."""
         midnight, days = ordinal * DAY_S, self._lives.day(ordinal)
         for rank, name in self._members.items():
@@ -148,7 +148,7 @@ class Seating:
                 if seats:
                     begin, end = midnight + first.begin, midnight + doings[numbers[-1]].end
                     is_asleep = first.activity == SLEEP
-                    yield Claim(is_asleep, begin, rank, end, tuple(numbers), seats, own)
+                    yield SeatClaim(is_asleep, begin, rank, end, tuple(numbers), seats, own)
 
     def _wanted_by(self, rank: int, doing: Doing) -> tuple[Sequence[Seat], int]:
         """Return the places that a member may have for a doing, and how many are its own."""
