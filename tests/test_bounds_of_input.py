@@ -264,7 +264,7 @@ def test_a_bound_is_raised_by_the_environment(
     with pytest.raises(InputError, match="this is a list"):
         read_document(path)
     monkeypatch.setenv("FLEET2D_MAX_DEPTH", "many")
-    with pytest.raises(InputError, match="FLEET2D_MAX_DEPTH is 'many': a whole number"):
+    with pytest.raises(InputError, match="FLEET2D_MAX_DEPTH: expected a whole number"):
         read_document(path)
     monkeypatch.setenv("FLEET2D_MAX_FILE_BYTES", "10")
     with pytest.raises(InputError, match="140 bytes, and at most 10"):
