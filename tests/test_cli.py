@@ -405,6 +405,65 @@ def test_help_lists_the_commands(fleet2d: Cli) -> None:
         assert command in out
 
 
+# What the bundled scenario doesn't use, and other scenarios or commands do.
+UNUSED = (
+    "fleet2d.algorithms.presence.fremen",
+    "fleet2d.algorithms.presence.real_time",
+    "fleet2d.calibrate",
+    "fleet2d.engine.expect",
+    "fleet2d.engine.gauges",
+    "fleet2d.engine.resume",
+    "fleet2d.entities.users.guest",
+    "fleet2d.expectations",
+    "fleet2d.fit",
+    "fleet2d.interventions.algorithms",
+    "fleet2d.interventions.bodies",
+    "fleet2d.interventions.home",
+    "fleet2d.interventions.people",
+    "fleet2d.interventions.perception",
+    "fleet2d.interventions.robots",
+    "fleet2d.interventions.sensors",
+    "fleet2d.logs",
+    "fleet2d.paper",
+    "fleet2d.published",
+    "fleet2d.search",
+    "fleet2d.studies",
+    "fleet2d.testing",
+    "fleet2d.view",
+    "fleet2d.viewer",
+)
+# The packages of others that a run needs, and what these need in turn.
+USED = {
+    "annotated_doc", "annotated_types", "cloudpickle", "cython_runtime", "numpy", "pyarrow", "pydantic", "pydantic_core", "shapely",
+    "shellingham", "typer", "typing_extensions", "typing_inspection", "yaml",
+}  # fmt: skip
+
+
+def test_run_imports_only_what_its_scenario_needs(tmp_path: Path) -> None:
+    script = """
+import json, sys
+from fleet2d.cli import main
+before = set(sys.modules)
+try:
+    main()
+except SystemExit:
+    print(json.dumps([sorted(sys.modules), sorted(before)]))
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", script, "run", "simulation.duration=1 min", "--quiet", "--seed", "1"],
+        capture_output=True, text=True, check=True, cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+    )  # fmt: skip
+    modules, before = map(set, json.loads(done.stdout))
+    others = {m.partition(".")[0] for m in modules - before} - sys.stdlib_module_names - {"fleet2d"}
+
+    assert [] == sorted(
+        m for m in modules if m in UNUSED or m.startswith(tuple(f"{u}." for u in UNUSED))
+    )
+    assert set() == {name for name in others if not name.startswith("_")} - USED
+    assert not {"typer", "pydantic", "numpy"} & before  # `main` sets what they read first
+
+
 def test_modules_are_imported_with_few_collections_of_garbage(tmp_path: Path) -> None:
     """They were a tenth of the time until the first step."""
     script = """

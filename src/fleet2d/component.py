@@ -260,14 +260,14 @@ def _registered(kind: str, name: str) -> type[Component] | None:
 
 
 def _import_builtins(kind: str, name: str | None = None) -> None:
-    """Import a kind's modules, or, if there is one called ``name``, only that module."""
+    """Import a kind's modules, or, if one is called like the begin of ``name``, only that one."""
     if kind in _COMPLETE or kind not in PACKAGES:
         return
     package = importlib.import_module(PACKAGES[kind])
     modules = sorted(
         m.name for m in pkgutil.walk_packages(package.__path__, f"{package.__name__}.")
     )
-    for module in [m for m in modules if name and m.rpartition(".")[2] == name]:
+    for module in [m for m in modules if name and name.startswith(m.rpartition(".")[2])]:
         importlib.import_module(module)
         if name and _registered(kind, name):
             return

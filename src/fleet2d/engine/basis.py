@@ -7,7 +7,6 @@ from fleet2d.clock import Clock
 from fleet2d.engine.bodies import Bodies
 from fleet2d.entities.decisions import DecidingActor
 from fleet2d.floorplan.home.home import Home
-from fleet2d.interventions.home import HomeIntervention
 from fleet2d.scenario.model import Scenario
 
 
@@ -47,5 +46,9 @@ class Basis:
     def may_change(self) -> bool:
         """Whether the home may change during the run."""
         scenario = self.scenario
+        if not scenario.script:
+            return bool(scenario.objects or scenario.changes)
+        from fleet2d.interventions.home import HomeIntervention  # only scripts need it
+
         moves = any(isinstance(entry.act, HomeIntervention) for entry in scenario.script)
         return bool(scenario.objects or scenario.changes or moves)

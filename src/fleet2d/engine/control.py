@@ -20,8 +20,6 @@ from fleet2d.errors import InputError, ScenarioError
 from fleet2d.events import Event, EventKind, Listener
 from fleet2d.floorplan.home.change import HomeChange
 from fleet2d.floorplan.home.home import Home
-from fleet2d.interventions.bodies import Decide, Drive
-from fleet2d.interventions.home import Change
 from fleet2d.interventions.intervention import Intervention, parse_intervention
 from fleet2d.interventions.script import WHEN, parse_entry
 from fleet2d.interventions.verbs import Verbs
@@ -289,7 +287,7 @@ class Steering(Verbs):
             change = HomeChange(**keys) if change is None else change
         except ValidationError as error:
             raise ScenarioError(f"change(): {error.errors()[0]['msg']}") from None
-        self.intervene(Change(change=change))
+        self._do("change", change=change)
 
     def drive(self, name: str) -> None:
         """Take over the decisions of a body: see `pending` and `advance`.
@@ -298,7 +296,7 @@ class Steering(Verbs):
             ScenarioError: There is no such body.
         """
         row = list(self.actors).index(self._body(name).name)
-        self.intervene(Drive(entity=name))
+        self._do("drive", entity=name)
         self._state.driven.add(row)
         self._state.bodies.ask_at[row] = self.step
 
@@ -328,7 +326,7 @@ class Steering(Verbs):
         row = list(self.actors).index(self._body(name).name)
         if row not in self._state.driven:
             raise InputError(f"{name} isn't driven, it decides itself: call drive({name!r}) first")
-        self.intervene(Decide(entity=name, plan=data_of(plan)))
+        self._do("decide", entity=name, plan=data_of(plan))
 
     def _take_decisions(self, plans: Mapping[str, Plan]) -> None:
         """Follow plans from outside up to the next step at which a driven body has to decide."""

@@ -9,7 +9,8 @@ import numpy as np
 from fleet2d.artifacts.store import RunStore
 from fleet2d.artifacts.table import Column, TableSpec
 from fleet2d.clock import Clock
-from fleet2d.engine.gauges import BatteryGauge, Block, Gauge, ValueGauge
+from fleet2d.engine.block import Block
+from fleet2d.engine.gauges import BatteryGauge, Gauge, ValueGauge
 from fleet2d.engine.learners import Learners
 from fleet2d.engine.tables import STEP, TIME
 from fleet2d.entities.actor import Actor

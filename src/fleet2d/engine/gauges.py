@@ -1,18 +1,16 @@
 """Gauges: they measure the signals of expectations during a run, block by block."""
 
 from collections.abc import Callable, Sequence, Set
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fleet2d.algorithms.activities import ROBOT
-from fleet2d.algorithms.log import SensorRow
-from fleet2d.engine.bodies import Bodies
+from fleet2d.engine.block import Block
 from fleet2d.entities.actor import Actor
 from fleet2d.entities.battery import Course
-from fleet2d.events import Event, EventKind
+from fleet2d.events import EventKind
 from fleet2d.expectations import states
 from fleet2d.expectations.trace import Trace, constant, joined, pulses, shortest
 from fleet2d.floorplan.home.home import Home
@@ -25,31 +23,6 @@ I64 = NDArray[np.int64]
 # The charge of a battery is rounded down to thousandths; errors of floats must not lower it.
 PARTS = 1000
 ROUNDING = 1e-9
-
-
-@dataclass
-class Block:
-    """The steps from `first` to `end` - 1, in which the home doesn't change.
-
-    Attributes:
-        first: The first step.
-        end: The step after the last one.
-        bodies: The bodies and their poses.
-        home: The home in these steps.
-        observations: The observations of robots, int64 (n, OBSERVATION).
-        readings: The readings of sensors.
-        sensors: Names of the sensors, in the order of their numbers.
-        events: The events, in order of step.
-    """
-
-    first: int
-    end: int
-    bodies: Bodies
-    home: Home
-    observations: I64
-    readings: Sequence[SensorRow]
-    sensors: Sequence[str]
-    events: Sequence[Event] = ()
 
 
 class Gauge:

@@ -1,21 +1,24 @@
-"""Expectations of a simulation from outside, and their verdicts."""
+"""Expectations of a simulation from outside, and their verdicts.
+
+What reads and measures them is imported when a run has some.
+"""
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from fleet2d.artifacts.manifest import Status
 from fleet2d.engine.control import Steering
-from fleet2d.engine.expect import expect
 from fleet2d.errors import InputError
-from fleet2d.expectations.expectation import Expectation
-from fleet2d.expectations.parse import parse_expectation
-from fleet2d.expectations.verdict import Verdict
+
+if TYPE_CHECKING:
+    from fleet2d.expectations.expectation import Expectation
+    from fleet2d.expectations.verdict import Verdict
 
 
 class Judging(Steering):
     """The part of a simulation that adds and judges expectations."""
 
-    def expect(self, expectation: Expectation | str, name: str = "") -> str:
+    def expect(self, expectation: "Expectation | str", name: str = "") -> str:
         """Expect something from the next step on; the verdict is in the run's manifest.
 
         Args:
@@ -42,14 +45,15 @@ class Judging(Steering):
             raise InputError(
                 "the run is finished: add expectations before its end, or call judge(…) on the run"
             )
-        if isinstance(expectation, str):
-            expectation = parse_expectation(expectation)
+        from fleet2d.engine.expect import expect
+
+        expectation = _parsed(expectation)
         self._state.settle(self.step)
         name = name or str(expectation)
         expect(self._state, self.scenario, self.clock, name, expectation, self.step)
         return name
 
-    def verdicts(self) -> dict[str, Verdict]:
+    def verdicts(self) -> "dict[str, Verdict]":
         """Return the present verdicts on all expectations, by name.
 
         A verdict that can't change any more is `decided`; a test may end then.
@@ -60,14 +64,13 @@ class Judging(Steering):
             self._state.settle(self.step)
         return self._state.expectations.verdicts(ended=self.done)
 
-    def judge(self, expectation: Expectation | str, name: str = "") -> Verdict:
+    def judge(self, expectation: "Expectation | str", name: str = "") -> "Verdict":
         """Return the verdict on an expectation from the step on at which it was first requested.
 
         Raises:
             InputError: See `expect`; or no step has been simulated since.
         """
-        if isinstance(expectation, str):
-            expectation = parse_expectation(expectation)
+        expectation = _parsed(expectation)
         name = name or str(expectation)
         expectations = self._state.expectations
         if expectations is None or name not in expectations.entries:
@@ -92,6 +95,14 @@ class Judging(Steering):
         """Add the expectations of a stored run that are not in its scenario."""
         for name, content in expectations.items():
             if name not in self.scenario.expect:
-                expectation = parse_expectation(content["expectation"])
+                from fleet2d.engine.expect import expect
+
+                expectation = _parsed(content["expectation"])
                 first = content["first"]
                 expect(self._state, self.scenario, self.clock, name, expectation, first)
+
+
+def _parsed(expectation: "Expectation | str") -> "Expectation":
+    from fleet2d.expectations.parse import parse_expectation
+
+    return parse_expectation(expectation) if isinstance(expectation, str) else expectation

@@ -13,7 +13,6 @@ from fleet2d.engine.cameras import Cameras, open_cameras
 from fleet2d.engine.changes import Changes
 from fleet2d.engine.clearance import Clearance
 from fleet2d.engine.encounters import Encounters
-from fleet2d.engine.expect import expect
 from fleet2d.engine.interventions import Interventions
 from fleet2d.engine.layers import LayerBook, lay_layers
 from fleet2d.engine.learners import Learners
@@ -27,7 +26,7 @@ from fleet2d.entities.objects.door import Door
 from fleet2d.errors import PlacementError, ScenarioError
 from fleet2d.events import EventKind, EventStream
 from fleet2d.floorplan.home.home import Home
-from fleet2d.interventions.robots import causes_errors
+from fleet2d.interventions.script import causes_errors
 from fleet2d.problems import suggest
 from fleet2d.scenario.model import Scenario
 
@@ -86,6 +85,8 @@ def set_up(scenario: Scenario, clock: Clock, seed: int, store: RunStore) -> Stat
         with _locate_errors(scenario, path), _prefix_errors(path):
             schedule(state, entry, 0, index)
     for name, expectation in scenario.expect.items():
+        from fleet2d.engine.expect import expect  # with much that other scenarios don't need
+
         with _locate_errors(scenario, f"expect.{name}"):
             expect(state, scenario, clock, name, expectation, 0)
     return state

@@ -7,12 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fleet2d.algorithms.output import to_columns
+from fleet2d.engine.block import Block
 from fleet2d.engine.cameras import Cameras
 from fleet2d.engine.gauges import (
     ActivityGauge,
     AwayGauge,
     BatteryGauge,
-    Block,
     DistanceGauge,
     DoorGauge,
     EventGauge,

@@ -3,7 +3,7 @@
 from collections.abc import Sequence, Set
 from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,14 +12,13 @@ from fleet2d.algorithms.activities import ROBOT
 from fleet2d.algorithms.log import Log
 from fleet2d.algorithms.observations import OBSERVATION
 from fleet2d.artifacts.store import RunStore
+from fleet2d.engine.block import Block
 from fleet2d.engine.blocking import BlockedWays
 from fleet2d.engine.bodies import Bodies
 from fleet2d.engine.cameras import Cameras
 from fleet2d.engine.changes import Changes
 from fleet2d.engine.clearance import Clearance
 from fleet2d.engine.encounters import Encounters
-from fleet2d.engine.expectations import RunExpectations
-from fleet2d.engine.gauges import Block
 from fleet2d.engine.interventions import Interventions
 from fleet2d.engine.layers import LayerBook
 from fleet2d.engine.learners import Learners
@@ -32,6 +31,9 @@ from fleet2d.events import Event, EventKind, EventStream
 from fleet2d.floorplan.home.home import Home
 from fleet2d.kernels.look import SIGHTING
 from fleet2d.kernels.look import STEP as STEP_COLUMN
+
+if TYPE_CHECKING:
+    from fleet2d.engine.expectations import RunExpectations
 
 # The most steps that watchers process together: fewer if there are many bodies.
 MOST_STEPS = 1 << 16
@@ -93,7 +95,7 @@ class State:
     driven: set[int] = field(default_factory=set)
     requested: frozenset[str] = frozenset()
     awaited: frozenset[str] = frozenset()
-    expectations: RunExpectations | None = None
+    expectations: "RunExpectations | None" = None
     notes_emitted: list[int] = field(init=False)
 
     def __post_init__(self) -> None:

@@ -1,9 +1,7 @@
 """Fields of a scenario that hold expectations: text, or a mapping from operators to conditions."""
 
 from collections.abc import Mapping
-from typing import Annotated, Any
-
-from pydantic import BeforeValidator, PlainSerializer, WithJsonSchema
+from typing import Any
 
 from fleet2d.errors import InputError
 from fleet2d.expectations import vocabulary
@@ -119,24 +117,17 @@ def _refuse(value: Mapping[str, Any], operator: str, *keys: str) -> None:
             raise problem_at((key,), f"{key!r} can't be combined with {operator}")
 
 
-ExpectationField = Annotated[
-    Any,
-    BeforeValidator(read_expectation),
-    PlainSerializer(str, return_type=str, when_used="json"),
-    WithJsonSchema(
+JSON_SCHEMA: dict[str, Any] = {
+    "description": "an expectation: text such as always(distance(ana, astro) > 0.5 m), or the same"
+    " as a mapping",
+    "anyOf": [
+        {"type": "string"},
         {
-            "description": "an expectation: text such as always(distance(ana, astro) > 0.5 m), or"
-            " the same as a mapping",
-            "anyOf": [
-                {"type": "string"},
-                {
-                    "type": "object",
-                    "properties": {key: {} for key in KEYS},
-                    "additionalProperties": False,
-                },
-            ],
-            "examples": ["always(distance(ana, astro) > 0.5 m)"],
-        }
-    ),
-]
-"""Type of the fields of a scenario that hold an expectation; an `Expectation` in Python."""
+            "type": "object",
+            "properties": {key: {} for key in KEYS},
+            "additionalProperties": False,
+        },
+    ],
+    "examples": ["always(distance(ana, astro) > 0.5 m)"],
+}
+"""What `read_expectation` reads."""

@@ -3,11 +3,11 @@
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from datetime import timedelta
-from typing import Any
+from typing import Any, cast
 
 from pydantic import ValidationError
 
-from fleet2d.interventions import bodies, people
+from fleet2d.component import lookup
 from fleet2d.interventions.intervention import Intervention, refusal
 
 Time = str | timedelta
@@ -56,7 +56,7 @@ class BodyVerbs(ABC):
             >>> simulation.state["ana"]["room"].startswith("kitchen")
             True
         """
-        self._do(bodies.Put, entity=name, to=to, heading_deg=heading_deg)
+        self._do("put", entity=name, to=to, heading_deg=heading_deg)
 
     def send(
         self,
@@ -86,7 +86,7 @@ class BodyVerbs(ABC):
             >>> simulation.state["ana"]["room"]
             'kitchen_0'
         """
-        self._do(bodies.Send, entity=name, to=to, heading_deg=heading_deg, duration=duration)
+        self._do("send", entity=name, to=to, heading_deg=heading_deg, duration=duration)
 
     def hold(self, name: str, *, duration: Time | None = None) -> None:
         """Let a body stand still where it is, for a duration or until it is released.
@@ -94,7 +94,7 @@ class BodyVerbs(ABC):
         Raises:
             ScenarioError: There is no such person or robot.
         """
-        self._do(bodies.HoldStill, entity=name, duration=duration)
+        self._do("hold", entity=name, duration=duration)
 
     def release(self, name: str) -> None:
         """Return a body to the control of its own behaviors.
@@ -102,7 +102,7 @@ class BodyVerbs(ABC):
         Raises:
             ScenarioError: There is no such person or robot.
         """
-        self._do(bodies.Release, entity=name)
+        self._do("release", entity=name)
 
     def replan(self, name: str) -> None:
         """Let a body's behaviors decide anew at the present step, whatever it is doing.
@@ -110,7 +110,7 @@ class BodyVerbs(ABC):
         Raises:
             ScenarioError: There is no such person or robot.
         """
-        self._do(bodies.Replan, entity=name)
+        self._do("replan", entity=name)
 
     # People
 
@@ -120,7 +120,7 @@ class BodyVerbs(ABC):
         Raises:
             ScenarioError: There is no such person.
         """
-        self._do(people.Away, entity=name, duration=duration)
+        self._do("away", entity=name, duration=duration)
 
     def call_home(
         self, name: str, to: Any = ("living_room", "any"), *, duration: Time | None = None
@@ -131,7 +131,7 @@ class BodyVerbs(ABC):
             ScenarioError: There is no such person.
             PlacementError: There is no such place, or it can't be reached.
         """
-        self._do(people.CallHome, entity=name, to=to, duration=duration)
+        self._do("call_home", entity=name, to=to, duration=duration)
 
     def guest(self, name: str, to: Any = ("living_room", "any"), *, duration: Time = "2 h") -> None:
         """Let a guest, a user with the behavior `guest`, come, stay for a duration, and leave.
@@ -140,7 +140,7 @@ class BodyVerbs(ABC):
             ScenarioError: There is no such person, or the person is not a guest.
             PlacementError: There is no such place, or it can't be reached.
         """
-        self._do(people.LetIn, entity=name, to=to, duration=duration)
+        self._do("guest", entity=name, to=to, duration=duration)
 
     def activity(
         self, name: str, what: str, to: Any = None, *, duration: Time | None = None
@@ -157,11 +157,13 @@ class BodyVerbs(ABC):
             ScenarioError: There is no such person, or no place for that activity.
             PlacementError: There is no such place, or it can't be reached.
         """
-        self._do(people.StartActivity, entity=name, what=what, to=to, duration=duration)
+        self._do("activity", entity=name, what=what, to=to, duration=duration)
 
-    def _do(self, verb: type[Intervention], **fields: Any) -> None:
+    def _do(self, verb: str, **fields: Any) -> None:
+        """Apply an intervention; its module is imported when it is first used."""
+        intervention = cast(type[Intervention], lookup("intervention", verb))
         try:
-            act = verb(**{key: value for key, value in fields.items() if value is not None})
+            act = intervention(**{key: value for key, value in fields.items() if value is not None})
         except ValidationError as error:
-            raise refusal(f"{verb.type_name}()", error) from None
+            raise refusal(f"{verb}()", error) from None
         self.intervene(act)

@@ -280,14 +280,6 @@ def check_camera(actor: Actor, camera: bool | str | None) -> None:
         raise ScenarioError(f"{actor.name} has no camera {name!r}{suggest(name, eyes, 'It has')}")
 
 
-def causes_errors(act: Intervention, robot: str) -> bool:
-    """Whether an intervention lets a robot perceive something wrong."""
-    disturbance = getattr(act, "disturbance", None)
-    if disturbance is None or getattr(act, "entity", None) != robot:
-        return False
-    return bool(disturbance.errs or disturbance.mistaken or disturbance.injected)
-
-
 def check_truth(world: World, name: str) -> None:
     """Refuse to let a robot perceive an unknown person where no table can store that.
 

@@ -97,3 +97,11 @@ def parse_entry(content: Mapping[str, Any]) -> Entry:
         return Entry.model_validate(dict(content))
     except ValidationError as error:
         raise refusal("", error) from None
+
+
+def causes_errors(act: Intervention, robot: str) -> bool:
+    """Whether an intervention lets a robot perceive something wrong."""
+    disturbance = getattr(act, "disturbance", None)
+    if disturbance is None or getattr(act, "entity", None) != robot:
+        return False
+    return bool(disturbance.errs or disturbance.mistaken or disturbance.injected)

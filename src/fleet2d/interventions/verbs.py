@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from typing import Any
 
 from fleet2d.entities.objects.sensor import SensorFault
-from fleet2d.interventions import algorithms, home, perception, robots, sensors
 from fleet2d.interventions.body_verbs import BodyVerbs, Time
 
 
@@ -39,7 +38,7 @@ class Verbs(BodyVerbs):
             ScenarioError: There is no such robot, or none of its behaviors responds.
             PlacementError: There is no such place, or it can't be reached.
         """
-        self._do(robots.Call, entity=name, to=to, find=find, dock=dock, command=command)
+        self._do("call", entity=name, to=to, find=find, dock=dock, command=command)
 
     def battery(self, name: str, charge: float | str) -> None:
         """Set the charge of a robot's battery: 0.2, or "20 %".
@@ -47,7 +46,7 @@ class Verbs(BodyVerbs):
         Raises:
             ScenarioError: There is no such robot, or it has no battery.
         """
-        self._do(robots.SetBattery, entity=name, charge=charge)
+        self._do("battery", entity=name, charge=charge)
 
     def switch_off(
         self,
@@ -69,7 +68,7 @@ class Verbs(BodyVerbs):
             ScenarioError: There is nothing of that name.
         """
         fields = {"camera": camera, "behavior": behavior, "duration": duration}
-        self._do(robots.SwitchOff, entity=name, **fields)
+        self._do("switch_off", entity=name, **fields)
 
     def switch_on(
         self, name: str, *, camera: bool | str | None = None, behavior: str | None = None
@@ -79,7 +78,7 @@ class Verbs(BodyVerbs):
         Raises:
             ScenarioError: There is nothing of that name.
         """
-        self._do(robots.SwitchOn, entity=name, camera=camera, behavior=behavior)
+        self._do("switch_on", entity=name, camera=camera, behavior=behavior)
 
     def fault(
         self,
@@ -105,7 +104,7 @@ class Verbs(BodyVerbs):
             ScenarioError: There is no such robot or camera, or nothing fails.
         """
         fields = {"wheels": wheels, "dark": dark, "detection": detection, "errs": errs}
-        self._do(robots.Fault, entity=name, duration=duration, **fields)
+        self._do("fault", entity=name, duration=duration, **fields)
 
     def restore(self, name: str) -> None:
         """End all that lasts on a robot, a sensor or an algorithm: faults, switches and the like.
@@ -113,7 +112,7 @@ class Verbs(BodyVerbs):
         Raises:
             ScenarioError: There is nothing of that name.
         """
-        self._do(sensors.Restore, name=name)
+        self._do("restore", name=name)
 
     # What robots perceive
 
@@ -125,7 +124,7 @@ class Verbs(BodyVerbs):
         Raises:
             ScenarioError: There is no such robot, camera or person.
         """
-        self._do(perception.Suppress, entity=name, user=user, camera=camera, duration=duration)
+        self._do("suppress", entity=name, user=user, camera=camera, duration=duration)
 
     def mistake(
         self,
@@ -142,7 +141,7 @@ class Verbs(BodyVerbs):
             ScenarioError: There is no such robot, camera or person.
         """
         fields = {"camera": camera, "duration": duration}
-        self._do(perception.Mistake, entity=name, user=user, taken_for=taken_for, **fields)
+        self._do("mistake", entity=name, user=user, taken_for=taken_for, **fields)
 
     def inject(
         self,
@@ -169,7 +168,7 @@ class Verbs(BodyVerbs):
             PlacementError: The spot is outside the home.
         """
         fields = {"heading_deg": heading_deg, "camera": camera, "duration": duration}
-        self._do(perception.Inject, entity=name, user=user, spot=spot, **fields)
+        self._do("inject", entity=name, user=user, spot=spot, **fields)
 
     # Algorithms
 
@@ -179,7 +178,7 @@ class Verbs(BodyVerbs):
         Raises:
             ScenarioError: There is no such algorithm.
         """
-        self._do(algorithms.Reset, algorithm=algorithm, learned=learned)
+        self._do("reset", algorithm=algorithm, learned=learned)
 
     def replace(
         self,
@@ -205,7 +204,7 @@ class Verbs(BodyVerbs):
             ScenarioError: There is no such algorithm or room, or not exactly one output is given.
         """
         fields = {"rooms": rooms, "values": values, "frozen": frozen, "withheld": withheld}
-        self._do(algorithms.Replace, algorithm=algorithm, duration=duration, **fields)
+        self._do("replace", algorithm=algorithm, duration=duration, **fields)
 
     # The home and its sensors
 
@@ -217,7 +216,7 @@ class Verbs(BodyVerbs):
         Raises:
             ScenarioError: There is no such sensor.
         """
-        self._do(sensors.Stick, sensor=sensor, says=says, duration=duration)
+        self._do("stick", sensor=sensor, says=says, duration=duration)
 
     def open(self, door: str) -> None:
         """Open a door, even a locked one.
@@ -225,7 +224,7 @@ class Verbs(BodyVerbs):
         Raises:
             ScenarioError: There is no such door.
         """
-        self._do(home.Open, door=door)
+        self._do("open", door=door)
 
     def shut(self, door: str) -> None:
         """Shut a door, as soon as nobody stands in the doorway.
@@ -233,7 +232,7 @@ class Verbs(BodyVerbs):
         Raises:
             ScenarioError: There is no such door.
         """
-        self._do(home.Shut, door=door)
+        self._do("shut", door=door)
 
     def lock(self, door: str) -> None:
         """Lock a door: nobody opens it by hand once it is shut.
@@ -241,7 +240,7 @@ class Verbs(BodyVerbs):
         Raises:
             ScenarioError: There is no such door.
         """
-        self._do(home.Lock, door=door)
+        self._do("lock", door=door)
 
     def unlock(self, door: str) -> None:
         """Unlock a door.
@@ -249,7 +248,7 @@ class Verbs(BodyVerbs):
         Raises:
             ScenarioError: There is no such door.
         """
-        self._do(home.Unlock, door=door)
+        self._do("unlock", door=door)
 
     def move(self, furniture: str, to: tuple[float, float], turn_deg: float = 0.0) -> None:
         """Move a piece of furniture, so that its centre is at (x, y) [m], and turn it.
@@ -257,7 +256,7 @@ class Verbs(BodyVerbs):
         Raises:
             ScenarioError: There is no such piece, or it can't stand there.
         """
-        self._do(home.Move, object=furniture, to=to, turn_deg=turn_deg)
+        self._do("move", object=furniture, to=to, turn_deg=turn_deg)
 
     def room(self, name: str, type: str) -> None:  # noqa: A002
         """Change the type of a room from now on.
@@ -265,4 +264,4 @@ class Verbs(BodyVerbs):
         Raises:
             ScenarioError: There is no such room, or no such room type.
         """
-        self._do(home.SetRoomType, name=name, type=type)
+        self._do("room", name=name, type=type)

@@ -22,13 +22,13 @@ from fleet2d.document import Document
 from fleet2d.entities.entity import Robot, User
 from fleet2d.entities.objects.home_object import HomeObject
 from fleet2d.errors import ScenarioError
-from fleet2d.expectations.field import ExpectationField
 from fleet2d.floorplan.home.change import HomeChange
 from fleet2d.floorplan.source import FloorPlanSource
 from fleet2d.interventions.script import Entry
 from fleet2d.metrics.metric import Metric
 from fleet2d.problems import problem, problem_at, suggest
 from fleet2d.scenario.compose import compose
+from fleet2d.scenario.expectation_field import ExpectationField
 from fleet2d.scenario.explain import explain
 from fleet2d.short_form import ShortForm
 from fleet2d.sight.settings import SightSettings
