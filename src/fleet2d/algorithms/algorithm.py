@@ -4,18 +4,16 @@ from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
 from fleet2d.algorithms.history import History
 from fleet2d.algorithms.learned import check_shapes, run_state
 from fleet2d.component import Component
+from fleet2d.floorplan.home.home import Home
 from fleet2d.streams import Draws, stream_key
 from fleet2d.units import InputPath, PositiveDuration
-
-if TYPE_CHECKING:
-    from fleet2d.floorplan.home.home import Home
 
 
 @dataclass(frozen=True)
@@ -37,7 +35,7 @@ class Present:
     step: int
     time: datetime
     start: datetime
-    home: "Home"
+    home: Home
     users: tuple[str, ...]
     robots: tuple[str, ...]
     outputs: Mapping[str, Any]
@@ -91,7 +89,7 @@ class Algorithm(Component):
 
     learned: InputPath | None = None
 
-    def start(self, home: "Home") -> None:
+    def start(self, home: Home) -> None:
         """Prepare for a run."""
 
     def remember(self) -> Mapping[str, Any]:

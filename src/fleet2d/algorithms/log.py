@@ -1,7 +1,7 @@
 """The log of a run: motions, observations and events, as far back as components may look."""
 
 from collections.abc import Callable, Mapping, Sequence, Set
-from typing import TYPE_CHECKING, NamedTuple, Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,11 +19,9 @@ from fleet2d.algorithms.patches import Patches
 from fleet2d.algorithms.poses import BodyPoses, Path
 from fleet2d.errors import ComponentError
 from fleet2d.events import HOME, Event, EventKind
+from fleet2d.floorplan.home.home import Home
 from fleet2d.kernels.look import IDENTITY, STEP, X, Y
 from fleet2d.kernels.timelines import Window
-
-if TYPE_CHECKING:
-    from fleet2d.floorplan.home.home import Home
 
 
 class SensorRow(NamedTuple):
@@ -46,7 +44,7 @@ class Log:
     """The motions and observations of a run, as far back as components may look."""
 
     def __init__(
-        self, home: "Home", names: Sequence[str], motions: Motions, activities: Activities
+        self, home: Home, names: Sequence[str], motions: Motions, activities: Activities
     ) -> None:
         """Begin an empty log.
 

@@ -2,13 +2,14 @@
 
 from collections.abc import Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fleet2d.algorithms.activities import ROBOT, Activities, Names
 from fleet2d.floorplan.cache import read_only
+from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.kernels.chambers import fill_from_neighbors
 from fleet2d.kernels.headings import in_radians
 from fleet2d.kernels.look import (
@@ -26,9 +27,6 @@ from fleet2d.kernels.look import (
     Y,
 )
 from fleet2d.kernels.measure import rooms_at
-
-if TYPE_CHECKING:
-    from fleet2d.floorplan.plan import FloorPlan
 
 NOWHERE = -1  # the room of a body that is away
 NO_NAMES: Names = np.empty(0, object)
@@ -65,7 +63,7 @@ class Observations:
 
     def __init__(
         self,
-        plan: "FloorPlan",
+        plan: FloorPlan,
         rooms: "NearestRooms",
         rows: Rows,
         activities: Activities,
@@ -159,7 +157,7 @@ class Looks(NamedTuple):
 class NearestRooms:
     """The room of any place; in a wall or outside, the nearest room."""
 
-    def __init__(self, plan: "FloorPlan", of_cell: NDArray[np.int16] | None = None) -> None:
+    def __init__(self, plan: FloorPlan, of_cell: NDArray[np.int16] | None = None) -> None:
         """Use the rooms of a plan, or other parts of it, such as the patches of its rooms.
 
         Args:
@@ -189,7 +187,7 @@ def _shared(rooms: NDArray[np.int16]) -> NDArray[np.int16]:
     return rooms
 
 
-def truth(plan: "FloorPlan", rows: NDArray[np.int64], activities: Activities) -> Truth:
+def truth(plan: FloorPlan, rows: NDArray[np.int64], activities: Activities) -> Truth:
     """Return the truth behind rows of observations."""
     xy = plan.lattice.to_metres(rows[:, [TRUE_X, TRUE_Y]])
     return Truth(

@@ -2,17 +2,14 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fleet2d.algorithms.observations import NOWHERE
 from fleet2d.floorplan.cache import read_only
+from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.kernels.mesh import label_triangles, rasterize_cells
-
-if TYPE_CHECKING:
-    from fleet2d.floorplan.plan import FloorPlan
 
 # Side of a patch [m], approximately; larger where a room would have more than about MOST_PATCHES.
 SIDE_M = 1.0
@@ -48,14 +45,14 @@ class Patches:
         return read_only(cells)
 
 
-def whole_rooms(plan: "FloorPlan") -> Patches:
+def whole_rooms(plan: FloorPlan) -> Patches:
     """Return each room as one patch."""
     rooms, count = plan.room_of_cell, len(plan.rooms)
     cells = np.bincount(rooms[rooms != NOWHERE], minlength=count)
     return Patches(rooms, read_only(np.arange(count)), read_only(cells), islands(plan))
 
 
-def patches_of(plan: "FloorPlan") -> Patches:
+def patches_of(plan: FloorPlan) -> Patches:
     """Divide the bounding box of each room into equal boxes along both axes.
 
     Example:
@@ -89,7 +86,7 @@ def patches_of(plan: "FloorPlan") -> Patches:
     return Patches(read_only(of_cell), read_only(room), cells, islands(plan))
 
 
-def islands(plan: "FloorPlan") -> NDArray[np.int64] | None:
+def islands(plan: FloorPlan) -> NDArray[np.int64] | None:
     """Return the part of the free space that holds each room: int64 (rooms,).
 
     Rooms with floor in the same part, and parts with floor in the same room, count as one. None if

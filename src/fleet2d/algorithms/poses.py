@@ -1,19 +1,17 @@
 """Poses of one body over a stretch of steps, as arrays in metres and radians."""
 
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fleet2d.algorithms.frozen import frozen
 from fleet2d.algorithms.observations import NOWHERE
+from fleet2d.floorplan.home.home import Home
 from fleet2d.kernels.headings import in_radians
 from fleet2d.kernels.measure import count_together, rooms_at, sum_moves
 from fleet2d.kernels.motion import Poses
-
-if TYPE_CHECKING:
-    from fleet2d.floorplan.home.home import Home
 
 Array = TypeVar("Array", bound=NDArray[Any])
 
@@ -53,7 +51,7 @@ class Path(Protocol):
 class BodyPoses:
     """Poses of one body, one entry per step; columns are computed on demand."""
 
-    def __init__(self, home: "Home", runs: Path) -> None:
+    def __init__(self, home: Home, runs: Path) -> None:
         self._home, self._runs = home, runs
 
     def __len__(self) -> int:

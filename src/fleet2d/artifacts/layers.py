@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fleet2d.artifacts.table import Column, Kind, TableSpec
-
-if TYPE_CHECKING:
-    from fleet2d.floorplan.home.layers import Layer
+from fleet2d.floorplan.home.layers import Layer
 
 PREFIX = "layer."
 EVERYWHERE = -1

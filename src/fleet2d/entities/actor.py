@@ -2,10 +2,10 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 from fleet2d.blame import blame
 from fleet2d.entities.battery import Charge
+from fleet2d.entities.behavior import Attention, Behavior, Command
 from fleet2d.entities.body import NEVER, Body
 from fleet2d.entities.kinds import is_kind
 from fleet2d.entities.motion import Motion, Pose
@@ -14,9 +14,6 @@ from fleet2d.entities.plan import Plan
 from fleet2d.floorplan.objects import PlacedObject
 from fleet2d.kernels.headings import TURN
 from fleet2d.streams import Draws
-
-if TYPE_CHECKING:
-    from fleet2d.entities.behavior import Attention, Behavior, Command
 
 
 @dataclass(eq=False)
@@ -33,7 +30,7 @@ class Actor(Body):
         planned_at: The step at which it began the plan.
     """
 
-    behaviors: "list[Behavior]" = field(init=False)
+    behaviors: list[Behavior] = field(init=False)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -59,7 +56,7 @@ class Actor(Body):
             self._bodies.ask_at[self.row] = NEVER if step is None else step
 
     @property
-    def attention(self) -> "Attention | None":
+    def attention(self) -> Attention | None:
         """Which actions of robots interrupt its plans: those of the first attentive behavior."""
         return self._attentive[1] if self._attentive else None
 

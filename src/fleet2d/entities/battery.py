@@ -1,19 +1,17 @@
 """Batteries: how long a robot drives and stands on a charge, and its charge during a run."""
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fleet2d.component import Settings
+from fleet2d.entities.body import Body
 from fleet2d.entities.furniture import stop_at
 from fleet2d.entities.motion import Motion, Track
 from fleet2d.entities.place import Place
 from fleet2d.entities.plan import Note, Plan
 from fleet2d.units import PositiveDuration, Share, micros
-
-if TYPE_CHECKING:
-    from fleet2d.entities.body import Body
 
 # The table of events gets a row `battery` when the charge has changed by this much.
 RECORDED_CHANGE = 0.05
@@ -74,7 +72,7 @@ class Charge:
         charger: Where the charger is [lattice].
     """
 
-    def __init__(self, battery: Battery, body: "Body") -> None:
+    def __init__(self, battery: Battery, body: Body) -> None:
         self.level = battery.charge
         self._drain = 1 / micros(battery.driving), 1 / micros(battery.standing)  # per us
         self._gain = 1 / micros(battery.charging)

@@ -1,11 +1,12 @@
 """Blocked bodies: plans to wait for another body, and to go round it."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fleet2d.entities.actor import Actor
+from fleet2d.entities.behavior import Situation
 from fleet2d.entities.giving_way import RoutesAround
 from fleet2d.entities.motion import Track
 from fleet2d.entities.plan import Note, Plan
@@ -15,14 +16,10 @@ from fleet2d.kernels.headings import TURN, turn_between
 from fleet2d.kernels.mesh import SUB
 from fleet2d.kernels.motion import Breakpoints
 
-if TYPE_CHECKING:
-    from fleet2d.entities.actor import Actor
-    from fleet2d.entities.behavior import Situation
-
 I64 = NDArray[np.int64]
 
 
-def plan_after_a_step(now: "Situation", interrupted: Plan, notes: Sequence[Note] = ()) -> Plan:
+def plan_after_a_step(now: Situation, interrupted: Plan, notes: Sequence[Note] = ()) -> Plan:
     """Return a plan that stands for a step, and then continues the present one.
 
     A random walk isn't continued: the behavior is asked again.
@@ -41,7 +38,7 @@ def plan_after_a_step(now: "Situation", interrupted: Plan, notes: Sequence[Note]
     return plan
 
 
-def plan_around(now: "Situation", interrupted: Plan, bodies: I64) -> Plan | None:
+def plan_around(now: Situation, interrupted: Plan, bodies: I64) -> Plan | None:
     """Return the rest of the present plan, by a way round other bodies to its next stop.
 
     If a body stands at that stop, and it is the last one, it stops beside it in the room. A body on
@@ -129,7 +126,7 @@ def _rows(track: Breakpoints) -> I64:
     return np.stack([column.astype(np.int64) for column in track], axis=-1)
 
 
-def _beside(actor: "Actor", goal: tuple[int, int], detour: RoutesAround) -> tuple[int, int] | None:
+def _beside(actor: Actor, goal: tuple[int, int], detour: RoutesAround) -> tuple[int, int] | None:
     """Return the free place nearest to an occupied one, in its room; None if there is none."""
     plan, space = actor.home.plan, actor.space
     room = plan.room_of_cell[goal[1] // SUB, goal[0] // SUB]

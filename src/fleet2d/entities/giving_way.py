@@ -1,21 +1,19 @@
 """Giving way: a robot that stops in front of people, waits, and goes round them or gives up."""
 
 from datetime import timedelta
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
 from fleet2d.component import Settings
+from fleet2d.entities.behavior import Situation
+from fleet2d.entities.body import Body
 from fleet2d.entities.plan import Plan
 from fleet2d.entities.resume import resumed, without_next_stop
 from fleet2d.floorplan.home.costmap import CLOSED, route_by_cost
 from fleet2d.units import Length, PositiveDuration, micros
-
-if TYPE_CHECKING:
-    from fleet2d.entities.behavior import Situation
-    from fleet2d.entities.body import Body
 
 # Time between two looks whether the way is clear again: a tenth of the time waited so far, within
 # these limits.
@@ -115,7 +113,7 @@ class WaitForPeople:
         """Return how long it has waited at a step [us]."""
         return (step - self.since) * self._step_us
 
-    def stand_still(self, now: "Situation", person: str, gives_way: GivesWay) -> Plan:
+    def stand_still(self, now: Situation, person: str, gives_way: GivesWay) -> Plan:
         """Stand still until it goes round or gives up, if nobody moves."""
         plan, look, patience = now.plan(), self._look_after(now.step), micros(gives_way.patience)
         if now.step == self.since:
@@ -129,11 +127,11 @@ class WaitForPeople:
         plan.interrupts = self.interrupts
         return plan
 
-    def continued(self, now: "Situation") -> Plan | None:
+    def continued(self, now: Situation) -> Plan | None:
         """Return the rest of the plan; None if nothing is left."""
         return self._with_interrupts(resumed(now.actor, now.plan(), self.interrupted, self.step))
 
-    def go_round(self, now: "Situation", people: I64, distance: float) -> Plan | None:
+    def go_round(self, now: Situation, people: I64, distance: float) -> Plan | None:
         """Return the rest of the plan by a way that keeps clear of people; None without such a way.
 
         Args:
@@ -150,18 +148,18 @@ class WaitForPeople:
                 return self._with_interrupts(rest)
         return None
 
-    def leave_out(self, now: "Situation", person: str) -> Plan | None:
+    def leave_out(self, now: Situation, person: str) -> Plan | None:
         """Return the plan without the stop that it can't get to; None if that was the last."""
         plan = self._stand_for_a_step(now).note("gives_up", person)
         return self._with_interrupts(
             without_next_stop(now.actor, plan, self.interrupted, self.step)
         )
 
-    def give_up(self, now: "Situation", person: str) -> Plan:
+    def give_up(self, now: Situation, person: str) -> Plan:
         """Stand for a step, after which the behaviors are asked again."""
         return self._stand_for_a_step(now).note("gives_up", person)
 
-    def _stand_for_a_step(self, now: "Situation") -> Plan:
+    def _stand_for_a_step(self, now: Situation) -> Plan:
         """Return a plan that begins with a step of standing, so that people in the way are seen."""
         return now.plan().stay(timedelta(microseconds=now.actor.clock.step_us))
 
@@ -182,7 +180,7 @@ class RoutesAround:
         people: x and y of each of them, and the distance to keep [lattice], int64 (n, 3).
     """
 
-    def __init__(self, body: "Body", people: I64) -> None:
+    def __init__(self, body: Body, people: I64) -> None:
         self._space = body.space
         xs, ys = body.home.plan.lattice.centre_axes()
         self.cost = np.zeros(body.space.part_of_cell.shape, np.int32)

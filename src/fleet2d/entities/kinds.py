@@ -6,23 +6,19 @@ body's `notes` say so. A single place that is missing is an error that names the
 """
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
+from fleet2d.entities.body import Body
 from fleet2d.entities.place import ANY, Point, RoomChoice, is_point
 from fleet2d.errors import PlacementError
 from fleet2d.floorplan.furniture.catalogue import FURNITURE
+from fleet2d.floorplan.plan import Room
 from fleet2d.floorplan.rooms.vocabulary import PRIORITY, usual_type
-
-if TYPE_CHECKING:
-    from fleet2d.entities.body import Body
-    from fleet2d.floorplan.plan import Room
 
 P = TypeVar("P", bound=RoomChoice | Point)
 
 
-def available_places(
-    body: "Body", key: str, places: Iterable[P], *, needed: bool = True
-) -> list[P]:
+def available_places(body: Body, key: str, places: Iterable[P], *, needed: bool = True) -> list[P]:
     """Return the places that the home has, and note which kinds of places it lacks.
 
     Args:
@@ -56,14 +52,14 @@ def available_places(
 
 
 def available_rooms(
-    body: "Body", key: str, names: Iterable[str], *, needed: bool = True
-) -> "list[Room]":
+    body: Body, key: str, names: Iterable[str], *, needed: bool = True
+) -> list[Room]:
     """Return the rooms of some names and kinds, as `available_places` does."""
     places = available_places(body, key, [(name,) for name in names], needed=needed)
     return list(dict.fromkeys(room for place in places for room in body.rooms(place)))
 
 
-def is_kind(body: "Body", place: RoomChoice | Point) -> bool:
+def is_kind(body: Body, place: RoomChoice | Point) -> bool:
     """Whether a place gives a type ('bathroom'), not a particular room or object ('bathroom_0')."""
     if is_point(place):
         return False

@@ -1,21 +1,18 @@
 """Meander: the random walk of the paper, for users and robots."""
 
 import math
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 from pydantic import Field
 
 from fleet2d.component import register
+from fleet2d.entities.actor import Actor
 from fleet2d.entities.behavior import Behavior, Situation
 from fleet2d.entities.plan import Plan
 from fleet2d.kernels.headings import TURN
 from fleet2d.kernels.motion import WalkRule
 from fleet2d.kernels.random import BELL_STD
 from fleet2d.units import AngleDeg
-
-if TYPE_CHECKING:
-    from fleet2d.entities.actor import Actor
-
 
 # A step longer than any home is never possible; this limit keeps products within 64 bits.
 LONGEST_STRIDE = 256 << 21
@@ -39,7 +36,7 @@ class Meander(Behavior):
 
     at_walls: Literal["turn", "stay"] = "turn"
 
-    def start(self, actor: "Actor") -> None:
+    def start(self, actor: Actor) -> None:
         """Convert the rule of the walk to lattice units per step."""
         step_s = actor.clock.step_us / 1e6
         std = self.turn_std_deg / 360 * TURN * math.sqrt(step_s)  # headings per step

@@ -1,16 +1,13 @@
 """Free points near a person or an object, where a body can stand."""
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
+from fleet2d.entities.body import Body
 from fleet2d.kernels.headings import TURN, UNIT, cosine, sine
-
-if TYPE_CHECKING:
-    from fleet2d.entities.body import Body
 
 
 def points_at_distance(
-    body: "Body", center: tuple[int, int], distance: int, directions: int
+    body: Body, center: tuple[int, int], distance: int, directions: int
 ) -> Iterator[tuple[int, int]]:
     """Yield the points at a distance from a point where a body can stand, in the point's room.
 

@@ -1,14 +1,12 @@
 """The free cells nearest to many points at once, found by a spatial index."""
 
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from fleet2d.entities.body import Body
+from fleet2d.entities.body import Body
 
 I64 = NDArray[np.int64]
 
@@ -16,7 +14,7 @@ I64 = NDArray[np.int64]
 class Nearest:
     """Centres [lattice] of the free cells that a body can get to, in one room or in all."""
 
-    def __init__(self, body: "Body", room: int | None = None) -> None:
+    def __init__(self, body: Body, room: int | None = None) -> None:
         cells = body.space.cells(room, body.part)
         xs, ys = body.home.plan.lattice.centre_axes()
         self.centres: I64 = np.stack([xs[cells[:, 1]], ys[cells[:, 0]]], 1)

@@ -5,21 +5,19 @@ still runs down. An order ends after its duration, with the next order, or on re
 """
 
 from datetime import timedelta
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
+from fleet2d.entities.behavior import Situation
 from fleet2d.entities.place import Point, RoomChoice
 from fleet2d.entities.plan import Plan
 from fleet2d.kernels.headings import TURN, turn_between
 from fleet2d.units import micros
 
-if TYPE_CHECKING:
-    from fleet2d.entities.behavior import Situation
-
 
 class Order(Protocol):
     """Base of orders, which decide in place of a body's behaviors."""
 
-    def decide(self, now: "Situation") -> Plan | None:
+    def decide(self, now: Situation) -> Plan | None:
         """Return what to do from now on; None: it is over."""
 
 
@@ -34,7 +32,7 @@ class StandStill:
         self._lasts_us = None if duration is None else micros(duration)
         self._until_us: int | None = None
 
-    def decide(self, now: "Situation") -> Plan | None:
+    def decide(self, now: Situation) -> Plan | None:
         """Stay for the rest of the time."""
         plan = now.plan()
         if self._lasts_us is None:
@@ -56,7 +54,7 @@ class Trip:
         self._until_us: int | None = None
         self._goal: tuple[int, int, int] | None = None  # where it stays: x, y, away
 
-    def decide(self, now: "Situation") -> Plan | None:
+    def decide(self, now: Situation) -> Plan | None:
         """Go there, unless it is there already, and stay for the rest of the time."""
         plan = now.plan()
         if self._goal != (plan.x, plan.y, plan.away):
@@ -67,7 +65,7 @@ class Trip:
             return None
         return plan.stay() if self._until_us is None else plan.stay_until(self._until_us)
 
-    def go(self, now: "Situation", plan: Plan) -> None:
+    def go(self, now: Situation, plan: Plan) -> None:
         """Add the way there to the plan."""
         raise NotImplementedError
 
@@ -90,7 +88,7 @@ class GoTo(Trip):
         super().__init__(duration)
         self._place, self._heading = place, heading
 
-    def go(self, now: "Situation", plan: Plan) -> None:
+    def go(self, now: Situation, plan: Plan) -> None:
         """Go to the place, and turn."""
         plan.come_home().go_to(self._place, "send")
         if self._heading is not None:
@@ -100,7 +98,7 @@ class GoTo(Trip):
 class GoOut(Trip):
     """Leave the home, and stay away."""
 
-    def go(self, now: "Situation", plan: Plan) -> None:
+    def go(self, now: Situation, plan: Plan) -> None:
         """Leave by the way out."""
         plan.leave_home()
 
@@ -120,7 +118,7 @@ class DoActivity(Trip):
         super().__init__(duration)
         self._activity, self._place = activity, place
 
-    def go(self, now: "Situation", plan: Plan) -> None:
+    def go(self, now: Situation, plan: Plan) -> None:
         """Go to where it is done, and begin."""
         if self._place is not None:
             plan.come_home().go_to(self._place, "send")

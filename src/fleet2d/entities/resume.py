@@ -1,25 +1,22 @@
 """Resuming: the rest of a plan that was interrupted, from wherever the body is by now."""
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fleet2d.entities.body import Body
 from fleet2d.entities.motion import Track
 from fleet2d.entities.plan import Note, Plan
 from fleet2d.errors import NoWayError
 from fleet2d.kernels.headings import TURN, turn_between
 from fleet2d.kernels.motion import Breakpoints
 
-if TYPE_CHECKING:
-    from fleet2d.entities.body import Body
-
 Detour = Callable[[tuple[int, int], tuple[int, int]], NDArray[np.int64] | None]
 
 
 def resumed(
-    body: "Body", plan: Plan, interrupted: Plan, step: int, detour: Detour | None = None
+    body: Body, plan: Plan, interrupted: Plan, step: int, detour: Detour | None = None
 ) -> Plan | None:
     """Fill a plan with the rest of one that was interrupted.
 
@@ -39,7 +36,7 @@ def resumed(
     return _rest(body, plan, interrupted, step * body.clock.step_us, detour)
 
 
-def without_next_stop(body: "Body", plan: Plan, interrupted: Plan, step: int) -> Plan | None:
+def without_next_stop(body: Body, plan: Plan, interrupted: Plan, step: int) -> Plan | None:
     """Fill a plan with the rest of one that was interrupted, without its next stop.
 
     Returns:
@@ -62,7 +59,7 @@ def without_next_stop(body: "Body", plan: Plan, interrupted: Plan, step: int) ->
 
 
 def _rest(
-    body: "Body", plan: Plan, interrupted: Plan, interrupted_us: int, detour: Detour | None
+    body: Body, plan: Plan, interrupted: Plan, interrupted_us: int, detour: Detour | None
 ) -> Plan | None:
     """Fill a plan with the part of another one that comes after a moment."""
     motion = interrupted.finish()
@@ -96,7 +93,7 @@ def _rest(
     return plan
 
 
-def next_stop(body: "Body", track: Breakpoints, interrupted_us: int) -> int | None:
+def next_stop(body: Body, track: Breakpoints, interrupted_us: int) -> int | None:
     """Return the index of the breakpoint at which the body next stands still; None: no such."""
     x, y, time = track.x, track.y, track.time
     at = max(int(np.searchsorted(time, interrupted_us, side="right")) - 1, 0)

@@ -10,17 +10,15 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Set
 from dataclasses import dataclass
 from datetime import timedelta
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
 from fleet2d.clock import Clock
 from fleet2d.errors import InputError
+from fleet2d.expectations.scene import Scene
 from fleet2d.expectations.trace import F64, I64, Trace, combine, spells
 from fleet2d.units import micros
-
-if TYPE_CHECKING:
-    from fleet2d.expectations.scene import Scene
 
 INFINITE = float("inf")
 TINY = float(np.finfo(np.float64).tiny)
@@ -87,7 +85,7 @@ class Expectation(ABC):
         """Yield the expectations that it is made of."""
         yield from ()
 
-    def check(self, scene: "Scene") -> None:
+    def check(self, scene: Scene) -> None:
         """Refuse what a run doesn't have, part by part.
 
         Raises:

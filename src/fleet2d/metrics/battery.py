@@ -1,15 +1,13 @@
 """How robots use their batteries."""
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
+from fleet2d.algorithms.algorithm import Present
 from fleet2d.algorithms.history import History
 from fleet2d.component import register
+from fleet2d.floorplan.home.home import Home
 from fleet2d.metrics.metric import Metric
-
-if TYPE_CHECKING:
-    from fleet2d.algorithms.algorithm import Present
-    from fleet2d.floorplan.home.home import Home
 
 
 @register("metric", "battery")
@@ -30,7 +28,7 @@ class BatteryUse(Metric):
         "empty": "share of time",
     }
 
-    def start(self, home: "Home") -> None:
+    def start(self, home: Home) -> None:
         """Begin counting."""
         self.lowest: dict[str, float] = {}
         self.dockings: dict[str, int] = {}
@@ -40,7 +38,7 @@ class BatteryUse(Metric):
         self.steps = 0
         self.step_s = 1.0
 
-    def update(self, history: History, state: "Present") -> Any:
+    def update(self, history: History, state: Present) -> Any:
         """Read the events."""
         for event in history.events:
             name = event.entity

@@ -2,20 +2,18 @@
 
 from collections import Counter
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from pydantic import Field
 
+from fleet2d.algorithms.algorithm import Present
 from fleet2d.algorithms.history import History
 from fleet2d.component import register
+from fleet2d.floorplan.home.home import Home
 from fleet2d.metrics.metric import Metric
 from fleet2d.metrics.pairs import pairs_of
 from fleet2d.units import Length
-
-if TYPE_CHECKING:
-    from fleet2d.algorithms.algorithm import Present
-    from fleet2d.floorplan.home.home import Home
 
 
 @register("metric", "blocking")
@@ -41,7 +39,7 @@ class Blocking(Metric):
 
     clearance: Length = Field(default=0.4, gt=0, le=3)
 
-    def start(self, home: "Home") -> None:
+    def start(self, home: Home) -> None:
         """Begin counting."""
         self.blocks: dict[tuple[str, str], int] = {}
         self.seconds: dict[tuple[str, str], float] = {}
@@ -49,7 +47,7 @@ class Blocking(Metric):
         self.last: dict[tuple[str, str], tuple[tuple[float, float], bool, bool]] = {}
         self.days = 0.0
 
-    def update(self, history: History, state: "Present") -> Any:
+    def update(self, history: History, state: Present) -> Any:
         """Count the steps in which a user walks into a robot."""
         for pair in pairs_of(history, state):
             key = (pair.robot, pair.user)

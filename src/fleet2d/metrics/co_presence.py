@@ -1,15 +1,13 @@
 """Share of users' time at home with a robot in the same room."""
 
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
+from fleet2d.algorithms.algorithm import Present
 from fleet2d.algorithms.history import History
 from fleet2d.component import register
+from fleet2d.floorplan.home.home import Home
 from fleet2d.metrics.metric import Metric
 from fleet2d.metrics.pairs import pairs_of
-
-if TYPE_CHECKING:
-    from fleet2d.algorithms.algorithm import Present
-    from fleet2d.floorplan.home.home import Home
 
 
 @register("metric", "co_presence")
@@ -22,11 +20,11 @@ class CoPresence(Metric):
 
     unit: ClassVar[str] = "share of time at home"
 
-    def start(self, home: "Home") -> None:
+    def start(self, home: Home) -> None:
         """Begin counting."""
         self.steps: dict[tuple[str, str], list[int]] = {}  # together, at home
 
-    def update(self, history: History, state: "Present") -> Any:
+    def update(self, history: History, state: Present) -> Any:
         """Count the steps together."""
         for pair in pairs_of(history, state):
             counts = self.steps.setdefault((pair.robot, pair.user), [0, 0])

@@ -1,17 +1,15 @@
 """How much of the home a robot has seen."""
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
+from fleet2d.algorithms.algorithm import Present
 from fleet2d.algorithms.history import History
 from fleet2d.component import register
+from fleet2d.floorplan.home.home import Home
 from fleet2d.metrics.metric import Metric
-
-if TYPE_CHECKING:
-    from fleet2d.algorithms.algorithm import Present
-    from fleet2d.floorplan.home.home import Home
 
 SHARES = {"half": 0.5, "most": 0.9}
 
@@ -33,13 +31,13 @@ class Coverage(Metric):
         "most_h": "h",
     }
 
-    def start(self, home: "Home") -> None:
+    def start(self, home: Home) -> None:
         """Begin without any cells seen."""
         self.first: dict[str, Any] = {}  # sorted first steps of the cells seen, by robot
         self.cells = int(np.count_nonzero(home.plan.room_of_cell >= 0))
         self.step_s = 0.0
 
-    def update(self, history: History, state: "Present") -> Any:
+    def update(self, history: History, state: Present) -> Any:
         """Read the layers of first steps; return a row for each robot."""
         self.step_s, inside = history.step_s, state.home.plan.room_of_cell >= 0
         for robot in state.robots:

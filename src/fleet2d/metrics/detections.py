@@ -1,18 +1,16 @@
 """Quality of a robot's perception: precision, recall, and confusion of identities."""
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fleet2d.algorithms.algorithm import Present
 from fleet2d.algorithms.history import History
 from fleet2d.component import register
+from fleet2d.floorplan.home.home import Home
 from fleet2d.metrics.metric import Metric
-
-if TYPE_CHECKING:
-    from fleet2d.algorithms.algorithm import Present
-    from fleet2d.floorplan.home.home import Home
 
 UNKNOWN = "unknown"  # name in the confusion of a person not recognized
 NO_ONE = "nobody"  # name in the confusion of false positives
@@ -40,13 +38,13 @@ class Detections(Metric):
 
     unit: ClassVar[str] = "share"
 
-    def start(self, home: "Home") -> None:
+    def start(self, home: Home) -> None:
         """Begin counting."""
         self.looks: NDArray[np.int64] | None = None  # (robots, users, 2): in view, noticed
         self.confusion: NDArray[np.int64]  # (robots, users + 1, users + 1): true, perceived
         self.names: tuple[tuple[str, ...], tuple[str, ...]] = ((), ())
 
-    def update(self, history: History, state: "Present") -> Any:
+    def update(self, history: History, state: Present) -> Any:
         """Count looks and observations; return a row for each robot and user."""
         robots, users = len(state.robots), len(state.users)
         if self.looks is None:

@@ -1,15 +1,13 @@
 """Distance that each body covers."""
 
 from math import dist
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
+from fleet2d.algorithms.algorithm import Present
 from fleet2d.algorithms.history import History
 from fleet2d.component import register
+from fleet2d.floorplan.home.home import Home
 from fleet2d.metrics.metric import Metric
-
-if TYPE_CHECKING:
-    from fleet2d.algorithms.algorithm import Present
-    from fleet2d.floorplan.home.home import Home
 
 
 @register("metric", "distance")
@@ -18,13 +16,13 @@ class Distance(Metric):
 
     unit: ClassVar[str] = "m a day"
 
-    def start(self, home: "Home") -> None:
+    def start(self, home: Home) -> None:
         """Begin counting."""
         self.metres: dict[str, float] = {}
         self.last: dict[str, tuple[float, float]] = {}
         self.days = 0.0
 
-    def update(self, history: History, state: "Present") -> Any:
+    def update(self, history: History, state: Present) -> Any:
         """Add up the moves."""
         for name in (*state.users, *state.robots):
             poses = history.poses(name)

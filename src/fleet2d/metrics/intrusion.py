@@ -2,18 +2,16 @@
 
 from collections.abc import Mapping
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
+from fleet2d.algorithms.algorithm import Present
 from fleet2d.algorithms.history import History
 from fleet2d.component import register
+from fleet2d.floorplan.home.home import Home
 from fleet2d.metrics.metric import Metric
 from fleet2d.metrics.pairs import in_sight, pairs_of
-
-if TYPE_CHECKING:
-    from fleet2d.algorithms.algorithm import Present
-    from fleet2d.floorplan.home.home import Home
 
 # Hall's zones, by the distance at which they end [m].
 ZONES = {"intimate": 0.45, "personal": 1.2, "social": 3.6}
@@ -30,12 +28,12 @@ class Intrusion(Metric):
 
     unit: ClassVar[str] = "min a day"
 
-    def start(self, home: "Home") -> None:
+    def start(self, home: Home) -> None:
         """Begin counting."""
         self.minutes: dict[tuple[str, str], list[float]] = {}
         self.days = 0.0
 
-    def update(self, history: History, state: "Present") -> Any:
+    def update(self, history: History, state: Present) -> Any:
         """Count the steps in each zone; return a row for each robot and user."""
         rows: dict[str, list[Any]] = {name: [] for name in ("robot", "user", *ZONES)}
         for pair in pairs_of(history, state):

@@ -2,15 +2,13 @@
 
 from collections.abc import Mapping, Set
 from datetime import timedelta
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
+from fleet2d.algorithms.algorithm import Present
 from fleet2d.algorithms.history import History
 from fleet2d.component import Component
+from fleet2d.floorplan.home.home import Home
 from fleet2d.units import PositiveDuration
-
-if TYPE_CHECKING:
-    from fleet2d.algorithms.algorithm import Present
-    from fleet2d.floorplan.home.home import Home
 
 
 class Metric(Component):
@@ -40,10 +38,10 @@ class Metric(Component):
         """Return the names of the algorithms that it measures, which the scenario must have."""
         return ()
 
-    def start(self, home: "Home") -> None:
+    def start(self, home: Home) -> None:
         """Prepare for a run."""
 
-    def update(self, history: History, state: "Present") -> Any:
+    def update(self, history: History, state: Present) -> Any:
         """Process the history since the last update; return rows to store, or None."""
         raise NotImplementedError
 

@@ -1,18 +1,16 @@
 """Pairs of a robot and a user, which several metrics measure step by step."""
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fleet2d.algorithms.algorithm import Present
 from fleet2d.algorithms.history import History
 from fleet2d.algorithms.poses import BodyPoses
+from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.kernels.points import points_in_sight
-
-if TYPE_CHECKING:
-    from fleet2d.algorithms.algorithm import Present
-    from fleet2d.floorplan.plan import FloorPlan
 
 DAY_S = 86_400.0
 
@@ -46,14 +44,14 @@ class RobotUserPair(NamedTuple):
         return np.where(self.at_home, np.sqrt((gap * gap).sum(axis=1)), np.inf)
 
 
-def pairs_of(history: History, state: "Present") -> Iterator[RobotUserPair]:
+def pairs_of(history: History, state: Present) -> Iterator[RobotUserPair]:
     """Yield every robot with every user."""
     for robot in state.robots:
         for user in state.users:
             yield RobotUserPair(robot, user, history.poses(robot), history.poses(user))
 
 
-def in_sight(plan: "FloorPlan", pair: RobotUserPair, steps: NDArray[np.int64]) -> Bool:
+def in_sight(plan: FloorPlan, pair: RobotUserPair, steps: NDArray[np.int64]) -> Bool:
     """Return whether no wall of the plan is between the two at each of some steps: bool (n,).
 
     Doors count as open, and furniture as too low to block the view.

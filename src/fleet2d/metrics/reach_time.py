@@ -2,20 +2,18 @@
 
 from collections.abc import Mapping
 from datetime import timedelta
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from pydantic import Field
 
+from fleet2d.algorithms.algorithm import Present
 from fleet2d.algorithms.history import History
 from fleet2d.component import register
+from fleet2d.floorplan.home.home import Home
 from fleet2d.metrics.metric import Metric
 from fleet2d.metrics.pairs import pairs_of
 from fleet2d.units import Length, PositiveDuration, Speed, micros
-
-if TYPE_CHECKING:
-    from fleet2d.algorithms.algorithm import Present
-    from fleet2d.floorplan.home.home import Home
 
 
 @register("metric", "reach_time")
@@ -44,12 +42,12 @@ class ReachTime(Metric):
     speed: Speed = Field(default=0.6, gt=0)
     radius: Length = Field(default=0.15, gt=0, le=2)
 
-    def start(self, home: "Home") -> None:
+    def start(self, home: Home) -> None:
         """Begin counting."""
         self.seconds: dict[tuple[str, str], list[float]] = {}
         self.unreached: dict[tuple[str, str], int] = {}
 
-    def update(self, history: History, state: "Present") -> Any:
+    def update(self, history: History, state: Present) -> Any:
         """Add the calls of each user at home."""
         step_us = round(history.step_s * 1e6)
         every = max(1, -(-micros(self.every) // step_us))

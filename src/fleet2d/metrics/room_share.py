@@ -1,17 +1,15 @@
 """True share of time that users spend in each room."""
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
+from fleet2d.algorithms.algorithm import Present
 from fleet2d.algorithms.history import History
 from fleet2d.component import register
+from fleet2d.floorplan.home.home import Home
 from fleet2d.metrics.metric import Metric
-
-if TYPE_CHECKING:
-    from fleet2d.algorithms.algorithm import Present
-    from fleet2d.floorplan.home.home import Home
 
 AWAY = "away"
 MOST_PLACES = 4  # places per user in the closing table
@@ -26,12 +24,12 @@ class RoomShare(Metric):
 
     unit: ClassVar[str] = "share of time"
 
-    def start(self, home: "Home") -> None:
+    def start(self, home: Home) -> None:
         """Begin counting."""
         self.names = [*(room.name for room in home.rooms), AWAY]
         self.seconds: dict[str, Any] = {}
 
-    def update(self, history: History, state: "Present") -> Any:
+    def update(self, history: History, state: Present) -> Any:
         """Count the steps per room."""
         users, shares = [], []
         for user in state.users:

@@ -1,16 +1,14 @@
 """How much the robots see of the users."""
 
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
+from fleet2d.algorithms.algorithm import Present
 from fleet2d.algorithms.history import History
 from fleet2d.component import register
+from fleet2d.floorplan.home.home import Home
 from fleet2d.metrics.metric import Metric
-
-if TYPE_CHECKING:
-    from fleet2d.algorithms.algorithm import Present
-    from fleet2d.floorplan.home.home import Home
 
 
 @register("metric", "sightings")
@@ -19,12 +17,12 @@ class Sightings(Metric):
 
     unit: ClassVar[str] = "share of time at home"
 
-    def start(self, home: "Home") -> None:
+    def start(self, home: Home) -> None:
         """Begin counting."""
         self.seen: dict[str, int] = {}
         self.at_home: dict[str, int] = {}
 
-    def update(self, history: History, state: "Present") -> Any:
+    def update(self, history: History, state: Present) -> Any:
         """Count detections by step."""
         observations = history.observations
         order = np.argsort(observations.user, kind="stable")  # of one user still in order of step

@@ -2,23 +2,21 @@
 
 from collections.abc import Mapping
 from datetime import timedelta
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from fleet2d.algorithms.algorithm import Present
 from fleet2d.algorithms.history import History
 from fleet2d.component import register
 from fleet2d.events import Event
+from fleet2d.floorplan.home.home import Home
 from fleet2d.kernels.points import points_in_sight
 from fleet2d.metrics.metric import Metric
 from fleet2d.metrics.survival import kaplan_meier, quantile, restricted_mean
 from fleet2d.units import Length, PositiveDuration
-
-if TYPE_CHECKING:
-    from fleet2d.algorithms.algorithm import Present
-    from fleet2d.floorplan.home.home import Home
 
 ENDS = ("found", "not_at_home", "gave_up")
 
@@ -90,7 +88,7 @@ class TimeToFind(Metric):
     sight: Length = Field(default=4.5, gt=0)
     radius: Length = Field(default=0.15, gt=0, le=2)
 
-    def start(self, home: "Home") -> None:
+    def start(self, home: Home) -> None:
         """Begin without searches."""
         self.open: dict[str, SearchRecord] = {}
         self.done: dict[str, list[SearchRecord]] = {}
@@ -98,7 +96,7 @@ class TimeToFind(Metric):
         self.last: dict[str, tuple[float, float]] = {}
         self.end, self.step_s = 0, 1.0
 
-    def update(self, history: History, state: "Present") -> Any:
+    def update(self, history: History, state: Present) -> Any:
         """Update the searches; return a row for each that ended."""
         ended: list[tuple[str, SearchRecord]] = []
         for robot in state.robots:
@@ -125,9 +123,7 @@ class TimeToFind(Metric):
         lengths = np.sqrt((moves * moves).sum(axis=1))
         return self.driven.get(robot, 0.0) + np.cumsum(lengths)
 
-    def _begin(
-        self, history: History, state: "Present", event: Event, metres: float
-    ) -> SearchRecord:
+    def _begin(self, history: History, state: Present, event: Event, metres: float) -> SearchRecord:
         i, user = event.step - history.first, history.poses(event.detail)
         at_home = not bool(user.away[i])
         ideal = 0.0
@@ -147,7 +143,7 @@ class TimeToFind(Metric):
             end=end,
         )
 
-    def _ideal(self, home: "Home", robot: tuple[float, float], user: tuple[float, float]) -> float:
+    def _ideal(self, home: Home, robot: tuple[float, float], user: tuple[float, float]) -> float:
         """Return the shortest distance to drive until a robot could see a user [m]."""
         plan, space = home.plan, home.space(self.radius)
         lattice = plan.lattice

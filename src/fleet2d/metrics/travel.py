@@ -3,19 +3,17 @@
 from collections.abc import Mapping
 from datetime import timedelta
 from math import dist
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from pydantic import Field
 
+from fleet2d.algorithms.algorithm import Present
 from fleet2d.algorithms.history import History
 from fleet2d.component import register
+from fleet2d.floorplan.home.home import Home
 from fleet2d.metrics.metric import Metric
 from fleet2d.units import Length, PositiveDuration
-
-if TYPE_CHECKING:
-    from fleet2d.algorithms.algorithm import Present
-    from fleet2d.floorplan.home.home import Home
 
 Place = tuple[float, float]
 
@@ -38,7 +36,7 @@ class Travel(Metric):
     rest: PositiveDuration = timedelta(minutes=1)
     apart: Length = Field(default=0.5, ge=0)
 
-    def start(self, home: "Home") -> None:
+    def start(self, home: Home) -> None:
         """Begin counting."""
         self.metres: dict[str, float] = {}
         self.relocations: dict[str, int] = {}
@@ -46,7 +44,7 @@ class Travel(Metric):
         self.standing: dict[str, tuple[Place, int]] = {}  # place, and for how many steps
         self.days = 0.0
 
-    def update(self, history: History, state: "Present") -> Any:
+    def update(self, history: History, state: Present) -> Any:
         """Add up moves and rests."""
         rest_steps = self.rest.total_seconds() / history.step_s
         for robot in state.robots:

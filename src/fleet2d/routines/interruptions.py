@@ -5,18 +5,15 @@ begin and end as planned. A day's interruptions are a function of its date and i
 """
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from fleet2d.kernels.random import Bits
-from fleet2d.routines.activity import seconds
+from fleet2d.routines.activity import Activity, seconds
 from fleet2d.routines.laws import Law
+from fleet2d.routines.needs import Errand, Need
 from fleet2d.routines.occupancy import Occupancy
 from fleet2d.routines.planner import DAY_S, FINISHES, INTERRUPTS, RESUMES, SLEEP, Doing
 from fleet2d.streams import Draws
-
-if TYPE_CHECKING:
-    from fleet2d.routines.activity import Activity
-    from fleet2d.routines.needs import Errand, Need
 
 # Probabilities have this many bits, and laws 2 to this power quantiles: few bits of a draw suffice.
 CHANCE_BITS, QUANTILE_BITS = 10, 8
@@ -90,9 +87,9 @@ class InterruptionRules(NamedTuple):
 
 
 def interruption_rules(
-    needs: Mapping[str, "Need"],
-    errands: Mapping[str, "Errand"],
-    activities: Mapping[str, "Activity"],
+    needs: Mapping[str, Need],
+    errands: Mapping[str, Errand],
+    activities: Mapping[str, Activity],
 ) -> InterruptionRules:
     """Return the rules of needs and errands.
 
@@ -119,7 +116,7 @@ def interruption_rules(
     )
 
 
-def _need_rule(name: str, need: "Need", activities: Mapping[str, "Activity"]) -> NeedRule:
+def _need_rule(name: str, need: Need, activities: Mapping[str, Activity]) -> NeedRule:
     steps = [_step(need.activity or name, 1.0, need.takes, activities)]
     steps += [_step(then, chance, None, activities) for then, chance in need.then.items()]
     window = None
@@ -146,7 +143,7 @@ def _chance(share: float) -> int:
 
 
 def _step(
-    name: str, chance: float, takes: object, activities: Mapping[str, "Activity"]
+    name: str, chance: float, takes: object, activities: Mapping[str, Activity]
 ) -> InterruptionStep:
     activity = activities[name]
     law = (takes or activity.takes).table()  # type: ignore[attr-defined]

@@ -1,18 +1,15 @@
 """The readings of a run's sensors as a text file in the layout of the CASAS smart homes."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from fleet2d.errors import RunDirectoryError
-
-if TYPE_CHECKING:
-    from fleet2d.runs.run import Run
+from fleet2d.runs.run import Run
 
 # The activity that CASAS writes where none is known.
 OTHER = "Other_Activity"
 
 
-def write_casas(run: "Run", path: Path) -> int:
+def write_casas(run: Run, path: Path) -> int:
     """Write a line per reading: date, time, room, sensor, state, activity.
 
     Spaces in names become underscores, because spaces separate the columns.

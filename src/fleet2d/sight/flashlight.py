@@ -1,20 +1,18 @@
 """Flashlight: a cache of the cells in view, by pose of the camera."""
 
 from collections import OrderedDict
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
 from fleet2d.component import register
+from fleet2d.floorplan.home.home import Home
 from fleet2d.kernels.headings import TURN
 from fleet2d.kernels.mesh import SUB, Mesh
 from fleet2d.sight.fov import I64, Bool, FieldOfView, Reach
 from fleet2d.sight.visibility_polygon import filled_cells
-
-if TYPE_CHECKING:
-    from fleet2d.floorplan.home.home import Home
 
 # Memory of an entry besides its bits: keys, tuple and array.
 ENTRY_BYTES = 450
@@ -43,16 +41,16 @@ class Flashlight(FieldOfView):
 
     memory_mb: float = Field(default=64.0, gt=0)
 
-    def start(self, home: "Home") -> None:
+    def start(self, home: Home) -> None:
         """Begin with an empty cache."""
         self._reset(home)
 
-    def visible(self, home: "Home", x: int, y: int, points: I64) -> Bool:
+    def visible(self, home: Home, x: int, y: int, points: I64) -> Bool:
         """Return which points lie in cells whose centre is visible from (x, y)."""
         everything = Reach(near_squared=0, far_squared=1 << 50, half_angle=TURN)
         return self.sees(home, x, y, 0, everything, points)
 
-    def sees(self, home: "Home", x: int, y: int, heading: int, reach: Reach, points: I64) -> Bool:
+    def sees(self, home: Home, x: int, y: int, heading: int, reach: Reach, points: I64) -> Bool:
         """Return which points lie in cells whose centre is in view."""
         cells = self._lookup(home, x, y, heading, reach)
         row, column = points[:, 1] // SUB - cells.row, points[:, 0] // SUB - cells.column
@@ -61,7 +59,7 @@ class Flashlight(FieldOfView):
         in_view[in_view] = cells.bits[bit >> 3] >> (7 - (bit & 7)).astype(np.uint8) & 1 == 1
         return in_view
 
-    def cells(self, home: "Home", x: int, y: int, heading: int, reach: Reach) -> Bool:
+    def cells(self, home: Home, x: int, y: int, heading: int, reach: Reach) -> Bool:
         """Return which cells are in view: bool (rows, columns)."""
         cells, lattice = self._lookup(home, x, y, heading, reach), home.plan.lattice
         mask = np.zeros((lattice.rows, lattice.columns), np.bool_)
@@ -75,7 +73,7 @@ class Flashlight(FieldOfView):
         """The number of cached poses, and their memory [bytes]."""
         return len(self._cache), self._bytes
 
-    def _lookup(self, home: "Home", x: int, y: int, heading: int, reach: Reach) -> CellBits:
+    def _lookup(self, home: Home, x: int, y: int, heading: int, reach: Reach) -> CellBits:
         if getattr(self, "_walls", None) is not home.walls:
             self._reset(home)
         key = (x, y, heading, *reach)
@@ -89,7 +87,7 @@ class Flashlight(FieldOfView):
             self._bytes -= ENTRY_BYTES + oldest.bits.nbytes
         return cells
 
-    def _reset(self, home: "Home") -> None:
+    def _reset(self, home: Home) -> None:
         """Empty the cache, for the present walls of the home."""
         self._walls: Mesh = home.walls
         self._cache: OrderedDict[tuple[int, ...], CellBits] = OrderedDict()

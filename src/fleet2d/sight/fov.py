@@ -1,18 +1,16 @@
 """Fields of view: the base of the methods that a scenario can choose by `sight.method`."""
 
 from abc import abstractmethod
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fleet2d.component import Component
+from fleet2d.floorplan.home.home import Home
 from fleet2d.kernels.mesh import CELL_CENTRE, SUB
 from fleet2d.kernels.points import points_in_reach
 from fleet2d.kernels.seen import Reach
-
-if TYPE_CHECKING:
-    from fleet2d.floorplan.home.home import Home
 
 Bool = NDArray[np.bool_]
 I64 = NDArray[np.int64]
@@ -39,11 +37,11 @@ class FieldOfView(Component):
 
     kind: ClassVar[str] = "sight"
 
-    def start(self, home: "Home") -> None:
+    def start(self, home: Home) -> None:
         """Prepare for a run."""
 
     @abstractmethod
-    def visible(self, home: "Home", x: int, y: int, points: I64) -> Bool:
+    def visible(self, home: Home, x: int, y: int, points: I64) -> Bool:
         """Return which points are not hidden by walls, regardless of range and bearing.
 
         Args:
@@ -56,7 +54,7 @@ class FieldOfView(Component):
             bool (n,).
         """
 
-    def sees(self, home: "Home", x: int, y: int, heading: int, reach: Reach, points: I64) -> Bool:
+    def sees(self, home: Home, x: int, y: int, heading: int, reach: Reach, points: I64) -> Bool:
         """Return which points are in view: in range, within the angle, and not hidden.
 
         Args:
@@ -75,7 +73,7 @@ class FieldOfView(Component):
             in_view[in_view] = self.visible(home, x, y, points[in_view])
         return in_view
 
-    def cells(self, home: "Home", x: int, y: int, heading: int, reach: Reach) -> Bool:
+    def cells(self, home: Home, x: int, y: int, heading: int, reach: Reach) -> Bool:
         """Return which cells have their centre in view: bool (rows, columns)."""
         lattice = home.plan.lattice
         rows, columns = np.indices((lattice.rows, lattice.columns))

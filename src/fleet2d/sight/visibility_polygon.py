@@ -4,7 +4,7 @@ import hashlib
 import os
 from collections import OrderedDict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Self
+from typing import Any, Literal, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,14 +12,12 @@ from pydantic import Field, model_validator
 
 from fleet2d.component import register
 from fleet2d.errors import ScenarioError
+from fleet2d.floorplan.home.home import Home
 from fleet2d.kernels.mesh import SUB, Mesh, rasterize_cells
 from fleet2d.kernels.region import region_contains_points, regions_of_cells, visible_region
 from fleet2d.kernels.seen import cells_in_view, mark_spans
 from fleet2d.problems import problem_at
 from fleet2d.sight.fov import I64, Bool, FieldOfView, Reach
-
-if TYPE_CHECKING:
-    from fleet2d.floorplan.home.home import Home
 
 I32 = NDArray[np.int32]
 Pieces = tuple[I32, I32]
@@ -68,20 +66,20 @@ class VisibilityPolygon(FieldOfView):
             raise problem_at(("path",), "give 'path' with precompute: file, and only with it")
         return self
 
-    def start(self, home: "Home") -> None:
+    def start(self, home: Home) -> None:
         """Compute the regions of all cells, if configured."""
         self._reset(home)
 
-    def visible(self, home: "Home", x: int, y: int, points: I64) -> Bool:
+    def visible(self, home: Home, x: int, y: int, points: I64) -> Bool:
         """Return which points are in the region of (x, y)."""
         right, wall = self._region(home, x, y)
         return region_contains_points(home.walls, x, y, right, wall, points)
 
-    def cells(self, home: "Home", x: int, y: int, heading: int, reach: Reach) -> Bool:
+    def cells(self, home: Home, x: int, y: int, heading: int, reach: Reach) -> Bool:
         """Return which cells have their centre in the region, cut by range and angle."""
         return filled_cells(home, x, y, heading, reach)
 
-    def _region(self, home: "Home", x: int, y: int) -> Pieces:
+    def _region(self, home: Home, x: int, y: int) -> Pieces:
         if getattr(self, "_walls", None) is not home.walls:
             self._reset(home)
         row, column = y // SUB, x // SUB
@@ -98,7 +96,7 @@ class VisibilityPolygon(FieldOfView):
             self._visited.popitem(last=False)
         return region
 
-    def _reset(self, home: "Home") -> None:
+    def _reset(self, home: Home) -> None:
         """Empty the cache, for the present walls of the home."""
         self._walls: Mesh = home.walls
         self._visited: OrderedDict[tuple[int, int], Pieces] = OrderedDict()
@@ -109,7 +107,7 @@ class VisibilityPolygon(FieldOfView):
             self._regions = _shared_regions(home, self.path)
 
 
-def filled_cells(home: "Home", x: int, y: int, heading: int, reach: Reach) -> Bool:
+def filled_cells(home: Home, x: int, y: int, heading: int, reach: Reach) -> Bool:
     """Return the cells in view by filling the visible region: bool (rows, columns)."""
     lattice = home.plan.lattice
     grid = (lattice.rows, lattice.columns)
@@ -118,7 +116,7 @@ def filled_cells(home: "Home", x: int, y: int, heading: int, reach: Reach) -> Bo
     return mask
 
 
-def _regions_of(home: "Home") -> Regions:
+def _regions_of(home: Home) -> Regions:
     lattice = home.plan.lattice
     triangles = rasterize_cells(home.walls, lattice.rows, lattice.columns)
     cells = np.ascontiguousarray(np.argwhere(triangles >= 0))
@@ -131,7 +129,7 @@ def _numbers(triangles: I32) -> I32:
     return np.where(free, np.cumsum(free.ravel()).reshape(free.shape) - 1, -1).astype(np.int32)
 
 
-def _shared_regions(home: "Home", folder: Path) -> Regions:
+def _shared_regions(home: Home, folder: Path) -> Regions:
     """Return the regions of all cells from the file for these walls; create it if missing."""
     lattice, walls = home.plan.lattice, home.walls
     digest = hashlib.sha256(f"{FORMAT} {lattice.rows} {lattice.columns}".encode())

@@ -4,9 +4,11 @@ import pickle
 import sys
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, TypeVar
+from typing import Any, Literal, TypeVar
 
 from fleet2d.errors import ComponentError, InputError
+from fleet2d.runs.run import Run
+from fleet2d.scenario.model import Scenario
 from fleet2d.studies.catalogue import Changed
 from fleet2d.studies.driver import RunOptions, check_study, run_study
 from fleet2d.studies.execution import Executor, LostTask, SerialExecutor, cores
@@ -17,10 +19,6 @@ from fleet2d.studies.reader import Study, open_study
 from fleet2d.studies.record import WorkerTask
 from fleet2d.studies.schedule import TaskSchedule
 from fleet2d.studies.specification import read_specification
-
-if TYPE_CHECKING:
-    from fleet2d.runs.run import Run
-    from fleet2d.scenario.model import Scenario
 
 Result = TypeVar("Result")
 ExecutorName = Literal["local", "ray", "serial"]
@@ -68,7 +66,7 @@ def study(
 
 def map_runs(
     function: "Callable[[Run], Result]",
-    scenarios: "Iterable[str | Path | Mapping[str, Any] | Scenario]",
+    scenarios: Iterable[str | Path | Mapping[str, Any] | Scenario],
     *,
     workers: int | None = None,
     executor: ExecutorName | Executor = "local",

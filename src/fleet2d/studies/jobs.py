@@ -3,9 +3,10 @@
 import pickle
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
 from fleet2d.errors import Fleet2DError
+from fleet2d.runs.run import Run
 from fleet2d.studies.design import Design
 from fleet2d.studies.engine import (
     VariantOutcome,
@@ -17,9 +18,6 @@ from fleet2d.studies.engine import (
 from fleet2d.studies.identity import FileHashes, identity, input_hash, scenario_content
 from fleet2d.studies.record import WorkerTask, record_of
 from fleet2d.trust import Trust, current_trust, restrict
-
-if TYPE_CHECKING:
-    from fleet2d.runs.run import Run
 
 
 class WorkerJob(Protocol):
@@ -115,7 +113,7 @@ class FunctionJob:
         except Exception as error:  # noqa: BLE001 - raised again in the driver
             return pickle.dumps((False, _portable(error)))
 
-    def _call(self, run: "Run") -> Any:
+    def _call(self, run: Run) -> Any:
         function: Callable[[Run], Any] = pickle.loads(self.function)  # noqa: S301 - our own
         return function(run)
 

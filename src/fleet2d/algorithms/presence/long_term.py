@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence, Set
 from datetime import datetime, timedelta
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, cast
+from typing import Annotated, Any, ClassVar, Literal, cast
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -14,12 +14,10 @@ from fleet2d.algorithms.presence.belief import Presence
 from fleet2d.algorithms.presence.counts import in_time
 from fleet2d.algorithms.presence.estimator import F64, Estimator
 from fleet2d.component import OneOf, register
+from fleet2d.floorplan.home.home import Home
 from fleet2d.problems import problem
 from fleet2d.streams import stream_key
 from fleet2d.units import PositiveDuration, Share
-
-if TYPE_CHECKING:
-    from fleet2d.floorplan.home.home import Home
 
 MINUTE = timedelta(minutes=1)
 DAY = timedelta(days=1)
@@ -60,7 +58,7 @@ class LongTermPresence(Algorithm):
             )
         return self
 
-    def start(self, home: "Home") -> None:
+    def start(self, home: Home) -> None:
         """Begin without evidence."""
         self.rooms = len(home.rooms)
         self.has_begun = False

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence, Set
 from datetime import datetime, timedelta
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, cast
+from typing import Annotated, Any, ClassVar, cast
 
 import numpy as np
 
@@ -14,10 +14,8 @@ from fleet2d.algorithms.presence.counts import in_time
 from fleet2d.algorithms.presence.model import Model
 from fleet2d.component import OneOf, register
 from fleet2d.errors import ComponentError
+from fleet2d.floorplan.home.home import Home
 from fleet2d.units import PositiveDuration
-
-if TYPE_CHECKING:
-    from fleet2d.floorplan.home.home import Home
 
 SECOND_US = 1_000_000
 
@@ -39,7 +37,7 @@ class RealTimePresence(Algorithm):
     period: PositiveDuration = timedelta(minutes=5)
     model: Annotated[Model, OneOf("presence_model")] = cast("Any", "hmm")
 
-    def start(self, home: "Home") -> None:
+    def start(self, home: Home) -> None:
         """Begin without evidence."""
         self.rooms = len(home.rooms)
         self.has_begun = False

@@ -2,19 +2,16 @@
 
 import math
 from datetime import timedelta
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fleet2d.entities.actor import Actor
 from fleet2d.entities.behavior import Situation
 from fleet2d.entities.nearby import points_at_distance
+from fleet2d.entities.plan import Plan
 from fleet2d.errors import ScenarioError
 from fleet2d.kernels.headings import TURN, heading_of, turn_between
-
-if TYPE_CHECKING:
-    from fleet2d.entities.actor import Actor
-    from fleet2d.entities.plan import Plan
 
 # Time after which a robot tries again to pass a shut door.
 AT_A_DOOR = timedelta(seconds=10)
@@ -24,7 +21,7 @@ DIRECTIONS = 32
 LatticePoint = tuple[int, int]
 
 
-def way_seconds(actor: "Actor", start: LatticePoint, goal: LatticePoint) -> float | None:
+def way_seconds(actor: Actor, start: LatticePoint, goal: LatticePoint) -> float | None:
     """Return how long a robot drives between two lattice points, without turns; None: no way."""
     route = actor.space.route(start, goal)
     return None if route is None else sum(_legs(route)) / actor.speed
@@ -83,7 +80,7 @@ def spot_back(now: Situation, x: float, y: float, distance: float) -> LatticePoi
     return min(spots, key=lambda spot: _distance(spot, position), default=position)
 
 
-def approach(now: Situation, plan: "Plan", x: float, y: float, distance: float) -> "Plan":
+def approach(now: Situation, plan: Plan, x: float, y: float, distance: float) -> Plan:
     """Drive to `spot_near` a person at (x, y) [m], unless the robot is already there."""
     spot = spot_near(now, x, y, distance)
     if spot != (plan.x, plan.y):
@@ -91,13 +88,13 @@ def approach(now: Situation, plan: "Plan", x: float, y: float, distance: float) 
     return plan
 
 
-def face(plan: "Plan", x: int, y: int) -> "Plan":
+def face(plan: Plan, x: int, y: int) -> Plan:
     """Turn towards a lattice point."""
     heading = int(heading_of(x - plan.x, y - plan.y))
     return plan.turn_by(turn_between(plan.heading, heading) / TURN)
 
 
-def check_has_camera(actor: "Actor", behavior: str) -> None:
+def check_has_camera(actor: Actor, behavior: str) -> None:
     """Refuse a behavior that needs a camera, for a body without one.
 
     Raises:
@@ -110,7 +107,7 @@ def check_has_camera(actor: "Actor", behavior: str) -> None:
         )
 
 
-def _is_free(actor: "Actor", point: NDArray[np.int64]) -> bool:
+def _is_free(actor: Actor, point: NDArray[np.int64]) -> bool:
     return actor.space.part_at(int(point[0]), int(point[1])) == actor.part
 
 

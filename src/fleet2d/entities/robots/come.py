@@ -1,16 +1,14 @@
 """Come: go where a user or an app calls the robot to, and wait there."""
 
 from datetime import timedelta
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 from fleet2d.component import register
+from fleet2d.entities.actor import Actor
 from fleet2d.entities.behavior import Behavior, Command, Situation
 from fleet2d.entities.furniture import stop_at
 from fleet2d.entities.plan import Plan
 from fleet2d.units import Duration
-
-if TYPE_CHECKING:
-    from fleet2d.entities.actor import Actor
 
 
 @register("behavior", "come")
@@ -31,7 +29,7 @@ class Come(Behavior):
 
     stay: Duration = timedelta(minutes=10)
 
-    def start(self, actor: "Actor") -> None:
+    def start(self, actor: Actor) -> None:
         """Start without a command."""
         self.command: Command | None = None
 

@@ -1,18 +1,16 @@
 """Dock: drive to the charger before the battery is empty, and charge."""
 
 from datetime import datetime, timedelta
-from typing import TYPE_CHECKING, ClassVar, Self
+from typing import ClassVar, Self
 
 from pydantic import model_validator
 
 from fleet2d.component import register
+from fleet2d.entities.actor import Actor
 from fleet2d.entities.behavior import Behavior, Situation
 from fleet2d.entities.plan import Plan
 from fleet2d.errors import ScenarioError
 from fleet2d.units import Share, problem
-
-if TYPE_CHECKING:
-    from fleet2d.entities.actor import Actor
 
 # How long it rests at the charger before all behaviors are asked again.
 REST = timedelta(hours=1)
@@ -49,7 +47,7 @@ class Dock(Behavior):
             )
         return self
 
-    def start(self, actor: "Actor") -> None:
+    def start(self, actor: Actor) -> None:
         """Check that there is a battery.
 
         Raises:

@@ -1,13 +1,14 @@
 """Explore: drive from frontier to frontier of the floor seen so far, until all of it is seen."""
 
 from datetime import datetime, timedelta
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
 from fleet2d.component import register
+from fleet2d.entities.actor import Actor
 from fleet2d.entities.behavior import Behavior, Situation
 from fleet2d.entities.plan import Plan
 from fleet2d.entities.robots.approach import check_has_camera
@@ -15,9 +16,6 @@ from fleet2d.entities.robots.viewpoints import centres, spread, visible_from
 from fleet2d.kernels.fields import squared_distance
 from fleet2d.kernels.headings import TURN
 from fleet2d.units import Length, Share
-
-if TYPE_CHECKING:
-    from fleet2d.entities.actor import Actor
 
 # The most cells of the home that are tried as viewpoints, and as targets to be seen.
 STANDS_TRIED = 800
@@ -53,7 +51,7 @@ class Explore(Behavior):
     enough: Share = 0.98
     reach: Length = Field(default=1.0, ge=0.1, le=5)
 
-    def start(self, actor: "Actor") -> None:
+    def start(self, actor: Actor) -> None:
         """Determine the floor to be seen, and the places from which it may be seen."""
         check_has_camera(actor, "explore")
         plan = actor.home.plan
@@ -129,7 +127,7 @@ class Explore(Behavior):
         near[sorted(self.blocked_stands)] = False
         return near if frontier.any() else np.zeros(len(self.stands), np.bool_)
 
-    def _visible(self, actor: "Actor", stand: int) -> Bool:
+    def _visible(self, actor: Actor, stand: int) -> Bool:
         """Return which targets are visible from a place, bool (targets,), by present walls."""
         if self.visible[0] != actor.home.version:
             self.visible = actor.home.version, {}

@@ -1,7 +1,7 @@
 """Find: look for a person, room by room, by probabilities and distances."""
 
 from datetime import datetime, timedelta
-from typing import TYPE_CHECKING, ClassVar, NamedTuple, Self
+from typing import ClassVar, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,6 +9,7 @@ from pydantic import Field, model_validator
 
 from fleet2d.clock import midnight_of
 from fleet2d.component import register
+from fleet2d.entities.actor import Actor
 from fleet2d.entities.behavior import Command, Situation
 from fleet2d.entities.plan import Plan
 from fleet2d.entities.resume import resumed
@@ -18,9 +19,6 @@ from fleet2d.entities.robots.sites import Sites
 from fleet2d.errors import PlacementError
 from fleet2d.search.policies import MOST_EXACT, Policy, after_empty_looks, order_by
 from fleet2d.units import Duration, Length, PositiveDuration, Share, TimeOfDay, problem
-
-if TYPE_CHECKING:
-    from fleet2d.entities.actor import Actor
 
 DAY = timedelta(days=1)
 
@@ -110,7 +108,7 @@ class Find(BeliefBehavior):
         """Tell whether it looks for the person of a command."""
         return super().takes(command) and self.user in (ANYONE, command.target)
 
-    def start(self, actor: "Actor") -> None:
+    def start(self, actor: Actor) -> None:
         """Choose the viewpoints of each room."""
         check_has_camera(actor, "find")
         self.sites = Sites(actor, self.views)

@@ -1,18 +1,16 @@
 """Follow: stay behind a person in view, and look for a person who was lost."""
 
 from datetime import timedelta
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 from pydantic import Field
 
 from fleet2d.component import register
+from fleet2d.entities.actor import Actor
 from fleet2d.entities.behavior import Behavior, Situation
 from fleet2d.entities.plan import Plan
 from fleet2d.entities.robots.approach import approach, check_has_camera, face
 from fleet2d.units import Duration, Length, PositiveDuration
-
-if TYPE_CHECKING:
-    from fleet2d.entities.actor import Actor
 
 # Distance from where a person was lost at which it looks for the person [m].
 SOUGHT_FROM = 0.3
@@ -50,7 +48,7 @@ class Follow(Behavior):
         """Return the user that it follows, if it is one by name."""
         return (self.user,) if self.user else ()
 
-    def start(self, actor: "Actor") -> None:
+    def start(self, actor: Actor) -> None:
         """Check that it has a camera."""
         check_has_camera(actor, "follow")
         self.person: str | None = None  # the one that it follows now

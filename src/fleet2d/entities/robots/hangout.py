@@ -1,13 +1,14 @@
 """Hangout: stand near people without blocking their way, and move rarely."""
 
 from datetime import datetime, timedelta
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
 from fleet2d.component import register
+from fleet2d.entities.actor import Actor
 from fleet2d.entities.behavior import Situation
 from fleet2d.entities.hours import Hours, holds
 from fleet2d.entities.kinds import available_rooms
@@ -17,12 +18,9 @@ from fleet2d.entities.robots.belief import BeliefBehavior
 from fleet2d.entities.robots.places import HangoutPlaces, Nearness
 from fleet2d.entities.robots.viewpoints import Viewpoints, viewpoints_of
 from fleet2d.errors import PlacementError
+from fleet2d.floorplan.home.space import Space
 from fleet2d.kernels.mesh import SUB
 from fleet2d.units import Length, PositiveDuration, Share
-
-if TYPE_CHECKING:
-    from fleet2d.entities.actor import Actor
-    from fleet2d.floorplan.home.space import Space
 
 # When exploring a room: the part of it to be shown, by at most this many viewpoints.
 ENOUGH = 0.95
@@ -78,7 +76,7 @@ class Hangout(BeliefBehavior):
     quiet: Hours = ()
     off_doors: Length = Field(default=0.8, ge=0)
 
-    def start(self, actor: "Actor") -> None:
+    def start(self, actor: Actor) -> None:
         """Lay out the places, and rate them by what doesn't depend on where people are."""
         avoided = available_rooms(actor, "hangout.avoid", self.avoid, needed=False)
         self.avoided = frozenset(room.index for room in avoided)
@@ -163,7 +161,7 @@ class Hangout(BeliefBehavior):
             self.rated_by, self.worth = joint, gain - self.penalty
         return self.worth - self._ways(now.actor)
 
-    def _ways(self, actor: "Actor") -> NDArray[np.float64]:
+    def _ways(self, actor: Actor) -> NDArray[np.float64]:
         """Return the cost of the way to each place, float64 (n,), infinite without a way.
 
         The robot decides often, but stands at few places: costs are kept by position, until its

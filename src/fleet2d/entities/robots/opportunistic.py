@@ -1,18 +1,16 @@
 """Opportunistic: approach people who come into view, and interact for a while."""
 
 from datetime import datetime, timedelta
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 from pydantic import Field
 
 from fleet2d.component import register
+from fleet2d.entities.actor import Actor
 from fleet2d.entities.behavior import Behavior, Situation
 from fleet2d.entities.plan import Plan
 from fleet2d.entities.robots.approach import approach, check_has_camera, face
 from fleet2d.units import Duration, Length, Share
-
-if TYPE_CHECKING:
-    from fleet2d.entities.actor import Actor
 
 
 @register("behavior", "opportunistic")
@@ -44,7 +42,7 @@ class Opportunistic(Behavior):
         """Return the users that it approaches, if only some."""
         return self.users
 
-    def start(self, actor: "Actor") -> None:
+    def start(self, actor: Actor) -> None:
         """Check that it has a camera."""
         check_has_camera(actor, "opportunistic")
         self.last_opportunity: dict[str, datetime] = {}  # by person

@@ -1,20 +1,18 @@
 """Patrol: a robot's rounds through rooms or along waypoints."""
 
 from datetime import timedelta
-from typing import TYPE_CHECKING, ClassVar, Literal, Self
+from typing import ClassVar, Literal, Self
 
 from pydantic import model_validator
 
 from fleet2d.component import register
+from fleet2d.entities.actor import Actor
 from fleet2d.entities.behavior import Behavior, Situation
 from fleet2d.entities.furniture import stops_at
 from fleet2d.entities.kinds import available_places
 from fleet2d.entities.place import Place, Point
 from fleet2d.entities.plan import Plan
 from fleet2d.units import Duration, problem
-
-if TYPE_CHECKING:
-    from fleet2d.entities.actor import Actor
 
 
 @register("behavior", "patrol")
@@ -48,7 +46,7 @@ class Patrol(Behavior):
             raise problem("there is nowhere to go: name rooms, or waypoints, or leave out 'rooms'")
         return self
 
-    def start(self, actor: "Actor") -> None:
+    def start(self, actor: Actor) -> None:
         """Find the stops."""
         if self.waypoints:
             self.stops = [actor.point(point) for point in self.waypoints]

@@ -1,20 +1,18 @@
 """Places to hang out at, rated by all that doesn't depend on where people are at present."""
 
 from itertools import combinations
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from fleet2d.entities.actor import Actor
 from fleet2d.entities.robots.viewpoints import sight_range
 from fleet2d.floorplan.cache import read_only
+from fleet2d.floorplan.plan import Room
 from fleet2d.kernels.mesh import CELL_CENTRE, SUB
 from fleet2d.kernels.points import points_in_sight
-
-if TYPE_CHECKING:
-    from fleet2d.entities.actor import Actor
-    from fleet2d.floorplan.plan import Room
 
 # Radius of the bodies whose ways count as the ways of people [m].
 PERSON = 0.2
@@ -42,7 +40,7 @@ class HangoutPlaces:
         prox: How deep it is in personal space, from 1 on a seat to 0 outside, float64 (n,).
     """
 
-    def __init__(self, actor: "Actor", avoid: frozenset[int], off_doors: float) -> None:
+    def __init__(self, actor: Actor, avoid: frozenset[int], off_doors: float) -> None:
         """Lay out the places, by walls and furniture as they are at present.
 
         Args:
@@ -109,7 +107,7 @@ class HangoutPlaces:
             points, rooms = points[clear], rooms[clear]
         return np.ascontiguousarray(points), rooms
 
-    def _seats_of(self, room: "Room") -> I64:
+    def _seats_of(self, room: Room) -> I64:
         """Return where people usually are in a room [lattice]: at its furniture, else all over."""
         plan = self._actor.home.plan
         uses = [
@@ -124,10 +122,10 @@ class HangoutPlaces:
         cells = cells[:: max(1, len(cells) // SEATS_TRIED)]
         return np.ascontiguousarray(cells[:, ::-1] * SUB + CELL_CENTRE)
 
-    def _same_room(self, room: "Room") -> F64:
+    def _same_room(self, room: Room) -> F64:
         return (self.room == room.index).astype(np.float64)
 
-    def _view(self, room: "Room") -> F64:
+    def _view(self, room: Room) -> F64:
         walls, reach = self._actor.home.walls, sight_range(self._actor)
         seats = self._seats[room.index]
         share = np.zeros(len(self.points))
@@ -137,7 +135,7 @@ class HangoutPlaces:
                 share[i] = np.count_nonzero(points_in_sight(walls, x, y, seats[near])) / len(seats)
         return share
 
-    def _path(self, room: "Room", tau: float) -> F64:
+    def _path(self, room: Room, tau: float) -> F64:
         actor, lattice = self._actor, self._actor.home.plan.lattice
         cells = actor.space.cells(room.index, actor.part)
         if not len(cells):

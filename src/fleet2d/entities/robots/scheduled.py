@@ -2,12 +2,13 @@
 
 from collections.abc import Iterator
 from datetime import datetime, timedelta
-from typing import TYPE_CHECKING, Annotated, ClassVar
+from typing import Annotated, ClassVar
 
 from pydantic import Field
 
 from fleet2d.clock import midnight_of
 from fleet2d.component import Settings, register
+from fleet2d.entities.actor import Actor
 from fleet2d.entities.behavior import Behavior, Situation
 from fleet2d.entities.furniture import stop_at
 from fleet2d.entities.hours import DAY
@@ -16,9 +17,6 @@ from fleet2d.entities.plan import Plan
 from fleet2d.entities.robots.approach import AT_A_DOOR
 from fleet2d.units import Duration, TimeOfDay
 from fleet2d.weekdays import Days, weekdays_of
-
-if TYPE_CHECKING:
-    from fleet2d.entities.actor import Actor
 
 
 class ScheduledVisit(Settings):
@@ -60,7 +58,7 @@ class Scheduled(Behavior):
     visits: tuple[ScheduledVisit, ...] = Field(min_length=1)
     late: Duration = timedelta(minutes=30)
 
-    def start(self, actor: "Actor") -> None:
+    def start(self, actor: Actor) -> None:
         """Find the stops."""
         self.stops = [stop_at(actor, visit.place) for visit in self.visits]
         self.last_decision = actor.clock.start - timedelta(microseconds=1)

@@ -1,20 +1,17 @@
 """The rooms of a home as sites of a search: where to look round, and how long that takes."""
 
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fleet2d.entities.actor import Actor
 from fleet2d.entities.behavior import Situation
+from fleet2d.entities.plan import Plan
 from fleet2d.entities.robots.approach import way_seconds
 from fleet2d.entities.robots.viewpoints import viewpoints_of
 from fleet2d.kernels.headings import TURN
 from fleet2d.search.problem import SearchProblem, search_problem
-
-if TYPE_CHECKING:
-    from fleet2d.entities.actor import Actor
-    from fleet2d.entities.plan import Plan
 
 # The part of a room to be shown by its viewpoints, if there are few enough of them.
 ENOUGH = 0.9
@@ -32,7 +29,7 @@ class Sites:
         share: The part of each room that its viewpoints show, float64 (n,).
     """
 
-    def __init__(self, actor: "Actor", views: int) -> None:
+    def __init__(self, actor: Actor, views: int) -> None:
         """Choose the viewpoints, by walls and furniture as they are at present.
 
         Args:
@@ -51,11 +48,11 @@ class Sites:
         """Return the number of sites."""
         return len(self.rooms)
 
-    def can_go(self, plan: "Plan", site: int) -> bool:
+    def can_go(self, plan: Plan, site: int) -> bool:
         """Tell whether all viewpoints of a site can be reached from where a plan ends so far."""
         return all(plan.reaches(*point) for point in self._points[site])
 
-    def look_round(self, plan: "Plan", site: int) -> "Plan":
+    def look_round(self, plan: Plan, site: int) -> Plan:
         """Go to a site and turn once at each of its viewpoints."""
         for point in self._points[site]:
             plan.go_to_point(*point).turn_by(1.0)

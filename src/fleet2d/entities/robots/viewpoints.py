@@ -1,16 +1,14 @@
 """Viewpoints: where in a room to look round from, so that little of it stays out of view."""
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fleet2d.entities.actor import Actor
+from fleet2d.floorplan.plan import Room
 from fleet2d.kernels.mesh import CELL_CENTRE, SUB
 from fleet2d.kernels.points import points_in_sight
-
-if TYPE_CHECKING:
-    from fleet2d.entities.actor import Actor
-    from fleet2d.floorplan.plan import Room
 
 # The most cells of a room that are tried as viewpoints, and as targets to be seen, evenly spread.
 STANDS_TRIED = 48
@@ -31,13 +29,13 @@ class Viewpoints(NamedTuple):
     share: float
 
 
-def sight_range(actor: "Actor") -> float:
+def sight_range(actor: Actor) -> float:
     """Return how far the cameras of a body see [lattice]; 0 without a camera."""
     ranges = [camera.range[1] for camera in actor.entity.eyes.values()]
     return max(ranges, default=0.0) * actor.home.plan.lattice.units_per_m
 
 
-def viewpoints_of(actor: "Actor", room: "Room", enough: float, most: int) -> Viewpoints:
+def viewpoints_of(actor: Actor, room: Room, enough: float, most: int) -> Viewpoints:
     """Return the viewpoints of a room, chosen greedily: each adds as much to the view as possible.
 
     Walls and tall furniture count as they are at present.
@@ -53,7 +51,7 @@ def viewpoints_of(actor: "Actor", room: "Room", enough: float, most: int) -> Vie
     return home.cached(key, lambda: _choose_viewpoints(actor, room, enough, most))
 
 
-def _choose_viewpoints(actor: "Actor", room: "Room", enough: float, most: int) -> Viewpoints:
+def _choose_viewpoints(actor: Actor, room: Room, enough: float, most: int) -> Viewpoints:
     plan = actor.home.plan
     stands = spread(actor.space.cells(room.index, actor.part), STANDS_TRIED)
     targets = spread(np.argwhere(plan.room_of_cell == room.index), TARGETS_TRIED)
@@ -74,7 +72,7 @@ def _choose_viewpoints(actor: "Actor", room: "Room", enough: float, most: int) -
     return Viewpoints(tuple(points), 1 - float(unseen.sum()) / len(goals))
 
 
-def visible_from(actor: "Actor", place: I64, goals: I64) -> NDArray[np.bool_]:
+def visible_from(actor: Actor, place: I64, goals: I64) -> NDArray[np.bool_]:
     """Return which goals (n, 2) are in range and in sight of a place, at any heading, bool (n,)."""
     near = ((goals - place) ** 2).sum(axis=1) <= sight_range(actor) ** 2
     visible = np.zeros(len(goals), np.bool_)

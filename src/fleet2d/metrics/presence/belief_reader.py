@@ -1,24 +1,22 @@
 """Outputs of algorithms as presence, for the metrics that measure it."""
 
 from datetime import timedelta
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fleet2d.algorithms.algorithm import Present
 from fleet2d.algorithms.history import History
 from fleet2d.algorithms.output import RoomDistribution
 from fleet2d.algorithms.presence.belief import BeliefSeries, Presence
 from fleet2d.errors import ComponentError
 
-if TYPE_CHECKING:
-    from fleet2d.algorithms.algorithm import Present
-
 F64 = NDArray[np.float64]
 I64 = NDArray[np.int64]
 
 
-def presence_of(name: str, state: "Present") -> Presence | None:
+def presence_of(name: str, state: Present) -> Presence | None:
     """Return an algorithm's newest output as presence; None before the first.
 
     A RoomDistribution counts for every user and for anyone, who are never away.
@@ -53,7 +51,7 @@ class BeliefReader:
         self.name = name
         self._previous: Presence | None = None
 
-    def at(self, history: History, state: "Present", ends: I64) -> tuple[F64, F64] | None:
+    def at(self, history: History, state: Present, ends: I64) -> tuple[F64, F64] | None:
         """Return shares of rooms (bins, users + 1, rooms) and of away (bins, users + 1).
 
         Args:

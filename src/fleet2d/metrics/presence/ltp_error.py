@@ -2,15 +2,17 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from fleet2d.algorithms.algorithm import Present
 from fleet2d.algorithms.history import History
 from fleet2d.algorithms.presence.belief import ANYONE, Presence
 from fleet2d.component import register
+from fleet2d.floorplan.home.home import Home
 from fleet2d.metrics.metric import Metric
 from fleet2d.metrics.presence.belief_reader import presence_of
 from fleet2d.metrics.presence.distances import (
@@ -28,10 +30,6 @@ from fleet2d.metrics.presence.occupancy import (
     walking_distances,
 )
 from fleet2d.units import PositiveDuration, Share
-
-if TYPE_CHECKING:
-    from fleet2d.algorithms.algorithm import Present
-    from fleet2d.floorplan.home.home import Home
 
 F64 = NDArray[np.float64]
 I64 = NDArray[np.int64]
@@ -60,7 +58,7 @@ class LongTermMetric(Metric):
         """Return the name of the algorithm that it measures."""
         return (self.of,)
 
-    def start(self, home: "Home") -> None:
+    def start(self, home: Home) -> None:
         """Begin counting."""
         self.counts: list[I64] = []  # of each period in the window
         self.steps: list[int] = []
@@ -123,7 +121,7 @@ class LtpError(LongTermMetric):
     alpha: float = Field(default=1e-3, gt=0, le=1)
     burn_in: Share = 0.1
 
-    def start(self, home: "Home") -> None:
+    def start(self, home: Home) -> None:
         """Begin counting."""
         super().start(home)
         self.metres = walking_distances(home)
@@ -131,7 +129,7 @@ class LtpError(LongTermMetric):
         self.within: dict[str, float | None] = {}
         self.best: dict[str, tuple[int, int]] = {}  # the likeliest room, and its changes so far
 
-    def update(self, history: History, state: "Present") -> Any:
+    def update(self, history: History, state: Present) -> Any:
         """Compare the presence with the truth so far; return a row for each user."""
         count_steps = steps_by_hour if self.given == "hour_of_week" else steps_in_places
         counts, steps = self.count(count_steps(history, state), history)
@@ -237,13 +235,13 @@ class LtpGap(LongTermMetric):
 
     unit: ClassVar[str] = "share of time, gap at the end"
 
-    def start(self, home: "Home") -> None:
+    def start(self, home: Home) -> None:
         """Begin counting."""
         super().start(home)
         self.rooms = [room.name for room in home.rooms]
         self.last: dict[str, F64] = {}
 
-    def update(self, history: History, state: "Present") -> Any:
+    def update(self, history: History, state: Present) -> Any:
         """Compare the presence with the truth so far; return a row for each user and room."""
         counts, steps = self.count(steps_in_places(history, state), history)
         presence = presence_of(self.of, state)

@@ -1,21 +1,18 @@
 """True occupancy of rooms, which presence is measured by."""
 
 from datetime import timedelta
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fleet2d.algorithms.algorithm import Present
 from fleet2d.algorithms.history import History
 from fleet2d.algorithms.observations import NOWHERE
 from fleet2d.algorithms.presence.belief import HOURS
 from fleet2d.floorplan.cache import read_only
+from fleet2d.floorplan.home.home import Home
+from fleet2d.floorplan.home.space import Space
 from fleet2d.kernels.mesh import SUB
-
-if TYPE_CHECKING:
-    from fleet2d.algorithms.algorithm import Present
-    from fleet2d.floorplan.home.home import Home
-    from fleet2d.floorplan.home.space import Space
 
 I64 = NDArray[np.int64]
 F64 = NDArray[np.float64]
@@ -25,7 +22,7 @@ HOUR_US = 3_600_000_000
 RADIUS = 0.2
 
 
-def steps_in_places(history: History, state: "Present") -> I64:
+def steps_in_places(history: History, state: Present) -> I64:
     """Return the number of steps that each user was in each place: int64 (users + 1, rooms + 1).
 
     The last column is away. The last row is for anyone: steps with somebody in the room, and last
@@ -42,7 +39,7 @@ def steps_in_places(history: History, state: "Present") -> I64:
     return counts
 
 
-def steps_by_hour(history: History, state: "Present") -> I64:
+def steps_by_hour(history: History, state: Present) -> I64:
     """Return the same by hour of the week: int64 (168, users + 1, rooms + 1)."""
     rooms, users = len(state.home.rooms), state.users
     counts = np.zeros((HOURS, len(users) + 1, rooms + 1), np.int64)
@@ -58,7 +55,7 @@ def steps_by_hour(history: History, state: "Present") -> I64:
     return counts
 
 
-def hours_of_week(history: History, state: "Present") -> I64:
+def hours_of_week(history: History, state: Present) -> I64:
     """Return the hour of the week, from Monday 00:00, of each step of a history."""
     monday = state.start.replace(hour=0, minute=0, second=0, microsecond=0)
     monday -= timedelta(days=monday.weekday())
@@ -67,7 +64,7 @@ def hours_of_week(history: History, state: "Present") -> I64:
     return (start_us + steps * round(history.step_s * 1e6)) // HOUR_US % HOURS
 
 
-def _anybody(history: History, state: "Present") -> NDArray[np.bool_]:
+def _anybody(history: History, state: Present) -> NDArray[np.bool_]:
     """Return whether each room had somebody in it, last nobody at home: bool (steps, rooms + 1)."""
     change = np.zeros((len(history) + 1, len(state.home.rooms) + 1), np.int32)
     for user in state.users:
@@ -87,7 +84,7 @@ def shares(counts: I64, steps: float) -> tuple[F64, F64]:
     return home, counts[..., -1] / max(steps, 1)
 
 
-def walking_distances(home: "Home") -> F64:
+def walking_distances(home: Home) -> F64:
     """Return the distance on foot between the middles of each two rooms [m].
 
     Without a route between them it is twice the longest distance.
@@ -99,7 +96,7 @@ def walking_distances(home: "Home") -> F64:
     return home.cached(("walking distances", space), lambda: read_only(_distances(home, space)))
 
 
-def _distances(home: "Home", space: "Space") -> F64:
+def _distances(home: Home, space: Space) -> F64:
     lattice = home.plan.lattice
     places = []
     for room in home.rooms:

@@ -2,15 +2,17 @@
 
 from collections.abc import Mapping
 from datetime import timedelta
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fleet2d.algorithms.algorithm import Present
 from fleet2d.algorithms.evidence import steps_of_bin
 from fleet2d.algorithms.history import History
 from fleet2d.algorithms.observations import NOWHERE
 from fleet2d.component import register
+from fleet2d.floorplan.home.home import Home
 from fleet2d.metrics.metric import Metric
 from fleet2d.metrics.presence.belief_reader import BeliefReader
 from fleet2d.metrics.presence.scores import (
@@ -24,10 +26,6 @@ from fleet2d.metrics.presence.scores import (
     top_k,
 )
 from fleet2d.units import PositiveDuration
-
-if TYPE_CHECKING:
-    from fleet2d.algorithms.algorithm import Present
-    from fleet2d.floorplan.home.home import Home
 
 F64 = NDArray[np.float64]
 I64 = NDArray[np.int64]
@@ -124,13 +122,13 @@ class RtpScore(Metric):
         """Return the name of the scored algorithm, and of the reference if there is one."""
         return (self.of,) if self.reference is None else (self.of, self.reference)
 
-    def start(self, home: "Home") -> None:
+    def start(self, home: Home) -> None:
         """Begin scoring."""
         self.beliefs = [BeliefReader(name) for name in self.reads()]
         self.last: dict[str, tuple[int, int]] = {}  # step and room of the last correct sighting
         self.scored: dict[str, list[ScoredBins]] = {}
 
-    def update(self, history: History, state: "Present") -> Any:
+    def update(self, history: History, state: Present) -> Any:
         """Score the bins of the period; return a row for each user and class of gaps in it."""
         size = steps_of_bin(round(history.step_s * 1e6))
         ends = np.arange(-(-(history.first + 1) // size) * size, history.end + 1, size) - 1
