@@ -223,7 +223,9 @@ def test_bad_settings_are_refused(fields: dict[str, Any], words: str) -> None:
 def test_an_output_that_says_nothing_of_rooms_is_an_error_that_names_it() -> None:
     algorithms = {"tick": {"type": "tests.own_components:Keeper", "period": "1 min"}}
     content = home_with([search(source="tick"), STAY], "30 min", algorithms=algorithms)
-    with pytest.raises(fleet2d.ComponentError, match=r"robots\.astro.*'tick' has no room probabilities"):
+    with pytest.raises(
+        fleet2d.ComponentError, match=r"robots\.astro.*'tick' has no room probabilities"
+    ):
         run(content)
 
 
