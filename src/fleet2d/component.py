@@ -34,7 +34,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import CoreSchema, InitErrorDetails, core_schema
 
 from fleet2d.component_class import ComponentClass
-from fleet2d.descriptions import Described
+from fleet2d.descriptions import DescribedModel
 from fleet2d.errors import ScenarioError
 from fleet2d.problems import did_you_mean, problem, problem_at, rewrite, shown, unknown_key
 from fleet2d.user_modules import BrokenModule, class_path, import_class
@@ -56,7 +56,7 @@ PACKAGES = {
 """Where the built-in components of each kind live."""
 
 
-class Settings(Described):
+class Settings(DescribedModel):
     """A frozen group of configuration keys; the error about an unknown key lists the known ones."""
 
     # Validators are built when a class is first used: a scenario uses few of all classes.

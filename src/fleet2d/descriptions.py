@@ -39,7 +39,7 @@ def summary(cls: type) -> str:
     return _SECTION.split(inspect.cleandoc(cls.__doc__ or ""))[0].rstrip()
 
 
-class Described(BaseModel):
+class DescribedModel(BaseModel):
     """A model whose JSON Schema takes the descriptions of its fields from docstrings.
 
     A `description` of a field itself counts more.

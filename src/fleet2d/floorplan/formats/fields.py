@@ -18,7 +18,7 @@ from pydantic import (
 )
 from pydantic_core import ErrorDetails
 
-from fleet2d.descriptions import Described
+from fleet2d.descriptions import DescribedModel
 from fleet2d.errors import FloorPlanError
 from fleet2d.problems import Location, problem, suggest
 
@@ -31,7 +31,7 @@ Listed = Annotated[list[T], Field(fail_fast=True)]
 """A list of which only the first wrong item is an error, however long it is."""
 
 
-class FileModel(Described):
+class FileModel(DescribedModel):
     """An object in a file; a missing or an unknown key is an error that names the known ones."""
 
     model_config = ConfigDict(extra="forbid", strict=True, defer_build=True)
