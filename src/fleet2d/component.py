@@ -61,11 +61,7 @@ class Settings(DescribedModel):
 
     # Validators are built when a class is first used: a scenario uses few of all classes.
     model_config = ConfigDict(
-        frozen=True,
-        extra="forbid",
-        validate_default=True,
-        allow_inf_nan=False,
-        defer_build=True,
+        frozen=True, extra="forbid", validate_default=True, allow_inf_nan=False, defer_build=True
     )
 
     @model_validator(mode="wrap")

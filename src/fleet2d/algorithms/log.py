@@ -9,12 +9,7 @@ from numpy.typing import NDArray
 from fleet2d.algorithms.activities import Activities
 from fleet2d.algorithms.blocks import Blocks
 from fleet2d.algorithms.evidence import Evidence, SightingRows, gather
-from fleet2d.algorithms.observations import (
-    Looks,
-    NearestRooms,
-    Observations,
-    Rows,
-)
+from fleet2d.algorithms.observations import Looks, NearestRooms, Observations, Rows
 from fleet2d.algorithms.patches import Patches
 from fleet2d.algorithms.poses import BodyPoses, Path
 from fleet2d.errors import ComponentError

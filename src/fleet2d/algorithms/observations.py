@@ -62,11 +62,7 @@ class Observations:
     """
 
     def __init__(
-        self,
-        plan: FloorPlan,
-        rooms: "NearestRooms",
-        rows: Rows,
-        activities: Activities,
+        self, plan: FloorPlan, rooms: "NearestRooms", rows: Rows, activities: Activities
     ) -> None:
         self._plan, self._rooms, self._rows, self._activities = plan, rooms, rows, activities
 

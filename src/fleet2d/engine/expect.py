@@ -18,12 +18,7 @@ from fleet2d.units import MICROSECOND
 
 
 def expect(
-    state: State,
-    scenario: Scenario,
-    clock: Clock,
-    name: str,
-    expectation: Expectation,
-    since: int,
+    state: State, scenario: Scenario, clock: Clock, name: str, expectation: Expectation, since: int
 ) -> None:
     """Add an expectation to a run, from a step on.
 

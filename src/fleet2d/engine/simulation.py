@@ -25,13 +25,7 @@ from fleet2d.engine.lifecycle import (
 from fleet2d.engine.pace import Pace
 from fleet2d.engine.phases import PHASES, Span
 from fleet2d.engine.setup import set_up
-from fleet2d.engine.snapshot import (
-    Constants,
-    copy_state,
-    open_snapshot,
-    read_state,
-    write_snapshot,
-)
+from fleet2d.engine.snapshot import Constants, copy_state, open_snapshot, read_state, write_snapshot
 from fleet2d.engine.state import State
 from fleet2d.errors import ArtifactError, InputError
 from fleet2d.garbage import rare_collections
@@ -92,10 +86,7 @@ class Simulation(Judging):
         self._setup_s = time.perf_counter() - began
 
     def _prepare(
-        self,
-        scenario: Scenario,
-        store: RunStore,
-        interventions: Sequence[Mapping[str, Any]] = (),
+        self, scenario: Scenario, store: RunStore, interventions: Sequence[Mapping[str, Any]] = ()
     ) -> None:
         """Set up all but the directory."""
         self.scenario, simulation = scenario, scenario.simulation
@@ -320,10 +311,7 @@ class Simulation(Judging):
             self._store.manifest.notes += notes
 
     def _run_to(
-        self,
-        end: int,
-        on_progress: Callable[[Self], None] | None = None,
-        spans: int | None = None,
+        self, end: int, on_progress: Callable[[Self], None] | None = None, spans: int | None = None
     ) -> None:
         self._check_not_over()
         began, save_s = time.perf_counter(), self._state.recorder.wall_s

@@ -122,11 +122,7 @@ JSON_SCHEMA: dict[str, Any] = {
     " as a mapping",
     "anyOf": [
         {"type": "string"},
-        {
-            "type": "object",
-            "properties": {key: {} for key in KEYS},
-            "additionalProperties": False,
-        },
+        {"type": "object", "properties": {key: {} for key in KEYS}, "additionalProperties": False},
     ],
     "examples": ["always(distance(ana, astro) > 0.5 m)"],
 }

@@ -8,13 +8,7 @@ import numpy as np
 from pydantic_core import PydanticCustomError
 
 from fleet2d.errors import InputError
-from fleet2d.expectations.expectation import (
-    INFINITE,
-    TINY,
-    Expectation,
-    RunSignals,
-    truth,
-)
+from fleet2d.expectations.expectation import INFINITE, TINY, Expectation, RunSignals, truth
 from fleet2d.expectations.formatting import argument_text, call_text, number_text
 from fleet2d.expectations.scene import Scene
 from fleet2d.expectations.trace import F64, Trace

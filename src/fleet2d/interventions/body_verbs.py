@@ -59,12 +59,7 @@ class BodyVerbs(ABC):
         self._do("put", entity=name, to=to, heading_deg=heading_deg)
 
     def send(
-        self,
-        name: str,
-        to: Any,
-        heading_deg: float | None = None,
-        *,
-        duration: Time | None = None,
+        self, name: str, to: Any, heading_deg: float | None = None, *, duration: Time | None = None
     ) -> None:
         """Send a body to a place, where it stays.
 

@@ -11,9 +11,4 @@ from fleet2d._core import (
     vertices_seen_from_vertex,
 )
 
-__all__ = [
-    "build_fans",
-    "line_of_sight",
-    "vertices_seen_from_point",
-    "vertices_seen_from_vertex",
-]
+__all__ = ["build_fans", "line_of_sight", "vertices_seen_from_point", "vertices_seen_from_vertex"]

@@ -87,9 +87,7 @@ class InterruptionRules(NamedTuple):
 
 
 def interruption_rules(
-    needs: Mapping[str, Need],
-    errands: Mapping[str, Errand],
-    activities: Mapping[str, Activity],
+    needs: Mapping[str, Need], errands: Mapping[str, Errand], activities: Mapping[str, Activity]
 ) -> InterruptionRules:
     """Return the rules of needs and errands.
 
@@ -156,10 +154,7 @@ def _quantiles(law: Law) -> Quantiles:
 
 
 def interrupt(
-    rules: InterruptionRules,
-    draws: Draws,
-    day: Sequence[Doing],
-    occupancy: Occupancy | None = None,
+    rules: InterruptionRules, draws: Draws, day: Sequence[Doing], occupancy: Occupancy | None = None
 ) -> list[Doing]:
     """Return a day with interruptions.
 

@@ -133,11 +133,7 @@ class Chain(NamedTuple):
 
 
 def plan_day(
-    plan: DayPlan,
-    draws: Draws,
-    wake: int,
-    next_wake: int,
-    occupancy: Occupancy | None = None,
+    plan: DayPlan, draws: Draws, wake: int, next_wake: int, occupancy: Occupancy | None = None
 ) -> list[Doing]:
     """Draw a day.
 

@@ -44,13 +44,7 @@ from fleet2d.problems import suggest
 from fleet2d.sight.camera import Lens
 from fleet2d.sight.curve import chance, cumulative, decay
 from fleet2d.sight.perception import POSTURES as POSTURE_NAMES
-from fleet2d.sight.perception import (
-    Attributes,
-    Detection,
-    FalsePositives,
-    Identity,
-    Perception,
-)
+from fleet2d.sight.perception import Attributes, Detection, FalsePositives, Identity, Perception
 from fleet2d.units import micros
 
 I64 = NDArray[np.int64]

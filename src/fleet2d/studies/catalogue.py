@@ -67,10 +67,7 @@ class ReconciledPlan:
 
 
 def reconcile(
-    plan: StudyPlan,
-    directory: StudyDirectory,
-    finished: Iterable[int],
-    changed: Changed | None,
+    plan: StudyPlan, directory: StudyDirectory, finished: Iterable[int], changed: Changed | None
 ) -> ReconciledPlan:
     """Number the variants of a plan as in the stored study; new variants get new numbers.
 
@@ -136,7 +133,7 @@ def plan_table(plan: StudyPlan) -> "pa.Table":
     import pyarrow as pa
 
     columns: dict[str, pa.Array] = {
-        VARIANT: pa.array([v.number for v in plan.variants], pa.int32()),
+        VARIANT: pa.array([v.number for v in plan.variants], pa.int32())
     }
     for name in PLAN_COLUMNS[1:]:
         columns[name] = pa.array([getattr(v, name) for v in plan.variants])

@@ -251,9 +251,7 @@ def results_table(headers: Iterable[Mapping[str, Any]]) -> "pa.Table":
     import pyarrow as pa
 
     rows = list(headers)
-    columns: dict[str, pa.Array] = {
-        VARIANT: pa.array([row["number"] for row in rows], pa.int32()),
-    }
+    columns: dict[str, pa.Array] = {VARIANT: pa.array([row["number"] for row in rows], pa.int32())}
     for name in _HEADER_FIELDS:
         columns[name] = pa.array([row.get(name) for row in rows], pa.string())
     columns["attempts"] = pa.array([row["attempts"] for row in rows], pa.int32())

@@ -17,13 +17,7 @@ from fleet2d.studies.reader import Study, open_study
 from fleet2d.studies.sampling import rounded
 from fleet2d.studies.specification import PairedComparison, Specification, read_specification
 from fleet2d.studies.storage import write_error
-from fleet2d.studies.trials import (
-    FAILURE,
-    TrialJob,
-    TrialSchedule,
-    TrialTask,
-    check_settings,
-)
+from fleet2d.studies.trials import FAILURE, TrialJob, TrialSchedule, TrialTask, check_settings
 from fleet2d.studies.tune_settings import TuneSettings
 
 if TYPE_CHECKING:

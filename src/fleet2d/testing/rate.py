@@ -142,13 +142,7 @@ def _steps(
         mass = undecided * rate
         mass[1:] += undecided[:-1] * (1 - rate)
         is_accepted, is_refused = failures <= accept[number], failures >= refuse[number]
-        steps.append(
-            (
-                float(mass[is_accepted].sum()),
-                float(mass[is_refused].sum()),
-                mass,
-            )
-        )
+        steps.append((float(mass[is_accepted].sum()), float(mass[is_refused].sum()), mass))
         undecided = np.where(is_accepted | is_refused, 0.0, mass)
     return steps
 

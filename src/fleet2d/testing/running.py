@@ -89,11 +89,7 @@ def run_claim(claim: Claim, body: Body) -> ClaimResult:
 
 
 def run_trial(
-    variant: Variant,
-    body: Body,
-    *,
-    out: Path | None = None,
-    without: Collection[int] = (),
+    variant: Variant, body: Body, *, out: Path | None = None, without: Collection[int] = ()
 ) -> TrialResult:
     """Run one trial of a test.
 

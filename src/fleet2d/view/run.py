@@ -13,13 +13,7 @@ from numpy.typing import NDArray
 from fleet2d.palette import ACCENT_COLOR
 from fleet2d.runs.categories import categories
 from fleet2d.runs.run import Run
-from fleet2d.view.actogram import (
-    MARKS,
-    draw_actogram,
-    marks_by_day,
-    room_color,
-    rooms_by_day,
-)
+from fleet2d.view.actogram import MARKS, draw_actogram, marks_by_day, room_color, rooms_by_day
 from fleet2d.view.floorplan import (
     DPI,
     check_picture,

@@ -31,11 +31,7 @@ class PageServer:
     """
 
     def __init__(
-        self,
-        sources: Sequence[Path | PageData],
-        *,
-        port: int = 0,
-        live: LiveRoutes | None = None,
+        self, sources: Sequence[Path | PageData], *, port: int = 0, live: LiveRoutes | None = None
     ) -> None:
         """Bind a port of this machine.
 

@@ -11,12 +11,7 @@ from pydantic import Field
 from fleet2d.algorithms.presence.counts import Bins
 from fleet2d.algorithms.presence.day_evidence import DayEvidence, by_day
 from fleet2d.algorithms.presence.estimator import F64, FEWEST_DAYS, Estimator, normalized
-from fleet2d.algorithms.presence.person import (
-    Person,
-    Prior,
-    StateLayout,
-    StretchPlaces,
-)
+from fleet2d.algorithms.presence.person import Person, Prior, StateLayout, StretchPlaces
 from fleet2d.component import register
 from fleet2d.errors import ComponentError
 from fleet2d.kernels.evidence import sum_places

@@ -45,11 +45,7 @@ class Fixes:
 
 
 def place_fixes(
-    actor: "Actor",
-    time_us: I64,
-    xy: NDArray[np.float64],
-    turns: NDArray[np.float64],
-    reach: float,
+    actor: "Actor", time_us: I64, xy: NDArray[np.float64], turns: NDArray[np.float64], reach: float
 ) -> Fixes:
     """Return fixes moved to the nearest place where the body can be.
 

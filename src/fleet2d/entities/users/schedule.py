@@ -207,8 +207,7 @@ def _entries(day: Agenda, rest: RoomChoice | Point, number: int = 0) -> list[Age
             )
         if begins >= DAY:
             raise problem_at(
-                key,
-                f"it begins at {format_time_of_day(begins)}: an item begins before 24:00",
+                key, f"it begins at {format_time_of_day(begins)}: an item begins before 24:00"
             )
         if over is not None and begins > over:
             entries.append(AgendaEntry(over, rest, "rest"))

@@ -193,17 +193,13 @@ def _corners(points: list[tuple[float, float]]) -> list[tuple[float, float]]:
 
 Text = Annotated[str, PlainValidator(_text), WithJsonSchema({"type": "string", "minLength": 1})]
 Coordinate = Annotated[
-    float,
-    PlainValidator(lambda value: _numbers([value], 1)[0]),
-    WithJsonSchema({"type": "number"}),
+    float, PlainValidator(lambda value: _numbers([value], 1)[0]), WithJsonSchema({"type": "number"})
 ]
 """A length [m] or an angle [rad]."""
 
 _POINT = {"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 2}
 Point = Annotated[
-    tuple[float, float],
-    PlainValidator(lambda value: _numbers(value, 2)),
-    WithJsonSchema(_POINT),
+    tuple[float, float], PlainValidator(lambda value: _numbers(value, 2)), WithJsonSchema(_POINT)
 ]
 """A place (x, y) [m]."""
 BoxSides = Annotated[
@@ -212,9 +208,6 @@ BoxSides = Annotated[
 """The sides of a box (x0, y0, x1, y1) [m]."""
 RING_SCHEMA = {"type": "array", "items": _POINT, "minItems": 3}
 Ring = Annotated[
-    Listed[Point],
-    list_of("points [x, y]"),
-    AfterValidator(_corners),
-    WithJsonSchema(RING_SCHEMA),
+    Listed[Point], list_of("points [x, y]"), AfterValidator(_corners), WithJsonSchema(RING_SCHEMA)
 ]
 """The corners of an outline [m]."""

@@ -14,12 +14,7 @@ from numpy.typing import NDArray
 from pydantic import Field, TypeAdapter
 
 from fleet2d.errors import FloorPlanError
-from fleet2d.floorplan.formats.fields import (
-    MAX_COORDINATE_M,
-    Listed,
-    shown_value,
-    validate,
-)
+from fleet2d.floorplan.formats.fields import MAX_COORDINATE_M, Listed, shown_value, validate
 
 MAP_CLASS = "ValetudoMap"
 VERSION = 2

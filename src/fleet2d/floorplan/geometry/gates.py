@@ -80,11 +80,7 @@ def _with_edges(
 
 
 def _force_edge(
-    vertices: I64,
-    corners: list[tuple[int, ...]],
-    owner: dict[tuple[int, int], int],
-    a: int,
-    b: int,
+    vertices: I64, corners: list[tuple[int, ...]], owner: dict[tuple[int, int], int], a: int, b: int
 ) -> None:
     """Flip the edges that cross a segment until it is an edge itself (Sloan 1993)."""
     if (a, b) in owner and (b, a) in owner:

@@ -56,10 +56,7 @@ def snap_polygon(polygon: Polygon | MultiPolygon) -> SnappedPolygon:
 
 
 def build_mesh(
-    polygons: Sequence[Polygon],
-    columns: int,
-    rows: int,
-    corners: Sequence[tuple[int, int]] = (),
+    polygons: Sequence[Polygon], columns: int, rows: int, corners: Sequence[tuple[int, int]] = ()
 ) -> Mesh:
     """Triangulate free space.
 

@@ -251,10 +251,7 @@ class Layers(Mapping[str, Layer]):
         return self.add_layer(name, settings)
 
     def add_layer(
-        self,
-        name: str,
-        settings: LayerSettings,
-        source: Callable[[], NDArray[Any]] | None = None,
+        self, name: str, settings: LayerSettings, source: Callable[[], NDArray[Any]] | None = None
     ) -> Layer:
         """Add a layer as a scenario describes it; see `add`."""
         if not _NAME.fullmatch(name):

@@ -105,11 +105,7 @@ def label_chambers(
 
 
 def _claims(
-    chambers: Chambers,
-    frames: I64,
-    boxes: Sequence[Patch],
-    is_opening: Sequence[bool],
-    cell: float,
+    chambers: Chambers, frames: I64, boxes: Sequence[Patch], is_opening: Sequence[bool], cell: float
 ) -> tuple[dict[int, set[int]], dict[int, str]]:
     """Return the chambers that each box claims, and the reasons of boxes that claim none."""
     sizes = np.bincount(chambers.of_cell[chambers.of_cell >= 0], minlength=chambers.count)

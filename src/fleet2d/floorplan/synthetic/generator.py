@@ -14,12 +14,7 @@ from fleet2d.floorplan.synthetic.geometry import (
     outer_walls,
     turn_boxes,
 )
-from fleet2d.floorplan.synthetic.judge import (
-    light_cost,
-    outline_corners,
-    outline_kind,
-    shape_cost,
-)
+from fleet2d.floorplan.synthetic.judge import light_cost, outline_corners, outline_kind, shape_cost
 from fleet2d.floorplan.synthetic.layout import RoomLayout, draw_layout
 from fleet2d.floorplan.synthetic.program import Brief, Wishes, choose_rooms, settle_wishes
 from fleet2d.floorplan.synthetic.request import LayoutRequest

@@ -10,12 +10,7 @@ from fleet2d.floorplan.source import FloorPlanSource
 from fleet2d.floorplan.synthetic.convert import floor_plan
 from fleet2d.floorplan.synthetic.generator import Style, generate
 from fleet2d.floorplan.synthetic.geometry import PER_M
-from fleet2d.floorplan.synthetic.program import (
-    LARGEST_M2,
-    MAX_ROOMS_OF_A_KIND,
-    SMALLEST_M2,
-    Wishes,
-)
+from fleet2d.floorplan.synthetic.program import LARGEST_M2, MAX_ROOMS_OF_A_KIND, SMALLEST_M2, Wishes
 from fleet2d.problems import problem
 from fleet2d.units import Length
 
@@ -67,10 +62,7 @@ class Synthetic(FloorPlanSource):
         """
         wishes = Wishes(self.area_m2, self.bedrooms, self.bathrooms, self.garage)
         style = Style(
-            self.outline,
-            self.open_plan,
-            _units(self.corridor_width),
-            _units(self.door_width),
+            self.outline, self.open_plan, _units(self.corridor_width), _units(self.door_width)
         )
         house = generate(self.seed, wishes, style)
         name = f"synthetic_{self.seed}"

@@ -269,10 +269,7 @@ class LtpGap(LongTermMetric):
     def result(self) -> dict[str, Any]:
         """Return {user: {room: gap, "mean": of all rooms}} at the end."""
         return {
-            user: {
-                MEAN: float(gaps.mean()),
-                **dict(zip(self.rooms, gaps.tolist(), strict=True)),
-            }
+            user: {MEAN: float(gaps.mean()), **dict(zip(self.rooms, gaps.tolist(), strict=True))}
             for user, gaps in self.last.items()
         }
 

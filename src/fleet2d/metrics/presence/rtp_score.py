@@ -172,13 +172,7 @@ class RtpScore(Metric):
         return np.where(steps[index] == NEVER, NEVER, ends - steps[index]), rooms[index]
 
     def _score(
-        self,
-        user: str,
-        beliefs: list[F64 | None],
-        gap: I64,
-        last: I64,
-        history: History,
-        ends: I64,
+        self, user: str, beliefs: list[F64 | None], gap: I64, last: I64, history: History, ends: I64
     ) -> ScoredBins:
         poses, index = history.poses(user), ends - history.first
         is_away, room = poses.away[index], poses.room[index].astype(np.int64)
