@@ -22,6 +22,8 @@ pytest.importorskip("optuna")
 
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 OVER = "robots.astro.speed={low: 0.05, high: 0.6}"
+ALIASES = ", ".join(f"&a{n} [{', '.join([f'*a{n - 1}'] * 9)}]" for n in range(1, 10))
+BOMB = f"[&a0 [1, 1], {ALIASES}]"
 
 
 @pytest.fixture
@@ -91,6 +93,8 @@ def test_without_a_failure_the_smallest_margin_is_reported(folder: Path) -> None
         (["flat.yaml", "--over", "robots.astro.sped={low: 1, high: 2}"], "speed"),
         (["flat.yaml", "--over", "home={synthetik: 5}"], "synthetic"),
         (["flat.yaml", "--over", "axis.yaml"], "no such file"),
+        (["flat.yaml", "--over", f"home={BOMB}"], "values"),
+        (["flat.yaml", "--over", "home={synthetic: 5"], "not valid YAML"),
         (["flat.yaml", "--over", "robots.astro.speed={low: 2, high: 1}"], "low below high"),
         (["bundled:base", "--over", OVER], "has no expectations"),
         (["flat.yaml", "--over", OVER, "--budget", "soon"], "--budget: expected"),

@@ -98,7 +98,9 @@ class LocalExecutor:
                     worker.is_ready, self._failed_starts = True, 0
                 else:
                     task, payload, rss_mb = message[1]
-                    yield self._finished(worker, task, payload, rss_mb, attempts)
+                    worker.tasks.popleft()
+                    worker.is_full = rss_mb > self._limit_mb
+                    yield FinishedTask(task, payload, attempts.get(task.number, 0) + 1)
                 self._hand_out(worker, tasks)
         finally:
             self._stop()
@@ -141,18 +143,6 @@ class LocalExecutor:
         while len(worker.tasks) < AHEAD and (task := tasks.take(worker.number)) is not None:
             worker.tasks.append(task)
             worker.send(task)
-
-    def _finished(
-        self,
-        worker: _Worker,
-        task: WorkerTask,
-        payload: bytes,
-        rss_mb: float,
-        attempts: dict[int, int],
-    ) -> FinishedTask:
-        worker.tasks.popleft()
-        worker.is_full = rss_mb > self._limit_mb
-        return FinishedTask(task, payload, attempts.get(task.number, 0) + 1)
 
     def _replace(
         self, worker: _Worker, job: WorkerJob, tasks: TaskSchedule, attempts: dict[int, int]

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import yaml
 from pydantic import TypeAdapter, ValidationError
 
-from fleet2d.document import Document, Keys, read_document
+from fleet2d.bounds import one_line
+from fleet2d.document import Document, Keys, parse_yaml, read_document
 from fleet2d.errors import Fleet2DError, InputError, ScenarioError
 from fleet2d.problems import did_you_mean
 from fleet2d.scenario.compose import apply_changes, assignment
@@ -143,11 +143,8 @@ def parse_over(texts: list[str]) -> dict[str, Any]:
     content: dict[str, Any] = {}
     for text in texts:
         name, equals, value = text.partition("=")
-        if equals and not Path(text).exists():
-            try:
-                content[name.strip()] = yaml.safe_load(value)
-            except yaml.YAMLError as error:
-                raise InputError(f"--over {text}: {error}") from None
+        if equals and not text.endswith((".yaml", ".yml")):
+            content[name.strip()] = parse_yaml(value, Path.cwd(), f"--over {one_line(text, 100)}")
             continue
         if not Path(text).is_file():
             near = did_you_mean(text, [p.name for p in Path().glob("*.yaml")])
