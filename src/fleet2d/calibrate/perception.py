@@ -11,6 +11,7 @@ from scipy.stats import chi2
 from fleet2d.calibrate.factors import Constant, Falling, Orientation
 from fleet2d.calibrate.likelihood import Factor, Fit, ParameterEstimate, ProductLikelihood, wilson
 from fleet2d.calibrate.log import DetectionLog, recognized
+from fleet2d.sums import sum_in_order
 
 GROUPS = 10
 SIGNIFICANCE = 0.05  # the largest p value of a likelihood ratio test with which a factor is used
@@ -52,7 +53,7 @@ class FittedProbability:
     @property
     def chi_square(self) -> float:
         """The statistic of Hosmer and Lemeshow: how far observed and predicted are apart."""
-        return sum(
+        return sum_in_order(
             group.rows * (group.observed.value - group.predicted) ** 2
             / max(group.predicted * (1 - group.predicted), 1e-12)
             for group in self.groups
@@ -212,7 +213,7 @@ def _shares(counts: dict[str, int]) -> dict[str, float]:
     total = sum(counts.values())
     shares = {name: round(count / total, 4) for name, count in counts.items()}
     most = max(shares, key=lambda name: shares[name])
-    shares[most] = round(1 - sum(v for name, v in shares.items() if name != most), 4)
+    shares[most] = round(1 - sum_in_order(v for name, v in shares.items() if name != most), 4)
     return shares
 
 

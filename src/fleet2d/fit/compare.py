@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fleet2d.fit.timeline import I16, MINUTES, runs
+from fleet2d.sums import sum_in_order
 
 HOURS = 24
 FEWEST_STAYS = 5  # the fewest stays at a place whose durations are compared
@@ -47,8 +48,8 @@ def distances(real: I16, other: I16, count: int) -> Distances:
     return Distances(
         share=_variation(shares(real, count), shares(other, count)),
         hours=float(np.mean([_variation(a, b) for a, b in hours])),
-        ks=sum(len(a) * ks_distance(a, b) for a, b in pairs) / total,
-        stay_min=sum(len(a) * wasserstein(a, b) for a, b in pairs) / total,
+        ks=sum_in_order(len(a) * ks_distance(a, b) for a, b in pairs) / total,
+        stay_min=sum_in_order(len(a) * wasserstein(a, b) for a, b in pairs) / total,
     )
 
 

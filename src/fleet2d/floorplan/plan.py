@@ -35,6 +35,7 @@ from fleet2d.floorplan.rooms.vocabulary import room_type
 from fleet2d.kernels.chambers import fill_from_neighbors
 from fleet2d.kernels.mesh import Mesh, rasterize_cells, strictly_inside
 from fleet2d.leaves import views
+from fleet2d.sums import sum_in_order
 
 __all__ = ["FloorPlan", "LabelledRegion", "Room"]
 
@@ -196,7 +197,7 @@ class FloorPlan:
     @cached_property
     def area_m2(self) -> float:
         """Area of the free space on the lattice [m²], exact and independent of cells."""
-        units2 = sum(polygon.area for polygon in self.polygons)
+        units2 = sum_in_order(polygon.area for polygon in self.polygons)
         return float(units2) / self.lattice.units_per_m**2
 
     @cached_property

@@ -8,6 +8,7 @@ from pydantic import Field, model_validator
 
 from fleet2d.component import Settings
 from fleet2d.problems import problem
+from fleet2d.sums import sum_in_order
 from fleet2d.units import AngleDeg, Length
 
 Pair = tuple[float, float]
@@ -99,7 +100,9 @@ class Frame(Settings):
 
 
 def _mean(points: list[Pair]) -> Pair:
-    return sum(x for x, _ in points) / len(points), sum(y for _, y in points) / len(points)
+    return sum_in_order(x for x, _ in points) / len(points), sum_in_order(
+        y for _, y in points
+    ) / len(points)
 
 
 def _direction(degrees: float) -> Pair:

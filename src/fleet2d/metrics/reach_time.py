@@ -13,6 +13,7 @@ from fleet2d.component import register
 from fleet2d.floorplan.home.home import Home
 from fleet2d.metrics.metric import Metric
 from fleet2d.metrics.pairs import pairs_of
+from fleet2d.sums import sum_in_order
 from fleet2d.units import Length, PositiveDuration, Speed, micros
 
 
@@ -82,7 +83,7 @@ class ReachTime(Metric):
         for (robot, user), seconds in self.seconds.items():
             numbers: dict[str, Any] = {"calls": len(seconds) + self.unreached[robot, user]}
             if seconds:
-                numbers["mean"] = sum(seconds) / len(seconds)
+                numbers["mean"] = sum_in_order(seconds) / len(seconds)
                 numbers["p90"] = float(np.quantile(seconds, 0.9))
             if self.unreached[robot, user]:
                 numbers["unreached"] = self.unreached[robot, user]

@@ -4,6 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from fleet2d.sums import sum_in_order
+
 
 def kaplan_meier(times: Sequence[float], happened: Sequence[bool]) -> list[tuple[float, float]]:
     """Return the survival curve: the share without an event by each time of an event.
@@ -48,4 +50,4 @@ def restricted_mean(curve: Sequence[tuple[float, float]], until: float) -> float
     """
     times = [0.0, *(min(time, until) for time, _ in curve), until]
     shares = [1.0, *(share for _, share in curve)]
-    return float(sum(np.diff(times) * np.array(shares)))
+    return sum_in_order((np.diff(times) * np.array(shares)).tolist())

@@ -16,6 +16,7 @@ from fleet2d.floorplan.home.home import Home
 from fleet2d.kernels.points import points_in_sight
 from fleet2d.metrics.metric import Metric
 from fleet2d.metrics.survival import kaplan_meier, quantile, restricted_mean
+from fleet2d.sums import sum_in_order
 from fleet2d.units import Length, PositiveDuration
 
 ENDS = ("found", "not_at_home", "gave_up")
@@ -201,15 +202,15 @@ class TimeToFind(Metric):
                 if (time := quantile(curve, share)) is not None:
                     numbers[name] = time
             quality = [s.ideal / max(s.ideal, s.metres) if s.metres > 0 else 1.0 for s in finds]
-            numbers["spl"] = sum(quality) / len(at_home)
-            if sum(s.ideal for s in finds) > 0:
-                most = sum(max(s.ideal, s.metres) for s in finds)
-                numbers["ratio"] = most / sum(s.ideal for s in finds)
+            numbers["spl"] = sum_in_order(quality) / len(at_home)
+            if sum_in_order(s.ideal for s in finds) > 0:
+                most = sum_in_order(max(s.ideal, s.metres) for s in finds)
+                numbers["ratio"] = most / sum_in_order(s.ideal for s in finds)
         if away:
             correct = [s for s in away if s.end == "not_at_home"]
             numbers["out_told"] = len(correct) / len(away)
             if correct:
-                numbers["out_mean"] = sum(s.seconds for s in correct) / len(correct)
+                numbers["out_mean"] = sum_in_order(s.seconds for s in correct) / len(correct)
         return numbers
 
 

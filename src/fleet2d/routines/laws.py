@@ -13,6 +13,7 @@ from itertools import accumulate, pairwise
 from typing import NamedTuple
 
 from fleet2d.streams import Draws
+from fleet2d.sums import sum_in_order
 
 KNOTS = 128
 _BITS = 24
@@ -90,7 +91,7 @@ class Law(NamedTuple):
     def mean(self) -> float:
         """Return the mean of the law between its bounds [s]."""
         inside = [min(max(knot, self.shortest), self.longest) for knot in self.knots]
-        return sum((a + b) / 2 for a, b in pairwise(inside)) / (len(inside) - 1)
+        return sum_in_order((a + b) / 2 for a, b in pairwise(inside)) / (len(inside) - 1)
 
     def within(self, shortest: int | None, longest: int | None) -> "Law":
         """Return the law cut to bounds [s]."""

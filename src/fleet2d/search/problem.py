@@ -12,6 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fleet2d.sums import sum_in_order
+
 F64 = NDArray[np.float64]
 
 
@@ -54,13 +56,15 @@ class SearchOutcome(NamedTuple):
     def cost(self) -> float:
         """Sum of time times chance [s], by which the orders of all sites are compared."""
         return float(
-            sum(t * p for t, p in zip(self.time.tolist(), self.chance.tolist(), strict=True))
+            sum_in_order(
+                t * p for t, p in zip(self.time.tolist(), self.chance.tolist(), strict=True)
+            )
         )
 
     @property
     def success(self) -> float:
         """Probability that the target is found at all."""
-        return float(sum(self.chance.tolist()))
+        return sum_in_order(self.chance.tolist())
 
     @property
     def mean(self) -> float:
@@ -71,8 +75,8 @@ class SearchOutcome(NamedTuple):
         """Return the expected time until the target is found or the deadline is reached [s]."""
         inside = self.time <= deadline
         chances, times = self.chance[inside].tolist(), self.time[inside].tolist()
-        before_deadline = sum(t * p for t, p in zip(times, chances, strict=True))
-        return float(before_deadline + deadline * (1 - sum(chances)))
+        before_deadline = sum_in_order(t * p for t, p in zip(times, chances, strict=True))
+        return float(before_deadline + deadline * (1 - sum_in_order(chances)))
 
 
 def search_problem(
@@ -110,7 +114,7 @@ def search_problem(
     for name, values in problem._asdict().items():
         if not (np.isfinite(values).all() and (values >= 0).all()):
             raise ValueError(f"{name} has a value that is negative or not finite: {values}")
-    if sum(chances.tolist()) > 1 + 1e-9 or (problem.detect > 1).any():
+    if sum_in_order(chances.tolist()) > 1 + 1e-9 or (problem.detect > 1).any():
         raise ValueError("prior sums to more than one, or detect is above one")
     return problem
 
@@ -146,6 +150,6 @@ def clairvoyant_time(problem: SearchProblem) -> float:
     compared with it by division.
     """
     direct = problem.reach + problem.look
-    total = sum(problem.prior.tolist())
-    weighted = sum((problem.prior * direct).tolist())
+    total = sum_in_order(problem.prior.tolist())
+    weighted = sum_in_order((problem.prior * direct).tolist())
     return float(weighted / total) if total > 0 else 0.0

@@ -12,6 +12,7 @@ from pydantic import Field, model_validator
 from fleet2d.component import Settings
 from fleet2d.problems import problem_at
 from fleet2d.sight.curve import Curve
+from fleet2d.sums import sum_in_order
 from fleet2d.units import AngleDeg, Duration, Length, Share
 
 Posture = Literal["stand", "sit", "lie"]
@@ -92,7 +93,7 @@ class FalsePositives(Settings):
 
     @model_validator(mode="after")
     def _is_a_share(self) -> Self:
-        _check_sum(("looks_like",), sum(self.looks_like.values()))
+        _check_sum(("looks_like",), sum_in_order(self.looks_like.values()))
         return self
 
 
@@ -121,7 +122,7 @@ class Identity(Settings):
                 raise problem_at(
                     ("confusion", user), f"{user!r} can't be mistaken for itself: leave it out"
                 )
-            total = sum(others.values())
+            total = sum_in_order(others.values())
             if abs(total - 1) > SUM_ERROR:
                 raise problem_at(("confusion", user), f"the shares add up to {total:g}, not to 1")
         return self
@@ -161,7 +162,7 @@ class Attributes(Settings):
                     raise problem_at(
                         (key, true), f"{true!r} can't be mistaken for itself: leave it out"
                     )
-                _check_sum((key, true), sum(others.values()))
+                _check_sum((key, true), sum_in_order(others.values()))
         return self
 
 

@@ -45,6 +45,7 @@ from fleet2d.sight.camera import Lens
 from fleet2d.sight.curve import chance, cumulative, decay
 from fleet2d.sight.perception import POSTURES as POSTURE_NAMES
 from fleet2d.sight.perception import Attributes, Detection, FalsePositives, Identity, Perception
+from fleet2d.sums import sum_in_order
 from fleet2d.units import micros
 
 I64 = NDArray[np.int64]
@@ -225,7 +226,7 @@ def _fill_attributes(table: I64, model: Attributes, context: TableContext) -> No
     table[HEADING_NOISE] = round(model.heading_noise_deg / 360 * TURN * per_bell)
     for i, posture in enumerate(POSTURE_NAMES):
         others: dict[str, float] = dict(model.posture.get(posture, {}).items())
-        others[posture] = 1 - sum(others.values())
+        others[posture] = 1 - sum_in_order(others.values())
         sums = _whole(cumulative(others, POSTURE_NAMES), others, POSTURE_NAMES)
         _put(table, AT_SEEMS + POSTURES * i, sums)
 
@@ -244,8 +245,8 @@ def _fill_false_positives(
     mean = sum(map(Decimal, rates)) * hours
     if mean > 1:
         raise ScenarioError(
-            f"{context.path}: perception.false_positives: {sum(rates):g} per hour exceeds the"
-            f" limit of one per look ({float(1 / hours):g} per hour at this period)"
+            f"{context.path}: perception.false_positives: {sum_in_order(rates):g} per hour exceeds"
+            f" the limit of one per look ({float(1 / hours):g} per hour at this period)"
         )
     # A sum of Poisson processes is one, whose points belong to each by its share of the rate.
     term, total = decay(mean), 0.0
@@ -253,7 +254,7 @@ def _fill_false_positives(
         total += term
         tables.ghosts[camera, count] = chance(min(total, 1.0))
         term *= float(mean) / (count + 1)
-    shares = {str(i): rate / sum(rates) for i, rate in enumerate(rates)}
+    shares = {str(i): rate / sum_in_order(rates) for i, rate in enumerate(rates)}
     tables.source[camera, : len(rates)] = _whole(
         cumulative(shares, list(shares)), shares, list(shares)
     )

@@ -7,6 +7,7 @@ from datetime import timedelta
 from fleet2d.errors import ComponentError
 from fleet2d.studies.engine import measure
 from fleet2d.studies.plan import StudyPlan
+from fleet2d.sums import sum_in_order
 
 SAMPLES = 3
 
@@ -43,8 +44,8 @@ def forecast(plan: StudyPlan, samples: int = SAMPLES) -> Forecast:
             speeds.append(measure(plan.design.scenario(plan.variants[i].index)))
     if not speeds:
         raise ComponentError("all measured variants fail: run one of them with `fleet2d run`")
-    wall_s = sum(
-        sum(speed.seconds(variant.simulated_s) for speed in speeds) / len(speeds)
+    wall_s = sum_in_order(
+        sum_in_order(speed.seconds(variant.simulated_s) for speed in speeds) / len(speeds)
         for variant in plan.variants
     )
     simulated_s = sum(variant.simulated_s for variant in plan.variants)

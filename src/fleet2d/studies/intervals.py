@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fleet2d.extras import extra
+from fleet2d.sums import sum_in_order
 
 F64 = NDArray[np.float64]
 LEVEL = 0.95
@@ -51,10 +52,10 @@ class Spread:
         """
         parts = [(self.components[level] / n, n - 1) for level, n in units.items()]
         parts.append((self.residual / math.prod(units.values()), max(units.values()) - 1))
-        variance = sum(part for part, _ in parts)
+        variance = sum_in_order(part for part, _ in parts)
         if not variance:
             return True
-        freedom = variance**2 / sum(part**2 / df for part, df in parts)
+        freedom = variance**2 / sum_in_order(part**2 / df for part, df in parts)
         return math.sqrt(variance) * (_student_quantile(freedom, LEVEL) + POWER_Z) <= abs(size)
 
 
@@ -173,10 +174,10 @@ def _analyse(data: F64, codes: Mapping[str, NDArray[np.int64]]) -> tuple[Spread,
     residual_freedom = max(count - 1 - sum(n - 1 for n in units.values()), 1)
     residual = float((residuals**2).sum()) / residual_freedom
     share = residual / count
-    variance = max(sum(squares.values()) - (len(codes) - 1) * share, share)
+    variance = max(sum_in_order(squares.values()) - (len(codes) - 1) * share, share)
     parts = [(square, units[name] - 1.0) for name, square in squares.items()]
     parts.append(((len(codes) - 1) * share, float(residual_freedom)))
-    freedom = variance**2 / max(sum(part**2 / df for part, df in parts), 1e-300)
+    freedom = variance**2 / max(sum_in_order(part**2 / df for part, df in parts), 1e-300)
     freedom = max(freedom, min(units.values()) - 1.0)
     components = {name: max(0.0, (squares[name] - share) * units[name]) for name in codes}
     return Spread(units, components, residual, count), variance, freedom

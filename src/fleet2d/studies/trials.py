@@ -15,6 +15,7 @@ from fleet2d.studies.engine import StagedRun, describe_error, flat_numbers
 from fleet2d.studies.record import WorkerTask
 from fleet2d.studies.sampling import Parameter, rounded
 from fleet2d.studies.schedule import TaskSchedule
+from fleet2d.sums import sum_in_order
 from fleet2d.trust import Trust, current_trust, restrict
 
 if TYPE_CHECKING:
@@ -234,7 +235,9 @@ class TrialSchedule(TaskSchedule):
 
     def _continue(self, running: _RunningTrial) -> bool:
         """Report the means of a stage to Optuna; start the next stage, if there is to be one."""
-        means = [sum(values) / len(values) for values in zip(*running.objectives, strict=True)]
+        means = [
+            sum_in_order(values) / len(values) for values in zip(*running.objectives, strict=True)
+        ]
         until_s = self._stages[running.stage]
         if until_s is None:
             self._study.tell(running.trial, means)

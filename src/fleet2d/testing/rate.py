@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fleet2d.errors import InputError
+from fleet2d.sums import sum_in_order
 
 MOST_SEEDS = 10_000
 BISECTIONS = 14
@@ -58,7 +59,7 @@ class RateTest:
 
     def mean_seeds(self, rate: float) -> float:
         """Return the exact mean number of seeds until a decision if this is the true rate."""
-        return float(sum(_walk(self.accept, self.refuse, rate)[1]))
+        return sum_in_order(_walk(self.accept, self.refuse, rate)[1])
 
 
 @lru_cache(maxsize=64)

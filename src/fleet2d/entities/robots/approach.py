@@ -12,6 +12,7 @@ from fleet2d.entities.nearby import points_at_distance
 from fleet2d.entities.plan import Plan
 from fleet2d.errors import ScenarioError
 from fleet2d.kernels.headings import TURN, heading_of, turn_between
+from fleet2d.sums import sum_in_order
 
 # Time after which a robot tries again to pass a shut door.
 AT_A_DOOR = timedelta(seconds=10)
@@ -24,7 +25,7 @@ LatticePoint = tuple[int, int]
 def way_seconds(actor: Actor, start: LatticePoint, goal: LatticePoint) -> float | None:
     """Return how long a robot drives between two lattice points, without turns; None: no way."""
     route = actor.space.route(start, goal)
-    return None if route is None else sum(_legs(route)) / actor.speed
+    return None if route is None else sum_in_order(_legs(route)) / actor.speed
 
 
 def spot_near(now: Situation, x: float, y: float, distance: float) -> LatticePoint:

@@ -18,6 +18,7 @@ from fleet2d.entities.robots.belief import ANYONE, BeliefBehavior
 from fleet2d.entities.robots.sites import Sites
 from fleet2d.errors import PlacementError
 from fleet2d.search.policies import MOST_EXACT, Policy, after_empty_looks, order_by
+from fleet2d.sums import sum_in_order
 from fleet2d.units import Duration, Length, PositiveDuration, Share, TimeOfDay, problem
 
 DAY = timedelta(days=1)
@@ -212,7 +213,7 @@ class Find(BeliefBehavior):
         prior, away = self._prior(now)
         age, memory = self._ages(search, now), self.memory.total_seconds()
         remaining = after_empty_looks(prior, age, memory, self.sites.share)
-        is_out = away >= self.out_at * (away + sum(remaining.tolist()))
+        is_out = away >= self.out_at * (away + sum_in_order(remaining.tolist()))
         unseen = np.flatnonzero(np.isinf(age)).tolist()
         if is_out and not any(self.sites.can_go(plan, site) for site in unseen):
             return self._end(plan, "not_at_home")
@@ -236,7 +237,7 @@ class Find(BeliefBehavior):
         belief = self.belief(now, self.search.user)
         sizes = np.array([now.home.plan.rooms[room].cells for room in self.sites.rooms.tolist()])
         shares = belief.share[self.sites.rooms]
-        total = sum(shares.tolist())
+        total = sum_in_order(shares.tolist())
         shares = shares / total if total > 0 else np.zeros(len(sizes))
         doubt = self.doubt if total > 0 else 1.0
         mixed = (1 - doubt) * shares + doubt * sizes / int(sizes.sum())

@@ -12,6 +12,7 @@ from fleet2d.entities.robots.approach import way_seconds
 from fleet2d.entities.robots.viewpoints import viewpoints_of
 from fleet2d.kernels.headings import TURN
 from fleet2d.search.problem import SearchProblem, search_problem
+from fleet2d.sums import sum_in_order
 
 # The part of a room to be shown by its viewpoints, if there are few enough of them.
 ENOUGH = 0.9
@@ -81,7 +82,7 @@ class Sites:
             travel = np.array([[self._seconds(a, b) for b in first] for a in last], np.float64)
             turn = TURN / self._actor.turn_rate
             look = [
-                len(points) * turn + sum(self._seconds(a, b) for a, b in pairwise(points))
+                len(points) * turn + sum_in_order(self._seconds(a, b) for a, b in pairwise(points))
                 for points in self._points
             ]
             self._times = version, travel, np.array(look, np.float64)

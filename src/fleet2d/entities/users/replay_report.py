@@ -7,6 +7,7 @@ from fleet2d.logs.frame import Frame
 from fleet2d.logs.log import ActivityLog, PositionLog
 from fleet2d.logs.rooms import RoomChoice
 from fleet2d.logs.visits import UNKNOWN, LoggedVisits, VisitRule
+from fleet2d.sums import sum_in_order
 
 if TYPE_CHECKING:
     from fleet2d.entities.users.follow_fixes import Fixes, FixFollower
@@ -32,7 +33,7 @@ def report_rooms(
             f"{logged.overruled} readings yield to later ones of another room in their step"
         )
     gaps = [visit for visit in logged.visits if visit.place == UNKNOWN]
-    hours = sum(
+    hours = sum_in_order(
         (min(v.last + 1, rule.steps) - max(v.first, 0)) * rule.step_us / 3.6e9 for v in gaps
     )
     if gaps:

@@ -19,6 +19,7 @@ from fleet2d.problems import problem
 from fleet2d.routines.activity import AnyDurationLaw, DurationLaw
 from fleet2d.routines.laws import draw_weighted
 from fleet2d.streams import Draws
+from fleet2d.sums import sum_in_order
 
 if TYPE_CHECKING:
     from fleet2d.entities.actor import Actor
@@ -75,7 +76,7 @@ class RoomSampling(Behavior):
         for name, share in self.shares.items():
             if share < 0:
                 raise problem(f"the share of {name} is {share:g}: a share is 0 or more")
-        if sum(self.shares.values()) <= 0:
+        if sum_in_order(self.shares.values()) <= 0:
             raise problem("all shares are 0: give one room a share above that")
         return self
 
@@ -84,7 +85,7 @@ class RoomSampling(Behavior):
         names = [(name,) for name in self.shares if name != AWAY]
         available = {name for (name,) in available_places(actor, "room_sampling.shares", names)}
         shares = {n: share for n, share in self.shares.items() if n == AWAY or n in available}
-        total = sum(shares.values())
+        total = sum_in_order(shares.values())
         if total <= 0:
             raise PlacementError(
                 f"room_sampling.shares: nothing is left of it in this home: {', '.join(shares)}"

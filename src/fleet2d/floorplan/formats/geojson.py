@@ -29,6 +29,7 @@ from fleet2d.floorplan.rooms.passage import (
 from fleet2d.floorplan.rooms.vocabulary import PRIORITY, UNKNOWN, room_type, usual_type
 from fleet2d.floorplan.source import FloorPlanSource, in_file, read_json
 from fleet2d.paths import InputPath
+from fleet2d.sums import sum_in_order
 from fleet2d.units import Length
 
 WALL_M = 0.1
@@ -189,9 +190,9 @@ class _Draft:
     def _room_space(self, walls: BaseGeometry, wall_m: float) -> MultiPolygon:
         """Return the rooms, with walls where they touch unless the file draws these."""
         free, borders = _areas(self._of("room")), shared_borders(self.rooms)
-        length = sum(line.length for line in borders)
+        length = sum_in_order(line.length for line in borders)
         near = walls.buffer(TOUCH_M + wall_m / 2, join_style="mitre")
-        drawn = sum(float(line.intersection(near).length) for line in borders)
+        drawn = sum_in_order(float(line.intersection(near).length) for line in borders)
         if borders and wall_m > 0 and drawn < length / 2:
             self.notes.append(
                 f"rooms touch along {length:.1f} m: there are walls of {wall_m:g} m but for doors"

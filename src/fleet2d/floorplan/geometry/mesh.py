@@ -11,6 +11,7 @@ from shapely.geometry import MultiPolygon, Polygon
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.geometry.lattice import COORDINATE_LIMIT
 from fleet2d.kernels.mesh import SUB, WALL, Mesh
+from fleet2d.sums import sum_in_order
 
 GRID = 2
 """Walls lie on even lattice units; cell centres are odd, so no straight wall hits one."""
@@ -51,7 +52,7 @@ def snap_polygon(polygon: Polygon | MultiPolygon) -> SnappedPolygon:
     snapped = shapely.set_precision(sound, GRID)
     parts = [part for part in shapely.get_parts(snapped) if part.area > 0]
     parts = [shapely.orient_polygons(part) for part in parts]
-    area_change = sum(part.area for part in parts) - polygon.area
+    area_change = sum_in_order(part.area for part in parts) - polygon.area
     return SnappedPolygon(parts, area_change, GRID * polygon.length)
 
 

@@ -17,6 +17,7 @@ from fleet2d.floorplan.objects import PlacedObject, Point
 from fleet2d.floorplan.plan import FloorPlan, Room
 from fleet2d.floorplan.rooms.regions import LabelledRegion
 from fleet2d.floorplan.rooms.vocabulary import UNKNOWN
+from fleet2d.sums import sum_in_order
 
 Severity = Literal["unlivable", "wrong", "odd"]
 
@@ -174,8 +175,8 @@ def _labels(plan: FloorPlan) -> Iterator[Finding]:
         if room.area_m2 < TINY_ROOM_M2 and room.type != UNKNOWN:
             text = f"{room.name} has only {room.area_m2:.2f} m2"
             yield Finding("room", "odd", text, room.anchor_xy)
-    unlabelled = sum(room.area_m2 for room in plan.rooms if room.type == UNKNOWN)
-    share = unlabelled / sum(room.area_m2 for room in plan.rooms)
+    unlabelled = sum_in_order(room.area_m2 for room in plan.rooms if room.type == UNKNOWN)
+    share = unlabelled / sum_in_order(room.area_m2 for room in plan.rooms)
     if share > MAX_UNLABELLED_SHARE:
         text = f"{100 * share:.0f} % of the floor belongs to no room with a known use"
         yield Finding("labels", "odd", text)

@@ -7,6 +7,7 @@ import shapely
 from fleet2d.floorplan.synthetic.geometry import PER_M, Box, Wall
 from fleet2d.floorplan.synthetic.layout import RoomLayout
 from fleet2d.floorplan.synthetic.program import SIZES
+from fleet2d.sums import sum_in_order
 
 # Rooms that need a window, and the length of outer wall that it takes [units].
 _LIT = {"bedroom": 24, "living_room": 30, "kitchen": 16, "dining_room": 20, "office": 20}
@@ -60,8 +61,10 @@ def shape_cost(layout: RoomLayout, ease: float = 1.0) -> float | None:
 
 def corridor_share(layout: RoomLayout) -> float:
     """Return the part of the clear area that is hallway."""
-    halls = sum(b.clear_area for b in layout.boxes if layout.briefs[b.room].kind == "hallway")
-    return halls / sum(box.clear_area for box in layout.boxes)
+    halls = sum_in_order(
+        b.clear_area for b in layout.boxes if layout.briefs[b.room].kind == "hallway"
+    )
+    return halls / sum_in_order(box.clear_area for box in layout.boxes)
 
 
 def light_cost(layout: RoomLayout, outer: Sequence[Wall]) -> float | None:

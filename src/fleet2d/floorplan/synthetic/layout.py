@@ -10,6 +10,7 @@ from fleet2d.floorplan.synthetic.plans import Placing, across, columns, inline, 
 from fleet2d.floorplan.synthetic.program import Brief
 from fleet2d.floorplan.synthetic.request import LayoutRequest, is_promising
 from fleet2d.floorplan.synthetic.slicing import gross_area
+from fleet2d.sums import sum_in_order
 
 # Share of the home's clear area that is in rooms; the rest is in door gaps.
 ROOMS_SHARE = 0.992
@@ -63,7 +64,7 @@ def _place_at_scale(placing: Placing, briefs: Sequence[Brief], area_m2: float) -
         boxes = placing(areas)
         if boxes is None or not is_promising(boxes, briefs):
             return None
-        area = sum(box.clear_area for box in boxes)
+        area = sum_in_order(box.clear_area for box in boxes)
         if abs(area - target) <= TOLERANCE * target:
             return boxes
         factor *= target / area

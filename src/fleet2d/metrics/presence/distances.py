@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fleet2d.algorithms.presence.logarithm import LN_2, natural_log
+from fleet2d.sums import sum_in_order
 
 F64 = NDArray[np.float64]
 
@@ -115,7 +116,7 @@ class _Flow:
     def cost(self) -> float:
         """The sum of mass times metres."""
         pairs = zip(self.mass, self.metres, strict=True)
-        return sum(a * b for row, costs in pairs for a, b in zip(row, costs, strict=True))
+        return sum_in_order(a * b for row, costs in pairs for a, b in zip(row, costs, strict=True))
 
     def push(self, source: int, most: float) -> float:
         """Send at most `most` mass from a source along a shortest path; return how much."""

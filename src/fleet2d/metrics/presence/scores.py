@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fleet2d.algorithms.presence.logarithm import natural_log
+from fleet2d.sums import sum_in_order
 
 F64 = NDArray[np.float64]
 I64 = NDArray[np.int64]
@@ -101,7 +102,7 @@ def classwise_error(probability: F64, truth: I64, masses: int = MASSES) -> float
         return 0.0
     places = range(probability.shape[1])
     gaps = (_gaps(probability[:, c], (truth == c).astype(np.float64), masses) for c in places)
-    return sum(gaps) / len(places)
+    return sum_in_order(gaps) / len(places)
 
 
 class Murphy(NamedTuple):
