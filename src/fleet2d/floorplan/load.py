@@ -8,7 +8,7 @@ import re
 from pathlib import Path
 from typing import Any
 
-from fleet2d.component import lookup
+from fleet2d.component import components, lookup
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.formats.bundled import HOMES, bundled_names
 from fleet2d.floorplan.formats.native import native_plan, read_native
@@ -114,26 +114,31 @@ def format_of_file(path: Path) -> str:
 
 
 def _unknown_format(path: Path) -> FloorPlanError:
-    from fleet2d.floorplan.formats.geojson_file import COLLECTION
-    from fleet2d.floorplan.formats.valetudo_file import MAP_CLASS
-
+    marks = [f"{_as_json(*mark)} ({kind})" for kind, mark in sorted(_marks().items())]
     return FloorPlanError(
-        f"{path} is not a floor plan that Fleet2D can read: it has neither `verts` (HouseExpo) nor"
-        f' "format": "{FORMAT}", "__class": "{MAP_CLASS}" or "type": "{COLLECTION}" (GeoJSON)'
+        f"{path} is not a floor plan that Fleet2D can read: it has none of {', '.join(marks)}"
     )
 
 
-def _format_of(content: dict[str, Any]) -> str | None:
-    if content.get("format") == FORMAT:
-        return "native"
-    if "verts" in content:
-        return "houseexpo"
-    from fleet2d.floorplan.formats.geojson_file import COLLECTION
-    from fleet2d.floorplan.formats.valetudo_file import MAP_CLASS
+def _as_json(key: str, value: str | None) -> str:
+    return f'"{key}"' if value is None else f'"{key}": "{value}"'
 
-    if content.get("type") == COLLECTION:
-        return "geojson"
-    return "valetudo" if content.get("__class") == MAP_CLASS else None
+
+def _format_of(content: dict[str, Any]) -> str | None:
+    """Return the `type` of the floor plan in a file, by the marks that formats declare."""
+    if content.get("format") == FORMAT:  # the usual format, without importing the others
+        return "native"
+    for kind, (key, value) in _marks().items():
+        if key in content and value in (None, content[key]):
+            return kind
+    return None
+
+
+def _marks() -> dict[str, tuple[str, str | None]]:
+    """Return the mark of each format that has one, by its `type`."""
+    sources = components("floorplan").items()
+    marks = {kind: getattr(source, "mark", None) for kind, source in sources}
+    return {kind: mark for kind, mark in marks.items() if mark is not None}
 
 
 def _load_image(path: Path, resolution: float | None, cell: float | None) -> FloorPlan:

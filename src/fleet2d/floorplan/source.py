@@ -52,6 +52,9 @@ class FloorPlanSource(Component):
 
     kind: ClassVar[str] = "floorplan"
 
+    # The key, and the value unless that is None, by which the content of a file is recognized.
+    mark: ClassVar[tuple[str, str | None] | None] = None
+
     cell: Length = 0.05
     rooms: tuple[RoomCorrection, ...] = Field(
         default=(), examples=[[{"at": [2.5, 1.0], "name": "den", "type": "office"}]]

@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 import shapely
@@ -13,7 +14,14 @@ from shapely.geometry.base import BaseGeometry
 from fleet2d.component import register
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.formats.fields import validate
-from fleet2d.floorplan.formats.geojson_file import Feature, Move, Units, in_metres, read_features
+from fleet2d.floorplan.formats.geojson_file import (
+    COLLECTION,
+    Feature,
+    Move,
+    Units,
+    in_metres,
+    read_features,
+)
 from fleet2d.floorplan.formats.native_file import ObjectUse
 from fleet2d.floorplan.names import distinct_names
 from fleet2d.floorplan.objects import PlacedObject
@@ -68,6 +76,8 @@ class GeoJson(FloorPlanSource):
         wall_m: Thickness of walls drawn as lines, and of those between rooms that touch.
         level: The floor, by id, name or ordinal; left out: the one of ordinal 0.
     """
+
+    mark: ClassVar = ("type", COLLECTION)
 
     path: InputPath
     units: Units = "auto"

@@ -1,7 +1,7 @@
 """Floor plans of the HouseExpo data set: one outline and boxes with a room category each."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import shapely
 from pydantic import BaseModel, ConfigDict, TypeAdapter
@@ -37,6 +37,8 @@ class HouseExpo(FloorPlanSource):
     Attributes:
         path: The plan's JSON file.
     """
+
+    mark: ClassVar = ("verts", None)
 
     path: InputPath
 

@@ -11,7 +11,7 @@ A plan that is written by `native_document` and read again at the same cell size
 """
 
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import shapely
@@ -36,6 +36,8 @@ class Native(FloorPlanSource):
     Attributes:
         path: The plan's JSON or YAML file.
     """
+
+    mark: ClassVar = ("format", FORMAT)
 
     path: InputPath
 

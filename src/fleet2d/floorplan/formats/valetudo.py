@@ -7,7 +7,7 @@ import math
 from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 import shapely
@@ -20,6 +20,7 @@ from fleet2d.component import register
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.formats.occupancy import outline
 from fleet2d.floorplan.formats.valetudo_file import (
+    MAP_CLASS,
     Mask,
     PixelBox,
     PixelLayer,
@@ -61,6 +62,8 @@ class Valetudo(PixelSource):
         no_go: Meaning of no-go areas and virtual walls: areas that robots keep out of
             (`keep_out`), walls (`wall`), or nothing (`ignore`).
     """
+
+    mark: ClassVar = ("__class", MAP_CLASS)
 
     path: InputPath
     no_go: NoGo = "keep_out"
