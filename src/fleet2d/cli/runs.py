@@ -80,8 +80,12 @@ def print_results(result: "Run", *, as_json: bool, quiet: bool) -> None:
 def export(
     directory: Annotated[Path, typer.Argument(metavar="RUN_DIR", help="A stored run.")],
     out: Annotated[
-        Path | None, typer.Argument(help="The file of sensor readings to write.")
+        Path | None, typer.Argument(help="The file to write, for other programs.")
     ] = None,
+    layout: Annotated[
+        str,
+        typer.Option("--format", help="Its format; casas: sensor readings in the layout of CASAS."),
+    ] = "casas",
     html: Annotated[
         Path | None, typer.Option(help="The page to write: one file that plays anywhere.")
     ] = None,
@@ -92,20 +96,20 @@ def export(
     trust: TrustFiles = None,
     trust_dir: TrustFolders = None,
 ) -> None:
-    """Write a run for others: a web page in one file, or sensor readings in the layout of CASAS."""
+    """Write a run for others: a file for other programs, or a web page in one file."""
     from fleet2d.runs.run import open_run
 
     if (out is None) == (html is None):
         raise InputError(
-            "name exactly one output: --html FILE (web page), or FILE (sensor readings, CASAS)"
+            "name exactly one output: FILE (see --format), or --html FILE (a web page)"
         )
     if html is None and (begin is not None or end is not None):
         raise InputError("--from and --to need --html FILE")
     run = open_run(directory)
     if out is not None:
-        from fleet2d.runs.casas import write_casas
+        from fleet2d.runs.exporters import exporter
 
-        typer.echo(f"{write_casas(run, out)} readings in {out}")
+        typer.echo(exporter(layout)(run, out))
     elif html is not None:
         from fleet2d.viewer.export import export_html
         from fleet2d.viewer.moments import steps_of

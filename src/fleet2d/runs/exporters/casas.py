@@ -9,7 +9,7 @@ from fleet2d.runs.run import Run
 OTHER = "Other_Activity"
 
 
-def write_casas(run: Run, path: Path) -> int:
+def export(run: Run, path: Path) -> str:
     """Write a line per reading: date, time, room, sensor, state, activity.
 
     Spaces in names become underscores, because spaces separate the columns.
@@ -19,7 +19,7 @@ def write_casas(run: Run, path: Path) -> int:
         path: The file to write.
 
     Returns:
-        The number of lines.
+        A line with the number of readings.
 
     Raises:
         RunDirectoryError: The run has no sensors, or the file can't be written.
@@ -39,7 +39,7 @@ def write_casas(run: Run, path: Path) -> int:
         path.write_text("".join(lines), encoding="utf-8")
     except OSError as error:
         raise RunDirectoryError(f"{path} can't be written: {error.strerror}") from error
-    return len(lines)
+    return f"{len(lines)} readings in {path}"
 
 
 def _word(name: str) -> str:

@@ -9,15 +9,16 @@ from tests.scenes import run, scenario
 
 from fleet2d.errors import RunDirectoryError
 from fleet2d.logs.casas import read_casas
-from fleet2d.runs.casas import write_casas
+from fleet2d.runs.exporters.casas import export
 
 
 def test_file_has_a_line_per_reading_in_the_columns_of_casas(plan: str, tmp_path: Path) -> None:  # noqa: F811
     stored = run(household(plan))
     path = tmp_path / "log.txt"
-    count = write_casas(stored, path)
+    text = export(stored, path)
     lines = path.read_text().splitlines()
-    assert stored.tables["sensors"].num_rows == count == len(lines)
+    assert stored.tables["sensors"].num_rows == len(lines)
+    assert f"{len(lines)} readings in {path}" == text
     date, time, room, sensor, state, activity = lines[0].split(" ")
     assert ("2026-01-05", "hallway_0") == (date, room)
     assert sensor in {"hall", "contact"}
@@ -28,15 +29,15 @@ def test_file_has_a_line_per_reading_in_the_columns_of_casas(plan: str, tmp_path
 
 def test_reader_of_casas_logs_reads_it(plan: str, tmp_path: Path) -> None:  # noqa: F811
     path = tmp_path / "log.txt"
-    write_casas(run(household(plan)), path)
+    export(run(household(plan)), path)
     assert read_casas(path)
 
 
 def test_run_without_sensors_is_refused_with_what_to_do(tmp_path: Path) -> None:
     with pytest.raises(RunDirectoryError, match="add objects that sense to its scenario"):
-        write_casas(run(scenario("1 min")), tmp_path / "log.txt")
+        export(run(scenario("1 min")), tmp_path / "log.txt")
 
 
 def test_file_that_can_not_be_written_is_named(plan: str, tmp_path: Any) -> None:  # noqa: F811
     with pytest.raises(RunDirectoryError, match=r"no/log\.txt can't be written"):
-        write_casas(run(household(plan)), tmp_path / "no" / "log.txt")
+        export(run(household(plan)), tmp_path / "no" / "log.txt")
