@@ -10,9 +10,9 @@ from fleet2d.artifacts.store import RunStore
 from fleet2d.artifacts.table import Column, TableSpec
 from fleet2d.clock import Clock
 from fleet2d.engine.block import Block
+from fleet2d.engine.columns import STEP, TIME
 from fleet2d.engine.gauges import BatteryGauge, Gauge, ValueGauge
 from fleet2d.engine.learners import Learners
-from fleet2d.engine.tables import STEP, TIME
 from fleet2d.entities.actor import Actor
 from fleet2d.events import Event
 from fleet2d.expectations.expectation import Expectation, RunSignals

@@ -4,13 +4,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fleet2d.artifacts.settings import ArtifactSettings
+from fleet2d.artifacts.table import Column, TableSpec
 from fleet2d.clock import Clock
 from fleet2d.engine.basis import Basis
 from fleet2d.engine.bodies import Bodies
+from fleet2d.engine.columns import HEADING, STEP, TIME, X, Y, away_column
 from fleet2d.engine.ordering import in_order
 from fleet2d.kernels.headings import in_radians
 from fleet2d.kernels.mesh import SUB
 from fleet2d.units import whole_steps
+
+
+def trajectory_table(entity: Column, room: Column) -> TableSpec:
+    """Return the table of trajectories; `Samples.store` fills its columns."""
+    away = away_column("x, y and room are missing")
+    return TableSpec("trajectories", (STEP, TIME, entity, X, Y, HEADING, room, away))
 
 
 class Samples:

@@ -6,15 +6,11 @@ from dataclasses import replace
 from fleet2d.artifacts.table import Column, TableSpec
 from fleet2d.engine.basis import Basis
 from fleet2d.engine.cameras import Cameras
+from fleet2d.engine.columns import HEADING, STEP, TIME, X, Y, away_column
+from fleet2d.engine.samples import trajectory_table
 from fleet2d.engine.sensors import Sensors
 from fleet2d.runs.key_kinds import KEY_KINDS
 from fleet2d.sight.perception import POSTURES
-
-STEP = Column("step", "step", description="step at which the row takes effect")
-TIME = Column("time", "time", description="local time")
-X = Column("x", "float64", "m", nullable=True)
-Y = Column("y", "float64", "m", nullable=True)
-HEADING = Column("heading", "float64", "rad", description="counter-clockwise from +x")
 
 
 def table_specs(
@@ -35,11 +31,19 @@ def table_specs(
     room = Column("room", "category", nullable=True, categories=rooms)
     specs = []
     if settings.trajectories != "off":
-        columns = (STEP, TIME, entity, X, Y, HEADING, room, _away("x, y and room are missing"))
-        specs.append(TableSpec("trajectories", columns))
+        specs.append(trajectory_table(entity, room))
     if settings.key_frames:
         kind = Column("kind", "category", categories=KEY_KINDS)
-        columns = (STEP, TIME, entity, kind, X, Y, HEADING, _away("x and y are where it left"))
+        columns = (
+            STEP,
+            TIME,
+            entity,
+            kind,
+            X,
+            Y,
+            HEADING,
+            away_column("x and y are where it left"),
+        )
         specs.append(TableSpec("key_frames", columns))
     if settings.observations and users and robots:
         specs.append(_observation_table(users, robots, room, camera_names(cameras), activities))
@@ -58,10 +62,6 @@ def table_specs(
     if sensors.names:
         specs.append(_sensor_table(sensors))
     return specs
-
-
-def _away(text: str) -> Column:
-    return Column("away", "bool", description=f"not at home: {text}")
 
 
 def camera_names(cameras: Sequence[Cameras]) -> tuple[str, ...]:
