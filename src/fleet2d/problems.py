@@ -8,6 +8,7 @@ from pydantic import ValidationError
 from pydantic_core import InitErrorDetails, PydanticCustomError, core_schema
 
 from fleet2d.bounds import one_line
+from fleet2d.errors import ScenarioError
 
 Location = tuple[int | str, ...]
 
@@ -64,6 +65,19 @@ def rewrite(
             )
         lines.append(change(details))
     return ValidationError.from_exception_data(error.title, lines)
+
+
+def refusal(prefix: str, error: ValidationError) -> ScenarioError:
+    """Return the first error of a validation, in one line.
+
+    Args:
+        prefix: The beginning of the message, such as the method that was called; may be empty.
+        error: The error of the validation.
+    """
+    first = error.errors(include_url=False)[0]
+    key = ".".join(str(part) for part in first["loc"])
+    reason = first.get("ctx", {}).get("error", first["msg"])
+    return ScenarioError(": ".join(filter(None, [prefix, key, str(reason)])))
 
 
 def did_you_mean(name: object, known: Iterable[object]) -> str:

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from fleet2d.errors import InputError
-from fleet2d.problems import suggest
+from fleet2d.problems import refusal, suggest
 
 
 def show_diary(name: str | None, out: Path | None, days: int, seed: int) -> list[str]:
@@ -36,9 +36,7 @@ def show_diary(name: str | None, out: Path | None, days: int, seed: int) -> list
     try:
         persona = TypeAdapter(AnyPersona).validate_python(name)
     except ValidationError as error:
-        problem = error.errors()[0]
-        key = ".".join(str(part) for part in problem["loc"])
-        raise InputError(f"{name}: {key + ': ' if key else ''}{problem['msg']}") from None
+        raise refusal(name, error) from None
     diary = diary_days(persona, days, seed)
     target = out or Path(f"{path.stem}-diary.png")
     draw_diary(persona, path.stem, diary, target)

@@ -24,7 +24,7 @@ from fleet2d.interventions.intervention import Intervention, parse_intervention
 from fleet2d.interventions.script import WHEN, parse_entry
 from fleet2d.interventions.verbs import Verbs
 from fleet2d.kernels.headings import in_radians
-from fleet2d.problems import suggest
+from fleet2d.problems import refusal, suggest
 from fleet2d.runs.run import Run
 from fleet2d.scenario.model import Scenario
 from fleet2d.units import parse_duration
@@ -286,7 +286,7 @@ class Steering(Verbs):
         try:
             change = HomeChange(**keys) if change is None else change
         except ValidationError as error:
-            raise ScenarioError(f"change(): {error.errors()[0]['msg']}") from None
+            raise refusal("change()", error) from None
         self._do("change", change=change)
 
     def drive(self, name: str) -> None:

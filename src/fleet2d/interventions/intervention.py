@@ -17,7 +17,7 @@ from fleet2d.component import Codec, Component, components
 from fleet2d.entities.decisions import DecidingActor
 from fleet2d.errors import ScenarioError
 from fleet2d.interventions.world import World
-from fleet2d.problems import did_you_mean, problem, problem_at, rewrite, suggest
+from fleet2d.problems import did_you_mean, problem, problem_at, refusal, rewrite, suggest
 from fleet2d.units import PositiveDuration
 
 
@@ -207,16 +207,3 @@ def dump_intervention(act: Intervention) -> dict[str, Any]:
         {'do': 'put', 'entity': 'ana', 'to': 'kitchen'}
     """
     return _ADAPTER.dump_python(act, mode="json", exclude_defaults=True)
-
-
-def refusal(prefix: str, error: ValidationError) -> ScenarioError:
-    """Return the error about an intervention that is not valid, in one line.
-
-    Args:
-        prefix: The beginning of the message, such as the method that was called; may be empty.
-        error: The error of the validation.
-    """
-    first = error.errors(include_url=False)[0]
-    key = ".".join(str(part) for part in first["loc"])
-    reason = first.get("ctx", {}).get("error", first["msg"])
-    return ScenarioError(": ".join(filter(None, [prefix, key, str(reason)])))

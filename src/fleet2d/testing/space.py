@@ -10,8 +10,8 @@ from pydantic import TypeAdapter, ValidationError
 
 from fleet2d.bounds import one_line
 from fleet2d.document import Document, Keys, parse_yaml, read_document
-from fleet2d.errors import Fleet2DError, InputError, ScenarioError
-from fleet2d.problems import did_you_mean
+from fleet2d.errors import Fleet2DError, InputError
+from fleet2d.problems import did_you_mean, refusal
 from fleet2d.scenario.compose import apply_changes, assignment
 from fleet2d.scenario.model import Scenario, scenario_of
 from fleet2d.studies.axes import AnyAxis
@@ -128,9 +128,7 @@ def read_space(content: Mapping[str, Any]) -> SearchSpace:
                 axis = {"key": name, **axis}
             choices[name] = tuple(_AXIS.validate_python(axis).choices(name))
         except ValidationError as error:
-            first = error.errors(include_url=False)[0]
-            key = ".".join(map(str, (name, *first["loc"])))
-            raise ScenarioError(f"over {key}: {first['msg']}") from None
+            raise refusal(f"over {name}", error) from None
     return SearchSpace(ranges, choices)
 
 
