@@ -1,0 +1,227 @@
+"""What the docs say in prose and tables, tried with the program: one test for each claim."""
+
+import re
+from collections.abc import Iterator
+from datetime import timedelta
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from pydantic import TypeAdapter
+from tests.scenes import Cli, run, table
+from tests.test_docs_tables import is_default
+
+import fleet2d
+from fleet2d import History, Plan, Present, Situation
+from fleet2d.errors import InputError
+from fleet2d.floorplan.home.costmap import CostmapSettings
+from fleet2d.floorplan.home.layers import LayerSettings
+from fleet2d.kernels.headings import TURN
+from fleet2d.kernels.mesh import SUB
+from fleet2d.routines.manners import Manners
+from fleet2d.routines.persona import bundled_names
+from fleet2d.units import AngleDeg, Duration, Length, Share, Speed, TurnRateDeg
+
+ROOT = Path(__file__).parent.parent
+
+
+def page(name: str) -> str:
+    path = ROOT / ("README.md" if name == "README" else f"docs/{name}.md")
+    return path.read_text(encoding="utf-8")
+
+
+def rows(text: str, head: str) -> Iterator[list[str]]:
+    """Yield the cells of the rows of the table whose heading begins so."""
+    part = text[text.index(head) :].split("\n\n", 1)[0]
+    for row in part.splitlines()[2:]:
+        yield [cell.strip() for cell in row.strip().strip("|").split("|")]
+
+
+def names(cell: str) -> list[str]:
+    return re.findall(r"`([a-z_]+)", cell)
+
+
+@pytest.fixture(scope="module")
+def day() -> fleet2d.Run:
+    return fleet2d.run("simulation.duration=1 d", seed=4)
+
+
+# The scenario file
+
+
+@pytest.mark.parametrize(
+    ("quantity", "kind"),
+    [
+        ("duration", Duration),
+        ("length", Length),
+        ("speed", Speed),
+        ("angle", AngleDeg),
+        ("turn rate", TurnRateDeg),
+        ("share", Share),
+    ],
+)
+def test_units_of_a_quantity_are_read(quantity: str, kind: Any) -> None:
+    cells = next(c for c in rows(page("scenario"), "| quantity |") if c[0].startswith(quantity))
+    literals = re.findall(r"`([^`]+)`", cells[2])
+    assert literals
+    for literal in literals:
+        assert TypeAdapter(kind).validate_python(yaml.safe_load(literal)) is not None
+
+
+def test_only_the_duration_and_the_floor_plan_are_required() -> None:
+    least = {"simulation": {"duration": "1 min"}, "floorplan": "bundled"}
+    assert 60 == fleet2d.load_scenario(least).simulation.steps
+    for section in least:
+        with pytest.raises(InputError, match="missing"):
+            fleet2d.load_scenario({k: v for k, v in least.items() if k != section})
+
+
+def test_durations_in_mappings_merge_and_as_text_replace() -> None:
+    base = {"extends": "bundled:base"}
+    merged = fleet2d.load_scenario({**base, "simulation": {"duration": {"hours": 2}}})
+    assert timedelta(days=30, hours=2) == merged.simulation.duration
+    replaced = fleet2d.load_scenario({**base, "simulation": {"duration": "2 h"}})
+    assert timedelta(hours=2) == replaced.simulation.duration
+
+
+# Concepts
+
+
+def test_the_lattice_and_headings_have_the_sizes_of_the_page() -> None:
+    text = page("concepts")
+    assert f"{SUB} units to a cell" in text
+    assert f"{1000 * 0.05 / SUB:.2f} mm" in text
+    assert f"{TURN}ths of a turn" in text
+
+
+def test_a_run_has_as_many_full_steps_as_fit() -> None:
+    assert (
+        3 == fleet2d.load_scenario(None, "simulation={duration: 25 s, step: 7 s}").simulation.steps
+    )
+
+
+# What a run stores
+
+
+def test_columns_of_the_stored_tables_are_those_of_the_page(day: fleet2d.Run) -> None:
+    text = page("artifacts")
+    for name in ("trajectories", "key_frames", "observations", "events"):
+        part = text[text.index(f"**{name}**") :]
+        columns = [column for cells in rows(part, "| column |") for column in names(cells[0])]
+        stored = [c for c in day.tables[name].column_names if c not in ("step", "time")]
+        assert set(stored) <= set(columns), name
+        optional = {"heading", "posture", "camera", "activity", "true_activity", "time"}
+        extra = {c for c in set(columns) - set(stored) if not c.startswith("true_")} - optional
+        assert set() == extra, name
+
+
+def test_columns_with_the_truth_are_there_if_a_camera_can_err() -> None:
+    cells = next(c for c in rows(page("artifacts"), "| column | unit | |") if "entity" in c[0])
+    assert cells
+    erring = run({"extends": "bundled:base"}, "simulation.duration=3 h",
+                 "robots.astro.perception={attributes: {range_noise: 5 cm, activity: {}}}", seed=4)  # fmt: skip
+    columns = set(erring.tables["observations"].column_names)
+    part = page("artifacts")
+    part = part[part.index("**observations**") :]
+    said = {n for cells in rows(part, "| column |") for n in names(cells[0])}
+    assert columns - {"step", "time"} <= said
+    assert {"true_user", "true_x", "true_activity", "activity"} <= columns
+
+
+def test_keys_of_the_manifest_are_those_of_the_page(day: fleet2d.Run) -> None:
+    part = page("artifacts")
+    part = part[part.index("## The manifest") :]
+    said = {name for cells in rows(part, "| key | |") for name in names(cells[0])}
+    assert said - {"resumed", "seal"} <= set(day.manifest) | {"seal"}
+    assert set(day.manifest) <= said
+
+
+def test_the_readme_names_the_tables_of_the_bundled_scenario(day: fleet2d.Run) -> None:
+    text = page("README")
+    listed = re.search(r"Parquet file per table \(([^)]*)\)", text)
+    assert listed is not None
+    assert set(day.tables) == set(names(listed[1]))
+    assert {6: "six"}[len(bundled_names())] in text
+
+
+# Behaviors, algorithms, layers, reactions
+
+
+@pytest.mark.parametrize(
+    ("where", "head", "subject"),
+    [
+        ("behaviors", "| `now.` |", Situation),
+        ("behaviors", "| call |", Plan),
+        ("algorithms", "| `state.` |", Present),
+        ("algorithms", "| `history.` |", History),
+    ],
+)
+def test_what_the_page_lists_exists(where: str, head: str, subject: type) -> None:
+    has = {*dir(subject), *getattr(subject, "__dataclass_fields__", {})}
+    listed = [name for cells in rows(page(where), head) for name in names(cells[0])]
+    assert len(listed) > 4
+    assert [] == [name for name in listed if name != "len" and name not in has]
+
+
+@pytest.mark.parametrize(
+    ("where", "head", "model"),
+    [("layers", "| key | default | |", LayerSettings),
+     ("layers", "| `floorplan.costmap.` |", CostmapSettings)],
+)  # fmt: skip
+def test_keys_of_layers_have_their_defaults(where: str, head: str, model: Any) -> None:
+    for cells in rows(page(where), head):
+        for name in names(cells[0]):
+            assert name in model.model_fields
+            if cells[1] and not cells[1].startswith("only"):
+                said = cells[1].removesuffix(" %")
+                assert is_default(model, name, said), (name, said)
+
+
+def test_manners_have_their_defaults() -> None:
+    for cells in rows(page("people"), "| of `manners` |"):
+        for name, said in zip(names(cells[0]), cells[1].split(", "), strict=True):
+            if " to " not in said and "±" not in said:
+                assert is_default(Manners, name, said), (name, said)
+
+
+# Commands
+
+
+def test_json_has_the_keys_of_the_page(fleet2d: Cli) -> None:
+    code, out, _ = fleet2d("run", "simulation.duration=10 min", "--json", "--out", "ten")
+    shown = re.search(r"```json\n(\{.*?\})\n```", page("cli"), re.DOTALL)
+    assert shown is not None
+    printed, said = yaml.safe_load(out), yaml.safe_load(shown[1])
+    assert 0 == code
+    assert set(said) == set(printed)
+    assert set(said["wall_s"]) == set(printed["wall_s"])
+
+
+@pytest.mark.parametrize("plan", ["synthetic:7", "family_home"])
+def test_commands_that_take_a_floor_plan_take_bundled_and_synthetic_ones(
+    fleet2d: Cli, plan: str
+) -> None:
+    assert 0 == fleet2d("validate", plan)[0]
+    assert 0 == fleet2d("convert", plan, "plan.json")[0]
+    assert 0 == fleet2d("show", plan, "--out", "plan.svg")[0]
+
+
+def test_the_bundled_month_is_as_the_pages_say() -> None:
+    """Its error of presence after the month, and the rounds that the robot makes."""
+    month = run({"extends": "bundled:base"})
+    said = re.search(r"printed by `fleet2d run`: (0\.\d+) after the month", page("presence"))
+    assert said is not None
+    assert float(said[1]) == pytest.approx(month.metrics["ltp_error"]["ana"]["tv"], abs=0.0005)
+
+
+def test_people_of_different_households_ignore_each_other() -> None:
+    alone = {"ana": {"type": "routine", "persona": "retired"}}
+    both = {**alone, "ben": {"type": "routine", "persona": "student"}}
+    settings = {"simulation": {"duration": "1 d", "seed": 4}, "robots": {}}
+    home = {"floorplan": {"type": "bundled", "furnish": True}}
+    ways = [
+        table(run({**settings, **home, "users": users}), "key_frames", entity="ana")
+        for users in (alone, both)
+    ]
+    assert ways[0]["x"].tolist() == ways[1]["x"].tolist()
