@@ -54,46 +54,12 @@ struct StayModel {
     Range patches_of(i64 room) const { return {first[room], first[room + 1]}; }
 };
 
-// Transition probabilities over a stretch, for each length that stretches have.
-struct Transitions {
-    Array<i64> length;    // (stretches,) the index of each stretch's length
-    Array<f64, 2> over;   // (lengths, nodes) that the stage ends
-    Array<f64, 2> rest;   // (lengths, nodes) of the same stage, without a change of patch
-    Array<f64, 2> hop;    // (lengths, nodes) of the same stage, with a change of patch
-    Array<f64, 3> leave;  // (lengths, nodes, rooms + 1) of going to each room, and to the next stage
-    Array<f64> missed;    // (lengths,) that a person in view isn't perceived
-};
-
-// The filtered distributions: given the evidence up to each stretch; index 0 is before the first stretch.
-//
-// Robots see few rooms at a time. Where `visible` is false, nothing of the room is in view, and `in_view`
-// is 0: that half of the states can be skipped, without changing any sum.
-struct Filtered {
-    Transitions transitions;
-    Array<f64, 3> in_view;   // (stretches + 1, stages, patches) probability of each state in view
-    Array<f64, 3> hidden;    // (stretches + 1, stages, patches) probability of each hidden state
-    Array<bool, 2> visible;  // (stretches + 1, rooms) whether the person may be in view in the room
-    Array<f64, 2> mass;      // (stretches + 1, nodes) probability of each node
-    Array<f64, 2> likely;    // (stretches, 2) likelihood of no sighting, for states in view and for hidden ones
-    Array<f64> scale;        // (stretches,) factor that normalized the probabilities
-    Array<bool, 2> same;     // (stretches, patches) whether the part of the patch in view is the same as before
-};
-
-// Filter stretches; the model is described at `smooth`.
+// P(room) in each stretch, given the evidence up to it: (stretches, rooms). There must be a stretch.
 //
 // `now` (2, stages, patches) is the probability before the first stretch, of states in view and of hidden ones;
-// `shown` (patches,) is the part of each patch that was in view before, -1 if unknown.
-Filtered filter_stays(const StayModel& model, const Stretches& stretches, View<const f64, 3> now,
-                      View<const i64> shown);
-
-// P(room) in each stretch, given the evidence up to it: (stretches, rooms). There must be a stretch.
-// `now` and `shown` are those of `filter_stays`; they become those after the last stretch.
+// `shown` (patches,) is the part of each patch that was in view before, -1 if unknown. They become those after the
+// last.
 Array<f64, 2> follow(const StayModel& model, const Stretches& stretches, View<f64, 3> now, View<i64> shown);
-
-// Weight states (stages, patches) by the sightings in a stretch. They are evidence for states in view, or for
-// hidden states of a patch of which nothing is in view, as positions may be noisy. `likely` (2,) is that of Filtered.
-void weigh_sightings(const Stretches& stretches, i64 t, View<const f64> likely, View<f64, 2> in_view,
-                     View<f64, 2> hidden);
 
 // Stretches that own their arrays, without the views.
 struct OwnedStretches {
@@ -102,6 +68,9 @@ struct OwnedStretches {
     Array<i64> begin;
     Array<i64> patch;
     Array<f64> share;
+
+    // The stretches, with the views whose numbers they have.
+    Stretches of(View<const u8, 2> views) const { return {bins, view, views, begin, patch, share}; }
 };
 
 // Numbers of steps at which a user was perceived, by bin and patch, ascending, without zeros.

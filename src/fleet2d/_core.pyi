@@ -2,7 +2,6 @@
 The compiled core of Fleet2D: arrays and integers in, arrays and integers out.
 """
 
-from collections.abc import Sequence
 import enum
 from typing import Any, overload
 
@@ -1077,13 +1076,14 @@ def gather_views(cells: numpy.typing.NDArray[numpy.int64], room: numpy.typing.ND
         one step: float64 (bins, patches); and that in parts of 255: uint8 (bins, patches).
     """
 
-def sum_places(chains: Sequence[tuple[Any, ...]], unknown: numpy.typing.NDArray[numpy.bool_], users: int, first: numpy.typing.NDArray[numpy.int64]) -> numpy.typing.NDArray[numpy.float64]:
+def sum_places(chains: tuple[Any, ...], unknown: numpy.typing.NDArray[numpy.bool_], users: int, first: numpy.typing.NDArray[numpy.int64]) -> numpy.typing.NDArray[numpy.float64]:
     """
     Sum presence by hour, in the order of NumPy's add.reduceat over the first axis.
 
     Args:
-        chains: Of each user, consecutive stretches of bins: float64 (stretches, places), probability of each place,
-            away last; and int64 (stretches,), number of bins of each.
+        chains: Consecutive stretches of bins, those of one user after the other: float64 (stretches, places),
+            probability of each place, away last; int64 (stretches,), number of bins of each; and where those of each
+            user begin, int64 (users + 1,).
         unknown: bool (bins, places - 1), the rooms with an unknown person.
         users: Number of users; 0: `chains` holds one person, who is anyone.
         first: int64 (hours,), the bins at which hours begin, the first 0.
@@ -1191,6 +1191,45 @@ def follow(model: tuple[Any, ...], stretches: tuple[Any, ...], now: numpy.typing
 
     Raises:
         ValueError: Arrays aren't of one person, or hold numbers of patches or sightings that aren't.
+    """
+
+def follow_people(model: tuple[Any, ...], day: tuple[Any, ...], longest: int, now: numpy.typing.NDArray[numpy.float64]) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64]]:
+    """
+    Return `follow` of each person, from merged bins of a day, when no view is known before.
+
+    Args:
+        model: The transition probabilities: as of one person, with people as the first dimension.
+        day: The evidence, see `fleet2d.kernels.people`.
+        longest: Largest number of bins in a stretch.
+        now: float64 (people, stages, patches), probability before the first bin; becomes that after the last.
+
+    Returns:
+        P(room), away last, in all stretches of one person after the other: float64 (stretches, rooms + 1); the number
+        of bins of each, int64 (stretches,); and where those of each person begin, int64 (people + 1,).
+
+    Raises:
+        ValueError: Arrays aren't of the same people, rooms and patches, or hold numbers of patches or bins that aren't.
+    """
+
+def smooth_people(model: tuple[Any, ...], day: tuple[Any, ...], longest: int, prior: numpy.typing.NDArray[numpy.float64], future: numpy.typing.NDArray[numpy.float64], moments: tuple[Any, ...]) -> tuple[tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64]], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
+    """
+    Return `smooth` of each person, from merged bins of a day.
+
+    Args:
+        model: The transition probabilities: as of one person, with people as the first dimension.
+        day: The evidence, see `fleet2d.kernels.people`.
+        longest: Largest number of bins in a stretch.
+        prior: float64 (people, stages, patches), probability before the first bin.
+        future: float64 (people, stages, patches), likelihood of the evidence after the last one.
+        moments: To add to; with people as the first dimension.
+
+    Returns:
+        What `follow_people` returns, given all evidence; the probability of stage and patch after the last bin, given
+        what was before, and how likely each before the first makes the evidence, largest 1: float64 (people, stages,
+        patches) each.
+
+    Raises:
+        ValueError: Arrays aren't of the same people, rooms and patches, or hold numbers of patches or bins that aren't.
     """
 
 def smooth(model: tuple[Any, ...], stretches: tuple[Any, ...], prior: numpy.typing.NDArray[numpy.float64], future: numpy.typing.NDArray[numpy.float64], moments: tuple[Any, ...]) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:

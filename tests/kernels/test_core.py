@@ -22,6 +22,7 @@ from fleet2d.floorplan.geometry.lattice import Lattice
 from fleet2d.kernels.lens import Lenses
 from fleet2d.kernels.look import LookRule, new_memory
 from fleet2d.kernels.motion import Breakpoints, WalkRule, empty_poses
+from fleet2d.kernels.people import PeopleEvidence
 from fleet2d.kernels.perception import ErrorTables
 from fleet2d.kernels.routes import Corners
 from fleet2d.kernels.seen import Reach
@@ -218,6 +219,20 @@ def model() -> StayModel:
     return StayModel(np.full(3, 0.9), follow, spread, np.array([0.1, 0.0, 0.0]), first, 0.8)
 
 
+def people() -> StayModel:
+    """Return the model of five people, a group and one more."""
+    *arrays, first, detection = model()
+    return StayModel(*(np.repeat(part[None], 5, axis=0) for part in arrays), first, detection)
+
+
+def evidence() -> PeopleEvidence:
+    views = np.zeros((2, 4), np.uint8)
+    views[1, 2] = 60
+    begin, view = np.array([0, 1, 1, 3, 3, 4]), np.array([0, 0, 1, 1, 1])
+    columns = np.array([1, 0, 4, 2]), np.array([2, 1, 2, 0]), np.array([1, 2, 2, 3])
+    return PeopleEvidence(np.arange(5), view, views, begin, *columns)
+
+
 def stretches() -> Stretches:
     shown = np.array([[255, 0, 30, 0], [255, 0, 30, 0], [0, 0, 255, 0]], np.uint8)
     begin, patch = np.array([0, 1, 1, 2]), np.array([0, 2])
@@ -399,7 +414,7 @@ CALLS: dict[str, Args] = {
         7,
     ),
     "sum_places": lambda: (
-        [(np.full((2, 3), 0.3), np.array([5, 1])), (np.full((3, 3), 0.3), np.array([1, 3, 2]))],
+        (np.full((5, 3), 0.3), np.array([5, 1, 1, 3, 2]), np.array([0, 2, 5])),
         np.zeros((6, 2), bool),
         2,
         np.array([0, 4]),
@@ -414,6 +429,15 @@ CALLS: dict[str, Args] = {
     ),
     "follow": lambda: (model(), stretches(), np.full((2, 1, 4), 0.125), np.full(4, -1)),
     "smooth": lambda: (model(), stretches(), np.full((1, 4), 0.25), np.ones((1, 4)), moments()),
+    "follow_people": lambda: (people(), evidence(), 2, np.full((5, 1, 4), 0.25)),
+    "smooth_people": lambda: (
+        people(),
+        evidence(),
+        2,
+        np.full((5, 1, 4), 0.25),
+        np.ones((5, 1, 4)),
+        Moments(*(np.repeat(part[None], 5, axis=0) for part in moments())),
+    ),
     "Window": lambda: (
         0,
         *(np.arange(6).reshape(2, 3) for _ in range(3)),
@@ -600,6 +624,8 @@ WRITTEN = {
     "look": [(7, i) for i in range(5)],
     "follow": [(2,), (3,)],
     "smooth": [(4, i) for i in range(5)],
+    "follow_people": [(3,)],
+    "smooth_people": [(5, i) for i in range(5)],
 }
 """The arrays that are written to, by function."""
 

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from fleet2d.algorithms.presence.anyone import with_anyone
 from fleet2d.kernels.evidence import gather_views, sum_places
+from fleet2d.kernels.people import PeoplePlaces
 
 F64 = NDArray[np.float64]
 
@@ -61,6 +62,13 @@ def values(chains: F64, unknown: NDArray[np.bool_], users: int) -> F64:
     return np.concatenate([rows, rows * (1 - rows), np.ones((*rows.shape[:2], 1))], axis=2)
 
 
+def together(stretches: list[tuple[F64, NDArray[np.int64]]]) -> PeoplePlaces:
+    """Return the stretches of people one after the other."""
+    places, bins = (np.concatenate(parts) for parts in zip(*stretches, strict=True))
+    begin = np.cumsum([0, *(len(lengths) for _, lengths in stretches)])
+    return PeoplePlaces(places, bins, begin)
+
+
 def chain_of(random: np.random.Generator, bins: int) -> tuple[F64, NDArray[np.int64]]:
     """Return probabilities of places in stretches of up to five bins, and their lengths."""
     cuts = np.cumsum(random.integers(1, 6, bins))
@@ -81,7 +89,7 @@ def test_sums_by_hour_equal_numpy(users: int, longest: int) -> None:
     first = np.array([0, *ends[:-1]])
     expected = np.add.reduceat(values(chains, unknown, users), first, axis=0)
 
-    result = sum_places(stretches, unknown, users, first)
+    result = sum_places(together(stretches), unknown, users, first)
 
     assert np.array_equal(expected, result)
     for sums, (a, b) in zip(result, pairwise([0, *ends.tolist()]), strict=True):
@@ -90,13 +98,24 @@ def test_sums_by_hour_equal_numpy(users: int, longest: int) -> None:
 
 def test_wrong_sizes_are_refused() -> None:
     chain, unknown = (np.full((2, 3), 1 / 3), np.array([3, 1])), np.zeros((4, 2), bool)
-    chains = [chain, chain]
+    chains = together([chain, chain])
     with pytest.raises(ValueError, match="no users"):
         sum_places(chains, unknown, 3, np.array([0]))
-    wrong = (chain[0][:, :2], chain[1]), (chain[0][:1], chain[1]), (chain[0], np.array([4, 0]))
+    wrong = (
+        chains._replace(probability=chains.probability[:, :2]),
+        chains._replace(bins=np.array([3, 1, 4, 0])),
+        chains._replace(begin=np.array([0, 1, 4])),
+    )
     for other in wrong:
         with pytest.raises(ValueError, match="a chain must be"):
-            sum_places([chain, other], unknown, 2, np.array([0]))
+            sum_places(other, unknown, 2, np.array([0]))
+    for other in (
+        chains._replace(probability=chains.probability[:3]),
+        chains._replace(begin=np.array([0, 3, 2])),
+        chains._replace(begin=np.array([0, 2, 5])),
+    ):
+        with pytest.raises(ValueError, match="chains must be"):
+            sum_places(other, unknown, 2, np.array([0]))
     with pytest.raises(ValueError, match="a chain must be"):
         sum_places(chains, unknown[:3], 2, np.array([0]))
     for first in ([1], [0, 0], [0, 4]):

@@ -5,42 +5,18 @@
 
 namespace fleet2d {
 
-template <>
-struct border::Fields<Chain> {
-    static constexpr auto name = nb::detail::const_name("tuple[typing.Any, ...]");
-    static constexpr auto members = std::tuple(&Chain::places, &Chain::bins);
-};
-
-// The chains of some people.
+// Where people were, one after the other; as in PeoplePlaces.
 struct Chains {
-    std::vector<Chain> all;
+    View<const f64, 2> places;
+    View<const i64> bins;
+    View<const i64> begin;
 };
 
-}  // namespace fleet2d
-
-namespace nanobind::detail {
-
-// A list of chains.
 template <>
-struct type_caster<fleet2d::Chains> {
-    NB_TYPE_CASTER(fleet2d::Chains, const_name("collections.abc.Sequence[tuple[typing.Any, ...]]"))
-    std::vector<make_caster<fleet2d::Chain>> casters;  // they own what had to be copied
-
-    bool from_python(handle source, uint32_t flags, cleanup_list* cleanup) noexcept {
-        if (!PyList_Check(source.ptr())) return false;
-        casters = decltype(casters)(static_cast<std::size_t>(PyList_Size(source.ptr())));
-        for (auto& caster : casters) {
-            handle item = PyList_GetItem(source.ptr(), static_cast<Py_ssize_t>(value.all.size()));
-            if (!caster.from_python(item, flags, cleanup)) return false;
-            value.all.push_back(caster.value);
-        }
-        return true;
-    }
+struct border::Fields<Chains> {
+    static constexpr auto name = nb::detail::const_name("tuple[typing.Any, ...]");
+    static constexpr auto members = std::tuple(&Chains::places, &Chains::bins, &Chains::begin);
 };
-
-}  // namespace nanobind::detail
-
-namespace fleet2d {
 
 namespace {
 
@@ -51,6 +27,22 @@ bool is_chain(const Chain& chain, i64 places, i64 bins) {
     i64 sum = 0;
     for (const i64 length : chain.bins) sum += length;
     return sum == bins;
+}
+
+// The chain of each person.
+std::vector<Chain> split(const Chains& chains) {
+    const i64 count = chains.bins.size(), width = chains.places.shape[1];
+    require(chains.places.size() == count && all_in_range(chains.begin, 0, count + 1) &&
+                std::is_sorted(chains.begin.begin(), chains.begin.end()),
+            "chains must be (stretches, places), (stretches,), and where those of each person begin");
+    std::vector<Chain> result;
+    for (i64 person = 0; person + 1 < chains.begin.size(); ++person) {
+        const i64 begin = chains.begin[person], end = chains.begin[person + 1];
+        const View<const f64, 2> places(chains.places.data + begin * chains.places.stride[0], {end - begin, width},
+                                        chains.places.stride);
+        result.push_back({places, chains.bins.slice(begin, end)});
+    }
+    return result;
 }
 
 // Whether numbers ascend from 0, by one at most, to `count` - 1.
@@ -104,21 +96,23 @@ Returns:
     m.def(
         "sum_places",
         [](const Chains& chains, View<const bool, 2> unknown, i64 users, View<const i64> first) {
-            const i64 count = static_cast<i64>(chains.all.size()), bins = unknown.size();
+            const std::vector<Chain> all = split(chains);
+            const i64 count = static_cast<i64>(all.size()), bins = unknown.size();
             require(count == std::max(users, i64{1}), "there must be a chain of each user, one if there are no users");
-            for (const Chain& chain : chains.all) {
+            for (const Chain& chain : all) {
                 require(is_chain(chain, unknown.shape[1] + 1, bins),
                         "a chain must be probabilities (stretches, places), and how many bins each stretch has");
             }
             require(begins(first, bins), "first must ascend from 0, below the number of bins");
-            return sum_places(chains.all, unknown, users, first);
+            return sum_places(all, unknown, users, first);
         },
         "chains"_a, "unknown"_a, "users"_a, "first"_a, Unlocked(),
         R"(Sum presence by hour, in the order of NumPy's add.reduceat over the first axis.
 
 Args:
-    chains: Of each user, consecutive stretches of bins: float64 (stretches, places), probability of each place,
-        away last; and int64 (stretches,), number of bins of each.
+    chains: Consecutive stretches of bins, those of one user after the other: float64 (stretches, places),
+        probability of each place, away last; int64 (stretches,), number of bins of each; and where those of each
+        user begin, int64 (users + 1,).
     unknown: bool (bins, places - 1), the rooms with an unknown person.
     users: Number of users; 0: `chains` holds one person, who is anyone.
     first: int64 (hours,), the bins at which hours begin, the first 0.

@@ -31,6 +31,7 @@ NB_MODULE(_core, m) {
     bind_evidence(m);
     bind_legs(m);
     bind_stays(m);
+    bind_people(m);
     bind_smoothing(m);
     bind_timelines(m);
     bind_signals(m);

@@ -20,9 +20,9 @@ struct border::Fields<StayModel> {
                                                &StayModel::restless, &StayModel::first, &StayModel::detection);
 };
 
-// All arrays must be of one person, and the stretches evidence of as many patches.
-inline void check_stays(const StayModel& model, const Stretches& stretches) {
-    const i64 rooms = model.rooms(), patches = model.patches(), count = stretches.size();
+// All arrays must be of one person.
+inline void check_model(const StayModel& model) {
+    const i64 rooms = model.rooms(), patches = model.patches();
     require(rooms > 0 && patches > 0 && model.nodes() > 0 && model.nodes() % rooms == 0,
             "stay must be (rooms * stages,), restless (rooms,), spread (patches,), none of them 0");
     require(model.follow.size() == model.nodes() && model.follow.shape[1] == rooms + 1,
@@ -30,6 +30,12 @@ inline void check_stays(const StayModel& model, const Stretches& stretches) {
     require(model.first.size() == rooms + 1 && model.first[0] == 0 && model.first[rooms] == patches &&
                 std::is_sorted(model.first.begin(), model.first.end()),
             "first must be (rooms + 1,), ascending from 0 to the number of patches");
+}
+
+// The stretches must be evidence of as many patches as a model has.
+inline void check_stays(const StayModel& model, const Stretches& stretches) {
+    check_model(model);
+    const i64 patches = model.patches(), count = stretches.size();
     require(stretches.view.size() == count && stretches.views.shape[1] == patches &&
                 stretches.begin.size() == count + 1 && stretches.patch.size() == stretches.share.size(),
             "stretches must be of one length and of the patches of spread, begin one longer, patch as long as share");

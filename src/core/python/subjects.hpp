@@ -28,6 +28,7 @@ void bind_presence(nanobind::module_& m);
 void bind_evidence(nanobind::module_& m);
 void bind_legs(nanobind::module_& m);
 void bind_stays(nanobind::module_& m);
+void bind_people(nanobind::module_& m);
 void bind_smoothing(nanobind::module_& m);
 void bind_signals(nanobind::module_& m);
 

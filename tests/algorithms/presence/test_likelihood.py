@@ -62,7 +62,7 @@ def test_stays_and_shares_are_those_the_person_was_drawn_from() -> None:
         where = person(60 * DAY, 4, seed)
         estimator = Likelihood(detection=DETECTION, together=1)
         presence = learn(estimator, evidence(where, 4, patrol, seed), 4)
-        leave, estimate = 1 - np.diagonal(truth), 1 - estimator.people[0].model.stay
+        leave, estimate = 1 - np.diagonal(truth), 1 - estimator.people.model.stay[0]
         bound = np.array([0.2, 0.2, 0.2, 0.2, 0.45])
         assert (np.abs(estimate - leave) < bound * leave).all()
         assert total_variation(shares_at_home(where, 4), presence.share("u0")) < 0.03

@@ -113,7 +113,7 @@ def test_markov_decay_is_the_row_of_the_power_since_the_last_sighting() -> None:
 
     model = MarkovDecay()
     track = followed(model, bins_of(Evidence(0, 1, watched, seen)), 3, 1).track
-    steps = steps_of(model.learner.people[0].model)
+    steps = steps_of(model.learner.people.model_of(0))
     for t in (4, 5, 20, 39):
         power = np.linalg.matrix_power(steps, t - 4)[1]
         belief = np.append(track.home[t, 0] * (1 - track.away[t, 0]), track.away[t, 0])
@@ -179,9 +179,8 @@ def test_learning_continues_from_a_learned_state(cls: type[Model]) -> None:
     home, _ = other.observe(any_evidence(9).part(20, 21))
     assert np.abs(home.sum(axis=2) - 1).max() < 1e-9
     if cls in CHAINS:
-        for mine, theirs in zip(one.learner.people, other.learner.people, strict=True):
-            for part, same in zip(mine.model, theirs.model, strict=True):
-                assert np.array_equal(part, same)
+        for part, same in zip(one.learner.people.model, other.learner.people.model, strict=True):
+            assert np.array_equal(part, same)
 
 
 def sleeper(days: int, seed: int) -> np.ndarray:

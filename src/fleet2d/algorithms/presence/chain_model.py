@@ -17,7 +17,7 @@ from fleet2d.algorithms.presence.estimator import F64, normalized
 from fleet2d.algorithms.presence.habits import Habits
 from fleet2d.algorithms.presence.likelihood import Likelihood
 from fleet2d.algorithms.presence.model import Model
-from fleet2d.algorithms.presence.person import Person
+from fleet2d.algorithms.presence.people import StateLayout
 from fleet2d.component import register
 from fleet2d.kernels.presence import advance
 from fleet2d.kernels.stays import StayModel, Stretches, follow
@@ -120,9 +120,9 @@ class Follower:
         shown: int64 (patches,), the part of each patch in view.
     """
 
-    def __init__(self, person: Person) -> None:
+    def __init__(self, layout: StateLayout) -> None:
         """Begin with the uninformed distribution."""
-        anywhere = person.layout.anywhere
+        self.layout, anywhere = layout, layout.anywhere
         self.now = np.stack([np.zeros_like(anywhere), anywhere])
         self.shown: I64 = np.full(anywhere.shape[1], -1, np.int64)
 
@@ -135,12 +135,12 @@ class Follower:
         """
         return follow(model, stretches, self.now, self.shown)
 
-    def forecast(self, person: Person, habits: Habits | None) -> PersonForecast:
+    def forecast(self, model: StayModel, habits: Habits | None) -> PersonForecast:
         """Return the present distribution over rooms, with the transitions of the person."""
-        stages = person.layout.stages
-        nodes = person.layout.room[:, np.newaxis] * stages + np.arange(stages)
+        stages = self.layout.stages
+        nodes = self.layout.room[:, np.newaxis] * stages + np.arange(stages)
         mass = np.bincount(nodes.ravel(), (self.now[0] + self.now[1]).T.ravel())
-        return PersonForecast(mass.astype(np.float64), person.model, habits)
+        return PersonForecast(mass.astype(np.float64), model, habits)
 
 
 def steps_of(model: StayModel) -> F64:
@@ -193,17 +193,16 @@ class Filter(Model):
         return home, away
 
     def _observe_day(self, bins: Bins) -> tuple[F64, F64]:
-        day = self.learner.add(bins)
-        people = self.learner.people
-        self.followers = self.followers or [Follower(person) for person in people]
-        places = [self._follow(user, day) for user in range(len(people))]
+        day, people = self.learner.add(bins)
+        self.followers = self.followers or [Follower(people.layout) for _ in range(people.count)]
+        places = [self._follow(user, day, people.model_of(user)) for user in range(people.count)]
         return split(places, self.users, bins)
 
-    def _follow(self, user: int, day: DayEvidence) -> F64:
+    def _follow(self, user: int, day: DayEvidence, model: StayModel) -> F64:
         stretches = day.stretches(user, 1)
         if not self.negative:
             stretches = stretches._replace(views=np.zeros_like(stretches.views))
-        return self.followers[user].follow(self.learner.people[user].model, stretches)
+        return self.followers[user].follow(model, stretches)
 
     def habits(self, user: int) -> Habits | None:
         """Return how a user's transitions depend on the hour; None: they don't."""
@@ -213,9 +212,11 @@ class Filter(Model):
         self, users: Sequence[str], time: datetime, bin_us: int, track: BeliefSeries
     ) -> Presence:
         """Return the present belief, which forecasts later times by `at`."""
-        pairs = enumerate(zip(self.learner.people, self.followers, strict=True))
+        learned = self.learner.people
+        assert learned is not None, "there is a track of evidence"
         people = [
-            follower.forecast(person, self.habits(user)) for user, (person, follower) in pairs
+            follower.forecast(learned.model_of(user), self.habits(user))
+            for user, follower in enumerate(self.followers)
         ]
         return ChainPresence(users, people, time, bin_us, track)
 
@@ -255,8 +256,8 @@ class RoutineModel(SemiMarkov):
 
     smoothing: float = Field(default=60, gt=0)
 
-    def _follow(self, user: int, day: DayEvidence) -> F64:
-        habits, model = self.habits(user), self.learner.people[user].model
+    def _follow(self, user: int, day: DayEvidence, model: StayModel) -> F64:
+        habits = self.habits(user)
         hours = day.minute // 60
         ends = [0, *(np.flatnonzero(np.diff(hours)) + 1).tolist(), len(hours)]
         places = []

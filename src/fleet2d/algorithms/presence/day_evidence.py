@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from fleet2d.algorithms.evidence import SightingCounts
 from fleet2d.algorithms.presence.anyone import unknown_seen
 from fleet2d.algorithms.presence.counts import Bins
+from fleet2d.kernels.people import PeopleEvidence
 from fleet2d.kernels.stays import WHOLE_PATCH, Stretches, merge_bins
 
 I64 = NDArray[np.int64]
@@ -76,6 +77,12 @@ class DayEvidence(NamedTuple):
         """
         seen = self.sightings.of_user(user)
         return merge_bins(self.minute, self.view, self.views, seen, longest)
+
+    def of_people(self, count: int) -> PeopleEvidence:
+        """Return the evidence of the first `count` users; without users, the first is anybody."""
+        user, seen_bin, patch, steps, _ = self.sightings
+        begin = np.searchsorted(user, np.arange(count + 1)).astype(np.int64)
+        return PeopleEvidence(self.minute, self.view, self.views, begin, seen_bin, patch, steps)
 
 
 def watched_patches(bins: Bins) -> U8:

@@ -11,10 +11,11 @@ from pydantic import Field
 from fleet2d.algorithms.presence.counts import Bins
 from fleet2d.algorithms.presence.day_evidence import DayEvidence, by_day
 from fleet2d.algorithms.presence.estimator import F64, FEWEST_DAYS, Estimator, normalized
-from fleet2d.algorithms.presence.person import Person, Prior, StateLayout, StretchPlaces
+from fleet2d.algorithms.presence.people import People, Prior, StateLayout
 from fleet2d.component import register
 from fleet2d.errors import ComponentError
 from fleet2d.kernels.evidence import sum_places
+from fleet2d.kernels.people import PeoplePlaces
 from fleet2d.units import Share
 
 I64 = NDArray[np.int64]
@@ -47,7 +48,7 @@ class Likelihood(Estimator):
 
     Shares are the means of P(room | all evidence), by smoothing. Lengths of stays, transitions
     between rooms, and the choice and change of patches are learned by expectation maximization
-    with a prior of one event each (`fleet2d.algorithms.presence.person`). When a day is over it is
+    with a prior of one event each (`fleet2d.algorithms.presence.people`). When a day is over it is
     smoothed as a whole, and so are two of the last 64 days, in turn, with messages from and to the
     days next to them (incremental, after Neal and Hinton 1998); the present day is only filtered.
 
@@ -79,7 +80,7 @@ class Likelihood(Estimator):
     def begin(self, rooms: int, users: int, half_life: float | None = None) -> None:
         """Prepare for a run."""
         super().begin(rooms, users, half_life)
-        self.people: list[Person] = []
+        self.people: People | None = None
         self.learned: Mapping[str, Any] = {}
         self.parts: list[DayEvidence] = []  # the parts of the present day
         self.days: list[DayEvidence] = []  # the days that are revisited
@@ -118,9 +119,11 @@ class Likelihood(Estimator):
         shape = (self.users + 1, self.rooms + 1)
         if len(self.counts.days) < FEWEST_DAYS:
             return np.zeros(shape), np.ones(shape)
-        total, lengths = self.counts.total, [person.length_of_stay for person in self.people]
-        anyone = [np.max(lengths, axis=0)] if self.users else []
-        variance = np.maximum(total[:, self.rooms + 1 : -1], 0) * np.array(lengths + anyone)
+        assert self.people is not None, "days are over"
+        total, lengths = self.counts.total, self.people.length_of_stay
+        if self.users:
+            lengths = np.append(lengths, [np.max(lengths, axis=0)], axis=0)
+        variance = np.maximum(total[:, self.rooms + 1 : -1], 0) * lengths
         at_home = np.maximum(total[:, : self.rooms].sum(axis=1, keepdims=True), 1)
         bins = np.concatenate([np.repeat(at_home, self.rooms, axis=1), total[:, -1:]], axis=1)
         home, away = self.shares(total)
@@ -155,38 +158,33 @@ class Likelihood(Estimator):
     def observe(self, bins: Bins) -> None:
         """Process the next bins of evidence."""
         for day in by_day(bins):
-            part = self.add(day)
-            places = [
-                person.follow(part.stretches(user, self.together))
-                for user, person in enumerate(self.people)
-            ]
-            self.counts.add_hours(*self._by_hour(places, part))
+            part, people = self.add(day)
+            self.counts.add_hours(*self._by_hour(people.follow(part), part))
 
-    def add(self, bins: Bins) -> DayEvidence:
+    def add(self, bins: Bins) -> tuple[DayEvidence, People]:
         """Add evidence of one day, which is learned from when the next day begins."""
-        if not self.people:
-            self._create_people(bins)
-        self._look_into(bins)
+        people = self.people = self.people or self._create_people(bins)
+        self._look_into(bins, people)
         part = DayEvidence.of(bins)
         if part.number != self.counts.today:
             if self.parts:
-                self._end_day(part.number)
+                self._end_day(part.number, people)
             self.counts.begin_day(part.number)
         self.parts.append(part)
-        return part
+        return part, people
 
-    def _create_people(self, bins: Bins) -> None:
+    def _create_people(self, bins: Bins) -> People:
         layout, prior = StateLayout.of(bins, self.stages), Prior(self.detection, self.restless)
-        self.people = [Person(layout, prior) for _ in range(max(self.users, 1))]
-        for i, person in enumerate(self.people):
-            if self.learned and not person.recall(self.learned.get(str(i), {})):
-                raise ComponentError(
-                    f"the learned state doesn't fit {self.stages} stages in {len(layout.room) - 1}"
-                    f" patches of {self.rooms} rooms: it is from another home, other users, another"
-                    " estimator, or one with other stages"
-                )
+        people = People(layout, prior, max(self.users, 1), self.together)
+        if self.learned and not people.recall(self.learned):
+            raise ComponentError(
+                f"the learned state doesn't fit {self.stages} stages in {len(layout.room) - 1}"
+                f" patches of {self.rooms} rooms: it is from another home, other users, another"
+                " estimator, or one with other stages"
+            )
+        return people
 
-    def _look_into(self, bins: Bins) -> None:
+    def _look_into(self, bins: Bins, people: People) -> None:
         """Note which rooms were watched, and let people be in the parts of the home they are in."""
         is_watched = self.is_watched | bins.watched.any(axis=0)
         if np.array_equal(is_watched, self.is_watched):
@@ -194,8 +192,7 @@ class Likelihood(Estimator):
         before, self.is_watched = self._possible_rooms, is_watched
         self.island = bins.parts.island
         if not np.array_equal(self._possible_rooms, before):
-            for person in self.people:
-                person.confine(np.append(self._possible_rooms, True).astype(np.float64))
+            people.confine(np.append(self._possible_rooms, True).astype(np.float64))
 
     @property
     def _possible_rooms(self) -> NDArray[np.bool_]:
@@ -204,7 +201,7 @@ class Likelihood(Estimator):
             return np.ones(self.rooms, bool)
         return np.isin(self.island, self.island[self.is_watched])
 
-    def _by_hour(self, places: list[StretchPlaces], day: DayEvidence) -> tuple[I64, F64]:
+    def _by_hour(self, places: PeoplePlaces, day: DayEvidence) -> tuple[I64, F64]:
         """Return the hours of the bins, as ordinal * 24 + hour, and the sums of each hour.
 
         The sums are those of p, p (1 - p), and 1: float64 (hours, users + 1, width).
@@ -214,48 +211,39 @@ class Likelihood(Estimator):
         sums = sum_places(places, day.unknown, self.users, first)
         return day.number * 24 + hour[first], sums
 
-    def _whole_day(self, places: list[StretchPlaces], day: DayEvidence) -> F64:
+    def _whole_day(self, places: PeoplePlaces, day: DayEvidence) -> F64:
         """Return the sums of each hour of a day: float64 (24, users + 1, width)."""
         hours, sums = self._by_hour(places, day)
         by_hour = np.zeros((24, *sums.shape[1:]))
         by_hour[hours % 24] = sums
         return by_hour
 
-    def _end_day(self, next_day: int) -> None:
+    def _end_day(self, next_day: int, people: People) -> None:
         """Smooth the present day as a whole, learn from it, and revisit earlier days."""
         day, self.parts = DayEvidence.joined(self.parts), []
-        places = [
-            person.end_day(day.stretches(user, self.together))
-            for user, person in enumerate(self.people)
-        ]
-        self.counts.hours = self._whole_day(places, day)
+        self.counts.hours = self._whole_day(people.end_day(day), day)
         self.hours.append(self.counts.hours)
         self.days.append(day)
         for _ in range(REVISITS):
             self.turn = (self.turn - 1) % len(self.days)
-            self._revisit(self.turn)
+            self._revisit(self.turn, people)
         fade = self.counts.faded(next_day - self.counts.today)
-        for person in self.people:
-            person.fade(fade)
-            person.forget(STORED_DAYS)
+        people.fade(fade)
+        people.forget(STORED_DAYS)
         del self.days[:-STORED_DAYS], self.hours[:-STORED_DAYS]
 
-    def _revisit(self, number: int) -> None:
+    def _revisit(self, number: int, people: People) -> None:
         """Smooth a day with the present model, and replace its sums."""
         day = self.days[number]
         weight = self.counts.faded(self.counts.today - day.number)
-        places = [
-            person.revisit(number, weight, day.stretches(user, self.together))
-            for user, person in enumerate(self.people)
-        ]
-        hours = self._whole_day(places, day)
+        hours = self._whole_day(people.revisit(number, weight, day), day)
         self.counts.put(day.number, self.hours[number], hours)
         self.hours[number] = hours
 
     def remember(self) -> dict[str, Any]:
         """Return the learned state, as arrays in mappings."""
-        stays = {str(i): person.remember() for i, person in enumerate(self.people)}
-        return {**super().remember(), "stays": stays or self.learned}
+        stays = self.learned if self.people is None else self.people.remember()
+        return {**super().remember(), "stays": stays}
 
     def recall(self, learned: Mapping[str, Any], today: int) -> None:
         """Restore what `remember` returned; called after `begin`."""

@@ -10,9 +10,9 @@ from tests.kernels.test_stays import PATCHES, PLACES, ROOM, by_state, case, twin
 from fleet2d.algorithms.evidence import Evidence, Parts, SightingCounts
 from fleet2d.algorithms.presence.counts import Bins, in_time
 from fleet2d.algorithms.presence.day_evidence import DayEvidence, distinct
-from fleet2d.algorithms.presence.person import (
+from fleet2d.algorithms.presence.people import (
     STAY,
-    Person,
+    People,
     Prior,
     StateLayout,
     model_of,
@@ -126,13 +126,13 @@ def test_a_user_never_seen_in_a_watched_patch_may_be_in_the_other() -> None:
     """However long a robot looks at one patch of a room, the other may have somebody in it."""
     prior, seen = Prior(0.9, 1e-6), [[0, 0, 0]] * 600
     bins = bins_of([[1, 0, 1]] * 600, seen)
-    person = Person(StateLayout.of(bins, 1), prior)
-    places = person.end_day(stretches_of(bins, longest=5)).by_bin
+    people = People(StateLayout.of(bins, 1), prior, 1, longest=5)
+    places = people.end_day(DayEvidence.of(bins)).by_bin(0)
     assert places[300, 0] > 0.1
     assert places[300, 1] < 0.01
     hidden = bins_of([[0.5, 0, 1]] * 600, seen)
-    person = Person(StateLayout.of(hidden, 1), prior)
-    again = person.end_day(stretches_of(hidden, longest=5)).by_bin
+    people = People(StateLayout.of(hidden, 1), prior, 1, longest=5)
+    again = people.end_day(DayEvidence.of(hidden)).by_bin(0)
     assert places[300, 0] + 0.02 < again[300, 0]
 
 
@@ -142,18 +142,56 @@ def test_revisited_days_count_once() -> None:
     shown = np.eye(3)[looks]
     seen = (np.eye(3)[looks] * (random.random((3 * 1440, 1)) < 0.3) * 5).astype(int)
     bins = bins_of(shown, seen)
-    person = Person(StateLayout.of(bins, 2), PRIOR)
-    days = [stretches_of(bins.part(day * 1440, (day + 1) * 1440), longest=1) for day in range(3)]
-    for stretches in days:
-        person.end_day(stretches)
+    people = People(StateLayout.of(bins, 2), PRIOR, 1, longest=1)
+    days = [DayEvidence.of(bins.part(day * 1440, (day + 1) * 1440)) for day in range(3)]
+    for day in days:
+        people.end_day(day)
     for _ in range(20):
-        for day in (2, 1, 0):
-            person.revisit(day, 1.0, days[day])
+        for number in (2, 1, 0):
+            people.revisit(number, 1.0, days[number])
     for total, parts in zip(
-        person.total, zip(*(day.moments for day in person.days), strict=True), strict=True
+        people.total, zip(*(day.moments for day in people.days), strict=True), strict=True
     ):
         assert np.abs(total - np.sum(parts, axis=0)).max() < 1e-6
-    assert 3 * 1440 == pytest.approx(person.total.time.sum(), rel=1e-9)
+    assert 3 * 1440 == pytest.approx(people.total.time.sum(), rel=1e-9)
+
+
+def crowd_of(count: int, bins: int, seed: int) -> Bins:
+    """Evidence of several users of two rooms, most of whom are hardly ever seen."""
+    random = np.random.default_rng(seed)
+    shown = random.choice([0, 0, 0.4, 1], (bins // 4 + 1, 3)).repeat(4, axis=0)[:bins]
+    seen = np.where(random.random((bins, count + 1, 3)) < 0.02, random.integers(1, 9), 0)
+    seen[:, -1] = seen.max(axis=1)
+    base = bins_of(shown, seen[:, 0])
+    assert base.by_patch is not None
+    by_patch = base.by_patch._replace(sightings=SightingCounts.of(seen))
+    in_rooms = np.stack([seen[..., :2].max(axis=-1), seen[..., 2]], axis=-1)
+    return base._replace(by_patch=by_patch, seen=in_rooms)
+
+
+@pytest.mark.parametrize("count", [1, 3, 4, 9])
+@pytest.mark.parametrize("stages", [1, 3])
+def test_people_learn_together_as_each_alone_to_the_last_bit(count: int, stages: int) -> None:
+    bins = crowd_of(count, 300, count)
+    layout, day = StateLayout.of(bins, stages), DayEvidence.of(bins)
+    people = People(layout, PRIOR, count, longest=5)
+    alone = [People(layout, PRIOR, 1, longest=5) for _ in range(count)]
+    for user, person in enumerate(alone):
+        rows = day.sightings.user == user
+        own = SightingCounts(*(column[rows] for column in day.sightings[:4]), (300, 2, 3))
+        only = day._replace(sightings=own._replace(user=np.zeros(rows.sum(), np.int64)))
+        person.follow(only.part(0, 100))
+        person.end_day(only)
+        person.revisit(0, 0.7, only)
+    people.follow(day.part(0, 100))
+    people.end_day(day)
+    people.revisit(0, 0.7, day)
+    for user, person in enumerate(alone):
+        assert np.array_equal(people.now[user], person.now[0])
+        for together, single in zip(people.total, person.total, strict=True):
+            assert np.array_equal(together[user], single[0])
+        for part, expected in zip(people.model_of(user), person.model_of(0), strict=True):
+            assert np.array_equal(part, expected)
 
 
 def test_merging_bins_loses_nothing() -> None:

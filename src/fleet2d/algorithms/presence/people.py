@@ -1,0 +1,273 @@
+"""The stays of people: hidden Markov models, learned from all days."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, NamedTuple, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fleet2d.algorithms.presence.counts import Bins
+from fleet2d.algorithms.presence.day_evidence import DayEvidence
+from fleet2d.kernels.people import PeoplePlaces, follow_people, smooth_people
+from fleet2d.kernels.stays import Moments, StayModel
+
+F64 = NDArray[np.float64]
+I64 = NDArray[np.int64]
+
+# Mean length of a stay before anything was learned, and of the first and last of several stages.
+# All in bins.
+STAY = 120.0
+SHORT, LONG = 5.0, 240.0
+
+
+class StateLayout(NamedTuple):
+    """The states of a person's model.
+
+    Attributes:
+        room: int64 (patches + 1,), the room of each patch; the last is away, one past the rooms.
+        spread: float64 (patches + 1,), the share of each patch in the floor of its room.
+        rooms: Number of rooms.
+        stages: Number of stages of a stay.
+        possible: float64 (rooms + 1,), 1 for the places where the person may be, 0 for the others.
+    """
+
+    room: I64
+    spread: F64
+    rooms: int
+    stages: int
+    possible: F64
+
+    @classmethod
+    def of(cls, bins: Bins, stages: int) -> Self:
+        """Return the states for the rooms and patches of evidence."""
+        room, cells = bins.parts.room, bins.parts.cells
+        rooms = bins.watched.shape[1]
+        floor = np.maximum(cells, 1)
+        spread = np.append(floor / np.bincount(room, floor, minlength=rooms)[room], 1.0)
+        return cls(np.append(room, rooms), spread, rooms, stages, np.ones(rooms + 1))
+
+    @property
+    def anywhere(self) -> F64:
+        """The uninformed distribution, equal for rooms and away: (stages, patches + 1)."""
+        spread = self.spread * self.possible[self.room]
+        return np.tile(spread / (self.possible.sum() * self.stages), (self.stages, 1))
+
+    def unknown_view(self) -> I64:
+        """Return -1, for unknown, as the part of each patch in view: int64 (patches + 1,)."""
+        return np.full(len(self.room), -1, np.int64)
+
+    def no_moments(self, *people: int) -> Moments:
+        """Return moments of some people that are all zero, with people as the first dimension."""
+        places, nodes = self.rooms + 1, (self.rooms + 1) * self.stages
+        return Moments(
+            np.zeros((*people, nodes)),
+            np.zeros((*people, nodes, places + 1)),
+            np.zeros((*people, len(self.room))),
+            np.zeros((*people, places)),
+            np.zeros((*people, places)),
+        )
+
+
+class Prior(NamedTuple):
+    """What is assumed of a person before anything was learned.
+
+    Attributes:
+        detection: Probability that a person in view is perceived.
+        restless: Probability per bin that a person in a room changes patch.
+    """
+
+    detection: float
+    restless: float
+
+
+def model_of(moments: Moments, layout: StateLayout, prior: Prior) -> StayModel:
+    """Return the most probable transitions: expected counts by expected time, with a prior.
+
+    The prior of a stage is one end after STAY bins (with several stages, 5 to 240 bins), and one
+    next room, distributed as rooms are entered overall; with several stages, half of it goes to the
+    next stage. The prior of a room is one arrival, spread over its floor, and one change of patch
+    after 1 / `restless` bins.
+
+    Args:
+        moments: What was learned; of several people, with people as the first dimension.
+        layout: The states.
+        prior: What was assumed before.
+
+    Returns:
+        The transitions, with as many dimensions.
+    """
+    places, stages = layout.rooms + 1, layout.stages
+    lengths = np.linspace(SHORT, LONG, stages) if stages > 1 else np.array([STAY])
+    ends = moments.exits.sum(axis=-1)
+    stay = 1 - (ends + 1) / (moments.time + np.tile(lengths, places))
+    entered = moments.exits[..., :places].sum(axis=-2) + layout.possible / layout.possible.sum()
+    others = np.repeat(entered[..., None, :], places, axis=-2)
+    others[..., np.arange(places), np.arange(places)] = 0.0
+    others = np.repeat(others / others.sum(axis=-1, keepdims=True), stages, axis=-2)
+    next_stage = np.tile(np.arange(stages) < stages - 1, places) / 2
+    prior_exits = np.empty_like(moments.exits)
+    prior_exits[..., :places] = others * (1 - next_stage)[:, None]
+    prior_exits[..., places] = next_stage
+    follow = (moments.exits + prior_exits) / (ends + 1)[..., None]
+    spread = moments.arrivals + layout.spread
+    spread = spread / _sum_by_room(spread, layout.room)[..., layout.room]
+    trials = moments.moves + moments.rests + 1 / max(prior.restless, 1e-6)
+    restless = (moments.moves + 1) / np.maximum(trials, 1)
+    restless[..., -1] = 0.0  # away has no patches
+    first = np.searchsorted(layout.room, np.arange(places + 1)).astype(np.int64)
+    return StayModel(stay, follow, spread, np.minimum(restless, 1), first, prior.detection)
+
+
+def _sum_by_room(values: F64, room: I64) -> F64:
+    """Return the sums over the patches of each room, in order: (..., patches) to (..., rooms)."""
+    rooms, rows = int(room[-1]) + 1, values.reshape(-1, len(room))
+    slot = np.arange(len(rows))[:, None] * rooms + room
+    sums = np.bincount(slot.ravel(), rows.ravel()).astype(np.float64)
+    return sums.reshape(*values.shape[:-1], rooms)
+
+
+@dataclass
+class PeopleDay:
+    """The messages to one day of people, and the statistics learned from it.
+
+    Attributes:
+        start: float64 (people, stages, patches), the distribution before the day.
+        backward: float64 (people, stages, patches), the backward message from later days: the
+            likelihood of their evidence given each state.
+        moments: The expected sufficient statistics of the day, with people as first dimension.
+    """
+
+    start: F64
+    backward: F64
+    moments: Moments
+
+
+class People:
+    """The models of all users.
+
+    Attributes:
+        model: The transition probabilities, with people as first dimension.
+        total: Sum of the moments of all days, with decayed weights of older ones, likewise.
+        now: float64 (people, stages, patches), the distribution after the last bin.
+        days: The finished days that are still revisited.
+    """
+
+    def __init__(self, layout: StateLayout, prior: Prior, count: int, longest: int) -> None:
+        """Begin with the prior.
+
+        Args:
+            layout: The states.
+            prior: What is assumed of each person.
+            count: Number of people.
+            longest: Largest number of consecutive bins with equal evidence that are merged.
+        """
+        self.layout, self.prior, self.count, self.longest = layout, prior, count, longest
+        self.total = layout.no_moments(count)
+        self.model = model_of(self.total, layout, prior)
+        self.now = self.day_start = np.repeat(layout.anywhere[None], count, axis=0)
+        self.days: list[PeopleDay] = []
+
+    def model_of(self, person: int) -> StayModel:
+        """Return the transition probabilities of one person."""
+        stay, follow, spread, restless, first, detection = self.model
+        own = (stay[person], follow[person], spread[person], restless[person])
+        return StayModel(*own, first, detection)
+
+    def confine(self, possible: F64) -> None:
+        """Let people be in some places only: float64 (rooms + 1,), as `possible`."""
+        self.layout = self.layout._replace(possible=possible)
+        self.model = model_of(self.total, self.layout, self.prior)
+        self.now, self.day_start = (
+            np.stack([self._within(places) for places in all_places])
+            for all_places in (self.now, self.day_start)
+        )
+
+    def _within(self, places: F64) -> F64:
+        """Return one person's distribution without the places where the person can't be."""
+        rest = places * self.layout.possible[self.layout.room]
+        return rest / rest.sum() if rest.any() else self.layout.anywhere
+
+    @property
+    def length_of_stay(self) -> F64:
+        """Mean length of a stay in each room, and away [bins]: float64 (people, rooms + 1)."""
+        places = self.layout.rooms + 1
+        time = self.total.time.reshape(self.count, places, -1).sum(axis=2)
+        ends = self.total.exits[..., :places].reshape(self.count, places, -1).sum(axis=2)
+        return (time + STAY) / (ends + 1)
+
+    def follow(self, part: DayEvidence) -> PeoplePlaces:
+        """Filter over the next part of a day; return P(room | evidence up to the stretch)."""
+        self.now = self.now.copy()
+        evidence = part.of_people(self.count)
+        return PeoplePlaces(*follow_people(self.model, evidence, self.longest, self.now))
+
+    def end_day(self, day: DayEvidence) -> PeoplePlaces:
+        """Smooth the finished day as a whole, and learn from it."""
+        moments = self.layout.no_moments(self.count)
+        self.days.append(PeopleDay(self.day_start, np.ones_like(self.day_start), moments))
+        return self.revisit(len(self.days) - 1, 1.0, day)
+
+    def revisit(self, number: int, weight: float, evidence: DayEvidence) -> PeoplePlaces:
+        """Smooth a day with the present models, and update the models by the difference.
+
+        The day before and the next day get new boundary messages, which they use when they are
+        revisited.
+
+        Args:
+            number: Index of the day in `days`.
+            weight: Weight of the day.
+            evidence: The evidence of the day.
+        """
+        day, moments = self.days[number], self.layout.no_moments(self.count)
+        places, end, begin = smooth_people(
+            self.model,
+            evidence.of_people(self.count),
+            self.longest,
+            day.start,
+            day.backward,
+            moments,
+        )
+        if number > 0:
+            self.days[number - 1].backward = begin
+        if number + 1 < len(self.days):
+            self.days[number + 1].start = end
+        else:
+            self.now = self.day_start = end
+        self.total = Moments(
+            *(
+                np.maximum(total + weight * (new - old), 0.0)
+                for total, new, old in zip(self.total, moments, day.moments, strict=True)
+            )
+        )
+        day.moments = moments
+        self.model = model_of(self.total, self.layout, self.prior)
+        return PeoplePlaces(*places)
+
+    def fade(self, weight: float) -> None:
+        """Multiply the moments learned so far by a weight."""
+        if weight < 1:
+            self.total = Moments(*(weight * part for part in self.total))
+
+    def forget(self, count: int) -> None:
+        """Keep the last `count` days only; the statistics of the others stay."""
+        del self.days[:-count]
+
+    def remember(self) -> dict[str, Any]:
+        """Return what was learned of each person, as arrays, by number."""
+        return {
+            str(person): {name: part[person] for name, part in self.total._asdict().items()}
+            for person in range(self.count)
+        }
+
+    def recall(self, learned: Mapping[str, Any]) -> bool:
+        """Restore what `remember` returned; return whether it has the same people and states."""
+        for person in range(self.count):
+            own = learned.get(str(person), {})
+            for name, part in self.total._asdict().items():
+                values = np.asarray(own.get(name, ()))
+                if values.shape != part[person].shape:
+                    return False
+                part[person] = values
+        self.model = model_of(self.total, self.layout, self.prior)
+        return True
