@@ -14,13 +14,17 @@ from tests.test_docs_tables import is_default
 
 import fleet2d
 from fleet2d import History, Plan, Present, Situation
+from fleet2d.bounds import BOUNDS
 from fleet2d.errors import InputError
 from fleet2d.floorplan.home.costmap import CostmapSettings
 from fleet2d.floorplan.home.layers import LayerSettings
+from fleet2d.interventions.intervention import verbs
 from fleet2d.kernels.headings import TURN
 from fleet2d.kernels.mesh import SUB
 from fleet2d.routines.manners import Manners
 from fleet2d.routines.persona import bundled_names
+from fleet2d.studies.specification import StudyFile
+from fleet2d.testing.rate import rate_test
 from fleet2d.units import AngleDeg, Duration, Length, Share, Speed, TurnRateDeg
 
 ROOT = Path(__file__).parent.parent
@@ -225,3 +229,62 @@ def test_people_of_different_households_ignore_each_other() -> None:
         for users in (alone, both)
     ]
     assert ways[0]["x"].tolist() == ways[1]["x"].tolist()
+
+
+# Interventions, tests, studies, security
+
+
+def test_messages_of_the_page_of_interventions_are_those_of_the_program(fleet2d: Cli) -> None:
+    """Each wrong value is put into the page's own file; a message ends where the page has …"""
+    text = page("interventions")
+    scenario = re.search(r"```yaml title=evening.yaml\n(.*?)```", text, re.DOTALL)
+    assert scenario is not None
+    wrong = [
+        [("guest: gina,", "guest: gna,")],
+        [("{type: find}, ", "")],
+        [("[found, astro]", "[docks, astro]"), ("{type: dock}, ", "")],
+        [('at: "20:00"', "at: 2 d")],
+    ]
+    said = re.findall(r"^error: evening.yaml.*$", text, re.MULTILINE)
+    for line, changes in zip(said, wrong, strict=True):
+        content = scenario[1]
+        for old, new in changes:
+            assert old in content
+            content = content.replace(old, new)
+        Path("evening.yaml").write_text(content, encoding="utf-8")
+        _, _, message = fleet2d("validate", "evening.yaml")
+        assert message.startswith(line.removesuffix(" …"))
+
+
+def test_interventions_of_the_page_exist() -> None:
+    text = page("interventions")
+    part = text[text.index("## Kinds of interventions") : text.index("Lights are a curve")]
+    cells = [line.split("|")[1] for line in part.splitlines() if line.startswith("| `")]
+    listed = {name for cell in cells for name in re.findall(r"`([a-z_]+)(?::|`)", cell)}
+    arguments = {"find", "dock", "behavior", "rooms", "values"}
+    assert set() == listed - set(verbs()) - arguments
+    assert set(verbs()) - listed == {"change", "decide", "drive", "switch_on"}  # by Python alone
+
+
+def test_rates_that_seeds_can_tell_apart_are_as_the_page_says() -> None:
+    text = page("product-tests")
+    said = re.search(r"30 tell 90 % from (\d+) %, 100 from (\d+) %, 300 from (\d+) %", text)
+    assert said is not None
+    for seeds, percent in zip((30, 100, 300), said.groups(), strict=True):
+        assert int(percent) == round(100 * rate_test(seeds, 0.9).alternative)
+    assert f"{100 * rate_test(100, 0.9).alternative:.1f} %" in text
+    assert f"{100 * rate_test(100, 0.95).alternative:.1f} %" in text
+
+
+def test_bounds_of_the_page_are_those_of_the_program() -> None:
+    units = {"MiB": 1 << 20, "GiB": 1 << 30}
+    said = {}
+    for cells in rows(page("security"), "| variable | bound |"):
+        number, _, unit = cells[1].replace(",", "").partition(" ")
+        said[cells[0].strip("`")] = int(number) * units.get(unit, 1)
+    assert {bound.variable: bound.most for bound in BOUNDS} == said
+
+
+def test_keys_of_a_study_are_those_of_the_page() -> None:
+    said = {n for cells in rows(page("studies"), "| key | |") for n in names(cells[0])}
+    assert set(StudyFile.model_fields) == said
