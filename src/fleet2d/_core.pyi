@@ -1448,3 +1448,19 @@ def until(start: numpy.typing.NDArray[numpy.int64], hold: numpy.typing.NDArray[n
     Returns:
         The steps at which it changes, int64 (m,), and what it is from then on, float64 (m,).
     """
+
+def earth_mover(start: numpy.typing.NDArray[numpy.float64], end: numpy.typing.NDArray[numpy.float64], metres: numpy.typing.NDArray[numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    Return the least mean distance by which each of some distributions is moved onto another one.
+
+    The minimum of the sum of f(i, j) * metres(i, j) over flows f >= 0 from place to place, found exactly
+    by successive shortest paths. Mass that both have at a place stays.
+
+    Args:
+        start: float64 (n, places).
+        end: float64 (n, places), each of the sum of that row of `start`.
+        metres: float64 (places, places), at least 0.
+
+    Returns:
+        float64 (n,).
+    """

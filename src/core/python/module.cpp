@@ -35,4 +35,5 @@ NB_MODULE(_core, m) {
     bind_smoothing(m);
     bind_timelines(m);
     bind_signals(m);
+    bind_flows(m);
 }

@@ -31,5 +31,6 @@ void bind_stays(nanobind::module_& m);
 void bind_people(nanobind::module_& m);
 void bind_smoothing(nanobind::module_& m);
 void bind_signals(nanobind::module_& m);
+void bind_flows(nanobind::module_& m);
 
 }  // namespace fleet2d

@@ -158,8 +158,7 @@ class LtpError(LongTermMetric):
             return self._distances(truth, np.array([presence.with_away(user) for user in users]))
         estimate = np.array([presence.share(user) for user in users])
         columns = self._distances(home, estimate)
-        moved = [earth_mover(*both, self.metres) for both in zip(home, estimate, strict=True)]
-        columns["earth_mover_m"] = np.array(moved)
+        columns["earth_mover_m"] = earth_mover(home, estimate, self.metres)
         if presence.low() is not None and presence.high() is not None:
             low = np.array([presence.low(user) for user in users])
             high = np.array([presence.high(user) for user in users])
