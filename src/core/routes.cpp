@@ -193,7 +193,9 @@ std::shared_ptr<const Array<i64, 2>> KnownRoutes::find(const Mesh& mesh, const R
         const auto known = routes_.find(ends);
         if (known != routes_.end()) return known->second;
     }
+    if (!strictly_inside(mesh, start.x, start.y) || !strictly_inside(mesh, goal.x, goal.y)) return {};
     auto route = std::make_shared<const Array<i64, 2>>(find_route(mesh, graph, start, goal));
+    if (route->size() == 0) return {};
     const std::lock_guard lock(mutex_);
     if (routes_.size() >= MOST) routes_.clear();
     routes_.emplace(ends, route);

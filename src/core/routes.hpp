@@ -47,11 +47,11 @@ Array<i64, 2> find_route(const Mesh& mesh, const RouteGraph& graph, Point start,
 // The routes that were found last: bodies go the same ways day after day. Threads may share it.
 class KnownRoutes {
 public:
-    // As `find_route`.
+    // As `find_route`; null where there is none, or an end isn't strictly inside.
     std::shared_ptr<const Array<i64, 2>> find(const Mesh& mesh, const RouteGraph& graph, Point start, Point goal);
 
 private:
-    static constexpr std::size_t MOST = 1 << 16;  // of about 200 bytes each; then it begins anew
+    static constexpr std::size_t MOST = 1 << 17;  // of about 200 bytes each; then it begins anew
     struct Ends {
         Point start, goal;
         bool operator==(const Ends&) const = default;

@@ -978,10 +978,12 @@ class Routes:
 
     def find(self, ax: int, ay: int, bx: int, by: int) -> numpy.typing.NDArray[numpy.int64] | None:
         """
-        Return the shortest path from (ax, ay) to (bx, by), int64 (n, 2); None where there is none.
+        Return the shortest path from (ax, ay) to (bx, by), int64 (n, 2).
 
-        Both ends are strictly inside the space: a goal on its border is not seen by the last corner. Ties go
-        to the corner that is lower by (x, y), so the path depends on the walls only.
+        Ties go to the corner that is lower by (x, y), so the path depends on the walls only.
+
+        Returns:
+            None where there is no way, or an end isn't strictly inside the space.
         """
 
     @property

@@ -4,7 +4,6 @@
 
 #include <bit>
 
-#include "../sight.hpp"
 #include "arrays.hpp"
 #include "motion.hpp"
 #include "random.hpp"
@@ -117,12 +116,11 @@ Returns:
                f64 turn_rate) -> std::optional<Row> {
                 const Moment now = checked(time, x, y, heading, 0);
                 check_rates(speed, turn_rate);
-                if (!strictly_inside(routes.mesh(), x, y) || !strictly_inside(routes.mesh(), to_x, to_y)) return {};
                 const auto route = [&] {
                     const nb::gil_scoped_release unlocked;
                     return routes.find({x, y}, {to_x, to_y});
                 }();
-                if (route->size() == 0) return {};
+                if (route == nullptr) return {};
                 return plain(self.walk(now, *route, speed, turn_rate));
             },
             "time"_a, "x"_a, "y"_a, "heading"_a, "routes"_a, "to_x"_a, "to_y"_a, "speed"_a, "turn_rate"_a,

@@ -40,7 +40,7 @@ auto state_of(nb::handle_t<Routes> self) {
 
 std::optional<Array<i64, 2>> find(Routes& self, i64 ax, i64 ay, i64 bx, i64 by) {
     const auto points = self.find({ax, ay}, {bx, by});
-    if (points->size() == 0) return std::nullopt;
+    if (points == nullptr) return std::nullopt;
     return Array<i64, 2>::copy_of(*points);
 }
 
@@ -64,10 +64,12 @@ Raises:
     ValueError: The corners have another shape, or are none of the mesh.)")
         .def(nb::init<nb::handle_t<OwnedMesh>, const Corners&>(), "mesh"_a, "corners"_a)
         .def("find", &find, "ax"_a, "ay"_a, "bx"_a, "by"_a, Unlocked(),
-             R"(Return the shortest path from (ax, ay) to (bx, by), int64 (n, 2); None where there is none.
+             R"(Return the shortest path from (ax, ay) to (bx, by), int64 (n, 2).
 
-Both ends are strictly inside the space: a goal on its border is not seen by the last corner. Ties go
-to the corner that is lower by (x, y), so the path depends on the walls only.)")
+Ties go to the corner that is lower by (x, y), so the path depends on the walls only.
+
+Returns:
+    None where there is no way, or an end isn't strictly inside the space.)")
         .def_prop_ro("leg_start", read_only<&RouteGraph::leg_start>(),
                      nb::sig("def leg_start(self) -> numpy.typing.NDArray[numpy.int32]"),
                      "int32 (corners + 1,), where the legs from each corner begin in `leg_end`.")

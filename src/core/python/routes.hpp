@@ -14,13 +14,12 @@ public:
     // Raises ValueError: the corners aren't what `Corners` says.
     Routes(nb::handle_t<OwnedMesh> mesh, const Corners& corners);
 
-    // The shortest path, (points, 2); empty where there is none. Both ends are strictly inside the space.
+    // The shortest path, (points, 2); null where there is none, or an end isn't strictly inside the space.
     std::shared_ptr<const Array<i64, 2>> find(Point start, Point goal) {
         return known_.find(mesh_, graph_, start, goal);
     }
 
     nb::object owner() const { return owner_; }
-    const Mesh& mesh() const { return mesh_; }
     const RouteGraph& graph() const { return graph_; }
 
 private:

@@ -1,8 +1,10 @@
 """Inhabitants: the base of behaviors that do one activity after another in the home."""
 
+from bisect import bisect_right
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from datetime import datetime, timedelta
+from operator import attrgetter
 from typing import TYPE_CHECKING
 
 from fleet2d.entities.behavior import Behavior, Situation
@@ -29,6 +31,7 @@ if TYPE_CHECKING:
 DOINGS_A_DAY = 1024
 # Added to the address for the part of a doing after midnight.
 AFTER_MIDNIGHT = DOINGS_A_DAY // 2
+END = attrgetter("end")
 # Within this time before the end of a doing, no small move begins.
 NEARLY_OVER_US = 90 * SECOND_US
 # How far ahead people plan who may be interrupted by robots at any time.
@@ -136,16 +139,14 @@ class Inhabitant(Behavior):
         """
         plan, clock = now.plan(), now.actor.clock
         midnight_us = clock.elapsed(datetime.fromordinal(now.time.toordinal() + 1))
-        far_us = plan.time_us + AHEAD_US if now.actor.attention else midnight_us
-        for ordinal, i, doing in self._doings(now.time):
-            day_us = clock.elapsed(datetime.fromordinal(ordinal))
-            begin_us = day_us + doing.begin * SECOND_US
-            if plan.time_us >= min(far_us, midnight_us) or begin_us >= midnight_us:
+        last_us = min(plan.time_us + AHEAD_US, midnight_us) if now.actor.attention else midnight_us
+        for which, day_us, doing in self._doings(now.time):
+            if plan.time_us >= last_us or day_us + doing.begin * SECOND_US >= midnight_us:
                 break
             end_us = min(day_us + doing.end * SECOND_US, midnight_us)
             if plan.time_us >= end_us:  # the way to the last doing took longer than this one lasts
                 continue
-            if not self._do(plan, doing, (ordinal, i), end_us):
+            if not self._do(plan, doing, which, end_us):
                 break
         self.last.step = clock.step_at_or_after(plan.time_us)
         return plan
@@ -161,19 +162,23 @@ class Inhabitant(Behavior):
 
     def give_up(self, now: Situation) -> None:
         """Rest for the remaining time of the present doing, from the next plan on."""
-        for ordinal, i, doing in self._doings(now.time):
-            day_us = now.actor.clock.elapsed(datetime.fromordinal(ordinal))
-            if day_us + doing.end * SECOND_US > now.step * now.actor.clock.step_us:
-                self.last.given_up = (ordinal, i)
-                return
+        self.last.given_up = next(self._doings(now.time))[0]
 
-    def _doings(self, time: datetime) -> Iterator[tuple[int, int, Doing]]:
-        """Yield the doings from a time on: the day's ordinal, the number in it, the doing."""
-        ordinal = time.toordinal()
+    def _doings(self, time: datetime) -> Iterator[tuple[tuple[int, int], int, Doing]]:
+        """Yield the doings that are not over at a time.
+
+        Yields:
+            The day's ordinal and the number in it, the midnight of that day [us since the start],
+            and the doing.
+        """
+        ordinal, now_us = time.toordinal(), self.clock.elapsed(time)
         if time < datetime.fromordinal(ordinal) + timedelta(seconds=self.day(ordinal)[0].begin):
             ordinal -= 1
         while True:
-            yield from ((ordinal, i, doing) for i, doing in enumerate(self.day(ordinal)))
+            day, day_us = self.day(ordinal), self.clock.elapsed(datetime.fromordinal(ordinal))
+            first = bisect_right(day, (now_us - day_us) // SECOND_US, key=END)
+            for i in range(first, len(day)):
+                yield (ordinal, i), day_us, day[i]
             ordinal += 1
 
     def _do(self, plan: Plan, doing: Doing, which: tuple[int, int], end_us: int) -> bool:
@@ -239,23 +244,25 @@ class Inhabitant(Behavior):
 
     def _within(self, setting: Setting, room: "Room") -> Setting:
         """Return the setting of an activity, in one room only."""
-        activity = setting.activity
-        seats = self.spots.at_furniture(activity.objects, [room], activity.posture)
-        return setting._replace(rooms=[room], seats=seats)
+        return setting._replace(rooms=[room], seats=self._seats(setting.activity, room))
+
+    def _seats(self, activity: Activity, room: "Room") -> list[Seat]:
+        """Return its places for an activity at the furniture in a room."""
+        return self.spots.at_furniture(activity.objects, (room,), activity.posture)
 
     def _go(self, plan: Plan, setting: Setting, draws: Draws) -> Spot | Seat:
         """Go to where the activity is done: a place at its furniture, else a spot in its room."""
-        choose = setting.activity.choose
+        choose, rooms, seats = setting.activity.choose, setting.rooms, setting.seats
         if choose == "here":
             return self._stay_in_the_room(plan, setting, draws)
-        if choose == "nearest" and len(setting.rooms) > 1:
-            setting = self._within(setting, self.spots.nearest(setting.rooms, plan.x, plan.y))
-        room = draws.choice(setting.rooms)
+        if choose == "nearest" and len(rooms) > 1:
+            rooms = [self.spots.nearest(rooms, plan.x, plan.y)]
+            seats = self._seats(setting.activity, rooms[0])
+        room = draws.choice(rooms)
         if choose == "each_time":
-            setting = self._within(setting, room)
-        place: Spot | Seat = (
-            draws.choice(setting.seats) if setting.seats else draws.choice(self.spots.in_room(room))
-        )
+            seats = self._seats(setting.activity, room)
+        places: Sequence[Spot | Seat] = seats or self.spots.in_room(room)
+        place = draws.choice(places)
         settle_at(plan, setting, place)
         return place
 
@@ -263,7 +270,7 @@ class Inhabitant(Behavior):
         """Use the furniture of the room that the body is in, or else stay on the spot."""
         plan.come_home()
         room = self.spots.room_at(plan.x, plan.y)
-        seats = [] if room is None else self._within(setting, room).seats
+        seats = [] if room is None else self._seats(setting.activity, room)
         place = draws.choice(seats) if seats else Spot(plan.x, plan.y)
         settle_at(plan, setting, place)
         return place
@@ -282,14 +289,15 @@ class Inhabitant(Behavior):
         facing = plan.heading
         end_us -= NEARLY_OVER_US
         while True:
-            k = min(range(len(next_us)), key=next_us.__getitem__)
-            if next_us[k] >= end_us:
+            due_us = min(next_us)
+            if due_us >= end_us:
                 return place
+            k = next_us.index(due_us)
             if moves[k].kind == "shifts":  # the first of the moves, also of those due at once
                 until_us = min([end_us, *(other_us + 1 for other_us in next_us[1:])])
-                next_us[0] = turn_aside(plan, moves[0], bits, facing, next_us[0], until_us)
+                next_us[0] = turn_aside(plan, moves[0], bits, facing, due_us, until_us)
                 continue
-            plan.stay_until(next_us[k])
+            plan.stay_until(due_us)
             if moves[k].kind == "moves":
                 place = self._go_elsewhere(plan, setting, place, draws)
             else:
