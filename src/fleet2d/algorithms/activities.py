@@ -40,6 +40,9 @@ class ActivitySense:
 class Activities:
     """The activities of each user over time, and how the cameras of each robot perceive them.
 
+    Attributes:
+        are_perceived: Whether any camera perceives activities.
+
     Example:
         >>> sense = ActivitySense(0, np.array([7], np.uint64), {"cook": {"bake": 1.0}})
         >>> activities = Activities(1, {(0, 0): sense})
@@ -53,6 +56,7 @@ class Activities:
     def __init__(self, users: int, senses: Mapping[tuple[int, int], ActivitySense]) -> None:
         """Begin without activities; `senses` are by index of the robot and of its camera."""
         self._senses = dict(senses)
+        self.are_perceived = any(sense.confusion is not None for sense in senses.values())
         self._codes: dict[str | None, int] = {None: NOTHING}
         self._begun: list[tuple[list[int], list[int]]] = [([], [NOTHING]) for _ in range(users)]
 
@@ -61,14 +65,12 @@ class Activities:
         """Number of users."""
         return len(self._begun)
 
-    @property
-    def are_perceived(self) -> bool:
-        """Whether any camera perceives activities."""
-        return any(sense.confusion is not None for sense in self._senses.values())
-
     def begin(self, user: int, step: int, activity: str) -> None:
         """Record the activity of a user from a step on; steps must not decrease."""
         steps, codes = self._begun[user]
+        if not self.are_perceived:  # then only the present one is asked for
+            steps.clear()
+            codes.clear()
         steps.append(step)
         codes.append(self._code(activity))
 

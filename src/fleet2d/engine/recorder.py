@@ -24,6 +24,7 @@ from fleet2d.events import HOME, Event, EventKind
 
 # Events whose detail is a user, who has a column of their own.
 OF_USERS = frozenset({EventKind.USER_LOST, EventKind.USER_SEEN})
+ACTIVITY = EventKind.ACTIVITY.value
 # Rows that are collected before they are stored.
 MOST_ROWS = 1 << 15
 
@@ -88,9 +89,9 @@ class Recorder:
         """Collect events."""
         if "events" in self._tables:
             self._events += events
-        for event in events:
-            if event.event == EventKind.ACTIVITY and event.entity in self._users:
-                self.activities.begin(self._users[event.entity], event.step, event.detail)
+        for step, entity, event, detail in events:
+            if event == ACTIVITY and entity in self._users:
+                self.activities.begin(self._users[entity], step, detail)
 
     def take(
         self, first: int, end: int, observations: NDArray[np.int64], readings: Sequence[SensorRow]
@@ -175,11 +176,15 @@ class Recorder:
     def _store_events(self) -> None:
         if not self._events:
             return
-        rows, users = self._rows, self._users
-        events = sorted(self._events, key=lambda e: (e.step, rows[e.entity], e.rank))
+        users, events = self._users, self._events
+        steps = np.array([event.step for event in events], np.int64)
+        rows = np.array([self._rows[event.entity] for event in events], np.int32)
+        ranks = np.array([event.rank for event in events], np.int8)
+        order = np.lexsort((ranks, rows, steps))
+        events = [events[i] for i in order.tolist()]
         self._events = []
         is_of_user = [event.event in OF_USERS for event in events]
-        columns: dict[str, Any] = self._times(np.array([event.step for event in events], np.int64))
+        columns: dict[str, Any] = self._times(steps[order])
         if users:
             user = [
                 users.get(event.detail, -1) if is_user else -1
@@ -189,7 +194,7 @@ class Recorder:
         self.store.append(
             "events",
             **columns,
-            entity=np.array([rows[event.entity] for event in events], np.int32),
+            entity=rows[order],
             event=[str(event.event) for event in events],
             detail=[
                 "" if is_user else event.detail

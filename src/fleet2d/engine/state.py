@@ -150,15 +150,16 @@ class State:
         """Emit the notes of a body's plan up to a step as events."""
         actor = self.actors[row]
         notes, begin = actor.plan.notes, self.notes_emitted[row]
-        moment, end = step * actor.clock.step_us, begin
-        while end < len(notes) and notes[end].time_us <= moment:
-            end += 1
-        if end > begin:
-            self.notes_emitted[row] = end
-            step_of = actor.clock.step_at_or_after
-            self.events.emit(
-                [Event(step_of(n.time_us), actor.name, n.event, n.detail) for n in notes[begin:end]]
-            )
+        if begin == len(notes):
+            return
+        step_us, name = actor.clock.step_us, actor.name
+        events = []
+        for time_us, event, detail in notes[begin:]:
+            if time_us > step * step_us:
+                break
+            events.append(Event(-(-time_us // step_us), name, event, detail))
+        self.notes_emitted[row] = begin + len(events)
+        self.events.emit(events)
 
     def next_note(self, step: int, kinds: Set[str]) -> int | None:
         """Return the next step from `step` on at which a plan has an event of these kinds."""

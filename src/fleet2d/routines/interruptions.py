@@ -277,8 +277,8 @@ class _InterruptedDay:
         needs = self.rules.needs
         is_uninterruptible = self.doing.activity in self.rules.uninterruptible
         while needs:
-            i = min(range(len(needs)), key=self.due.__getitem__)
-            at = max(self.due[i], self.now)
+            first = min(self.due)
+            i, at = self.due.index(first), max(first, self.now)
             if at >= self.end:
                 return
             waits = is_uninterruptible or (

@@ -40,6 +40,8 @@ class Law(NamedTuple):
         knots: Quantiles at evenly spaced probabilities, ascending [s].
         shortest: The least value that is drawn [s].
         longest: The largest value that is drawn [s].
+        first: The position of `shortest` among the knots.
+        last: The position of `longest` among them.
 
     Example:
         >>> from fleet2d.streams import Draws, stream_key
@@ -52,17 +54,25 @@ class Law(NamedTuple):
     knots: tuple[int, ...]
     shortest: int
     longest: int
+    first: int
+    last: int
 
     def draw(self, draws: Draws, low: int | None = None, high: int | None = None) -> int:
         """Draw a value from the law, conditional on being from `low` to `high` [s].
 
         If the law has no values between them, the result is the bound nearer to the law.
         """
-        low = self.shortest if low is None or low < self.shortest else low
-        high = self.longest if high is None or high > self.longest else high
+        first, last = self.first, self.last
+        if low is None or low <= self.shortest:
+            low = self.shortest
+        else:
+            first = position(self.knots, low)
+        if high is None or high >= self.longest:
+            high = self.longest
+        else:
+            last = position(self.knots, high)
         if low >= high:
             return min(low, high) if high < self.shortest else low
-        first, last = position(self.knots, low), position(self.knots, high)
         if first >= last:
             return low if low >= self.knots[-1] else high
         at = first + draws.below(last - first)
@@ -77,9 +87,7 @@ class Law(NamedTuple):
         >>> uniform(0, 80).quantiles(4)
         [10, 30, 50, 70]
         """
-        first = position(self.knots, self.shortest)
-        wide = position(self.knots, self.longest) - first
-        last = len(self.knots) - 1
+        first, wide, last = self.first, self.last - self.first, len(self.knots) - 1
         values = []
         for k in range(count):
             i, part = divmod(first + wide * (2 * k + 1) // (2 * count), _ONE)
@@ -95,7 +103,7 @@ class Law(NamedTuple):
 
     def within(self, shortest: int | None, longest: int | None) -> "Law":
         """Return the law cut to bounds [s]."""
-        return Law(
+        return _bounded(
             self.knots,
             self.shortest if shortest is None else shortest,
             self.longest if longest is None else longest,
@@ -112,13 +120,18 @@ def position(knots: Sequence[int], value: int) -> int:
     return (i << _BITS) + ((value - knots[i]) << _BITS) // (knots[i + 1] - knots[i])
 
 
+def _bounded(knots: tuple[int, ...], shortest: int, longest: int) -> Law:
+    """Return the law of knots between two bounds."""
+    return Law(knots, shortest, longest, position(knots, shortest), position(knots, longest))
+
+
 def _law(quantile: Callable[[float], float]) -> Law:
     """Return the law whose quantiles are a function of those of the standard normal law."""
     knots: list[int] = []
     for z in NORMAL:
         value = int(quantile(z) + 0.5)
         knots.append(max(value, knots[-1] if knots else 0))
-    return Law(tuple(knots), knots[0], knots[-1])
+    return _bounded(tuple(knots), knots[0], knots[-1])
 
 
 @lru_cache(None)
@@ -152,17 +165,17 @@ def normal(mean_s: float, std_s: float) -> Law:
 def exponential(mean_s: float) -> Law:
     """Return the exponential law of a mean [s]: the time to the next event of a Poisson process."""
     knots = [int(-mean_s * log((KNOTS - i - 0.5) / KNOTS) + 0.5) for i in range(KNOTS)]
-    return Law(tuple(knots), knots[0], knots[-1])
+    return _bounded(tuple(knots), knots[0], knots[-1])
 
 
 def uniform(low_s: int, high_s: int) -> Law:
     """Return the uniform law of whole seconds from `low_s` to `high_s`."""
-    return Law((low_s, high_s), low_s, high_s)
+    return _bounded((low_s, high_s), low_s, high_s)
 
 
 def empirical(quantiles: Sequence[int]) -> Law:
     """Return the law of measured quantiles at evenly spaced probabilities from 0 to 1 [s]."""
-    return Law(tuple(quantiles), quantiles[0], quantiles[-1])
+    return _bounded(tuple(quantiles), quantiles[0], quantiles[-1])
 
 
 def draw_weighted(draws: Draws, weights: Sequence[int]) -> int:
