@@ -6,7 +6,8 @@ All that a run writes goes through these functions, so that tests can make each 
 from __future__ import annotations
 
 import os
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 PARTIAL = ".partial"
@@ -62,16 +63,27 @@ def write_atomically(path: Path, content: bytes | memoryview) -> None:
         >>> file.read_text(), [path.name for path in file.parent.iterdir()]
         ('{}', ['plan.json'])
     """
+    with replacing(path) as handle:
+        write_all(handle, content)
+
+
+@contextmanager
+def replacing(path: Path) -> Iterator[int]:
+    """Yield the handle of a new file, which replaces a file atomically in the end.
+
+    Raises:
+        OSError: It can't be written; the old content is unchanged.
+    """
     partial = path.with_name(f"{path.name}{PARTIAL}")
     try:
         handle = os.open(partial, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o666)
         try:
-            write_all(handle, content)
+            yield handle
             sync(handle)
         finally:
             os.close(handle)
         replace(path, partial)
-    except OSError:
+    except Exception:
         with suppress(OSError):
             partial.unlink(missing_ok=True)
         raise

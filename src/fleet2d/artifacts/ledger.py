@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
 
-from fleet2d.artifacts.files import PARTIAL, sync_directory, write_atomically
+from fleet2d.artifacts.files import PARTIAL, replacing, sync_directory
 from fleet2d.artifacts.journal import (
     FOLDER,
     JOURNAL_NAME,
@@ -103,13 +103,17 @@ class Ledger:
             self._synced = now
         return commit
 
-    def keep_checkpoint(self, content: bytes | memoryview) -> None:
+    def keep_checkpoint(self, write: Callable[[int], None]) -> None:
         """Replace the checkpoint atomically; the rows that it refers to must be synced before.
+
+        Args:
+            write: Writes the checkpoint to the handle of an open file.
 
         Raises:
             OSError: It can't be written; the checkpoint before it is unchanged.
         """
-        write_atomically(self.checkpoint, content)
+        with replacing(self.checkpoint) as handle:
+            write(handle)
         sync_directory(self.folder)
 
     def end(self, *, keep: bool = False, undo: bool = False) -> None:

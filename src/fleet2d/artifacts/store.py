@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -151,14 +151,14 @@ class RunStore:
         with self._writing(name):
             write_atomically(self._root / name, content.encode())
 
-    def keep_checkpoint(self, content: bytes | memoryview) -> None:
-        """Replace the checkpoint of the run.
+    def keep_checkpoint(self, write: Callable[[int], None]) -> None:
+        """Replace the checkpoint of the run; see `Ledger.keep_checkpoint`.
 
         Raises:
             ArtifactError: It can't be written; the run is marked as failed.
         """
         with self._writing("the checkpoint"):
-            self._ledger_of().keep_checkpoint(content)
+            self._ledger_of().keep_checkpoint(write)
 
     def commit(self, step: int, *, sync: bool = False) -> Commit | None:
         """Write all rows so far to the journal, so that they survive a crash of the process.

@@ -5,6 +5,7 @@ process or worse. These functions check them.
 """
 
 import copyreg
+import pickle
 from collections.abc import Sequence
 from typing import Any, Literal
 
@@ -15,6 +16,8 @@ from fleet2d.errors import ArtifactError
 
 # Booleans, numbers, times and text of a fixed length.
 _PLAIN = frozenset("biufcmMSU")
+# Arrays of fewer bytes are copied when they are written.
+_SMALL_BYTES = 4096
 
 
 def plain_type(text: str) -> np.dtype[Any]:
@@ -64,8 +67,16 @@ def _reduce_array(array: NDArray[Any]) -> tuple[Any, ...]:
     order: Literal["C", "F"] = (
         "F" if array.flags.f_contiguous and not array.flags.c_contiguous else "C"
     )
-    content = array.tobytes(order)
-    return plain_array, (text, array.shape, content, order, array.flags.writeable)
+    return plain_array, (text, array.shape, _content(array, order), order, array.flags.writeable)
+
+
+def _content(array: NDArray[Any], order: Literal["C", "F"]) -> bytes | pickle.PickleBuffer:
+    """Return the bytes of an array; those of a large one are not copied."""
+    if array.nbytes < _SMALL_BYTES or not (array.flags.c_contiguous or array.flags.f_contiguous):
+        return array.tobytes(order)
+    view = array.ravel(order).view(np.uint8)
+    view.setflags(write=False)  # else it would be stored as a bytearray
+    return pickle.PickleBuffer(view.data)
 
 
 def _reduce_scalar(value: Any) -> tuple[Any, ...]:

@@ -1,19 +1,26 @@
 """Commits of the rows of a run, and checkpoints of its state, while it is running."""
 
-import io
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from datetime import timedelta
+from functools import partial
 from pathlib import Path
 from typing import Any, BinaryIO, Self
 
+from fleet2d.artifacts import files
 from fleet2d.artifacts.journal import Commit
 from fleet2d.artifacts.manifest import Manifest
 from fleet2d.artifacts.settings import ArtifactSettings
 from fleet2d.artifacts.store import RunStore
 from fleet2d.clock import Clock
-from fleet2d.engine.snapshot import Constants, open_snapshot, read_state, write_snapshot
+from fleet2d.engine.snapshot import (
+    Constants,
+    UnstorableStateError,
+    open_snapshot,
+    read_state,
+    write_snapshot,
+)
 from fleet2d.engine.state import State
 from fleet2d.errors import ArtifactError, RunDirectoryError
 from fleet2d.units import micros
@@ -166,16 +173,18 @@ class CheckpointWriter:
         began = time.perf_counter()
         if self.is_able:
             constants, header = self._describe()
-            content = io.BytesIO()
+            header = {**header, "commit": commit}
+
+            def write(handle: int) -> None:
+                write_snapshot(partial(files.write_all, handle), state, constants, header)
+
             try:
-                write_snapshot(content, state, constants, {**header, "commit": commit})
-            except ArtifactError as error:
+                self._store.keep_checkpoint(write)
+            except UnstorableStateError as error:
                 self.is_able = False
                 self._store.manifest.notes.append(
                     f"no checkpoint from step {state.bodies.step} on: {error}"
                 )
-            else:
-                self._store.keep_checkpoint(content.getbuffer())
         state.recorder.wall_s += time.perf_counter() - began
         now = time.process_time()
         self._next_checkpoint = (

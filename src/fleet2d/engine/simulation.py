@@ -25,7 +25,7 @@ from fleet2d.engine.lifecycle import (
 from fleet2d.engine.pace import Pace
 from fleet2d.engine.phases import PHASES, Span
 from fleet2d.engine.setup import set_up
-from fleet2d.engine.snapshot import Constants, copy_state, open_snapshot, read_state, write_snapshot
+from fleet2d.engine.snapshot import Constants, copy_state, open_snapshot, read_state, save_snapshot
 from fleet2d.engine.state import State
 from fleet2d.errors import ArtifactError, InputError
 from fleet2d.garbage import rare_collections
@@ -200,7 +200,7 @@ class Simulation(Judging):
                 " continue by `fleet2d resume`"
             )
         self._check_not_over()
-        write_snapshot(path, self._state, self._constants, self._header())
+        save_snapshot(path, self._state, self._constants, self._header())
 
     @classmethod
     def load(cls, path: str | Path | BinaryIO) -> Self:

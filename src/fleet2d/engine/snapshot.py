@@ -9,7 +9,8 @@ import hashlib
 import io
 import json
 import pickle
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
+from contextlib import suppress
 from pathlib import Path
 from types import BuiltinFunctionType, FunctionType
 from typing import Any, BinaryIO
@@ -101,8 +102,15 @@ _NO_STATE = (
 _REFERENCES = (type, FunctionType, BuiltinFunctionType)
 
 MAGIC = b"fleet2d simulation"
+_DIGEST_BYTES = 64  # at the end of the file: SHA-256 of all before, in hexadecimal digits
+# Size of the parts of a file [bytes]: as few as possible, and little memory.
+_PART_BYTES = 1 << 22
 
 Constants = Mapping[str, object]
+
+
+class UnstorableStateError(ArtifactError):
+    """A component of the user holds something that can't be written to a file."""
 
 
 def copy_state(state: State, constants: Constants) -> State:
@@ -112,21 +120,6 @@ def copy_state(state: State, constants: Constants) -> State:
     _StateWriter(buffer, constants, shared).dump(state)
     buffer.seek(0)
     return _StateReader(buffer, constants, shared).state()
-
-
-def write_state(state: State, constants: Constants, file: BinaryIO) -> None:
-    """Write a state to a file.
-
-    Raises:
-        ArtifactError: A component of the user holds something that can't be written, such as an
-            open file.
-    """
-    try:
-        _StateWriter(file, constants, None).dump(state)
-    except ArtifactError:
-        raise
-    except Exception as error:  # a component's own pickling may raise anything
-        raise ArtifactError(f"the state of the run can't be written: {error}") from error
 
 
 def read_state(file: BinaryIO, constants: Constants) -> State:
@@ -144,48 +137,106 @@ def read_state(file: BinaryIO, constants: Constants) -> State:
 
 
 def write_snapshot(
-    path: str | Path | BinaryIO, state: State, constants: Constants, header: Mapping[str, Any]
+    write: Callable[[bytes], object], state: State, constants: Constants, header: Mapping[str, Any]
 ) -> None:
     """Write a state after a header that describes the run.
+
+    Args:
+        write: Called with one part of the content after the other.
+        state: The state.
+        constants: The constants of the run by name.
+        header: Plain values.
+
+    Raises:
+        UnstorableStateError: A component of the user holds something that can't be written, such as
+            an open file.
+        OSError: `write` failed.
+    """
+    parts = _SnapshotParts(write)
+    parts.write(MAGIC + b"\n")
+    parts.write(json.dumps({"fleet2d": __version__, **plain(header)}).encode() + b"\n")
+    try:
+        _StateWriter(parts, constants, None).dump(state)
+    except ArtifactError as error:
+        raise UnstorableStateError(str(error)) from error
+    except Exception as error:  # a component's own pickling may raise anything
+        if error is parts.error:
+            raise
+        raise UnstorableStateError(f"the state of the run can't be written: {error}") from error
+    parts.finish()
+
+
+def save_snapshot(
+    path: str | Path | BinaryIO, state: State, constants: Constants, header: Mapping[str, Any]
+) -> None:
+    """Write a snapshot to a file.
 
     Raises:
         ArtifactError: The state, or the file, can't be written.
     """
-    body = io.BytesIO()
-    write_state(state, constants, body)
-    first = json.dumps({"fleet2d": __version__, **plain(header)}).encode()
-    digest = hashlib.sha256(first)
-    digest.update(body.getbuffer())
-    # In parts: a state may be large, and a copy of it for each step of this as well.
-    parts = (b"%s\n%s\n%s\n" % (MAGIC, digest.hexdigest().encode(), first), body.getbuffer())
     if not isinstance(path, str | Path):
-        path.writelines(parts)
+        write_snapshot(path.write, state, constants, header)
         return
     partial = Path(f"{path}.partial")
     try:
         with partial.open("wb") as file:
-            file.writelines(parts)
+            write_snapshot(file.write, state, constants, header)
         partial.replace(path)
     except OSError as error:
         raise ArtifactError(f"{path} can't be written: {error.strerror or error}") from error
+    finally:
+        with suppress(OSError):
+            partial.unlink()  # if it was not renamed
+
+
+class _SnapshotParts:
+    """What a pickler writes, followed by its digest, in parts: a state may be large.
+
+    Attributes:
+        error: The error of the function that writes, if it failed.
+    """
+
+    def __init__(self, write: Callable[[bytes], object]) -> None:
+        self._write, self._hash, self._buffer = write, hashlib.sha256(), bytearray()
+        self.error: OSError | None = None
+
+    def write(self, content: bytes) -> None:
+        """Add content, and write it when there is enough."""
+        self._buffer += content
+        if len(self._buffer) >= _PART_BYTES:
+            self._hash.update(self._buffer)
+            self._flush()
+
+    def finish(self) -> None:
+        """Write the rest and the digest of all."""
+        self._hash.update(self._buffer)
+        self._buffer += self._hash.hexdigest().encode()
+        self._flush()
+
+    def _flush(self) -> None:
+        content, self._buffer = bytes(self._buffer), bytearray()
+        try:
+            self._write(content)
+        except OSError as error:
+            self.error = error
+            raise
 
 
 def open_snapshot(path: str | Path | BinaryIO) -> tuple[dict[str, Any], BinaryIO]:
     """Return the header of a snapshot, and the state after it for `read_state`.
 
     Raises:
-        ArtifactError: It is not a snapshot, is damaged, or is of another version of Fleet2D.
+        ArtifactError: It is no snapshot, is damaged, or is of another version of Fleet2D.
     """
     try:
         content = Path(path).read_bytes() if isinstance(path, str | Path) else path.read()
     except OSError as error:
         raise ArtifactError(f"{path} can't be read: {error.strerror or error}") from error
-    magic, _, rest = content.partition(b"\n")
-    digest, _, rest = rest.partition(b"\n")
-    first, _, body = rest.partition(b"\n")
-    if magic != MAGIC:
+    first, _, body = content.removeprefix(MAGIC + b"\n").partition(b"\n")
+    if not content.startswith(MAGIC + b"\n"):
         raise ArtifactError(f"{path} is not a saved simulation")
-    if hashlib.sha256(first + body).hexdigest().encode() != digest:
+    view, digest = memoryview(content)[:-_DIGEST_BYTES], content[-_DIGEST_BYTES:]
+    if hashlib.sha256(view).hexdigest().encode() != digest:
         raise ArtifactError(f"{path} is damaged: its content is not what was written")
     try:
         header: dict[str, Any] = json.loads(first)
@@ -197,13 +248,15 @@ def open_snapshot(path: str | Path | BinaryIO) -> tuple[dict[str, Any], BinaryIO
             f"{path} was written by Fleet2D {header['fleet2d']}, and this is {__version__}: only"
             " the same version can load it"
         )
-    return header, io.BytesIO(body)
+    return header, io.BytesIO(memoryview(body)[:-_DIGEST_BYTES])
 
 
 class _StateWriter(pickle.Pickler):
     """Replaces constants by their names, and collects shared objects."""
 
-    def __init__(self, file: BinaryIO, constants: Constants, shared: list[object] | None) -> None:
+    def __init__(
+        self, file: "BinaryIO | _SnapshotParts", constants: Constants, shared: list[object] | None
+    ) -> None:
         super().__init__(file, pickle.HIGHEST_PROTOCOL)
         self._names = {id(value): name for name, value in constants.items()}
         self._shared = shared
