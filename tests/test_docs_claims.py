@@ -8,16 +8,19 @@ from typing import Any
 
 import pytest
 import yaml
-from pydantic import TypeAdapter
+from pydantic import TypeAdapter, ValidationError
 from tests.scenes import Cli, run, table
 from tests.test_docs_tables import is_default
 
 import fleet2d
 from fleet2d import History, Plan, Present, Situation
 from fleet2d.bounds import BOUNDS
+from fleet2d.component import lookup
 from fleet2d.errors import InputError
+from fleet2d.expectations.parse import parse_expectation
 from fleet2d.floorplan.home.costmap import CostmapSettings
 from fleet2d.floorplan.home.layers import LayerSettings
+from fleet2d.floorplan.synthetic.source import Synthetic
 from fleet2d.interventions.intervention import verbs
 from fleet2d.kernels.headings import TURN
 from fleet2d.kernels.mesh import SUB
@@ -43,7 +46,7 @@ def rows(text: str, head: str) -> Iterator[list[str]]:
 
 
 def names(cell: str) -> list[str]:
-    return re.findall(r"`([a-z_]+)", cell)
+    return re.findall(r"`([a-z_0-9]+)", cell)
 
 
 @pytest.fixture(scope="module")
@@ -305,3 +308,49 @@ def test_what_the_paper_page_says_of_the_feedback_loop_is_in_its_table() -> None
     clock = errors["hangout, 10 % rounds by the clock"]
     assert f"is as good ({clock[2]:.3f} and {clock[3]:.3f})" in text
     assert min(errors["hangout, 10 % of moves at random"]) == least
+
+
+# Homes, expectations
+
+
+def test_keys_of_floor_plans_are_those_of_the_page() -> None:
+    for cells in rows(page("floorplans"), "| type | keys |"):
+        kind, *aliases = names(cells[0])
+        model = lookup("floorplan", kind)
+        assert all(lookup("floorplan", alias) is model for alias in aliases)
+        assert set(names(cells[1])) <= set(model.model_fields), kind
+
+
+def test_the_bundled_home_is_as_large_as_the_page_says() -> None:
+    said = re.search(r"a home of (\d+) m² and (\d+) rooms", page("floorplans"))
+    assert said is not None
+    plan = fleet2d.load_floorplan()
+    assert (round(plan.area_m2), len(plan.rooms)) == (int(said[1]), int(said[2]))
+
+
+def test_synthetic_homes_have_the_ranges_of_the_page() -> None:
+    ranges = {
+        cells[0].strip("`"): cells[2]
+        for cells in rows(page("synthetic"), "| key | default | range")
+    }
+    for key, less, more in (
+        ("area_m2", 29, 451),
+        ("bedrooms", 0, 9),
+        ("bathrooms", 0, 7),
+        ("corridor_width", 0.85, 2.05),
+        ("door_width", 0.65, 1.25),
+    ):
+        low, high = (float(number) for number in re.findall(r"\d+(?:\.\d+)?", ranges[key])[:2])
+        assert less < low < high < more
+        for value in (less, more):
+            with pytest.raises(ValidationError):
+                Synthetic(**{key: value})
+
+
+def test_expectations_of_the_page_are_read() -> None:
+    text = page("expectations")
+    written = [
+        re.findall(r"`([^`]+)`", cells[1])[0] for cells in rows(text, "| to expect that | write |")
+    ]
+    assert len(written) > 10
+    assert all(parse_expectation(each) is not None for each in written)
