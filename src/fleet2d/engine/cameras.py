@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from fleet2d.algorithms.activities import ActivitySense
 from fleet2d.blame import blame
+from fleet2d.clock import midnight_of
 from fleet2d.engine.basis import Basis
 from fleet2d.engine.bodies import Bodies, poses_of
 from fleet2d.engine.disturbances import (
@@ -49,6 +50,7 @@ from fleet2d.sight.line_of_sight import LineOfSight
 from fleet2d.sight.perception import Perception
 from fleet2d.sight.tables import TableContext, error_tables, is_perfect, stack_lenses
 from fleet2d.streams import stream_key
+from fleet2d.units import micros
 
 # The name of the random stream of each draw.
 USER_STREAMS = {
@@ -182,12 +184,10 @@ class Cameras(Watcher):
             self._sense_activities(perceptions)
         count = len(self.others)
         bursts = count + MOST_GHOSTS * self.errors.has_ghosts + len(self.errors.injected)
-        midnight = clock.start.replace(hour=0, minute=0, second=0, microsecond=0)
-        since_midnight = clock.start - midnight
         self.rule = LookRule(
             patience=max(lens.patience for lens in lenses),
             step_us=clock.step_us,
-            start_us=since_midnight.seconds * 10**6 + since_midnight.microseconds,
+            start_us=micros(clock.start - midnight_of(clock.start)),
             burst=int(bursts.sum()),
             stop_lost=False,
             stop_seen=False,

@@ -27,7 +27,7 @@ from fleet2d.kernels.headings import in_radians
 from fleet2d.problems import refusal, suggest
 from fleet2d.runs.run import Run
 from fleet2d.scenario.model import Scenario
-from fleet2d.units import parse_duration
+from fleet2d.units import micros, parse_duration
 
 
 class Steering(Verbs):
@@ -191,7 +191,7 @@ class Steering(Verbs):
         if isinstance(when, datetime):
             when = when - self.clock.start
         if isinstance(when, timedelta):
-            return self.clock.step_at_or_after(when // timedelta(microseconds=1))
+            return self.clock.step_at_or_after(micros(when))
         return operator.index(when)
 
     def _run_until_event(
@@ -204,9 +204,7 @@ class Steering(Verbs):
             _check_name("entity", entity, [*self.actors, *self.scenario.objects])
         if timeout is not None:
             wait = parse_duration(timeout) if isinstance(timeout, str) else timeout
-            end = min(
-                end, self.step + self.clock.step_at_or_after(wait // timedelta(microseconds=1))
-            )
+            end = min(end, self.step + self.clock.step_at_or_after(micros(wait)))
         state.wait_for(frozenset({event}))
         try:
             while self.step < end:

@@ -6,6 +6,7 @@ from datetime import timedelta
 
 import numpy as np
 
+from fleet2d.clock import midnight_of
 from fleet2d.expectations.expectation import RunSignals
 from fleet2d.expectations.formatting import call_text
 from fleet2d.expectations.scene import Scene
@@ -187,7 +188,7 @@ class IsDuring(Condition):
     def trace(self, run: RunSignals) -> Trace:
         """Return 1 where the time is within these hours, 0 elsewhere."""
         clock, day = run.clock, timedelta(days=1)
-        midnight = clock.time(run.first).replace(hour=0, minute=0, second=0, microsecond=0) - day
+        midnight = midnight_of(clock.time(run.first)) - day
         starts, values = [run.first], [0.0]
         while midnight < clock.time(run.end):
             if midnight.weekday() in self.days:

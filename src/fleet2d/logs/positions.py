@@ -25,6 +25,7 @@ from fleet2d.bounds import (
 from fleet2d.logs.log import DAY_US, LogError, PositionLog
 from fleet2d.logs.times import parse_time
 from fleet2d.problems import did_you_mean
+from fleet2d.units import micros
 
 NAMES = {
     "time": ("time", "timestamp", "t", "datetime", "time_s"),
@@ -247,7 +248,7 @@ def _parse_texts(texts: list[str], path: Path, line: I64) -> tuple[I64, bool]:
         zones.add(moment.tzinfo is not None)
         if moment.tzinfo is not None:
             moment = moment.astimezone(UTC).replace(tzinfo=None)
-        values.append((moment - epoch) // timedelta(microseconds=1))
+        values.append(micros(moment - epoch))
     if len(zones) > 1:
         raise LogError(f"{path}: some of its times have a time zone and some have none")
     return np.array(values, np.int64), zones == {True}
@@ -281,7 +282,7 @@ def _in_zone(utc_us: I64, name: str) -> tuple[I64, NDArray[np.bool_]]:
         (epoch + timedelta(microseconds=int(q) * QUARTER_HOUR_US)).astimezone(zone)
         for q in quarters
     ]
-    offsets = [(m.utcoffset() or timedelta(0)) // timedelta(microseconds=1) for m in moments]
+    offsets = [micros(m.utcoffset() or timedelta(0)) for m in moments]
     folds = np.array([m.fold for m in moments], bool)
     return utc_us + np.array(offsets, np.int64)[inverse], folds[inverse]
 

@@ -9,8 +9,10 @@ from matplotlib.colors import to_rgb
 from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 
+from fleet2d.clock import midnight_of
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.palette import OTHER_COLOR, ROOM_COLORS, TEXT_COLOR
+from fleet2d.units import micros
 from fleet2d.view.overlay import HATCH_COLOR, QUIET_COLOR
 from fleet2d.view.traces import BodyTrace
 
@@ -39,9 +41,7 @@ def room_color(plan: FloorPlan, index: int) -> tuple[float, float, float]:
 
 def rooms_by_day(trace: BodyTrace, start: datetime, step_us: int, steps: int) -> Rooms:
     """Return the room in each minute of each day, int16 (days, BINS); -1 away, -2 not simulated."""
-    midnight = (start - start.replace(hour=0, minute=0, second=0, microsecond=0)) // timedelta(
-        microseconds=1
-    )
+    midnight = micros(start - midnight_of(start))
     days = -(-(midnight + steps * step_us) // DAY_US)
     begins = np.arange(days * BINS) * (DAY_US // BINS) - midnight
     ends = begins + DAY_US // BINS
@@ -59,8 +59,8 @@ def marks_by_day(seen: NDArray[np.int64], start: datetime, step_us: int, days: i
         step_us: The length of a step [us].
         days: The number of days.
     """
-    midnight = start.replace(hour=0, minute=0, second=0, microsecond=0)
-    begins = np.unique(seen) * step_us + (start - midnight) // timedelta(microseconds=1)
+    midnight = midnight_of(start)
+    begins = np.unique(seen) * step_us + micros(start - midnight)
     edges = np.arange(days * MARKS + 1) * (DAY_US // MARKS)
     started = np.searchsorted(begins, edges)
     # All steps that start before an edge have ended by then, except possibly the last.

@@ -8,7 +8,7 @@ from pydantic_core import PydanticCustomError
 from fleet2d.clock import Clock, midnight_of
 from fleet2d.errors import InputError
 from fleet2d.runs.run import Run
-from fleet2d.units import parse_duration
+from fleet2d.units import micros, parse_duration
 
 _DAY = re.compile(r"day (\d+)(?:[ ,]+(\d{1,2}):(\d{2})(?::(\d{2}))?)?", re.IGNORECASE)
 _STEP = re.compile(r"step (\d+)", re.IGNORECASE)
@@ -83,7 +83,7 @@ def _elapsed_us(text: str, clock: Clock) -> int | None:
             return None
         midnight = midnight_of(clock.start)
         since = timedelta(days=int(day[1]) - 1, hours=parts[0], minutes=parts[1], seconds=parts[2])
-        return clock.elapsed(midnight) + since // timedelta(microseconds=1)
+        return clock.elapsed(midnight) + micros(since)
     try:
         moment = datetime.fromisoformat(text)
     except ValueError:
@@ -93,6 +93,6 @@ def _elapsed_us(text: str, clock: Clock) -> int | None:
 
 def _duration_us(text: str) -> int | None:
     try:
-        return parse_duration(text) // timedelta(microseconds=1)
+        return micros(parse_duration(text))
     except (PydanticCustomError, ValueError):
         return None

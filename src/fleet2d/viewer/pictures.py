@@ -12,6 +12,7 @@ from matplotlib.colors import PowerNorm
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from fleet2d.clock import midnight_of
 from fleet2d.errors import InputError
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.palette import TEXT_COLOR
@@ -188,7 +189,7 @@ def _hours_per_m2(run: Run, plan: FloorPlan, names: list[str]) -> NDArray[np.flo
 def _day_around(run: Run, step: int) -> tuple[int, int]:
     """Return the first step of the day of a step, and the first step after that day."""
     clock = clock_of(run)
-    midnight = clock.time(step).replace(hour=0, minute=0, second=0, microsecond=0)
+    midnight = midnight_of(clock.time(step))
     first = clock.step_at_or_after(clock.elapsed(midnight))
     end = clock.step_at_or_after(clock.elapsed(midnight + timedelta(days=1)))
     return max(0, first), min(clock.steps, end)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from fleet2d.algorithms.evidence import Evidence, Parts, SightingCounts
 from fleet2d.algorithms.learned import array_of
 from fleet2d.algorithms.presence.belief import HOURS
+from fleet2d.clock import midnight_of
 
 F64 = NDArray[np.float64]
 I64 = NDArray[np.int64]
@@ -68,7 +69,7 @@ def in_time(evidence: Evidence, start: datetime, step_us: int) -> Bins:
         start: Local time of step 0.
         step_us: Length of a step [us].
     """
-    midnight = start.replace(hour=0, minute=0, second=0, microsecond=0)
+    midnight = midnight_of(start)
     start_us = (start - midnight).seconds * 1_000_000 + start.microsecond
     steps = evidence.begin + np.arange(len(evidence.watched), dtype=np.int64) * evidence.bin_steps
     day, time_us = np.divmod(start_us + steps * step_us, DAY_US)

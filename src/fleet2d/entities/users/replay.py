@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import BeforeValidator, Field, WithJsonSchema
 
+from fleet2d.clock import midnight_of
 from fleet2d.component import register
 from fleet2d.entities.behavior import Behavior, Situation
 from fleet2d.entities.plan import Plan
@@ -142,7 +143,7 @@ class Replay(Behavior):
     def _begin(self, log: ActivityLog | PositionLog, actor: "Actor") -> int:
         """Return the moment of the log that is step 0 [us since its first midnight]."""
         start = actor.clock.start
-        clock_us = micros(start - start.replace(hour=0, minute=0, second=0, microsecond=0))
+        clock_us = micros(start - midnight_of(start))
         day = self.day
         if isinstance(day, str):
             if log.first_day is None:

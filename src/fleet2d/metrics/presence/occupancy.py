@@ -9,10 +9,12 @@ from fleet2d.algorithms.algorithm import Present
 from fleet2d.algorithms.history import History
 from fleet2d.algorithms.observations import NOWHERE
 from fleet2d.algorithms.presence.belief import HOURS
+from fleet2d.clock import midnight_of
 from fleet2d.floorplan.cache import read_only
 from fleet2d.floorplan.home.home import Home
 from fleet2d.floorplan.home.space import Space
 from fleet2d.kernels.mesh import SUB
+from fleet2d.units import micros
 
 I64 = NDArray[np.int64]
 F64 = NDArray[np.float64]
@@ -57,9 +59,9 @@ def steps_by_hour(history: History, state: Present) -> I64:
 
 def hours_of_week(history: History, state: Present) -> I64:
     """Return the hour of the week, from Monday 00:00, of each step of a history."""
-    monday = state.start.replace(hour=0, minute=0, second=0, microsecond=0)
+    monday = midnight_of(state.start)
     monday -= timedelta(days=monday.weekday())
-    start_us = (state.start - monday) // timedelta(microseconds=1)
+    start_us = micros(state.start - monday)
     steps = np.arange(history.first, history.end, dtype=np.int64)
     return (start_us + steps * round(history.step_s * 1e6)) // HOUR_US % HOURS
 
