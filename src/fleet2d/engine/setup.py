@@ -58,14 +58,16 @@ def set_up(scenario: Scenario, clock: Clock, seed: int, store: RunStore) -> Stat
         group.awaited = learners.awaited
     sensors.awaited = EventKind.SENSOR in learners.awaited
     log = _log(basis, cameras, recorder) if learners.all else None
+    clearance, blocking = Clearance(basis.users, basis.robots), BlockedWays(basis)
+    encounters = Encounters(basis.users, basis.robots)
     state = State(
         bodies=basis.bodies,
         actors=basis.actors,
         home=basis.home,
         changes=changes,
-        clearance=Clearance(basis.users, basis.robots),
-        blocking=BlockedWays(basis),
-        encounters=Encounters(basis.users, basis.robots),
+        clearance=clearance,
+        blocking=blocking,
+        encounters=encounters,
         sensors=sensors,
         user_cameras=user_cameras,
         cameras=cameras,
@@ -77,6 +79,15 @@ def set_up(scenario: Scenario, clock: Clock, seed: int, store: RunStore) -> Stat
         events=EventStream([recorder, sensors, *([] if log is None else [log])]),
         interventions=Interventions(clock),
         max_span=scenario.simulation.max_span,
+        watchers=[
+            clearance,
+            blocking,
+            *user_cameras,
+            *cameras,
+            encounters,
+            sensors,
+            *layers.areas,
+        ],
     )
     for group in [*user_cameras, *cameras]:
         group.owner.in_view = InView(state, group)

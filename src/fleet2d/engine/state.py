@@ -89,7 +89,7 @@ class State:
     events: EventStream
     interventions: Interventions
     max_span: int | None
-    watchers: list[Watcher] = field(init=False)
+    watchers: list[Watcher]
     settled: int = 0
     pending: dict[int, list[SightEvent]] = field(default_factory=dict)
     driven: set[int] = field(default_factory=set)
@@ -99,16 +99,7 @@ class State:
     notes_emitted: list[int] = field(init=False)
 
     def __post_init__(self) -> None:
-        """List the watchers."""
-        self.watchers = [
-            self.clearance,
-            self.blocking,
-            *self.user_cameras,
-            *self.cameras,
-            self.encounters,
-            self.sensors,
-            *self.layers.areas,
-        ]
+        """Begin without notes."""
         self.notes_emitted = [0] * len(self.actors)
 
     @property

@@ -41,3 +41,8 @@ class BodySettings(Settings):
     def eyes(self) -> dict[str, Camera]:
         """Its cameras by name; none, unless a subclass has some."""
         return {}
+
+    @property
+    def interrupts(self) -> frozenset[str]:
+        """The events that a plan may name to be interrupted by; found by watchers."""
+        return frozenset(self.sight_events if self.eyes else ())

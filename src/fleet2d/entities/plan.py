@@ -15,7 +15,7 @@ from fleet2d.floorplan.home.space import straight_way
 from fleet2d.floorplan.objects import POSTURES, PlacedObject, Posture
 from fleet2d.kernels.headings import TURN
 from fleet2d.kernels.motion import Breakpoints, Legs, WalkRule
-from fleet2d.problems import did_you_mean
+from fleet2d.problems import did_you_mean, suggest
 from fleet2d.units import LONGEST_DURATION, micros
 
 if TYPE_CHECKING:
@@ -342,24 +342,20 @@ class Plan:
         return self.note("calls", user)
 
     def interrupt_on(self, *events: str) -> Self:
-        """Ask the behavior again as soon as one of these events of its cameras happens.
+        """Ask the behavior again as soon as one of these events happens.
 
-        A robot has the events user_seen and user_lost, a user with a camera robot_seen and
-        robot_lost.
+        A robot with a camera has the events user_seen and user_lost, a user with a camera
+        robot_seen and robot_lost.
 
         Raises:
-            ComponentError: There is no such event, or the body has no camera to notice it.
+            ComponentError: No such event interrupts plans of the body.
         """
         entity = self._body.entity
-        if not entity.eyes:
+        for event in sorted({*events} - {*entity.interrupts}):
+            names = suggest(event, sorted(entity.interrupts), "These do")
+            hint = "" if entity.eyes else f" ({' and '.join(entity.sight_events)} need a camera)"
             raise ComponentError(
-                f"{self._body.path}: a camera interrupts plans by what it sees, but there is none"
-            )
-        unknown = set(events) - set(entity.sight_events)
-        if unknown:
-            allowed = ", ".join(sorted(entity.sight_events))
-            raise ComponentError(
-                f"{self._body.path}: no event {sorted(unknown)[0]!r}; there are: {allowed}"
+                f"{self._body.path}: no event {event!r} interrupts its plans{names}{hint}"
             )
         self.interrupts |= frozenset(events)
         return self
