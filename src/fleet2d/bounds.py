@@ -25,8 +25,8 @@ class Bound:
     Example:
         >>> Bound("DEPTH", 64, "lists in lists").check(100, "home.yaml")
         Traceback (most recent call last):
-        fleet2d.errors.InputError: home.yaml has 100 lists in lists, and at most 64 are read; if \
-that is as it should be, set FLEET2D_MAX_DEPTH=100 in the environment
+        fleet2d.errors.InputError: home.yaml has 100 lists in lists, and at most 64 are read; to \
+read more, set FLEET2D_MAX_DEPTH=100 in the environment
     """
 
     name: str

@@ -228,7 +228,7 @@ def test_a_camera_that_its_offset_puts_into_a_wall_sees_nothing() -> None:
         ({"perception": {"detection": {"range": 3}}}, ["unknown key 'range'"]),
         (
             {"perception": {"identity": {"confusion": {"ana": {"ana": 1}}}}},
-            ["confusion.ana", "right"],
+            ["confusion.ana", "leave it out"],
         ),
         (
             {"perception": {"identity": {"confusion": {"ana": {"bem": 1}}}}},

@@ -151,7 +151,10 @@ def test_own_method_decides_who_is_in_view() -> None:
 @pytest.mark.parametrize(
     ("method", "why"),
     [
-        ("Wrong", r"sight.method failed at step 0: Wrong answered array\(\[1\]\) for 1 points"),
+        (
+            "Wrong",
+            r"sight.method failed at step 0: Wrong returned array\(\[1\]\), expected a bool array",
+        ),
         ("Broken", r"sight.method failed at step 0: KeyError: 'glass'"),
     ],
 )
@@ -295,5 +298,5 @@ def test_user_that_errs_is_refused() -> None:
         fleet2d.load_scenario(facing(perception={"detection": {"distance": 0.5}}))
     content = facing()
     content["users"]["ana"].update(behaviors=[{"type": f"{HERE}:Shy"}], camera=None)
-    with pytest.raises(Fleet2DError, match="there is none"):
+    with pytest.raises(Fleet2DError, match="need a camera"):
         run(content)

@@ -93,7 +93,7 @@ def test_an_input_that_is_gone_is_named(tmp_path: Path) -> None:
     content["floorplan"]["path"] = str(plan)
     fleet2d.run(content, out=tmp_path / "run")
     plan.unlink()
-    with pytest.raises(RunDirectoryError, match=r"flat\.json.*gone"):
+    with pytest.raises(RunDirectoryError, match=r"flat\.json.*missing"):
         fleet2d.reproduce(tmp_path / "run")
 
 
@@ -103,7 +103,7 @@ def test_a_component_that_is_gone_is_named(tmp_path: Path) -> None:
     content = scenario(algorithms={"share": {"type": f"{tmp_path.as_posix()}/mine:Share"}})
     fleet2d.run(content, out=tmp_path / "run")
     module.unlink()
-    with pytest.raises(RunDirectoryError, match=r"mine\.py.*gone"):
+    with pytest.raises(RunDirectoryError, match=r"mine\.py.*missing"):
         fleet2d.reproduce(tmp_path / "run")
 
 

@@ -51,7 +51,7 @@ def test_a_kind_that_is_there_but_out_of_reach_is_left_out_too() -> None:
     [
         (robot({"type": "hangout", "avoid": ["bathroom_7"]}), ["hangout.avoid", "bathroom_7"]),
         (robot({"type": "patrol", "rooms": ["kitchen", "kitchn_0"]}), ["patrol.rooms", "kitchn_0"]),
-        (robot({"type": "patrol", "rooms": ["garage"]}), ["patrol.rooms", "nothing is left"]),
+        (robot({"type": "patrol", "rooms": ["garage"]}), ["patrol.rooms", "has none of these"]),
         (user(type="room_sampling", shares={"garage": 1}), ["room_sampling.shares", "garage"]),
     ],
 )

@@ -55,8 +55,8 @@ def test_presence_of_an_unknown_user_is_refused_by_name() -> None:
         ({"home": np.array([[1.5, -0.5], [0.5, 0.5]])}, "'ana' is not a distribution"),
         ({"away": np.array([0.5, np.nan])}, "'anyone'.*away nan"),
         ({"away": np.array([-0.1, 0.5])}, "'ana'.*away -0.1"),
-        ({"away": np.array([0.5])}, "shapes"),
-        ({"home": np.array([[0.5, 0.5]])}, "needs 2 rows"),
+        ({"away": np.array([0.5])}, "of shape"),
+        ({"home": np.array([[0.5, 0.5]])}, "needs shares of shape"),
     ],
 )
 def test_what_is_no_distribution_is_refused(changes, words: str) -> None:

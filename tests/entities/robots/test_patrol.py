@@ -118,7 +118,7 @@ def test_a_round_that_takes_no_time_does_not_hang_the_run() -> None:
         ({"rooms": []}, ["nowhere to go"]),
         ({"rooms": "kitchen"}, ["robots.astro.rooms"]),
         ({"order": "backwards"}, ["order", "fixed", "random"]),
-        ({"dwell": "-1 min"}, ["dwell", "negative"]),
+        ({"dwell": "-1 min"}, ["dwell", "0 or more"]),
         ({"rooms": ["storage"]}, ["robots.astro", "storage", "can't be reached", "living_room_0"]),
         ({"rooms": ["kichen"]}, ["robots.astro", "kichen", "did you mean 'kitchen", "bedroom_0"]),
         ({"waypoints": [[5.05, 1.0]]}, ["robots.astro", "5.05", "wall", "nearest free point"]),

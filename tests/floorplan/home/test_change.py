@@ -25,8 +25,8 @@ def test_moment_is_a_local_time_or_the_time_since_the_start(text: str, moment: o
 @pytest.mark.parametrize(
     ("settings", "words"),
     [
-        ({}, "nothing is given"),
-        ({"open": "a", "shut": "a"}, "open and shut is given"),
+        ({}, "got nothing"),
+        ({"open": "a", "shut": "a"}, "got open and shut"),
         ({"move": "sofa_0"}, "'move' and 'to' go together"),
         ({"room": "office_0"}, "'room' and 'type' go together"),
         ({"shut": "a", "to": (1, 2)}, "'move' and 'to' go together"),
