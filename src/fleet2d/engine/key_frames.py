@@ -38,6 +38,7 @@ class KeyFrames:
         self._moved: set[int] = set()  # bodies that were put elsewhere since their last plan
         self._blocks: list[NDArray[np.int64]] = []
         self._rows = 0
+        self._end = 0  # key frames before this step are collected when they are stored
 
     @property
     def count(self) -> int:
@@ -107,10 +108,18 @@ class KeyFrames:
                 self._blocks.append(planned)
 
     def take(self, end: int) -> None:
-        """Collect the key frames of all bodies up to step `end` - 1."""
+        """Collect random walks up to step `end` - 1; `collect` the other key frames later.
+
+        The poses of a random walk are forgotten afterwards, the breakpoints of a plan are not.
+        """
         for row in range(len(self._actors)):
-            self.pass_by(row, end - 1)
             self._walk_on(row, end)
+        self._end = end
+
+    def collect(self) -> None:
+        """Collect the key frames of all bodies before the step up to which they were taken."""
+        for row in range(len(self._actors)):
+            self.pass_by(row, self._end - 1)
 
     def _walk_on(self, row: int, end: int) -> None:
         """Collect the states of a random walk up to step `end` - 1."""
@@ -124,7 +133,8 @@ class KeyFrames:
         self._walked[row] = max(first, end)
 
     def store(self) -> None:
-        """Append all collected key frames to the store."""
+        """Append all key frames so far to the store."""
+        self.collect()
         if not self._blocks:
             return
         rows = in_order(self._blocks)

@@ -118,6 +118,7 @@ class Recorder:
     def end(self, step: int, rows: int) -> None:
         """Collect the ends of the present plans, as the run ends before `step`; store all rows."""
         if "key_frames" in self._tables:
+            self._keys.collect()
             for row in range(rows):
                 # Not at the last step, whose rows may be stored already: the order would be wrong.
                 self._keys.break_off(row, step)
@@ -127,7 +128,8 @@ class Recorder:
         """Append all collected rows to the store."""
         began = time.perf_counter()
         self._samples.store()
-        self._keys.store()
+        if "key_frames" in self._tables:
+            self._keys.store()
         self._store_observations()
         self._store_events()
         self._store_readings()

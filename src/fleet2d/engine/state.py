@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence, Set
 from dataclasses import dataclass, field
-from itertools import pairwise
+from itertools import islice, pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -141,11 +141,11 @@ class State:
         """Emit the notes of a body's plan up to a step as events."""
         actor = self.actors[row]
         notes, begin = actor.plan.notes, self.notes_emitted[row]
-        if begin == len(notes):
-            return
         step_us, name = actor.clock.step_us, actor.name
+        if begin == len(notes) or notes[begin].time_us > step * step_us:
+            return
         events = []
-        for time_us, event, detail in notes[begin:]:
+        for time_us, event, detail in islice(notes, begin, None):
             if time_us > step * step_us:
                 break
             events.append(Event(-(-time_us // step_us), name, event, detail))
