@@ -700,6 +700,16 @@ def test_arrays_that_are_read_may_lie_in_memory_as_they_like(
             assert same(expected, answer(name, put(CALLS[name](), at, other))), other.flags
 
 
+def test_an_optional_array_that_has_to_be_copied_lives_as_long_as_the_call() -> None:
+    """The copy of `shown` was freed before it was read: found with numpy's cache of memory off."""
+    steps = 1_100_000  # memory of above 32 MiB is unmapped when it is freed
+    still, away = np.full((USERS + 1, steps), 300), np.ones((USERS + 1, steps), np.uint8)
+    bodies = _core.Window(0, still, still, still, away, away.astype(np.int8))
+    shown = np.ones((steps, USERS, 2), np.uint64).T
+    end, *_ = _core.look(*CALLS["look"]()[:4], bodies, 0, 1, new_memory(2, USERS, steps), shown)
+    assert end == steps
+
+
 EXTREME = [-(2**63), -(2**62), -(2**31), -2, -1, 0, 1, 2, 3, 1000, 2**31, 2**40, 2**62, 2**63 - 1]
 
 

@@ -6,6 +6,7 @@
 #pragma once
 
 #include <nanobind/nanobind.h>
+#include <nanobind/stl/optional.h>
 #include <nanobind/stl/pair.h>
 #include <nanobind/stl/tuple.h>
 
@@ -16,6 +17,7 @@
 #endif
 #include <numpy/arrayobject.h>
 
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <tuple>
@@ -212,6 +214,25 @@ struct type_caster<fleet2d::View<T, N>> {
 
     bool from_python(handle source, uint32_t, cleanup_list*) noexcept {
         return fleet2d::border::view_of(source, value, copy);
+    }
+};
+
+// nanobind's own caster of optional values would free the copy before the call.
+template <class T, std::size_t N>
+struct type_caster<std::optional<fleet2d::View<T, N>>> {
+    using V = std::optional<fleet2d::View<T, N>>;
+    using Caster = make_caster<fleet2d::View<T, N>>;
+    NB_TYPE_CASTER(V, optional_name(Caster::Name))
+    Caster caster;
+
+    bool from_python(handle source, uint32_t flags, cleanup_list* cleanup) noexcept {
+        if (source.is_none()) {
+            value.reset();
+            return true;
+        }
+        if (!caster.from_python(source, flags, cleanup)) return false;
+        value = caster.value;
+        return true;
     }
 };
 

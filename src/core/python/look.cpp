@@ -2,8 +2,6 @@
 
 #include "../occlusion.hpp"
 
-#include <nanobind/stl/optional.h>
-
 #include <algorithm>
 #include <cstddef>
 #include <cstring>
