@@ -405,6 +405,11 @@ CALLS: dict[str, Args] = {
         3,
         3,
     ),
+    "earth_mover": lambda: (
+        np.array([[0.5, 0.25, 0.25], [1.0, 0.0, 0.0]]),
+        np.array([[0.25, 0.25, 0.5], [0.0, 0.5, 0.5]]),
+        np.array([[0.0, 1.0, 2.0], [1.0, 0.0, 1.5], [2.0, 1.5, 0.0]]),
+    ),
     "resampled": lambda: (KEY, np.arange(12.0).reshape(4, 3), 5),
     "gather_views": lambda: (
         np.ones((3, 2, 2, 4), np.int64),
