@@ -153,7 +153,7 @@ class History:
             )
 
     def _check_metric(self, need: str) -> None:
-        if self.visible != frozenset(self.log.index):
+        if not self._sees_all:
             raise ComponentError(
                 f"'{need}' is ground truth: algorithms can't read it, only metrics can"
             )
@@ -176,5 +176,9 @@ class History:
             raise ComponentError(
                 f"poses of {name!r} were requested, but {reason}; available: {available}"
             )
-        is_metric = self.visible == frozenset(self.log.index)
-        return self.log.poses(name, self.first, self.end, true=is_metric)
+        return self.log.poses(name, self.first, self.end, true=self._sees_all)
+
+    @cached_property
+    def _sees_all(self) -> bool:
+        """Whether it is the history of a metric, to which all bodies are visible."""
+        return self.visible == frozenset(self.log.index)

@@ -11,7 +11,7 @@ from fleet2d.entities.furniture import seat_at
 from fleet2d.entities.motion import Motion, RandomWalk, Track
 from fleet2d.errors import ComponentError, NoWayError
 from fleet2d.events import KINDS
-from fleet2d.floorplan.home.space import straight_way
+from fleet2d.floorplan.home.space import Space, straight_way
 from fleet2d.floorplan.objects import POSTURES, PlacedObject, Posture
 from fleet2d.kernels.headings import TURN
 from fleet2d.kernels.motion import Breakpoints, Legs, WalkRule
@@ -116,26 +116,25 @@ class Plan:
         """
         self.come_home()
         self._check_goes_on()
-        self._get_up()
-        if route is None and self._go_shortest(x, y):
+        body, space = self._body, self._body.space
+        self._get_up(space)
+        if route is None and self._go_shortest(space, x, y):
             return self
-        body = self._body
         if route is None:
-            route = body.space.route((self.x, self.y), (x, y))
+            route = space.route((self.x, self.y), (x, y))
         if route is None:
             at = body.home.plan.lattice.to_metres([x, y]).round(2).tolist()
             raise NoWayError(f"{body.path}: there is no way to {at} for a body of its radius")
         self._walk(route)
         return self
 
-    def _go_shortest(self, x: int, y: int) -> bool:
+    def _go_shortest(self, space: Space, x: int, y: int) -> bool:
         """Walk to a lattice point, if a shortest route between points in the space is all it takes.
 
         Returns:
             Whether it does; `go_to_point` does the rest in more steps.
         """
-        body = self._body
-        routes = body.space.shortest
+        body, routes = self._body, space.shortest
         if routes is None:
             return False
         end = self.legs.go(
@@ -202,10 +201,10 @@ class Plan:
         times = [time for time, _ in self.postures]
         return np.array(times, np.int64), np.array(codes, np.int8)
 
-    def _get_up(self) -> None:
+    def _get_up(self, space: Space) -> None:
         """Stand up, and step off the object that the body sits or lies on."""
         self.take("stand")
-        body, space = self._body, self._body.space
+        body = self._body
         approach = body.home.approach_of((self.x, self.y))
         # Chairs round a table may leave a gap in which a body fits, but which it can't walk out of.
         if approach is None or space.part_at(self.x, self.y) == body.part:
