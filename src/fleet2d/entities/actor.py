@@ -24,7 +24,7 @@ class Actor(Body):
         behaviors: Its own copies of the behaviors of its configuration, the first one first.
         charge: The charge of its battery; None without a battery.
         command: What it was called to do, until a behavior takes it up.
-        in_view: Returns whom its cameras have in view, and where each was perceived last [m].
+        in_view: Returns the people that its cameras have in view, and the last place of each [m].
         plan: The plan that it follows.
         motion: The motion of that plan.
         planned_at: The step at which it began the plan.

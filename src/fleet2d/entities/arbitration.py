@@ -84,7 +84,7 @@ class Arbiter:
         return None
 
     def give_up(self, now: Situation) -> None:
-        """Tell the active behavior that its plan can't be continued."""
+        """Let the active behavior give up its plan, which can't be continued."""
         if self.active is not None:
             self.behaviors[self.active].give_up(now)
 
@@ -116,7 +116,7 @@ class Arbiter:
         self.wake_step = max(min(steps), now.step + 1) if steps else None
 
     def _may_decide(self, number: int, now: Situation) -> bool:
-        """Tell whether a behavior may be asked: it is on, within its hours, after its cooldown."""
+        """Return whether a behavior may be asked: it is on, in its hours, and past its cooldown."""
         behavior = self.behaviors[number]
         if number in self.off:
             return False

@@ -207,7 +207,7 @@ class Behavior(Component):
         return None
 
     def heeds(self, actor: "Actor", event: SightEvent, step: int) -> bool:
-        """Tell whether an event of its `attention` interrupts the plan."""
+        """Return whether an event of its `attention` interrupts the plan."""
         return True
 
     def furniture(self, actor: "Actor", kind: str) -> str | None:
@@ -230,7 +230,7 @@ class Behavior(Component):
         return ()
 
     def takes(self, command: Command) -> bool:
-        """Tell whether it carries out a command."""
+        """Return whether it carries out a command."""
         return command.do in self.answers
 
     def activities(self) -> tuple[str, ...]:
@@ -242,7 +242,7 @@ class Behavior(Component):
         raise NotImplementedError
 
     def busy(self) -> bool:
-        """Tell whether it is in the middle of something that hours and cooldown don't end."""
+        """Return whether it is in the middle of something that hours and cooldown don't end."""
         return False
 
     def decide(self, now: Situation) -> Plan | None:

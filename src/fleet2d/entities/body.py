@@ -313,7 +313,7 @@ class Body:
         return lattice.to_metres(point).round(4).tolist()
 
     def _has_any(self, names: RoomChoice | Point) -> bool:
-        """Tell whether the home has such furniture, or a reachable room of such a name or kind."""
+        """Return whether the home has such furniture, or a reachable room of that name or kind."""
         if furniture_of(self, names) is not None:
             return True
         return any({r.name, r.type, ANY} & set(names) for r in self.reachable_rooms())

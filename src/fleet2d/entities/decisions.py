@@ -57,7 +57,7 @@ class DecidingActor(Actor):
         self.arbiter.wake_step = None
 
     def hear(self, command: Command, step: int) -> bool:
-        """Keep a command until a behavior takes it up; tell whether one is asked at once.
+        """Keep a command until a behavior takes it up; return whether one is asked at once.
 
         A behavior that comes after the active one has to wait for its turn.
         """
@@ -70,13 +70,13 @@ class DecidingActor(Actor):
         return now
 
     def heeds(self, event: SightEvent, step: int) -> bool:
-        """Tell whether it reacts to an action of a robot."""
+        """Return whether it reacts to an action of a robot."""
         if self.order is not None:
             return False
         return self._attentive is not None and self._attentive[0].heeds(self, event, step)
 
     def goes_on(self, now: Situation) -> bool:
-        """Tell whether its plan goes on at a step at which behaviors want to be asked.
+        """Return whether its plan goes on at a step at which behaviors want to be asked.
 
         If one of them returns another plan, `decide` takes that.
         """

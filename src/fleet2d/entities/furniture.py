@@ -94,7 +94,7 @@ def stops_at(body: "Body", place: RoomChoice | Point) -> list[tuple[int, int]]:
 
 
 def _gets_to(body: "Body", thing: "PlacedObject") -> bool:
-    """Tell whether a body can get to the first place at which a piece of furniture is used."""
+    """Return whether a body can get to the first place at which a piece of furniture is used."""
     if not thing.uses:
         return False
     x, y = body.place_at(thing, 0).approach

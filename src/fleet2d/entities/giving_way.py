@@ -58,7 +58,7 @@ class Surroundings(NamedTuple):
     arrangement: tuple[int, int]
 
     def is_as(self, other: "Surroundings") -> bool:
-        """Tell whether no person and no object has moved."""
+        """Return whether no person and no object has moved."""
         same = np.array_equal(self.everybody, other.everybody)
         return same and self.arrangement == other.arrangement
 

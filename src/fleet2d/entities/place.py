@@ -86,7 +86,7 @@ Place = Annotated[
 
 
 def is_point(place: RoomChoice | Point) -> bool:
-    """Tell whether a place is a point."""
+    """Return whether a place is a point."""
     return not isinstance(place[0], str)
 
 

@@ -219,7 +219,7 @@ class Plan:
             self._walk(straight_way((self.x, self.y), (x, y)))
 
     def reaches(self, x: int, y: int) -> bool:
-        """Tell whether there is a way to a lattice point from where the plan ends so far."""
+        """Return whether there is a way to a lattice point from where the plan ends so far."""
         return self._body.space.route((self.x, self.y), (x, y)) is not None
 
     def follow(self, breakpoints: I64) -> Self:
@@ -375,7 +375,7 @@ class Plan:
         return max(clock.step_at_or_after(min(ends)), least) if ends else None
 
     def is_over(self, step: int) -> bool:
-        """Tell whether it is over at a step."""
+        """Return whether it is over at a step."""
         return self.over_at is not None and self.over_at <= step
 
     def finish(self) -> Motion:

@@ -303,7 +303,7 @@ def _clusters(done: Sequence[tuple[int, Stretch]]) -> list[list[tuple[int, Stret
 
 
 def _is_task(stretches: Sequence[Stretch], count: int, days: int) -> bool:
-    """Tell whether an activity is a task.
+    """Return whether an activity is a task.
 
     Args:
         stretches: The longest one of each day that has some.

@@ -128,7 +128,7 @@ def _by_minute(seconds: I16, states: int) -> I16:
 
 
 def is_sleep(state: ActivityPlace) -> bool:
-    """Tell whether the activity of a state is sleep, by its name."""
+    """Return whether the activity of a state is sleep, by its name."""
     return "sleep" in state.activity and not state.activity.startswith("go_to")
 
 

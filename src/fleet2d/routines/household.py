@@ -243,7 +243,7 @@ class Lives:
         return doing.activity in self._rooms[name] or find_activity(doing.activity, own).exclusive
 
     def is_out(self, name: str, doing: Doing) -> bool:
-        """Tell whether a member is out of the home for a doing."""
+        """Return whether a member is out of the home for a doing."""
         return find_activity(doing.activity, self.household.members[name].activities).away
 
     def _draw(self, ordinal: int) -> Mapping[str, Sequence[Doing]]:

@@ -212,7 +212,7 @@ class DayTemplate(Settings):
 
 
 def holds_on(dates: Dates, day: date) -> bool:
-    """Tell whether a day is one of some dates, or in one of their ranges."""
+    """Return whether a day is one of some dates, or in one of their ranges."""
     spans = (d if isinstance(d, tuple) else (d, d) for d in dates)
     return any(first <= day <= last for first, last in spans)
 

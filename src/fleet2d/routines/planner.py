@@ -256,7 +256,7 @@ def _latest(jobs: Sequence[Job], bed: int) -> list[int]:
 
 
 def fits(plan: DayPlan, chain: Chain, wake: int) -> bool:
-    """Tell whether all jobs of a chain fit into a day that begins at `wake`."""
+    """Return whether all jobs of a chain fit into a day that begins at `wake`."""
     earliest = wake
     for job, last in zip(chain.jobs, chain.latest, strict=False):
         if job.starts is not None:

@@ -254,7 +254,7 @@ def test_outline_that_crosses_itself_keeps_both_sides(tmp_path: Path) -> None:
     plan = home(tmp_path, verts=[[0, 0], [4, 4], [4, 0], [0, 4]])
 
     assert 8.0 == pytest.approx(plan.area_m2, abs=0.01)
-    assert "crosses itself at (2, 2) m: all that it goes round is free" in plan.notes[0]
+    assert "crosses itself at (2, 2) m: everything inside it is free" in plan.notes[0]
 
 
 def test_outline_that_runs_over_itself_stays_free_there(tmp_path: Path) -> None:
@@ -274,8 +274,8 @@ def test_boxes_from_high_to_low_are_turned_with_a_note(tmp_path: Path) -> None:
 
     assert {"hall_0": 2400, "gym_0": 2400} == {room.name: room.cells for room in plan.rooms}
     assert plan.notes == (
-        "room_category.Hall[0] runs from its high to its low corner: taken the right way round",
-        "room_category.Gym[0] runs from its high to its low corner: taken the right way round",
+        "room_category.Hall[0] runs from its high to its low corner: the corners are exchanged",
+        "room_category.Gym[0] runs from its high to its low corner: the corners are exchanged",
     )
 
 

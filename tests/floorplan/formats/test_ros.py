@@ -301,7 +301,7 @@ def test_image_path_of_another_computer_is_replaced_by_the_file_beside_the_map_w
 ) -> None:
     plan = read_ros(write(tmp_path, image=image))
 
-    assert f"there is no image {image}: map.pgm beside map.yaml was taken" == plan.notes[0]
+    assert f"there is no image {image}: map.pgm beside map.yaml is used instead" == plan.notes[0]
 
 
 def test_missing_image_is_refused(tmp_path: Path) -> None:

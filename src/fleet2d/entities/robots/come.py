@@ -34,7 +34,7 @@ class Come(Behavior):
         self.command: Command | None = None
 
     def busy(self) -> bool:
-        """Tell whether it is on its way."""
+        """Return whether it is on its way."""
         return self.command is not None
 
     def decide(self, now: Situation) -> Plan | None:

@@ -61,7 +61,7 @@ class Dock(Behavior):
         self.charging = False
 
     def busy(self) -> bool:
-        """Tell whether it is charging."""
+        """Return whether it is charging."""
         return self.charging
 
     def wakes_at(self, now: Situation, plan: Plan) -> datetime | None:

@@ -106,7 +106,7 @@ class Find(BeliefBehavior):
         return self
 
     def takes(self, command: Command) -> bool:
-        """Tell whether it looks for the person of a command."""
+        """Return whether it looks for the person of a command."""
         return super().takes(command) and self.user in (ANYONE, command.target)
 
     def start(self, actor: Actor) -> None:
@@ -130,7 +130,7 @@ class Find(BeliefBehavior):
         return self.due
 
     def busy(self) -> bool:
-        """Tell whether it searches."""
+        """Return whether it searches."""
         return self.search is not None
 
     def give_up(self, now: Situation) -> None:
@@ -176,7 +176,7 @@ class Find(BeliefBehavior):
         return None if plan is None else plan.interrupt_on("user_seen")
 
     def _is_due(self, now: Situation) -> bool:
-        """Tell whether a search is due and not too late; afterwards the next one is due."""
+        """Return whether a search is due and not too late; afterwards the next one is due."""
         due, start = self.due, now.actor.clock.start
         while self.due is not None and self.due <= now.time:
             due, self.due = self.due, self._next(self.due, start)

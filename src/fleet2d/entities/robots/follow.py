@@ -58,7 +58,7 @@ class Follow(Behavior):
         self.is_searching = False
 
     def busy(self) -> bool:
-        """Tell whether it follows or looks for a person."""
+        """Return whether it follows or looks for a person."""
         return self.person is not None
 
     def decide(self, now: Situation) -> Plan | None:

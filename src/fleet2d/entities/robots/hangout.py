@@ -126,7 +126,7 @@ class Hangout(BeliefBehavior):
         self.is_blocked = True
 
     def _is_in_avoided_room(self, now: Situation) -> bool:
-        """Tell whether it is in a room to avoid, as after a visit or when the run begins."""
+        """Return whether it is in a room to avoid, as after a visit or when the run begins."""
         return now.room is not None and now.room.index in self.avoided
 
     def _choose(self, now: Situation, plan: Plan) -> None:

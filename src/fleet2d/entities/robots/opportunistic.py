@@ -58,7 +58,7 @@ class Opportunistic(Behavior):
         return None
 
     def _is_opportunity(self, name: str, now: Situation) -> bool:
-        """Tell whether it may approach a person: one of its users, left alone for long enough."""
+        """Return whether it may approach a person: one of its users, left alone for long enough."""
         if self.users and name not in self.users:
             return False
         last = self.last_opportunity.get(name)

@@ -50,7 +50,7 @@ class Sites:
         return len(self.rooms)
 
     def can_go(self, plan: Plan, site: int) -> bool:
-        """Tell whether all viewpoints of a site can be reached from where a plan ends so far."""
+        """Return whether all viewpoints of a site can be reached from where a plan ends so far."""
         return all(plan.reaches(*point) for point in self._points[site])
 
     def look_round(self, plan: Plan, site: int) -> Plan:

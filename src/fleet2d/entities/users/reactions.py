@@ -69,7 +69,7 @@ class Reactions(Behavior):
         )
 
     def heeds(self, actor: "Actor", event: SightEvent, step: int) -> bool:
-        """Tell whether the person reacts to an event at a step; drawn by its probability."""
+        """Return whether the person reacts to an event at a step; drawn by its probability."""
         if step < self.until and RANKS.index(event.event) >= self.rank:
             return False  # the present reaction is more important
         probability: float = getattr(self.used_manners, PROBABILITIES[event.event])

@@ -149,11 +149,11 @@ class Spots:
         return list(part_of(seats, rank, members)) if seats else []
 
     def can_reach(self, seat: Seat) -> bool:
-        """Tell whether the body can get to a place at furniture at present."""
+        """Return whether the body can get to a place at furniture at present."""
         return self._can_reach(self._actor.home.object(seat.thing).uses[seat.place])
 
     def _can_reach(self, use: "UsePlace") -> bool:
-        """Tell whether the body can get to a place at furniture, or close enough to use it."""
+        """Return whether the body can get to a place at furniture, or close enough to use it."""
         at = (use.x, use.y) if use.approach is None else use.approach
         return self._actor.space.part_about(at) == self._actor.part
 
@@ -176,17 +176,17 @@ def seats_at(
     kinds: Sequence[str],
     indices: Set[int],
     posture: str,
-    wanted: int,
+    bodies: int,
     can_reach: "Callable[[UsePlace], bool] | None" = None,
 ) -> list[Seat]:
     """Return the places at the furniture in some rooms.
 
     Args:
         home: The home.
-        kinds: Types of furniture, to try in turn until there are `wanted` places.
+        kinds: Types of furniture, to try in turn until there are `bodies` places.
         indices: The numbers of the rooms.
         posture: If a piece has places for this posture, only those of its places are used.
-        wanted: The number of bodies that share the places.
+        bodies: The number of bodies that share the places.
         can_reach: Tells whether a place can be used; None: all can.
     """
     seats: list[Seat] = []
@@ -197,7 +197,7 @@ def seats_at(
                 usable = [i for i, use in enumerate(thing.uses) if not can_reach or can_reach(use)]
                 fit = [i for i in usable if thing.uses[i].posture == posture]
                 seats += [Seat(thing.name, i) for i in fit or usable]
-        if len(seats) >= wanted:
+        if len(seats) >= bodies:
             break
     return seats
 

@@ -262,7 +262,7 @@ class _Draft:
         shapes = [feature.shape for feature in self._of("entrance")]
         if shapes:
             if len(shapes) > 1:
-                self.notes.append(f"it has {len(shapes)} entrances: the first was taken")
+                self.notes.append(f"it has {len(shapes)} entrances: the first is used")
             at = shapes[0].centroid
         elif len(self.ways_out) == 1:
             at = shapely.Point(self.ways_out[0].inside(INSIDE_M))

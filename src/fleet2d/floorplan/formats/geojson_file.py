@@ -273,7 +273,7 @@ def _shape(geometry: object, kind: str, where: str, notes: list[str]) -> BaseGeo
     if shape.is_valid or form not in _SURFACES:
         return shape
     at = shapely.is_valid_reason(shape).rpartition("[")[2].rstrip("]").replace(" ", ", ")
-    notes.append(f"{where} touches or crosses itself at ({at}): all that it goes round was taken")
+    notes.append(f"{where} touches or crosses itself at ({at}): everything inside it is used")
     return shapely.make_valid(shape, method="structure", keep_collapsed=False)
 
 

@@ -93,7 +93,7 @@ def _free_space(corners: list[Point]) -> tuple[Polygon | MultiPolygon, list[str]
     repaired = shapely.make_valid(outline, method="structure", keep_collapsed=False)
     at = shapely.is_valid_reason(outline).rpartition("[")[2].rstrip("]").replace(" ", ", ")
     parts = [part for part in shapely.get_parts(repaired) if part.geom_type == "Polygon"]
-    note = f"the outline touches or crosses itself at ({at}) m: all that it goes round is free"
+    note = f"the outline touches or crosses itself at ({at}) m: everything inside it is free"
     return MultiPolygon(parts), [note]
 
 
@@ -106,7 +106,7 @@ def _regions(categories: dict[str, list[BoxSides]]) -> tuple[list[LabelledRegion
             if x1 < x0 or y1 < y0:
                 notes.append(
                     f"room_category.{category}[{number}] runs from its high to its low corner:"
-                    " taken the right way round"
+                    " the corners are exchanged"
                 )
             shape = shapely.box(min(x0, x1), min(y0, y1), max(x0, x1), max(y0, y1))
             regions.append(LabelledRegion((category,), shape))
