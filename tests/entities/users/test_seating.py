@@ -58,6 +58,13 @@ def test_more_people_than_places_leave_nobody_on_a_place_of_another() -> None:
     assert 1 == np.sum(seat, axis=0).max()
 
 
+def test_members_who_share_a_bedroom_and_are_no_couple_lie_on_places_of_their_own() -> None:
+    """The home has three bedrooms, for four: two shared a place in bed all night."""
+    names = list(EVENING["members"])
+    result = run(household(EVENING, *names, simulation={"start": "2026-01-05T20:00"}), seed=1)
+    assert 0 == seconds_on_one_place(result, *names)
+
+
 def test_order_of_users_and_length_of_spans_change_nothing() -> None:
     names = list(EVENING["members"])
     forward = run(household(EVENING, *names), seed=2)

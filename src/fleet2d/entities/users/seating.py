@@ -58,8 +58,8 @@ class Seating:
     Who comes first has a place until the end of what they do there, interruptions included; who
     comes later has another place of that furniture or of another piece, or none: then it is done on
     a spot in the room. Of those who come at once, the first member of the household is first.
-    Sleepers have their own places in any case. All members compute the same from what the household
-    plans, so that none has to know where the others are.
+    Sleepers come before all others of their day. All members compute the same from the plans of the
+    household, so that none has to know where the others are.
     """
 
     def __init__(self, actor: "Actor", lives: Lives) -> None:
@@ -116,15 +116,10 @@ class Seating:
         places: dict[tuple[int, int], Seat | None] = {}
         for claim in sorted(self._claims(ordinal), key=lambda c: (not c.is_asleep, *c[1:3])):
             time = claim.begin, claim.end
-            if claim.is_asleep:
-                seats: Sequence[Seat] = claim.seats
-            else:
-                seat = next(
-                    (s for s in self._by_preference(claim, ordinal) if self._is_free(s, time)), None
-                )
-                places |= {(claim.rank, number): seat for number in claim.doings}
-                seats = () if seat is None else (seat,)
-            for seat in seats:
+            free = (s for s in self._by_preference(claim, ordinal) if self._is_free(s, time))
+            seat = next(free, None)
+            places |= {(claim.rank, number): seat for number in claim.doings}
+            if seat is not None:
                 self._taken.setdefault(self._spot[seat], []).append(time)
         return places
 
@@ -168,13 +163,16 @@ class Seating:
         rooms = self._rooms(
             rank, activity.rooms, household.bedrooms()[member] if name == SLEEP else None
         )
-        of, members = household.side_of_bed(member) if name == SLEEP else (rank, self._count)
+        share = household.side_of_bed(member) if name == SLEEP else (rank, self._count)
         indices = frozenset(room.index for room in rooms)
-        seats = seats_at(self._home, activity.objects, indices, activity.posture, members)
-        seats = list({self._spot[seat]: seat for seat in reversed(seats)}.values())[::-1]
-        own = list(part_of(seats, of, members)) if seats else []
-        others = [] if name == SLEEP else [seat for seat in seats if seat not in own]
-        return (*own, *others), len(own)
+        seats = self._seats(activity, indices, self._count)
+        own = list(part_of(self._seats(activity, indices, share[1]), *share)) if seats else []
+        return (*own, *(seat for seat in seats if seat not in own)), len(own)
+
+    def _seats(self, activity: "Activity", rooms: frozenset[int], wanted: int) -> Sequence[Seat]:
+        """Return the places for an activity in some rooms, of those at one spot the first."""
+        seats = seats_at(self._home, activity.objects, rooms, activity.posture, wanted)
+        return list({self._spot[seat]: seat for seat in reversed(seats)}.values())[::-1]
 
     def _rooms(self, rank: int, names: tuple[str, ...], bedroom: int | None) -> "Sequence[Room]":
         """Return the rooms of an activity, as `Inhabitant` chooses them for this member."""
