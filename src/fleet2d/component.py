@@ -256,7 +256,7 @@ def _registered(kind: str, name: str) -> type[Component] | None:
 
 
 def _import_builtins(kind: str, name: str | None = None) -> None:
-    """Import a kind's modules, or, if one is called like the begin of ``name``, only that one."""
+    """Import a kind's modules, or, if one has the first part of ``name``, only that one."""
     if kind in _COMPLETE or kind not in PACKAGES:
         return
     package = importlib.import_module(PACKAGES[kind])

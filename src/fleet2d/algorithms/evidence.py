@@ -83,7 +83,10 @@ class SightingCounts(NamedTuple):
 
     @property
     def unknown(self) -> NDArray[np.bool_]:
-        """Where anybody was perceived at more steps than all users: bool (bins, places)."""
+        """Whether somebody was perceived who wasn't recognized as a user: bool (bins, places).
+
+        True where people were perceived at more steps than those of all users together.
+        """
         bins, users, places = self.shape
         signed = np.where(self.user == users - 1, self.steps, -self.steps)
         excess = np.bincount(self.bin * places + self.place, signed, bins * places)

@@ -252,7 +252,8 @@ def _check_integers(column: Column, values: Any, unmasked: Any) -> Any:
     count = len(column.categories)
     if unmasked.size and not (lowest <= unmasked.min() and unmasked.max() < count):
         raise ArtifactError(
-            f"has code {int(unmasked.min())} or {int(unmasked.max())}: there are {count} categories"
+            f"has codes from {int(unmasked.min())} to {int(unmasked.max())}, expected {lowest} to"
+            f" {count - 1}: there are {count} categories"
         )
     return values >= 0 if column.nullable else None
 

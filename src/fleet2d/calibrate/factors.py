@@ -65,7 +65,7 @@ class Falling:
 
 
 class Orientation:
-    """A factor that decreases with the angle by which a person is turned away, linear by parts.
+    """A factor that decreases with the angle by which a person is turned away, piecewise linear.
 
     It is 1 for a person who faces the camera, `side` at 90 degrees and `back` at 180 degrees.
     """

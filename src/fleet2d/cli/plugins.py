@@ -67,4 +67,7 @@ def converter() -> Callable[[Path, Path], list[str]]:
     for entry in _entry_points("fleet2d.converter"):
         with suppress(ModuleNotFoundError):
             return entry.load()
-    raise InputError("this file is not a floor plan, and no converter for it is installed")
+    raise InputError(
+        "this is neither a floor plan (docs/floorplans.md lists the formats) nor a file that an"
+        " installed converter takes"
+    )

@@ -47,7 +47,7 @@ class Checkpoint:
         commit: The commit of the rows before it.
         manifest: The manifest at that time.
         wall_s: Wall time until then of setup, simulate, save [s].
-        body: The file, at the begin of the state.
+        body: The file, at the beginning of the state.
     """
 
     commit: Commit

@@ -59,7 +59,7 @@ class KeyFrames:
         )
 
     def begin_plan(self, row: int, step: int) -> None:
-        """Collect the begin of the plan that was made at `step`."""
+        """Collect the key frame at the beginning of a body's plan, which was made at `step`."""
         moment = step * self._clock.step_us
         # A plan that begins at the end of the last one needs no key frame there.
         self._walked[row] = step + 1

@@ -146,7 +146,7 @@ def watch(state: State, span: Span) -> None:
 
 
 def record(state: State, span: Span) -> None:
-    """Let watchers process this span and earlier ones, if something is due after it."""
+    """Let watchers process the spans so far, if an algorithm or layer needs them at this end."""
     due = (state.learners.next_due(), state.layers.next_due(span.first))
     span.settles = (
         state.max_span is not None

@@ -77,7 +77,7 @@ class Recorder:
             self._keys.end_plan(row, step)
 
     def after_plan(self, row: int, step: int) -> None:
-        """Collect the begin of the plan that was made at `step`."""
+        """Collect the beginning of a body's plan, which was made at `step`."""
         if "key_frames" in self._tables:
             self._keys.begin_plan(row, step)
 

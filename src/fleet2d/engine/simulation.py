@@ -196,8 +196,9 @@ class Simulation(Judging):
         """
         if self.directory is not None:
             raise ArtifactError(
-                f"the simulation stores in {self.directory}: set artifacts.checkpoint, and"
-                " continue by `fleet2d resume`"
+                f"a simulation that stores in {self.directory} can't be saved as a file, too: it"
+                " keeps checkpoints there if artifacts.checkpoint is set; continue it by"
+                " `fleet2d resume`"
             )
         self._check_not_over()
         save_snapshot(path, self._state, self._constants, self._header())

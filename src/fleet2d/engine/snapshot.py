@@ -237,7 +237,7 @@ def open_snapshot(path: str | Path | BinaryIO) -> tuple[dict[str, Any], BinaryIO
         raise ArtifactError(f"{path} is not a saved simulation")
     view, digest = memoryview(content)[:-_DIGEST_BYTES], content[-_DIGEST_BYTES:]
     if hashlib.sha256(view).hexdigest().encode() != digest:
-        raise ArtifactError(f"{path} is damaged: its content is not what was written")
+        raise ArtifactError(f"{path} is damaged (its digest differs): save the simulation again")
     try:
         header: dict[str, Any] = json.loads(first)
         _ = [header[key] for key in ("fleet2d", "scenario", "seed", "wall_s")]

@@ -130,7 +130,7 @@ class State:
         self.encounters.before_plan(row, self.actors[row], step)
 
     def begin_plan(self, row: int, step: int) -> None:
-        """Record the begin of the new plan of a body."""
+        """Record the beginning of a body's new plan."""
         self.notes_emitted[row] = 0
         self.emit_notes(row, step)
         self.recorder.after_plan(row, step)

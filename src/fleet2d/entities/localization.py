@@ -145,7 +145,7 @@ class Drift:
         return Offsets(x // FINE, y // FINE, turn // FINE)
 
     def misplace(self, x: I64, y: I64, robot_x: I64, robot_y: I64, steps: I64) -> tuple[I64, I64]:
-        """Return where the robot believes that points are which it sees, x and y [lattice].
+        """Return where the robot takes points that it sees to be: x and y [lattice].
 
         Args:
             x: The points' true x [lattice], int64 (n,).

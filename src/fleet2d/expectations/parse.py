@@ -93,7 +93,8 @@ class _Reader:
                 f"{value} is compared with nothing: write {value} > 0.5, or == kitchen"
             )
         raise InputError(
-            f"{ast.unparse(node)} is not a condition, which holds or doesn't"
+            f"{ast.unparse(node)} is not a condition: write one that is true or false, such as"
+            " ana.battery > 0.5 or during('22:00-07:00')"
             f"{did_you_mean(value, WORDS)}"
         )
 

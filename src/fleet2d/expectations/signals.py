@@ -94,7 +94,7 @@ def _limit(signal: Signal, limit: object) -> float:
         if isinstance(limit, int | float | np.number) and not isinstance(limit, bool):
             return float(limit)
     except PydanticCustomError as error:
-        raise InputError(f"{signal} is compared: {error}") from None
+        raise InputError(f"{signal} is compared with {limit!r}: {error}") from None
     raise InputError(f"{signal} is compared with {limit!r}, expected a number")
 
 

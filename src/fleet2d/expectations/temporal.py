@@ -36,7 +36,7 @@ class Temporal(Expectation):
         return [] if value > 0 else [Violation(run.first, last, value, last)]
 
     def last(self, run: RunSignals) -> int:
-        """Return the last judged step that is known."""
+        """Return the last step that the judgement depends on and that has been simulated."""
         return run.end - 1
 
     def slack(self, run: RunSignals) -> int | None:

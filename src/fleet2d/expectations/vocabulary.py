@@ -173,7 +173,12 @@ def events(kind: str, entity: str | None = None, *, detail: str | None = None) -
 
 
 def during(hours: str, *, days: str | None = None) -> Expectation:
-    """Condition that it is a time of day, such as "22:00-07:00"; days as "weekdays", or all."""
+    """Condition that the time is within some hours, such as "22:00-07:00", on some days.
+
+    Args:
+        hours: From when to when; past midnight if the second is the earlier one.
+        days: Names of days, "weekdays" or "weekends", separated by commas; None: every day.
+    """
     try:
         begin, separator, end = hours.partition("-")
         if not separator:

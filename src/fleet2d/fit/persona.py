@@ -55,10 +55,10 @@ def fit_persona(
     another where both have the same activity at about the same time.
 
     With the model `laws`, an activity that is done once on most days at about the same time becomes
-    a task, with the mean and spread of its begin, the measured law of its duration and the share of
-    days that have it. All other activities become pastimes of three hours of the day each, with
-    weights and the measured durations of those that began in them. Getting up at night becomes
-    `fetches` of the activity sleep.
+    a task, with the mean and spread of its beginning, the measured law of its duration and the
+    share of days that have it. All other activities become pastimes: for each slot of three hours
+    of the day, their weights and durations are those that began in this slot. Getting up at night
+    becomes a rate of `fetches` during sleep.
 
     Raises:
         LogError: There are no days to fit.

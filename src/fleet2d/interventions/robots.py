@@ -95,7 +95,7 @@ class SetBattery(RobotIntervention):
     """Set the charge of a robot's battery.
 
     Attributes:
-        charge: The charge from then on.
+        charge: The charge at that moment, 0 to 1.
     """
 
     charge: Share
@@ -103,7 +103,7 @@ class SetBattery(RobotIntervention):
     def check(self, world: World) -> None:
         """Refuse a robot without a battery."""
         if robot(world, self.entity).charge is None:
-            raise ScenarioError(f"{self.entity} has no battery: give it one")
+            raise ScenarioError(f"{self.entity} has no battery: add `battery` to the robot")
 
     def begin(self, world: World) -> None:
         """Set it, and let the behaviors decide anew."""

@@ -64,7 +64,7 @@ class UserPoses(NamedTuple):
 class SightMemory(NamedTuple):
     """The state of a robot's perception between spans.
 
-    Identities are users, and last a person who wasn't recognized.
+    An axis of identities has a row for each user, and last one for people who weren't recognized.
     """
 
     noticed: I64  # (identities,): last step at which the identity was noticed; -1: never

@@ -41,18 +41,19 @@ class Stretches(NamedTuple):
 
     @property
     def shown(self) -> U8:
-        """The part of each patch in view in each stretch: uint8 (stretches, patches)."""
+        """The part of each patch in view, in 1/255, by stretch: uint8 (stretches, patches)."""
         return self.views[self.view]
 
 
 class StayModel(NamedTuple):
     """The transition probabilities of a person: between stages of a stay, and between rooms.
 
-    Each room, and away, the last, has its own stages: number room * stages + stage.
+    Each room, and being away, the last one, has the same number of stages of a stay. A node is a
+    stage in a room, by number room * stages per room + stage. A patch is a part of a room's floor.
 
     Attributes:
-        stay: float64 (stages,), probability of remaining in the stage for another bin.
-        follow: float64 (stages, rooms + 2), distribution after a stage: each room, away, and the
+        stay: float64 (nodes,), probability of remaining in the stage for another bin.
+        follow: float64 (nodes, rooms + 2), distribution after a stage: each room, away, and the
             next stage of the same room; rows sum to one.
         spread: float64 (patches,), probability of the patch given that a person comes to its room.
         restless: float64 (rooms + 1,), probability per bin of changing patch during a stay.
@@ -73,8 +74,8 @@ class Moments(NamedTuple):
     """Expected moments of a person's stays, given all evidence.
 
     Attributes:
-        time: float64 (stages,), bins spent in the stage.
-        exits: float64 (stages, rooms + 2), transitions to each room, away, and the next stage.
+        time: float64 (nodes,), bins spent in the stage.
+        exits: float64 (nodes, rooms + 2), transitions to each room, away, and the next stage.
         arrivals: float64 (patches,), arrivals at the patch, from another room or patch.
         moves: float64 (rooms + 1,), changes of patch.
         rests: float64 (rooms + 1,), bins without a change of patch.

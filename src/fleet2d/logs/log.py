@@ -156,7 +156,7 @@ def in_order(readings: list[Reading], path: Path, *, sort: bool) -> tuple[list[R
     if wrong:
         more = f" and {len(wrong) - _MOST_NAMED} more" if len(wrong) > _MOST_NAMED else ""
         lines = f"{', '.join(wrong[:_MOST_NAMED])}{more}"
-        notes.append(f"an end before the begin is ignored, in line {lines}")
+        notes.append(f"an end before the beginning is ignored, in line {lines}")
     if early:
         readings = sorted(readings, key=lambda reading: reading.begin_us)  # stable
         notes.append(f"{_counted(len(early), 'line')} ran backwards in time and were sorted in")

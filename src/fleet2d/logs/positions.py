@@ -55,9 +55,9 @@ def read_positions(
     """Read the fixes of one tag.
 
     Times are text, timestamps, or numbers: of s, ms, us or ns since 1970, which is recognized by
-    their size, or of seconds since the begin of the log if they are below 10⁸. Times with a time
-    zone are converted to the local time of `time_zone`. Headings are in radians, or in degrees if
-    the name of their column ends in _deg.
+    their size, or of seconds since the beginning of the log if they are below 10⁸. Times with a
+    time zone are converted to the local time of `time_zone`. Headings are in radians, or in degrees
+    if the name of their column ends in _deg.
 
     Args:
         path: The file, .csv or .parquet.
@@ -155,7 +155,7 @@ def _of_tag(
     """Return the rows of one tag, their lines in the file, and notes."""
     line = np.arange(table.num_rows) + (2 if path.suffix.lower() == ".csv" else 1)
     if not table.num_rows:
-        raise LogError(f"{path} holds no fix")
+        raise LogError(f"{path} holds no position")
     if column is None:
         if tag is not None:
             raise LogError(f"{path} has no column of ids: leave out 'id', or name it by columns")
@@ -204,7 +204,7 @@ def _numbers(table: pa.Table, name: str, path: Path, line: I64) -> NDArray[np.fl
 def _times(column: pa.ChunkedArray, path: Path, line: I64) -> tuple[I64, bool, bool]:
     """Return times [us], whether they count from 1970, and whether they have a time zone.
 
-    Times that don't count from 1970 count from the begin of the log; those with a zone are UTC.
+    Times that don't count from 1970 count from the beginning of the log; those with a zone are UTC.
     """
     if column.null_count:
         empty = np.flatnonzero(pc.is_null(column).combine_chunks().to_numpy(zero_copy_only=False))
@@ -295,7 +295,7 @@ def _in_order(fixes: list[Any], path: Path, notes: list[str], *, sort: bool) -> 
     """
     time_us, line = fixes[0], fixes[-1]
     if not len(time_us):
-        raise LogError(f"{path} holds no fix with a position")
+        raise LogError(f"{path} has no row with a position")
     back = np.flatnonzero(np.diff(time_us) < 0)
     if len(back) and not sort:
         raise LogError(

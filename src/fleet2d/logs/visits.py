@@ -52,8 +52,8 @@ class LoggedVisit(NamedTuple):
 
     Attributes:
         first: The first step at which the body is there.
-        keep: The step up to which the body must stay. Of a reading that lasts, only the begin must
-            be kept: its end may be cut for the way to the next visit.
+        keep: The step up to which the body must stay. Of a reading that lasts, only the first
+            moment must be kept: its end may be cut for the way to the next visit.
         last: The last step of the visit according to the log.
         place: The room or kind of room, "away", "door" or "unknown".
         activities: Pairs of a step and the activity from that step on.

@@ -1,4 +1,4 @@
-"""Conversion of the sections `simulation` and `floorplan` of the published Fleet2D."""
+"""Conversion of `simulation` and `floorplan` in configurations of the paper's simulator."""
 
 import os
 from contextlib import suppress

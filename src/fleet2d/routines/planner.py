@@ -190,7 +190,10 @@ def _feasible_chain(plan: DayPlan, draws: Draws, wake: int, next_wake: int) -> C
         if tries % ORDERS == 0:
             job = _least_needed(plan.jobs, chosen)
             if job is None:
-                raise RuntimeError(f"no order of the tasks of day {plan.name!r} fits")
+                raise RuntimeError(
+                    f"the tasks of day {plan.name!r} fit in no order between waking and bedtime:"
+                    " shorten some, widen their times, or give them less need"
+                )
             chosen.remove(job)
 
 

@@ -71,7 +71,7 @@ class SurveyGroup(NamedTuple):
         leave: Probability that an episode ends after a step, in parts of ONE, int32 (WEEK_STEPS, 9,
             AGES).
         enter: Cumulative probability of the next category, in parts of ONE, int32 (WEEK_STEPS, 9).
-        people: Shares of people by category and age at the begin of each day, float64 (7, 9, AGES).
+        people: Shares of people by category and age at 04:00 of each day, float64 (7, 9, AGES).
     """
 
     name: str

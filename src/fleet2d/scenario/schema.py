@@ -189,7 +189,7 @@ def describe_components() -> list[ComponentDescription]:
 
 
 def _parts_of(cls: type[Settings]) -> list[type[Settings]]:
-    """Return the groups of keys below a class that no `type` selects, outermost first."""
+    """Return the groups of keys inside of a class, outermost first, without components."""
     parts: list[type[Settings]] = []
     for field in cls.model_fields.values():
         for part in _settings_in(field.annotation):

@@ -119,7 +119,10 @@ class StudyDirectory:
                 f"{self.location} holds no study: give the folder that `fleet2d study run` wrote"
             ) from None
         except ValueError as error:
-            raise RunDirectoryError(f"{self.location}/{META} is damaged: {error}") from error
+            raise RunDirectoryError(
+                f"{self.location}/{META} is damaged ({error}): the runs in the folder are whole;"
+                " run the study again in a new folder"
+            ) from error
         return Meta.of(content, self.location)
 
     def write_meta(self, meta: Meta) -> None:

@@ -104,10 +104,11 @@ def rate_test(seeds: int, holds: float = 1.0, error: float = 0.05) -> RateTest:
 
 
 def _bounded(seeds: int, holds: float, other: float, error: float) -> RateTest:
-    """Return the test of a claimed rate against another, with at most `error` wrong refusals.
+    """Return the test of a claimed rate against another one.
 
-    The boundaries before the last seed use at most half of the error each (Ville's inequality);
-    the boundary at the last seed uses the remainder.
+    Each of its two errors, to refuse the claim or to accept it wrongly, has at most the probability
+    `error`. Half of it is for decisions before the last seed (Ville's inequality), the remainder
+    for the decision at the last seed.
     """
     number = np.arange(seeds + 1)
     failure = math.log((1 - other) / (1 - holds))  # evidence of one failure for the other rate

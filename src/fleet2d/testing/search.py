@@ -211,7 +211,7 @@ class FailureSearch:
         return self.failure
 
     def ask(self, number: int) -> TryTask:
-        """Return the task of a number: its point, and its own seed."""
+        """Return the try of a number: a point of the search space, and a seed of its own."""
         if self._study is None:
             point = self._job.space.draw(self._generator)
         else:

@@ -72,7 +72,9 @@ def forecasts_of(run: Run, algorithm: str) -> Forecasts:
         beliefs.append(belief[has_place])
         truths.append(np.where(is_away, places - 1, room)[has_place])
     if not beliefs:
-        raise ArtifactError(f"{algorithm} stored nothing of any user")
+        raise ArtifactError(
+            f"{algorithm} stored no estimate yet: let the run be longer than its first period"
+        )
     return Forecasts(np.concatenate(beliefs), np.concatenate(truths))
 
 

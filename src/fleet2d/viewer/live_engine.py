@@ -196,7 +196,10 @@ class LiveEngine:
             part = space.part_near(*at)
         near = space.nearest(*at, part) if part >= 0 else None
         if near is None:
-            raise PlacementError(f"{name} can't be at ({place[0]:g}, {place[1]:g}) m")
+            raise PlacementError(
+                f"{name} can't be at ({place[0]:g}, {place[1]:g}) m, nor is there free floor near:"
+                " choose a point in a room"
+            )
         x, y = lattice.to_metres(near).tolist()
         return x, y
 

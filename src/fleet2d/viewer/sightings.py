@@ -49,7 +49,7 @@ def sightings_of(run: Run) -> list[SightingFacts]:
 
 
 def _stretches(step: I64, false: NDArray[np.bool_], gap: int) -> tuple[I64, I64, Any]:
-    """Return the first step, last step and falseness of each stretch of steps without a gap."""
+    """Return first and last step of each stretch without a gap, and whether it is of false ones."""
     order = np.argsort(step, kind="stable")
     step, false = step[order], false[order]
     cuts = (np.diff(step) > gap) | (false[1:] != false[:-1])

@@ -211,7 +211,7 @@ class DayCounts:
         self.week = self.week * weight
 
     def faded(self, days: int) -> float:
-        """Return the weight of a day `days` days later, by repeated products."""
+        """Return the weight of a day after a number of further days, by repeated products."""
         weight = 1.0
         if self.fade < 1.0:
             for _ in range(min(days, 100_000)):

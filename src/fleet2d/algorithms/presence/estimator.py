@@ -138,9 +138,9 @@ class Estimator(Component):
         shape = np.asarray(learned.get("counts", {}).get("over", ())).shape
         if shape != self.counts.shape:
             raise ComponentError(
-                f"the learned state has sums of shape {shape}, but {self.type_name} needs"
-                f" {self.counts.shape} here (users and anyone, numbers of each): it is from another"
-                " home, other users or another estimator"
+                f"the learned state has sums of shape {shape}, expected {self.counts.shape} for the"
+                f" users and rooms of this run: take one that {self.type_name} learned in this home"
+                " with these users, or start without one"
             )
         self.counts.recall(learned["counts"], today)
 

@@ -212,7 +212,10 @@ class Likelihood(Estimator):
         return day.number * 24 + hour[first], sums
 
     def _whole_day(self, places: PeoplePlaces, day: DayEvidence) -> F64:
-        """Return the sums of each hour of a day: float64 (24, users + 1, width)."""
+        """Return a day's sums of places and of moments per hour: float64 (24, users + 1, width).
+
+        The last row is of anybody.
+        """
         hours, sums = self._by_hour(places, day)
         by_hour = np.zeros((24, *sums.shape[1:]))
         by_hour[hours % 24] = sums

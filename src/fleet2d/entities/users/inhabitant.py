@@ -152,7 +152,7 @@ class Inhabitant(Behavior):
         return plan
 
     def furniture(self, actor: "Actor", kind: str) -> str | None:
-        """Return the name of the furniture of a kind that it uses, first of all to sleep."""
+        """Return the name of a piece of furniture of a kind that it uses, its bed before others."""
         sleeps = [self.settings[SLEEP]] if SLEEP in self.settings else []
         for setting in (*sleeps, *self.settings.values()):
             for seat in setting.seats:

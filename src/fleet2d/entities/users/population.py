@@ -58,7 +58,7 @@ class Population(Inhabitant):
         self.settle(actor, {name: known[name] for name in sorted(names)}, Spots(actor))
 
     def begins_at(self, time: datetime) -> "RoomChoice | Point | None":
-        """Return the rooms of a likely activity at that time."""
+        """Return the rooms of what such people usually do at the beginning of the run."""
         draws, known = Draws(stream_key(0, "", "likely"), 0), catalogue()
         people = survey.group(survey.groups()[0] if self.group == "any" else self.group)
         ordinal = (time - timedelta(seconds=survey.DAWN_S)).toordinal()

@@ -155,7 +155,10 @@ def _size(kind: str, draws: Draws) -> tuple[float, float]:
 
 
 def _alone(kind: str, draws: Draws) -> list[FurnitureGroup]:
-    """Return groups of a single piece: of a size that is drawn, and of the smallest."""
+    """Return one piece as two groups to try: of a drawn size, and of its smallest size.
+
+    The smallest is for rooms in which the first finds no place.
+    """
     model = FURNITURE[kind]
     width, depth = _size(kind, draws)
     small = (model.width[0], model.depth[0])

@@ -70,11 +70,11 @@ class ChamberLabels:
 def label_chambers(
     chambers: Chambers, boxes: Sequence[Patch], is_opening: Sequence[bool], cell: float
 ) -> ChamberLabels:
-    """Divide chambers among boxes.
+    """Divide the free space among the boxes that label the rooms of a plan.
 
     Args:
         chambers: The free space, cut at doorways and openings.
-        boxes: The free cells of each box.
+        boxes: The free cells in each labelled rectangle of the plan.
         is_opening: Whether each line at which the chambers were cut is an opening, not a doorway.
         cell: Side of a cell [m].
     """
