@@ -190,7 +190,7 @@ def save_snapshot(
 
 
 class _SnapshotParts:
-    """What a pickler writes, followed by its digest, in parts: a state may be large.
+    """The output of a pickler and its digest, written in parts, as a state may be large.
 
     Attributes:
         error: The error of the function that writes, if it failed.
@@ -226,7 +226,7 @@ def open_snapshot(path: str | Path | BinaryIO) -> tuple[dict[str, Any], BinaryIO
     """Return the header of a snapshot, and the state after it for `read_state`.
 
     Raises:
-        ArtifactError: It is no snapshot, is damaged, or is of another version of Fleet2D.
+        ArtifactError: It is not a snapshot, is damaged, or is of another version of Fleet2D.
     """
     try:
         content = Path(path).read_bytes() if isinstance(path, str | Path) else path.read()

@@ -70,7 +70,7 @@ class StateLayout(NamedTuple):
 
 
 class Prior(NamedTuple):
-    """What is assumed of a person before anything was learned.
+    """The assumptions about a person before anything was learned.
 
     Attributes:
         detection: Probability that a person in view is perceived.
