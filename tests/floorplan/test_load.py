@@ -2,12 +2,16 @@
 
 import json
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 import pytest
 
+from fleet2d import component
 from fleet2d.errors import FloorPlanError
-from fleet2d.floorplan.load import load_floorplan
+from fleet2d.floorplan.load import format_of_file, is_floorplan, load_floorplan
+from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.floorplan.source import FloorPlanSource
 from fleet2d.floorplan.synthetic.source import Synthetic
 
 # How many rooms the file has (None: it names none), and its free space without specks [m2].
@@ -59,3 +63,27 @@ def test_synthetic_home_is_named_by_its_seed() -> None:
     assert Synthetic(seed=7).load() == load_floorplan("synthetic:7")
     with pytest.raises(FloorPlanError, match=r"synthetic:0, synthetic:1"):
         load_floorplan("synthetic7")
+
+
+def test_format_is_recognized_by_the_ending_that_it_declares(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Drawn(FloorPlanSource):
+        """A home, named in a file that is neither JSON nor YAML."""
+
+        suffixes: ClassVar = (".home",)
+        path: Path
+
+        def load(self) -> FloorPlan:
+            return load_floorplan(self.path.read_text(), self.cell)
+
+    component.components("floorplan")
+    kinds = component._REGISTRY["floorplan"]
+    monkeypatch.setitem(component._REGISTRY, "floorplan", {**kinds, "drawn": Drawn})
+    file = tmp_path / "mine.HOME"
+    file.write_text("synthetic:7")
+
+    assert is_floorplan(file)
+    assert format_of_file(file) == "drawn"
+    assert load_floorplan(file, 0.1).name == load_floorplan("synthetic:7", 0.1).name
+    assert not is_floorplan(tmp_path / "mine.dxf")

@@ -36,6 +36,10 @@ _MOST_CHARACTERS = 60
 Status = Literal["running", "complete", "interrupted", "failed"]
 
 
+# Marks a field of the manifest that differs between repetitions of a run.
+VARIES = "varies"
+
+
 def _check_time(text: str) -> str:
     """Refuse text that is not a local time."""
     if text:
@@ -148,17 +152,28 @@ class Manifest(BaseModel):
     start: Annotated[str, AfterValidator(_check_time)] = ""
     simulated_s: Annotated[float, Field(ge=0)] = 0.0
     entities: Entities = Entities()
-    versions: dict[str, str] = {}
-    inputs: list[InputRecord] = []
+    versions: Annotated[dict[str, str], VARIES] = {}
+    inputs: Annotated[list[InputRecord], VARIES] = []
     tables: dict[TableName, TableRecord] = {}
     digest: Sha256 | None = None
-    wall_s: dict[str, Annotated[float, Field(ge=0)]] = {}
+    wall_s: Annotated[dict[str, Annotated[float, Field(ge=0)]], VARIES] = {}
     metrics: dict[str, Any] = {}
     notes: list[str] = []
     interventions: list[dict[str, Any]] = []
     expectations: dict[str, dict[str, Any]] = {}
-    resumed: list[Count] = []
+    resumed: Annotated[list[Count], VARIES] = []
     seal: Seal | None = None
+
+    @classmethod
+    def varying(cls) -> list[str]:
+        """Return the fields that differ between repetitions of a run, marked by `VARIES`.
+
+        Example:
+            >>> Manifest.varying()
+            ['inputs', 'resumed', 'versions', 'wall_s']
+        """
+        fields = cls.model_fields.items()
+        return sorted(name for name, field in fields if VARIES in field.metadata)
 
     def content(self) -> dict[str, Any]:
         """Return the manifest as plain JSON data."""

@@ -20,8 +20,6 @@ from fleet2d.runs.run import FLOORPLAN_NAME, LEARNED_NAME, Run, open_run
 from fleet2d.scenario.model import load_scenario
 from fleet2d.trust import Trust, refuse_untrusted, restrict
 
-# Fields of the manifest that differ between repetitions.
-NOT_COMPARED = ("inputs", "resumed", "versions", "wall_s")
 # Fields that are compared in another way, or are the same for all runs.
 _COMPARED_APART = frozenset({"digest", "format", "scenario", "seal", "status", "tables", "notes"})
 
@@ -46,7 +44,7 @@ class Reproduction:
     digest: str | None
     differing: list[str]
     causes: list[str]
-    not_compared: list[str] = field(default_factory=lambda: list(NOT_COMPARED))
+    not_compared: list[str] = field(default_factory=Manifest.varying)
 
     @property
     def same(self) -> bool:
@@ -76,7 +74,8 @@ def reproduce_trusting(directory: str | Path, trust: Trust) -> Reproduction:
             f"{directory} holds a run that is {old.status}: only a complete run can be compared"
         )
     root, content = Path(directory), old.manifest
-    causes = [f"{path} has changed since" for path in changed_inputs(Manifest.read(root))]
+    manifest = Manifest.read(root)
+    causes = [f"{path} has changed since" for path in changed_inputs(manifest)]
     refuse_untrusted(root, content["scenario"], trust)
     seal = verify_run(root)
     causes += [
@@ -90,7 +89,7 @@ def reproduce_trusting(directory: str | Path, trust: Trust) -> Reproduction:
         causes += _other_versions(content["versions"], new.manifest["versions"])
         differing = {_short(name) for name in seal.differing}
         differing |= set(_tables(content["tables"], new.manifest["tables"]))
-        differing |= set(_fields(content, new.manifest))
+        differing |= set(_fields(content, new.manifest, manifest.model_fields_set))
         differing |= set(_files(root, Path(folder) / "run"))
     return Reproduction(old.digest, new.digest, sorted(differing), causes)
 
@@ -152,10 +151,13 @@ def _tables(old: Mapping[str, Any], new: Mapping[str, Any]) -> list[str]:
     return [name for name in old.keys() | new.keys() if old.get(name) != new.get(name)]
 
 
-def _fields(old: Mapping[str, Any], new: Mapping[str, Any]) -> list[str]:
-    """Return the fields of two manifests that differ and shouldn't."""
+def _fields(old: Mapping[str, Any], new: Mapping[str, Any], stored: Iterable[str]) -> list[str]:
+    """Return the fields of two manifests that differ and shouldn't.
+
+    An older version of Fleet2D stored fewer fields: only those are compared.
+    """
     fields = []
-    for name in sorted((old.keys() | new.keys()) - _COMPARED_APART - set(NOT_COMPARED)):
+    for name in sorted(set(stored) - _COMPARED_APART - set(Manifest.varying())):
         before, after = old.get(name), new.get(name)
         if before == after:
             continue

@@ -68,9 +68,11 @@ def load_floorplan(
 
 
 def _load_document(path: Path, cell: float | None) -> FloorPlan:
-    """Read a file whose content determines its format."""
-    content = read_document(path)
-    kind = _format_of(content) or ("ros" if path.suffix.lower() in YAML else None)
+    """Read a file whose ending or content determines its format."""
+    kind, content = _format_by_suffix(path), {}
+    if kind is None:
+        content = read_document(path)
+        kind = _format_of(content) or ("ros" if path.suffix.lower() in YAML else None)
     if kind is None:
         raise _unknown_format(path)
     if kind == "native":
@@ -90,7 +92,8 @@ def is_floorplan(plan: str | Path) -> bool:
     path = Path(plan)
     if path.suffix.lower() not in YAML:
         is_home = str(plan) in bundled_names() or SYNTHETIC.fullmatch(str(plan)) is not None
-        return is_home or path.suffix.lower() in (*JSON, *IMAGES)
+        is_known = path.suffix.lower() in (*JSON, *IMAGES) or _format_by_suffix(path) is not None
+        return is_home or is_known
     try:
         content = read_yaml(path)
     except FloorPlanError:
@@ -104,6 +107,9 @@ def format_of_file(path: Path) -> str:
     Raises:
         FloorPlanError: It can't be read, or is no floor plan that Fleet2D knows.
     """
+    kind = _format_by_suffix(path)
+    if kind is not None:
+        return kind
     content = read_document(path)
     kind = _format_of(content)
     if kind is None and path.suffix.lower() in YAML and "image" in content:
@@ -132,6 +138,15 @@ def _format_of(content: dict[str, Any]) -> str | None:
         if key in content and value in (None, content[key]):
             return kind
     return None
+
+
+def _format_by_suffix(path: Path) -> str | None:
+    """Return the `type` of floor plan that reads files with such an ending, if any declares it."""
+    suffix = path.suffix.lower()
+    if suffix in ("", *JSON, *YAML):
+        return None
+    sources = components("floorplan").items()
+    return next((k for k, source in sources if suffix in getattr(source, "suffixes", ())), None)
 
 
 def _marks() -> dict[str, tuple[str, str | None]]:

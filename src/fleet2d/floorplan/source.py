@@ -55,6 +55,9 @@ class FloorPlanSource(Component):
     # The key, and the value unless that is None, by which the content of a file is recognized.
     mark: ClassVar[tuple[str, str | None] | None] = None
 
+    # The endings, such as ".dxf", of the files that it reads, if they aren't JSON or YAML.
+    suffixes: ClassVar[tuple[str, ...]] = ()
+
     cell: Length = 0.05
     rooms: tuple[RoomCorrection, ...] = Field(
         default=(), examples=[[{"at": [2.5, 1.0], "name": "den", "type": "office"}]]

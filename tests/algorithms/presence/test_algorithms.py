@@ -8,11 +8,13 @@ import pytest
 from tests.scenes import digests, run, scenario, table
 
 import fleet2d
-from fleet2d.component import lookup
+from fleet2d.component import components, lookup
 from fleet2d.errors import Fleet2DError
 
-ESTIMATORS = ["sighting_share", "exposure_ratio", "audit_only", "likelihood", "hmm", "fremen"]
-MODELS = ["last_seen", "long_term", "hour_of_week", "markov", "hmm", "semi_markov", "routine"]
+ESTIMATORS, MODELS = (
+    sorted(n for n, c in components(kind).items() if c.__module__.startswith("fleet2d."))
+    for kind in ("presence_estimator", "presence_model")
+)
 USERS = {
     "ana": {"type": "room_sampling", "shares": {"kitchen": 3, "bedroom": 5, "away": 2}},
     "ben": {"type": "meander"},
@@ -150,7 +152,7 @@ def test_a_run_can_start_from_the_learned_state_of_another(tmp_path: Path) -> No
     assert known.tolist() == pytest.approx(
         table(second, "ltp", user="ana")["share"].tolist(), abs=0.08
     )
-    with pytest.raises(Fleet2DError, match="other users"):
+    with pytest.raises(Fleet2DError, match="with these users"):
         run({**content("1 h", **algorithms), "users": {"ana": USERS["ana"]}})
 
 

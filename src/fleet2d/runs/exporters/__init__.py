@@ -18,6 +18,13 @@ Exporter = Callable[[Run, Path], str]
 """Writes a run to a file, and returns a line about it."""
 
 
+def formats() -> list[str]:
+    """Return the names of all formats: modules of this package, and of installed plugins."""
+    own = [module.name for module in pkgutil.iter_modules(__path__)]
+    plugins = entry_points(group="fleet2d.exporter").names
+    return sorted({*(name for name in own if not name.startswith("_")), *plugins})
+
+
 def exporter(name: str) -> Exporter:
     """Return the function that exports runs to a format.
 
@@ -28,11 +35,8 @@ def exporter(name: str) -> Exporter:
         >>> exporter("casas").__module__
         'fleet2d.runs.exporters.casas'
     """
-    own = [module.name for module in pkgutil.iter_modules(__path__)]
-    if name in own:
+    if name not in formats():
+        raise InputError(f"there is no exporter {name!r}{suggest(name, formats())}")
+    if any(module.name == name for module in pkgutil.iter_modules(__path__)):
         return cast("Exporter", importlib.import_module(f"{__name__}.{name}").export)
-    plugins = entry_points(group="fleet2d.exporter")
-    if name not in plugins.names:
-        known = sorted({*own, *plugins.names})
-        raise InputError(f"there is no exporter {name!r}{suggest(name, known)}")
-    return cast("Exporter", plugins[name].load())
+    return cast("Exporter", entry_points(group="fleet2d.exporter")[name].load())
