@@ -10,8 +10,9 @@ namespace fleet2d {
 template <int W>
 struct Lanes;
 
-#if defined(__GNUC__) && defined(__x86_64__)
-// A warning that vectors are passed in another way on other processors: here all functions that do are inlined.
+#if defined(__GNUC__) && !defined(__clang__) && defined(__x86_64__)
+// A warning that vectors are passed in another way on other processors: here all functions that do are inlined. Clang
+// inlines only what such a function calls itself, so that it would be slower than one person after the other.
 #pragma GCC diagnostic ignored "-Wpsabi"
 // A function for processors that work on four numbers at once; all that it calls must be inlined.
 #define FLEET2D_FOUR __attribute__((target("avx2"), flatten))

@@ -53,8 +53,7 @@ template <int W>
 class BackwardPass {
 public:
     BackwardPass(const Group<W>& group, Steps<W>& steps, const Filtered<W>& filtered)
-        : group_(group),
-          model_(group.layout()),
+        : model_(group.layout()),
           steps_(steps),
           filtered_(filtered),
           rooms_(model_.rooms()),
@@ -307,7 +306,6 @@ private:
 
     i64 node(i64 room, i64 stage) const { return room * stages_ + stage; }
 
-    const Group<W>& group_;
     const StayModel& model_;  // the layout
     Steps<W>& steps_;
     const Filtered<W>& filtered_;
