@@ -1,15 +1,17 @@
 """Garbage is looked for rarely during a run, so a run must leave none behind that is large."""
 
 import gc
+import weakref
 from collections.abc import Iterator
 
+import numpy as np
 import pytest
 from tests.scenes import scenario
 
 import fleet2d
 from fleet2d.entities.actor import Actor
 from fleet2d.entities.plan import Plan
-from fleet2d.garbage import OBJECTS, rare_collections
+from fleet2d.garbage import OBJECTS, rare_collections, release_memory
 
 PATROL = {"astro": {"type": "patrol", "dwell": "1 min"}}
 
@@ -39,6 +41,15 @@ def test_what_a_run_was_made_of_is_freed_at_once(no_collector: None) -> None:
     before = alive()
     fleet2d.run(scenario("30 min", robots=PATROL))
     assert before == alive()
+
+
+def test_released_memory_is_that_of_garbage_too(no_collector: None) -> None:
+    loop: list[object] = [np.ones(10_000)]
+    loop.append(loop)
+    array = weakref.ref(loop[0])
+    del loop
+    release_memory()
+    assert array() is None
 
 
 def test_thresholds_are_as_before_once_no_run_needs_others(usual: tuple[int, int, int]) -> None:

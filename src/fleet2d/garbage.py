@@ -6,8 +6,9 @@ with many people, and a sixth of the time of all imports.
 """
 
 import gc
+import sys
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from threading import Lock
 
 # New objects between two collections.
@@ -41,6 +42,20 @@ def rare_collections() -> Iterator[None]:
             _runs -= 1
             if _runs == 0:
                 gc.set_threshold(*_usual)
+
+
+def release_memory() -> None:
+    """Collect garbage, and return memory that is free to the system, where that is possible.
+
+    The allocators of C and of Arrow keep what was freed: in years of simulation some dozens of MB.
+    """
+    import ctypes  # takes time, and short runs don't need it
+
+    gc.collect()
+    with suppress(AttributeError, OSError, TypeError):  # GNU's library only
+        ctypes.CDLL(None).malloc_trim(0)
+    if arrow := sys.modules.get("pyarrow"):
+        arrow.default_memory_pool().release_unused()
 
 
 def free_bodies(actors: Iterable[object]) -> None:

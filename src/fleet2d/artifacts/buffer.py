@@ -20,7 +20,7 @@ from fleet2d.artifacts.chunk import (
 from fleet2d.artifacts.table import DTYPES, Column, TableSpec
 from fleet2d.errors import ArtifactError
 
-FLUSH_ROWS = 2**15
+FLUSH_ROWS = 2**16
 """Rows that a table holds back at most, and rows of a Parquet row group at most."""
 
 _FIRST_CAPACITY = 256

@@ -23,6 +23,7 @@ from fleet2d.engine.snapshot import (
 )
 from fleet2d.engine.state import State
 from fleet2d.errors import ArtifactError, RunDirectoryError
+from fleet2d.garbage import release_memory
 from fleet2d.units import micros
 
 DAY_US = 86_400_000_000
@@ -185,6 +186,8 @@ class CheckpointWriter:
                 self._store.manifest.notes.append(
                     f"no checkpoint from step {state.bodies.step} on: {error}"
                 )
+        if not self._every:  # rarely
+            release_memory()
         state.recorder.wall_s += time.perf_counter() - began
         now = time.process_time()
         self._next_checkpoint = (
