@@ -14,7 +14,7 @@ Encoded = tuple[str, int, list[bytes]]
 """The encoding (raw, runs or ramps), the number of runs, and the bytes."""
 
 # Fewer values than this are stored raw: it isn't worth looking for runs.
-_FEW = 256
+FEW = 256
 _BITS = {1: np.uint8, 2: np.uint16, 4: np.uint32, 8: np.uint64}
 
 
@@ -30,7 +30,7 @@ def encode(values: NDArray[Any], *, ramps: bool = False) -> Encoded:
         >>> encoded[:2], sum(map(len, encoded[2])), decode(encoded, np.dtype(np.int64), 1000).sum()
         (('runs', 1), 12, np.int64(7000))
     """
-    if len(values) >= _FEW and values.dtype != np.uint8:  # text
+    if len(values) >= FEW and values.dtype != np.uint8:  # text
         series = values[1:] - values[:-1] if ramps else values
         bits = series.view(_BITS[values.itemsize])
         changes = (bits[1:] != bits[:-1]).nonzero()[0]

@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import os
 import struct
+import sys
 import zlib
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
@@ -20,7 +21,7 @@ import numpy as np
 
 from fleet2d.artifacts import files
 from fleet2d.artifacts.chunk import Chunk, ColumnChunk, Dictionary, new_dictionaries
-from fleet2d.artifacts.encoding import RAW, Encoded, decode, encode
+from fleet2d.artifacts.encoding import FEW, RAW, Encoded, decode, encode
 from fleet2d.artifacts.table import DTYPES, Column, TableSpec
 from fleet2d.errors import ArtifactError
 
@@ -37,6 +38,8 @@ _HEADER = struct.Struct("<BIQI")
 _BUFFER_BYTES = 1 << 22
 # Rows in one frame at most: a few damaged bytes must not request all memory.
 _MOST_ROWS = 1 << 20
+_IS_LITTLE_ENDIAN = sys.byteorder == "little"
+_to_json = json.JSONEncoder(separators=(",", ":")).encode
 
 
 class Commit(NamedTuple):
@@ -127,15 +130,19 @@ class JournalWriter:
                 if values is None:
                     parts.append(None)
                     continue
+                if len(values) < FEW and _IS_LITTLE_ENDIAN:  # most tables have few rows a day
+                    parts.append([RAW, len(values), values.nbytes])
+                    arrays.append(values.tobytes())
+                    continue
                 encoding, runs, content = encode(values, ramps=ramps and values.dtype != np.bool_)
                 parts.append([encoding, runs, sum(map(len, content))])
                 arrays += content
             columns.append(parts)
         added_words = {}
         for name, dictionary in words.items():
-            all_words = dictionary.in_order()
-            added_words[name] = all_words[table.words.get(name, 0) :]
-            table.words[name] = len(all_words)
+            known, count = table.words.get(name, 0), len(dictionary) - (None in dictionary)
+            added_words[name] = dictionary.in_order()[known:] if count > known else []
+            table.words[name] = count
         table.rows += rows
         size = {"table": table.number, "rows": rows}
         self._append("rows", {**size, "columns": columns, "words": added_words}, arrays)
@@ -173,7 +180,7 @@ class JournalWriter:
             self._handle = -1
 
     def _append(self, kind: Kind, description: Mapping[str, Any], arrays: list[bytes]) -> None:
-        text = json.dumps(description, separators=(",", ":")).encode()
+        text = _to_json(description).encode()
         content = b"".join(arrays)
         number = _KINDS.index(kind)
         header = _HEADER.pack(number, len(text), len(content), _checksum(number, text, content))
