@@ -110,6 +110,17 @@ def test_object_without_a_place_is_refused(tmp_path: Any) -> None:
         simulation(tmp_path, thing="rug").run()
 
 
+def test_place_moves_with_an_object_that_blocks_nothing(tmp_path: Any) -> None:
+    """Places were kept as long as the free space stayed the same, which a mat doesn't change."""
+    ana = simulation(tmp_path).actors["ana"]
+    for x in (0.75, 2.0):
+        uses = (UsePlace(x, 0.75, 0, "stand"),)
+        mat = PlacedObject("rug", "rug", shapely.box(x, 0.5, x + 0.5, 1), "nothing", uses=uses)
+        ana.home.put(mat)
+        place = ana.place_at("rug", 0)
+        assert (place.x, place.y) == ana.home.plan.lattice.point_at((x, 0.75))
+
+
 def test_unknown_object_is_refused_with_those_there_are(tmp_path: Any) -> None:
     with pytest.raises(ComponentError, match=r"no object 'bad': did you mean 'bed'\?.*bed, rug"):
         simulation(tmp_path, thing="bad").run()

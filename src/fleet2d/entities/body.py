@@ -96,7 +96,8 @@ class Body:
         self.speed = self.entity.speed * lattice.units_per_m  # units per second
         self.turn_rate = self.entity.turn_rate_deg / 360 * TURN  # headings per second
         self.part = 0
-        self._places: tuple[Space, dict[tuple[str, int], PlaceAt]] = self._space[1], {}
+        self._places: tuple[Space | None, tuple[PlacedObject, ...], dict[tuple[str, int], PlaceAt]]
+        self._places = None, (), {}
         self._bodies: RunBodies | None = None
         self._state: Pose
         self._state_step = 0
@@ -168,15 +169,16 @@ class Body:
         return self.home.way_out(self.space, self.part)
 
     def place_at(self, thing: PlacedObject | str, place: int) -> PlaceAt:
-        """Return a place to use an object from; kept until the body's space changes.
+        """Return a place to use an object from; kept until doors or objects of the home change.
 
         Raises:
             PlacementError: There is no such object, or no place to use it from.
         """
-        if self._places[0] is not self.space:
-            self._places = self.space, {}
+        space, objects = self.space, self.home.objects
+        if self._places[0] is not space or self._places[1] is not objects:
+            self._places = space, objects, {}
         name = thing if isinstance(thing, str) else thing.name
-        known = self._places[1].get((name, place))
+        known = self._places[2].get((name, place))
         if known is not None and (isinstance(thing, str) or known.thing is thing):
             return known
         home, lattice = self.home, self.home.plan.lattice
@@ -188,7 +190,7 @@ class Body:
         heading = round(use.heading / (2 * np.pi) * TURN) % TURN
         approach = home.approach(use, self.space, self.part)
         at = PlaceAt(thing, thing.name, x, y, heading, use.posture, approach)
-        self._places[1][name, place] = at
+        self._places[2][name, place] = at
         return at
 
     def stream(self, purpose: str) -> np.uint64:
