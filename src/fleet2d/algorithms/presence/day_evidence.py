@@ -41,7 +41,9 @@ class DayEvidence(NamedTuple):
     def of(cls, bins: Bins) -> Self:
         """Return the evidence of bins of one day."""
         number, sightings = int(bins.day[0]), bins.parts.sightings
-        watched = np.pad(watched_patches(bins), ((0, 0), (0, 1)))
+        patches = watched_patches(bins)
+        watched = np.zeros((len(patches), patches.shape[1] + 1), np.uint8)
+        watched[:, :-1] = patches
         return cls(number, bins.minute, unknown_seen(bins), *distinct(watched), sightings)
 
     @classmethod
