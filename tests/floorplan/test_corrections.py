@@ -94,9 +94,9 @@ def test_correction_that_fits_nowhere_is_an_error(
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        ({"name": "den"}, "needs either at, a place in it, or polygon"),
+        ({"name": "den"}, "needs either 'at'"),
         ({"at": [1, 1]}, "needs a name or a type"),
-        ({"at": [1, 1], "polygon": [[0, 0], [1, 0], [1, 1]], "name": "x"}, "needs either at"),
+        ({"at": [1, 1], "polygon": [[0, 0], [1, 0], [1, 1]], "name": "x"}, "needs either 'at'"),
         ({"polygon": [[0, 0], [1, 1]], "type": "office"}, "at least 3 corners"),
         ({"polygon": [[0, 0], [1, 1], [1, 0], [0, 1]], "type": "office"}, "no crossing sides"),
         ({"at": [1, 1], "nmae": "den"}, "did you mean 'name'"),

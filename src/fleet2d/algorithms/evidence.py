@@ -70,7 +70,7 @@ class SightingCounts(NamedTuple):
         return type(self)(*columns, (end - begin, *self.shape[1:]))
 
     def of_user(self, user: int) -> tuple[I64, I64, I64]:
-        """Return the bins, places and steps of a user, each (n,)."""
+        """Return a user's sightings: bin, place and number of steps of each, int64 (n,)."""
         begin, end = np.searchsorted(self.user, [user, user + 1])
         return self.bin[begin:end], self.place[begin:end], self.steps[begin:end]
 

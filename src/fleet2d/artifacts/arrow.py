@@ -254,7 +254,7 @@ class ParquetTable:
             self._writer.is_open = False
 
     def empty(self) -> bool:
-        """Free the disk space of a file that is lost; return whether that worked."""
+        """Free the disk space of a file that can't be completed; return whether that worked."""
         try:
             os.truncate(self.partial, 0)
         except OSError:

@@ -170,7 +170,7 @@ class ProductLikelihood:
         return Fit(theta, value, shares)
 
     def _interval_end(self, best: Fit, index: int, side: int) -> float | None:
-        """Return the end of the interval of a parameter, on the side of -1 or 1; None: open."""
+        """Return the lower (-1) or upper (1) end of a parameter's interval; None if unbounded."""
         limit = float((self.most if side > 0 else self.least)[index])
         free = np.ones(len(best.theta), bool)
         free[index] = False

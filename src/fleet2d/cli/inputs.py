@@ -35,7 +35,10 @@ def validate(
     scenario, overrides = split(arguments)
     if scenario is not None and is_floorplan(scenario):
         if overrides:
-            raise InputError(f"{scenario} is a floor plan: {overrides[0]} changes a scenario")
+            raise InputError(
+                f"{scenario} is a floor plan, and {overrides[0]} changes a scenario: leave it out,"
+                " or name a scenario"
+            )
         _check_floorplan(scenario, out, radius, resolution)
         return
     from fleet2d.engine.simulation import Simulation

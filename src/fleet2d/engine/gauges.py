@@ -292,7 +292,7 @@ class ValueGauge(Gauge):
         """Do nothing: the values are passed to `note`."""
 
     def trace(self, end: int) -> Trace:
-        """Return the signal before a step."""
+        """Return the signal at all steps before a step."""
         start, value = np.array(self._start, np.int64), np.array(self._value)
         is_before = start < end
         return shortest(start[is_before], value[is_before], end)

@@ -43,7 +43,7 @@ def sample_persona(
 
 
 def _fetches(activity: Activity, doing: Doing, draws: Draws) -> list[tuple[int, int]]:
-    """Return begin and end of each fetch during a doing [s], drawn like those of inhabitants."""
+    """Return begin and end [s] of each short trip during an activity, drawn as for inhabitants."""
     assert activity.fetches is not None
     wait, takes = exponential(seconds(activity.fetches)), activity.fetch_takes.table()
     times = []

@@ -47,7 +47,7 @@ class RoomCorrection(Settings):
     @model_validator(mode="after")
     def _says_where_and_what(self) -> Self:
         if (self.at is None) == (self.polygon is None):
-            raise problem("a room needs either at, a place in it, or polygon, its corners")
+            raise problem("a room needs either 'at' (a point in it) or 'polygon' (its corners)")
         if self.at is not None and self.name is None and self.type is None:
             raise problem("a room at a place needs a name or a type to give it")
         if self.polygon is not None and not _shape(self.polygon).is_valid:

@@ -69,7 +69,7 @@ def load_floorplan(
 
 def _load_document(path: Path, cell: float | None) -> FloorPlan:
     """Read a file whose ending or content determines its format."""
-    kind, content = _format_by_suffix(path), {}
+    kind, content = format_by_suffix(path), {}
     if kind is None:
         content = read_document(path)
         kind = _format_of(content) or ("ros" if path.suffix.lower() in YAML else None)
@@ -92,7 +92,7 @@ def is_floorplan(plan: str | Path) -> bool:
     path = Path(plan)
     if path.suffix.lower() not in YAML:
         is_home = str(plan) in bundled_names() or SYNTHETIC.fullmatch(str(plan)) is not None
-        is_known = path.suffix.lower() in (*JSON, *IMAGES) or _format_by_suffix(path) is not None
+        is_known = path.suffix.lower() in (*JSON, *IMAGES) or format_by_suffix(path) is not None
         return is_home or is_known
     try:
         content = read_yaml(path)
@@ -107,7 +107,7 @@ def format_of_file(path: Path) -> str:
     Raises:
         FloorPlanError: It can't be read, or is no floor plan that Fleet2D knows.
     """
-    kind = _format_by_suffix(path)
+    kind = format_by_suffix(path)
     if kind is not None:
         return kind
     content = read_document(path)
@@ -140,7 +140,7 @@ def _format_of(content: dict[str, Any]) -> str | None:
     return None
 
 
-def _format_by_suffix(path: Path) -> str | None:
+def format_by_suffix(path: Path) -> str | None:
     """Return the `type` of floor plan that reads files with such an ending, if any declares it."""
     suffix = path.suffix.lower()
     if suffix in ("", *JSON, *YAML):

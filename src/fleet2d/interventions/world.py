@@ -23,7 +23,7 @@ class World(Protocol):
 
     @property
     def clock(self) -> Clock:
-        """The steps of the run."""
+        """The clock of the run, which converts between times and steps."""
 
     @property
     def home(self) -> Home:

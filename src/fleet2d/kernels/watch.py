@@ -65,7 +65,7 @@ class WatchSetup(NamedTuple):
     """The constants of a robot's watching.
 
     Attributes:
-        walls: Free space.
+        walls: Mesh of the space that is free for sight; its borders are the walls.
         lenses: The robot's cameras.
         patch_of_cell: int16 (rows, columns), the patch of each cell, a room or a part of one; -1
             for none.

@@ -15,6 +15,13 @@ from fleet2d.studies.count import Count
 FLOORPLAN_SUFFIXES = (".json", ".geojson", ".yaml", ".yml")
 
 
+def _is_plan(path: Path) -> bool:
+    """Return whether a file has the ending of a floor plan."""
+    from fleet2d.floorplan.load import format_by_suffix
+
+    return path.suffix.lower() in FLOORPLAN_SUFFIXES or format_by_suffix(path) is not None
+
+
 def _texts(value: Any) -> tuple[Any, ...]:
     """Return a text or a list of texts as a tuple; each keeps the folder of its file."""
     texts = (value,) if isinstance(value, str | Path) else value
@@ -59,7 +66,7 @@ class FloorplansAxis(Axis):
         for pattern in self.floorplans:
             path = folder_of(pattern) / Path(pattern).expanduser()
             candidates = path.iterdir() if path.is_dir() else path.parent.glob(path.name)
-            plans = sorted(p for p in candidates if p.suffix.lower() in FLOORPLAN_SUFFIXES)
+            plans = sorted(p for p in candidates if _is_plan(p))
             if not plans:
                 raise ScenarioError(
                     f"no floor plan matches {pattern!r} in {folder_of(pattern)}: name a folder, a"

@@ -105,7 +105,7 @@ def dark_colors(colors: ArrayLike) -> NDArray[np.float64]:
 
 
 def _dark(rgb: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return colours of the dark theme: RGB, float64 (n, 3)."""
+    """Convert colours of the light theme to the dark one: RGB, float64 (n, 3)."""
     linear = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
     lab = np.cbrt(linear @ _CONES.T) @ _LAB.T
     light, chroma = lab[:, 0], np.hypot(lab[:, 1], lab[:, 2])

@@ -244,7 +244,7 @@ def test_after_another_behavior_had_its_turn_it_goes_on_with_its_day() -> None:
         ({"persona": {"extends": "retired", "activities": {"read": {"rooms": ["sauna"]}}}}, ["sauna", "The rooms are"]),
         ({"persona": {"extends": "retired", "days": {"every_day": {"do": {"nap": {"at": "25:00"}}}}}}, ["25:00"]),
         ({"persona": "retired", "household": FAMILY}, ["household", "persona"]),
-        ({"household": {**FAMILY, "members": {"ben": "retired"}, "couples": []}}, ["not a member", "ben"]),
+        ({"household": {**FAMILY, "members": {"ben": "retired"}, "couples": []}}, ["no member", "ben"]),
         ({"household": {**FAMILY, "couples": [["ana", "zoe"]]}}, ["zoe", "no member"]),
         ({"household": {**FAMILY, "together": {"dinner": {"at": "18:00"}}}}, ["dinner", "'on' or 'dates'"]),
         ({"visits": [["2026-01-06", "2026-01-05"]]}, ["not before its end"]),

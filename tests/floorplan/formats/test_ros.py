@@ -323,7 +323,7 @@ def test_image_of_another_size_than_its_header_is_refused(tmp_path: Path) -> Non
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"image": None}, "the key 'image' is missing, as in `image: map.pgm`"),
+        ({"image": None}, "the key 'image' is missing; write it like `image: map.pgm`"),
         ({"resolution": None}, "the key 'resolution' is missing"),
         ({"origin": None}, "the key 'origin' is missing"),
         ({"negate": None}, "the key 'negate' is missing"),

@@ -74,7 +74,7 @@ class Prior(NamedTuple):
 
     Attributes:
         detection: Probability that a person in view is perceived.
-        restless: Probability per bin that a person in a room changes patch.
+        restless: Probability per bin that a person moves to another patch (a part) of the room.
     """
 
     detection: float

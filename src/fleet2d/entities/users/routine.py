@@ -75,7 +75,7 @@ class Routine(Inhabitant):
             members = list(self.household.members)
             if actor.name not in members:
                 raise PlacementError(
-                    f"{actor.path}: it is not a member of its household"
+                    f"{actor.path}: the household has no member of this name"
                     f"{suggest(actor.name, members, 'Its members are')}"
                 )
             self._join_household(actor)
