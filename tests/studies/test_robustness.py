@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+import traceback
 from pathlib import Path
 
 import pytest
@@ -46,6 +47,8 @@ def run_in_a_child_and_kill(folder: Path, after_s: float, variants: int) -> None
         try:
             run(LARGE, folder, observer=Dies(variants))
             os._exit(0)
+        except BaseException:  # noqa: BLE001 - the child must not go on as pytest
+            traceback.print_exc()
         finally:
             os._exit(1)
     deadline = time.monotonic() + after_s
