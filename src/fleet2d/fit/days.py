@@ -26,9 +26,9 @@ class LivedDay(NamedTuple):
 
     Attributes:
         number: The number of its date in the log, from 0.
-        wake: Its begin.
+        wake: Its beginning.
         bed: Its end.
-        next_wake: The begin of the next day.
+        next_wake: The beginning of the next day.
         awake: The known stretches from `wake` to `bed`.
         up: The stretches out of bed in the night after it.
     """

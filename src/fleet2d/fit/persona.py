@@ -21,7 +21,7 @@ QUANTILES = 21  # the most quantiles of a law of durations
 LIE, SIT = ("sleep", "nap", "bed", "wake_up"), ("eat", "tv", "work", "read", "relax", "computer",
     "breakfast", "lunch", "dinner", "snack", "music", "rest", "social", "toilet")  # fmt: skip
 # A task is done on at least this share of the days, at most once a day. The standard deviation of
-# its begin is at most SPREAD, and the gap to begins at other times more than APART [min].
+# its beginning is at most SPREAD, and the gap to begins at other times more than APART [min].
 LEAST_SHARE, SPREAD, APART = 0.8, 20, 60
 LONG = 10  # the least mean duration of a task [min]
 FEWEST = 4  # the fewest days of a kind from which a template is fitted

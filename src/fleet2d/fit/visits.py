@@ -44,7 +44,7 @@ class Visits(NamedTuple):
 
 
 class Stay(NamedTuple):
-    """A stay in a kind of room: its begin [s of the trace] and its length [s]."""
+    """A stay in a kind of room: its beginning [s of the trace] and its length [s]."""
 
     kind: str
     begin: int

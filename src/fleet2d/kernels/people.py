@@ -16,7 +16,7 @@ class PeopleEvidence(NamedTuple):
     """Evidence of consecutive bins of a day.
 
     Attributes:
-        minute: int64 (bins,), begin of each bin [minutes since midnight].
+        minute: int64 (bins,), beginning of each bin [minutes since midnight].
         view: int64 (bins,), the row of `views`; consecutive bins with the same view have the same.
         views: uint8 (views, patches), as in `fleet2d.kernels.stays.Stretches`.
         begin: int64 (people + 1,), offsets of each person's sightings in `bin`, `patch`, `steps`.

@@ -96,7 +96,7 @@ def merge_bins(
     Bins in which the user was perceived in several patches aren't merged.
 
     Args:
-        minute: int64 (bins,), begin of each bin [minutes since midnight]; no stretch crosses an
+        minute: int64 (bins,), beginning of each bin [minutes since midnight]; no stretch crosses an
             hour.
         view: int64 (bins,), the row of `views`; consecutive bins with the same view have the same.
         views: uint8 (views, patches), as in Stretches.

@@ -40,7 +40,7 @@ class _ScriptedActivity:
 
     Attributes:
         activity: Its name.
-        begin_us: Its begin on the agenda [us since midnight].
+        begin_us: Its beginning on the agenda [us since midnight].
         end_us: Its end on the agenda [us since midnight].
         line: The line of the agenda.
         steps: Its script: time [us], objects by name and number, and line.

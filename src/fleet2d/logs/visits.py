@@ -134,7 +134,7 @@ def _sweep(intervals: Sequence[RoomInterval]) -> tuple[list[tuple[RoomInterval, 
         active.append((interval, number))
         now = interval.first
     advance(None)
-    # An interval without a piece isn't overruled if the piece at its begin is of the same room.
+    # An interval without a piece isn't overruled if the piece at its beginning is of the same room.
     place_at = {piece.first: piece.place for piece, _ in pieces}
     overruled = [
         interval

@@ -56,7 +56,7 @@ class Period(Settings):
         return self
 
     def seconds_since(self, midnight: datetime) -> tuple[int, int]:
-        """Return its begin and end [s since a midnight]."""
+        """Return its beginning and end [s since a midnight]."""
         return (self.begins - midnight) // SECOND, (self.ends - midnight) // SECOND
 
 

@@ -49,7 +49,7 @@ class Timing(Settings):
 
     Attributes:
         at: When it begins on average.
-        spread: Standard deviation of its begin.
+        spread: Standard deviation of its beginning.
         between: The earliest and latest begin; left out: 2.5 standard deviations around `at`.
     """
 

@@ -37,8 +37,8 @@ class Doing(NamedTuple):
 
     Attributes:
         activity: The activity.
-        begin: Its begin [s since the midnight of the day's date].
-        end: Its end, which is the begin of the next doing.
+        begin: Its beginning [s since the midnight of the day's date].
+        end: Its end, which is the beginning of the next doing.
         task: The template's task; empty for pastimes and sleep.
         room: The index of its room, if its household has chosen one; else -1.
         role: PLANNED, or of an interruption: INTERRUPTS a planned doing, RESUMES it afterwards, or
@@ -59,7 +59,8 @@ class Job(NamedTuple):
     Attributes:
         task: The name of the task.
         activity: Its activity.
-        starts: The law of its begin; None: right after the job before it, on waking or before bed.
+        starts: The law of its beginning; None: right after the job before it,
+            on waking or before bed.
         takes: The law of its duration.
         until: Its latest end.
         after: The indices of the jobs before it, all lower than its own.
@@ -123,8 +124,8 @@ class Chain(NamedTuple):
 
     Attributes:
         jobs: The jobs.
-        preferred: The drawn begin of each [s].
-        latest: The latest possible begin of each [s].
+        preferred: The drawn beginning of each [s].
+        latest: The latest possible beginning of each [s].
     """
 
     jobs: list[Job]
@@ -172,7 +173,7 @@ def plan_day(
 
 
 def _next_begin(job: Job, now: int, preferred: int) -> int:
-    """Return the begin of a job: the preferred one, or `now` if that is only a little earlier."""
+    """Return when a job begins: at the preferred time, or `now` if that is a little earlier."""
     begin = max(now, preferred)
     is_soon = begin - now < NO_GAP_S and (job.starts is None or job.starts.shortest <= now)
     return now if is_soon else begin

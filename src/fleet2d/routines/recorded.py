@@ -31,9 +31,9 @@ class RecordedDay(NamedTuple):
     """A recorded day; times in seconds since its midnight.
 
     Attributes:
-        begins: The begin of each activity, ascending.
+        begins: The beginning of each activity, ascending.
         activities: The activities; the last one is sleep.
-        end: The begin of the next day.
+        end: The beginning of the next day.
     """
 
     begins: tuple[int, ...]

@@ -225,7 +225,7 @@ def _conflict(chain: Chain, wake: int) -> tuple[tuple[str, ...], str]:
     for i, job in enumerate(chain.jobs):
         now = now if job.starts is None else max(now, job.starts.shortest)
         if now > chain.latest[i]:
-            until, takes = i, 0  # the first job from here on whose own window limits its begin
+            until, takes = i, 0  # the first job from here on whose own window limits its beginning
             while chain.latest[until] == chain.latest[until + 1] - chain.jobs[until].takes.shortest:
                 takes += chain.jobs[until].takes.shortest
                 until += 1

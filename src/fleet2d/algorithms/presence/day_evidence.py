@@ -22,7 +22,7 @@ class DayEvidence(NamedTuple):
 
     Attributes:
         number: The day, as `date.toordinal` counts.
-        minute: int64 (bins,), begin of each bin [minutes since midnight].
+        minute: int64 (bins,), beginning of each bin [minutes since midnight].
         unknown: bool (bins, rooms), where an unknown person was perceived.
         view: int64 (bins,), the row of `views`.
         views: uint8 (views, patches + 1), how much of each patch was watched, 0 to WHOLE_PATCH,

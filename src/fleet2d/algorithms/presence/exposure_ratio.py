@@ -149,7 +149,7 @@ class AuditOnly(ExposureRatio):
     begin because the user is lost; and it is noisy, as most sightings aren't used.
 
     Attributes:
-        every: Time from the begin of one audit to the next, counted from midnight.
+        every: Time from the beginning of one audit to the next, counted from midnight.
         length: Duration of an audit.
     """
 

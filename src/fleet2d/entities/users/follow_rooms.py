@@ -156,7 +156,7 @@ class RoomFollower:
         return x, y
 
     def _way(self, plan: "Plan", spot: tuple[int, int]) -> I64:
-        """Return the breakpoints of the way to a spot: time since its begin, x, y, heading."""
+        """Return the breakpoints of the way to a spot: time since its beginning, x, y, heading."""
         route = self.actor.space.route((plan.x, plan.y), spot)
         if route is None:  # a door is shut at present, but the log says that somebody went there
             route = straight_way((plan.x, plan.y), spot)

@@ -35,7 +35,7 @@ class SeatClaim(NamedTuple):
 
     Attributes:
         is_asleep: Whether the member sleeps there, which has precedence.
-        begin: Its begin [s since the midnight of ordinal 0].
+        begin: Its beginning [s since the midnight of ordinal 0].
         rank: The number of the member.
         end: Its end.
         doings: The numbers of the doings of the day that it is for.

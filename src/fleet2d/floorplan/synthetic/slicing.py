@@ -79,7 +79,7 @@ class Mouth(NamedTuple):
     Attributes:
         upright: Whether that side runs along y.
         at: The coordinate of that side [units].
-        low: The begin of the corridor along it [units].
+        low: The beginning of the corridor along it [units].
         high: The end of the corridor along it [units].
     """
 
