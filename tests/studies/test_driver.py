@@ -222,6 +222,26 @@ def test_a_folder_with_something_else_is_refused(tmp_path: Path) -> None:
         run(small(), tmp_path)
 
 
+@pytest.mark.parametrize("last", ["lock", "scenarios.parquet", "plan.parquet"])
+def test_a_study_that_was_killed_while_it_began_is_run(
+    undisturbed_dir: Path, tmp_path: Path, last: str
+) -> None:
+    """One of a thousand kills left the plan without `study.json`, and the folder was refused."""
+    written = ["lock", "scenarios.parquet", "plan.parquet", "study.json"]
+    number = written.index(last) + 1
+    for name in written[:number]:
+        shutil.copy(undisturbed_dir / name, tmp_path)
+    (tmp_path / f"{written[number]}.partial").write_bytes(b"half")
+    counts, _ = run(small(**ROWS), tmp_path)
+    assert counts.complete == 6
+
+
+def test_a_plan_without_the_lock_of_a_study_is_something_else(tmp_path: Path) -> None:
+    (tmp_path / "plan.parquet").write_bytes(b"precious")
+    with pytest.raises(RunDirectoryError, match="holds no study"):
+        run(small(), tmp_path)
+
+
 def test_wrong_input_leaves_nothing_behind(tmp_path: Path) -> None:
     with pytest.raises(ScenarioError):
         run(small(axes={SPEED: [0.3, "quick"]}), tmp_path / "study")

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from fleet2d.artifacts.files import PARTIAL
 from fleet2d.errors import RunDirectoryError
 from fleet2d.studies.journal import Journal
 from fleet2d.studies.parts import Part, next_number, part_name, read_parts, write_part
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 FORMAT = 1
+LOCK = "lock"
 META, PLAN, SCENARIOS, VARIANTS = (
     "study.json", "plan.parquet", "scenarios.parquet", "variants.parquet",
 )  # fmt: skip
@@ -101,7 +103,10 @@ class StudyDirectory:
         folder = self.storage.folder
         if folder is None or not folder.exists() or self.exists():
             return
-        if not folder.is_dir() or any(p.name != "lock" for p in folder.iterdir()):
+        is_folder = folder.is_dir()
+        names = {p.name.removesuffix(PARTIAL) for p in folder.iterdir()} if is_folder else {""}
+        # A study that was killed while it began has the files that are written before `study.json`.
+        if names and not {LOCK} <= names <= {LOCK, PLAN, SCENARIOS, META}:
             raise RunDirectoryError(
                 f"{folder} exists and holds no study: choose another --out or remove it"
             )
@@ -196,7 +201,7 @@ class StudyDirectory:
         """
         try:
             self.scratch.mkdir(parents=True, exist_ok=True)
-            file = os.open(self.scratch / "lock", os.O_RDWR | os.O_CREAT, 0o644)
+            file = os.open(self.scratch / LOCK, os.O_RDWR | os.O_CREAT, 0o644)
         except OSError as error:
             raise write_error(self.scratch, error) from error
         try:

@@ -6,6 +6,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from fleet2d.artifacts.directory import is_disk_full
+from fleet2d.artifacts.files import PARTIAL
 from fleet2d.errors import ArtifactError, RunDirectoryError
 
 COPY_BYTES = 1 << 22
@@ -116,7 +117,7 @@ class Storage:
                 return
             path = self.folder / name
             path.parent.mkdir(parents=True, exist_ok=True)
-            partial = path.with_name(path.name + ".partial")
+            partial = path.with_name(f"{path.name}{PARTIAL}")
             with partial.open("wb") as file:
                 file.write(content)
                 file.flush()
