@@ -8,8 +8,10 @@ table to a page of the docs. The exit code is 1 if a must isn't kept.
 """
 
 import argparse
+import importlib.metadata
 import json
 import os
+import re
 import resource
 import subprocess
 import sys
@@ -108,6 +110,14 @@ def least(do: Callable[[], object], times: int, *, imported: bool = False) -> fl
     return min(found)
 
 
+def least_of_both(
+    first: Callable[[], object], second: Callable[[], object], times: int
+) -> tuple[float, float]:
+    """Return the processor times of two calls [s], in turn, each the least of several."""
+    pairs = [(least(first, 1), least(second, 1)) for _ in range(times)]
+    return min(one for one, _ in pairs), min(other for _, other in pairs)
+
+
 def run(*overrides: str, **settings: Any) -> object:
     """Run the base scenario."""
     import fleet2d
@@ -170,6 +180,21 @@ def peak_gb() -> float:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
 
 
+def installed_mb(name: str) -> float:
+    """Return the size of the installed dependencies of a package, those of extras left out [MB]."""
+    names, pending = set(), [name]
+    while pending:
+        for requirement in importlib.metadata.requires(pending.pop()) or []:
+            package = re.match(r"[\w.-]+", requirement)
+            if package is None or "extra ==" in requirement or "platform_system" in requirement:
+                continue
+            if package[0] not in names:
+                names.add(package[0])
+                pending.append(package[0])
+    files = [Path(str(f.locate())) for n in names for f in importlib.metadata.files(n) or []]
+    return sum(file.stat().st_size for file in files if file.exists()) / 1e6
+
+
 def regions_of(name: str) -> float | None:
     """Return how long the regions of all free cells of a plan take [s]; None without the file."""
     import numpy as np
@@ -206,9 +231,11 @@ def measure(bound: Bound) -> float | None:
 
 def run_code(code: str) -> None:
     """Run the code of a bound, and print the figure that it sets."""
+    import statistics
+
     import fleet2d
 
-    names = {**globals(), "fleet2d": fleet2d}
+    names = {**globals(), "fleet2d": fleet2d, "statistics": statistics}
     exec(code, names)
     print(json.dumps(names["figure"]))
 

@@ -53,26 +53,45 @@ def main() -> None:
 
 def speed(data: Path) -> Iterable[tuple[str, float]]:
     """Yield what was timed, and how long it took [ms]."""
-    plans = [_best(lambda path=path: load_floorplan(path)) for path in _houseexpo(data)]
+    plans = plan_times(data)
     yield f"HouseExpo, {len(plans)} plans: median", statistics.median(plans)
     yield f"HouseExpo, {len(plans)} plans: worst", max(plans)
-    with tempfile.TemporaryDirectory() as folder:
-        path = write_ros_map(Path(folder))
-        yield "ROS map of 500 x 500 pixels", _best(lambda: load_floorplan(path))
+    yield "ROS map of 500 x 500 pixels", ros_map_time()
     for path in _maps(data):
         yield f"map {path.parent.name}/{path.stem}", _best(lambda path=path: load_floorplan(path))
-    seeds = range(HOMES)
-    homes = [_best(lambda seed=seed: Synthetic(seed=seed).load()) for seed in seeds]
+    homes = synthetic_times()
     yield f"synthetic home, seeds 0 to {HOMES - 1}: median", statistics.median(homes)
     yield f"synthetic home, seeds 0 to {HOMES - 1}: worst", max(homes)
-    bare = [Synthetic(seed=seed).load() for seed in seeds]
+    bare = [Synthetic(seed=seed).load() for seed in range(HOMES)]
     pieces = [_best(lambda plan=plan: furnish(plan), rounds=2) for plan in bare]
     yield "furnishing a synthetic home: median", statistics.median(pieces)
+    for path, cells, took in region_times(data):
+        yield f"visible from each of {cells} cells, {path.parent.name}/{path.stem}"[:52], took
+
+
+def plan_times(data: Path) -> list[float]:
+    """Return how long the plans of HouseExpo take, from file to rooms and mesh [ms]."""
+    return [_best(lambda path=path: load_floorplan(path)) for path in _houseexpo(data)]
+
+
+def ros_map_time() -> float:
+    """Return how long a map of 500 x 500 pixels takes [ms]."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = write_ros_map(Path(folder))
+        return _best(lambda: load_floorplan(path))
+
+
+def synthetic_times() -> list[float]:
+    """Return how long synthetic homes take, one for each seed [ms]."""
+    return [_best(lambda seed=seed: Synthetic(seed=seed).load()) for seed in range(HOMES)]
+
+
+def region_times(data: Path) -> Iterable[tuple[Path, int, float]]:
+    """Yield each jagged map, its number of free cells, and how long all their views take [ms]."""
     for path in _maps(data):
         plan = load_floorplan(path)
         cells = int(np.count_nonzero(plan.free))
-        label = f"visible from each of {cells} cells, {path.parent.name}/{path.stem}"
-        yield label[:52], _best(lambda plan=plan: look_around(plan), rounds=2)
+        yield path, cells, _best(lambda plan=plan: look_around(plan), rounds=2)
 
 
 def look_around(plan: FloorPlan) -> object:
