@@ -10,7 +10,7 @@ import typer
 import yaml
 from pydantic import BaseModel, TypeAdapter, ValidationError
 
-from fleet2d.cli.commands import app
+from fleet2d.cli.app import app
 from fleet2d.component import lookup
 from fleet2d.entities.behavior import Behavior
 from fleet2d.entities.localization import Localization

@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 import fleet2d
 from fleet2d import _core
 from fleet2d.cli import plugins
-from fleet2d.cli.commands import app
+from fleet2d.cli.app import app
 
 SOURCE = Path(fleet2d.__file__).parent
 LEAVES = {
@@ -31,7 +31,7 @@ LEAVES = {
 REST = """
 import sys
 import fleet2d
-from fleet2d.cli.commands import app
+from fleet2d.cli.app import app
 from fleet2d.component import PACKAGES, components
 
 for kind in PACKAGES:
@@ -120,7 +120,7 @@ def test_command_of_another_package_runs_or_says_what_is_wrong(
     value: str, output: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     entry = EntryPoint("greet", value, plugins.GROUP)
-    monkeypatch.setattr(plugins, "_entry_points", lambda group=plugins.GROUP: iter([entry]))
+    monkeypatch.setattr(plugins, "entries", lambda group=plugins.GROUP: iter([entry]))
 
     result = CliRunner().invoke(app, ["greet", "ana"])
 

@@ -16,7 +16,7 @@ def main() -> NoReturn:
     # To look for pydantic's plugins takes as long as to import it.
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     with rare_collections():
-        from fleet2d.cli.commands import app
+        from fleet2d.cli.app import app
 
         gc.freeze()  # modules live to the end: the collector needn't scan them
 

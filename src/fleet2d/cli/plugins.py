@@ -1,44 +1,68 @@
-"""Commands of installed packages: entry points of the group `fleet2d.command`.
+"""How commands are found: modules of `fleet2d.cli.commands`, and those of installed packages.
 
-Some of Fleet2D's own commands are declared the same way. Commands are loaded when they are called.
+The latter are entry points of the group `fleet2d.command`; some of Fleet2D's own commands are
+declared this way, too. All are loaded when they are called.
 """
 
-from collections.abc import Callable, Iterator
-from contextlib import suppress
-from pathlib import Path
+import pkgutil
+from collections.abc import Iterator
+from difflib import get_close_matches
+from importlib import import_module
 from typing import Any
 
 import typer
 from typer.core import TyperGroup
 from typer.main import get_group
 
-from fleet2d.errors import InputError
+from fleet2d.cli import commands
+from fleet2d.garbage import rare_collections
 
 GROUP = "fleet2d.command"
 
 
 class Commands(TyperGroup):
-    """The commands of Fleet2D, followed by those of installed packages."""
+    """The commands of Fleet2D and of installed packages, by name."""
 
     def list_commands(self, ctx: Any) -> list[str]:
-        """Return the names of all commands that can be loaded."""
-        built_in = super().list_commands(ctx)
-        plugins = sorted({entry.name for entry in _entry_points()} - set(built_in))
-        return [*built_in, *(name for name in plugins if self.get_command(ctx, name) is not None)]
+        """Return the names of all commands that can be loaded, sorted."""
+        own = set(_modules())
+        others = {entry.name for entry in entries()} - own
+        return sorted(own | {name for name in others if self.get_command(ctx, name) is not None})
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
         """Return a command, None if there is none of that name."""
-        command = super().get_command(ctx, cmd_name)
-        if command is not None:
-            return command
-        entry = next((entry for entry in _entry_points() if entry.name == cmd_name), None)
+        module = _modules().get(cmd_name)
+        if module is not None:
+            with rare_collections():
+                function = getattr(import_module(f"{commands.__name__}.{module}"), module)
+            return _command(cmd_name, function, ctx)
+        entry = next((entry for entry in entries() if entry.name == cmd_name), None)
         return None if entry is None else _load(entry, ctx)
 
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """Return the name of the command that arguments call, the command, and its arguments.
 
-def _entry_points(group: str = GROUP) -> Iterator[Any]:
+        Raises:
+            UsageError: There is no such command; the message names the nearest one.
+        """
+        if not args[0].startswith("-") and self.get_command(ctx, args[0]) is None:
+            near = get_close_matches(args[0], self.list_commands(ctx), n=1)
+            hint = f": did you mean {near[0]!r}?" if near else "."
+            ctx.fail(f"No such command {args[0]!r}{hint}")
+        return super().resolve_command(ctx, args)
+
+
+def entries(group: str = GROUP) -> Iterator[Any]:
+    """Return the entry points of a group."""
     from importlib.metadata import entry_points  # slow to import, and rarely needed
 
     return iter(entry_points(group=group))
+
+
+def _modules() -> dict[str, str]:
+    """Return the name of the module of each command, by the command's name."""
+    names = (module.name for module in pkgutil.iter_modules(commands.__path__))
+    return {name.replace("_", "-"): name for name in names}
 
 
 def _load(entry: Any, ctx: Any) -> Any:
@@ -50,24 +74,14 @@ def _load(entry: Any, ctx: Any) -> Any:
         if not missing or not f"{entry.module}.".startswith(f"{missing}."):
             typer.echo(f"the command {entry.name!r} ({entry.value}) fails: {error}", err=True)
         return None
+    return _command(entry.name, value, ctx)
+
+
+def _command(name: str, value: Any, ctx: Any) -> Any:
+    """Return the command of a function, or the group of a Typer app."""
     app = typer.Typer(rich_markup_mode=None, callback=lambda: None)
     if isinstance(value, typer.Typer):
-        app.add_typer(value, name=entry.name)
+        app.add_typer(value, name=name)
     else:
-        app.command(entry.name)(value)
-    return get_group(app).get_command(ctx, entry.name)
-
-
-def converter() -> Callable[[Path, Path], list[str]]:
-    """Return the function that converts a configuration of another program into a scenario.
-
-    Raises:
-        InputError: There is none.
-    """
-    for entry in _entry_points("fleet2d.converter"):
-        with suppress(ModuleNotFoundError):
-            return entry.load()
-    raise InputError(
-        "this is neither a floor plan (docs/floorplans.md lists the formats) nor a file that an"
-        " installed converter takes"
-    )
+        app.command(name)(value)
+    return get_group(app).get_command(ctx, name)

@@ -1,11 +1,14 @@
 """The summary of a finished run."""
 
+import json
 import os
 import sys
 import time
 from datetime import timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
+
+import typer
 
 from fleet2d.cli.verdicts import print_expectations
 
@@ -16,6 +19,15 @@ if TYPE_CHECKING:
 SEPARATOR = " · "
 
 _LOADED = time.perf_counter()
+
+
+def print_results(result: "Run", *, as_json: bool, quiet: bool) -> None:
+    """Print the results of a run: as one JSON object, as a table, or nothing."""
+    summary = summary_of(result)
+    if as_json:
+        typer.echo(json.dumps(summary))
+    elif not quiet:
+        print_summary(summary, result)
 
 
 def summary_of(run: "Run") -> dict[str, Any]:

@@ -7,7 +7,7 @@ import shapely
 from tests.homes import plan_files
 from typer.testing import CliRunner
 
-from fleet2d.cli.commands import app
+from fleet2d.cli.app import app
 from fleet2d.floorplan.furniture.catalogue import stand_furniture
 from fleet2d.floorplan.home.checkup import Finding, checkup
 from fleet2d.floorplan.load import load_floorplan

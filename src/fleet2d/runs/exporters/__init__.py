@@ -3,26 +3,29 @@
 A format of an installed package is an entry point of the group `fleet2d.exporter`: such a function.
 """
 
+import ast
 import importlib
 import pkgutil
 from collections.abc import Callable
-from importlib.metadata import entry_points
 from pathlib import Path
-from typing import cast
+from typing import TYPE_CHECKING, Any, cast
 
 from fleet2d.errors import InputError
-from fleet2d.problems import suggest
-from fleet2d.runs.run import Run
 
-Exporter = Callable[[Run, Path], str]
+if TYPE_CHECKING:
+    from fleet2d.runs.run import Run
+
+Exporter = Callable[["Run", Path], str]
 """Writes a run to a file, and returns a line about it."""
 
 
-def formats() -> list[str]:
-    """Return the names of all formats: modules of this package, and of installed plugins."""
-    own = [module.name for module in pkgutil.iter_modules(__path__)]
-    plugins = entry_points(group="fleet2d.exporter").names
-    return sorted({*(name for name in own if not name.startswith("_")), *plugins})
+def formats() -> dict[str, str]:
+    """Return what each format is, by its name, without importing any.
+
+    That is the first line of the module; empty for formats of installed packages.
+    """
+    own = {name: _first_line(Path(__path__[0], f"{name}.py")) for name in _modules()}
+    return dict(sorted({**dict.fromkeys(_plugins().names, ""), **own}.items()))
 
 
 def exporter(name: str) -> Exporter:
@@ -35,8 +38,25 @@ def exporter(name: str) -> Exporter:
         >>> exporter("casas").__module__
         'fleet2d.runs.exporters.casas'
     """
-    if name not in formats():
-        raise InputError(f"there is no exporter {name!r}{suggest(name, formats())}")
-    if any(module.name == name for module in pkgutil.iter_modules(__path__)):
+    if name in _modules():
         return cast("Exporter", importlib.import_module(f"{__name__}.{name}").export)
-    return cast("Exporter", entry_points(group="fleet2d.exporter")[name].load())
+    if name not in _plugins().names:
+        from fleet2d.problems import suggest  # with pydantic, which the help needn't import
+
+        raise InputError(f"there is no exporter {name!r}{suggest(name, formats())}")
+    return cast("Exporter", _plugins()[name].load())
+
+
+def _first_line(module: Path) -> str:
+    docstring = ast.get_docstring(ast.parse(module.read_text(encoding="utf-8")))
+    return (docstring or "").partition("\n")[0]
+
+
+def _modules() -> list[str]:
+    return [module.name for module in pkgutil.iter_modules(__path__)]
+
+
+def _plugins() -> Any:
+    from importlib.metadata import entry_points  # slow to import, and rarely needed
+
+    return entry_points(group="fleet2d.exporter")

@@ -1,4 +1,4 @@
-"""The command that continues a run: resume."""
+"""`fleet2d resume`: continue an unfinished run."""
 
 import sys
 from contextlib import nullcontext, redirect_stdout
@@ -7,7 +7,8 @@ from typing import Annotated
 
 import typer
 
-from fleet2d.cli.runs import print_results, run_with_progress
+from fleet2d.cli.progress import run_with_progress
+from fleet2d.cli.summary import print_results
 from fleet2d.trust_options import TrustFiles, TrustFolders, trust_of
 
 

@@ -1,4 +1,4 @@
-"""The command that compares a stored run with its seal: verify."""
+"""`fleet2d verify`: compare a stored run with its seal."""
 
 from pathlib import Path
 from typing import Annotated

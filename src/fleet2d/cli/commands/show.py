@@ -1,4 +1,4 @@
-"""The command that draws: `fleet2d show`."""
+"""`fleet2d show`: draw a floor plan, a run or a diary."""
 
 from pathlib import Path
 from typing import Annotated, Literal, NamedTuple

@@ -20,7 +20,7 @@ MOST_STORED = 5
 """The most failing seeds of one scenario that are stored or drawn."""
 
 
-def run_tests(
+def test(
     arguments: Annotated[
         list[str],
         typer.Argument(

@@ -1,4 +1,4 @@
-"""The command that runs a stored run again: reproduce."""
+"""`fleet2d reproduce`: run a stored run again, and compare."""
 
 from pathlib import Path
 from typing import Annotated

@@ -1,15 +1,10 @@
-"""All commands of the command line."""
+"""The program `fleet2d`: what is common to all commands."""
 
 from typing import Annotated
 
 import typer
 
-from fleet2d.cli import inputs, pictures, runs
 from fleet2d.cli.plugins import Commands
-from fleet2d.cli.product_tests import run_tests
-from fleet2d.cli.reproduce import reproduce
-from fleet2d.cli.resume import resume
-from fleet2d.cli.verify import verify
 
 app = typer.Typer(
     cls=Commands,
@@ -20,20 +15,6 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
-for command in (
-    runs.run,
-    inputs.validate,
-    inputs.schema,
-    inputs.components,
-    pictures.show,
-    inputs.convert,
-    runs.export,
-    resume,
-    verify,
-    reproduce,
-):
-    app.command()(command)
-app.command("test")(run_tests)
 
 
 @app.callback()

@@ -1,0 +1,53 @@
+"""`fleet2d export`: write a run for others."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from fleet2d.errors import InputError
+from fleet2d.runs.exporters import exporter, formats
+from fleet2d.trust_options import TrustFiles, TrustFolders, restrict_to
+
+
+def _format_help() -> str:
+    described = (f"{name}: {text}" if text else f"{name}." for name, text in formats().items())
+    return f"Its format. {' '.join(described)}"
+
+
+def export(
+    directory: Annotated[Path, typer.Argument(metavar="RUN_DIR", help="A stored run.")],
+    out: Annotated[
+        Path | None, typer.Argument(help="The file to write, for other programs.")
+    ] = None,
+    layout: Annotated[str, typer.Option("--format", help=_format_help())] = "casas",
+    html: Annotated[
+        Path | None, typer.Option(help="The page to write: one file that plays anywhere.")
+    ] = None,
+    begin: Annotated[
+        str | None, typer.Option("--from", help="Where the page begins, like 'day 3 18:30'.")
+    ] = None,
+    end: Annotated[str | None, typer.Option("--to", help="Where the page ends.")] = None,
+    trust: TrustFiles = None,
+    trust_dir: TrustFolders = None,
+) -> None:
+    """Write a run for others: a file for other programs, or a web page in one file."""
+    from fleet2d.runs.run import open_run
+
+    if (out is None) == (html is None):
+        raise InputError(
+            "name exactly one output: FILE (see --format), or --html FILE (a web page)"
+        )
+    if html is None and (begin is not None or end is not None):
+        raise InputError("--from and --to need --html FILE")
+    run = open_run(directory)
+    if out is not None:
+        typer.echo(exporter(layout)(run, out))
+    elif html is not None:
+        from fleet2d.viewer.export import export_html
+        from fleet2d.viewer.moments import steps_of
+
+        first, last = steps_of(run, begin, end)
+        with restrict_to(trust, trust_dir):
+            export_html(run, html, first, last)
+        typer.echo(f"{html}: {html.stat().st_size / 1e6:.1f} MB")
