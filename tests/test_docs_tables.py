@@ -34,8 +34,8 @@ IN_WORDS = re.compile(
 )
 
 
-def fields_of(component: str | type[BaseModel]) -> type[BaseModel]:
-    return lookup("behavior", component) if isinstance(component, str) else component
+def fields_of(component: str | type[BaseModel], kind: str = "behavior") -> type[BaseModel]:
+    return lookup(kind, component) if isinstance(component, str) else component
 
 
 def tables(page: str, section: str) -> Iterator[tuple[list[str], list[str]]]:
@@ -81,14 +81,18 @@ def test_keys_of_a_table_exist_with_their_defaults(
     assert [] == wrong
 
 
-def test_keys_of_the_other_behaviors_exist_with_their_defaults() -> None:
+@pytest.mark.parametrize(("kind", "verb"), [("behavior", "does"), ("drive", "moves")])
+def test_keys_of_the_other_behaviors_and_of_drives_exist_with_their_defaults(
+    kind: str, verb: str
+) -> None:
     text = (DOCS / "robots.md").read_text(encoding="utf-8")
-    rows = text.split("| type | does | keys (default) |")[1].split("\n\n", 1)[0].splitlines()[2:]
+    rows = text.split(f"| type | {verb} | keys (default) |")[1].split("\n\n", 1)[0].splitlines()[2:]
     wrong = []
     for row in rows:
         name, _, cell = [part.strip() for part in row.strip("|").split("|")]
-        model = fields_of(name.strip("`"))
+        model = fields_of(name.split("`")[1], kind)
         for key, said in re.findall(r"(?:^|[,;] )`([a-z_]+)` \(([^):]*)", cell):
+            said = said.removesuffix(" m/s²")
             if not IN_WORDS.fullmatch(said) and not is_default(model, key, said):
                 wrong.append((name, key, said, model.model_fields[key].default))
     assert [] == wrong

@@ -288,7 +288,7 @@ CHANGES: dict[tuple[type, str], dict[str, Any]] = {
     },
     (User, ANA): {**BODY, "camera": {"range": [0, 5], "angle_deg": 200}},
     (Robot, "robots.astro"): {
-        **BODY, "camera": None, "cameras": {"rear": {"heading_deg": 180}},
+        **BODY, "drive": "holonomic", "camera": None, "cameras": {"rear": {"heading_deg": 180}},
         "perception": {"detection": {"distance": [[0, 1], [4, 0.2]]}},
         "battery": {
             "driving": "2 h", "standing": "9 h", "charging": "3 h", "charger": "kitchen",

@@ -22,6 +22,10 @@ if TYPE_CHECKING:
     from fleet2d.entities.actor import Actor as Actor
     from fleet2d.entities.behavior import Behavior as Behavior
     from fleet2d.entities.behavior import Situation as Situation
+    from fleet2d.entities.drives.drive import Drive as Drive
+    from fleet2d.entities.drives.drive import Leg as Leg
+    from fleet2d.entities.drives.drive import Moment as Moment
+    from fleet2d.entities.drives.drive import Route as Route
     from fleet2d.entities.plan import Plan as Plan
     from fleet2d.errors import ComponentError as ComponentError
     from fleet2d.errors import Fleet2DError as Fleet2DError
@@ -52,6 +56,7 @@ _HOME_OF = {
     "Algorithm": "algorithms.algorithm",
     "Behavior": "entities.behavior",
     "ComponentError": "errors",
+    "Drive": "entities.drives.drive",
     "Duration": "units",
     "FieldOfView": "sight.fov",
     "Fleet2DError": "errors",
@@ -62,11 +67,14 @@ _HOME_OF = {
     "HomeChanges": "floorplan.home.change",
     "InputError": "errors",
     "LabelledRegion": "floorplan.plan",
+    "Leg": "entities.drives.drive",
     "Length": "units",
     "Metric": "metrics.metric",
+    "Moment": "entities.drives.drive",
     "Plan": "entities.plan",
     "Present": "algorithms.algorithm",
     "RoomDistribution": "algorithms.output",
+    "Route": "entities.drives.drive",
     "Run": "runs.run",
     "Scenario": "scenario.model",
     "Share": "units",

@@ -45,6 +45,7 @@ if TYPE_CHECKING:
 PACKAGES = {
     "floorplan": "fleet2d.floorplan",
     "behavior": "fleet2d.entities",
+    "drive": "fleet2d.entities.drives",
     "object": "fleet2d.entities.objects",
     "algorithm": "fleet2d.algorithms",
     "presence_estimator": "fleet2d.algorithms.presence",

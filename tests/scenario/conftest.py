@@ -8,6 +8,7 @@ import pytest
 from fleet2d import component
 from fleet2d.component import Component, OneOf, register
 from fleet2d.entities.behavior import Behavior
+from fleet2d.entities.drives.differential import Differential
 from fleet2d.sight.line_of_sight import LineOfSight
 from fleet2d.units import Duration, InputPath, Length, Share
 
@@ -79,7 +80,8 @@ def stand_ins(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(component, "_REGISTRY", {})
     monkeypatch.setattr(component, "_ALIASES", {})
     monkeypatch.setattr(component, "_COMPLETE", set(component.PACKAGES))
-    register("sight", "line_of_sight")(LineOfSight)  # a default that every scenario has
+    register("sight", "line_of_sight")(LineOfSight)  # defaults that every scenario has
+    register("drive", "differential")(Differential)
     register("floorplan", "houseexpo", aliases=("he",))(File)
     register("floorplan", "empty")(Empty)
     register("behavior", "drift")(Drift)

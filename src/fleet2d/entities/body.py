@@ -1,5 +1,6 @@
 """A body in its home: where it is, where it can be, and the places that it knows."""
 
+import copy
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple, Protocol
@@ -7,8 +8,12 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from fleet2d.blame import blame
 from fleet2d.clock import Clock
 from fleet2d.entities.body_settings import BodySettings
+from fleet2d.entities.drives.differential import Differential
+from fleet2d.entities.drives.drive import Drive
+from fleet2d.entities.drives.timing import breakpoints
 from fleet2d.entities.furniture import furniture_of, room_of_furniture
 from fleet2d.entities.motion import Pose
 from fleet2d.entities.place import ANY, Point, RoomChoice, is_point, matching_rooms, parse_place
@@ -19,6 +24,8 @@ from fleet2d.floorplan.objects import PlacedObject, Posture
 from fleet2d.floorplan.plan import Room
 from fleet2d.kernels.headings import TURN
 from fleet2d.streams import Draws, stream_key
+
+I64 = NDArray[np.int64]
 
 NEVER = 1 << 62
 """The step of what never happens."""
@@ -79,6 +86,7 @@ class Body:
         notes: Which kinds of rooms and furniture the home lacks, so that keys were left out.
         part: The connected part of its space that it is in.
         row: Its row among the bodies of the run.
+        drive: How it moves along routes; None: as `Differential`, which the core computes.
     """
 
     name: str
@@ -95,6 +103,9 @@ class Body:
         self._space: tuple[tuple[int, int], Space] = self.arrangement, self._present_space()
         self.speed = self.entity.speed * lattice.units_per_m  # units per second
         self.turn_rate = self.entity.turn_rate_deg / 360 * TURN  # headings per second
+        drive: Drive | None = getattr(self.entity, "drive", None)
+        is_usual = drive is None or type(drive) is Differential
+        self.drive: Drive | None = None if is_usual else copy.deepcopy(drive)
         self.part = 0
         self._places: tuple[Space | None, tuple[PlacedObject, ...], dict[tuple[str, int], PlaceAt]]
         self._places = None, (), {}
@@ -196,6 +207,33 @@ class Body:
     def stream(self, purpose: str) -> np.uint64:
         """Return the key of its random stream for a purpose."""
         return stream_key(self.seed, self.path, purpose)
+
+    def breakpoints(self, route: I64, begin_us: int, heading: int) -> I64:
+        """Return the breakpoints of its drive on a route (n, 2), after its beginning.
+
+        Returns:
+            Time [us], x, y [lattice], heading [1/4096 turn], away; int64 (m, 5).
+
+        Raises:
+            ComponentError: The drive fails, or doesn't lead to the end of the route.
+        """
+        assert self.drive is not None
+        rates, units_per_m = (self.speed, self.turn_rate), self.home.plan.lattice.units_per_m
+        with self._blame_drive():
+            rows = breakpoints(self.drive, route, heading, rates, units_per_m)
+        rows[:, 0] += begin_us
+        return rows
+
+    def seconds(self, metres: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return what it thinks that ways of some lengths take, without turns [s]."""
+        lattice = self.home.plan.lattice
+        if self.drive is None:
+            return metres * lattice.units_per_m / self.speed
+        with self._blame_drive():
+            return self.drive.seconds(metres, self.speed / lattice.units_per_m)
+
+    def _blame_drive(self) -> blame:
+        return blame(f"{self.path}.drive", None if self._bodies is None else self._bodies.step)
 
     def reachable_rooms(self) -> list[Room]:
         """Return the rooms in which it can stand, in index order."""

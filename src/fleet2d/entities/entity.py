@@ -9,6 +9,8 @@ from fleet2d.component import OneOf
 from fleet2d.entities.battery import Battery
 from fleet2d.entities.behavior import Behavior
 from fleet2d.entities.body_settings import BodySettings
+from fleet2d.entities.drives.differential import Differential
+from fleet2d.entities.drives.drive import Drive
 from fleet2d.entities.giving_way import GivesWay
 from fleet2d.entities.localization import Localization
 from fleet2d.problems import problem_at
@@ -63,6 +65,7 @@ class Robot(Entity):
         radius: Radius of the body [m].
         speed: Driving speed [m/s].
         turn_rate_deg: How fast it turns on the spot [deg/s].
+        drive: How it moves along its routes.
         camera: Its only camera; null: it is blind, or has `cameras`.
         cameras: Several cameras, by name, in place of `camera`; their order doesn't matter.
         perception: How its cameras err, unless they say so themselves; null: they don't.
@@ -74,6 +77,7 @@ class Robot(Entity):
     radius: Length = Field(default=0.15, gt=0, le=2)
     speed: Speed = Field(default=0.6, ge=0.01, le=20)
     turn_rate_deg: TurnRateDeg = Field(default=90.0, ge=0.01, le=36000)
+    drive: Annotated[Drive, OneOf("drive")] = Differential()
     camera: Camera | None = Camera()
     cameras: dict[str, Camera] = Field(default={})
     perception: Perception | None = None

@@ -13,7 +13,7 @@ from fleet2d.errors import ComponentError, NoWayError
 from fleet2d.events import KINDS
 from fleet2d.floorplan.home.space import Space, straight_way
 from fleet2d.floorplan.objects import POSTURES, PlacedObject, Posture
-from fleet2d.kernels.headings import TURN
+from fleet2d.kernels.headings import TURN, turn_between
 from fleet2d.kernels.motion import Breakpoints, Legs, WalkRule
 from fleet2d.problems import did_you_mean, suggest
 from fleet2d.units import LONGEST_DURATION, micros
@@ -135,7 +135,7 @@ class Plan:
             Whether it does; `go_to_point` does the rest in more steps.
         """
         body, routes = self._body, space.shortest
-        if routes is None:
+        if routes is None or body.drive is not None:
             return False
         end = self.legs.go(
             self.time_us, self.x, self.y, self.heading, routes, x, y, body.speed, body.turn_rate
@@ -146,6 +146,9 @@ class Plan:
 
     def _walk(self, route: I64) -> None:
         body = self._body
+        if body.drive is not None:
+            self.follow(body.breakpoints(route, self.time_us, self.heading))
+            return
         self.time_us, self.x, self.y, self.heading, _ = self.legs.walk(
             self.time_us, self.heading, route, body.speed, body.turn_rate
         )
@@ -168,18 +171,14 @@ class Plan:
         if self.away or (self.x, self.y) != (at.x, at.y):
             self.go_to_point(*at.approach)
         self._check_goes_on()
-        body = self._body
-        self.time_us, self.x, self.y, self.heading, _ = self.legs.settle(
-            self.time_us,
-            self.x,
-            self.y,
-            self.heading,
-            at.x,
-            at.y,
-            at.heading,
-            body.speed,
-            body.turn_rate,
-        )
+        body, now = self._body, (self.time_us, self.x, self.y, self.heading)
+        if body.drive is None:
+            self.time_us, self.x, self.y, self.heading, _ = self.legs.settle(
+                *now, at.x, at.y, at.heading, body.speed, body.turn_rate
+            )
+        else:
+            self._step_to(at.x, at.y)
+            self._turn(turn_between(self.heading, at.heading))
         self.take(at.posture)
         return self.note("uses", at.name)
 

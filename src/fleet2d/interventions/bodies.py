@@ -134,7 +134,7 @@ class Replan(BodyIntervention):
 
 
 @register("intervention", "drive")
-class Drive(BodyIntervention):
+class TakeControl(BodyIntervention):
     """Control a body externally for the rest of the run, by plans instead of its behaviors."""
 
     def begin(self, world: World) -> None:

@@ -20,6 +20,7 @@ ENTRIES = ("users", "robots", "objects", "algorithms", "metrics", "expect")
 _SLOTS = (
     (re.compile(r"floorplan"), "floorplan"),
     (re.compile(r"(users|robots)/[^/]+(/behaviors/\d+)?"), "behavior"),
+    (re.compile(r"robots/[^/]+/drive"), "drive"),
     (re.compile(r"objects/[^/]+"), "object"),
     (re.compile(r"algorithms/[^/]+"), "algorithm"),
     (re.compile(r"metrics/[^/]+"), "metric"),

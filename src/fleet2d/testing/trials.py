@@ -9,7 +9,7 @@ from typing import Any
 
 from fleet2d.engine.simulation import Simulation
 from fleet2d.expectations.verdict import Verdict
-from fleet2d.interventions.bodies import Decide, Drive
+from fleet2d.interventions.bodies import Decide, TakeControl
 from fleet2d.interventions.intervention import Intervention
 from fleet2d.scenario.model import Scenario
 from fleet2d.testing.claim import Variant
@@ -45,7 +45,7 @@ class Trial(Simulation):
         number = self.acts
         self.acts += 1
         # The commands of a driven body can't be left out: it would have no plan.
-        if number not in self._without or isinstance(act, Drive | Decide):
+        if number not in self._without or isinstance(act, TakeControl | Decide):
             super().intervene(act)
 
     @property

@@ -23,9 +23,15 @@ LatticePoint = tuple[int, int]
 
 
 def way_seconds(actor: Actor, start: LatticePoint, goal: LatticePoint) -> float | None:
-    """Return how long a robot drives between two lattice points, without turns; None: no way."""
+    """Return how long a robot drives between two lattice points; None: no way.
+
+    The usual drive, `differential`, leaves out its turns; others begin in the direction of the way.
+    """
     route = actor.space.route(start, goal)
-    return None if route is None else sum_in_order(_legs(route)) / actor.speed
+    if route is None or actor.drive is None:
+        return None if route is None else sum_in_order(_legs(route)) / actor.speed
+    rows = actor.breakpoints(route, 0, _first_heading(route))
+    return float(rows[-1, 0]) / 1e6 if len(rows) else 0.0
 
 
 def spot_near(now: Situation, x: float, y: float, distance: float) -> LatticePoint:
@@ -110,6 +116,12 @@ def check_has_camera(actor: Actor, behavior: str) -> None:
 
 def _is_free(actor: Actor, point: NDArray[np.int64]) -> bool:
     return actor.space.part_at(int(point[0]), int(point[1])) == actor.part
+
+
+def _first_heading(route: NDArray[np.int64]) -> int:
+    """Return the direction of the first leg of a route [1/4096 turn]."""
+    (dx, dy), *_ = np.diff(route, axis=0).tolist() or [[0, 0]]
+    return heading_of(dx, dy)
 
 
 def _legs(route: NDArray[np.int64]) -> list[float]:

@@ -110,10 +110,10 @@ class Explore(Behavior):
         near, gain = near[shows_enough], np.array(gains, np.float64)[shows_enough]
         if not len(near):
             return None
-        actor, lattice = now.actor, now.home.plan.lattice
+        actor = now.actor
         position = (actor.state.x, actor.state.y)
         metres = actor.space.distances(position, centres(self.stands[near]))
-        seconds = metres * lattice.units_per_m / actor.speed + TURN / actor.turn_rate
+        seconds = actor.seconds(metres) + TURN / actor.turn_rate
         best = int(np.argmax(gain / seconds))
         self.is_shut_out = not bool(np.isfinite(seconds[best]))
         return None if self.is_shut_out else int(near[best])

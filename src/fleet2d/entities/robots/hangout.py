@@ -172,8 +172,7 @@ class Hangout(BeliefBehavior):
             self.ways = space, {}
         cell = actor.state.x // SUB, actor.state.y // SUB
         if cell not in self.ways[1]:
-            metres = space.distances((actor.state.x, actor.state.y), points)
-            seconds = metres * actor.home.plan.lattice.units_per_m / actor.speed
+            seconds = actor.seconds(space.distances((actor.state.x, actor.state.y), points))
             is_reachable = np.isfinite(seconds)
             way = np.where(is_reachable, seconds, 0.0)
             move = way / (way + self.tau.total_seconds())

@@ -75,7 +75,8 @@ class HangoutPlaces:
         sight. `path`: exp(-t / tau), with t the travel time to the nearest point of the room [s].
         """
         actor = self._actor
-        key = ("nearness", *self._key, by, tau, actor.home.walls, sight_range(actor), actor.speed)
+        reach = actor.speed, type(actor.drive), repr(actor.drive)
+        key = ("nearness", *self._key, by, tau, actor.home.walls, sight_range(actor), *reach)
         # In column order: it is read room by room.
         return actor.home.cached(
             key, lambda: read_only(np.asfortranarray(self._compute_nearness(by, tau)))
@@ -136,14 +137,13 @@ class HangoutPlaces:
         return share
 
     def _path(self, room: Room, tau: float) -> F64:
-        actor, lattice = self._actor, self._actor.home.plan.lattice
+        actor = self._actor
         cells = actor.space.cells(room.index, actor.part)
         if not len(cells):
             return np.zeros(len(self.points))
         field = actor.space.distance_field(cells[:, ::-1] * SUB + CELL_CENTRE)
         metres = field[self.points[:, 1] // SUB, self.points[:, 0] // SUB]
-        seconds = metres * lattice.units_per_m / actor.speed
-        return decay(seconds / tau)
+        return decay(actor.seconds(metres) / tau)
 
     def _blocking(self) -> F64:
         """Return the share of people's ways from room to room that a robot at each place blocks."""

@@ -1,0 +1,1 @@
+"""Drives of robots: how they move along a route, one per module."""
