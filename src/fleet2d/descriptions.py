@@ -4,7 +4,7 @@ import inspect
 import re
 from typing import Any
 
-from pydantic import BaseModel, GetJsonSchemaHandler
+from pydantic import BaseModel, ConfigDict, GetJsonSchemaHandler
 from pydantic_core import CoreSchema
 
 _SECTION = re.compile(r"^(?:Attributes|Examples?|Raises):$", re.MULTILINE)
@@ -44,6 +44,9 @@ class DescribedModel(BaseModel):
 
     A `description` of a field itself counts more.
     """
+
+    # To build the first validator loads modules that a home without scenario doesn't need.
+    model_config = ConfigDict(defer_build=True)
 
     @classmethod
     def __get_pydantic_json_schema__(

@@ -1,6 +1,5 @@
 """Errors that validators raise: a message about a key, with the nearest valid name."""
 
-import difflib
 from collections.abc import Callable, Iterable, Mapping
 from typing import get_args
 
@@ -89,6 +88,8 @@ def did_you_mean(name: object, known: Iterable[object]) -> str:
     name = str(name)[:60]
     names = [str(k) for k in known]
     longer = [k for k in names if str(name) and k.startswith(f"{name}_")]
+    import difflib  # only messages need it
+
     near = longer or difflib.get_close_matches(str(name), names, n=1)
     return f": did you mean {near[0]!r}?" if near else "."
 

@@ -10,8 +10,8 @@ from typing import Any
 
 from fleet2d.component import components, lookup
 from fleet2d.errors import FloorPlanError
-from fleet2d.floorplan.formats.bundled import HOMES, bundled_names
-from fleet2d.floorplan.formats.native import native_plan, read_native
+from fleet2d.floorplan.formats.bundled import bundled_names, read_bundled
+from fleet2d.floorplan.formats.native import native_plan
 from fleet2d.floorplan.formats.native_file import FORMAT
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.source import YAML, FloorPlanSource, read_document, read_yaml
@@ -50,7 +50,7 @@ def load_floorplan(
             f"{plan} is not a picture: leave out --resolution, because the file contains lengths"
         )
     if str(plan) in names:
-        return read_native(HOMES / f"{plan}.json", usual)
+        return read_bundled(str(plan), usual)
     seed = SYNTHETIC.fullmatch(str(plan))
     if seed is not None:
         home = lookup("floorplan", "synthetic").model_validate(

@@ -8,10 +8,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
-import yaml
 from pydantic import AfterValidator, Field, TypeAdapter, ValidationError, model_validator
 
-from fleet2d import yaml_tree
 from fleet2d.bounds import FILE_BYTES, JSON_VALUES, one_line, read_bytes
 from fleet2d.component import Component
 from fleet2d.errors import FloorPlanError, InputError
@@ -23,7 +21,6 @@ from fleet2d.floorplan.home.layers import LayerSettings, check_layers
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.paths import InputPath
 from fleet2d.units import Length
-from fleet2d.yaml_tree import NodeError
 
 YAML = (".yaml", ".yml")
 # Homes that a process caches, read and furnished.
@@ -198,12 +195,17 @@ def read_yaml(path: Path) -> dict[str, Any]:
     Raises:
         FloorPlanError: There is no such file, or it doesn't hold a YAML mapping.
     """
+    # A home in a JSON file is set up without them.
+    import yaml
+
+    from fleet2d import yaml_tree
+
     text = _read_text(path, "YAML")
     try:
         content = yaml_tree.parse(text)
     except (yaml.YAMLError, RecursionError) as error:
         raise FloorPlanError(f"{path} is not YAML: {one_line(error, 200)}") from None
-    except NodeError as error:
+    except yaml_tree.NodeError as error:
         line = error.node.start_mark.line + 1
         raise FloorPlanError(f"{path}, line {line}: {error}") from None
     except InputError as error:

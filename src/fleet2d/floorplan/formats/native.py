@@ -21,7 +21,7 @@ from shapely import Polygon
 from fleet2d.component import register
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.formats.fields import shown_value, validate
-from fleet2d.floorplan.formats.native_file import FORMAT, PLAN_FILE, VERSION, space_of
+from fleet2d.floorplan.formats.native_file import FORMAT, PLAN_FILE, VERSION, PlanFile, space_of
 from fleet2d.floorplan.geometry.lattice import UNITS_PER_CELL, Lattice
 from fleet2d.floorplan.objects import PlacedObject, UsePlace
 from fleet2d.floorplan.plan import FloorPlan
@@ -74,19 +74,23 @@ def native_plan(content: dict[str, Any], path: Path, cell: float = 0.05) -> Floo
             raise FloorPlanError(
                 f"version {version} of the format is not known: this Fleet2D reads {VERSION}"
             )
-        file = validate(PLAN_FILE, {**content, "version": VERSION})
-        return FloorPlan.build(
-            file.name or path.stem,
-            space_of(file.free),
-            [room.to_region() for room in file.rooms or ()],
-            cell,
-            source=f"Fleet2D floor plan, {path.name}",
-            entrance=file.entrance,
-            doorways=None if file.doorways is None else [d.to_line() for d in file.doorways],
-            regions_are="none" if file.rooms is None else "exact",
-            objects=[thing.to_object() for thing in file.objects],
-            no_go=[area.polygon for area in file.no_go],
-        )
+        return plan_of(validate(PLAN_FILE, {**content, "version": VERSION}), path, cell)
+
+
+def plan_of(file: PlanFile, path: Path, cell: float) -> FloorPlan:
+    """Return the floor plan of a file."""
+    return FloorPlan.build(
+        file.name or path.stem,
+        space_of(file.free),
+        [room.to_region() for room in file.rooms or ()],
+        cell,
+        source=f"Fleet2D floor plan, {path.name}",
+        entrance=file.entrance,
+        doorways=None if file.doorways is None else [d.to_line() for d in file.doorways],
+        regions_are="none" if file.rooms is None else "exact",
+        objects=[thing.to_object() for thing in file.objects],
+        no_go=[area.polygon for area in file.no_go],
+    )
 
 
 def native_document(plan: FloorPlan) -> dict[str, Any]:

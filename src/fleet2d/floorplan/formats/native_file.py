@@ -1,5 +1,6 @@
 """The content of a file in Fleet2D's own floor plan format, and its JSON Schema."""
 
+from functools import cached_property
 from typing import Annotated, Any, Literal, Self
 
 import shapely
@@ -50,7 +51,7 @@ class AreaEntry(FileModel):
         _check_valid(self.polygon)
         return self
 
-    @property
+    @cached_property
     def polygon(self) -> Polygon:
         """The area [m]."""
         return Polygon(self.outline, self.holes)
@@ -232,6 +233,35 @@ class PlanFile(FileModel):
 
 
 PLAN_FILE = TypeAdapter(PlanFile)
+
+
+_LISTS: dict[str, type[FileModel]] = {
+    "free": AreaEntry,
+    "rooms": RoomEntry,
+    "region": AreaEntry,
+    "doorways": DoorwayEntry,
+    "objects": ObjectEntry,
+    "uses": UseEntry,
+    "no_go": AreaEntry,
+}
+_AREAS = ("polygon", "footprint")
+_POINTS = ("start", "end", "approach", "entrance")
+
+
+def unchecked(model: type[FileModel], content: Any) -> Any:
+    """Return the content of a file as a model, without checking it.
+
+    To check takes most of the time of reading a home, and loads modules that nothing else needs.
+    """
+    fields: dict[str, Any] = {"outline": content} if isinstance(content, list) else dict(content)
+    for key, value in fields.items():
+        if key in _LISTS:
+            fields[key] = [unchecked(_LISTS[key], item) for item in value]
+        elif key in _AREAS:
+            fields[key] = unchecked(AreaEntry, value)
+        elif key in _POINTS:
+            fields[key] = tuple(value)
+    return model.model_construct(**fields)
 
 
 def native_schema() -> dict[str, Any]:

@@ -10,7 +10,6 @@ from fleet2d.component import Settings
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.arrangement import number_objects
 from fleet2d.floorplan.furniture.catalogue import FURNITURE, stand_furniture
-from fleet2d.floorplan.furniture.furnish import furnish
 from fleet2d.floorplan.home.standing import BODY_RADIUS, standing_cells, with_approaches
 from fleet2d.floorplan.objects import Blocks, PlacedObject
 from fleet2d.floorplan.plan import FloorPlan
@@ -90,7 +89,11 @@ def place_furniture(
         standing = standing_cells(plan, BODY_RADIUS, everything)
         reachable = [with_approaches(plan, thing, standing, everything) for thing in things]
         plan = replace(plan, objects=number_objects([*plan.objects, *reachable]))
-    return plan if rules is None else furnish(plan, rules.seed, rules.density)
+    if rules is None:
+        return plan
+    from fleet2d.floorplan.furniture.furnish import furnish  # few homes need the rules
+
+    return furnish(plan, rules.seed, rules.density)
 
 
 def _check_stands(plan: FloorPlan, thing: PlacedObject, where: str) -> None:

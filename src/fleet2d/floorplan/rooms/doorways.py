@@ -188,10 +188,13 @@ def _with_corner(polygon: Polygon, point: NDArray[np.float64]) -> Polygon:
     if (shapely.get_coordinates(polygon) == point).all(axis=1).any():
         return polygon
     rings = [np.asarray(ring.coords) for ring in (polygon.exterior, *polygon.interiors)]
-    walls = [(r, i) for r, ring in enumerate(rings) for i in range(len(ring) - 1)]
-    lines = shapely.linestrings([rings[r][i : i + 2] for r, i in walls])
-    ring, after = walls[int(np.argmin(shapely.distance(lines, shapely.Point(point))))]
-    rings[ring] = np.insert(rings[ring], after + 1, point, axis=0)
+    walls = np.concatenate([np.stack([ring[:-1], ring[1:]], axis=1) for ring in rings])
+    after = int(np.argmin(shapely.distance(shapely.linestrings(walls), shapely.Point(point))))
+    number = 0
+    while after >= len(rings[number]) - 1:
+        after -= len(rings[number]) - 1
+        number += 1
+    rings[number] = np.insert(rings[number], after + 1, point, axis=0)
     return Polygon(rings[0], rings[1:])
 
 
