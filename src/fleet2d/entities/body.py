@@ -13,7 +13,7 @@ from fleet2d.clock import Clock
 from fleet2d.entities.body_settings import BodySettings
 from fleet2d.entities.drives.differential import Differential
 from fleet2d.entities.drives.drive import Drive
-from fleet2d.entities.drives.timing import breakpoints
+from fleet2d.entities.drives.timing import breakpoints, estimate
 from fleet2d.entities.furniture import furniture_of, room_of_furniture
 from fleet2d.entities.motion import Pose
 from fleet2d.entities.place import ANY, Point, RoomChoice, is_point, matching_rooms, parse_place
@@ -230,7 +230,7 @@ class Body:
         if self.drive is None:
             return metres * lattice.units_per_m / self.speed
         with self._blame_drive():
-            return self.drive.seconds(metres, self.speed / lattice.units_per_m)
+            return estimate(self.drive, metres, self.speed / lattice.units_per_m)
 
     def _blame_drive(self) -> blame:
         return blame(f"{self.path}.drive", None if self._bodies is None else self._bodies.step)

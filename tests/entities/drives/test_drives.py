@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 from tests.entities.drives.drives import CORNER, driven
 from tests.entities.robots.robots import assert_same_for_every_max_span, events, home_with
-from tests.scenes import digests, path, run
+from tests.scenes import digests, path, run, table
 
 import fleet2d
 from fleet2d import Behavior, Drive, Moment, Plan, Route, Situation
 from fleet2d.component import components
+from fleet2d.entities.drives import timing
 from fleet2d.entities.robots.approach import way_seconds
 from fleet2d.errors import ComponentError, ScenarioError
 from fleet2d.scenario.compose import compose
@@ -54,19 +55,23 @@ def busy(drive: Any) -> dict[str, Any]:
     behaviors = [
         {"type": "dock", "until": "40 %"},
         "come",
-        {"type": "find", "user": "ana", "every": "6 min"},
+        {"type": "find", "user": "ana", "every": "4 min"},
         {"type": "opportunistic", "interaction": "10 s", "again": "5 min"},
-        {"type": "follow", "when": "07:16-07:19", "longest": "1 min"},
-        {"type": "patrol", "when": "07:19-07:22", "dwell": "5 s"},
+        {"type": "follow", "when": "07:10-07:12", "longest": "1 min"},
+        {"type": "patrol", "when": "07:12-07:13", "dwell": "5 s"},
         {"type": "hangout", "period": "2 min", "explore": "50 %"},
     ]
     content = home_with(
         behaviors,
-        "25 min",
+        "15 min",
         {"type": "routine", "persona": "works_from_home"},
         astro={"drive": drive, "battery": BATTERY, "gives_way": {"patience": "3 s"}},
         simulation={"people_block": "3 s"},
-        script=[{"call": "astro", "to": "bedroom", "at": "07:08"}],
+        script=[
+            {"call": "astro", "to": "bedroom", "at": "07:08"},
+            {"put": "bolt", "to": "kitchen", "at": "07:04:05"},
+        ],
+        artifacts={"trajectories": "every step"},
     )
     content["users"]["ben"] = {"type": "meander"}
     content["robots"]["bolt"] = {"type": "patrol", "dwell": "5 s", "drive": drive}
@@ -81,9 +86,13 @@ def test_a_run_is_the_same_for_every_span_and_continues_from_a_copy_and_from_a_f
     whole = assert_same_for_every_max_span(content, 600, 7, 1)
     kinds = {name for _, name, _ in events(whole)}
     assert {"docks", "find_begins", "relocates", "gives_way", "called"} <= kinds
+    for robot in ("astro", "bolt"):
+        rows, rebuilt = table(whole, "trajectories", entity=robot), path(whole, robot)
+        assert rows["x"].tolist() == rebuilt.x.tolist()
+        assert rows["heading"].tolist() == rebuilt.heading.tolist()
 
     simulation = fleet2d.Simulation(content)
-    simulation.advance(777)
+    simulation.advance(537)
     branch = copy.deepcopy(simulation)
     simulation.save(tmp_path / "half.sim")
     assert digests(whole) == digests(branch.run())
@@ -146,6 +155,22 @@ def test_nonsense_is_refused(moments: Any, words: str, monkeypatch: pytest.Monke
     with pytest.raises(ComponentError) as caught:
         driven(Returned(), CORNER)
     assert words in str(caught.value)
+
+
+class Hopes(Returned):
+    """Estimates what a test sets."""
+
+    estimate: float | list[float]
+
+    def seconds(self, metres: Any, speed: float) -> Any:
+        return np.array(self.estimate)
+
+
+@pytest.mark.parametrize("estimate", [2.0, [1.0], [-1.0, 1.0], [float("nan"), 0.0]])
+def test_estimates_that_are_no_times_are_refused(estimate: Any) -> None:
+    drive = Hopes.model_construct(estimate=estimate)
+    with pytest.raises(ComponentError, match=r"Hopes estimated .* of shape \(2,\)"):
+        timing.estimate(drive, np.array([1.0, 2.0]), 0.6)
 
 
 @pytest.mark.parametrize(

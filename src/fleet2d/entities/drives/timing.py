@@ -17,6 +17,7 @@ LONGEST_S = 864_000
 NEAR_M = 1e-6
 
 I64 = NDArray[np.int64]
+F64 = NDArray[np.float64]
 
 
 def breakpoints(
@@ -62,6 +63,26 @@ def breakpoints(
         rows.append(row(moment, leg))
         last = moment
     return np.array(rows, np.int64).reshape(-1, 5)
+
+
+def estimate(drive: Drive, metres: F64, speed: float) -> F64:
+    """Return the times [s] that a drive estimates for ways of some lengths.
+
+    Args:
+        drive: The drive of the robot.
+        metres: The lengths, inf where there is no way.
+        speed: The speed of the robot [m/s].
+
+    Raises:
+        ComponentError: They are not as many times of 0 or more.
+    """
+    seconds = np.asarray(drive.seconds(metres, speed), np.float64)
+    if seconds.shape != metres.shape or not (seconds >= 0).all():
+        raise ComponentError(
+            f"the drive {drive.type_name} estimated {seconds} s for ways of {metres} m: expected"
+            f" times of 0 or more, of shape {metres.shape}"
+        )
+    return seconds
 
 
 def _checked(drive: Drive, route: Route, length: float) -> Iterator[Moment]:
