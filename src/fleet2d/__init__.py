@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from fleet2d.algorithms.history import History as History
     from fleet2d.algorithms.output import RoomDistribution as RoomDistribution
     from fleet2d.component import register as register
+    from fleet2d.engine.interrupts.interrupt import Interrupt as Interrupt
+    from fleet2d.engine.interrupts.interrupt import SpanView as SpanView
     from fleet2d.engine.reproduce import reproduce as reproduce
     from fleet2d.engine.resume import resume as resume
     from fleet2d.engine.run import run as run
@@ -67,6 +69,7 @@ _HOME_OF = {
     "HomeChange": "floorplan.home.change",
     "HomeChanges": "floorplan.home.change",
     "InputError": "errors",
+    "Interrupt": "engine.interrupts.interrupt",
     "LabelledRegion": "floorplan.plan",
     "Leg": "entities.drives.drive",
     "Length": "units",
@@ -81,6 +84,7 @@ _HOME_OF = {
     "Share": "units",
     "Simulation": "engine.simulation",
     "Situation": "entities.behavior",
+    "SpanView": "engine.interrupts.interrupt",
     "Study": "studies.reader",
     "VisibleRegion": "sight.region",
     "load_floorplan": "floorplan.load",

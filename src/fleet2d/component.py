@@ -51,6 +51,7 @@ PACKAGES = {
     "presence_estimator": "fleet2d.algorithms.presence",
     "presence_model": "fleet2d.algorithms.presence",
     "metric": "fleet2d.metrics",
+    "interrupt": "fleet2d.engine.interrupts",
     "sight": "fleet2d.sight",
     "intervention": "fleet2d.interventions",
 }

@@ -69,6 +69,7 @@ def decide(state: State, span: Span) -> None:
                 actor, step, state.take_pending(row), state.learners.readable_outputs
             )
             due = not actor.goes_on(situation)
+            state.interruptions.expect(row)  # for other events, if other behaviors listen now
         if due:
             state.end_plan(row, step)
             actor.decide(situation)

@@ -13,6 +13,7 @@ from fleet2d.engine.cameras import Cameras, open_cameras
 from fleet2d.engine.changes import Changes
 from fleet2d.engine.clearance import Clearance
 from fleet2d.engine.encounters import Encounters
+from fleet2d.engine.interruptions import SIGHT_EVENTS, Interruptions
 from fleet2d.engine.interventions import Interventions
 from fleet2d.engine.layers import LayerBook, lay_layers
 from fleet2d.engine.learners import Learners
@@ -23,7 +24,7 @@ from fleet2d.engine.state import InView, State
 from fleet2d.engine.tables import table_specs
 from fleet2d.entities.decisions import DecidingActor
 from fleet2d.entities.objects.door import Door
-from fleet2d.errors import PlacementError, ScenarioError
+from fleet2d.errors import ComponentError, PlacementError, ScenarioError
 from fleet2d.events import EventKind, EventStream
 from fleet2d.floorplan.home.home import Home
 from fleet2d.interventions.script import causes_errors
@@ -59,7 +60,7 @@ def set_up(scenario: Scenario, clock: Clock, seed: int, store: RunStore) -> Stat
     sensors.awaited = EventKind.SENSOR in learners.awaited
     log = _log(basis, cameras, recorder) if learners.all else None
     clearance, blocking = Clearance(basis.users, basis.robots), BlockedWays(basis)
-    encounters = Encounters(basis.users, basis.robots)
+    encounters, interruptions = Encounters(basis.users, basis.robots), Interruptions(basis)
     state = State(
         bodies=basis.bodies,
         actors=basis.actors,
@@ -68,6 +69,7 @@ def set_up(scenario: Scenario, clock: Clock, seed: int, store: RunStore) -> Stat
         clearance=clearance,
         blocking=blocking,
         encounters=encounters,
+        interruptions=interruptions,
         sensors=sensors,
         user_cameras=user_cameras,
         cameras=cameras,
@@ -85,6 +87,7 @@ def set_up(scenario: Scenario, clock: Clock, seed: int, store: RunStore) -> Stat
             *user_cameras,
             *cameras,
             encounters,
+            interruptions,
             sensors,
             *layers.areas,
         ],
@@ -165,8 +168,13 @@ def _prefix_errors(path: str) -> Iterator[None]:
 
 
 def _check_reads(scenario: Scenario, actors: list[DecidingActor]) -> None:
-    """Refuse behaviors that read an unknown algorithm."""
+    """Refuse behaviors that read an unknown algorithm, or listen to an unknown event."""
     for actor in actors:
+        for name in sorted({name for b in actor.behaviors for name in b.listens} - SIGHT_EVENTS):
+            try:
+                actor.entity.check_interrupt(name)
+            except ComponentError as error:
+                raise ScenarioError(f"{actor.path} listens to {name!r}: {error}") from error
         for name in (name for behavior in actor.behaviors for name in behavior.reads()):
             if name not in scenario.algorithms:
                 raise ScenarioError(

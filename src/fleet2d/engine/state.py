@@ -19,6 +19,7 @@ from fleet2d.engine.cameras import Cameras
 from fleet2d.engine.changes import Changes
 from fleet2d.engine.clearance import Clearance
 from fleet2d.engine.encounters import Encounters
+from fleet2d.engine.interruptions import Interruptions
 from fleet2d.engine.interventions import Interventions
 from fleet2d.engine.layers import LayerBook
 from fleet2d.engine.learners import Learners
@@ -51,7 +52,7 @@ class State:
         home: The present home: doors, furniture, rooms, layers.
         changes: The changes of the home.
         watchers: All followers of the bodies, in their order.
-        clearance, blocking, encounters, sensors: Some of the watchers.
+        clearance, blocking, encounters, interruptions, sensors: Some of the watchers.
         user_cameras: The cameras of users.
         cameras: The cameras of robots.
         layers: What robots have seen of the home, and when layers are stored.
@@ -78,6 +79,7 @@ class State:
     clearance: Clearance
     blocking: BlockedWays
     encounters: Encounters
+    interruptions: Interruptions
     sensors: Sensors
     user_cameras: list[Cameras]
     cameras: list[Cameras]
@@ -134,6 +136,7 @@ class State:
         self.notes_emitted[row] = 0
         self.emit_notes(row, step)
         self.recorder.after_plan(row, step)
+        self.interruptions.expect(row)
         if self.expectations is not None:
             self.expectations.begin_plan(self.actors[row])
 

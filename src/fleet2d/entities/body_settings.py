@@ -4,8 +4,10 @@ from typing import ClassVar
 
 from pydantic import Field
 
-from fleet2d.component import Settings
+from fleet2d.component import Settings, components, lookup
 from fleet2d.entities.place import Place
+from fleet2d.errors import ComponentError, ScenarioError
+from fleet2d.problems import suggest
 from fleet2d.sight.camera import Camera
 from fleet2d.units import AngleDeg, Length, Speed, TurnRateDeg
 
@@ -42,7 +44,20 @@ class BodySettings(Settings):
         """Its cameras by name; none, unless a subclass has some."""
         return {}
 
-    @property
-    def interrupts(self) -> frozenset[str]:
-        """The events that a plan may name to be interrupted by; found by watchers."""
-        return frozenset(self.sight_events if self.eyes else ())
+    def check_interrupt(self, name: str) -> None:
+        """Check that an event may end its plans: one of its cameras, or a registered interrupt.
+
+        Raises:
+            ComponentError: There is none of that name, or it needs a camera.
+        """
+        own = self.sight_events if self.eyes else ()
+        if name in own:
+            return
+        try:
+            lookup("interrupt", name)
+        except ScenarioError as error:
+            if ":" in name:
+                raise ComponentError(str(error)) from error
+            known = suggest(name, sorted({*own, *components("interrupt")}), "These do")
+            hint = "" if own else f" ({' and '.join(self.sight_events)} need a camera)"
+            raise ComponentError(f"no event {name!r} interrupts its plans{known}{hint}") from error

@@ -15,10 +15,11 @@ from fleet2d.floorplan.home.space import Space, straight_way
 from fleet2d.floorplan.objects import POSTURES, PlacedObject, Posture
 from fleet2d.kernels.headings import TURN, turn_between
 from fleet2d.kernels.motion import Breakpoints, Legs, WalkRule
-from fleet2d.problems import did_you_mean, suggest
+from fleet2d.problems import did_you_mean
 from fleet2d.units import LONGEST_DURATION, micros
 
 if TYPE_CHECKING:
+    from fleet2d.component import Component
     from fleet2d.entities.body import Body
     from fleet2d.entities.place import Point, RoomChoice
 
@@ -339,23 +340,23 @@ class Plan:
         """Call a person by name, or everybody who is near: people who react to robots may come."""
         return self.note("calls", user)
 
-    def interrupt_on(self, *events: str) -> Self:
+    def interrupt_on(self, *events: "str | type[Component]") -> Self:
         """Ask the behavior again as soon as one of these events happens.
 
         A robot with a camera has the events user_seen and user_lost, a user with a camera
-        robot_seen and robot_lost.
+        robot_seen and robot_lost. All bodies have the interrupts of `fleet2d.engine.interrupts`;
+        one of your own is its class.
 
         Raises:
             ComponentError: No such event interrupts plans of the body.
         """
-        entity = self._body.entity
-        for event in sorted({*events} - {*entity.interrupts}):
-            names = suggest(event, sorted(entity.interrupts), "These do")
-            hint = "" if entity.eyes else f" ({' and '.join(entity.sight_events)} need a camera)"
-            raise ComponentError(
-                f"{self._body.path}: no event {event!r} interrupts its plans{names}{hint}"
-            )
-        self.interrupts |= frozenset(events)
+        names = [event if isinstance(event, str) else event.type_name for event in events]
+        for name in sorted(names):
+            try:
+                self._body.entity.check_interrupt(name)
+            except ComponentError as error:
+                raise ComponentError(f"{self._body.path}: {error}") from error
+        self.interrupts |= frozenset(names)
         return self
 
     def ask_by(self, time: datetime) -> Self:

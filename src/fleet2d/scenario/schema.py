@@ -52,7 +52,8 @@ class ComponentDescription:
 
 def schema() -> dict[str, Any]:
     """Return the JSON Schema of a scenario file."""
-    registry = {kind: components(kind) for kind in PACKAGES}
+    # Interrupts are named by behaviors, not by the scenario.
+    registry = {kind: components(kind) for kind in PACKAGES if kind != "interrupt"}
     models: list[type[BaseModel]] = [
         Scenario,
         *(cls for classes in registry.values() for cls in classes.values()),

@@ -1,0 +1,1 @@
+"""Interrupts: conditions that end plans when they become true; one condition a module."""
