@@ -107,7 +107,7 @@ def hostile() -> dict[str, bytes]:
 
     from fleet2d.artifacts.lock import RunLock
     from fleet2d.engine.simulation import Simulation
-    from fleet2d.studies.journal import Journal
+    from fleet2d.studies.data.journal import Journal
     from fleet2d.viewer.serve import PageServer
 
     dotted = b"\x80\x04\x8c\x13fleet2d.paper.speed\x8c\x10subprocess.Popen\x93\x8c\x04true\x85R."

@@ -12,12 +12,15 @@ from tests.studies.scenes import SPEED, base, digests, run, small
 from tests.thorough import some
 
 from fleet2d.errors import ArtifactError, RunDirectoryError, ScenarioError
-from fleet2d.studies import catalogue, driver, identity, jobs
-from fleet2d.studies.execution import Event, SerialExecutor
-from fleet2d.studies.jobs import WorkerJob
-from fleet2d.studies.local import LocalExecutor
-from fleet2d.studies.reader import open_study
-from fleet2d.studies.schedule import TaskSchedule
+from fleet2d.studies import driver
+from fleet2d.studies.analysis.reader import open_study
+from fleet2d.studies.design import identity
+from fleet2d.studies.execution import jobs
+from fleet2d.studies.execution.executor import Event, SerialExecutor
+from fleet2d.studies.execution.jobs import WorkerJob
+from fleet2d.studies.execution.local import LocalExecutor
+from fleet2d.studies.execution.schedule import TaskSchedule
+from fleet2d.studies.plan import catalogue
 
 ROWS = {"keep": {"tables": ["room_share"]}}
 BROKEN = """from fleet2d import Algorithm

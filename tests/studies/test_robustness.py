@@ -14,12 +14,12 @@ import yaml
 from tests.studies.scenes import SPEED, base, digests, run, small
 from tests.thorough import THOROUGH, some
 
-from fleet2d.studies.directory import StudyDirectory
+from fleet2d.studies.analysis.reader import open_study
+from fleet2d.studies.data.directory import StudyDirectory
+from fleet2d.studies.data.record import VariantRecord
+from fleet2d.studies.data.results import count
 from fleet2d.studies.driver import Observer
-from fleet2d.studies.execution import cores
-from fleet2d.studies.reader import open_study
-from fleet2d.studies.record import VariantRecord
-from fleet2d.studies.results import count
+from fleet2d.studies.execution.executor import cores
 
 KILLS = int(os.environ.get("FLEET2D_KILLS", "50" if THOROUGH else "8"))
 ROOT = Path(__file__).parents[2]

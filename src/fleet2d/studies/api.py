@@ -9,16 +9,16 @@ from typing import Any, Literal, TypeVar
 from fleet2d.errors import ComponentError, InputError
 from fleet2d.runs.run import Run
 from fleet2d.scenario.model import Scenario
-from fleet2d.studies.catalogue import Changed
+from fleet2d.studies.analysis.reader import Study, open_study
+from fleet2d.studies.data.record import WorkerTask
+from fleet2d.studies.design.specification import read_specification
 from fleet2d.studies.driver import RunOptions, check_study, run_study
-from fleet2d.studies.execution import Executor, LostTask, SerialExecutor, cores
-from fleet2d.studies.jobs import FunctionJob
-from fleet2d.studies.local import LocalExecutor
+from fleet2d.studies.execution.executor import Executor, LostTask, SerialExecutor, cores
+from fleet2d.studies.execution.jobs import FunctionJob
+from fleet2d.studies.execution.local import LocalExecutor
+from fleet2d.studies.execution.schedule import TaskSchedule
+from fleet2d.studies.plan.catalogue import Changed
 from fleet2d.studies.progress import observing
-from fleet2d.studies.reader import Study, open_study
-from fleet2d.studies.record import WorkerTask
-from fleet2d.studies.schedule import TaskSchedule
-from fleet2d.studies.specification import read_specification
 
 Result = TypeVar("Result")
 ExecutorName = Literal["local", "ray", "serial"]
@@ -126,7 +126,7 @@ def make_executor(executor: ExecutorName | Executor, workers: int | None = None)
     if executor == "serial":
         return SerialExecutor()
     if executor == "ray":
-        from fleet2d.studies.ray_executor import RayExecutor
+        from fleet2d.studies.execution.ray_executor import RayExecutor
 
         return RayExecutor(workers)
     raise InputError(f"there is no executor {executor!r}: give local, ray or serial")

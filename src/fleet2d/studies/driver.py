@@ -8,26 +8,26 @@ from pathlib import Path
 from typing import Any
 
 from fleet2d.errors import ArtifactError
-from fleet2d.studies.catalogue import (
+from fleet2d.studies.data.directory import VARIANTS, Meta, StudyDirectory
+from fleet2d.studies.data.journal import Journal
+from fleet2d.studies.data.parts import Part, drop_part
+from fleet2d.studies.data.record import VariantRecord, WorkerTask, record_of
+from fleet2d.studies.data.results import Counts, statuses, write_variants
+from fleet2d.studies.design.identity import code_version
+from fleet2d.studies.design.specification import Specification, read_specification
+from fleet2d.studies.design.variants import build_design
+from fleet2d.studies.engine import VariantOutcome
+from fleet2d.studies.execution.executor import Event, Executor, LostTask
+from fleet2d.studies.execution.jobs import StudyJob
+from fleet2d.studies.execution.schedule import TaskSchedule
+from fleet2d.studies.plan.catalogue import (
     Changed,
     ReconciledPlan,
     ScenarioFile,
     reconcile,
     write_catalogue,
 )
-from fleet2d.studies.design import build_design
-from fleet2d.studies.directory import VARIANTS, Meta, StudyDirectory
-from fleet2d.studies.engine import VariantOutcome
-from fleet2d.studies.execution import Event, Executor, LostTask
-from fleet2d.studies.identity import code_version
-from fleet2d.studies.jobs import StudyJob
-from fleet2d.studies.journal import Journal
-from fleet2d.studies.parts import Part, drop_part
-from fleet2d.studies.plan import StudyPlan, check_setups, make_plan
-from fleet2d.studies.record import VariantRecord, WorkerTask, record_of
-from fleet2d.studies.results import Counts, statuses, write_variants
-from fleet2d.studies.schedule import TaskSchedule
-from fleet2d.studies.specification import Specification, read_specification
+from fleet2d.studies.plan.study_plan import StudyPlan, check_setups, make_plan
 
 PART_BYTES = 64_000_000  # size at which a journal becomes a part
 PART_S_REMOTE = 60.0  # the longest time that results for a store are on this machine only

@@ -14,10 +14,10 @@ from fleet2d.errors import Fleet2DError, InputError
 from fleet2d.problems import did_you_mean, refusal
 from fleet2d.scenario.compose import apply_changes, assignment
 from fleet2d.scenario.model import Scenario, scenario_of
-from fleet2d.studies.axes import AnyAxis
-from fleet2d.studies.choice import Choice, key_path
-from fleet2d.studies.sampling import Parameter
-from fleet2d.studies.trials import suggested
+from fleet2d.studies.axes.choice import Choice, key_path
+from fleet2d.studies.axes.kinds import AnyAxis
+from fleet2d.studies.axes.sampling import Parameter
+from fleet2d.studies.tune.trials import suggested
 
 if TYPE_CHECKING:
     import optuna

@@ -1,0 +1,1 @@
+"""The analysis of a study: its tables, statistics, figures and report."""

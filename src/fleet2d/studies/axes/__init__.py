@@ -1,0 +1,1 @@
+"""Axes of a study: lists, ranges, grids, samples, homes and people."""

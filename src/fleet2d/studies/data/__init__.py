@@ -1,0 +1,1 @@
+"""The stored data of a study: its folder, journal, parts and results."""

@@ -1,0 +1,1 @@
+"""The design of a study: its file, its variants, and the identity of each."""

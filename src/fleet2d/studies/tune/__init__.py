@@ -1,0 +1,1 @@
+"""Tuning: a search for settings on training homes, evaluated on other homes."""
