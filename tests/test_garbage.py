@@ -1,6 +1,8 @@
 """Garbage is looked for rarely during a run, so a run must leave none behind that is large."""
 
 import gc
+import subprocess
+import sys
 import weakref
 from collections.abc import Iterator
 
@@ -11,7 +13,7 @@ from tests.scenes import scenario
 import fleet2d
 from fleet2d.entities.actor import Actor
 from fleet2d.entities.plan import Plan
-from fleet2d.garbage import OBJECTS, rare_collections, release_memory
+from fleet2d.garbage import OBJECTS, library_imports, rare_collections, release_memory
 
 PATROL = {"astro": {"type": "patrol", "dwell": "1 min"}}
 
@@ -69,3 +71,25 @@ def test_a_user_who_wants_fewer_collections_keeps_them(
     with rare_collections():
         assert (own, 5, 5) == gc.get_threshold()
     assert (own, 5, 5) == gc.get_threshold()
+
+
+def test_modules_are_left_out_of_collections_only_in_a_process_with_few_objects() -> None:
+    code = """
+import gc, sys
+objects = [[] for _ in range(int(sys.argv[1]))]
+import fleet2d
+fleet2d.Home
+print(gc.get_freeze_count() > 10_000, gc.get_threshold()[0])
+"""
+    for number, is_frozen in ((0, True), (30_000, False)):
+        command = [sys.executable, "-c", code, str(number)]
+        done = subprocess.run(command, check=True, capture_output=True, text=True)
+        assert f"{is_frozen} 700" == done.stdout.strip()
+
+
+def test_objects_of_a_failed_import_are_collected_as_usual(usual: tuple[int, int, int]) -> None:
+    frozen = gc.get_freeze_count()
+    with pytest.raises(ImportError), library_imports():
+        raise ImportError
+    assert usual == gc.get_threshold()
+    assert frozen == gc.get_freeze_count()

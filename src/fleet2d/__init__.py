@@ -6,7 +6,7 @@ Heavy parts load when they are first used.
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from fleet2d.garbage import rare_collections
+from fleet2d.garbage import library_imports
 from fleet2d.leaves import Judges, Views, register_judges, register_views
 from fleet2d.version import __version__ as __version__
 
@@ -106,7 +106,7 @@ def __getattr__(name: str) -> Any:
     """Load a public name when it is first used."""
     if name not in _HOME_OF:
         raise AttributeError(f"module 'fleet2d' has no attribute {name!r}")
-    with rare_collections():
+    with library_imports():
         module = import_module(f"fleet2d.{_HOME_OF[name]}")
     value = getattr(module, name)
     globals()[name] = value

@@ -15,13 +15,12 @@ def main() -> NoReturn:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     # To look for pydantic's plugins takes as long as to import it.
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
-    with rare_collections():
-        from fleet2d.cli.app import app
-
-        gc.freeze()  # modules live to the end: the collector needn't scan them
-
     try:
-        app(standalone_mode=True)
+        with rare_collections():
+            from fleet2d.cli.app import app
+
+            gc.freeze()  # modules live to the end: the collector needn't scan them
+            app(standalone_mode=True)
     except Fleet2DError as error:
         for line in (f"error: {error}", *getattr(error, "__notes__", ())):
             sys.stderr.write(f"{line}\n")
