@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.scenes import flat_path
 
 import fleet2d
 from fleet2d import Run, Simulation, open_run
@@ -361,6 +362,23 @@ def test_ways_are_not_drawn_across_an_absence_nor_through_walls() -> None:
     for start, end in ana.legs:
         points = start + along * (end - start)
         assert VisibleRegion(run.plan, *points[0].tolist()).contains(points[1:]).all()
+
+
+def test_a_way_on_which_a_robot_brakes_is_drawn_as_one_line() -> None:
+    def legs(drive: str) -> Any:
+        robot = {"type": "patrol", "waypoints": [[1, 3], [7, 1], [7, 6]], "dwell": "1 s"}
+        content = {
+            "simulation": {"duration": "3 min"},
+            "floorplan": {"type": "native", "path": str(flat_path())},
+            "robots": {"astro": {**robot, "start": [1, 3], "drive": drive}},
+        }
+        run = fleet2d.run(content)
+        trace = trace_of(run, run.plan, "astro", 0, robot=True)
+        assert trace is not None
+        return trace.legs
+
+    usual, other = legs("differential"), legs("trapezoidal")
+    assert other[:7] == pytest.approx(usual[:7], abs=0.002)  # a round
 
 
 def test_field_of_view_is_what_is_visible_in_range_and_angle() -> None:

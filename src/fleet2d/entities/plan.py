@@ -99,7 +99,7 @@ class Plan:
     ) -> Self:
         """Walk to a place by the shortest path, turning on the spot towards every leg.
 
-        A robot takes the cheapest path where the home has a costmap.
+        A robot takes the cheapest path where the home has a costmap, and moves as its drive does.
 
         In a room, the place is a spot drawn from its free cells by the stream `purpose`. People use
         furniture that they go to; robots stop in front of it.

@@ -23,6 +23,8 @@ LEGS = 1_500
 WALKED_STEPS = 4_000_000
 # Positions with a longer time between them are not connected by a line.
 JOINED_US = 5_000_000
+# A position so near to the way between its neighbours is on it: somewhat more than rounding.
+STRAIGHT_M = 0.003
 
 F64 = NDArray[np.float64]
 I64 = NDArray[np.int64]
@@ -99,7 +101,7 @@ def _from_key_frames(run: Run, plan: FloorPlan, name: str, color: str, *, robot:
 
 def _legs_of(run: Run, plan: FloorPlan, name: str) -> tuple[F64, str]:
     """Return the legs between the key frames of a body; of a random walk, the first ones."""
-    keys = _rows(run, "key_frames", name, ("x", "y", "away"), "kind")
+    keys = _rows(run, "key_frames", name, ("x", "y", "heading", "away"), "kind")
     if (keys["kind"] == "walk").any():
         step_us, steps = run.manifest["step_us"], run.manifest["steps"]
         if steps > WALKED_STEPS or step_us > JOINED_US:
@@ -112,9 +114,10 @@ def _legs_of(run: Run, plan: FloorPlan, name: str) -> tuple[F64, str]:
         minutes = max(1, round(int(moving[LEGS]) * step_us / 6e7))
         return legs[:LEGS], f"only the ways of the first {minutes} min are drawn"
     # The end of a leg that was interrupted is only planned, and left out.
-    reached = keys["kind"] != "planned"
-    xy = np.stack([keys["x"][reached], keys["y"][reached]], axis=1)
-    legs = _legs_between(xy, keys["away"][reached])
+    keys = {name: column[keys["kind"] != "planned"] for name, column in keys.items()}
+    xy = np.stack([keys["x"], keys["y"]], axis=1)
+    ends = _are_ends(xy, np.stack([keys["heading"], keys["away"]], axis=1))
+    legs = _legs_between(xy[ends], keys["away"][ends])
     # A patrol repeats the same paths for weeks: equal legs, to the centimetre, are drawn once.
     _, first = np.unique(np.rint(legs.reshape(-1, 4) * 100), axis=0, return_index=True)
     return legs[np.sort(first)], ""
@@ -159,6 +162,22 @@ def _legs_between(xy: F64, away: NDArray[np.bool_]) -> F64:
     legs = np.stack([xy[:-1], xy[1:]], axis=1)
     home = ~away.astype(bool)
     return legs[(legs[:, 0] != legs[:, 1]).any(axis=1) & home[:-1] & home[1:]]
+
+
+def _are_ends(xy: F64, state: F64) -> NDArray[np.bool_]:
+    """Return which positions aren't just passed on a straight way, as where a robot brakes.
+
+    Args:
+        xy: Positions [m], float64 (n, 2).
+        state: What else differs at the ends of ways, (n, k).
+    """
+    to, on, way = xy[1:-1] - xy[:-2], xy[2:] - xy[1:-1], xy[2:] - xy[:-2]
+    beside = np.abs(to[:, 0] * way[:, 1] - to[:, 1] * way[:, 0])
+    is_straight = ((to * on).sum(axis=1) > 0) & (beside <= STRAIGHT_M * np.hypot(*way.T))
+    is_same = (state[1:] == state[:-1]).all(axis=1)
+    ends = np.ones(len(xy), np.bool_)
+    ends[1:-1] = ~(is_straight & is_same[1:] & is_same[:-1])
+    return ends
 
 
 def _no_legs() -> F64:

@@ -19,7 +19,7 @@ class Trapezoidal(Differential):
     """Turns on the spot towards each leg; on it, gathers speed, drives at constant speed, brakes.
 
     Gathering speed and braking take `pieces` equal times each, of constant speed: the position is
-    at most speed² / (8 acceleration pieces²) off, 1.4 mm at 0.6 m/s. Turns are at constant rate,
+    at most speed² / (8 acceleration pieces²) off, 6 mm at 0.6 m/s. Turns are at constant rate,
     and a plan begins at rest, also where another one was interrupted.
 
     Attributes:
@@ -28,7 +28,7 @@ class Trapezoidal(Differential):
     """
 
     acceleration: float = Field(default=0.5, ge=0.01, le=100)
-    pieces: int = Field(default=8, ge=1, le=64)
+    pieces: int = Field(default=4, ge=1, le=64)
 
     def straight(self, length: float, speed: float) -> Iterator[tuple[float, float]]:
         """Yield times [s] and ways [m] along a leg at which the speed changes, and at its end."""
