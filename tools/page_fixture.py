@@ -16,7 +16,7 @@ from fleet2d.floorplan.home.home import Home
 from fleet2d.sight.region import VisibleRegion
 from fleet2d.view.life import SightWalls
 from fleet2d.viewer.export import embedded_run
-from fleet2d.viewer.page_data import PageData
+from fleet2d.viewer.facts.page_data import PageData
 
 TARGET = Path(__file__).parents[1] / "page" / "test" / "run.json"
 SCENARIO: dict[str, Any] = {

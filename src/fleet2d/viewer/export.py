@@ -10,9 +10,9 @@ import numpy as np
 
 from fleet2d.errors import InputError
 from fleet2d.runs.run import Run
-from fleet2d.viewer.contract import RunFacts, SightingFacts
+from fleet2d.viewer.facts.contract import RunFacts, SightingFacts
+from fleet2d.viewer.facts.page_data import POSES, PageData, write_table
 from fleet2d.viewer.files import write_file
-from fleet2d.viewer.page_data import POSES, PageData, write_table
 from fleet2d.viewer.part import KEY_FRAMES, key_frame_rows
 
 PAGE = Path(__file__).parent / "page"

@@ -21,11 +21,11 @@ from fleet2d.runs.trajectory import Trajectory
 from fleet2d.view.floorplan import floorplan_axes
 from fleet2d.view.life import RIM_COLOR, SightWalls, field_of_view
 from fleet2d.view.overlay import QUIET_COLOR
-from fleet2d.viewer.contract import BodyFacts
+from fleet2d.viewer.facts.contract import BodyFacts
+from fleet2d.viewer.facts.run_facts import bodies_of
+from fleet2d.viewer.facts.walls import WallsHistory, doors_of
 from fleet2d.viewer.part import part_of_run
-from fleet2d.viewer.run_facts import bodies_of
-from fleet2d.viewer.strip import draw_strip, strip_rows
-from fleet2d.viewer.walls import WallsHistory, doors_of
+from fleet2d.viewer.pictures.strip import draw_strip, strip_rows
 
 TAIL = timedelta(minutes=1)  # length of the paths behind bodies
 LEAST_RADIUS_M = 0.2

@@ -4,10 +4,10 @@ from fleet2d.artifacts.manifest import plain
 from fleet2d.engine.simulation import Simulation
 from fleet2d.entities.objects.door import Door
 from fleet2d.version import __version__
-from fleet2d.viewer.contract import DoorFacts, RunFacts, WallsChange
-from fleet2d.viewer.home_facts import home_facts
-from fleet2d.viewer.run_facts import bodies_of
-from fleet2d.viewer.walls import door_facts
+from fleet2d.viewer.facts.contract import DoorFacts, RunFacts, WallsChange
+from fleet2d.viewer.facts.home_facts import home_facts
+from fleet2d.viewer.facts.run_facts import bodies_of
+from fleet2d.viewer.facts.walls import door_facts
 
 
 def live_facts(simulation: Simulation) -> RunFacts:

@@ -11,8 +11,8 @@ import pytest
 from starlette.testclient import TestClient
 
 import fleet2d
-from fleet2d.viewer.page_data import PageData
-from fleet2d.viewer.server import ServedRuns, page_app
+from fleet2d.viewer.facts.page_data import PageData
+from fleet2d.viewer.server.application import ServedRuns, page_app
 
 PORT = 8765
 BASE = f"http://127.0.0.1:{PORT}"

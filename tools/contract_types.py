@@ -1,13 +1,13 @@
-"""Generate ``contract.ts`` of the page: ``python -m fleet2d.viewer.typescript > contract.ts``."""
+"""Generate ``contract.ts`` of the page: ``python -m tools.contract_types > contract.ts``."""
 
 import sys
 import types
 import typing
 from typing import Any, Literal, is_typeddict
 
-from fleet2d.viewer import contract
+from fleet2d.viewer.facts import contract
 
-HEADER = "// Written by `python -m fleet2d.viewer.typescript` from fleet2d.viewer.contract.\n"
+HEADER = "// Written by `python -m tools.contract_types` from fleet2d.viewer.facts.contract.\n"
 _PLAIN = {str: "string", int: "number", float: "number", bool: "boolean", type(None): "null"}
 
 

@@ -15,7 +15,7 @@ from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.palette import TEXT_COLOR, deep_color
 from fleet2d.runs.run import Run
 from fleet2d.view.overlay import HATCH_COLOR, QUIET_COLOR
-from fleet2d.viewer.sightings import sightings_of
+from fleet2d.viewer.facts.sightings import sightings_of
 
 SEEN_PART = 0.22  # height of the marks of sightings at the foot of a row, as a share of it
 ROW_PART = 0.86

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from fleet2d.runs.categories import categories
 from fleet2d.runs.run import Run
-from fleet2d.viewer.contract import SightingFacts
+from fleet2d.viewer.facts.contract import SightingFacts
 
 I64 = NDArray[np.int64]
 JOIN_S = 6.0  # shorter gaps between sightings are no gaps in a lane

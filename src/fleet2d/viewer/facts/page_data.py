@@ -12,12 +12,12 @@ from typing import Any
 
 from fleet2d.errors import ArtifactError
 from fleet2d.runs.run import Run
-from fleet2d.viewer.contract import RunFacts, SightingFacts, WallsFacts
-from fleet2d.viewer.home_facts import walls_facts
+from fleet2d.viewer.facts.contract import RunFacts, SightingFacts, WallsFacts
+from fleet2d.viewer.facts.home_facts import walls_facts
+from fleet2d.viewer.facts.run_facts import run_facts, run_title
+from fleet2d.viewer.facts.sightings import sightings_of
+from fleet2d.viewer.facts.walls import WallsHistory, doors_of
 from fleet2d.viewer.part import positions
-from fleet2d.viewer.run_facts import run_facts, run_title
-from fleet2d.viewer.sightings import sightings_of
-from fleet2d.viewer.walls import WallsHistory, doors_of
 
 POSES = "poses"
 """A table that replaces `key_frames` for the page in runs with random walks."""

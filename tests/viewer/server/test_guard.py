@@ -6,9 +6,9 @@ from pathlib import Path
 import pytest
 from starlette.testclient import TestClient
 
-from fleet2d.viewer.guard import new_token
-from fleet2d.viewer.serve import PageServer
-from fleet2d.viewer.server import ServedRuns, page_app
+from fleet2d.viewer.server.application import ServedRuns, page_app
+from fleet2d.viewer.server.guard import new_token
+from fleet2d.viewer.server.serve import PageServer
 
 TOKEN = "0123456789abcdefghijABCDEFGHIJ01"
 PORT = 8765

@@ -12,7 +12,14 @@ from fleet2d.floorplan.objects import PlacedObject
 from fleet2d.floorplan.plan import FloorPlan, Room, rings
 from fleet2d.kernels.mesh import Mesh
 from fleet2d.palette import deep_color, room_color
-from fleet2d.viewer.contract import DoorFacts, HomeFacts, ObjectFacts, Point, RoomFacts, WallsFacts
+from fleet2d.viewer.facts.contract import (
+    DoorFacts,
+    HomeFacts,
+    ObjectFacts,
+    Point,
+    RoomFacts,
+    WallsFacts,
+)
 
 DIGITS = 4  # tenths of a millimetre
 

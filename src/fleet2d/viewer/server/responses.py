@@ -2,8 +2,8 @@
 
 from starlette.responses import Response
 
-from fleet2d.viewer.contract import Problem
-from fleet2d.viewer.page_data import compact_json
+from fleet2d.viewer.facts.contract import Problem
+from fleet2d.viewer.facts.page_data import compact_json
 
 
 def json_answer(content: bytes, status: int = 200) -> Response:

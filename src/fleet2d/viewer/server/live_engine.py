@@ -15,8 +15,8 @@ from fleet2d.floorplan.home.change import HomeChange
 from fleet2d.kernels.headings import TURN
 from fleet2d.kernels.mesh import Mesh
 from fleet2d.runs.run import Run
-from fleet2d.viewer.contract import LiveBody, LiveEvent, LiveOrder, MarkFacts
-from fleet2d.viewer.marks import intervention_marks
+from fleet2d.viewer.facts.contract import LiveBody, LiveEvent, LiveOrder, MarkFacts
+from fleet2d.viewer.facts.marks import intervention_marks
 
 AHEAD_US = 120_000_000
 MOST_CORNERS = 60

@@ -1,6 +1,6 @@
 """The data that the page receives, as types that Python and TypeScript share.
 
-`fleet2d.viewer.typescript` generates the TypeScript side, ``page/src/contract.ts``, from them; a
+`tools.contract_types` generates the TypeScript side, ``page/src/contract.ts``, from them; a
 test compares both.
 """
 

@@ -15,12 +15,12 @@ from starlette.types import ASGIApp
 from fleet2d.errors import ArtifactError, Fleet2DError
 from fleet2d.runs.run import open_run
 from fleet2d.version import __version__
-from fleet2d.viewer.contract import SessionFacts
-from fleet2d.viewer.guard import Guard
-from fleet2d.viewer.page_data import PageData, compact_json
-from fleet2d.viewer.responses import json_answer, problem
+from fleet2d.viewer.facts.contract import SessionFacts
+from fleet2d.viewer.facts.page_data import PageData, compact_json
+from fleet2d.viewer.server.guard import Guard
+from fleet2d.viewer.server.responses import json_answer, problem
 
-PAGE = Path(__file__).parent / "page"
+PAGE = Path(__file__).parents[1] / "page"
 MEDIA = {
     ".html": "text/html",
     ".js": "text/javascript",

@@ -4,11 +4,11 @@ import hashlib
 from pathlib import Path
 
 import pytest
+from tools.contract_types import contract_source
 
-from fleet2d.viewer.server import PAGE
-from fleet2d.viewer.typescript import contract_source
+from fleet2d.viewer.server.application import PAGE
 
-SOURCES = Path(__file__).parents[2] / "page"
+SOURCES = Path(__file__).parents[3] / "page"
 FILES = ("index.html", "package.json", "package-lock.json", "tsconfig.json", "vite.config.ts")
 
 pytestmark = pytest.mark.skipif(not SOURCES.exists(), reason="the page's sources are not here")

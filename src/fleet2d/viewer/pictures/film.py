@@ -22,8 +22,8 @@ from fleet2d.extras import extra
 from fleet2d.runs.run import Run
 from fleet2d.view.floorplan import drawing_style, figure_size
 from fleet2d.view.theme import apply_theme
-from fleet2d.viewer.stage import Stage
-from fleet2d.viewer.stamps import TextStamps
+from fleet2d.viewer.pictures.stage import Stage
+from fleet2d.viewer.pictures.stamps import TextStamps
 
 ENDINGS = (".mp4", ".gif", ".webp")
 MOST_FRAMES_A_S = 25

@@ -29,11 +29,11 @@ from fleet2d.view.layers import COLORS
 from fleet2d.view.life import blurred
 from fleet2d.view.run import run_figure
 from fleet2d.view.theme import SCALE
+from fleet2d.viewer.facts.run_facts import bodies_of
 from fleet2d.viewer.moments import clock_of
 from fleet2d.viewer.part import part_of_run
-from fleet2d.viewer.run_facts import bodies_of
-from fleet2d.viewer.stage import Stage
-from fleet2d.viewer.strip import draw_strip, strip_rows
+from fleet2d.viewer.pictures.stage import Stage
+from fleet2d.viewer.pictures.strip import draw_strip, strip_rows
 
 FigureKind = Literal["life", "heat", "strip"]
 

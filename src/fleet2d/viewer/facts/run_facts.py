@@ -11,10 +11,10 @@ from fleet2d.palette import body_color
 from fleet2d.runs.run import Run
 from fleet2d.units import parse_duration
 from fleet2d.version import __version__
-from fleet2d.viewer.contract import BodyFacts, CameraFacts, ColumnFacts, RunFacts, TableFacts
-from fleet2d.viewer.home_facts import home_facts
-from fleet2d.viewer.marks import marks_of
-from fleet2d.viewer.walls import HomeDoors, WallsHistory
+from fleet2d.viewer.facts.contract import BodyFacts, CameraFacts, ColumnFacts, RunFacts, TableFacts
+from fleet2d.viewer.facts.home_facts import home_facts
+from fleet2d.viewer.facts.marks import marks_of
+from fleet2d.viewer.facts.walls import HomeDoors, WallsHistory
 
 Role = Literal["log", "algorithm", "metric", "layer"]
 

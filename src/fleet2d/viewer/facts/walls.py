@@ -11,7 +11,7 @@ from fleet2d.floorplan.home.home import Home
 from fleet2d.floorplan.rooms.doorways import Doorway
 from fleet2d.kernels.mesh import Mesh
 from fleet2d.runs.run import Run
-from fleet2d.viewer.contract import DoorFacts, WallsChange
+from fleet2d.viewer.facts.contract import DoorFacts, WallsChange
 
 _MOVE = re.compile(r"(.+) to \((\S+), (\S+)\)")
 MOST_ARRANGEMENTS = 500

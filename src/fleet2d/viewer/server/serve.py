@@ -14,9 +14,9 @@ with extra("view", "watching needs a server"):
     import starlette  # noqa: F401 - the server needs it, too
     import uvicorn
 
-from fleet2d.viewer.guard import new_token
-from fleet2d.viewer.page_data import PageData
-from fleet2d.viewer.server import LiveRoutes, ServedRuns, page_app
+from fleet2d.viewer.facts.page_data import PageData
+from fleet2d.viewer.server.application import LiveRoutes, ServedRuns, page_app
+from fleet2d.viewer.server.guard import new_token
 
 HOST = "127.0.0.1"
 MOST_RUNS = 4

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any, Literal
 
 from fleet2d.runs.run import Run
-from fleet2d.viewer.contract import MarkFacts
+from fleet2d.viewer.facts.contract import MarkFacts
 
 INTERVENTIONS = "interventions"
 VIOLATIONS = "violations"  # name of the table

@@ -16,13 +16,13 @@ from starlette.routing import Route
 from fleet2d.engine.simulation import Simulation
 from fleet2d.errors import Fleet2DError, InputError
 from fleet2d.runs.run import Run
-from fleet2d.viewer.contract import LiveFrame, LiveOrder
-from fleet2d.viewer.home_facts import walls_facts
-from fleet2d.viewer.live_engine import LiveEngine
-from fleet2d.viewer.live_facts import live_facts
-from fleet2d.viewer.page_data import compact_json
-from fleet2d.viewer.responses import json_answer, problem
-from fleet2d.viewer.serve import PageServer
+from fleet2d.viewer.facts.contract import LiveFrame, LiveOrder
+from fleet2d.viewer.facts.home_facts import walls_facts
+from fleet2d.viewer.facts.live_facts import live_facts
+from fleet2d.viewer.facts.page_data import compact_json
+from fleet2d.viewer.server.live_engine import LiveEngine
+from fleet2d.viewer.server.responses import json_answer, problem
+from fleet2d.viewer.server.serve import PageServer
 
 FRAME_US = 60_000_000  # the most simulated time between two frames
 FRAMES_A_S = 30  # at a chosen speed

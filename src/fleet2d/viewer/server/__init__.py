@@ -1,0 +1,1 @@
+"""The server of the page: stored runs, and running simulations that it watches and controls."""
