@@ -44,7 +44,9 @@ if TYPE_CHECKING:
     from fleet2d.runs.run import open_run as open_run
     from fleet2d.scenario.model import Scenario as Scenario
     from fleet2d.scenario.model import load_scenario as load_scenario
+    from fleet2d.sight.camera_sightings import CameraSightings as CameraSightings
     from fleet2d.sight.fov import FieldOfView as FieldOfView
+    from fleet2d.sight.perception_error import PerceptionError as PerceptionError
     from fleet2d.sight.region import VisibleRegion as VisibleRegion
     from fleet2d.studies.analysis.reader import Study as Study
     from fleet2d.studies.analysis.reader import open_study as open_study
@@ -58,6 +60,7 @@ _HOME_OF = {
     "Actor": "entities.actor",
     "Algorithm": "algorithms.algorithm",
     "Behavior": "entities.behavior",
+    "CameraSightings": "sight.camera_sightings",
     "ComponentError": "errors",
     "Drive": "entities.drives.drive",
     "Duration": "units",
@@ -75,6 +78,7 @@ _HOME_OF = {
     "Length": "units",
     "Metric": "metrics.metric",
     "Moment": "entities.drives.drive",
+    "PerceptionError": "sight.perception_error",
     "Plan": "entities.plan",
     "Present": "algorithms.algorithm",
     "RoomDistribution": "algorithms.output",

@@ -159,6 +159,9 @@ def random_bell(key: int | numpy.uint64, counter: int | numpy.integer[Any]) -> i
     deviations, and exact on every machine, which a logarithm or a cosine is not.
     """
 
+def random_bells(key: int, counters: numpy.typing.NDArray[numpy.int64]) -> numpy.typing.NDArray[numpy.int64]:
+    """Return the bell-shaped integer of each counter, int64 (n,)."""
+
 class StepDraws:
     """
     The draws of one stream at one step, one after the other.

@@ -53,6 +53,7 @@ PACKAGES = {
     "metric": "fleet2d.metrics",
     "interrupt": "fleet2d.engine.interrupts",
     "sight": "fleet2d.sight",
+    "perception_error": "fleet2d.sight.errors",
     "intervention": "fleet2d.interventions",
 }
 """Where the built-in components of each kind live."""
@@ -319,9 +320,14 @@ class OneOf(Codec):
 
     Its input is a mapping with ``type``, the bare name of a type, or an instance; it dumps to the
     mapping.
+
+    Attributes:
+        kind: The kind.
+        by_name: Whether its name in a mapping stands for a type that is left out; see `NameAsType`.
     """
 
     kind: str
+    by_name: bool = False
 
     def validate(self, value: Any, info: ValidationInfo) -> Component:
         """Return the component that a mapping describes."""
@@ -359,4 +365,4 @@ class OneOf(Codec):
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> dict[str, Any]:
         """Return a mark that `fleet2d.scenario.schema` replaces by all types of the kind."""
-        return {"x-kind": self.kind}
+        return {"x-kind": self.kind} | ({"x-by-name": True} if self.by_name else {})

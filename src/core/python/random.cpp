@@ -82,6 +82,14 @@ void bind_random(nb::module_& m) {
 
 The sum of eight uniform bytes: close to normal (excess kurtosis -0.15), cut at 4.88 standard
 deviations, and exact on every machine, which a logarithm or a cosine is not.)");
+    m.def(
+        "random_bells",
+        [](u64 key, View<const i64> counters) {
+            auto bells = Array<i64>::empty({counters.size()});
+            for (i64 i = 0; i < counters.size(); ++i) bells[i] = random_bell(key, static_cast<u64>(counters[i]));
+            return bells;
+        },
+        "key"_a, "counters"_a, Unlocked(), "Return the bell-shaped integer of each counter, int64 (n,).");
     bind_draws(m);
 }
 

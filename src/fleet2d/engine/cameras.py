@@ -20,19 +20,16 @@ from fleet2d.engine.disturbances import (
     worsen,
 )
 from fleet2d.engine.points_in_view import points_seen
+from fleet2d.engine.sight_events import sight_events
 from fleet2d.engine.watcher import Watcher
 from fleet2d.entities.actor import Actor
 from fleet2d.entities.behavior import SightEvent
 from fleet2d.entities.localization import Drift, Localization
 from fleet2d.errors import ScenarioError
 from fleet2d.events import Event
-from fleet2d.kernels.headings import TURN
 from fleet2d.kernels.look import (
-    CAMERA,
-    HEADING,
     IDENTITY,
     SIGHTING,
-    STEP,
     USER_LOST,
     USER_SEEN,
     LookRule,
@@ -90,6 +87,7 @@ class Cameras(Watcher):
         radii: Radii of all bodies, if they hide each other [lattice units]; None: they don't.
         memory: The memory from span to span.
         drift: The error of the owner's belief about its own pose; None: it has none.
+        later: What changes sightings after the look; None: nothing does.
         perceived: The last perceived place of each identity, (identities, 2); the last row is for
             somebody unknown.
         awaited: Events that algorithms wait for: they end a span, too.
@@ -130,8 +128,6 @@ class Cameras(Watcher):
         self.memory = self._set_up()
         self.perceived = np.zeros((len(self.others) + 1, 2), np.int64)
         self.awaited: Set[str] = frozenset()
-        # Places of the owner in the last steps, for looks whose detections become known later.
-        self._trace = np.zeros((0, 2), np.int64)
         self._sightings: list[I64] = []  # not collected yet
         self._ahead: _Look | None = None
 
@@ -163,7 +159,6 @@ class Cameras(Watcher):
         ]
         has_errors = [not is_perfect(perception) for perception in perceptions]
         self.drift = _drift_of(owner)
-        self.errs = self.may_err or any(has_errors) or self.drift is not None
         context = TableContext(
             [other.name for other in self.others],
             [other.entity.radius * lattice.units_per_m for other in self.others],
@@ -179,6 +174,12 @@ class Cameras(Watcher):
         self.errors.has_ghosts[self._dark] = 0
         injected = injected_by(self.disturbances, self.names, context)
         self.errors = self.errors._replace(injected=injected)
+        self.later = None
+        if self.drift is not None or any(p and p.errors for p in perceptions):
+            from fleet2d.engine.sighting_errors import SightingErrors  # few runs need them
+
+            self.later = SightingErrors(self, perceptions)
+        self.errs = self.may_err or any(has_errors) or self.later is not None
         self._draw_streams()
         if not self.activity_senses:  # later ones would not fit the tables of the run
             self._sense_activities(perceptions)
@@ -274,15 +275,13 @@ class Cameras(Watcher):
         Cameras that looked beyond `end`, before another watcher ended the span, look again.
         """
         result, self._ahead = self._ahead, None
-        if result is not None and result.end != end:
+        if result is not None and result.looked != end:
             for array, old in zip(self.memory, result.old_memory, strict=True):
                 array[:] = old
             result = None
         if result is None:
             result = self._look(bodies, end, stop=False)
         rows = result.sightings
-        if self.drift is not None:
-            rows = self._misplace(rows, bodies, end)
         self.next_step = end
         if len(rows):
             self._sightings.append(rows)
@@ -306,30 +305,14 @@ class Cameras(Watcher):
                 x, y = lattice.to_metres(place).tolist()
                 yield self.row, SightEvent(event.event, event.detail, x, y)
 
-    def _misplace(self, rows: I64, bodies: Bodies, end: int) -> I64:
-        """Return sightings with the error of the owner's belief about its own pose."""
-        drift, latest = self.drift, int(self.lenses.latency.max())
-        assert drift is not None
-        if not len(rows) and not latest:
-            return rows
-        block = bodies.block(self.next_step, end)
-        now = np.stack([block.x[self.row], block.y[self.row]], axis=1)
-        trace = np.concatenate([self._trace, now])
-        looks = rows[:, STEP] - self.lenses.latency[rows[:, CAMERA]]
-        robot_x, robot_y = trace[looks - (end - len(trace))].T
-        rows = rows.copy()
-        rows[:, X], rows[:, Y] = drift.misplace(rows[:, X], rows[:, Y], robot_x, robot_y, looks)
-        rows[:, HEADING] = (rows[:, HEADING] + drift.at(looks).turn) % TURN
-        self._trace = trace[len(trace) - min(latest, len(trace)) :]
-        return rows
-
     def collect(self) -> I64:
         """Return the sightings since the last call, int64 (n, SIGHTING)."""
         blocks, self._sightings = self._sightings, []
         return np.concatenate([NOTHING, *blocks])
 
     def _look(self, bodies: Bodies, end: int, *, stop: bool = True) -> "_Look":
-        old_memory = [array.copy() for array in self.memory] if stop else []
+        may_redo = stop or self.later is not None
+        old_memory = [array.copy() for array in self.memory] if may_redo else []
         stop_lost, stop_seen = self.ends if stop else (False, False)
         home, window, points = self.owner.home, bodies.window(self.next_step, end), None
         if self.method is not None:
@@ -357,10 +340,19 @@ class Cameras(Watcher):
             self.radii,
         )
         events = list(zip(step.tolist(), identity.tolist(), kind.tolist(), strict=True))
-        return _Look(self.next_step + count, sightings, events, old_memory)
+        looked = end = self.next_step + count
+        if self.later is not None:
+            before = SightMemory(*old_memory)
+            sightings, differs = self.later.change(sightings, self.memory, before, window, looked)
+            if differs:
+                patience, stops = self.rule.patience, {USER_LOST: stop_lost, USER_SEEN: stop_seen}
+                events = sight_events(sightings, self.memory, patience, self.next_step, looked)
+                end = next((step + 1 for step, _, kind in events if stops[kind]), looked)
+        return _Look(looked, end, sightings, events, old_memory)
 
 
 def _drift_of(owner: Actor) -> Drift | None:
+    """Return the error of a body's belief about its own pose; None: it has none."""
     settings: Localization | None = getattr(owner.entity, "localization", None)
     if settings is None:
         return None
@@ -369,8 +361,12 @@ def _drift_of(owner: Actor) -> Drift | None:
 
 
 class _Look(NamedTuple):
-    """The result of a look up to step `end` - 1, and the memory before it."""
+    """The result of a look up to step `looked` - 1, and the memory before it.
 
+    The span ends at `end`, which is earlier if an error changed who was seen when.
+    """
+
+    looked: int
     end: int
     sightings: I64
     events: list[tuple[int, int, int]]

@@ -8,6 +8,7 @@ from fleet2d.artifacts.manifest import Manifest, input_record, is_regular
 from fleet2d.component import Component
 from fleet2d.errors import RunDirectoryError
 from fleet2d.scenario.model import Scenario
+from fleet2d.sight.perception import Perception
 
 
 def input_files(scenario: Scenario) -> list[Path]:
@@ -59,7 +60,19 @@ def components_of(scenario: Scenario) -> Iterator[Component]:
     queue += scenario.algorithms.values()
     queue += scenario.metrics.values()
     queue += [entry.act for entry in scenario.script]
+    for perception in _perceptions_of(scenario):
+        queue += perception.errors.values()
     while queue:  # components may contain others, such as an algorithm its model
         component = queue.pop()
         yield component
         queue += [value for _, value in component if isinstance(value, Component)]
+
+
+def _perceptions_of(scenario: Scenario) -> Iterator[Perception]:
+    """Yield the perceptions of all robots, their cameras, and the faults of a script."""
+    for robot in scenario.robots.values():
+        cameras = [camera.perception for camera in robot.eyes.values()]
+        yield from (p for p in (robot.perception, *cameras) if p is not None)
+    for entry in scenario.script:
+        if (errs := getattr(entry.act, "errs", None)) is not None:
+            yield errs

@@ -1,7 +1,6 @@
 """Localization: the error of a robot's own position, and so of the positions of people it sees."""
 
 from datetime import timedelta
-from functools import cache
 from typing import NamedTuple, Self
 
 import numpy as np
@@ -9,7 +8,7 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from fleet2d.component import Settings
-from fleet2d.kernels.headings import QUARTER, TURN, UNIT, cosine
+from fleet2d.kernels.headings import TURN, turned
 from fleet2d.kernels.random import BELL_STD, random_bell, random_below, random_uniform
 from fleet2d.kernels.timelines import Window
 from fleet2d.problems import problem_at
@@ -155,12 +154,8 @@ class Drift:
             steps: The steps, int64 (n,).
         """
         off = self.at(steps)
-        along, up = _cosines()[off.turn % TURN], _cosines()[(off.turn - QUARTER) % TURN]
-        dx, dy, half = x - robot_x, y - robot_y, UNIT // 2
-        return (
-            robot_x + off.x + (dx * along - dy * up + half) // UNIT,
-            robot_y + off.y + (dx * up + dy * along + half) // UNIT,
-        )
+        dx, dy = turned(x - robot_x, y - robot_y, 2 * off.turn)
+        return robot_x + off.x + dx, robot_y + off.y + dy
 
     def believed(self, runs: Window) -> Runs:
         """Return the poses that the robot believes it has."""
@@ -180,12 +175,6 @@ class Drift:
         if random_uniform(self._keys["jumps"], interval) >= self._jump_chance:
             return self._every_us
         return int(random_below(self._keys["when"], interval, self._every_us))
-
-
-@cache
-def _cosines() -> I64:
-    """Return the cosines of all headings, in 1/UNIT."""
-    return np.array([cosine(heading) for heading in range(TURN)], np.int64)
 
 
 def _noise(deviation: float) -> int:

@@ -11,6 +11,7 @@ Constants:
 """
 
 import math
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -37,13 +38,42 @@ __all__ = [
     "UNIT",
     "cosine",
     "half_sine",
+    "half_sines",
     "heading_of",
     "in_radians",
     "sine",
     "turn_between",
+    "turned",
 ]
 
 
 def in_radians(heading: int | NDArray[np.int64]) -> Any:
     """Return headings in radians, 0 to 2 pi."""
     return heading * (2 * math.pi / TURN)
+
+
+def turned(
+    x: NDArray[np.int64], y: NDArray[np.int64], angle: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return points turned about the origin, rounded: x and y.
+
+    Args:
+        x: int64 (n,), at most 2**31.
+        y: int64 (n,), at most 2**31.
+        angle: Any integers, 1/8192 of a turn, which is half a heading, int64 (n,).
+
+    Example:
+        >>> turned(np.array([10, 10]), np.array([0, 5]), np.array([2048, -2048]))
+        (array([0, 5]), array([ 10, -10]))
+    """
+    sines, half = half_sines(), UNIT // 2
+    along, up = sines[(angle + 2 * QUARTER) % (2 * TURN)], sines[angle % (2 * TURN)]
+    return (x * along - y * up + half) // UNIT, (x * up + y * along + half) // UNIT
+
+
+@cache
+def half_sines() -> NDArray[np.int64]:
+    """Return UNIT times the sines of a whole turn: entry i is the angle i * 2 pi / 8192."""
+    rising = SINES[:-1]
+    falling = SINES[:0:-1]
+    return np.concatenate([rising, falling, -rising, -falling])

@@ -6,8 +6,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fleet2d._core import camera_pose, hides, in_wedge, near_wedge, points_in_view
+from fleet2d.kernels.headings import TURN, turned
 
-__all__ = ["Lenses", "camera_pose", "hides", "in_wedge", "near_wedge", "points_in_view"]
+__all__ = [
+    "Lenses",
+    "camera_pose",
+    "camera_poses",
+    "hides",
+    "in_wedge",
+    "near_wedge",
+    "points_in_view",
+]
 
 I64 = NDArray[np.int64]
 
@@ -33,3 +42,25 @@ class Lenses(NamedTuple):
     bodies: I64  # (cameras, users, points + 1, 2): where they are, from the centre; it is first
     reach: I64  # (cameras, users): how far they are from it
     widest: I64  # (cameras, users): farthest distance of a centre in view, squared
+
+
+def camera_poses(
+    lenses: Lenses, camera: int, body: tuple[I64, I64, I64], moments_us: I64
+) -> tuple[I64, I64, I64]:
+    """Return where a camera is and where it looks at some moments, as `camera_pose` does.
+
+    Args:
+        lenses: The cameras of a body.
+        camera: The number of the camera.
+        body: x, y [lattice units] and heading of the body, int64 (n,) each.
+        moments_us: The times since the start, int64 (n,).
+    """
+    x, y, heading = body
+    dx, dy = turned(lenses.forward[camera], lenses.left[camera], 2 * heading)
+    looks = heading + lenses.heading[camera]
+    if lenses.pan_count[camera]:
+        looks = (
+            looks
+            + lenses.pans[camera][moments_us // lenses.pan_us[camera] % lenses.pan_count[camera]]
+        )
+    return x + dx, y + dy, looks % TURN

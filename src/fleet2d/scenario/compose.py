@@ -24,6 +24,10 @@ _SLOTS = (
     (re.compile(r"objects/[^/]+"), "object"),
     (re.compile(r"algorithms/[^/]+"), "algorithm"),
     (re.compile(r"metrics/[^/]+"), "metric"),
+    (
+        re.compile(r"robots/[^/]+/(camera/|cameras/[^/]+/)?perception/errors/[^/]+"),
+        "perception_error",
+    ),
 )
 
 

@@ -1,6 +1,5 @@
 """The scenario: everything that defines a run, validated."""
 
-import re
 from collections.abc import Mapping
 from datetime import date, datetime, timedelta
 from pathlib import Path
@@ -10,11 +9,11 @@ from pydantic import BeforeValidator, Field, PrivateAttr, ValidationError, model
 
 from fleet2d.algorithms.algorithm import Algorithm
 from fleet2d.artifacts.settings import ArtifactSettings
-from fleet2d.bounds import one_line
 from fleet2d.component import OneOf, Settings
 from fleet2d.document import Document
 from fleet2d.entities.entity import Robot, User
 from fleet2d.entities.objects.home_object import HomeObject
+from fleet2d.entry_names import CheckNames, NameAsType
 from fleet2d.errors import ScenarioError
 from fleet2d.floorplan.home.change import HomeChange
 from fleet2d.floorplan.source import FloorPlanSource
@@ -28,8 +27,6 @@ from fleet2d.short_form import ShortForm
 from fleet2d.sight.settings import SightSettings
 from fleet2d.trust import check_code
 from fleet2d.units import Duration, PositiveDuration, format_duration, micros
-
-_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,99}")
 
 
 def _parse_local_time(value: Any) -> Any:
@@ -46,33 +43,6 @@ def _parse_local_time(value: Any) -> Any:
             f" {moment.isoformat()}"
         )
     return moment
-
-
-def _check_names(entries: Any) -> Any:
-    """Refuse names that can't be part of a key path, a file name or a table name."""
-    if isinstance(entries, Mapping):
-        for name in entries:
-            if not _NAME.fullmatch(str(name)):
-                raise problem_at(
-                    (name,),
-                    f"the name {one_line(repr(name))} must be letters, digits, '_' and '-', a"
-                    " letter first, 100 characters at most",
-                )
-    return entries
-
-
-def _name_as_type(entries: Any) -> Any:
-    """Let `ltp_error: {of: ltp}` stand for `ltp_error: {type: ltp_error, of: ltp}`."""
-    if not isinstance(entries, Mapping):
-        return entries
-    return {
-        name: {"type": name, **entry} if isinstance(entry, Mapping) else entry
-        for name, entry in entries.items()
-    }
-
-
-_CheckNames = BeforeValidator(_check_names)
-_NameAsType = BeforeValidator(_name_as_type)
 
 
 class SimulationSettings(Settings):
@@ -146,21 +116,21 @@ class Scenario(Settings):
     name: str | None = None
     simulation: SimulationSettings
     floorplan: Annotated[FloorPlanSource, OneOf("floorplan")]
-    users: Annotated[dict[str, Annotated[User, ShortForm()]], _CheckNames] = Field(default={})
-    robots: Annotated[dict[str, Annotated[Robot, ShortForm()]], _CheckNames] = Field(default={})
-    objects: Annotated[dict[str, Annotated[HomeObject, OneOf("object")]], _CheckNames] = Field(
+    users: Annotated[dict[str, Annotated[User, ShortForm()]], CheckNames] = Field(default={})
+    robots: Annotated[dict[str, Annotated[Robot, ShortForm()]], CheckNames] = Field(default={})
+    objects: Annotated[dict[str, Annotated[HomeObject, OneOf("object")]], CheckNames] = Field(
         default={}
     )
     changes: tuple[HomeChange, ...] = ()
     script: tuple[Entry, ...] = ()
     sight: SightSettings = SightSettings()
     algorithms: Annotated[
-        dict[str, Annotated[Algorithm, OneOf("algorithm")]], _CheckNames, _NameAsType
+        dict[str, Annotated[Algorithm, OneOf("algorithm")]], CheckNames, NameAsType
     ] = Field(default={})
-    metrics: Annotated[dict[str, Annotated[Metric, OneOf("metric")]], _CheckNames, _NameAsType] = (
+    metrics: Annotated[dict[str, Annotated[Metric, OneOf("metric")]], CheckNames, NameAsType] = (
         Field(default={})
     )
-    expect: Annotated[dict[str, ExpectationField], _CheckNames] = Field(default={})
+    expect: Annotated[dict[str, ExpectationField], CheckNames] = Field(default={})
     artifacts: ArtifactSettings = ArtifactSettings()
     _folder: Path = PrivateAttr(default_factory=Path.cwd)
     _document: Document = PrivateAttr(default_factory=Document)

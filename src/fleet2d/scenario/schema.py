@@ -14,6 +14,9 @@ from fleet2d.interventions.intervention import verbs
 from fleet2d.scenario.compose import ENTRIES
 from fleet2d.scenario.model import Scenario
 
+UNTYPED = {"type": "object", "not": {"required": ["type"]}}
+"""The schema of an entry whose type is its name."""
+
 
 class _SchemaGenerator(GenerateJsonSchema):
     """Generates schemas with defaults as scenarios write them: '1 min', not pydantic's 'PT1M'."""
@@ -144,6 +147,8 @@ def _expand(value: Any, kinds: Mapping[str, Mapping[str, Any]]) -> Any:
     result = {k: _expand(v, kinds) for k, v in value.items() if k != "x-short-form"}
     if (kind := result.pop("x-kind", None)) is not None:
         result["$ref"] = f"#/$defs/{kind}"
+        if result.pop("x-by-name", False):
+            result = {"anyOf": [result, UNTYPED]}
     if (mark := value.get("x-short-form")) is not None:
         result["anyOf"] += [
             {
@@ -167,7 +172,7 @@ def _allow_composition(properties: dict[str, Any]) -> None:
     deletion = {"type": "null", "description": "null deletes an entry of the extended file"}
     for section in ENTRIES:
         entry = properties[section]["additionalProperties"]
-        forms = [entry, {"type": "object", "not": {"required": ["type"]}}, deletion]
+        forms = [entry, UNTYPED, deletion]
         if section in ("users", "robots"):  # only algorithms and metrics are typed by their name
             del forms[1]
         properties[section]["additionalProperties"] = {"anyOf": forms}

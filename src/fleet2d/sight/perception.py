@@ -5,13 +5,15 @@ Every part is perfect unless the scenario configures an error.
 
 from collections.abc import Mapping
 from datetime import timedelta
-from typing import Any, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from fleet2d.component import Settings
+from fleet2d.component import OneOf, Settings
+from fleet2d.entry_names import CheckNames, NameAsType
 from fleet2d.problems import problem_at
 from fleet2d.sight.curve import Curve
+from fleet2d.sight.perception_error import PerceptionError
 from fleet2d.sums import sum_in_order
 from fleet2d.units import AngleDeg, Duration, Length, Share
 
@@ -174,9 +176,16 @@ class Perception(Settings):
         false_positives: Rates of people that are perceived but aren't there.
         identity: Recognition of users.
         attributes: Errors of position, heading, posture and activity.
+        errors: Further errors by name, built in or your own; they act after the others, in this
+            order.
     """
 
     detection: Detection = Detection()
     false_positives: FalsePositives = FalsePositives()
     identity: Identity = Identity()
     attributes: Attributes = Attributes()
+    errors: Annotated[
+        dict[str, Annotated[PerceptionError, OneOf("perception_error", by_name=True)]],
+        CheckNames,
+        NameAsType,
+    ] = Field(default={})

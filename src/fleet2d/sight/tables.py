@@ -265,5 +265,5 @@ def _fill_false_positives(
 
 
 def is_perfect(perception: Perception | None) -> bool:
-    """Return whether a perception has no errors, so that it needs no random draws."""
-    return perception is None or perception == Perception()
+    """Return whether a look has no errors, so that it needs no tables; `errors` come after it."""
+    return perception is None or perception.model_copy(update={"errors": {}}) == Perception()

@@ -1,0 +1,1 @@
+"""Errors of perception: one module for each."""

@@ -1,0 +1,46 @@
+"""Sightings of one camera, made for tests of errors of perception."""
+
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from fleet2d import CameraSightings, Home
+from fleet2d.sight.camera_sightings import ErrorStream
+
+
+def sightings(
+    x: ArrayLike,
+    y: ArrayLike,
+    camera: tuple[float, float] = (0.0, 0.0),
+    seed: int = 1,
+    name: str = "camera: errors.e",
+    **columns: ArrayLike,
+) -> CameraSightings:
+    """Return sightings of ana at places [m], one a step, that are true but for some columns."""
+    count = len(np.asarray(x))
+    zeros: dict[str, Any] = {
+        "step": np.arange(count),
+        "true_user": np.zeros(count, np.int64),
+        "user": np.zeros(count, np.int64),
+        "posture": np.zeros(count, np.int64),
+        "noticed": np.ones(count, np.bool_),
+        "heading": np.zeros(count),
+    }
+    values = {**zeros, "x": x, "y": y, **columns}
+    values = {
+        key: np.array(value, np.asarray(zeros.get(key, 0.0)).dtype) for key, value in values.items()
+    }
+    true = {f"true_{key}": values[key].copy() for key in ("x", "y", "heading", "posture")}
+    eye = {f"camera_{key}": np.full(count, value) for key, value in zip("xy", camera, strict=True)}
+    return CameraSightings(
+        camera="camera",
+        users=("ana", "ben", "cleo"),
+        home=cast(Home, None),
+        step_s=1.0,
+        camera_heading=np.zeros(count),
+        _stream=ErrorStream(seed, "robots.r", name),
+        **values,
+        **true,
+        **eye,
+    )
