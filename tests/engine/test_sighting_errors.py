@@ -30,6 +30,12 @@ def unsure(**errors: Any) -> dict[str, Any]:
     return content
 
 
+def astro_with(errors: dict[str, Any]) -> dict[str, Any]:
+    """Return the section of robots with one, which has these errors."""
+    robots = unsure()["robots"]
+    return {"robots": {"astro": {**robots["astro"], "perception": {"errors": errors}}}}
+
+
 def reactions(stored: Run) -> list[Any]:
     """Return the events of seeing and losing, and what robots do about them."""
     rows = stored.tables["events"].to_pylist()
@@ -126,6 +132,19 @@ def test_each_camera_may_have_its_own_errors_and_each_error_its_own_draws() -> N
     del moved["errors"]["b"]  # which was drawn, and never used
     alone = table(run(content), "observations", robot="astro")
     np.testing.assert_array_equal(rows["x"], alone["x"])
+
+
+def test_errors_act_in_the_order_of_their_names() -> None:
+    """A stored scenario has its keys in the order of the alphabet: the file's order can't count."""
+    moved = {"type": "miscalibration", "offset": "1 m"}
+    scaled = {"type": "miscalibration", "scale": 2.0}
+    named = {"a": scaled, "b": moved}
+    first, twin, other = (
+        table(run({**unsure(), **astro_with(errors)}), "observations", robot="astro")
+        for errors in (named, dict(reversed(named.items())), {"a": moved, "b": scaled})
+    )
+    np.testing.assert_array_equal(first["x"], twin["x"])
+    assert (first["x"] != other["x"]).mean() > 0.9
 
 
 @pytest.mark.parametrize(

@@ -50,7 +50,7 @@ class CameraErrors(NamedTuple):
     Attributes:
         name: The name of the camera.
         path: Their path in the scenario, "robots.astro.perception.errors".
-        errors: The errors by name, in the order in which they act.
+        errors: The errors by name, in the order in which they act, that of the names.
     """
 
     name: str
@@ -74,7 +74,8 @@ class SightingErrors:
         for name, perception in zip(cameras.names, perceptions, strict=True):
             part = "" if perception is common else ".camera" if only else f".cameras.{name}"
             path = f"{owner.path}{part}.perception.errors"
-            self._cameras.append(CameraErrors(name, path, perception.errors if perception else {}))
+            errors = dict(sorted(perception.errors.items())) if perception else {}
+            self._cameras.append(CameraErrors(name, path, errors))
 
     def change(
         self, rows: I64, memory: SightMemory, before: SightMemory, window: Window, end: int

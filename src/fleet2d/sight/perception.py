@@ -176,8 +176,8 @@ class Perception(Settings):
         false_positives: Rates of people that are perceived but aren't there.
         identity: Recognition of users.
         attributes: Errors of position, heading, posture and activity.
-        errors: Further errors by name, built in or your own; they act after the others, in this
-            order.
+        errors: Further errors by name, built in or your own; they act after the others, in the
+            order of their names.
     """
 
     detection: Detection = Detection()
