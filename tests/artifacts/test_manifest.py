@@ -1,6 +1,5 @@
 """The manifest says what was run; a damaged one says so."""
 
-import datetime as dt
 import hashlib
 import json
 import math
@@ -8,8 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.scenes import run, scenario
 
-from fleet2d.artifacts.manifest import InputRecord, Manifest, input_record, plain, versions
+from fleet2d.artifacts.manifest import InputRecord, Manifest, input_record
+from fleet2d.artifacts.versions import versions
 from fleet2d.errors import RunDirectoryError
 
 
@@ -32,29 +33,6 @@ def test_manifest_is_sorted_and_strict_json(tmp_path: Path) -> None:
     assert {"a": None, "b": None} == content["metrics"]
     assert sorted(content) == list(content)
     assert text == json.dumps(content, indent=2, sort_keys=True) + "\n"
-
-
-def test_plain_has_words_for_what_models_hold() -> None:
-    given = {
-        "n": np.int32(3),
-        "a": np.array([1.5, np.nan]),
-        "d": dt.date(2026, 1, 5),
-        "t": dt.timedelta(minutes=1),
-        "p": Path("a"),
-        "s": {"b", "a"},
-        1: (True, None),
-    }
-
-    expected = {
-        "n": 3,
-        "a": [1.5, None],
-        "d": "2026-01-05",
-        "t": 60.0,
-        "p": "a",
-        "s": ["a", "b"],
-        "1": [True, None],
-    }
-    assert expected == plain(given)
 
 
 @pytest.mark.parametrize(
@@ -90,3 +68,16 @@ def test_versions_name_all_that_numbers_depend_on() -> None:
     expected = {"fleet2d", "numpy", "platform", "pyarrow", "python", "shapely"}
     assert expected == names.keys()
     assert np.__version__ == names["numpy"]
+
+
+def test_fields_are_filled_from_what_the_engine_knows_of_a_run() -> None:
+    users = {"ana": {"type": "meander"}, "ben": {}}
+    stored = run(scenario("5 min", users=users, robots={"astro": {}}))
+    manifest = Manifest.model_validate(stored.manifest)
+
+    assert (4, 300, 300.0) == (manifest.seed, manifest.steps, manifest.simulated_s)
+    assert (["ana", "ben"], ["astro"]) == (manifest.entities.users, manifest.entities.robots)
+    idle = [note for note in manifest.notes if "has no behavior" in note]
+    assert ["users.ben", "robots.astro"] == [note.split()[0] for note in idle]
+    assert {"setup", "simulate", "save"} == manifest.wall_s.keys()
+    assert 4 == manifest.scenario["simulation"]["seed"]

@@ -4,24 +4,24 @@ from __future__ import annotations
 
 import datetime as dt
 import hashlib
-import json
-import math
-import os
 import stat
-import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Protocol
 
-import numpy as np
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
 from fleet2d.artifacts.files import write_atomically
+from fleet2d.artifacts.plain import canonical, plain
 from fleet2d.artifacts.strict_json import read_json
 from fleet2d.artifacts.table import Kind
+from fleet2d.artifacts.versions import versions
 from fleet2d.bounds import FILE_BYTES, read_bytes
 from fleet2d.errors import RunDirectoryError
 from fleet2d.problems import did_you_mean
+
+if TYPE_CHECKING:
+    from fleet2d.clock import Clock
 
 FORMAT = 2
 """Version of the layout of run directories; a reader refuses a later one."""
@@ -32,6 +32,9 @@ FILE_NAME = "manifest.json"
 _MOST_PROBLEMS = 5
 # Characters of a wrong value that a message quotes, at most.
 _MOST_CHARACTERS = 60
+
+SLOW = "simulation.speedup is"
+"""Beginning of the note that a run was slower than its speedup."""
 
 Status = Literal["running", "complete", "interrupted", "failed"]
 
@@ -111,8 +114,39 @@ class Seal(_Record):
     files: dict[FileName, FileRecord]
 
 
+class ManifestFacts(Protocol):
+    """What fields of the manifest are filled from: the engine passes all that it knows of a run.
+
+    The scenario, the state and the pace are of packages above this one, which can't be imported.
+
+    Attributes:
+        scenario: The scenario, see `fleet2d.scenario.model`.
+        seed: The seed of the scenario, or the one that was drawn.
+        clock: The steps of the run.
+        state: The home, bodies, actors, learners …, see `fleet2d.engine.state`.
+        wall_s: Wall time by phase so far [s].
+        pace: Slows the run down; None: it runs as fast as it can.
+        results: The results of the metrics; empty before the end.
+    """
+
+    scenario: Any
+    seed: int
+    clock: Clock
+    state: Any
+    wall_s: Mapping[str, float]
+    pace: Any
+    results: Mapping[str, Any]
+
+    @property
+    def input_files(self) -> Iterable[Path]:
+        """The files that the run reads."""
+
+
 class Manifest(BaseModel):
     """The content of `manifest.json`. A field that a later version adds has a default.
+
+    A field is declared below, with the mark `VARIES` if it differs between repetitions of a run,
+    and filled in `describe_start` or `describe_end`.
 
     Attributes:
         format: Version of the layout of the run directory.
@@ -163,6 +197,39 @@ class Manifest(BaseModel):
     expectations: dict[str, dict[str, Any]] = {}
     resumed: Annotated[list[Count], VARIES] = []
     seal: Seal | None = None
+
+    def describe_start(self, run: ManifestFacts) -> None:
+        """Set the fields that are known before the first step."""
+        self.scenario = run.scenario.resolved()
+        self.scenario["simulation"]["seed"] = run.seed
+        self.seed = run.seed
+        self.step_us = run.clock.step_us
+        self.start = run.clock.start.isoformat()
+        self.entities = Entities(users=list(run.scenario.users), robots=list(run.scenario.robots))
+        self.versions = versions()
+        self.inputs = [input_record(path) for path in run.input_files]
+        self.notes = [
+            *run.state.home.plan.notes,
+            *(
+                f"{actor.path} has no behavior: it stays where it is"
+                for actor in run.state.actors
+                if not actor.entity.behaviors
+            ),
+        ]
+
+    def describe_end(self, run: ManifestFacts) -> None:
+        """Set the fields that are known after the last step."""
+        self.steps = run.state.bodies.step
+        self.simulated_s = self.steps * run.clock.step_us / 1e6
+        self.metrics = dict(run.results)
+        self.wall_s = dict(run.wall_s)
+        self.interventions = run.state.interventions.done
+        speedup = run.pace.speedup_until(self.simulated_s) if run.pace else 0.0
+        if run.pace and speedup < 0.98 * run.pace.speedup:
+            self.notes.append(
+                f"{SLOW} {run.pace.speedup:g}, but only {speedup:.0f} times real time was reached,"
+                " because computing took longer"
+            )
 
     @classmethod
     def varying(cls) -> list[str]:
@@ -268,11 +335,6 @@ def is_regular(path: Path) -> bool:
     return stat.S_ISREG(path.stat().st_mode)
 
 
-def canonical(content: Any) -> str:
-    """Return the one text that a manifest of some content has."""
-    return json.dumps(content, indent=2, sort_keys=True, allow_nan=False) + "\n"
-
-
 def _problems(error: ValidationError) -> str:
     """Return a message that names the wrong fields and what is wrong with each."""
     lines = []
@@ -305,50 +367,3 @@ def input_record(path: Path | str) -> InputRecord:
     with Path(path).open("rb") as file:
         sha256 = hashlib.file_digest(file, "sha256").hexdigest()
     return InputRecord(path=str(path), sha256=sha256)
-
-
-def versions() -> dict[str, str]:
-    """Return the versions of all software that the numbers of a run may depend on."""
-    packages = {name: _version(name) for name in ("fleet2d", "numpy", "pyarrow", "shapely")}
-    machine = os.uname().machine if hasattr(os, "uname") else "unknown"
-    python = ".".join(map(str, sys.version_info[:3]))
-    return {**packages, "python": python, "platform": f"{sys.platform} {machine}"}
-
-
-def _version(package: str) -> str:
-    # Searching the installed packages takes longer than simulating a day.
-    version = getattr(sys.modules.get(package), "__version__", None)
-    if isinstance(version, str):
-        return version
-    from importlib import metadata
-
-    try:
-        return metadata.version(package)
-    except metadata.PackageNotFoundError:
-        return "unknown"
-
-
-def plain(value: Any) -> Any:
-    """Convert a value to plain JSON data: NaN and infinity become null.
-
-    Example:
-        >>> plain({"mean": float("nan"), "at": dt.timedelta(hours=1), 3: (1, 2)})
-        {'mean': None, 'at': 3600.0, '3': [1, 2]}
-    """
-    if isinstance(value, np.generic | np.ndarray):
-        value = value.tolist()
-    if value is None or isinstance(value, bool | int | str):
-        return value
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    if isinstance(value, Mapping):
-        return {str(key): plain(entry) for key, entry in value.items()}
-    if isinstance(value, set | frozenset):
-        return sorted(plain(entry) for entry in value)
-    if isinstance(value, Sequence):
-        return [plain(entry) for entry in value]
-    if isinstance(value, dt.timedelta):
-        return value.total_seconds()
-    if isinstance(value, dt.date | dt.time):
-        return value.isoformat()
-    return str(value)

@@ -20,10 +20,10 @@ from fleet2d.artifacts.manifest import (
     FileRecord,
     Manifest,
     Seal,
-    canonical,
     is_regular,
     json_of,
 )
+from fleet2d.artifacts.plain import canonical
 from fleet2d.bounds import FILE_BYTES, read_bytes
 from fleet2d.errors import ArtifactError, RunDirectoryError
 

@@ -1,4 +1,4 @@
-"""The manifest and the floor plan of a run, and its end by a signal."""
+"""What is known of a run for its manifest, its floor plan on disk, and its end by a signal."""
 
 import json
 import os
@@ -6,24 +6,22 @@ import signal
 import threading
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from fleet2d.artifacts.directory import cannot_write
-from fleet2d.artifacts.manifest import Entities, Manifest, input_record, versions
 from fleet2d.artifacts.store import RunStore
 from fleet2d.blame import blame
 from fleet2d.clock import Clock
 from fleet2d.engine.inputs import input_files
 from fleet2d.engine.pace import Pace
+from fleet2d.engine.state import State
 from fleet2d.errors import ArtifactError
 from fleet2d.floorplan.formats.native import native_document
 from fleet2d.floorplan.home.home import Home
-from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.runs.run import FLOORPLAN_NAME
 from fleet2d.scenario.model import Scenario
-
-SLOW = "simulation.speedup is"
-"""Beginning of the note that a run was slower than its speedup."""
 
 # The messages of Ctrl-C, and of the signal that systemd, Docker and Slurm send before they kill.
 _MESSAGES = {
@@ -32,46 +30,22 @@ _MESSAGES = {
 }
 
 
-def describe_start(
-    manifest: Manifest, scenario: Scenario, seed: int, clock: Clock, plan: FloorPlan
-) -> None:
-    """Set the fields of a manifest that are known before the first step."""
-    manifest.scenario = scenario.resolved()
-    manifest.scenario["simulation"]["seed"] = seed
-    manifest.seed = seed
-    manifest.step_us = clock.step_us
-    manifest.start = clock.start.isoformat()
-    manifest.entities = Entities(users=list(scenario.users), robots=list(scenario.robots))
-    manifest.versions = versions()
-    manifest.inputs = [input_record(path) for path in input_files(scenario)]
-    manifest.notes = list(plan.notes)
-    for bucket, entities in (("users", scenario.users), ("robots", scenario.robots)):
-        manifest.notes += [
-            f"{bucket}.{name} has no behavior: it stays where it is"
-            for name, entity in entities.items()
-            if not entity.behaviors
-        ]
+@dataclass
+class EngineFacts:
+    """All that the engine knows of a run: what `ManifestFacts` has."""
 
+    scenario: Scenario
+    seed: int
+    clock: Clock
+    state: State
+    wall_s: Mapping[str, float]
+    pace: Pace | None
+    results: Mapping[str, Any]
 
-def describe_end(
-    manifest: Manifest,
-    clock: Clock,
-    step: int,
-    results: Mapping[str, Any],
-    wall_s: Mapping[str, float],
-    pace: Pace | None,
-) -> None:
-    """Set the fields of a manifest that are known after the last step."""
-    manifest.steps = step
-    manifest.simulated_s = step * clock.step_us / 1e6
-    manifest.metrics = dict(results)
-    manifest.wall_s = dict(wall_s)
-    speedup = pace.speedup_until(manifest.simulated_s) if pace else 0.0
-    if pace and speedup < 0.98 * pace.speedup:
-        manifest.notes.append(
-            f"{SLOW} {pace.speedup:g}, but only {speedup:.0f} times real time was reached, because"
-            " computing took longer"
-        )
+    @property
+    def input_files(self) -> list[Path]:
+        """The files that the run reads."""
+        return input_files(self.scenario)
 
 
 def open_store(store: RunStore, home: Home) -> None:

@@ -7,11 +7,10 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from fleet2d.artifacts.manifest import FILE_NAME, Manifest
+from fleet2d.artifacts.manifest import FILE_NAME, SLOW, Manifest
 from fleet2d.artifacts.seal import verify_run
 from fleet2d.engine.expectations import TABLE
 from fleet2d.engine.inputs import changed_inputs
-from fleet2d.engine.lifecycle import SLOW
 from fleet2d.engine.simulation import Simulation
 from fleet2d.errors import ArtifactError, InputError, RunDirectoryError
 from fleet2d.expectations.expectation import Expectation

@@ -16,9 +16,8 @@ from fleet2d.engine.checkpoint import Checkpoint, CheckpointWriter
 from fleet2d.engine.interventions import is_from_outside
 from fleet2d.engine.judging import Judging
 from fleet2d.engine.lifecycle import (
+    EngineFacts,
     deferred_interrupt,
-    describe_end,
-    describe_start,
     open_store,
     store_plan,
 )
@@ -100,13 +99,13 @@ class Simulation(Judging):
         self._pace: Pace | None = None
         self._is_stopping = self._has_failed = False
         self._run: Run | None = None  # set when it is finished
-        describe_start(self._store.manifest, self.scenario, self.seed, self.clock, self.home.plan)
-        store.manifest.interventions = outside
         self._keeper: CheckpointWriter | None = None
         if store.directory is not None:
             settings = scenario.artifacts
             self._keeper = CheckpointWriter(store, settings, self.clock, self._checkpoint_header)
         self._setup_s = self._simulate_s = self._save_s = 0.0
+        store.manifest.describe_start(self._facts())
+        store.manifest.interventions = outside
         self._began: float | None = None  # set while it simulates
 
     @classmethod
@@ -297,13 +296,18 @@ class Simulation(Judging):
             self._store_learned()
         self._store.close_tables()
         self._save_s += time.perf_counter() - began
-        wall_s = {"setup": self._setup_s, "simulate": self._simulate_s, "save": self._save_s}
-        self._store.manifest.interventions = state.interventions.done
-        describe_end(self._store.manifest, self.clock, self.step, results, wall_s, self._pace)
+        self._store.manifest.describe_end(self._facts(results))
         self._store.close(status)
         self._run = run_of(self._store)
         self._run.plan = self.home.plan
         return self._run
+
+    def _facts(self, results: Mapping[str, Any] | None = None) -> EngineFacts:
+        wall_s = {"setup": self._setup_s, "simulate": self._simulate_s, "save": self._save_s}
+        results = results or {}
+        return EngineFacts(
+            self.scenario, self.seed, self.clock, self._state, wall_s, self._pace, results
+        )
 
     def _store_learned(self) -> None:
         """Store what algorithms have learned; failures are noted in the manifest."""

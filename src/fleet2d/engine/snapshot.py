@@ -16,7 +16,7 @@ from types import BuiltinFunctionType, FunctionType
 from typing import Any, BinaryIO
 
 from fleet2d.artifacts.chunk import ColumnChunk
-from fleet2d.artifacts.manifest import plain
+from fleet2d.artifacts.plain import plain
 from fleet2d.engine import arrays
 from fleet2d.engine.inputs import components_of
 from fleet2d.engine.state import State

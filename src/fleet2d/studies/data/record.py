@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from fleet2d.artifacts.manifest import plain
+from fleet2d.artifacts.plain import plain
 from fleet2d.studies.engine import VariantOutcome
 
 if TYPE_CHECKING:

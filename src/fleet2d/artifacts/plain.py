@@ -1,0 +1,40 @@
+"""Plain JSON data: what manifests and other files of a run consist of."""
+
+import datetime as dt
+import json
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+
+def plain(value: Any) -> Any:
+    """Convert a value to plain JSON data: NaN and infinity become null.
+
+    Example:
+        >>> plain({"mean": float("nan"), "at": dt.timedelta(hours=1), 3: (1, 2)})
+        {'mean': None, 'at': 3600.0, '3': [1, 2]}
+    """
+    if isinstance(value, np.generic | np.ndarray):
+        value = value.tolist()
+    if value is None or isinstance(value, bool | int | str):
+        return value
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, Mapping):
+        return {str(key): plain(entry) for key, entry in value.items()}
+    if isinstance(value, set | frozenset):
+        return sorted(plain(entry) for entry in value)
+    if isinstance(value, Sequence):
+        return [plain(entry) for entry in value]
+    if isinstance(value, dt.timedelta):
+        return value.total_seconds()
+    if isinstance(value, dt.date | dt.time):
+        return value.isoformat()
+    return str(value)
+
+
+def canonical(content: Any) -> str:
+    """Return the one text that a file of some content has."""
+    return json.dumps(content, indent=2, sort_keys=True, allow_nan=False) + "\n"
