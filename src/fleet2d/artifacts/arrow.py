@@ -263,7 +263,7 @@ class ParquetTable:
 
 
 def read_parquet(path: Path) -> pa.Table:
-    """Read a table as `with_categories` returns it.
+    """Read a table from its file; the chunks of a category column share one dictionary.
 
     Raises:
         ArtifactError: The file is missing, cut off or otherwise damaged.

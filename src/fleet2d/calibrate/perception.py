@@ -97,7 +97,10 @@ class Calibration:
     notes: list[str] = field(default_factory=list)
 
     def section(self) -> dict[str, Any]:
-        """Return the `perception` section of a scenario; the camera's `detection` is 1 then."""
+        """Return the `perception` section of a scenario.
+
+        It has the whole probability of detection: set the camera's own `detection` to 1 beside it.
+        """
         estimates = self.detection.estimates
         detection: dict[str, Any] = {"distance": _curve(estimates, "distance")}
         if "bearing midpoint" in estimates:

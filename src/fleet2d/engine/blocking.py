@@ -68,7 +68,7 @@ class BlockedWays(Watcher):
     """
 
     def __init__(self, basis: Basis) -> None:
-        """Follow the bodies if the scenario says how long one waits for another."""
+        """Keep track of bodies if `simulation.people_block` says how long one waits for another."""
         self._actors, self._users = basis.actors, basis.bodies.users
         patience = basis.scenario.simulation.people_block
         self._patience_us = 0 if patience is None else micros(patience)

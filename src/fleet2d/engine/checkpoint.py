@@ -75,7 +75,9 @@ class Checkpoint:
         except (KeyError, TypeError, ValueError, RunDirectoryError) as error:
             raise UnusableCheckpointError(f"{path} is not a checkpoint of a run") from error
         if (stored.scenario, stored.seed) != (manifest.scenario, manifest.seed):
-            raise UnusableCheckpointError(f"{path} is of a run with another scenario or seed")
+            raise UnusableCheckpointError(
+                f"{path} was written by a run of another scenario or seed"
+            )
         return cls(commit, stored, (setup_s, simulate_s, save_s), body)
 
     def read(self, constants: Constants) -> State:

@@ -84,7 +84,7 @@ class Pair:
         ]
 
     def hears(self, column: int) -> bool:
-        """Whether the person hears a call of the robot in a column of the scanned span."""
+        """Whether the person hears a call of the robot at a step: a column of the scanned span."""
         return bool(self.distances[column] <= self.attention.hears * self.attention.hears)
 
     def advance(self, block: PoseBlock, count: int, events: Sequence[str]) -> None:

@@ -42,7 +42,7 @@ class Gauge:
         self._parts.append(self._measure(block))
 
     def trace(self, end: int) -> Trace:
-        """Return the measured signal before a step, which all blocks have reached."""
+        """Return the signal at all steps before a step, up to which all blocks were measured."""
         trace = joined(self._parts)
         self._parts = [trace]
         return trace

@@ -58,7 +58,7 @@ class PerfectCameras(Cameras):
 
 
 class InViewGauge(SwitchGauge):
-    """Measures whether a body is in view of a camera, by perfect cameras at the same place."""
+    """Measures whether a body is in view of another's cameras, as if these made no errors."""
 
     def __init__(self, state: State, cameras: Cameras, body: str) -> None:
         super().__init__(False)

@@ -146,7 +146,7 @@ class Body:
 
     @property
     def arrangement(self) -> tuple[int, int]:
-        """Versions of the home and of its costs: its space changes whenever they do."""
+        """The versions of the home and its route costs: the space is computed anew for others."""
         return self.home.version, self.home.costs_version if self.entity.minds_costs else 0
 
     def _present_space(self) -> Space:

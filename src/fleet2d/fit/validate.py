@@ -39,7 +39,10 @@ class Validation(NamedTuple):
     activities: tuple[Distances, ...]
 
     def worse_than_copying(self) -> list[str]:
-        """Return a line for each room distance in which the persona is worse than copied days."""
+        """Return a line for each measure by which copied days are nearer to the held-back ones.
+
+        The measures compare in which rooms somebody is; nearer than days of the persona is worse.
+        """
         persona, copies = self.rooms[0], self.rooms[1]
         keys = {"dwell times (KS)": "ks", "hours": "hours", "time shares": "share"}
         return [

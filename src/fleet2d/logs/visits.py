@@ -107,9 +107,14 @@ def _interval(reading: Reading, place: str, rule: VisitRule) -> RoomInterval:
 
 
 def _sweep(intervals: Sequence[RoomInterval]) -> tuple[list[tuple[RoomInterval, bool]], int]:
-    """Return disjoint pieces of intervals in order, and the number of overruled intervals.
+    """Cut overlapping intervals into disjoint pieces, in order: the one that began last wins.
 
-    Each piece comes with whether its interval is an instant.
+    Args:
+        intervals: The intervals, in the order of their beginnings.
+
+    Returns:
+        The pieces, each with whether its interval is an instant, and the number of intervals that
+        lost all their time to those of other rooms.
     """
     pieces: list[tuple[RoomInterval, bool]] = []
     active: list[tuple[RoomInterval, int]] = []  # a stack: the last one began last

@@ -193,7 +193,7 @@ def _feasible_chain(plan: DayPlan, draws: Draws, wake: int, next_wake: int) -> C
             if job is None:
                 raise RuntimeError(
                     f"the tasks of day {plan.name!r} fit in no order between waking and bedtime:"
-                    " shorten some, widen their times, or give them less need"
+                    " shorten some, widen their times, or give some a probability below 1"
                 )
             chosen.remove(job)
 

@@ -85,7 +85,7 @@ def run_claim(claim: Claim, body: Body) -> ClaimResult:
         holds = rate.decide(len(trials), failures)
         if holds is not None:
             return ClaimResult(claim, tuple(trials), holds)
-    raise AssertionError("the last seed decides")
+    raise AssertionError("Rate.decide() gave no verdict after the last seed")
 
 
 def run_trial(

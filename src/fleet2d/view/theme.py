@@ -138,7 +138,7 @@ def _darken_artist(artist: Artist) -> None:
 
 
 def _dark_or_transparent(color: Any) -> Any:
-    """Return a colour of the dark theme; a transparent colour stays as it is."""
+    """Convert a colour of the light theme to the dark one; a transparent one stays as it is."""
     colors = dark_colors(color)
     return tuple(colors[0].tolist()) if len(colors) and colors[0, 3] else color
 

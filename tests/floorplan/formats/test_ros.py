@@ -366,7 +366,7 @@ def test_wrong_settings_are_refused_with_the_reason(
         (b"[1, 2]", "holds a list: a floor plan is a YAML mapping"),
         (b"image: [", "not YAML"),
         (b"P5\n4 3\n255\n\xff\xfe\x00", "not a YAML text file"),
-        (b"mode: inorder\nposes: []\n", "no ROS map: the key 'image' is missing"),
+        (b"mode: inorder\nposes: []\n", "not a ROS map: the key 'image' is missing"),
     ],
 )
 def test_other_files_are_refused(tmp_path: Path, content: bytes, message: str) -> None:

@@ -22,11 +22,11 @@ class SightingShare(Estimator):
     """
 
     def width(self, rooms: int) -> int:
-        """Return the number of columns of `sums`: each room, bins watched, not seen, and all."""
+        """Return the number of columns of `sums`: one for each room, and three counts of bins."""
         return rooms + 3
 
     def sums(self, bins: Bins) -> F64:
-        """Return sightings per room, and bins with a view, with a view but nobody, and all."""
+        """Return sightings per room, then bins: watched, watched without a sighting, and all."""
         seen = bins.seen.astype(np.float64)
         is_seen = np.any(bins.seen > 0, axis=2)
         has_view = np.any(bins.watched > 0, axis=1)[:, np.newaxis] | is_seen

@@ -31,8 +31,8 @@ class Population(Inhabitant):
 
     Attributes:
         group: Group of people; any: drawn by the groups' shares of the people.
-        bodily_needs: Whether an adult's needs and errands interrupt what is done, which the survey
-            doesn't record: its shares count them as what they interrupt.
+        bodily_needs: Whether bodily needs and short errands interrupt an adult's activities. The
+            survey doesn't record them: it counts their time as that of the interrupted activity.
     """
 
     group: Literal["any", "workers", "retired", "working_parents", "at_home"] = "any"

@@ -75,8 +75,9 @@ class Routine(Inhabitant):
             members = list(self.household.members)
             if actor.name not in members:
                 raise PlacementError(
-                    f"{actor.path}: the household has no member of this name"
-                    f"{suggest(actor.name, members, 'Its members are')}"
+                    f"{actor.path}: the household has no member {actor.name!r}"
+                    f"{suggest(actor.name, members, 'Its members are')};"
+                    " add it there, or leave out `household`"
                 )
             self._join_household(actor)
             spots = Spots(actor, members.index(actor.name), len(members))

@@ -132,7 +132,9 @@ class _MapSettings:
 def _settings(content: dict[str, Any]) -> _MapSettings:
     for key, line in _KEYS.items():
         if key not in content:
-            raise FloorPlanError(f"no ROS map: the key {key!r} is missing; write it like `{line}`")
+            raise FloorPlanError(
+                f"not a ROS map: the key {key!r} is missing; write it like `{line}`"
+            )
     image = content["image"]
     if not isinstance(image, str) or not image:
         raise FloorPlanError(

@@ -55,7 +55,7 @@ def inline(
 def _offsets(outline: str | None, choices: Choices) -> tuple[int, int]:
     """Draw how far the core reaches beyond the wing at its low and its high side [units].
 
-    Between two wings it stands out on one side (`bar`) or back (`court`).
+    Between two wings it protrudes on one side (`bar`), or is set back there (`court`).
     """
     step = choices.between(24, 60)
     side = choices.below(2)

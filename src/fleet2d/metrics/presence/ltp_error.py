@@ -148,7 +148,7 @@ class LtpError(LongTermMetric):
     def _compare(
         self, presence: Presence, users: Sequence[str], counts: I64, steps: int
     ) -> dict[str, F64]:
-        """Return a number per user, by name."""
+        """Return each measure of the error, by its name: float64 (users,)."""
         if self.given == "hour_of_week":
             each = [self._by_hour(presence, u, counts[:, row]) for row, u in enumerate(users)]
             return {name: np.array([one[name] for one in each]) for name in COLUMNS}

@@ -43,8 +43,8 @@ class HomeFacts(TypedDict):
     """A home: outlines in metres, cells as runs of equal rooms.
 
     `free` lists polygons, each an outline and its holes. `room_cells` are pairs (room, number of
-    cells), row by row from the lowest; -1 is not a room. `place_cells` are the same for places in
-    cells that a wall cuts.
+    cells), row by row from the lowest; -1 is no room. `place_cells` are such pairs, too, in which
+    cells that a wall cuts have the room of a cell beside them: somebody may be in their free part.
     """
 
     name: str
