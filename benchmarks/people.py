@@ -34,11 +34,18 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from visits import (
+    RoomTrace,
+    Visits,
+    count_visits,
+    spread,
+    stays,
+    trace_of_log,
+    trace_of_persona,
+)
 
 import fleet2d
 import fleet2d.routines.survey as survey
-from fleet2d.fit.traces import RoomTrace, trace_of_log, trace_of_persona
-from fleet2d.fit.visits import Visits, count_visits, spread, stays
 from fleet2d.routines.interruptions import without_interruptions
 from fleet2d.routines.life import Life
 from fleet2d.routines.persona import bundled_names, bundled_persona

@@ -5,9 +5,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from benchmarks.visits import (
+    RoomTrace,
+    Visits,
+    count_visits,
+    spread,
+    stays,
+    trace_of_log,
+    trace_of_persona,
+)
 
-from fleet2d.fit.traces import RoomTrace, trace_of_log, trace_of_persona
-from fleet2d.fit.visits import Visits, count_visits, spread, stays
 from fleet2d.routines.persona import bundled_names
 
 KINDS = ("away", "bathroom", "hallway", "kitchen", "living_room")
