@@ -28,7 +28,7 @@ from fleet2d.artifacts import store
 from fleet2d.artifacts.journal import JournalWriter
 from fleet2d.artifacts.ledger import Ledger
 from fleet2d.artifacts.seal import verify_run
-from fleet2d.engine.checkpoint import CheckpointWriter
+from fleet2d.engine.snapshots.checkpoint import CheckpointWriter
 
 
 @contextmanager
@@ -78,7 +78,7 @@ import tempfile
 from pathlib import Path
 import journal, pyarrow.parquet
 from fleet2d.artifacts import ledger
-from fleet2d.engine import checkpoint
+from fleet2d.engine.snapshots import checkpoint
 checkpoint.COMMIT_S = checkpoint.COMPUTING_S = checkpoint.WAITING_S = ledger.SYNC_S = 1e9
 """
     )

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from tests.scenes import Cli, fleet2d_process
 
-from fleet2d.engine import arrays
-from fleet2d.engine.snapshot import read_state
+from fleet2d.engine.snapshots import arrays
+from fleet2d.engine.snapshots.snapshot import read_state
 from fleet2d.errors import ArtifactError
 
 OWN = """

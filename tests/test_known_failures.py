@@ -316,7 +316,7 @@ CHANGES: dict[tuple[type, str], dict[str, Any]] = {
         "outputs": False,
     },
     (SightSettings, "sight"): {
-        "method": {"type": f"{TESTS.as_posix()}/engine/test_points_in_view:XRay"},
+        "method": {"type": f"{TESTS.as_posix()}/engine/watchers/test_points_in_view:XRay"},
         "people_occlude": True,
     },
 }  # fmt: skip
@@ -326,7 +326,7 @@ ELSEWHERE = {
     (Robot, "localization"): "tests/entities/test_localization",
     (Robot, "color"): "tests/view: pictures",
     (User, "opens_doors"): "tests/engine/test_changes: there is no door in this home",
-    (Robot, "gives_way"): "tests/engine/test_clearance: it meets nobody on its way here",
+    (Robot, "gives_way"): "tests/engine/watchers/test_clearance: it meets nobody on its way here",
     (Robot, "opens_doors"): "tests/engine/test_changes: there is no door in this home",
     (ArtifactSettings, "checkpoint"): "tests/engine/test_resume: a file, no table",
     (ArtifactSettings, "learned"): "tests/algorithms/test_learned: a file, no table",
@@ -336,7 +336,10 @@ ELSEWHERE = {
     (Patrol, "preempts"): "tests/entities/test_arbitration: there is one behavior here",
     (Meander, "preempts"): "tests/entities/test_arbitration: there is one behavior here",
     (SimulationSettings, "max_span"): "test_spans: changes no result by design; see below",
-    (SightSettings, "seen_every"): "tests/engine/test_layers: nobody asks for the seen area here",
+    (
+        SightSettings,
+        "seen_every",
+    ): "tests/engine/watchers/test_layers: nobody asks for the seen area here",
     (SimulationSettings, "speedup"): "test_pace: wall time",
 }
 CASES = [

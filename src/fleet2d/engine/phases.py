@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 from fleet2d.algorithms.log import Log
 from fleet2d.blame import blame
+from fleet2d.engine.control.world import EngineWorld
 from fleet2d.engine.state import State
-from fleet2d.engine.world import EngineWorld
 from fleet2d.entities.behavior import Situation
 from fleet2d.floorplan.home.change import HomeChanges
 

@@ -10,9 +10,9 @@ from fleet2d.artifacts.journal import JOURNAL_NAME, last_commit
 from fleet2d.artifacts.ledger import Ledger, remove_leftovers
 from fleet2d.artifacts.manifest import FILE_NAME, Manifest
 from fleet2d.artifacts.store import RunStore
-from fleet2d.engine.checkpoint import Checkpoint, UnusableCheckpointError
 from fleet2d.engine.inputs import changed_inputs
 from fleet2d.engine.simulation import Simulation
+from fleet2d.engine.snapshots.checkpoint import Checkpoint, UnusableCheckpointError
 from fleet2d.errors import RunDirectoryError
 from fleet2d.runs.run import Run
 from fleet2d.scenario.model import load_scenario

@@ -7,21 +7,21 @@ from fleet2d.algorithms.log import Log
 from fleet2d.artifacts.store import RunStore
 from fleet2d.clock import Clock
 from fleet2d.engine.basis import Basis
-from fleet2d.engine.blocking import BlockedWays
 from fleet2d.engine.bodies import Bodies
-from fleet2d.engine.cameras import Cameras, open_cameras
 from fleet2d.engine.changes import Changes
-from fleet2d.engine.clearance import Clearance
-from fleet2d.engine.encounters import Encounters
-from fleet2d.engine.interruptions import SIGHT_EVENTS, Interruptions
+from fleet2d.engine.control.script import schedule
 from fleet2d.engine.interventions import Interventions
-from fleet2d.engine.layers import LayerBook, lay_layers
 from fleet2d.engine.learners import Learners
-from fleet2d.engine.recorder import Recorder, activities_of
-from fleet2d.engine.script import schedule
-from fleet2d.engine.sensors import Sensors
 from fleet2d.engine.state import InView, State
-from fleet2d.engine.tables import table_specs
+from fleet2d.engine.tables.definitions import table_specs
+from fleet2d.engine.tables.recorder import Recorder, activities_of
+from fleet2d.engine.watchers.blocking import BlockedWays
+from fleet2d.engine.watchers.cameras import Cameras, open_cameras
+from fleet2d.engine.watchers.clearance import Clearance
+from fleet2d.engine.watchers.encounters import Encounters
+from fleet2d.engine.watchers.interruptions import SIGHT_EVENTS, Interruptions
+from fleet2d.engine.watchers.layers import LayerBook, lay_layers
+from fleet2d.engine.watchers.sensors import Sensors
 from fleet2d.entities.decisions import DecidingActor
 from fleet2d.entities.objects.door import Door
 from fleet2d.errors import ComponentError, PlacementError, ScenarioError
@@ -99,7 +99,9 @@ def set_up(scenario: Scenario, clock: Clock, seed: int, store: RunStore) -> Stat
         with _locate_errors(scenario, path), _prefix_errors(path):
             schedule(state, entry, 0, index)
     for name, expectation in scenario.expect.items():
-        from fleet2d.engine.expect import expect  # with much that other scenarios don't need
+        from fleet2d.engine.judging.expect import (
+            expect,  # with much that other scenarios don't need
+        )
 
         with _locate_errors(scenario, f"expect.{name}"):
             expect(state, scenario, clock, name, expectation, 0)

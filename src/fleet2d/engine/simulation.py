@@ -12,9 +12,8 @@ from fleet2d.artifacts.ledger import Ledger
 from fleet2d.artifacts.manifest import Status
 from fleet2d.artifacts.store import RunStore
 from fleet2d.clock import Clock
-from fleet2d.engine.checkpoint import Checkpoint, CheckpointWriter
 from fleet2d.engine.interventions import is_from_outside
-from fleet2d.engine.judging import Judging
+from fleet2d.engine.judging.verdicts import Judging
 from fleet2d.engine.lifecycle import (
     EngineFacts,
     deferred_interrupt,
@@ -24,7 +23,14 @@ from fleet2d.engine.lifecycle import (
 from fleet2d.engine.pace import Pace
 from fleet2d.engine.phases import PHASES, Span
 from fleet2d.engine.setup import set_up
-from fleet2d.engine.snapshot import Constants, copy_state, open_snapshot, read_state, save_snapshot
+from fleet2d.engine.snapshots.checkpoint import Checkpoint, CheckpointWriter
+from fleet2d.engine.snapshots.snapshot import (
+    Constants,
+    copy_state,
+    open_snapshot,
+    read_state,
+    save_snapshot,
+)
 from fleet2d.engine.state import State
 from fleet2d.errors import ArtifactError, InputError
 from fleet2d.garbage import rare_collections

@@ -12,20 +12,20 @@ from fleet2d.algorithms.activities import ROBOT
 from fleet2d.algorithms.log import Log
 from fleet2d.algorithms.observations import OBSERVATION
 from fleet2d.artifacts.store import RunStore
-from fleet2d.engine.block import Block
-from fleet2d.engine.blocking import BlockedWays
 from fleet2d.engine.bodies import Bodies
-from fleet2d.engine.cameras import Cameras
 from fleet2d.engine.changes import Changes
-from fleet2d.engine.clearance import Clearance
-from fleet2d.engine.encounters import Encounters
-from fleet2d.engine.interruptions import Interruptions
+from fleet2d.engine.expectations.block import Block
 from fleet2d.engine.interventions import Interventions
-from fleet2d.engine.layers import LayerBook
 from fleet2d.engine.learners import Learners
-from fleet2d.engine.recorder import Recorder
-from fleet2d.engine.sensors import Sensors
-from fleet2d.engine.watcher import Watcher
+from fleet2d.engine.tables.recorder import Recorder
+from fleet2d.engine.watchers.blocking import BlockedWays
+from fleet2d.engine.watchers.cameras import Cameras
+from fleet2d.engine.watchers.clearance import Clearance
+from fleet2d.engine.watchers.encounters import Encounters
+from fleet2d.engine.watchers.interruptions import Interruptions
+from fleet2d.engine.watchers.layers import LayerBook
+from fleet2d.engine.watchers.sensors import Sensors
+from fleet2d.engine.watchers.watcher import Watcher
 from fleet2d.entities.behavior import SightEvent
 from fleet2d.entities.decisions import DecidingActor
 from fleet2d.events import Event, EventKind, EventStream
@@ -34,7 +34,7 @@ from fleet2d.kernels.look import SIGHTING
 from fleet2d.kernels.look import STEP as STEP_COLUMN
 
 if TYPE_CHECKING:
-    from fleet2d.engine.expectations import RunExpectations
+    from fleet2d.engine.expectations.run_expectations import RunExpectations
 
 # The most steps that watchers process together: fewer if there are many bodies.
 MOST_STEPS = 1 << 16

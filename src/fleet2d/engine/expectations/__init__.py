@@ -1,0 +1,1 @@
+"""Expectations in a run: gauges measure their signals, block by block."""

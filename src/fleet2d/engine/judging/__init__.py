@@ -1,0 +1,1 @@
+"""Expectations of a simulation: how they are added, and their verdicts."""

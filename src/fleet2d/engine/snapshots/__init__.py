@@ -1,0 +1,1 @@
+"""Copies of the state of a run, in memory and in files."""

@@ -1,0 +1,206 @@
+"""Commits of the rows of a run, and checkpoints of its state, while it is running."""
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from datetime import timedelta
+from functools import partial
+from pathlib import Path
+from typing import Any, BinaryIO, Self
+
+from fleet2d.artifacts import files
+from fleet2d.artifacts.journal import Commit
+from fleet2d.artifacts.manifest import Manifest
+from fleet2d.artifacts.settings import ArtifactSettings
+from fleet2d.artifacts.store import RunStore
+from fleet2d.clock import Clock
+from fleet2d.engine.snapshots.snapshot import (
+    Constants,
+    UnstorableStateError,
+    open_snapshot,
+    read_state,
+    write_snapshot,
+)
+from fleet2d.engine.state import State
+from fleet2d.errors import ArtifactError, RunDirectoryError
+from fleet2d.garbage import release_memory
+from fleet2d.units import micros
+
+DAY_US = 86_400_000_000
+# Longest wall time between commits of rows [s]; they are also committed every simulated day.
+COMMIT_S = 2.0
+# `auto`: a checkpoint is written after this much computing [s], or this much wall time [s] in a run
+# that is slowed down; and so rarely that checkpoints take at most 1/40 of the computing.
+COMPUTING_S = 10.0
+WAITING_S = 60.0
+SHARE = 40
+
+
+class UnusableCheckpointError(ArtifactError):
+    """A checkpoint can't be used: the run starts again from its first step."""
+
+
+@dataclass
+class Checkpoint:
+    """A checkpoint that was read from its file, without the state.
+
+    Attributes:
+        commit: The commit of the rows before it.
+        manifest: The manifest at that time.
+        wall_s: Wall time until then of setup, simulate, save [s].
+        body: The file, at the beginning of the state.
+    """
+
+    commit: Commit
+    manifest: Manifest
+    wall_s: tuple[float, float, float]
+    body: BinaryIO
+
+    @classmethod
+    def open(cls, path: Path, manifest: Manifest) -> Self:
+        """Open a checkpoint of the run that a manifest describes.
+
+        Raises:
+            UnusableCheckpointError: There is none, it is damaged, or of another run.
+        """
+        if not path.is_file():
+            raise UnusableCheckpointError("there is no checkpoint yet")
+        try:
+            header, body = open_snapshot(path)
+            commit = Commit(**header["commit"])
+            stored = Manifest.of_content(path, header["manifest"])
+            setup_s, simulate_s, save_s = map(float, header["wall_s"])
+        except ArtifactError as error:
+            raise UnusableCheckpointError(str(error)) from error
+        except (KeyError, TypeError, ValueError, RunDirectoryError) as error:
+            raise UnusableCheckpointError(f"{path} is not a checkpoint of a run") from error
+        if (stored.scenario, stored.seed) != (manifest.scenario, manifest.seed):
+            raise UnusableCheckpointError(
+                f"{path} was written by a run of another scenario or seed"
+            )
+        return cls(commit, stored, (setup_s, simulate_s, save_s), body)
+
+    def read(self, constants: Constants) -> State:
+        """Return the state.
+
+        Raises:
+            UnusableCheckpointError: It can't be read.
+        """
+        try:
+            return read_state(self.body, constants)
+        except ArtifactError as error:
+            raise UnusableCheckpointError(str(error)) from error
+
+
+class CheckpointWriter:
+    """Commits the rows of a run in a directory, and writes checkpoints of its state.
+
+    Attributes:
+        is_able: Whether the state can be written; False after that of a component could not.
+    """
+
+    def __init__(
+        self,
+        store: RunStore,
+        settings: ArtifactSettings,
+        clock: Clock,
+        describe: Callable[[], tuple[Constants, Mapping[str, Any]]],
+    ) -> None:
+        """Prepare the commits and checkpoints of a run.
+
+        Args:
+            store: The tables of the run.
+            settings: How often checkpoints are written.
+            clock: The clock of the run.
+            describe: Returns the constants of the run by name, and the header of a checkpoint.
+        """
+        self._store, self._describe = store, describe
+        self._day = max(1, DAY_US // clock.step_us)
+        every = settings.checkpoint
+        self._every = max(1, micros(every) // clock.step_us) if isinstance(every, timedelta) else 0
+        self.is_able = every != "off"
+        self.resume(0)
+
+    def resume(self, step: int) -> None:
+        """Count the time to the next commit and checkpoint from a step on."""
+        now = time.monotonic()
+        self._next_day = (step // self._day + 1) * self._day
+        self._next_commit = now + COMMIT_S
+        self._next_checkpoint = (time.process_time() + COMPUTING_S, now + WAITING_S)
+        self._next_step = (step // self._every + 1) * self._every if self._every else 0
+        self._check_at = min(self._next_day, self._next_step) if self._every else self._next_day
+
+    def after_span(self, state: State) -> None:
+        """Write a commit or a checkpoint if one is due.
+
+        Raises:
+            ArtifactError: The disk is full or failed; the run is marked as failed.
+        """
+        step = state.bodies.step
+        if step < self._check_at and time.monotonic() < self._next_commit:
+            return
+        is_due = step >= self._next_step
+        if not self._every:
+            computing_s, waiting_s = self._next_checkpoint
+            is_due = time.process_time() >= computing_s or time.monotonic() >= waiting_s
+        if is_due and self.is_able:
+            self.checkpoint(state)
+        else:
+            self.commit(state)
+
+    def commit(self, state: State, *, sync: bool = False) -> Mapping[str, Any] | None:
+        """Write all rows before the present step to the journal.
+
+        Returns:
+            The commit as a mapping; None for a run in memory.
+        """
+        step = state.bodies.step
+        state.settle(step)
+        state.recorder.drain()
+        began = time.perf_counter()
+        self._store_interventions(state)
+        commit = self._store.commit(step, sync=sync)
+        state.recorder.wall_s += time.perf_counter() - began
+        self._next_commit = time.monotonic() + COMMIT_S
+        while self._next_day <= step:
+            self._next_day += self._day
+        self._check_at = min(self._next_day, self._next_step) if self._every else self._next_day
+        return None if commit is None else commit._asdict()
+
+    def checkpoint(self, state: State) -> None:
+        """Write the state of the run and its rows, so that it can be resumed."""
+        computed = time.process_time()
+        if self._every:
+            self._next_step = (state.bodies.step // self._every + 1) * self._every
+        commit = self.commit(state, sync=self.is_able)
+        began = time.perf_counter()
+        if self.is_able:
+            constants, header = self._describe()
+            header = {**header, "commit": commit}
+
+            def write(handle: int) -> None:
+                write_snapshot(partial(files.write_all, handle), state, constants, header)
+
+            try:
+                self._store.keep_checkpoint(write)
+            except UnstorableStateError as error:
+                self.is_able = False
+                self._store.manifest.notes.append(
+                    f"no checkpoint from step {state.bodies.step} on: {error}"
+                )
+        if not self._every:  # rarely
+            release_memory()
+        state.recorder.wall_s += time.perf_counter() - began
+        now = time.process_time()
+        self._next_checkpoint = (
+            now + max(COMPUTING_S, SHARE * (now - computed)),
+            time.monotonic() + WAITING_S,
+        )
+
+    def _store_interventions(self, state: State) -> None:
+        """Update the interventions in the manifest."""
+        manifest = self._store.manifest
+        records = state.interventions.records
+        if len(records) != len(manifest.interventions):
+            manifest.interventions = records
+            self._store.keep("manifest.json", manifest.to_json())

@@ -1,0 +1,381 @@
+"""Snapshots: copies of the state of a run in memory and in files, by one mechanism.
+
+A state refers to constants of the run: its scenario, floor plan, clock. A snapshot contains only
+their names. A copy shares the constants; a file is read with those of a run that was set up from
+the same scenario.
+"""
+
+import hashlib
+import io
+import json
+import pickle
+from collections.abc import Callable, Collection, Mapping
+from contextlib import suppress
+from pathlib import Path
+from types import BuiltinFunctionType, FunctionType
+from typing import Any, BinaryIO
+
+from fleet2d.artifacts.chunk import ColumnChunk
+from fleet2d.artifacts.plain import plain
+from fleet2d.engine.inputs import components_of
+from fleet2d.engine.snapshots import arrays
+from fleet2d.engine.state import State
+from fleet2d.entities.motion import RandomWalk, Track
+from fleet2d.errors import ArtifactError
+from fleet2d.floorplan.home.costmap import CostedSpace
+from fleet2d.floorplan.home.space import Space
+from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.kernels.mesh import Mesh
+from fleet2d.routines.persona import Persona
+from fleet2d.scenario.model import Scenario
+from fleet2d.user_modules import is_scenario_module, public_name
+from fleet2d.version import __version__
+
+_HASH = type(hashlib.sha256())
+
+# Types of objects that never change: copies in one process share them.
+_SHARED = frozenset(
+    {CostedSpace, FloorPlan, FunctionType, Mesh, Persona, Space, Track, RandomWalk, ColumnChunk}
+)
+
+# Names that a file may refer to besides classes of Fleet2D and of the scenario's own modules.
+_ALLOWED = {
+    "builtins": {
+        "bool",
+        "bytearray",
+        "complex",
+        "dict",
+        "float",
+        "frozenset",
+        "int",
+        "list",
+        "object",
+        "range",
+        "set",
+        "slice",
+        "str",
+        "tuple",
+    },
+    "collections": {"Counter", "OrderedDict", "defaultdict", "deque"},
+    "copyreg": {"_reconstructor"},
+    "datetime": {"date", "datetime", "time", "timedelta"},
+    "decimal": {"Decimal"},
+    "fractions": {"Fraction"},
+    "shapely.io": {"from_wkb"},
+    "pathlib": {"Path", "PosixPath", "PurePosixPath", "PureWindowsPath", "WindowsPath"},
+}
+
+# Functions of Fleet2D that a file may call: they create plain values.
+_CONSTRUCTORS = frozenset({"object_array", "plain_array", "plain_scalar", "plain_type"})
+
+# Packages without classes of states: their objects could read, write or run something.
+_NO_STATE = (
+    "fleet2d.artifacts.arrow",
+    "fleet2d.artifacts.journal",
+    "fleet2d.artifacts.ledger",
+    "fleet2d.artifacts.lock",
+    "fleet2d.runs",
+    "fleet2d.calibrate",
+    "fleet2d.cli",
+    "fleet2d.component",
+    "fleet2d.document",
+    "fleet2d.engine.snapshots.checkpoint",
+    "fleet2d.engine.resume",
+    "fleet2d.engine.run",
+    "fleet2d.engine.simulation",
+    "fleet2d.engine.snapshots.snapshot",
+    "fleet2d.fit",
+    "fleet2d.leaves",
+    "fleet2d.user_modules",
+    "fleet2d.paper",
+    "fleet2d.published",
+    "fleet2d.scenario",
+    "fleet2d.studies",
+    "fleet2d.testing",
+    "fleet2d.trust",
+    "fleet2d.trust_options",
+    "fleet2d.view",
+    "fleet2d.viewer",
+)
+
+# Objects that are written as a module and a name.
+_REFERENCES = (type, FunctionType, BuiltinFunctionType)
+
+MAGIC = b"fleet2d simulation"
+_DIGEST_BYTES = 64  # at the end of the file: SHA-256 of all before, in hexadecimal digits
+# Size of the parts of a file [bytes]: as few as possible, and little memory.
+_PART_BYTES = 1 << 22
+
+Constants = Mapping[str, object]
+
+
+class UnstorableStateError(ArtifactError):
+    """A component of the user holds something that can't be written to a file."""
+
+
+def copy_state(state: State, constants: Constants) -> State:
+    """Return an independent copy of a state, which shares only objects that never change."""
+    shared: list[object] = []
+    buffer = io.BytesIO()
+    _StateWriter(buffer, constants, shared).dump(state)
+    buffer.seek(0)
+    return _StateReader(buffer, constants, shared).state()
+
+
+def read_state(file: BinaryIO, constants: Constants) -> State:
+    """Read a state from a file, for a run that was set up from the same scenario.
+
+    Raises:
+        ArtifactError: The file contains something else, or is damaged.
+    """
+    try:
+        return _StateReader(file, constants, None).state()
+    except ArtifactError:
+        raise
+    except Exception as error:  # a damaged pickle may raise anything
+        raise ArtifactError(f"the file holds no state of a run: {error}") from error
+
+
+def write_snapshot(
+    write: Callable[[bytes], object], state: State, constants: Constants, header: Mapping[str, Any]
+) -> None:
+    """Write a state after a header that describes the run.
+
+    Args:
+        write: Called with one part of the content after the other.
+        state: The state.
+        constants: The constants of the run by name.
+        header: Plain values.
+
+    Raises:
+        UnstorableStateError: A component of the user holds something that can't be written, such as
+            an open file.
+        OSError: `write` failed.
+    """
+    parts = _SnapshotParts(write)
+    parts.write(MAGIC + b"\n")
+    parts.write(json.dumps({"fleet2d": __version__, **plain(header)}).encode() + b"\n")
+    try:
+        _StateWriter(parts, constants, None).dump(state)
+    except ArtifactError as error:
+        raise UnstorableStateError(str(error)) from error
+    except Exception as error:  # a component's own pickling may raise anything
+        if error is parts.error:
+            raise
+        raise UnstorableStateError(f"the state of the run can't be written: {error}") from error
+    parts.finish()
+
+
+def save_snapshot(
+    path: str | Path | BinaryIO, state: State, constants: Constants, header: Mapping[str, Any]
+) -> None:
+    """Write a snapshot to a file.
+
+    Raises:
+        ArtifactError: The state, or the file, can't be written.
+    """
+    if not isinstance(path, str | Path):
+        write_snapshot(path.write, state, constants, header)
+        return
+    partial = Path(f"{path}.partial")
+    try:
+        with partial.open("wb") as file:
+            write_snapshot(file.write, state, constants, header)
+        partial.replace(path)
+    except OSError as error:
+        raise ArtifactError(f"{path} can't be written: {error.strerror or error}") from error
+    finally:
+        with suppress(OSError):
+            partial.unlink()  # if it was not renamed
+
+
+class _SnapshotParts:
+    """The output of a pickler and its digest, written in parts, as a state may be large.
+
+    Attributes:
+        error: The error of the function that writes, if it failed.
+    """
+
+    def __init__(self, write: Callable[[bytes], object]) -> None:
+        self._write, self._hash, self._buffer = write, hashlib.sha256(), bytearray()
+        self.error: OSError | None = None
+
+    def write(self, content: bytes) -> None:
+        """Add content, and write it when there is enough."""
+        self._buffer += content
+        if len(self._buffer) >= _PART_BYTES:
+            self._hash.update(self._buffer)
+            self._flush()
+
+    def finish(self) -> None:
+        """Write the rest and the digest of all."""
+        self._hash.update(self._buffer)
+        self._buffer += self._hash.hexdigest().encode()
+        self._flush()
+
+    def _flush(self) -> None:
+        content, self._buffer = bytes(self._buffer), bytearray()
+        try:
+            self._write(content)
+        except OSError as error:
+            self.error = error
+            raise
+
+
+def open_snapshot(path: str | Path | BinaryIO) -> tuple[dict[str, Any], BinaryIO]:
+    """Return the header of a snapshot, and the state after it for `read_state`.
+
+    Raises:
+        ArtifactError: It is not a snapshot, is damaged, or is of another version of Fleet2D.
+    """
+    try:
+        content = Path(path).read_bytes() if isinstance(path, str | Path) else path.read()
+    except OSError as error:
+        raise ArtifactError(f"{path} can't be read: {error.strerror or error}") from error
+    first, _, body = content.removeprefix(MAGIC + b"\n").partition(b"\n")
+    if not content.startswith(MAGIC + b"\n"):
+        raise ArtifactError(f"{path} is not a saved simulation")
+    view, digest = memoryview(content)[:-_DIGEST_BYTES], content[-_DIGEST_BYTES:]
+    if hashlib.sha256(view).hexdigest().encode() != digest:
+        raise ArtifactError(f"{path} is damaged (its digest differs): save the simulation again")
+    try:
+        header: dict[str, Any] = json.loads(first)
+        _ = [header[key] for key in ("fleet2d", "scenario", "seed", "wall_s")]
+    except (ValueError, TypeError, KeyError):
+        raise ArtifactError(f"{path} is not a saved simulation") from None
+    if header["fleet2d"] != __version__:
+        raise ArtifactError(
+            f"{path} was written by Fleet2D {header['fleet2d']}, and this is {__version__}: only"
+            " the same version can load it"
+        )
+    return header, io.BytesIO(memoryview(body)[:-_DIGEST_BYTES])
+
+
+class _StateWriter(pickle.Pickler):
+    """Replaces constants by their names, and collects shared objects."""
+
+    def __init__(
+        self, file: "BinaryIO | _SnapshotParts", constants: Constants, shared: list[object] | None
+    ) -> None:
+        super().__init__(file, pickle.HIGHEST_PROTOCOL)
+        self._names = {id(value): name for name, value in constants.items()}
+        self._shared = shared
+        if shared is None:
+            self.dispatch_table = arrays.REDUCERS
+        self._packages = {} if shared is not None else _packages_of(constants)
+        self._checked: set[int] = set()  # references to classes that are allowed, by id
+
+    def persistent_id(self, obj: Any) -> object:
+        name = self._names.get(id(obj))
+        if name is not None:
+            return name
+        kind = type(obj)
+        if kind is _HASH:  # of a table: when a file is read it is computed again from the rows
+            if self._shared is None:
+                return ("sha256",)
+            obj = obj.copy()
+        elif self._shared is None:
+            if isinstance(obj, _REFERENCES) and id(obj) not in self._checked:
+                self._check_reference(obj)
+                self._checked.add(id(obj))
+            return ("space", obj.key) if kind is Space else None
+        elif kind not in _SHARED and not isinstance(obj, type):
+            return None
+        self._shared.append(obj)
+        return len(self._shared) - 1
+
+    def _check_reference(self, obj: Any) -> None:
+        """Refuse a name that the reader would refuse."""
+        module, name = obj.__module__ or "builtins", obj.__qualname__
+        if not may_refer(module, name, self._packages) and obj is not type(None):
+            raise ArtifactError(
+                f"the state of the run can't be written: it refers to {module}.{name}"
+            )
+
+
+class _StateReader(pickle.Unpickler):
+    """Looks constants up by name; creates only plain values, and objects of allowed classes."""
+
+    def __init__(self, file: BinaryIO, constants: Constants, shared: list[object] | None) -> None:
+        super().__init__(file)
+        self._constants, self._shared = constants, shared
+        self._packages = {} if shared is not None else _packages_of(constants)
+
+    def state(self) -> State:
+        """Return the state."""
+        state = self.load()
+        if not isinstance(state, State):
+            raise ArtifactError("the file holds no state of a run")
+        return state
+
+    def persistent_load(self, pid: Any) -> object:
+        if self._shared is not None and isinstance(pid, int):
+            return self._shared[pid]
+        if isinstance(pid, tuple) and pid[0] == "sha256":
+            return hashlib.sha256()
+        if isinstance(pid, tuple) and pid[0] == "space":
+            return self._constants["shapes"].space_of(*pid[1])  # type: ignore[attr-defined]
+        return self._constants[pid]
+
+    def find_class(self, module: str, name: str) -> Any:
+        if self._shared is not None:
+            return super().find_class(module, name)
+        if not is_scenario_module(module):  # it may be one under another name in this process
+            top, dot, rest = public_name(module).partition(".")
+            module = self._packages.get(top, top) + dot + rest
+        if not may_refer(module, name, self._packages):
+            raise ArtifactError(
+                f"the file refers to {module}.{name}, which can't be part of a state"
+            )
+        value = super().find_class(module, name)
+        is_allowed = name in _ALLOWED.get(module, ()) or module == arrays.__name__
+        # Only a class that the module defines: a class that it imports could be any.
+        is_own = isinstance(value, type) and (value.__module__, value.__qualname__) == (
+            module,
+            name,
+        )
+        if not is_allowed and not is_own:
+            raise ArtifactError(
+                f"the file refers to {module}.{name}, which can't be part of a state"
+            )
+        return value
+
+
+def may_refer(module: str, name: str, packages: Collection[str] = ()) -> bool:
+    """Whether the file of a state may refer to a name.
+
+    Args:
+        module: The module of the name.
+        name: The qualified name in that module.
+        packages: The packages of the scenario's own components.
+
+    Example:
+        >>> may_refer("fleet2d.engine.state", "State"), may_refer("os", "system")
+        (True, False)
+    """
+    if name in _ALLOWED.get(module, ()) or (module == arrays.__name__ and name in _CONSTRUCTORS):
+        return True
+    if f"{module}.".startswith(tuple(f"{package}." for package in _NO_STATE)):
+        return False
+    top = module.partition(".")[0]
+    return top == "fleet2d" or top in packages or is_scenario_module(module)
+
+
+def _packages_of(constants: Constants) -> dict[str, str]:
+    """Return the packages outside Fleet2D that a scenario's components come from.
+
+    Returns:
+        The name of each in this process by its public name: in one process it may be installed, in
+        another it may come from the folder of the scenario.
+    """
+    scenario = constants.get("scenario")
+    if not isinstance(scenario, Scenario):
+        return {}
+    packages = {}
+    for component in components_of(scenario):
+        module = type(component).__module__
+        public = public_name(module)
+        package = public.partition(".")[0]
+        packages[package] = module.removesuffix(public) + package
+    packages.pop("fleet2d", None)
+    return packages

@@ -1,0 +1,169 @@
+"""Key frames: the few poses from which all poses of a run can be rebuilt."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fleet2d.engine.basis import Basis
+from fleet2d.engine.tables.ordering import in_order
+from fleet2d.entities.motion import Track
+from fleet2d.kernels.headings import in_radians
+from fleet2d.kernels.motion import Breakpoints
+from fleet2d.runs.key_kinds import PLANNED, TRACK, WALK
+
+# Time between the key frames of a random walk [us].
+WALK_KEY_US = 3_600_000_000
+
+
+class KeyFrames:
+    """Collects the key frames of a run."""
+
+    def __init__(self, basis: Basis) -> None:
+        """Start without key frames."""
+        self._store, self._clock, self._home = basis.store, basis.clock, basis.home
+        self._actors, self._bodies = basis.actors, basis.bodies
+        # A random walk is rebuilt by repeating it between the same walls; where these may change,
+        # each of its steps is a key frame.
+        self._walk_kind, self._walk_every = WALK, max(1, WALK_KEY_US // basis.clock.step_us)
+        if basis.may_change:
+            self._walk_kind, self._walk_every = TRACK, 1
+        # Collected breakpoints of the present plan; the plan before the first has none.
+        count = len(basis.actors)
+        self._emitted = [2] * count
+        self._complete_until = [-1] * len(
+            basis.actors
+        )  # the end of the last plan, if it was reached
+        self._walked = [1] * count  # the step before which a random walk is collected
+        self._moved: set[int] = set()  # bodies that were put elsewhere since their last plan
+        self._blocks: list[NDArray[np.int64]] = []
+        self._rows = 0
+        self._end = 0  # key frames before this step are collected when they are stored
+
+    @property
+    def count(self) -> int:
+        """Number of rows that are not stored yet, about; many small blocks take more memory."""
+        return self._rows + 8 * len(self._blocks)
+
+    def end_plan(self, row: int, step: int) -> None:
+        """Collect the end of the plan that is replaced at `step`."""
+        self.pass_by(row, step)
+        self._walk_on(row, step)
+        self.break_off(row, step)
+        motion = self._actors[row].motion
+        track = motion.breakpoints if isinstance(motion, Track) else None
+        self._complete_until[row] = (
+            int(track.time[-1])
+            if track is not None and self._emitted[row] == len(track.time)
+            else -1
+        )
+
+    def begin_plan(self, row: int, step: int) -> None:
+        """Collect the key frame at the beginning of a body's plan, which was made at `step`."""
+        moment = step * self._clock.step_us
+        # A plan that begins at the end of the last one needs no key frame there.
+        self._walked[row] = step + 1
+        is_joined = self._complete_until[row] == moment and step > 0 and row not in self._moved
+        self._emitted[row] = int(is_joined)
+        self._moved.discard(row)
+        actor = self._actors[row]
+        if not isinstance(actor.motion, Track):
+            self._blocks.append(_key(step, row, self._walk_kind, moment, actor.state))
+        self.pass_by(row, step)
+
+    def move_body(self, row: int, step: int) -> None:
+        """Begin the next plan of a body with a key frame, as it doesn't continue the last one.
+
+        A random walk ends with a key frame of its own, where the body was before it is moved.
+        """
+        self._moved.add(row)
+        actor = self._actors[row]
+        if self._walk_kind == WALK and not isinstance(actor.motion, Track):
+            self._walk_on(row, step)
+            self._blocks.append(_key(step, row, WALK, step * self._clock.step_us, actor.state))
+
+    def pass_by(self, row: int, step: int) -> None:
+        """Collect the breakpoints of the present plan that are reached up to a step."""
+        motion = self._actors[row].motion
+        if not isinstance(motion, Track):
+            return
+        moment, track = step * self._clock.step_us, motion.breakpoints
+        begin = self._emitted[row]
+        if begin < len(track.time) and track.time[begin] <= moment:
+            end = int(np.searchsorted(track.time, moment, side="right"))
+            self._blocks.append(_keys(track, begin, end, row, TRACK, self._clock.step_us))
+            self._rows += end - begin
+            self._emitted[row] = end
+
+    def break_off(self, row: int, step: int) -> None:
+        """Collect the planned end of the present segment."""
+        motion = self._actors[row].motion
+        if isinstance(motion, Track):
+            begin = self._emitted[row]
+            if begin < len(motion.breakpoints.time):
+                planned = _keys(
+                    motion.breakpoints, begin, begin + 1, row, PLANNED, self._clock.step_us
+                )
+                planned[:, 0] = step
+                self._blocks.append(planned)
+
+    def take(self, end: int) -> None:
+        """Collect random walks up to step `end` - 1; `collect` the other key frames later.
+
+        The poses of a random walk are forgotten afterwards, the breakpoints of a plan are not.
+        """
+        for row in range(len(self._actors)):
+            self._walk_on(row, end)
+        self._end = end
+
+    def collect(self) -> None:
+        """Collect the key frames of all bodies before the step up to which they were taken."""
+        for row in range(len(self._actors)):
+            self.pass_by(row, self._end - 1)
+
+    def _walk_on(self, row: int, end: int) -> None:
+        """Collect the states of a random walk up to step `end` - 1."""
+        if isinstance(self._actors[row].motion, Track):
+            return
+        every, first = self._walk_every, self._walked[row]
+        for step in range(-(-first // every) * every, end, every):
+            moment = step * self._clock.step_us
+            key = _key(step, row, self._walk_kind, moment, self._bodies.pose_at(row, step))
+            self._blocks.append(key)
+        self._walked[row] = max(first, end)
+
+    def store(self) -> None:
+        """Append all key frames so far to the store."""
+        self.collect()
+        if not self._blocks:
+            return
+        rows = in_order(self._blocks)
+        self._blocks, self._rows = [], 0
+        xy = self._home.plan.lattice.to_metres(rows[:, 4:6])
+        self._store.append(
+            "key_frames",
+            step=rows[:, 0],
+            time=self._clock.moments(rows[:, 3]),
+            entity=rows[:, 1].astype(np.int32),
+            kind=rows[:, 2].astype(np.int32),
+            x=xy[:, 0],
+            y=xy[:, 1],
+            heading=in_radians(rows[:, 6]),
+            away=rows[:, 7].astype(bool),
+        )
+
+
+def _key(step: int, row: int, kind: int, time_us: int, state: Sequence[int]) -> NDArray[np.int64]:
+    return np.array([[step, row, kind, time_us, *state]], np.int64)
+
+
+def _keys(
+    track: Breakpoints, begin: int, end: int, row: int, kind: int, step_us: int
+) -> NDArray[np.int64]:
+    keys = np.empty((end - begin, 8), np.int64)
+    time = track.time[begin:end]
+    keys[:, 0] = -(-time // step_us)
+    keys[:, 1], keys[:, 2], keys[:, 3] = row, kind, time
+    keys[:, 4], keys[:, 5] = track.x[begin:end], track.y[begin:end]
+    keys[:, 6], keys[:, 7] = track.heading[begin:end], track.away[begin:end]
+    return keys

@@ -1,0 +1,231 @@
+"""The recorder of a run: samples, key frames, observations, events and readings for the tables.
+
+Rows are collected over spans and stored in the order of (step, entity), so that the tables don't
+depend on the spans of a run.
+"""
+
+import time
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fleet2d.algorithms.activities import Activities
+from fleet2d.algorithms.log import SensorRow
+from fleet2d.algorithms.observations import NearestRooms, Observations, Rows, truth
+from fleet2d.engine.basis import Basis
+from fleet2d.engine.tables.definitions import camera_names
+from fleet2d.engine.tables.key_frames import KeyFrames
+from fleet2d.engine.tables.samples import Samples
+from fleet2d.engine.watchers.cameras import Cameras
+from fleet2d.engine.watchers.sensors import Sensors
+from fleet2d.events import HOME, Event, EventKind
+
+# Events whose detail is a user, who has a column of their own.
+OF_USERS = frozenset({EventKind.USER_LOST, EventKind.USER_SEEN})
+ACTIVITY = EventKind.ACTIVITY.value
+# Rows that are collected before they are stored.
+MOST_ROWS = 1 << 15
+
+
+def activities_of(cameras: Sequence[Cameras], users: int) -> Activities:
+    """Return the activities of users, and how each camera perceives them, before the first one."""
+    senses = {
+        (group.index, c): sense
+        for group in cameras
+        for c, sense in enumerate(group.activity_senses)
+    }
+    return Activities(users, senses)
+
+
+class Recorder:
+    """Collects the rows of a run.
+
+    Attributes:
+        activities: The activities of users so far.
+        wall_s: Wall time of storing [s].
+    """
+
+    def __init__(self, basis: Basis, cameras: Sequence[Cameras], sensors: Sensors) -> None:
+        """Prepare to record.
+
+        Args:
+            basis: The basis of the run.
+            cameras: The cameras of robots.
+            sensors: The sensors of the home.
+        """
+        self.store, self.clock = basis.store, basis.clock
+        self.home, self.bodies = basis.home, basis.bodies
+        self._tables = set(basis.store.names)
+        self._samples, self._keys = Samples(basis), KeyFrames(basis)
+        self.activities = activities_of(cameras, basis.bodies.users)
+        self._users = {actor.name: row for row, actor in enumerate(basis.users)}
+        entities = [*(actor.name for actor in basis.actors), *basis.scenario.objects]
+        self._rows = {name: row for row, name in enumerate(entities)} | {HOME: -1}
+        self._events: list[Event] = []
+        self._observations: list[NDArray[np.int64]] = []
+        self._sensors, self._readings = sensors, list[SensorRow]()
+        self._rooms = NearestRooms(basis.home.plan)
+        self._camera_codes = _codes_of(cameras)
+        self._count = 0  # observations and readings
+        self.wall_s = 0.0
+
+    def before_plan(self, row: int, step: int) -> None:
+        """Collect the end of the plan that is replaced at `step`."""
+        if "key_frames" in self._tables:
+            self._keys.end_plan(row, step)
+
+    def after_plan(self, row: int, step: int) -> None:
+        """Collect the beginning of a body's plan, which was made at `step`."""
+        if "key_frames" in self._tables:
+            self._keys.begin_plan(row, step)
+
+    def move_body(self, row: int, step: int) -> None:
+        """Note that a body is put elsewhere, so that its next plan begins with a key frame."""
+        self._keys.move_body(row, step)
+
+    def take_events(self, events: Sequence[Event]) -> None:
+        """Collect events."""
+        if "events" in self._tables:
+            self._events += events
+        for step, entity, event, detail in events:
+            if event == ACTIVITY and entity in self._users:
+                self.activities.begin(self._users[entity], step, detail)
+
+    def take(
+        self, first: int, end: int, observations: NDArray[np.int64], readings: Sequence[SensorRow]
+    ) -> None:
+        """Collect the rows of the steps from `first` to `end` - 1.
+
+        Args:
+            first: First step.
+            end: One past the last step.
+            observations: Observations of robots, (n, OBSERVATION), in order.
+            readings: Readings of sensors, in order.
+        """
+        self._samples.take(self.bodies, first, end)
+        if "key_frames" in self._tables:
+            self._keys.take(end)
+        if "observations" in self._tables and len(observations):
+            self._observations.append(observations)
+        self._readings += readings
+        self._count += len(observations) + len(readings)
+        count = self._count + self._samples.count + self._keys.count
+        if count + len(self._events) > MOST_ROWS:
+            self.drain()
+
+    def end(self, step: int, rows: int) -> None:
+        """Collect the ends of the present plans, as the run ends before `step`; store all rows."""
+        if "key_frames" in self._tables:
+            self._keys.collect()
+            for row in range(rows):
+                # Not at the last step, whose rows may be stored already: the order would be wrong.
+                self._keys.break_off(row, step)
+        self.drain()
+
+    def drain(self) -> None:
+        """Append all collected rows to the store."""
+        began = time.perf_counter()
+        self._samples.store()
+        if "key_frames" in self._tables:
+            self._keys.store()
+        self._store_observations()
+        self._store_events()
+        self._store_readings()
+        self._count = 0
+        self.wall_s += time.perf_counter() - began
+
+    def _store_observations(self) -> None:
+        if not self._observations:
+            return
+        rows, self._observations = Rows(self._observations), []
+        o = Observations(self.home.plan, self._rooms, rows, self.activities)
+        columns: dict[str, Any] = {
+            **self._times(o.step),
+            "robot": o.robot,
+            "user": o.user,
+            "x": o.x,
+            "y": o.y,
+            "room": o.room.astype(np.int32),
+        }
+        if self._camera_codes:
+            t = truth(self.home.plan, rows.whole, self.activities)
+            is_user = t.user >= 0
+            columns |= {
+                "heading": o.heading,
+                "posture": o.posture.astype(np.int32),
+                "camera": self._cameras(o.robot, o.camera),
+                "true_user": t.user,
+                "true_x": np.where(is_user, t.x, np.nan),
+                "true_y": np.where(is_user, t.y, np.nan),
+                "true_heading": np.where(is_user, t.heading, np.nan),
+                "true_posture": np.where(is_user, t.posture, -1).astype(np.int32),
+            }
+            if self.activities.are_perceived:
+                columns |= {"activity": o.activity.tolist(), "true_activity": t.activity.tolist()}
+        self.store.append("observations", **columns)
+
+    def _cameras(self, robot: NDArray[np.int32], camera: NDArray[np.int8]) -> NDArray[np.int32]:
+        """Return the codes of cameras from their indices among the cameras of their robot."""
+        codes = np.zeros(
+            (len(self.bodies), 1 + max(map(len, self._camera_codes.values()))), np.int32
+        )
+        for index, names in self._camera_codes.items():
+            codes[index, : len(names)] = names
+        return codes[robot, camera]
+
+    def _store_events(self) -> None:
+        if not self._events:
+            return
+        users, events = self._users, self._events
+        steps = np.array([event.step for event in events], np.int64)
+        rows = np.array([self._rows[event.entity] for event in events], np.int32)
+        ranks = np.array([event.rank for event in events], np.int8)
+        order = np.lexsort((ranks, rows, steps))
+        events = [events[i] for i in order.tolist()]
+        self._events = []
+        is_of_user = [event.event in OF_USERS for event in events]
+        columns: dict[str, Any] = self._times(steps[order])
+        if users:
+            user = [
+                users.get(event.detail, -1) if is_user else -1
+                for event, is_user in zip(events, is_of_user, strict=True)
+            ]
+            columns["user"] = np.array(user, np.int32)
+        self.store.append(
+            "events",
+            **columns,
+            entity=rows[order],
+            event=[str(event.event) for event in events],
+            detail=[
+                "" if is_user else event.detail
+                for event, is_user in zip(events, is_of_user, strict=True)
+            ],
+        )
+
+    def _store_readings(self) -> None:
+        if not self._readings:
+            return
+        step, sensor, on, activity = zip(*self._readings, strict=True)
+        self._readings = []
+        rooms, words = self._sensors.rooms, self._sensors.words
+        self.store.append(
+            "sensors",
+            **self._times(np.array(step, np.int64)),
+            room=[rooms[number] for number in sensor],
+            sensor=np.array(sensor, np.int32),
+            state=[words[number][not is_on] for number, is_on in zip(sensor, on, strict=True)],
+            activity=list(activity),
+        )
+
+    def _times(self, step: NDArray[np.int64]) -> dict[str, Any]:
+        return {"step": step, "time": self.clock.times(step)}
+
+
+def _codes_of(cameras: Sequence[Cameras]) -> dict[int, list[int]]:
+    """Return the code of each camera of each robot; none if observations don't name cameras."""
+    names = camera_names(cameras)
+    if not names:
+        return {}
+    return {group.index: [names.index(name) for name in group.names] for group in cameras}

@@ -1,0 +1,197 @@
+"""Blocking: the bodies that are about to walk into another one, step by step.
+
+It follows from the poses alone. A body is in another one's way at a step if that one moves towards
+it, and they would overlap before the next step. The body that moves decides at that step, before it
+moves, so the result doesn't depend on spans.
+"""
+
+from datetime import timedelta
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fleet2d.engine.basis import Basis
+from fleet2d.engine.bodies import Bodies
+from fleet2d.engine.watchers.watcher import Watcher
+from fleet2d.entities.behavior import Situation
+from fleet2d.entities.blocking import plan_after_a_step, plan_around
+from fleet2d.entities.plan import Note, Plan
+from fleet2d.units import micros
+
+# Time for which a body ignores another one that it goes round or squeezes past.
+PASSES = timedelta(seconds=10)
+
+I64 = NDArray[np.int64]
+Bool = NDArray[np.bool_]
+
+
+class Wait(NamedTuple):
+    """A body waits for another one.
+
+    Attributes:
+        since: The step at which it began to wait.
+        until: The step before which it stands, by its last decision.
+        blocker: The row of the body in its way.
+    """
+
+    since: int = -1
+    until: int = -1
+    blocker: int = -1
+
+
+class Pass(NamedTuple):
+    """A body that has waited for another one goes round it, or squeezes past.
+
+    Attributes:
+        until: The step before which it ignores the other one.
+        blocker: The row of the other one.
+    """
+
+    until: int = -1
+    blocker: int = -1
+
+
+class PoseColumns(NamedTuple):
+    """Places of bodies at consecutive steps, (bodies, steps) each."""
+
+    x: I64
+    y: I64
+    away: NDArray[np.uint8]
+
+
+class BlockedWays(Watcher):
+    """The bodies of a run that block each other's way.
+
+    Attributes:
+        rows: Their rows among the bodies; empty if bodies don't block each other.
+    """
+
+    def __init__(self, basis: Basis) -> None:
+        """Keep track of bodies if `simulation.people_block` says how long one waits for another."""
+        self._actors, self._users = basis.actors, basis.bodies.users
+        patience = basis.scenario.simulation.people_block
+        self._patience_us = 0 if patience is None else micros(patience)
+        self._radii = np.array([actor.entity.radius for actor in self._actors])
+        self._waits = [Wait()] * len(self._actors)
+        self._passes = [Pass()] * len(self._actors)
+        self.rows = range(0 if patience is None else len(self._actors))
+
+    @property
+    def waits(self) -> bool:
+        """Whether bodies block each other."""
+        return len(self.rows) > 0
+
+    def limit(self, bodies: Bodies, end: int) -> int:
+        """Return the step at which a body has to decide: not the first of the span."""
+        first = self.next_step
+        block = bodies.block(first, end + 1)  # a move leads to the step after
+        poses = PoseColumns(block.x, block.y, block.away)
+        for row in self.rows:
+            meeting = self._first_meeting(poses, row, first, np.arange(1, end - first))
+            end = end if meeting is None else first + meeting[0]
+        return end
+
+    def in_way(self, bodies: Bodies, row: int) -> int | None:
+        """Return the row of the body into which one would walk next; None if its way is free."""
+        step = bodies.step
+        if bodies.pose_at(row, step)[:2] == bodies.pose_at(row, step + 1)[:2]:
+            return None  # mostly it rests
+        (x, y, _, away), (next_x, next_y, _, next_away) = bodies.poses(step), bodies.poses(step + 1)
+        poses = PoseColumns(
+            np.stack([x, next_x], axis=1),
+            np.stack([y, next_y], axis=1),
+            np.stack([away, next_away], axis=1),
+        )
+        meeting = self._first_meeting(poses, row, step, np.array([0]))
+        return None if meeting is None else meeting[1]
+
+    def plan(self, now: Situation, other: int) -> Plan | None:
+        """Return a plan to wait for another body, or to go round it; None to squeeze past."""
+        row, lattice = now.actor.row, now.actor.home.plan.lattice
+        actor = self._actors[row]
+        others = [a for a in self._actors if a.row != row and not a.state.away]
+        reach = self._reach(row, np.array([a.row for a in others], np.int64))
+        positions = np.array([a.state[:2] for a in others], np.int64).reshape(-1, 2)
+        clear = np.column_stack([positions, reach + int(lattice.cell * lattice.units_per_m)])
+        step, step_us, wait = now.step, actor.clock.step_us, self._waits[row]
+        since = wait.since if wait.until == step else step
+        # Of two who wait for each other, the later one in the scenario waits twice as long.
+        patience_us = self._patience_us * (
+            2 if other < row and self._avoids(other, row, step) else 1
+        )
+        if (step - since) * step_us < patience_us:
+            first = since == step
+            notes = [Note(step * step_us, "gives_way", self._actors[other].name)] if first else []
+            plan: Plan | None = plan_after_a_step(now, actor.plan, notes)
+            self._waits[row] = Wait(since, step + 1, other)
+        else:
+            plan = plan_around(now, actor.plan, clear)
+            until = step + micros(PASSES) // step_us + 1
+            self._waits[row] = Wait()
+            self._passes[row] = Pass(until, other)
+        if plan is not None:
+            plan.interrupts = actor.arbiter.own
+        return plan
+
+    def _avoids(self, row: int, other: int, step: int) -> bool:
+        """Whether a body waits for another one at a step, or is about to pass it."""
+        pairs = (self._waits[row], self._passes[row])
+        return any(pair.blocker == other and pair.until > step for pair in pairs)
+
+    def _first_meeting(
+        self, poses: PoseColumns, row: int, first: int, columns: I64
+    ) -> tuple[int, int] | None:
+        """Return the first of some columns at which another body blocks one, and its row."""
+        x, y, away = poses
+        moved = (x[row, columns + 1] != x[row, columns]) | (y[row, columns + 1] != y[row, columns])
+        moves = columns[moved & ((away[row, columns] | away[row, columns + 1]) == 0)]
+        # A robot with `gives_way` keeps clear of people by that option.
+        polite = getattr(self._actors[row].entity, "gives_way", None) is not None
+        others = np.arange(self._users if polite else 0, len(self._actors))
+        others = others[others != row]
+        if not len(moves) or not len(others):
+            return None
+        met = _approach(x, y, row, others[:, None], moves, self._reach(row, others)[:, None])
+        met &= (away[others[:, None], moves] | away[others[:, None], moves + 1]) == 0
+        passed = self._passes[row]
+        met &= (others != passed.blocker)[:, None] | (first + moves >= passed.until)
+        blocked = met.any(axis=0)
+        if not blocked.any():
+            return None
+        at = int(blocked.argmax())
+        return int(moves[at]), int(others[met[:, at].argmax()])
+
+    def _reach(self, row: int, others: I64) -> I64:
+        """Return the distances at which a body touches others [lattice units], int64 (n,)."""
+        units_per_m = self._actors[row].home.plan.lattice.units_per_m
+        return ((self._radii[row] + self._radii[others]) * units_per_m).astype(np.int64)
+
+
+def _approach(x: I64, y: I64, row: int, others: I64, columns: I64, reach: I64) -> Bool:
+    """Return in which columns a body moves towards others so that they would overlap.
+
+    All move straight from one step to the next. Sums and products of integers are exact if no body
+    moves farther than about 100 m in a step.
+
+    Args:
+        x: int64 (bodies, steps).
+        y: int64 (bodies, steps).
+        row: Of the body.
+        others: Rows of the others, int64 (n, 1).
+        columns: int64 (m,).
+        reach: Distances at which it touches them, int64 (n, 1).
+
+    Returns:
+        bool (n, m).
+    """
+    dx, dy = (c[row, columns + 1] - c[row, columns] for c in (x, y))
+    other_dx, other_dy = (c[others, columns + 1] - c[others, columns] for c in (x, y))
+    away_x, away_y = (c[others, columns] - c[row, columns] for c in (x, y))
+    vx, vy = dx - other_dx, dy - other_dy
+    way, towards, near = (vx * vx + vy * vy), (away_x * vx + away_y * vy), reach * reach
+    ends = (away_x - vx) ** 2 + (away_y - vy) ** 2 < near
+    beside = (away_x * vy - away_y * vx).astype(np.float64)
+    passes = beside * beside < near.astype(np.float64) * way.astype(np.float64)
+    nearer: Bool = (towards > 0) & (away_x * dx + away_y * dy > 0)
+    return nearer & np.where(towards < way, passes, ends)

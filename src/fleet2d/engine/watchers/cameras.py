@@ -1,0 +1,393 @@
+"""The cameras of a body in a run: their memory from span to span, and what they perceive."""
+
+from collections.abc import Iterator, Sequence, Set
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fleet2d.algorithms.activities import ActivitySense
+from fleet2d.blame import blame
+from fleet2d.clock import midnight_of
+from fleet2d.engine.basis import Basis
+from fleet2d.engine.bodies import Bodies, poses_of
+from fleet2d.engine.watchers.disturbances import (
+    carry_over,
+    dark_cameras,
+    forced_of,
+    injected_by,
+    present_errors,
+    worsen,
+)
+from fleet2d.engine.watchers.points_in_view import points_seen
+from fleet2d.engine.watchers.sight_events import sight_events
+from fleet2d.engine.watchers.watcher import Watcher
+from fleet2d.entities.actor import Actor
+from fleet2d.entities.behavior import SightEvent
+from fleet2d.entities.localization import Drift, Localization
+from fleet2d.errors import ScenarioError
+from fleet2d.events import Event
+from fleet2d.kernels.look import (
+    IDENTITY,
+    SIGHTING,
+    USER_LOST,
+    USER_SEEN,
+    LookRule,
+    SightMemory,
+    UserPoses,
+    X,
+    Y,
+    look,
+    new_memory,
+)
+from fleet2d.kernels.perception import MOST_GHOSTS, About, GhostDraw, UserDraw
+from fleet2d.sight.disturbance import Disturbance
+from fleet2d.sight.fov import FieldOfView
+from fleet2d.sight.line_of_sight import LineOfSight
+from fleet2d.sight.perception import Perception
+from fleet2d.sight.tables import TableContext, error_tables, is_perfect, stack_lenses
+from fleet2d.streams import stream_key
+from fleet2d.units import micros
+
+# The name of the random stream of each draw.
+USER_STREAMS = {
+    UserDraw.DETECT: "detect",
+    UserDraw.ATTEND: "attend",
+    UserDraw.IDENTIFY: "identify",
+    UserDraw.MISTAKE: "whom",
+    UserDraw.RANGE: "range",
+    UserDraw.BEARING: "bearing",
+    UserDraw.HEADING: "heading",
+    UserDraw.POSTURE: "posture",
+}
+GHOST_STREAMS = {
+    GhostDraw.COUNT: "how many",
+    GhostDraw.SOURCE: "which",
+    GhostDraw.PLACE: "where",
+    GhostDraw.IDENTITY: "looks like",
+    GhostDraw.HEADING: "faces",
+}
+
+I64 = NDArray[np.int64]
+NOTHING: I64 = np.zeros((0, SIGHTING), np.int64)
+
+
+class Cameras(Watcher):
+    """The cameras of one body. Robots look at users; a user who has a camera looks at robots.
+
+    Attributes:
+        owner: The body with the cameras.
+        row: The owner's row among the bodies.
+        index: Its index among the robots, or among the users.
+        others: The bodies that can be seen.
+        names: Names of the cameras.
+        errs: Whether observations can differ from the truth.
+        activity_senses: How each camera perceives activities.
+        method: The method of sight; None: lines of sight.
+        radii: Radii of all bodies, if they hide each other [lattice units]; None: they don't.
+        memory: The memory from span to span.
+        drift: The error of the owner's belief about its own pose; None: it has none.
+        later: What changes sightings after the look; None: nothing does.
+        perceived: The last perceived place of each identity, (identities, 2); the last row is for
+            somebody unknown.
+        awaited: Events that algorithms wait for: they end a span, too.
+        next_step: The first step at which it has not looked.
+    """
+
+    def __init__(
+        self,
+        row: int,
+        actors: Sequence[Actor],
+        users: int,
+        method: FieldOfView | None = None,
+        radii: I64 | None = None,
+    ) -> None:
+        """Set up the cameras of one body.
+
+        Args:
+            row: Its row among the bodies.
+            actors: All bodies, users first.
+            users: Number of users among them.
+            method: The method of sight; None: lines of sight.
+            radii: Radii of all bodies, if they hide each other [lattice units].
+
+        Raises:
+            ScenarioError: A period is not a multiple of the step, or an unknown body is named.
+        """
+        self.owner, self.row = actors[row], row
+        # Lines of sight are compiled into the look.
+        self.method = None if isinstance(method, LineOfSight) else method
+        self.radii = radii
+        is_robot = row >= users
+        self.index = row - users if is_robot else row
+        self._first = 0 if is_robot else users
+        self.disturbances: list[Disturbance] = []
+        self.activity_senses: list[ActivitySense] = []
+        self.may_err = False  # because of interventions
+        self.others = actors[:users] if is_robot else actors[users:]
+        self.memory = self._set_up()
+        self.perceived = np.zeros((len(self.others) + 1, 2), np.int64)
+        self.awaited: Set[str] = frozenset()
+        self._sightings: list[I64] = []  # not collected yet
+        self._ahead: _Look | None = None
+
+    def prepare_to_err(self) -> None:
+        """Let observations be stored beside the truth, because interventions will disturb them."""
+        self.may_err = self.errs = True
+
+    def disturb(self, disturbances: Sequence[Disturbance]) -> None:
+        """Set all disturbances from the step on before which they have looked."""
+        self.disturbances = list(disturbances)
+        memory, people = self._set_up(), [other.name for other in self.others]
+        forced = forced_of(self.disturbances, self.names, people)
+        self.memory = carry_over(memory, self.memory, forced)
+
+    def _set_up(self) -> SightMemory:
+        owner, lattice, clock = self.owner, self.owner.home.plan.lattice, self.owner.clock
+        cameras = owner.entity.eyes
+        self.names = tuple(cameras)
+        try:
+            lenses = [
+                camera.lens(lattice.units_per_m, clock.step_us) for camera in cameras.values()
+            ]
+        except ValueError as error:
+            raise ScenarioError(f"{owner.path}: {error}") from None
+        common = getattr(owner.entity, "perception", None)  # users have no errors
+        perceptions = [
+            present_errors(self.disturbances, name) or camera.perception or common
+            for name, camera in cameras.items()
+        ]
+        has_errors = [not is_perfect(perception) for perception in perceptions]
+        self.drift = _drift_of(owner)
+        context = TableContext(
+            [other.name for other in self.others],
+            [other.entity.radius * lattice.units_per_m for other in self.others],
+            lattice,
+            clock.step_us,
+            owner.path,
+        )
+        self.lenses = stack_lenses(lenses, has_errors, context)
+        errors = [p if errs else None for p, errs in zip(perceptions, has_errors, strict=True)]
+        self.errors = error_tables(lenses, errors, context)
+        self._dark = dark_cameras(self.disturbances, self.names)
+        worsen(self.lenses, self.disturbances, self.names)
+        self.errors.has_ghosts[self._dark] = 0
+        injected = injected_by(self.disturbances, self.names, context)
+        self.errors = self.errors._replace(injected=injected)
+        self.later = None
+        if self.drift is not None or any(p and p.errors for p in perceptions):
+            from fleet2d.engine.watchers.sighting_errors import SightingErrors  # few runs need them
+
+            self.later = SightingErrors(self, perceptions)
+        self.errs = self.may_err or any(has_errors) or self.later is not None
+        self._draw_streams()
+        if not self.activity_senses:  # later ones would not fit the tables of the run
+            self._sense_activities(perceptions)
+        count = len(self.others)
+        bursts = count + MOST_GHOSTS * self.errors.has_ghosts + len(self.errors.injected)
+        self.rule = LookRule(
+            patience=max(lens.patience for lens in lenses),
+            step_us=clock.step_us,
+            start_us=micros(clock.start - midnight_of(clock.start)),
+            burst=int(bursts.sum()),
+            stop_lost=False,
+            stop_seen=False,
+        )
+        looks = self.lenses.latency // self.lenses.period + 2
+        return new_memory(len(lenses), count, int((looks * bursts).max()))
+
+    def _draw_streams(self) -> None:
+        """Set the random stream of each draw, by names: another user doesn't change the others'."""
+        owner, errors = self.owner, self.errors
+        for c, camera in enumerate(self.names):
+            prefix = "" if len(self.names) == 1 and camera == "camera" else f"{camera}: "
+            for u, other in enumerate(self.others):
+                for draw in UserDraw if self.errs else (UserDraw.DETECT,):
+                    name = f"{prefix}{USER_STREAMS[draw]} {other.name}"
+                    errors.keys[c, u, draw.value] = stream_key(owner.seed, owner.path, name)
+            for ghost_draw, purpose in GHOST_STREAMS.items():
+                name = f"{prefix}{purpose}, false positives"
+                errors.ghost_keys[c, ghost_draw.value] = stream_key(owner.seed, owner.path, name)
+
+    def _sense_activities(self, perceptions: Sequence[Perception | None]) -> None:
+        """Set how each camera perceives activities."""
+        for c, (name, perception) in enumerate(zip(self.names, perceptions, strict=True)):
+            keys = [
+                stream_key(self.owner.seed, self.owner.path, f"{name}: activity {other.name}")
+                for other in self.others
+            ]
+            confusion = perception.attributes.activity if perception else None
+            latency = int(self.lenses.latency[c])
+            sense = ActivitySense(latency, np.array(keys, np.uint64), confusion)
+            self.activity_senses.append(sense)
+
+    @property
+    def event_names(self) -> tuple[str, str]:
+        """The event kinds (lost, seen) of these cameras."""
+        return self.owner.entity.sight_events
+
+    @property
+    def stops(self) -> tuple[bool, bool]:
+        """Whether its owner's plan ends when a body is lost, and when a body is seen."""
+        interrupts, names = self.owner.plan.interrupts, self.event_names
+        return names[USER_LOST] in interrupts, names[USER_SEEN] in interrupts
+
+    @property
+    def ends(self) -> tuple[bool, bool]:
+        """Whether a span ends when a body is lost, and when a body is seen."""
+        lost, seen = self.stops
+        names = self.event_names
+        return lost or names[USER_LOST] in self.awaited, seen or names[USER_SEEN] in self.awaited
+
+    @property
+    def waits(self) -> bool:
+        """Whether an event of it may end the present span."""
+        return any(self.ends)
+
+    @property
+    def counts(self) -> I64:
+        """How often each camera had each user in view, and noticed them: (cameras, users, 2)."""
+        return self.memory.about[..., [About.IN_VIEW.value, About.NOTICED.value]]
+
+    @property
+    def in_view(self) -> dict[str, tuple[float, float]]:
+        """The last perceived place [m] of each body in view, by name, when it last looked."""
+        lattice, in_view = self.owner.home.plan.lattice, {}
+        for identity in np.flatnonzero(self.memory.seen).tolist():
+            x, y = lattice.to_metres(self.perceived[identity]).tolist()
+            in_view[self.name_of(identity)] = (x, y)
+        return in_view
+
+    def name_of(self, identity: int) -> str:
+        """Return the name of an identity; empty for somebody unknown."""
+        return self.others[identity].name if identity < len(self.others) else ""
+
+    def limit(self, bodies: Bodies, end: int) -> int:
+        """Return the step after the first event that ends the span, `end` if there is none."""
+        if not self.waits or end <= self.next_step:
+            return end
+        self._ahead = self._look(bodies, end)
+        return self._ahead.end
+
+    def take(self, bodies: Bodies, end: int) -> Sequence[Event]:
+        """Look in the steps from `next_step` to `end` - 1; return the events of seeing and losing.
+
+        Cameras that looked beyond `end`, before another watcher ended the span, look again.
+        """
+        result, self._ahead = self._ahead, None
+        if result is not None and result.looked != end:
+            for array, old in zip(self.memory, result.old_memory, strict=True):
+                array[:] = old
+            result = None
+        if result is None:
+            result = self._look(bodies, end, stop=False)
+        rows = result.sightings
+        self.next_step = end
+        if len(rows):
+            self._sightings.append(rows)
+        identity = rows[:, IDENTITY]  # -1, somebody unknown, is the last row
+        self.perceived[identity, 0] = rows[:, X]
+        self.perceived[identity, 1] = rows[:, Y]
+        names, entity = self.event_names, self.owner.name
+        return [
+            Event(step, entity, names[kind], self.name_of(identity))
+            for step, identity, kind in result.events
+        ]
+
+    def interruptions(self, events: Sequence[Event]) -> Iterator[tuple[int, SightEvent]]:
+        """Yield the events of the last step that end its owner's plan."""
+        stops = {name for name, stop in zip(self.event_names, self.stops, strict=True) if stop}
+        lattice = self.owner.home.plan.lattice
+        index = {other.name: i for i, other in enumerate(self.others)}
+        for event in events:
+            if event.step == self.next_step - 1 and event.event in stops:
+                place = self.perceived[index.get(event.detail, len(index))]
+                x, y = lattice.to_metres(place).tolist()
+                yield self.row, SightEvent(event.event, event.detail, x, y)
+
+    def collect(self) -> I64:
+        """Return the sightings since the last call, int64 (n, SIGHTING)."""
+        blocks, self._sightings = self._sightings, []
+        return np.concatenate([NOTHING, *blocks])
+
+    def _look(self, bodies: Bodies, end: int, *, stop: bool = True) -> "_Look":
+        may_redo = stop or self.later is not None
+        old_memory = [array.copy() for array in self.memory] if may_redo else []
+        stop_lost, stop_seen = self.ends if stop else (False, False)
+        home, window, points = self.owner.home, bodies.window(self.next_step, end), None
+        if self.method is not None:
+            block = bodies.block(self.next_step, end)
+            others = slice(self._first, self._first + len(self.others))
+            crowd = UserPoses._make(column[others] for column in block)
+            poses = poses_of(block, self.row)
+            step_us = self.owner.clock.step_us
+            with blame("sight.method", self.next_step):
+                lenses = self.lenses._replace(widest=np.maximum(self.lenses.widest, 0))
+                points = points_seen(
+                    self.method, home, lenses, poses, crowd, self.next_step, step_us
+                )
+                points[self._dark] = 0
+        count, sightings, step, identity, kind = look(
+            home.walls,
+            self.lenses,
+            self.errors,
+            self.rule._replace(stop_lost=stop_lost, stop_seen=stop_seen),
+            window,
+            self.row,
+            self._first,
+            self.memory,
+            points,
+            self.radii,
+        )
+        events = list(zip(step.tolist(), identity.tolist(), kind.tolist(), strict=True))
+        looked = end = self.next_step + count
+        if self.later is not None:
+            before = SightMemory(*old_memory)
+            sightings, differs = self.later.change(sightings, self.memory, before, window, looked)
+            if differs:
+                patience, stops = self.rule.patience, {USER_LOST: stop_lost, USER_SEEN: stop_seen}
+                events = sight_events(sightings, self.memory, patience, self.next_step, looked)
+                end = next((step + 1 for step, _, kind in events if stops[kind]), looked)
+        return _Look(looked, end, sightings, events, old_memory)
+
+
+def _drift_of(owner: Actor) -> Drift | None:
+    """Return the error of a body's belief about its own pose; None: it has none."""
+    settings: Localization | None = getattr(owner.entity, "localization", None)
+    if settings is None:
+        return None
+    lattice, clock = owner.home.plan.lattice, owner.clock
+    return Drift(settings, lattice.units_per_m, clock.step_us, owner.seed, owner.path)
+
+
+class _Look(NamedTuple):
+    """The result of a look up to step `looked` - 1, and the memory before it.
+
+    The span ends at `end`, which is earlier if an error changed who was seen when.
+    """
+
+    looked: int
+    end: int
+    sightings: I64
+    events: list[tuple[int, int, int]]
+    old_memory: list[I64]
+
+
+def open_cameras(basis: Basis) -> tuple[list[Cameras], list[Cameras]]:
+    """Return the cameras of users and those of robots; none without both users and robots."""
+    actors, users = basis.actors, basis.bodies.users
+    if not 0 < users < len(actors):
+        return [], []
+    home, sight = basis.home, basis.scenario.sight
+    method, radii = sight.method.model_copy(), None
+    with blame("sight.method", None):
+        method.start(home)
+    if sight.people_occlude:
+        units = home.plan.lattice.units_per_m
+        radii = np.array([max(round(actor.entity.radius * units), 1) for actor in actors], np.int64)
+    cameras = [
+        Cameras(row, actors, users, method, radii)
+        for row, actor in enumerate(actors)
+        if actor.entity.eyes
+    ]
+    return [c for c in cameras if c.row < users], [c for c in cameras if c.row >= users]

@@ -1,0 +1,247 @@
+"""Encounters: robots that come near to people who react to them.
+
+They follow from the poses alone, step by step, so they don't depend on spans. A span ends with its
+first encounter, and the person decides right after it.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fleet2d.engine.bodies import Bodies, PoseBlock
+from fleet2d.engine.watchers.watcher import Watcher
+from fleet2d.entities.behavior import Attention, SightEvent
+from fleet2d.entities.decisions import DecidingActor
+from fleet2d.events import Event, EventKind
+from fleet2d.floorplan.objects import POSTURES
+from fleet2d.kernels.mesh import locate
+from fleet2d.kernels.sight import line_of_sight
+
+# The squared distance of a person who can't be met: larger than any home [lattice units²].
+FAR = 1 << 50
+LYING = POSTURES.index("lie")
+STANDING = POSTURES.index("stand")
+# A robot is noticed again after it was farther away than these multiples of the distance.
+AGAIN_NEAR = (5, 4)
+AGAIN_COMING = (3, 2)
+
+I64 = NDArray[np.int64]
+Bool = NDArray[np.bool_]
+
+
+class Encounter(NamedTuple):
+    """An encounter of a person and a robot, in a column of a span."""
+
+    column: int
+    event: str
+    robot: DecidingActor
+    pair: "Pair"
+
+
+@dataclass
+class Pair:
+    """A person and a robot, and their state from span to span.
+
+    Attributes:
+        user: The person.
+        user_row: The person's row among the bodies.
+        robot: The robot.
+        robot_row: Its row among the bodies.
+        attention: What the person notices.
+        near: Whether the person would notice the robot nearby: not if it has stayed there.
+        coming: Whether the person would notice the robot driving up: not if it has just done so.
+        close_steps: Number of steps for which it has been too close.
+        distance: Squared distance at the last step [lattice units²].
+        at: Place of the robot at the last step [lattice units].
+    """
+
+    user: DecidingActor
+    user_row: int
+    robot: DecidingActor
+    robot_row: int
+    attention: Attention
+    near: bool = True
+    coming: bool = True
+    close_steps: int = 0
+    distance: int = FAR
+    at: tuple[int, int] = (-1, -1)
+
+    def scan(self, block: PoseBlock, count: int) -> list[Encounter]:
+        """Return the first encounter of each kind in `count` steps."""
+        self.distances = self._measure(block, count)
+        kinds = {
+            "robot_near": self._first_near(block),
+            "robot_coming": self._first_coming(block),
+            "robot_close": self._first_close(),
+        }
+        return [
+            Encounter(column, event, self.robot, self)
+            for event, column in kinds.items()
+            if column is not None
+        ]
+
+    def hears(self, column: int) -> bool:
+        """Whether the person hears a call of the robot at a step: a column of the scanned span."""
+        return bool(self.distances[column] <= self.attention.hears * self.attention.hears)
+
+    def advance(self, block: PoseBlock, count: int, events: Sequence[str]) -> None:
+        """Update the state after `count` steps, with encounters in the last one."""
+        distances = self.distances[:count]
+        self.near = "robot_near" not in events and bool(self._armed_near()[count - 1])
+        self.coming = "robot_coming" not in events and bool(self._armed_coming()[count - 1])
+        self.close_steps = int(self._close_run()[count - 1])
+        self.distance = int(distances[-1])
+        row = self.robot_row
+        self.at = int(block.x[row, count - 1]), int(block.y[row, count - 1])
+
+    def _measure(self, block: PoseBlock, count: int) -> I64:
+        """Return the squared distances; FAR if one is away or the person lies."""
+        u, r = self.user_row, self.robot_row
+        dx = block.x[u, :count] - block.x[r, :count]
+        dy = block.y[u, :count] - block.y[r, :count]
+        away = block.away[u, :count] | block.away[r, :count]
+        is_unreachable = (away != 0) | (block.posture[u, :count] == LYING)
+        return np.where(is_unreachable, FAR, dx * dx + dy * dy)
+
+    def _is_beyond(self, limit: int, factor: tuple[int, int]) -> Bool:
+        far = limit * factor[0] // factor[1]
+        return self.distances > far * far
+
+    def _armed_near(self) -> Bool:
+        has_left: Bool = np.logical_or.accumulate(
+            self._is_beyond(self.attention.notices, AGAIN_NEAR)
+        )
+        return has_left | self.near
+
+    def _armed_coming(self) -> Bool:
+        has_left: Bool = np.logical_or.accumulate(
+            self._is_beyond(self.attention.in_way, AGAIN_COMING)
+        )
+        return has_left | self.coming
+
+    def _close_run(self) -> I64:
+        """Return the number of steps for which the robot has been too close, at each step."""
+        limit = self.attention.too_close
+        is_close = self.distances <= limit * limit
+        index = np.arange(len(is_close))
+        last = np.maximum.accumulate(np.where(is_close, -1, index))
+        return index - last + np.where(last < 0, self.close_steps, 0)
+
+    def _first_near(self, block: PoseBlock) -> int | None:
+        """Return the first column in which the robot is noticed: near, and in line of sight."""
+        limit = self.attention.notices
+        candidates = np.flatnonzero((self.distances <= limit * limit) & self._armed_near())
+        u, r = self.user_row, self.robot_row
+        walls, checked = self.user.home.walls, None
+        rows = (block.x[u], block.y[u], block.x[r], block.y[r])
+        for column, *places in zip(
+            candidates.tolist(), *(row[candidates].tolist() for row in rows), strict=True
+        ):
+            if places == checked:
+                continue
+            checked = places
+            x, y, robot_x, robot_y = places
+            if line_of_sight(walls, x, y, locate(walls, x, y), robot_x, robot_y):
+                return int(column)
+        return None
+
+    def _first_coming(self, block: PoseBlock) -> int | None:
+        """Return the first column in which the robot drives up to the person, who stands."""
+        limit, count, row = self.attention.in_way, len(self.distances), self.robot_row
+        is_inside = (self.distances <= limit * limit) & self._armed_coming()
+        if not is_inside.any():
+            return None
+        x, y = block.x[row, :count], block.y[row, :count]
+        last = self.at if self.at[0] >= 0 else (int(x[0]), int(y[0]))
+        moves = (np.diff(x, prepend=last[0]) != 0) | (np.diff(y, prepend=last[1]) != 0)
+        approaches = np.diff(self.distances, prepend=self.distance) < 0
+        stands = block.posture[self.user_row, :count] == STANDING
+        return _first(is_inside & moves & approaches & stands)
+
+    def _first_close(self) -> int | None:
+        return _first(self._close_run() == self.attention.patience)
+
+
+class Encounters(Watcher):
+    """All pairs of a person who reacts to robots and a robot.
+
+    Attributes:
+        pairs: The pairs.
+        next_step: The first step that is not processed.
+    """
+
+    def __init__(self, users: Sequence[DecidingActor], robots: Sequence[DecidingActor]) -> None:
+        self._robots = [(len(users) + i, robot) for i, robot in enumerate(robots)]
+        self.pairs = [
+            Pair(user, row, robot, robot_row, user.attention)
+            for row, user in enumerate(users)
+            if user.attention is not None
+            for robot_row, robot in self._robots
+        ]
+        self._calls: list[tuple[int, int, str]] = []  # at the ends of plans: step, row, user
+        self._ahead: list[Encounter] = []
+        self._last: list[tuple[int, DecidingActor, SightEvent]] = []
+
+    @property
+    def waits(self) -> bool:
+        """Whether any person reacts to robots."""
+        return bool(self.pairs)
+
+    def before_plan(self, row: int, actor: DecidingActor, step: int) -> None:
+        """Record the calls at `step` of a robot's plan that is replaced."""
+        if self.pairs:
+            self._calls += [call for call in _calls(row, actor) if call[0] == step]
+
+    def limit(self, bodies: Bodies, end: int) -> int:
+        """Return the step after the first encounter, `end` if there is none."""
+        first, block = self.next_step, bodies.block(self.next_step, end)
+        self._ahead = [event for pair in self.pairs for event in pair.scan(block, end - first)]
+        calls = self._calls + [call for row, robot in self._robots for call in _calls(row, robot)]
+        self._calls = []
+        self._ahead += [
+            Encounter(step - first, "robot_calls", pair.robot, pair)
+            for step, row, user in calls
+            if first <= step < end
+            for pair in self.pairs
+            if pair.robot_row == row and user in ("", pair.user.name) and pair.hears(step - first)
+        ]
+        return min((event.column + first + 1 for event in self._ahead), default=end)
+
+    def take(self, bodies: Bodies, end: int) -> Sequence[Event]:
+        """Take in the steps up to `end` - 1."""
+        first, self.next_step, count = self.next_step, end, end - self.next_step
+        self._last = []
+        if not self.pairs or not count:
+            return ()
+        block = bodies.block(first, end)
+        for pair in self.pairs:
+            last = [e for e in self._ahead if e.pair is pair and e.column == count - 1]
+            pair.advance(block, count, [e.event for e in last])
+            x, y = pair.user.home.plan.lattice.to_metres(pair.at).tolist()
+            self._last += [
+                (pair.user_row, pair.user, SightEvent(e.event, e.robot.name, x, y)) for e in last
+            ]
+        return ()
+
+    def interruptions(self, events: Sequence[Event]) -> Iterable[tuple[int, SightEvent]]:
+        """Yield the encounters of the last step to which the person reacts."""
+        for row, user, event in self._last:
+            if user.heeds(event, self.next_step - 1):
+                yield row, event
+
+
+def _calls(row: int, robot: DecidingActor) -> list[tuple[int, int, str]]:
+    """Return the calls of a robot's plan: step, the robot's row, and the user it calls."""
+    return [
+        (robot.clock.step_at_or_after(note.time_us), row, note.detail)
+        for note in robot.plan.notes
+        if note.event == EventKind.CALLS
+    ]
+
+
+def _first(flags: Bool) -> int | None:
+    column = int(flags.argmax())
+    return column if flags[column] else None

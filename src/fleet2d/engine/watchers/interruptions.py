@@ -1,0 +1,115 @@
+"""Interruptions: the plans that wait for interrupts, and the steps at which these happen.
+
+They follow from the poses alone, so they don't depend on spans. A span ends with the first one, and
+the body decides right after it.
+"""
+
+from collections.abc import Iterator, Sequence
+from typing import cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fleet2d.blame import blame
+from fleet2d.component import lookup
+from fleet2d.engine.basis import Basis
+from fleet2d.engine.bodies import Bodies
+from fleet2d.engine.interrupts.interrupt import Interrupt, SpanView
+from fleet2d.engine.watchers.watcher import Watcher
+from fleet2d.entities.behavior import SightEvent
+from fleet2d.entities.entity import Robot, User
+from fleet2d.errors import ComponentError
+from fleet2d.events import Event
+
+# The events of cameras, which are watchers of their own.
+SIGHT_EVENTS = frozenset({*User.sight_events, *Robot.sight_events})
+
+Wait = tuple[int, str]
+"""The row of a body, and the name of the interrupt for which its plan waits."""
+
+
+class Interruptions(Watcher):
+    """The plans that wait for interrupts; it does nothing while there are none."""
+
+    def __init__(self, basis: Basis) -> None:
+        self._actors, self._users = basis.actors, basis.bodies.users
+        # Whether the condition held at the last step; None: the plan has not begun yet.
+        self._held: dict[Wait, bool | None] = {}
+        self._ahead: dict[Wait, NDArray[np.bool_]] = {}  # whether it holds in the present span
+        self._last: list[Wait] = []
+        self._interrupts: dict[str, Interrupt] = {}
+
+    def __getstate__(self) -> dict[str, object]:
+        """Leave out the interrupts, which follow from their names."""
+        return {**self.__dict__, "_interrupts": {}}
+
+    @property
+    def waits(self) -> bool:
+        """Whether a plan waits for an interrupt."""
+        return bool(self._held)
+
+    def expect(self, row: int) -> None:
+        """Wait for the interrupts that the present plan of a body names, and for no others."""
+        names = self._actors[row].plan.interrupts
+        if not names and not self._held:
+            return
+        named = {(row, name) for name in names - SIGHT_EVENTS}
+        others = {wait: held for wait, held in self._held.items() if wait[0] != row}
+        new = {wait: self._held.get(wait) for wait in named}
+        self._held = dict(sorted((others | new).items(), key=lambda item: item[0]))
+
+    def limit(self, bodies: Bodies, end: int) -> int:
+        """Return the step after the first interruption, `end` if there is none."""
+        first = self.next_step
+        block, self._ahead = bodies.block(first, end), {}
+        for wait in self._held:
+            row, name = wait
+            span = SpanView(self._actors[row], self._actors, self._users, first, block)
+            with blame(self._actors[row].path, first):
+                self._ahead[wait] = _checked(name, self._interrupt(name).holds(span), end - first)
+            begins = self._begins(wait)
+            if begins.any():
+                end = min(end, first + int(begins.argmax()) + 1)
+        return end
+
+    def take(self, bodies: Bodies, end: int) -> Sequence[Event]:
+        """Take in the steps up to `end` - 1."""
+        count, self.next_step = end - self.next_step, end
+        self._last = [wait for wait in self._ahead if self._begins(wait)[count - 1]]
+        for wait, holds in self._ahead.items():
+            self._held[wait] = bool(holds[count - 1])
+        self._ahead = {}
+        return ()
+
+    def interruptions(self, events: Sequence[Event]) -> Iterator[tuple[int, SightEvent]]:
+        """Yield the interruptions at the last step, with the place of the body itself."""
+        for row, name in self._last:
+            actor = self._actors[row]
+            x, y = actor.home.plan.lattice.xy_of(actor.state.x, actor.state.y)
+            yield row, SightEvent(name, "", x, y)
+
+    def _interrupt(self, name: str) -> Interrupt:
+        if name not in self._interrupts:
+            self._interrupts[name] = cast("Interrupt", lookup("interrupt", name)())
+        return self._interrupts[name]
+
+    def _begins(self, wait: Wait) -> NDArray[np.bool_]:
+        """Return at which steps of the present span a condition becomes true."""
+        holds, held = self._ahead[wait], self._held[wait]
+        before = np.concatenate([holds[:1] if held is None else [held], holds[:-1]])
+        return holds & ~before
+
+
+def _checked(name: str, holds: NDArray[np.bool_], steps: int) -> NDArray[np.bool_]:
+    """Return the answer of an interrupt.
+
+    Raises:
+        ComponentError: It is not an array of that many booleans.
+    """
+    shape = getattr(holds, "shape", None)
+    if shape != (steps,) or holds.dtype != np.bool_:
+        raise ComponentError(
+            f"interrupt {name}: holds() returned {holds!r}, expected an array of {steps} booleans,"
+            " one for each step of the span"
+        )
+    return holds

@@ -1,0 +1,163 @@
+"""The sensors of a run: their readings, and the activities at that time."""
+
+from bisect import bisect_right
+from collections.abc import Iterable, Sequence
+from copy import copy
+from operator import itemgetter
+
+import numpy as np
+
+from fleet2d.algorithms.log import SensorRow
+from fleet2d.blame import blame
+from fleet2d.engine.basis import Basis
+from fleet2d.engine.bodies import Bodies, PoseBlock
+from fleet2d.engine.watchers.watcher import Watcher
+from fleet2d.entities.objects.contact_sensor import ContactSensor
+from fleet2d.entities.objects.sensor import (
+    Sensor,
+    SensorFault,
+    SensorReading,
+    SensorState,
+    SensorView,
+    in_order,
+)
+from fleet2d.errors import ScenarioError
+from fleet2d.events import Event, EventKind
+from fleet2d.problems import suggest
+
+
+class Sensors(Watcher):
+    """All sensors of a scenario.
+
+    Attributes:
+        names: Their names, in the order of the scenario.
+        next_step: The first step at which the sensors have not been read.
+        rooms: The room in the readings of each sensor.
+        words: The words of each sensor for its two states, on and off.
+        stuck: The faults from outside, by name.
+        awaited: Whether an algorithm waits for readings.
+    """
+
+    def __init__(self, basis: Basis, doors: Sequence[str]) -> None:
+        home, step_us = basis.home, basis.clock.step_us
+        self.home, self.users = home, basis.bodies.users
+        self.stuck: dict[str, SensorFault] = {}
+        self.awaited = False
+        self._rows: list[SensorRow] = []
+        self.sensors: list[Sensor] = []
+        self.names: list[str] = []
+        for name, item in basis.scenario.objects.items():
+            if isinstance(item, Sensor):
+                sensor = item.model_copy(deep=True)
+                if isinstance(sensor, ContactSensor):
+                    sensor.watch(_door(name, sensor.of, doors))
+                sensor.start(home, step_us)
+                self.names.append(name)
+                self.sensors.append(sensor)
+        self.rooms = [sensor.room or sensor.place(home) for sensor in self.sensors]
+        self.words = [sensor.words for sensor in self.sensors]
+        self._states = [SensorState(sensor.hold_us() // step_us) for sensor in self.sensors]
+        self._last_poses: tuple[np.ndarray, ...] | None = None
+        self._activities: dict[str, list[tuple[int, str]]] = {user.name: [] for user in basis.users}
+
+    @property
+    def on(self) -> dict[str, bool]:
+        """Whether each sensor is on at present."""
+        return {name: state.on for name, state in zip(self.names, self._states, strict=True)}
+
+    @property
+    def waits(self) -> bool:
+        """Whether readings end a span."""
+        return self.awaited and bool(self.sensors)
+
+    def limit(self, bodies: Bodies, end: int) -> int:
+        """Return the step after the first in which a sensor reports something."""
+        first, last_poses = self.next_step, self._last_poses
+        with blame("objects", first):
+            view = self._view(bodies.block(first, end), first)
+            self._last_poses = last_poses
+            for number, state in enumerate(self._states):
+                readings = self._read(number, copy(state), view, end)
+                end = min([end, *(reading.step + 1 for reading in readings)])
+        return end
+
+    def take(self, bodies: Bodies, end: int) -> Sequence[Event]:
+        """Read the sensors; `collect` returns the readings."""
+        first, self.next_step = self.next_step, end
+        if not self.sensors or first == end:
+            return ()
+        with blame("objects", first):
+            view = self._view(bodies.block(first, end), first)
+            readings = []
+            for number, state in enumerate(self._states):
+                new = self._read(number, state, view, end)
+                readings += [(number, reading) for reading in new]
+        self._rows += [
+            SensorRow(reading.step, number, reading.on, self._activity(reading.user, reading.step))
+            for number, reading in in_order(readings)
+        ]
+        return ()
+
+    def _read(
+        self, number: int, state: SensorState, view: SensorView, end: int
+    ) -> list[SensorReading]:
+        """Return the readings of a sensor before step `end`, and update its state."""
+        steps, users = self.sensors[number].sense(view, self.home)
+        fault = self.stuck.get(self.names[number])
+        if fault == "on":
+            steps = np.arange(view.first, end)
+            users = np.full(len(steps), -1)
+        elif fault == "off":
+            steps, users = steps[:0], users[:0]
+        readings = state.read(steps, users, end)
+        return [] if fault == "silent" else readings
+
+    def collect(self) -> list[SensorRow]:
+        """Return the readings since the last call, by step and sensor."""
+        rows, self._rows = self._rows, []
+        return rows
+
+    def events_of(self, rows: Iterable[SensorRow]) -> list[Event]:
+        """Return readings as events, with the sensor and its state in the words of the table."""
+        names, words = self.names, self.words
+        return [
+            Event(row.step, names[row.sensor], EventKind.SENSOR, words[row.sensor][not row.on])
+            for row in rows
+        ]
+
+    def take_events(self, events: Sequence[Event]) -> None:
+        """Record the activities of users, for the readings."""
+        if not self.sensors:
+            return
+        for event in events:
+            if event.event == EventKind.ACTIVITY and event.entity in self._activities:
+                self._activities[event.entity].append((event.step, event.detail))
+
+    def _view(self, block: PoseBlock, first: int) -> SensorView:
+        arrays = (block.x, block.y, block.away == 0)
+        last_poses = self._last_poses or tuple(array[:, :1] for array in arrays)
+        self._last_poses = tuple(array[:, -1:].copy() for array in arrays)
+        x, y, present = (
+            np.concatenate(pair, axis=1) for pair in zip(last_poses, arrays, strict=True)
+        )
+        return SensorView(first, x, y, present, self.users)
+
+    def _activity(self, user: int, step: int) -> str:
+        """Return the activity of a user at a step, if known; that of all users for user -1."""
+        if user >= self.users:
+            return ""
+        if user < 0:
+            activities = [self._activity(number, step) for number in range(self.users)]
+            return " and ".join(dict.fromkeys(text for text in activities if text))
+        activities_of_user = list(self._activities.values())[user]
+        index = bisect_right(activities_of_user, step, key=itemgetter(0))
+        return activities_of_user[index - 1][1] if index else ""
+
+
+def _door(name: str, door: str, doors: Sequence[str]) -> int:
+    if door in doors:
+        return list(doors).index(door)
+    raise ScenarioError(
+        f"objects.{name}.of names {door!r}, which is not a door of the"
+        f" scenario{suggest(door, doors)}"
+    )

@@ -1,0 +1,185 @@
+"""The errors of sightings that come after the look: components, and the belief about a pose."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fleet2d.blame import blame
+from fleet2d.errors import ComponentError
+from fleet2d.floorplan.geometry.lattice import Lattice
+from fleet2d.kernels.headings import TURN, in_radians
+from fleet2d.kernels.lens import camera_poses
+from fleet2d.kernels.look import (
+    CAMERA,
+    HEADING,
+    IDENTITY,
+    POSTURE,
+    STEP,
+    TRUE_HEADING,
+    TRUE_POSTURE,
+    TRUE_X,
+    TRUE_Y,
+    USER,
+    SightMemory,
+    X,
+    Y,
+)
+from fleet2d.kernels.perception import NOBODY, About
+from fleet2d.kernels.timelines import Window
+from fleet2d.sight.camera_sightings import CameraSightings, ErrorStream
+from fleet2d.sight.perception import Perception
+from fleet2d.sight.perception_error import PerceptionError
+
+if TYPE_CHECKING:
+    from fleet2d.engine.watchers.cameras import Cameras
+
+I64 = NDArray[np.int64]
+Place = tuple[I64, I64, I64]  # x, y [lattice units] and heading, one element for each look
+
+# The user of a sighting that an error took back, until it would have become known.
+TAKEN_BACK = -2
+
+
+class CameraErrors(NamedTuple):
+    """The errors of one camera.
+
+    Attributes:
+        name: The name of the camera.
+        path: Their path in the scenario, "robots.astro.perception.errors".
+        errors: The errors by name, in the order in which they act, that of the names.
+    """
+
+    name: str
+    path: str
+    errors: dict[str, PerceptionError]
+
+
+class SightingErrors:
+    """Changes the sightings of a body in the span of their look, also those that still wait.
+
+    Errors of perception come first, then the error of the belief about the body's own pose.
+    """
+
+    def __init__(self, cameras: "Cameras", perceptions: Sequence[Perception | None]) -> None:
+        """Take the errors of the cameras of a body; `perceptions` has one for each camera."""
+        owner = self._owner = cameras.owner
+        self._row, self._drift, self._lenses = cameras.row, cameras.drift, cameras.lenses
+        self._users = tuple(other.name for other in cameras.others)
+        common, only = getattr(owner.entity, "perception", None), "camera" in cameras.names
+        self._cameras = []
+        for name, perception in zip(cameras.names, perceptions, strict=True):
+            part = "" if perception is common else ".camera" if only else f".cameras.{name}"
+            path = f"{owner.path}{part}.perception.errors"
+            errors = dict(sorted(perception.errors.items())) if perception else {}
+            self._cameras.append(CameraErrors(name, path, errors))
+
+    def change(
+        self, rows: I64, memory: SightMemory, before: SightMemory, window: Window, end: int
+    ) -> tuple[I64, bool]:
+        """Return the sightings that become known in a span, and whether others were seen.
+
+        If so, `memory` holds of the identities what it held before the span.
+
+        Args:
+            rows: The sightings as the look returns them, (n, SIGHTING).
+            memory: The memory after the look; sightings that wait in it are changed, too.
+            before: The memory before the look.
+            window: The poses of all bodies, from the first step of the span on.
+            end: The step after the last one of the span.
+        """
+        rows, identities = rows.copy(), rows[:, IDENTITY]
+        poses: tuple[I64, ...] = ()
+        for c in range(len(self._cameras)):
+            here = np.flatnonzero(rows[:, CAMERA] == c)
+            begin, length = memory.waiting[c].tolist()
+            places = (begin + np.arange(length)) % max(1, memory.backlog.shape[1])
+            part = np.concatenate([rows[here], memory.backlog[c, places]])
+            looks = part[:, STEP] - self._lenses.latency[c]
+            is_new = looks >= window.first
+            if not is_new.any():
+                continue
+            poses = poses or window.dense(self._row, window.first, end)[:3]
+            at = looks[is_new] - window.first
+            body = poses[0][at], poses[1][at], poses[2][at]
+            part[is_new] = self._change(c, part[is_new], looks[is_new], body, memory)
+            rows[here], memory.backlog[c, places] = part[: len(here)], part[len(here) :]
+        is_kept = rows[:, USER] != TAKEN_BACK
+        differs = not is_kept.all() or bool((rows[:, IDENTITY] != identities).any())
+        if differs:
+            memory.noticed[:], memory.seen[:] = before.noticed, before.seen
+        return rows[is_kept], differs
+
+    def _change(self, c: int, rows: I64, looks: I64, body: Place, memory: SightMemory) -> I64:
+        """Return the sightings of some looks of a camera; the body is at a place in each."""
+        camera = self._cameras[c]
+        if camera.errors:
+            eye = camera_poses(self._lenses, c, body, looks * self._owner.clock.step_us)
+            old = self._sightings(camera.name, rows, looks, eye)
+            new = self._with_errors(camera, old)
+            _write(rows, old, new, self._owner.home.plan.lattice)
+            missed = rows[~new.noticed & (rows[:, USER] != NOBODY), USER]
+            np.subtract.at(memory.about, (c, missed, About.NOTICED.value), 1)
+            rows[~new.noticed, USER] = TAKEN_BACK
+        if self._drift is not None:
+            x, y, _ = body
+            rows[:, X], rows[:, Y] = self._drift.misplace(rows[:, X], rows[:, Y], x, y, looks)
+            rows[:, HEADING] = (rows[:, HEADING] + self._drift.at(looks).turn) % TURN
+        return rows
+
+    def _with_errors(self, camera: CameraErrors, sightings: CameraSightings) -> CameraSightings:
+        """Return sightings with the errors of a camera, one after the other."""
+        owner = self._owner
+        for name, error in camera.errors.items():
+            stream = ErrorStream(owner.seed, owner.path, f"{camera.name}: errors.{name}")
+            with blame(f"{camera.path}.{name}", int(sightings.step[0])):
+                given = replace(sightings, _stream=stream)
+                sightings = error.distort(given)
+                if getattr(sightings, "step", None) is not given.step:
+                    raise ComponentError(
+                        f"distort returned {sightings!r:.100}: return what sightings.replace(…) or"
+                        " sightings.moved(…) returns, or the sightings themselves"
+                    )
+        return sightings
+
+    def _sightings(self, camera: str, rows: I64, looks: I64, eye: Place) -> CameraSightings:
+        """Return the sightings of some looks of a camera, which is at a place in each."""
+        owner = self._owner
+        lattice = owner.home.plan.lattice
+        seen, true, at = (
+            lattice.to_metres(np.stack(xy, axis=1))
+            for xy in ((rows[:, X], rows[:, Y]), (rows[:, TRUE_X], rows[:, TRUE_Y]), eye[:2])
+        )
+        return CameraSightings(
+            camera=camera,
+            users=self._users,
+            home=owner.home,
+            step_s=owner.clock.step_us / 1e6,
+            step=looks.copy(),
+            user=rows[:, IDENTITY].copy(),
+            x=seen[:, 0],
+            y=seen[:, 1],
+            heading=in_radians(rows[:, HEADING]),
+            posture=rows[:, POSTURE].copy(),
+            noticed=np.ones(len(rows), np.bool_),
+            true_user=rows[:, USER].copy(),
+            true_x=true[:, 0],
+            true_y=true[:, 1],
+            true_heading=in_radians(rows[:, TRUE_HEADING]),
+            true_posture=rows[:, TRUE_POSTURE].copy(),
+            camera_x=at[:, 0],
+            camera_y=at[:, 1],
+            camera_heading=in_radians(eye[2]),
+        )
+
+
+def _write(rows: I64, old: CameraSightings, new: CameraSightings, lattice: Lattice) -> None:
+    """Write the values that errors changed to sightings, in place and rounded."""
+    if new.x is not old.x or new.y is not old.y:
+        rows[:, [X, Y]] = lattice.to_lattice(np.stack([new.x, new.y], axis=1))
+    if new.heading is not old.heading:
+        rows[:, HEADING] = np.rint(new.heading * (TURN / (2 * math.pi))).astype(np.int64) % TURN
+    rows[:, POSTURE], rows[:, IDENTITY] = new.posture, new.user

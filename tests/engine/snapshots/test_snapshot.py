@@ -1,0 +1,585 @@
+"""Copies of a run, in memory and in files: each goes on to the digest of an undisturbed run."""
+
+import copy
+import hashlib
+import io
+import json
+import os
+import pickle
+import random
+import subprocess
+from collections.abc import Callable
+from functools import cache, partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from tests.engine.watchers.test_perceiving import full
+from tests.scenes import digests, every_step, everything, process, run, scenario
+from tests.thorough import THOROUGH
+
+import fleet2d
+from fleet2d import Algorithm, Behavior, Plan, Simulation, Situation
+from fleet2d.engine.snapshots.snapshot import MAGIC, may_refer, open_snapshot
+from fleet2d.errors import ArtifactError, ComponentError, InputError
+from fleet2d.events import Event
+
+HOUSE = {
+    "hall": {"type": "door", "doorway": "living_room_0-bedroom_0", "closes_after": "20 s"},
+    "bath": {"type": "door", "doorway": "kitchen_0-bathroom_0"},
+    "eye": {"type": "motion_sensor", "at": [2.5, 2.5], "range": 4, "hold": "20 s"},
+    "switch": {"type": "contact_sensor", "of": "bath"},
+}
+
+
+def house(duration: str = "20 min") -> dict[str, Any]:
+    """Doors that people open, sensors, layers, people who react, robots that give way."""
+    content = everything(duration, objects=HOUSE)
+    content["changes"] = [
+        {"at": "9 min", "shut": "bath"},
+        {"at": "13 min", "lock": "hall"},
+        {"at": "17 min", "unlock": "hall"},
+    ]
+    seen = {name: {"store": True} for name in ("explored", "last_seen")}
+    content["floorplan"]["layers"] = {**seen, "costmap": {"store": True, "every": "10 min"}}
+    content["users"]["cleo"] = {"behaviors": ["reactions", "meander"]}
+    content["robots"]["astro"]["gives_way"] = {}
+    content["robots"]["zed"] = {"type": "find", "user": "ana", "every": "5 min", "source": "rtp"}
+    on = {"type": "tests.engine.test_events:Heard", "on": ["sensor", "user_lost"]}
+    content["algorithms"] |= {"rtp": {"type": "rtp"}, "ltp": {"type": "ltp"}, "heard": on}
+    content["metrics"] |= {"rtp_score": {"of": "rtp"}, "detections": {}, "coverage": {}}
+    return content
+
+
+def routine() -> dict[str, Any]:
+    """The bundled home, with people of a household and a robot that learns where they are."""
+    member = {"type": "routine", "household": {"members": {"ana": "works_from_home"}}}
+    return {
+        "simulation": {"start": "2026-01-05T06:00", "duration": "4 h", "seed": 4},
+        "floorplan": {"type": "bundled", "furnish": True},
+        "users": {"ana": member},
+        "robots": {"astro": {"type": "patrol", "dwell": "1 min"}},
+        "sight": {"method": {"type": "flashlight"}},
+        "algorithms": {"rtp": {"type": "rtp", "model": "routine"}},
+    }
+
+
+def markov() -> dict[str, Any]:
+    return {
+        "simulation": {"start": "2026-01-05T06:00", "duration": "6 h", "seed": 4},
+        "floorplan": {"type": "bundled"},
+        "users": {"ana": {"type": "room_sampling", "shares": {"kitchen": 0.4, "bedroom": 0.6}}},
+        "robots": {"astro": {"behaviors": [{"type": "hangout", "source": "rtp"}]}},
+        "algorithms": {"rtp": {"type": "rtp", "model": "semi_markov", "period": "5 min"}},
+    }
+
+
+SCENES: dict[str, Callable[[], dict[str, Any]]] = {
+    "every behavior": partial(everything, "40 min"),
+    "cameras that err": partial(full, "40 min"),
+    "doors, sensors, layers": house,
+    "after every step": partial(every_step, "4 min"),
+    "no users": lambda: scenario("40 min", robots={"astro": {"type": "patrol"}}),
+    "no robots": lambda: scenario("40 min", users={"ana": {"type": "meander"}}),
+    "nobody": lambda: scenario("40 min"),
+    "a household": routine,
+    "chains": markov,
+}
+
+
+@cache
+def undisturbed(scene: str) -> tuple[dict[str, Any], str]:
+    """Return the digests of a run, and its metrics."""
+    stored = run(SCENES[scene]())
+    return digests(stored), json.dumps(stored.metrics, sort_keys=True)
+
+
+def result(simulation: Simulation) -> tuple[dict[str, Any], str]:
+    """Run to the end, and return the same."""
+    stored = simulation.run()
+    return digests(stored), json.dumps(stored.metrics, sort_keys=True)
+
+
+def through_a_stream(simulation: Simulation) -> Simulation:
+    file = io.BytesIO()
+    simulation.save(file)
+    file.seek(0)
+    return Simulation.load(file)
+
+
+WAYS: dict[str, Callable[[Simulation], Simulation]] = {
+    "deepcopy": copy.deepcopy,
+    "pickle": lambda simulation: pickle.loads(pickle.dumps(simulation)),
+    "save": through_a_stream,
+}
+
+
+@pytest.mark.parametrize(
+    ("scene", "way"),
+    [
+        (scene, way)
+        for i, scene in enumerate(SCENES)
+        for j, way in enumerate(WAYS)
+        if THOROUGH or j in (2, i % 3)
+    ],
+)
+def test_a_copy_made_at_any_step_goes_on_to_the_same_run(scene: str, way: str) -> None:
+    content, draws = SCENES[scene](), random.Random(f"{scene} {way}")
+    simulation = Simulation(content)
+    steps = sorted(draws.randrange(simulation.clock.steps) for _ in range(2 if THOROUGH else 1))
+    for step in [0, *steps]:
+        simulation.run_until(step)
+        twin = WAYS[way](simulation)
+        assert (step, simulation.seed) == (twin.step, twin.seed)
+        assert simulation.state == twin.state
+        assert undisturbed(scene) == result(twin), step
+    assert undisturbed(scene) == result(simulation)
+
+
+@pytest.mark.parametrize("scene", ["cameras that err", "doors, sensors, layers"])
+def test_a_copy_of_a_copy_of_a_copy_goes_on_to_the_same_run(scene: str) -> None:
+    simulation, ways = Simulation(SCENES[scene]()), random.Random(scene)
+    while not simulation.done:
+        simulation.advance(ways.choice([1, 7, 300, 611]))
+        simulation = WAYS[ways.choice(list(WAYS))](simulation)
+    assert undisturbed(scene) == result(simulation)
+
+
+def test_copies_can_be_changed_without_the_other_noticing() -> None:
+    simulation = Simulation(house())
+    simulation.advance(700)
+    twins = [way(simulation) for way in WAYS.values()]
+    for twin in twins:
+        twin.put("ana", "kitchen")
+        twin.change(open="bath")
+        twin.advance(300)
+        assert simulation.state != twin.state
+    assert undisturbed("doors, sensors, layers") == result(simulation)
+    assert undisturbed("doors, sensors, layers") != result(twins[0])
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_a_copy_keeps_what_was_done_and_what_is_still_to_be_done(way: str) -> None:
+    content = everything("20 min")
+    later = [{"do": "put", "step": 900, "entity": "ben", "to": "kitchen", "heading_deg": 5}]
+    simulation = Simulation(content, interventions=later)
+    simulation.advance(100)
+    simulation.replan("astro")
+    simulation.advance(100)
+    twin = WAYS[way](simulation)
+    assert ["replan", "put"] == [i["do"] for i in twin.run().manifest["interventions"]]
+    assert result(simulation)[0]["run"] == twin.finish().digest
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_a_listener_stays_with_the_one_that_it_listens_to(way: str) -> None:
+    simulation, heard = Simulation(everything("20 min")), list[Event]()
+    simulation.listen(heard.extend)
+    simulation.advance(600)
+    before = len(heard)
+    WAYS[way](simulation).run()
+    assert before == len(heard)
+    simulation.run()
+    assert before < len(heard)
+
+
+def test_copies_in_memory_share_what_never_changes() -> None:
+    simulation = Simulation(everything("20 min"))
+    simulation.advance(600)
+    twin = copy.deepcopy(simulation)
+    assert simulation.home.plan is twin.home.plan
+    assert simulation.scenario is twin.scenario
+    assert simulation.home.walls is twin.home.walls
+    for name, actor in simulation.actors.items():
+        assert actor.entity is twin.actors[name].entity
+        assert actor.space is twin.actors[name].space
+        assert actor is not twin.actors[name]
+
+
+def test_a_read_simulation_has_one_home_and_one_clock() -> None:
+    twin = through_a_stream(Simulation(house()))
+    for actor in twin.actors.values():
+        assert actor.home is twin.home
+        assert actor.clock is twin.clock
+        assert actor.entity in [*twin.scenario.users.values(), *twin.scenario.robots.values()]
+    for cameras in twin._state.cameras:
+        assert cameras.owner is twin.actors[cameras.owner.name]
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_a_finished_run_does_not_go_on_in_a_copy(way: str) -> None:
+    simulation = Simulation(everything("25 min"))
+    stored = simulation.run()
+    with pytest.raises(InputError, match="finished"):
+        WAYS[way](simulation).advance(1)
+    assert stored.digest == simulation.finish().digest
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_a_run_that_broke_off_does_not_go_on_in_a_copy(way: str) -> None:
+    bad = {"bad": {"type": "tests.own_components:Bad", "period": "1 min"}}
+    simulation = Simulation(scenario("10 min", algorithms=bad))
+    with pytest.raises(ComponentError):
+        simulation.advance(100)
+    with pytest.raises(InputError, match="run failed"):
+        WAYS[way](simulation).advance(1)
+
+
+# --- Files -------------------------------------------------------------------------------------
+
+LOAD = """
+import sys, fleet2d
+print(fleet2d.Simulation.load(sys.argv[1]).run().digest)
+"""
+
+
+def saved(path: Path, content: dict[str, Any] | None = None, steps: int = 500) -> Path:
+    """Save a run on its way."""
+    simulation = Simulation(everything("20 min") if content is None else content)
+    simulation.advance(steps)
+    simulation.save(path)
+    return path
+
+
+@pytest.mark.parametrize("scene", ["cameras that err", "doors, sensors, layers"])
+def test_another_process_goes_on_from_a_file(scene: str, tmp_path: Path) -> None:
+    path = saved(tmp_path / "run.fleet2d", SCENES[scene](), 1111)
+    done = process("-c", LOAD, str(path), timeout=300, PYTHONHASHSEED="3")
+    assert 0 == done.returncode, done.stderr
+    assert undisturbed(scene)[0]["run"] == done.stdout.strip()
+
+
+OWN = """
+from fleet2d import Algorithm
+
+
+class Steps:
+    def __init__(self):
+        self.count = 0
+
+
+class Looks(Algorithm):
+    def start(self, home):
+        self.steps = Steps()
+
+    def update(self, history, state):
+        self.steps.count += len(history)
+        return {"steps": self.steps.count}
+"""
+
+SAVE = """
+import json, sys, fleet2d
+if sys.argv[2] == "imported before":
+    import looks
+simulation = fleet2d.Simulation(json.loads(sys.argv[3]))
+simulation.advance(300)
+simulation.save(sys.argv[1])
+print(simulation.run().digest)
+"""
+
+
+@pytest.mark.parametrize("module", ["imported before", "from the folder"])
+def test_a_module_may_be_imported_in_one_process_and_from_the_folder_in_the_other(
+    module: str, tmp_path: Path
+) -> None:
+    """The state spoke of looks.Looks, the other process of its own name for the folder's looks."""
+    (tmp_path / "looks.py").write_text(OWN)
+    path = tmp_path / "run.fleet2d"
+    content = json.dumps(scenario(algorithms={"looks": {"type": "looks:Looks"}}))
+    whole = process("-c", SAVE, str(path), module, content, cwd=tmp_path)
+    assert 0 == whole.returncode, whole.stderr
+    done = process("-c", LOAD, str(path), cwd=tmp_path)
+    assert 0 == done.returncode, done.stderr
+    assert whole.stdout == done.stdout
+
+
+def test_a_file_of_the_same_state_is_the_same_in_any_process(tmp_path: Path) -> None:
+    """But for the time that it took until then."""
+    one, other = (open_snapshot(saved(tmp_path / name)) for name in "ab")
+    assert one[0].keys() == other[0].keys()
+    assert one[1].read() == other[1].read()
+
+
+def test_saving_replaces_a_file_and_leaves_nothing_else(tmp_path: Path) -> None:
+    path = tmp_path / "run.fleet2d"
+    path.write_text("old")
+    simulation = Simulation(everything("20 min"))
+    simulation.save(path)
+    simulation.advance(100)
+    simulation.save(str(path))
+    assert [path] == list(tmp_path.iterdir())
+    assert 100 == Simulation.load(path).step
+
+
+def test_a_simulation_that_stores_in_a_directory_is_not_saved(tmp_path: Path) -> None:
+    simulation = Simulation(scenario("2 min"), out=tmp_path / "run")
+    for way in WAYS.values():
+        with pytest.raises(ArtifactError, match="stores in"):
+            way(simulation)
+    simulation.finish()
+
+
+def test_a_place_where_nothing_can_be_written_is_an_error_in_words(tmp_path: Path) -> None:
+    simulation = Simulation(scenario("2 min"))
+    with pytest.raises(ArtifactError, match=r"run can't be written: No such file"):
+        simulation.save(tmp_path / "nowhere" / "run")
+    (tmp_path / "folder").mkdir()
+    with pytest.raises(ArtifactError, match=r"folder can't be written"):
+        simulation.save(tmp_path / "folder")
+
+
+@pytest.mark.parametrize("name", ["nowhere", "folder"])
+def test_a_file_that_is_not_there_is_an_error_in_words(tmp_path: Path, name: str) -> None:
+    (tmp_path / "folder").mkdir()
+    with pytest.raises(ArtifactError, match=rf"{name} can't be read: "):
+        Simulation.load(tmp_path / name)
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"",
+        b"\n",
+        b"hello",
+        b"PK\3\4 a zip",
+        MAGIC[:-1] + b"\n\n\n",
+        pickle.dumps({"a": 1}),
+        bytes(99),
+    ],
+)
+def test_a_foreign_file_is_refused_in_plain_words(tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "other"
+    path.write_bytes(content)
+    with pytest.raises(ArtifactError, match="other is not a saved simulation"):
+        Simulation.load(path)
+
+
+def test_a_damaged_file_is_refused_wherever_it_is_damaged(tmp_path: Path) -> None:
+    path = saved(tmp_path / "run")
+    whole, draws = path.read_bytes(), random.Random(5)
+    for place in [
+        0,
+        len(MAGIC),
+        len(MAGIC) + 5,
+        *(draws.randrange(len(whole)) for _ in range(200)),
+    ]:
+        damaged = bytearray(whole)
+        damaged[place] ^= 1 << draws.randrange(8)
+        path.write_bytes(damaged)
+        with pytest.raises(ArtifactError, match=r"is damaged|is not a saved simulation"):
+            Simulation.load(path)
+    for length in [
+        1,
+        len(MAGIC) + 1,
+        len(MAGIC) + 99,
+        *(draws.randrange(len(whole)) for _ in range(50)),
+    ]:
+        path.write_bytes(whole[:length])
+        with pytest.raises(ArtifactError, match=r"is damaged|is not a saved simulation"):
+            Simulation.load(path)
+    path.write_bytes(whole + b"more")
+    with pytest.raises(ArtifactError, match="is damaged"):
+        Simulation.load(path)
+
+
+def file_of(header: Any, body: bytes) -> io.BytesIO:
+    """Return a file whose digest is right, whatever is in it."""
+    first = header if isinstance(header, bytes) else json.dumps(header).encode()
+    content = b"\n".join((MAGIC, first, body))
+    return io.BytesIO(content + hashlib.sha256(content).hexdigest().encode())
+
+
+@cache
+def header() -> dict[str, Any]:
+    file = io.BytesIO()
+    Simulation(scenario("2 min")).save(file)
+    file.seek(0)
+    return open_snapshot(file)[0]
+
+
+def test_a_file_of_another_version_says_which(tmp_path: Path) -> None:
+    with pytest.raises(ArtifactError, match=r"written by Fleet2D 0\.0\.7, and this is"):
+        Simulation.load(file_of({**header(), "fleet2d": "0.0.7"}, b""))
+
+
+@pytest.mark.parametrize(
+    "first",
+    [b"no json", b"[]", b"3", b"{}", {"fleet2d": fleet2d.__version__}, {"scenario": {}}],
+    ids=repr,
+)
+def test_a_header_that_says_nothing_is_refused_in_plain_words(first: Any) -> None:
+    with pytest.raises(ArtifactError, match=r"is not a saved simulation"):
+        Simulation.load(file_of(first, b""))
+
+
+@pytest.mark.parametrize(
+    "body",
+    [b"", b"garbage", pickle.dumps(None), pickle.dumps([1, 2]), pickle.dumps({"a": np.float64})],
+)
+def test_a_file_without_a_state_is_refused_in_plain_words(body: bytes) -> None:
+    with pytest.raises(ArtifactError, match=r"no state of a run|can't be part of a state"):
+        Simulation.load(file_of(header(), body))
+
+
+class Calls:
+    """What a pickle makes of it: a call."""
+
+    def __init__(self, function: Any, *arguments: Any) -> None:
+        self.call = function, arguments
+
+    def __reduce__(self) -> Any:
+        return self.call
+
+
+def named(module: str, name: str) -> bytes:
+    """Return a pickle that calls whatever has a name, with the name of a file to make."""
+    body = pickle.dumps(("made", "w"), 4)[2:-1]
+    return (
+        b"\x80\x04" + b"\x8c" + bytes([len(module)]) + module.encode() + b"\x8c" + bytes([len(name)])
+        + name.encode() + b"\x93" + body + b"R."
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("module", "name"),
+    [
+        ("os", "system"),
+        ("posix", "system"),
+        ("subprocess", "Popen"),
+        ("builtins", "eval"),
+        ("builtins", "exec"),
+        ("builtins", "open"),
+        ("builtins", "getattr"),
+        ("builtins", "__import__"),
+        ("importlib", "import_module"),
+        ("functools", "partial"),
+        ("operator", "attrgetter"),
+        ("io", "open"),
+        ("pathlib", "Path.touch"),
+        ("pathlib", "os.system"),
+        ("numpy", "ndarray.tofile"),
+        ("numpy", "f2py.subprocess.Popen"),
+        ("numpy", "load"),
+        ("fleet2d.clock", "np.f2py.subprocess.Popen"),
+        ("fleet2d.engine.snapshots.snapshot", "pickle.loads"),
+        ("fleet2d.engine.snapshots.snapshot", "Path"),
+        ("fleet2d.engine.snapshots.snapshot", "json.loads"),
+        ("fleet2d.engine.snapshots.snapshot", "_Reader"),
+        ("fleet2d.engine.run", "run"),
+        ("fleet2d.engine.simulation", "Simulation"),
+        ("fleet2d.artifacts.arrow", "ParquetTable"),
+        ("fleet2d.user_modules", "import_class"),
+        ("fleet2d.user_modules", "importlib.import_module"),
+        ("fleet2d", "run"),
+        ("antigravity", "webbrowser"),
+        ("nowhere", "nothing"),
+    ],
+)
+def test_a_file_that_refers_to_what_is_no_part_of_a_state_is_refused(
+    module: str, name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert not may_refer(module, name) or "." in name or module.startswith("fleet2d")
+    with pytest.raises(ArtifactError, match=r"can't be part of a state|no state of a run"):
+        Simulation.load(file_of(header(), named(module, name)))
+    assert [] == list(tmp_path.iterdir())
+
+
+def test_a_file_that_calls_os_system_is_refused_and_nothing_is_called(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for function, argument in ((os.system, "touch made"), (subprocess.Popen, ["touch", "made"])):
+        body = pickle.dumps(Calls(function, argument))
+        with pytest.raises(
+            ArtifactError, match=r"refers to (posix|os|subprocess)\.\w+, which can't be"
+        ):
+            Simulation.load(file_of(header(), body))
+    assert [] == list(tmp_path.iterdir())
+
+
+# --- Components that keep things ---------------------------------------------------------------
+
+
+class Keeps(Algorithm):
+    """Keeps something of its own from update to update."""
+
+    what: str
+
+    def start(self, home: Any) -> None:
+        kept: dict[str, Callable[[], Any]] = {
+            "file": lambda: open(os.devnull),  # noqa: PTH123, SIM115
+            "generator": lambda: (i for i in range(3)),
+            "lambda": lambda: lambda: 3,
+            "random": lambda: np.random.default_rng(3),
+            "plain": lambda: {"a": [1, (2.5, "x")], "b": np.arange(3), "c": {4, 5}, "d": None},
+            "objects": lambda: np.array([{"a": 1}, None], object),
+            "home": lambda: home,
+            "itself": lambda: self,
+        }
+        self.kept, self.count = kept[self.what](), 0
+
+    def update(self, history: Any, state: Any) -> dict[str, Any]:
+        self.count += 1
+        return {"count": self.count}
+
+
+class Bound(Behavior):
+    """Keeps a method of its own."""
+
+    def start(self, actor: Any) -> None:
+        self.how, self.count = self.go, 0
+
+    def go(self, now: Situation) -> Plan:
+        self.count += 1
+        return now.plan().turn_by(self.count / 100)
+
+    def decide(self, now: Situation) -> Plan:
+        return self.how(now)
+
+
+def keeping(what: str) -> dict[str, Any]:
+    own = {"type": f"{__name__}:Keeps", "what": what, "period": "1 min"}
+    return scenario("10 min", algorithms={"mine": own}, users={"ana": {"type": "meander"}})
+
+
+@pytest.mark.parametrize("what", ["plain", "objects", "home", "itself"])
+@pytest.mark.parametrize("way", WAYS)
+def test_what_a_component_keeps_goes_with_it(what: str, way: str) -> None:
+    simulation = Simulation(keeping(what))
+    simulation.advance(301)
+    twin = WAYS[way](simulation)
+    mine = twin.algorithms["mine"]
+    assert 5 == mine.count
+    assert mine is not simulation.algorithms["mine"]
+    if what == "home":
+        assert mine.kept is twin.home
+    if what == "itself":
+        assert mine.kept is mine
+    if what == "plain":
+        assert repr(mine.kept) == repr(simulation.algorithms["mine"].kept)
+    assert run(keeping(what)).digest == twin.run().digest
+
+
+@pytest.mark.parametrize("what", ["file", "generator", "lambda", "random"])
+def test_what_can_not_be_written_is_an_error_in_words(what: str, tmp_path: Path) -> None:
+    simulation = Simulation(keeping(what))
+    simulation.advance(301)
+    with pytest.raises(ArtifactError, match="the state of the run can't be written: "):
+        simulation.save(tmp_path / "run")
+    assert [] == list(tmp_path.iterdir())
+    if what == "file":
+        simulation.algorithms["mine"].kept.close()
+
+
+def test_a_method_that_a_behavior_keeps_is_its_copy_s_own_and_is_in_no_file() -> None:
+    content = scenario("10 min", users={"ana": {"behaviors": [{"type": f"{__name__}:Bound"}]}})
+    simulation = Simulation(content)
+    simulation.advance(77)
+    twin = copy.deepcopy(simulation)
+    expected = run(content).digest
+    assert expected == twin.run().digest
+    with pytest.raises(ArtifactError, match="the state of the run can't be written: it refers to"):
+        simulation.save(io.BytesIO())
+    assert expected == simulation.run().digest

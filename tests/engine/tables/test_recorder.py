@@ -1,0 +1,120 @@
+"""What is written down, how often, and in which order."""
+
+from itertools import pairwise
+from typing import Any
+
+import pytest
+from tests.scenes import digests, every_step, everything, run, scenario, table
+
+from fleet2d.engine.tables import recorder
+
+
+def small(**artifacts: Any) -> dict[str, Any]:
+    return scenario(
+        "30 min",
+        users={"ana": {"type": "meander"}, "ben": {"type": "meander"}},
+        robots={"astro": {"type": "patrol", "dwell": "30 s"}},
+        artifacts=artifacts,
+        metrics={"room_share": {"period": "10 min"}},
+    )
+
+
+@pytest.mark.parametrize("span", [None, 1, 13])
+def test_tables_do_not_depend_on_when_rows_are_handed_over(
+    monkeypatch: pytest.MonkeyPatch, span: int | None
+) -> None:
+    expected = digests(run(everything("30 min")))
+    monkeypatch.setattr(recorder, "MOST_ROWS", 0)
+    assert expected == digests(run(everything("30 min"), max_span=span))
+
+
+def test_every_step_of_the_end_is_the_same_when_rows_are_handed_over_late_or_early(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The last rows of several bodies fall on one step: where they break off."""
+    for seconds in (601, 613, 640):
+        content = everything(f"{seconds} s")
+        expected = digests(run(content))
+        with monkeypatch.context() as patch:
+            patch.setattr(recorder, "MOST_ROWS", 0)
+            assert expected == digests(run(content, max_span=1)), seconds
+
+
+@pytest.mark.parametrize("name", ["trajectories", "key_frames", "observations", "events"])
+def test_rows_are_in_order_of_step_and_entity(name: str) -> None:
+    stored = run(everything("1 h"))
+    columns = table(stored, name)
+    bodies = [*stored.manifest["entities"]["users"], *stored.manifest["entities"]["robots"]]
+    who = columns["robot" if name == "observations" else "entity"]
+    keys = list(zip(columns["step"].tolist(), [bodies.index(w) for w in who], strict=True))
+    if name == "observations":
+        users = [bodies.index(u) for u in columns["user"]]
+        keys = [(*key, user) for key, user in zip(keys, users, strict=True)]
+        assert len(keys) == len(set(keys))
+    assert len(keys) > 20
+    assert keys == sorted(keys)
+
+
+@pytest.mark.parametrize("name", ["trajectories", "key_frames", "observations", "events"])
+def test_a_table_that_is_off_is_not_there_and_changes_no_other(name: str) -> None:
+    everything_on = digests(run(small()))
+    off = digests(run(small(**{name: "off" if name == "trajectories" else False})))
+    assert everything_on.keys() - {name} == off.keys()
+    assert {k: v for k, v in everything_on.items() if k not in ("run", name)} == {
+        k: v for k, v in off.items() if k != "run"
+    }
+
+
+def test_seen_and_lost_take_turns() -> None:
+    stored = run(everything("2 h"))
+    count = 0
+    for robot in ("astro", "bolt", "curio", "drift"):
+        for user in ("ana", "ben"):
+            events = table(stored, "events", entity=robot, user=user)["event"].tolist()
+            assert events[:1] in ([], ["user_seen"])
+            assert all(one != other for one, other in pairwise(events))
+            count += len(events)
+    assert count > 100
+
+
+def test_users_are_seen_at_their_first_detection_and_lost_when_the_patience_is_over() -> None:
+    stored = run(everything("2 h"))
+    for robot, patience in (("astro", 20), ("bolt", 4)):  # 3.5 s are 4 steps
+        for user in ("ana", "ben"):
+            detected = table(stored, "observations", robot=robot, user=user)["step"]
+            expected: list[tuple[int, str]] = []
+            for k, step in enumerate(detected.tolist()):
+                if k == 0 or step - detected[k - 1] >= patience + 1:
+                    expected.append((step, "user_seen"))
+                following = detected[k + 1] if k + 1 < len(detected) else 10**9
+                if following > step + patience and step + patience < 7200:
+                    expected.append((step + patience, "user_lost"))
+            events = table(stored, "events", entity=robot, user=user)
+            found = list(zip(events["step"].tolist(), events["event"], strict=True))
+            assert expected == found
+
+
+def test_an_observation_is_where_the_user_was_at_that_step_in_that_room() -> None:
+    stored = run(everything("1 h"), "artifacts.trajectories=every step")
+    observations = table(stored, "observations")
+    for user in ("ana", "ben"):
+        truth = table(stored, "trajectories", entity=user)
+        mine = observations["user"] == user
+        steps = observations["step"][mine]
+        assert len(steps) > 50
+        for column in ("x", "y", "room"):
+            assert truth[column][steps].tolist() == observations[column][mine].tolist()
+
+
+def test_nobody_who_is_away_is_observed() -> None:
+    stored = run(everything("2 h"), "artifacts.trajectories=every step")
+    truth = table(stored, "trajectories", entity="ana")
+    steps = table(stored, "observations", user="ana")["step"]
+    assert truth["away"].any()
+    assert not truth["away"][steps].any()
+
+
+def test_the_record_of_a_per_step_algorithm_is_in_the_order_of_steps() -> None:
+    steps = table(run(every_step("10 min")), "tick")["step"].tolist()
+    assert steps == sorted(set(steps))
+    assert len(steps) > 1

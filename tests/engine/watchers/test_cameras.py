@@ -1,0 +1,161 @@
+"""Cameras in a run: those that wait for something end a span together, at the earliest of it."""
+
+import copy
+from typing import Any
+
+import numpy as np
+import pytest
+from tests.scenes import OWN, everything, scenario
+
+import fleet2d
+from fleet2d.engine import phases
+from fleet2d.engine.phases import PHASES, Span
+from fleet2d.engine.watchers.cameras import Cameras
+from fleet2d.kernels.look import new_memory
+
+
+def test_a_robot_that_has_seen_nobody_remembers_nothing() -> None:
+    memory = new_memory(2, 3, 5)
+    assert [-1] * 4 == memory.noticed.tolist()
+    assert not memory.seen.any()
+    assert (2, 5) == memory.backlog.shape[:2]
+    assert not memory.waiting.any()
+
+
+class Glance:
+    """A watcher that ends a span after so many steps, and counts those that it has looked at."""
+
+    waits = True
+
+    def __init__(self, stops: int) -> None:
+        self.stops, self.next_step, self.looked = stops, 0, 0
+
+    def limit(self, bodies: object, end: int) -> int:
+        return min(end, self.next_step + self.stops)
+
+    def take(self, bodies: object, end: int) -> tuple[()]:
+        self.looked += end - self.next_step
+        self.next_step = end
+        return ()
+
+    def interruptions(self, events: object) -> tuple[()]:
+        return ()
+
+
+class Idle(Glance):
+    """One that doesn't wait for anything."""
+
+    waits = False
+
+    def limit(self, bodies: object, end: int) -> int:
+        raise AssertionError
+
+
+@pytest.mark.parametrize(
+    "stops", [[9], [9, 9], [3, 9], [9, 3], [9, 5, 3], [3, 5, 9], [5, 3, 5, 1, 9]]
+)
+def test_those_who_wait_have_looked_at_the_same_steps(stops: list[int]) -> None:
+    state = fleet2d.Simulation(scenario())._state
+    glances, idle = [Glance(stop) for stop in stops], Idle(1)
+    state.watchers = [*glances, idle]
+    span = Span(0, 9)
+    phases.watch(state, span)
+    assert min(stops) == span.end == state.bodies.step
+    assert [span.end] * len(stops) == [glance.looked for glance in glances]
+    assert 0 == idle.looked
+
+
+def observed(cameras: Cameras) -> Any:
+    """Return all that cameras carry along and have perceived."""
+    sightings = cameras.collect()
+    cameras._sightings = [sightings]
+    memory = [array.tolist() for array in cameras.memory]
+    return cameras.next_step, memory, cameras.perceived.tolist(), sightings.tolist()
+
+
+def looks() -> dict[str, Any]:
+    """Four robots with cameras of all kinds, which wait for what they see."""
+    content = everything("1 h")
+    for name, radius in (("curio", 0.15), ("drift", 0.1)):
+        camera = content["robots"][name]["camera"]
+        behaviors = [{"type": f"{OWN}:Greet"}, {"type": "patrol"}]
+        content["robots"][name] = {"camera": camera, "radius": radius, "behaviors": behaviors}
+    astro = content["robots"]["astro"]
+    astro["cameras"] = {
+        "front": {**astro.pop("camera"), "latency": "2 s"},
+        "rear": {"heading_deg": 180, "period": "3 s", "body_points": 4},
+        "mast": {"pan": {"headings_deg": [-60, 0, 60], "dwell": "4 s"}},
+    }
+    astro["perception"] = {
+        "false_positives": {"per_hour": 60},
+        "identity": {"mistaken": 0.2},
+        "detection": {"distance": 0.7, "memory": "10 s"},
+    }
+    return content
+
+
+@pytest.mark.parametrize("method", ["line_of_sight", "flashlight"])
+def test_a_span_ends_at_the_earliest_event_and_all_cameras_have_looked_up_to_it(
+    method: str,
+) -> None:
+    """What a camera saw beyond the end of a span is as if it had never looked there."""
+    simulation = fleet2d.Simulation({**looks(), "sight": {"method": {"type": method}}})
+    state, beyond, ended = simulation._state, 0, 0
+    while simulation.step < 600:
+        span = Span(simulation.step, 600)
+        for phase in PHASES[: PHASES.index(phases.watch)]:
+            phase(state, span)
+        ahead, whole = (copy.deepcopy(simulation)._state for _ in range(2))
+        limits, end = [span.end], span.end
+        for cameras in ahead.cameras:
+            if cameras.waits:
+                ahead.take(cameras, span.first)
+                limits.append(cameras.limit(ahead.bodies, end))
+        phases.watch(state, span)
+        assert min(limits) == span.end == state.bodies.step
+        ended += span.end < end
+        beyond += max(limits[1:], default=0) > span.end
+        for cameras, twin in zip(state.cameras, whole.cameras, strict=True):
+            if cameras.waits:
+                whole.take(twin, span.end)
+                assert observed(twin) == observed(cameras)
+        for phase in PHASES[PHASES.index(phases.watch) + 1 :]:
+            phase(state, span)
+    assert ended > 20
+    assert beyond > 5
+
+
+def test_every_draw_of_every_camera_has_a_stream_of_its_own() -> None:
+    content = everything("1 min")
+    robot = content["robots"]["astro"]
+    robot["cameras"] = {"left": robot.pop("camera"), "right": {}}
+    robot["perception"] = {"false_positives": {"per_hour": 1}, "attributes": {"activity": {}}}
+    content["robots"]["curio"]["perception"] = robot["perception"]
+    simulation = fleet2d.Simulation(content)
+    keys: list[int] = []
+    for cameras in simulation._state.cameras:
+        errors = cameras.errors
+        used = errors.keys if cameras.errs else errors.keys[..., :1]
+        keys += used.ravel().tolist() + errors.ghost_keys.ravel().tolist()
+        keys += [key for sense in cameras.activity_senses for key in sense.keys.tolist()]
+    assert len(keys) > 80
+    assert len(set(keys)) == len(keys)
+
+
+def test_a_run_without_users_or_without_robots_has_no_cameras() -> None:
+    for content in (scenario(robots={"r": {}}), scenario(users={"ana": {"camera": {}}})):
+        state = fleet2d.Simulation(content)._state
+        assert not state.cameras
+        assert not state.user_cameras
+
+
+def test_users_with_cameras_look_at_robots_and_robots_at_users() -> None:
+    content = everything("1 min")
+    content["users"]["ben"]["camera"] = {"angle_deg": 180}
+    state = fleet2d.Simulation(content)._state
+    (gaze,) = state.user_cameras
+    assert ["ben", 1, 1] == [gaze.owner.name, gaze.row, gaze.index]
+    assert ["astro", "bolt", "curio", "drift", "ego"] == [actor.name for actor in gaze.others]
+    assert [(2, 0), (3, 1), (4, 2), (5, 3)] == [(c.row, c.index) for c in state.cameras]
+    assert all(["ana", "ben"] == [actor.name for actor in c.others] for c in state.cameras)
+    assert np.array_equal(gaze.counts, np.zeros((1, 5, 2)))

@@ -1,0 +1,139 @@
+"""Encounters: beside a slow twin that goes from step to step."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from tests.scenes import scenario
+from tests.thorough import examples
+
+from fleet2d.engine.bodies import Bodies, PoseBlock
+from fleet2d.engine.simulation import Simulation
+from fleet2d.engine.watchers.encounters import Encounters
+
+UNITS = 1280  # lattice units per metre
+LYING, SITTING = 2, 1
+ALWAYS = {"turns": 1, "steps_aside": 1, "leaves": 1, "comes": 1}
+CLOSE = {"notices": 2.5, "in_the_way": 0.9, "too_close": 0.7, "patience": "3 s"}
+
+
+class Seen(NamedTuple):
+    """A step as the twin sees it."""
+
+    distance: float
+    moved: bool
+    posture: int
+    away: bool
+
+
+def simulation() -> Simulation:
+    user = {"behaviors": [{"type": "reactions", "manners": {**ALWAYS, **CLOSE}}]}
+    return Simulation(scenario(users={"ana": user}, robots={"astro": {"type": "patrol"}}))
+
+
+def twin(steps: list[Seen]) -> list[tuple[int, str]]:
+    """Say what happens, step by step."""
+    result, near, coming, close, last = [], True, True, 0, float("inf")
+    for k, step in enumerate(steps):
+        gone = step.away or step.posture == LYING
+        distance = float("inf") if gone else step.distance
+        if distance > 2.5 * 1.25:
+            near = True
+        if distance > 0.9 * 1.5:
+            coming = True
+        close = close + 1 if distance <= 0.7 else 0
+        if near and distance <= 2.5:
+            result.append((k, "robot_near"))
+            near = False
+        drives_up = step.moved and distance < last and step.posture == 0
+        if coming and distance <= 0.9 and drives_up:
+            result.append((k, "robot_coming"))
+            coming = False
+        if close == 3:
+            result.append((k, "robot_close"))
+        last = distance
+    return result
+
+
+@st.composite
+def meetings(draw: st.DrawFn) -> list[tuple[int, int, bool]]:
+    """Distances [cm], postures, and whether she is away, of some steps in a row."""
+    legs = draw(st.lists(st.tuples(st.integers(5, 390), st.integers(1, 6)), min_size=1, max_size=8))
+    result, at = [], 300
+    for goal, count in legs:
+        posture = draw(st.sampled_from([0, 0, 0, SITTING, LYING]))
+        away = draw(st.integers(0, 9)) == 0
+        result += [(at + (goal - at) * i // count, posture, away) for i in range(1, count + 1)]
+        at = goal
+    return result
+
+
+class Given(Bodies):
+    """Bodies whose poses are given at each step."""
+
+    def __init__(self, poses: PoseBlock) -> None:
+        self.poses_at = poses
+
+    def block(self, first: int, end: int) -> PoseBlock:
+        return PoseBlock(*(column[:, first:end] for column in self.poses_at))
+
+
+@settings(max_examples=examples(80))
+@given(meeting=meetings(), cuts=st.lists(st.integers(1, 7), max_size=40))
+def test_what_happens_is_that_of_the_twin_however_a_run_is_cut(
+    meeting: list[tuple[int, int, bool]], cuts: list[int]
+) -> None:
+    users, robots = _bodies()
+    encounters = Encounters(users, robots)
+    # In the middle of the living room; the robot comes along its long side.
+    x = [4.7 * UNITS - cm * UNITS // 100 for cm, _, _ in meeting]
+    user = round(4.7 * UNITS), round(3.1 * UNITS)
+    xs = [round(v) for v in x]
+    still = np.full(len(xs), user[0]), np.full(len(xs), user[1])
+    zero = np.zeros((2, len(xs)), np.int64)
+    away = zero.astype(np.uint8)
+    away[0] = [away for _, _, away in meeting]
+    posture = zero.astype(np.int8)
+    posture[0] = [posture for _, posture, _ in meeting]
+    x, y = np.array([still[0], xs]), np.array([still[1], still[1]])
+    bodies = Given(PoseBlock(x, y, zero, away, posture))
+    result, first, sizes = [], 0, iter(cuts)
+    while first < len(meeting):
+        end = encounters.limit(bodies, min(first + next(sizes, 5), len(meeting)))
+        assert first < end
+        for row, event in encounters.interruptions(encounters.take(bodies, end)):
+            assert 0 == row
+            result.append((end - 1, event.event))
+        assert end == encounters.next_step
+        first = end
+    moved = np.diff(xs, prepend=xs[0]) != 0
+    steps = [
+        Seen(abs(user[0] - xs[k]) / UNITS, bool(moved[k]), posture, away)
+        for k, (_, posture, away) in enumerate(meeting)
+    ]
+    assert twin(steps) == result
+
+
+_ACTORS: list[Any] = []
+
+
+def _bodies() -> tuple[list[Any], list[Any]]:
+    """Ana, who always reacts, and a robot; set up once."""
+    if not _ACTORS:
+        actors = simulation().actors
+        _ACTORS.extend([actors["ana"], actors["astro"]])
+    return _ACTORS[:1], _ACTORS[1:]
+
+
+def test_nobody_is_watched_who_does_not_react() -> None:
+    _, robots = _bodies()
+    quiet = Simulation(scenario(users={"ana": {"type": "meander"}})).actors["ana"]
+    encounters = Encounters([quiet], robots)
+    assert [] == encounters.pairs
+    assert not encounters.waits
+    nowhere = np.zeros((2, 17), np.int64)
+    bodies = Given(PoseBlock(*[nowhere] * 3, nowhere.astype(np.uint8), nowhere.astype(np.int8)))
+    assert 17 == encounters.limit(bodies, 17)
+    assert () == encounters.take(bodies, 17)
+    assert [] == list(encounters.interruptions(()))

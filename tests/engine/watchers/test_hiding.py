@@ -1,0 +1,146 @@
+"""Bodies that hide people from cameras: in runs, for every span and by every method."""
+
+from typing import Any
+
+import pytest
+from tests.engine.watchers.test_points_in_view import HERE, METHODS, with_odd_cameras
+from tests.reference.look import hides
+from tests.scenes import digests, each_step, run, scenario
+
+from fleet2d.expectations import in_view, never
+
+HIDE = {"sight": {"people_occlude": True}}
+UNITS_PER_M = 1280
+RADII = {"ana": 256, "ben": 256, "cleo": 256, "dora": 512}
+"""Of the people in the crowd [lattice units]."""
+WALK = {"type": "tests.own_components:Scripted", "speed": 0.3}
+
+
+def row_of_people(**users: Any) -> dict[str, Any]:
+    """A robot that looks along the living room, ana behind ben, for 40 s."""
+    people = {"ana": {"start": [4, 3.5]}, "ben": {"start": [2.5, 3.5], "radius": 0.25}, **users}
+    robot = {"start": [1, 3.5], "start_heading_deg": 0, "camera": {"lost_after": "1 s"}}
+    return scenario("40 s", users=people, robots={"astro": robot}) | HIDE
+
+
+def seen(content: dict[str, Any]) -> dict[str, list[int]]:
+    """Return the steps at which each person is perceived."""
+    rows = run(content).pandas("observations")
+    return {name: group["step"].tolist() for name, group in rows.groupby("user", observed=True)}
+
+
+def test_a_body_hides_who_is_behind_it() -> None:
+    hidden = row_of_people()
+
+    assert {"ben": [*range(40)]} == seen(hidden)
+    assert {"ana": [*range(40)], "ben": [*range(40)]} == seen({**hidden, "sight": {}})
+
+
+def test_who_walks_through_the_view_hides_others_just_then() -> None:
+    """Only while the walker is within its radius, 10 cm, of the line."""
+    script = [10.0, [2.5, 2.8], 60.0]
+    ben = {**WALK, "start": [2.5, 3.7], "start_heading_deg": -90, "script": script, "radius": 0.1}
+    content = row_of_people(ben=ben)
+    result = seen(content)
+    gone = sorted({*range(40)} - {*result["ana"]})
+
+    assert gone == [*range(gone[0], gone[-1] + 1)]
+    assert 1 <= len(gone) <= 3
+    rows = run(content).pandas("events")
+    assert ["user_seen", "user_lost", "user_seen"] == rows[rows["user"] == "ana"]["event"].tolist()
+
+
+def test_who_is_away_hides_nobody() -> None:
+    out = {"type": "schedule", "days": [{"items": [{"at": "00:00", "away": True}]}]}
+    content = row_of_people(ben={**out, "radius": 0.25})
+
+    assert {"ana": [*range(40)]} == seen(content)
+
+
+def test_a_robot_hides_people_from_another_and_not_from_itself() -> None:
+    content = row_of_people()
+    del content["users"]["ben"]
+    content["robots"]["bolt"] = {"start": [2.5, 3.5], "start_heading_deg": 0}
+    rows = run(content).pandas("observations")
+
+    assert {"bolt"} == set(rows["robot"])
+    assert 40 == len(rows)
+
+
+def test_people_who_look_have_robots_hidden_from_them() -> None:
+    content = row_of_people(ana={"start": [4, 3.5], "start_heading_deg": 180, "camera": {}})
+
+    for sight, sees in ((content["sight"], False), ({}, True)):
+        events = set(run({**content, "sight": sight}).pandas("events")["event"])
+        assert ("robot_seen" in events) == sees
+
+
+def test_expectations_go_by_what_is_really_in_view() -> None:
+    content = row_of_people() | {"expect": {"hidden": str(never(in_view("ana", by="astro")))}}
+
+    assert run(content).manifest["expectations"]["hidden"]["holds"]
+    assert not run({**content, "sight": {}}).manifest["expectations"]["hidden"]["holds"]
+
+
+def crowd(duration: str = "30 min") -> dict[str, Any]:
+    """The scenario with everything, odd cameras, and two more people in it."""
+    content = with_odd_cameras()
+    content["simulation"]["duration"] = duration
+    content["users"]["cleo"] = {"type": "meander", "speed": 0.4, "camera": {"angle_deg": 200}}
+    content["users"]["dora"] = {"start": [3, 3], "radius": 0.4}
+    return content | HIDE
+
+
+@pytest.mark.parametrize("span", [1, 7, 61])
+def test_spans_do_not_show_where_bodies_hide_people(span: int) -> None:
+    content = crowd()
+
+    assert digests(run(content)) == digests(run(content, max_span=span))
+
+
+@pytest.mark.parametrize("method", METHODS[:1], ids=["visibility_polygon"])
+def test_run_past_bodies_is_the_same_by_every_exact_method(method: dict[str, Any]) -> None:
+    content = crowd("20 min")
+    expected = {**digests(run(content)), "run": ""}
+
+    result = run({**content, "sight": {"method": method, **HIDE["sight"]}})
+
+    assert expected == {**digests(result), "run": ""}
+    assert expected["observations"] != digests(run({**content, "sight": {}}))["observations"]
+
+
+def test_bodies_hide_people_by_a_method_of_ones_own() -> None:
+    xray = {"method": {"type": f"{HERE}:XRay"}, **HIDE["sight"]}
+
+    assert {"ben": [*range(40)]} == seen({**row_of_people(), "sight": xray})
+
+
+def test_those_are_perceived_whom_no_body_hides() -> None:
+    """Against the rule in fractions, step by step, of those whom walls alone leave in view."""
+    content = crowd("20 min")
+    content["robots"] = {"curio": {**content["robots"]["curio"], "cameras": {"plain": {}}}}
+    clear, users = perceived({**content, "sight": {}}), content["users"]
+    poses = {name: each_step(content, name) for name in ("curio", *users)}
+
+    def from_eye(name: str, step: int) -> tuple[int, int]:
+        (x, y), (eye_x, eye_y) = (
+            (poses[n]["x"][step], poses[n]["y"][step]) for n in (name, "curio")
+        )
+        return round((x - eye_x) * UNITS_PER_M), round((y - eye_y) * UNITS_PER_M)
+
+    def is_hidden(step: int, user: str) -> bool:
+        return any(
+            hides(from_eye(user, step), from_eye(other, step), radius)
+            for other, radius in RADII.items()
+            if other != user and not poses[other]["away"][step]
+        )
+
+    expected = {(step, user) for step, user in clear if not is_hidden(step, user)}
+
+    assert expected == perceived(content)
+    assert 20 < len(expected) < len(clear)
+
+
+def perceived(content: dict[str, Any]) -> set[tuple[int, str]]:
+    """Return who is perceived when."""
+    return {(step, user) for user, steps in seen(content).items() for step in steps}

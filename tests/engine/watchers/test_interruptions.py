@@ -1,0 +1,175 @@
+"""Interruptions: plans that wait for interrupts, beside a twin that goes from step to step."""
+
+import copy
+import io
+import textwrap
+from collections.abc import Callable
+from datetime import timedelta
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from tests.scenes import run, scenario, table
+
+from fleet2d import Behavior, Plan, Run, Simulation, Situation
+from fleet2d.engine.interrupts.interrupt import Interrupt, SpanView
+from fleet2d.engine.watchers.interruptions import Interruptions
+from fleet2d.errors import ComponentError, ScenarioError
+
+PERIOD = 7
+
+
+class EveryWeek(Interrupt):
+    """The first two of every seven steps."""
+
+    def holds(self, span: SpanView) -> np.ndarray[Any, np.dtype[np.bool_]]:
+        steps = span.first + np.arange(span.poses.x.shape[1])
+        return steps % PERIOD < 2
+
+
+class Counts(Interrupt):
+    """An interrupt that answers with a number."""
+
+    def holds(self, span: SpanView) -> Any:
+        return 3
+
+
+class Waits(Behavior):
+    """Waits for an event, and notes each that happens; the plan ends itself every `stay`."""
+
+    event: str = ""
+    stay: timedelta = timedelta(minutes=2)
+
+    def decide(self, now: Situation) -> Plan:
+        plan = now.plan().interrupt_on(self.event)
+        for event in now.events:
+            plan.note("reacts", event.event)
+        return plan.stay(self.stay)
+
+
+class Overrules(Waits):
+    """Takes over at an event, for one step."""
+
+    listens = frozenset({EveryWeek.type_name})
+
+    def decide(self, now: Situation) -> Plan | None:  # type: ignore[override]
+        if not now.events:
+            return None
+        return now.plan().note("reacts", now.events[0].event).stay(timedelta(seconds=1))
+
+
+def content(event: str, **behavior: Any) -> dict[str, Any]:
+    waits = {"type": "tests.engine.watchers.test_interruptions:Waits", "event": event, **behavior}
+    return scenario("3 min", robots={"astro": {"behaviors": [waits]}})
+
+
+def reactions(stored: Run) -> list[int]:
+    """Return the steps at which the behavior was asked because of an event."""
+    return table(stored, "events", event="reacts")["step"].tolist()
+
+
+def twin(steps: int) -> list[int]:
+    """Return the steps at which a plan that waits for `EveryWeek` is ended, step by step."""
+    ends: list[int] = []
+    held: bool | None = None
+    for step in range(steps - 1):
+        holds = step % PERIOD < 2
+        if holds and held is False:
+            ends.append(step + 1)
+        held = holds
+    return ends
+
+
+@pytest.mark.parametrize("max_span", [None, 1, 5, 64])
+def test_plan_ends_when_the_condition_becomes_true(max_span: int | None) -> None:
+    stored = run(content(EveryWeek.type_name), f"simulation.max_span={max_span or 'null'}")
+
+    assert twin(180) == reactions(stored)
+
+
+def test_a_behavior_before_the_active_one_listens() -> None:
+    first = {"type": "tests.engine.watchers.test_interruptions:Overrules"}
+    rests = {"type": "tests.engine.watchers.test_interruptions:Waits", "event": "user_seen"}
+    stored = run(scenario("3 min", robots={"astro": {"behaviors": [first, rests]}}))
+
+    assert twin(180) == reactions(stored)
+
+
+def test_copies_and_saved_simulations_go_on_alike() -> None:
+    simulation = Simulation(content(EveryWeek.type_name), seed=1)
+    simulation.advance(50)
+    other = copy.deepcopy(simulation)
+    file = io.BytesIO()
+    simulation.save(file)
+    file.seek(0)
+
+    assert 1 == len({s.run().digest for s in (simulation, other, Simulation.load(file))})
+
+
+def test_nothing_is_done_where_no_plan_waits(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Interruptions, "limit", lambda *_: pytest.fail("it looked ahead"))
+
+    run(content("user_seen"))
+
+
+def test_answer_of_a_wrong_shape_names_the_interrupt_and_what_is_expected() -> None:
+    with pytest.raises(ComponentError, match=r"robots\.astro.*Counts.*returned 3.*booleans"):
+        run(content(Counts.type_name))
+
+
+def raises(error: type[Exception], call: Callable[[], object]) -> str:
+    with pytest.raises(error) as caught:
+        call()
+    return str(caught.value)
+
+
+def test_event_that_there_is_not_is_refused_with_the_nearest() -> None:
+    text = raises(ComponentError, lambda: run(content("home_emty")))
+
+    assert "robots.astro: no event 'home_emty' interrupts its plans" in text
+    assert "did you mean 'home_empty'? These do: home_empty, home_occupied, user_" in text
+
+
+def test_behavior_that_listens_to_an_unknown_event_is_refused(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(Overrules, "listens", frozenset({"doorbell"}))
+    first = {"type": "tests.engine.watchers.test_interruptions:Overrules"}
+    text = raises(
+        ScenarioError, lambda: Simulation(scenario(robots={"astro": {"behaviors": [first]}}))
+    )
+
+    assert "robots.astro listens to 'doorbell': no event 'doorbell' interrupts its plans" in text
+
+
+OWN = """
+import numpy as np
+from fleet2d import Behavior, Interrupt
+
+class Minute(Interrupt):
+    def holds(self, span):
+        return (span.first + np.arange(span.poses.x.shape[1])) % 60 == 30
+
+class Rests(Behavior):
+    def decide(self, now):
+        plan = now.plan().interrupt_on(Minute)
+        for event in now.events:
+            assert event.event == Minute.type_name
+            plan.note("reacts", "minute")
+        return plan.stay()
+"""
+
+
+def test_interrupt_of_a_users_own_file_is_given_by_its_class(tmp_path: Path) -> None:
+    (tmp_path / "rest.py").write_text(textwrap.dedent(OWN))
+    behavior = {"type": f"{tmp_path.as_posix()}/rest:Rests"}
+    simulation = Simulation(scenario("3 min", robots={"astro": {"behaviors": [behavior]}}), seed=1)
+    simulation.advance(40)
+    file = io.BytesIO()
+    simulation.save(file)
+    file.seek(0)
+    stored = simulation.run()
+
+    assert [31, 91, 151] == reactions(stored)
+    assert Simulation.load(file).run().digest == stored.digest

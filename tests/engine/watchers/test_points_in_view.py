@@ -1,0 +1,302 @@
+"""Methods of sight in runs: the same run by each, whoever looks; and users who look themselves."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from tests.scenes import TESTS, digests, everything, flat_path, run, scenario, table
+
+import fleet2d
+from fleet2d import Behavior
+from fleet2d.engine.watchers.points_in_view import points_seen
+from fleet2d.errors import ComponentError, Fleet2DError, InputError
+from fleet2d.floorplan.home.home import Home
+from fleet2d.kernels.lens import Lenses, camera_pose
+from fleet2d.kernels.look import UserPoses
+from fleet2d.kernels.motion import Poses
+from fleet2d.kernels.seen import Reach
+from fleet2d.sight.camera import Camera
+from fleet2d.sight.flashlight import Flashlight
+from fleet2d.sight.fov import Bool, FieldOfView
+from fleet2d.sight.line_of_sight import LineOfSight
+from fleet2d.sight.tables import TableContext, stack_lenses
+from fleet2d.sight.visibility_polygon import VisibilityPolygon
+
+HERE = f"{TESTS.as_posix()}/engine/watchers/test_points_in_view"
+SECOND = 1_000_000
+ODD = {
+    "range": [0.3, 5], "angle_deg": 140, "offset": [0.1, -0.04], "heading_deg": 30, "body_points": 6,
+    "pan": {"headings_deg": [-60, 0, 60], "dwell": "7 s"},
+}  # fmt: skip
+METHODS: list[dict[str, Any]] = [
+    {"type": "visibility_polygon"},
+    {"type": "visibility_polygon", "keep": 2},
+    {"type": "visibility_polygon", "precompute": "all"},
+]
+
+
+class XRay(FieldOfView):
+    """A user's own method, for which walls don't count."""
+
+    def visible(self, home: Home, x: int, y: int, points: Any) -> Bool:
+        return np.ones(len(points), np.bool_)
+
+
+class Wrong(FieldOfView):
+    """One that answers with numbers."""
+
+    def visible(self, home: Home, x: int, y: int, points: Any) -> Any:
+        return np.ones(len(points), np.int64)
+
+    def sees(self, home: Home, x: int, y: int, heading: int, reach: Reach, points: Any) -> Any:
+        return self.visible(home, x, y, points)
+
+
+class Broken(FieldOfView):
+    """One that fails."""
+
+    def visible(self, home: Home, x: int, y: int, points: Any) -> Bool:
+        raise KeyError("glass")
+
+
+class Shy(Behavior):
+    """Goes elsewhere when a robot comes into view."""
+
+    records = frozenset({"shied"})
+
+    def decide(self, now: Any) -> Any:
+        for event in now.events:
+            plan = now.plan().note("shied", f"{event.event} {event.user}").go_to("bedroom")
+            return plan.stay().interrupt_on("robot_lost")
+        return now.plan().stay().interrupt_on("robot_seen")
+
+
+def stored_without_scenario(content: dict[str, Any], **changes: Any) -> dict[str, str]:
+    """Return the digests of a run's tables."""
+    return {
+        name: digest for name, digest in digests(run(content, **changes)).items() if name != "run"
+    }
+
+
+def with_odd_cameras() -> dict[str, Any]:
+    """The scenario with everything; two robots have odd cameras, one of them several."""
+    content = everything("20 min")
+    content["robots"]["curio"].pop("camera")
+    content["robots"]["curio"]["cameras"] = {"odd": ODD, "plain": {"period": "3 s"}}
+    content["robots"]["bolt"]["camera"] = ODD
+    return content
+
+
+@pytest.mark.parametrize("method", METHODS, ids=["visited", "few kept", "all"])
+def test_run_is_the_same_by_every_exact_method(method: dict[str, Any]) -> None:
+    content = with_odd_cameras()
+    expected = stored_without_scenario(content)
+
+    assert expected == stored_without_scenario({**content, "sight": {"method": method}})
+    assert len(table(run(content), "observations")["step"]) > 50
+
+
+def test_run_by_a_shared_file_is_the_same(tmp_path: Any) -> None:
+    content = with_odd_cameras()
+    method = {"type": "visibility_polygon", "precompute": "file", "path": str(tmp_path)}
+    expected = stored_without_scenario(content)
+
+    assert expected == stored_without_scenario({**content, "sight": {"method": method}})
+    assert 1 == len(list(tmp_path.iterdir()))
+
+
+def test_run_by_flashlight_is_the_same_where_users_stand_at_centres_of_cells() -> None:
+    users = {name: {"start": room} for name, room in (("ana", "kitchen"), ("ben", "living_room"))}
+    robots = {
+        "astro": {"type": "patrol", "dwell": "5 s"},
+        "drift": {"type": "meander", "camera": {"range": [0.2, 3], "angle_deg": 200}},
+    }
+    content = scenario("30 min", users=users, robots=robots)
+    expected = stored_without_scenario(content)
+
+    assert len(table(run(content), "observations")["step"]) > 50
+    for memory_mb in (64, 0.01):
+        method = {"type": "flashlight", "memory_mb": memory_mb}
+        assert expected == stored_without_scenario({**content, "sight": {"method": method}})
+
+
+def test_run_by_flashlight_is_nearly_the_same_where_users_walk() -> None:
+    content = everything("20 min")
+    exact = run(content)
+    by_cells = run({**content, "sight": {"method": {"type": "flashlight"}}})
+    seen = [len(table(one, "observations")["step"]) for one in (exact, by_cells)]
+
+    assert digests(exact)["observations"] != digests(by_cells)["observations"]
+    assert seen[0] == pytest.approx(seen[1], rel=0.1)
+
+
+@pytest.mark.parametrize("span", [1, 50])
+def test_spans_do_not_show_in_a_run_by_another_method(span: int) -> None:
+    content = {**with_odd_cameras(), "sight": {"method": {"type": "flashlight"}}}
+
+    assert digests(run(content)) == digests(run(content, max_span=span))
+
+
+def test_own_method_decides_who_is_in_view() -> None:
+    users = {"ana": {"start": [7.5, 0.5]}}
+    robot = {"start": [0.5, 3.5], "start_heading_deg": -20, "camera": {"range": [0, 20]}}
+    content = scenario("1 min", users=users, robots={"astro": robot})
+
+    assert 0 == len(table(run(content), "observations")["step"])
+    own = {**content, "sight": {"method": {"type": f"{HERE}:XRay"}}}
+    assert 60 == len(table(run(own), "observations")["step"])
+
+
+@pytest.mark.parametrize(
+    ("method", "why"),
+    [
+        (
+            "Wrong",
+            r"sight.method failed at step 0: Wrong returned array\(\[1\]\), expected a bool array",
+        ),
+        ("Broken", r"sight.method failed at step 0: KeyError: 'glass'"),
+    ],
+)
+def test_own_method_that_fails_is_blamed(method: str, why: str) -> None:
+    robot = {"start": [0.5, 3.5], "start_heading_deg": 0}
+    content = scenario("1 min", users={"ana": {"start": [2, 3.5]}}, robots={"astro": robot})
+    with pytest.raises(ComponentError, match=why):
+        run({**content, "sight": {"method": {"type": f"{HERE}:{method}"}}})
+
+
+# --- The slow twin ---------------------------------------------------------------------------
+
+
+def seen_one_by_one(
+    method: FieldOfView, home: Home, lenses: Lenses, robot: Poses, crowd: UserPoses, first: int
+) -> NDArray[np.uint64]:
+    """Return what `points_seen` does, asking about every body in every step."""
+    cameras, bodies = lenses.widest.shape
+    seen = np.zeros((cameras, bodies, len(robot.x)), np.uint64)
+    for c in range(cameras):
+        reach = Reach(
+            *(int(v[c]) for v in (lenses.near_squared, lenses.far_squared, lenses.half_angle))
+        )
+        for j in range(len(robot.x)):
+            if robot.away[j] or (first + j) % lenses.period[c]:
+                continue
+            pose = (int(robot.x[j]), int(robot.y[j]), int(robot.heading[j]))
+            eye = [int(v) for v in camera_pose(lenses, c, *pose, (first + j) * SECOND)]
+            for u in range(bodies):
+                if not crowd.away[u, j]:
+                    points = lenses.bodies[c, u, : int(lenses.points[c]) + 1]
+                    points = points + np.array([crowd.x[u, j], crowd.y[u, j]])
+                    in_view = method.sees(home, *eye, reach, points).tolist()
+                    seen[c, u, j] = sum(2**i for i, sees in enumerate(in_view) if sees)
+    return seen
+
+
+def wandering(rng: np.random.Generator, home: Home, bodies: int, steps: int) -> Any:
+    """Return poses (4, bodies, steps) of bodies that stand, walk, jump, and are away at times."""
+    cells = home.plan.lattice.cell_centre(*np.argwhere(home.plan.free).T)
+    spots = np.stack(cells)[:, rng.integers(0, len(cells[0]), (bodies, 6))]
+    at = np.repeat(rng.integers(0, 6, (bodies, steps)), 3, axis=1)[:, :steps]
+    xy = np.take_along_axis(spots, at[None], axis=2) + rng.choice(
+        [0, 0, 0, 7, -20], (2, bodies, steps)
+    )
+    heading = np.repeat(rng.integers(0, 4096, (bodies, steps)), 4, axis=1)[:, :steps]
+    return xy[0], xy[1], heading, (rng.random((bodies, steps)) < 0.1).astype(np.uint8)
+
+
+@pytest.mark.parametrize(
+    "method", [LineOfSight(), VisibilityPolygon(), Flashlight(), XRay()], ids=repr
+)
+@pytest.mark.parametrize("first", [0, 5])
+def test_points_seen_are_those_of_asking_about_everybody_each_time(
+    method: FieldOfView, first: int
+) -> None:
+    home = Home(fleet2d.load_floorplan(flat_path()))
+    cameras = [Camera.model_validate(c) for c in (ODD, {"period": "3 s"}, {"angle_deg": 330})]
+    scene = TableContext(["a", "b", "c"], [256.0] * 3, home.plan.lattice, SECOND, "robots.r")
+    lenses = [c.lens(home.plan.lattice.units_per_m, SECOND) for c in cameras]
+    stacked = stack_lenses(lenses, [False] * 3, scene)
+    rng = np.random.default_rng(first)
+    poses = wandering(rng, home, 4, 40)
+    robot = Poses(*(np.ascontiguousarray(column[0]) for column in poses))
+    crowd = UserPoses(*(column[1:] for column in poses), np.zeros((3, 40), np.int8))
+
+    expected = seen_one_by_one(method, home, stacked, robot, crowd, first)
+
+    assert np.array_equal(expected, points_seen(method, home, stacked, robot, crowd, first, SECOND))
+    assert (expected > 0).sum() > 10
+
+
+# --- Users who look --------------------------------------------------------------------------
+
+
+def facing(**camera: Any) -> dict[str, Any]:
+    """A user who looks along the living room, through which a robot goes to and fro."""
+    user = {"start": [0.5, 3.5], "start_heading_deg": 0, "camera": {"range": [0, 9], **camera}}
+    robot = {"type": "patrol", "waypoints": [[4.0, 3.5], [7.5, 0.5]], "dwell": "20 s"}
+    robot |= {"start": [4.0, 3.0], "start_heading_deg": 90}
+    return scenario("10 min", users={"ana": user}, robots={"astro": {**robot, "camera": None}})
+
+
+def sights(stored: Any) -> list[tuple[int, str, str, str]]:
+    rows = stored.pandas("events")
+    rows = rows[rows["event"].str.startswith("robot_")]
+    return list(zip(rows["step"], rows["entity"], rows["event"], rows["detail"], strict=True))
+
+
+def test_user_with_a_camera_sees_robots_come_and_go() -> None:
+    result = sights(run(facing()))
+
+    assert len(result) > 8
+    assert {("ana", "astro")} == {(who, whom) for _, who, _, whom in result}
+    assert ["robot_seen", "robot_lost"] * 4 == [event for _, _, event, _ in result[:8]]
+    behind = facing()
+    behind["users"]["ana"]["start_heading_deg"] = 180
+    assert [] == sights(run(behind))
+
+
+def test_user_sees_a_robot_just_when_a_robot_like_the_user_would_see_a_user_like_it() -> None:
+    content = facing(lost_after="1 s")
+    ana = dict(content["users"]["ana"])
+    astro = {**content["robots"]["astro"], "radius": 0.2, "speed": 0.6, "turn_rate_deg": 90}
+    astro.pop("camera")
+    robot = {**content["robots"]["astro"], "radius": 0.2}
+    swapped = {**content, "users": {"astro": astro}, "robots": {"ana": {**ana, "radius": 0.2}}}
+    rows = run(swapped).pandas("events")
+    rows = rows[rows["event"].str.startswith("user_")]
+    expected = [
+        (step, event.replace("user", "robot"))
+        for step, event in zip(rows["step"], rows["event"], strict=True)
+    ]
+    result = sights(run({**content, "robots": {"astro": robot}}))
+
+    assert expected == [(step, event) for step, _, event, _ in result]
+
+
+def test_user_is_interrupted_by_the_sight_of_a_robot_and_spans_do_not_show() -> None:
+    content = facing()
+    content["users"]["ana"]["behaviors"] = [{"type": f"{HERE}:Shy"}]
+    stored = run(content)
+    rows = stored.pandas("events")
+
+    assert "robot_seen astro" == rows[rows["event"] == "shied"]["detail"].iloc[0]
+    assert digests(stored) == digests(run(content, max_span=1))
+
+
+def test_users_who_look_change_nothing_else() -> None:
+    content = everything("20 min")
+    looking = everything("20 min")
+    looking["users"]["ben"]["camera"] = {"angle_deg": 180}
+    before, after = stored_without_scenario(content), stored_without_scenario(looking)
+
+    assert before.keys() == after.keys()
+    assert ["events"] == [name for name in before if before[name] != after[name]]
+
+
+def test_user_that_errs_is_refused() -> None:
+    with pytest.raises(InputError, match=r"camera.perception: .*users see robots as they are"):
+        fleet2d.load_scenario(facing(perception={"detection": {"distance": 0.5}}))
+    content = facing()
+    content["users"]["ana"].update(behaviors=[{"type": f"{HERE}:Shy"}], camera=None)
+    with pytest.raises(Fleet2DError, match="need a camera"):
+        run(content)
