@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.engine.test_cameras import looks
+from tests.engine.watchers.test_cameras import looks
 from tests.scenes import OWN, digests, everything, run, table
 
 import fleet2d
