@@ -11,13 +11,21 @@ template <int W>
 struct Lanes;
 
 #if defined(__GNUC__) && !defined(__clang__) && defined(__x86_64__)
-// A warning that vectors are passed in another way on other processors: here all functions that do are inlined. Clang
-// inlines only what such a function calls itself, so that it would be slower than one person after the other.
-#pragma GCC diagnostic ignored "-Wpsabi"
-// A function for processors that work on four numbers at once; all that it calls must be inlined.
-#define FLEET2D_FOUR __attribute__((target("avx2"), flatten))
-// The most people side by side.
+// The most people side by side. Clang inlines only what a function with `flatten` calls itself, so that four people
+// would be slower than one after the other.
 inline int widest() { return __builtin_cpu_supports("avx2") ? 4 : 1; }
+
+// Do work on W people with the instructions for as many; all that it calls is inlined for that.
+template <int W, class Work>
+    requires(W == 1)
+void side_by_side(Work work) {
+    work();
+}
+template <int W, class Work>
+    requires(W == 4)
+__attribute__((target("avx2"), flatten)) void side_by_side(Work work) {
+    work();
+}
 
 template <int W>
 struct Lanes {
@@ -35,8 +43,12 @@ struct Lanes {
     void operator/=(const Lanes& other) { all /= other.all; }
 };
 #else
-#define FLEET2D_FOUR
 inline int widest() { return 1; }
+
+template <int W, class Work>
+void side_by_side(Work work) {
+    work();
+}
 
 template <int W>
 struct Lanes {

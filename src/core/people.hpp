@@ -83,12 +83,11 @@ PeopleSmoothed smooth_people(const PeopleModel& model, const DayEvidence& day, i
 template <class Work>
 void in_groups(i64 people, Work work) {
     i64 first = 0;
-    if (widest() == 4) {
-        Filtered<4> four;
-        for (; first + 4 <= people; first += 4) work(four, first);
-    }
-    Filtered<1> one;
-    for (; first < people; ++first) work(one, first);
+    const auto go_on = [&]<int W>(Filtered<W> filtered) {
+        for (; widest() >= W && first + W <= people; first += W) work(filtered, first);
+    };
+    go_on(Filtered<4>());
+    go_on(Filtered<1>());
 }
 
 // An array of what a function returns for each lane.

@@ -354,15 +354,6 @@ void smooth_group(const Group<W>& group, Filtered<W>& filtered, const std::array
     }
 }
 
-FLEET2D_FOUR void smooth_some(const Group<4>& group, Filtered<4>& filtered, const std::array<View<f64, 2>, 4>& places,
-                              const std::array<Ends, 4>& ends) {
-    smooth_group<4>(group, filtered, places, ends);
-}
-void smooth_some(const Group<1>& group, Filtered<1>& filtered, const std::array<View<f64, 2>, 1>& places,
-                 const std::array<Ends, 1>& ends) {
-    smooth_group<1>(group, filtered, places, ends);
-}
-
 }  // namespace
 
 Smoothed smooth(const StayModel& model, const Stretches& stretches, View<const f64, 2> prior, View<const f64, 2> future,
@@ -388,11 +379,13 @@ PeopleSmoothed smooth_people(const PeopleModel& model, const DayEvidence& day, i
     const SharedViews shared(model.of(0), day.views);
     in_groups(model.size(), [&]<int W>(Filtered<W>& filtered, i64 first) {
         const auto now = for_lanes<W>([&](i64 lane) { return all_hidden(prior[first + lane]); });
-        smooth_some(group_of<W>(model, stretches, shared, first, now), filtered,
-                    for_lanes<W>([&](i64 lane) { return result.where.of(first + lane); }), for_lanes<W>([&](i64 lane) {
-                        return Ends{future[first + lane], result.end[first + lane], result.ahead[first + lane],
-                                    moments.of(first + lane)};
-                    }));
+        const Group<W> group = group_of<W>(model, stretches, shared, first, now);
+        const auto places = for_lanes<W>([&](i64 lane) { return result.where.of(first + lane); });
+        const auto ends = for_lanes<W>([&](i64 lane) {
+            const i64 person = first + lane;
+            return Ends{future[person], result.end[person], result.ahead[person], moments.of(person)};
+        });
+        side_by_side<W>([&] { smooth_group<W>(group, filtered, places, ends); });
     });
     return result;
 }

@@ -54,15 +54,6 @@ void follow_group(const Group<W>& group, Filtered<W>& filtered, const std::array
     }
 }
 
-FLEET2D_FOUR void follow_some(const Group<4>& group, Filtered<4>& filtered, const std::array<View<f64, 2>, 4>& places,
-                              const std::array<View<f64, 3>, 4>& now) {
-    follow_group<4>(group, filtered, places, now);
-}
-void follow_some(const Group<1>& group, Filtered<1>& filtered, const std::array<View<f64, 2>, 1>& places,
-                 const std::array<View<f64, 3>, 1>& now) {
-    follow_group<1>(group, filtered, places, now);
-}
-
 }  // namespace
 
 Array<f64, 2> follow(const StayModel& model, const Stretches& stretches, View<f64, 3> now, View<i64> shown) {
@@ -180,9 +171,10 @@ PeoplePlaces follow_people(const PeopleModel& model, const DayEvidence& day, i64
     const SharedViews shared(model.of(0), day.views);
     in_groups(model.size(), [&]<int W>(Filtered<W>& filtered, i64 first) {
         auto states = for_lanes<W>([&](i64 lane) { return all_hidden(now[first + lane]); });
-        follow_some(group_of<W>(model, stretches, shared, first, states), filtered,
-                    for_lanes<W>([&](i64 lane) { return result.of(first + lane); }),
-                    for_lanes<W>([&](i64 lane) { return states[static_cast<std::size_t>(lane)].view(); }));
+        const Group<W> group = group_of<W>(model, stretches, shared, first, states);
+        const auto places = for_lanes<W>([&](i64 lane) { return result.of(first + lane); });
+        const auto after = for_lanes<W>([&](i64 lane) { return states[static_cast<std::size_t>(lane)].view(); });
+        side_by_side<W>([&] { follow_group<W>(group, filtered, places, after); });
         for (std::size_t lane = 0; lane < W; ++lane) {
             const View<f64, 2> after = now[first + static_cast<i64>(lane)];
             for (i64 stage = 0; stage < after.size(); ++stage) {

@@ -101,6 +101,31 @@ def posteriors(steps: Any, weights: Any, start: Any, end: Any) -> tuple[Any, Any
     return np.array(forward[1:]), np.array([b / b.sum() for b in both])
 
 
+def people(model: Any, day: Any, prior: Any, future: Any) -> list[tuple[Any, Any]]:
+    """Filtered and smoothed states of people one by one, each bin a stretch of its own.
+
+    Args:
+        model: As for `stays`, with people as the first dimension.
+        day: view, views, begin, bin, patch, steps: the evidence of all people.
+        prior: Of each person by stage and patch, out of view.
+        future: Likelihood of later evidence, of each person by stage and patch.
+    """
+    chains = []
+    for person, (first, last) in enumerate(pairwise(day.begin.tolist())):
+        seen = np.zeros((len(day.view), day.views.shape[1]))
+        for i in range(first, last):
+            seen[day.bin[i], day.patch[i]] = day.steps[i]
+        seen /= np.maximum(seen.sum(axis=1, keepdims=True), 1)
+        parts = (model.stay, model.follow, model.spread, model.restless)
+        own = type(model)(*(part[person] for part in parts), model.first, model.detection)
+        shown = day.views[day.view].tolist()
+        chain = stays(own, [1] * len(shown), shown, seen.tolist(), [-1] * seen.shape[1])
+        start = np.stack([np.zeros_like(prior[person]), prior[person]], axis=-1)
+        end = np.stack([future[person]] * 2, axis=-1)
+        chains.append(posteriors(*chain, start.ravel(), end.ravel()))
+    return chains
+
+
 def fremen(minutes: Sequence[int], weight: Any, state: Any, days: int, m: int, at: int) -> float:
     """The forecast of order m at a minute of the week, from samples of one room, by definition."""
     n = sum(weight)
