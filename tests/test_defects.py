@@ -12,6 +12,7 @@ from tests.scenes import path, run, scenario, table
 from typer.testing import CliRunner
 
 import fleet2d
+from fleet2d.algorithms.evidence import SightingCounts
 from fleet2d.algorithms.presence.counts import Bins
 from fleet2d.algorithms.presence.sighting_share import SightingShare
 from fleet2d.cli.app import app
@@ -94,7 +95,7 @@ def test_sums_of_a_wrong_width_name_the_line_of_the_user() -> None:
     own = Own()
     own.begin(rooms=3, users=2)
     day = np.array([1], np.int64)
-    bins = Bins(day, day, 60, np.zeros((1, 3)), np.zeros((1, 3, 3), np.int64))
+    bins = Bins(day, day, 60, np.zeros((1, 3)), SightingCounts.of(np.zeros((1, 3, 3), np.int64)))
     with pytest.raises(ComponentError, match=r"Own\.sums returned .*test_defects\.py:\d+, in sums"):
         own.observe(bins)
 

@@ -31,33 +31,16 @@ inline Array<f64> advance(View<const f64> probability, View<const f64, 2> transi
     return now;
 }
 
-// Count the steps at which each user was perceived in each room, once however often.
-//
-// `step` (n,) is in order of time, from the beginning of the first bin; `user` (n,) is below 0 for
-// somebody unknown, `room` (n,) below 0 for none. `seen`, (bins, users + 1, rooms), is added to; its
-// last user is anybody.
-inline void count_sightings(View<const i64> step, View<const i64> user, View<const i64> room, i64 bin_steps,
-                            View<i64, 3> seen) {
-    const i64 bins = seen.shape[0], anybody = seen.shape[1] - 1;
-    auto last = Array<i64, 2>::filled({anybody + 1, seen.shape[2]}, -1);  // step that was counted last
-    for (i64 i = 0; i < step.size(); ++i) {
-        const i64 at = step[i], where = room[i], bin = floor_div(at, bin_steps);
-        if (where < 0 || bin < 0 || bin >= bins) continue;
-        for (const i64 who : {user[i], anybody}) {
-            if (who < 0 || last(who, where) == at) continue;
-            last(who, where) = at;
-            ++seen(bin, who, where);
-        }
-    }
-}
-
 // At how many steps of each bin users were perceived in each room, where that isn't 0: arrays of one length, by user,
 // bin and room, ascending.
 struct SightingCounts {
     Array<i64> user, bin, room, steps;
 };
 
-// What `count_sightings` would add to zeros of `shape`.
+// Count the steps at which each user was perceived in each room, once however often.
+//
+// `step` (n,) is in order of time, from the beginning of the first bin; `user` (n,) is below 0 for somebody unknown,
+// `room` (n,) below 0 for none. `shape` is (bins, users + 1, rooms); its last user is anybody.
 inline SightingCounts list_sightings(View<const i64> step, View<const i64> user, View<const i64> room, i64 bin_steps,
                                      std::array<i64, 3> shape) {
     struct Entry {

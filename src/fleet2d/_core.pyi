@@ -1023,21 +1023,9 @@ def advance(probability: numpy.typing.NDArray[numpy.float64], transition: numpy.
         float64 (states,).
     """
 
-def count_sightings(step: numpy.typing.NDArray[numpy.int64], user: numpy.typing.NDArray[numpy.int64], room: numpy.typing.NDArray[numpy.int64], bin_steps: int, seen: numpy.typing.NDArray[numpy.int64]) -> None:
-    """
-    Count the steps at which each user was perceived in each room, each step once.
-
-    Args:
-        step: int64 (n,), in order of time, from the beginning of the first bin.
-        user: int64 (n,), below 0 for somebody unknown.
-        room: int64 (n,), below 0 for none.
-        bin_steps: Steps of a bin.
-        seen: int64 (bins, users + 1, rooms), to be added to; the last user is anybody.
-    """
-
 def list_sightings(step: numpy.typing.NDArray[numpy.int64], user: numpy.typing.NDArray[numpy.int64], room: numpy.typing.NDArray[numpy.int64], bin_steps: int, bins: int, users: int, rooms: int) -> tuple[numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64]]:
     """
-    List what `count_sightings` would add to zeros (bins, users, rooms), where it isn't 0.
+    Count the steps at which each user was perceived in each room, each step once, where that isn't 0.
 
     Args:
         step: int64 (n,), in order of time, from the beginning of the first bin.

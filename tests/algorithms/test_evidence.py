@@ -59,14 +59,14 @@ def test_bins_last_a_minute_or_a_step() -> None:
 def test_users_perceived_by_two_robots_count_once_and_strangers_only_as_anyone() -> None:
     rows = [(60, 0, 1), (60, 0, 1), (61, 0, 1), (61, -1, 1), (119, 1, 0), (120, -1, 0), (180, 0, 0)]
 
-    seen = count_seen(sightings(rows), 60, 2, 60, 2, 2)
+    seen = count_seen(sightings(rows), 60, 2, 60, 2, 2).dense
 
     assert [[0, 2], [1, 0], [1, 2]] == seen[0].tolist()
     assert [[0, 0], [0, 0], [1, 0]] == seen[1].tolist()
 
 
 def test_nobody_perceived_is_evidence_of_zeros() -> None:
-    assert 0 == count_seen(sightings([]), 0, 3, 60, 1, 2).sum()
+    assert 0 == count_seen(sightings([]), 0, 3, 60, 1, 2).dense.sum()
 
 
 def evidence_of(period: str, what: str = "Tell", **settings: Any) -> Any:

@@ -389,13 +389,6 @@ CALLS: dict[str, Args] = {
     "Routes.find": lambda: (_core.Routes(MESH, corners()), 100, 500, 1000, 500),
     "distance": lambda: (1, 2, 3, 4),
     "advance": lambda: (np.array([0.5, 0.5]), np.array([[0.9, 0.1], [0.3, 0.7]]), 5),
-    "count_sightings": lambda: (
-        np.arange(6),
-        np.array([0, 1, -1, 0, 1, 0]),
-        np.array([0, -1, 2, 1, 1, 1]),
-        3,
-        np.zeros((2, 3, 3), np.int64),
-    ),
     "list_sightings": lambda: (
         np.arange(6),
         np.array([0, 1, -1, 0, 1, 0]),
@@ -638,7 +631,6 @@ WRITTEN = {
     "settle": [*((1, i) for i in range(5)), (2,)],
     "trace_track": [(3, i) for i in range(4)],
     "trace_meander": [(5, i) for i in range(4)],
-    "count_sightings": [(4,)],
     "look": [(7, i) for i in range(5)],
     "follow": [(2,), (3,)],
     "smooth": [(4, i) for i in range(5)],

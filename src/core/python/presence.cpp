@@ -24,26 +24,6 @@ Args:
 Returns:
     float64 (states,).)");
     m.def(
-        "count_sightings",
-        [](View<const i64> step, View<const i64> user, View<const i64> room, i64 bin_steps, View<i64, 3> seen) {
-            require(step.size() == user.size() && step.size() == room.size(),
-                    "step, user and room must have one length");
-            require(bin_steps > 0, "bin_steps must be 1 or more");
-            require(seen.shape[1] > 0 && all_in_range(user, INT64_MIN, seen.shape[1]) &&
-                        all_in_range(room, INT64_MIN, seen.shape[2]),
-                    "seen must have an entry for each user and each room, and one more for anybody");
-            count_sightings(step, user, room, bin_steps, seen);
-        },
-        "step"_a, "user"_a, "room"_a, "bin_steps"_a, "seen"_a, Unlocked(),
-        R"(Count the steps at which each user was perceived in each room, each step once.
-
-Args:
-    step: int64 (n,), in order of time, from the beginning of the first bin.
-    user: int64 (n,), below 0 for somebody unknown.
-    room: int64 (n,), below 0 for none.
-    bin_steps: Steps of a bin.
-    seen: int64 (bins, users + 1, rooms), to be added to; the last user is anybody.)");
-    m.def(
         "list_sightings",
         [](View<const i64> step, View<const i64> user, View<const i64> room, i64 bin_steps, i64 bins, i64 users,
            i64 rooms) {
@@ -59,7 +39,7 @@ Args:
             return std::tuple(std::move(made.user), std::move(made.bin), std::move(made.room), std::move(made.steps));
         },
         "step"_a, "user"_a, "room"_a, "bin_steps"_a, "bins"_a, "users"_a, "rooms"_a, Unlocked(),
-        R"(List what `count_sightings` would add to zeros (bins, users, rooms), where it isn't 0.
+        R"(Count the steps at which each user was perceived in each room, each step once, where that isn't 0.
 
 Args:
     step: int64 (n,), in order of time, from the beginning of the first bin.

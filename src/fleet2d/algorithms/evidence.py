@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from fleet2d.algorithms.patches import Patches
 from fleet2d.floorplan.cache import read_only
 from fleet2d.kernels.evidence import gather_views
-from fleet2d.kernels.presence import count_sightings, list_sightings
+from fleet2d.kernels.presence import list_sightings
 
 I64 = NDArray[np.int64]
 
@@ -134,20 +134,28 @@ class Evidence(NamedTuple):
             longer.
         watched: float64 (bins, rooms), share of each room's cells in view, averaged over the steps
             of the bin; with several robots, that of the robot that saw most of the room.
-        seen: int64 (bins, users + 1, rooms), steps of the bin at which each user was perceived in
-            each room; the last row counts anybody, recognized or not.
+        sightings: Where users were perceived, by rooms.
         parts: The same by patches of rooms; None: each room is one patch.
 
     Example:
-        >>> Evidence(0, 60, np.array([[0.5, 0.0]]), np.array([[[30, 0], [30, 0]]])).seen.shape
-        (1, 2, 2)
+        >>> counts = SightingCounts.of(np.array([[[30, 0], [30, 0]]]))
+        >>> Evidence(0, 60, np.array([[0.5, 0.0]]), counts).seen.tolist()
+        [[[30, 0], [30, 0]]]
     """
 
     begin: int
     bin_steps: int
     watched: NDArray[np.float64]
-    seen: NDArray[np.int64]
+    sightings: SightingCounts
     parts: Parts | None = None
+
+    @property
+    def seen(self) -> I64:
+        """Steps of each bin at which each user was perceived in each room, made anew.
+
+        int64 (bins, users + 1, rooms); the last row counts anybody, recognized or not.
+        """
+        return self.sightings.dense
 
     def __len__(self) -> int:
         """Return the number of bins."""
@@ -191,20 +199,16 @@ def gather(
         sightings: Users that were perceived, with patches in place of rooms.
         users: Number of users.
     """
-    count = len(patches.room)
     watched, by_patch, shown, shown_parts = gather_views(
         cells, patches.room, patches.cells, patches.room_cells, bin_steps
     )
     bins, in_room = len(cells), sightings._replace(room=patches.room[sightings.room])
-    user, patch = sightings.user.astype(np.int64), sightings.room.astype(np.int64)
-    shape = (bins, users + 1, count)
-    counts = list_sightings(sightings.step - first, user, patch, bin_steps, *shape)
     parts = Parts(
         patches.room,
         patches.cells,
         by_patch,
         shown,
-        SightingCounts(*counts, shape),
+        count_seen(sightings, first, bins, bin_steps, users, len(patches.room)),
         shown_parts,
         patches.island,
     )
@@ -214,15 +218,12 @@ def gather(
 
 def count_seen(
     sightings: SightingRows, begin: int, bins: int, bin_steps: int, users: int, rooms: int
-) -> NDArray[np.int64]:
+) -> SightingCounts:
     """Count, per bin and room, the steps at which each user was perceived.
 
     Several sightings of a user in a room in one step count once.
-
-    Returns:
-        `Evidence.seen`, int64 (bins, users + 1, rooms).
     """
-    seen = np.zeros((bins, users + 1, rooms), np.int64)
+    shape = (bins, users + 1, rooms)
     user, room = sightings.user.astype(np.int64), sightings.room.astype(np.int64)
-    count_sightings(sightings.step - begin, user, room, bin_steps, seen)
-    return seen
+    counts = list_sightings(sightings.step - begin, user, room, bin_steps, *shape)
+    return SightingCounts(*counts, shape)

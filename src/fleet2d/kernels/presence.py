@@ -4,6 +4,6 @@ BLAS and einsum add in an order that depends on the machine. These loops don't, 
 and the decisions of robots that follow from them, are the same everywhere.
 """
 
-from fleet2d._core import advance, count_sightings, list_sightings, resampled
+from fleet2d._core import advance, list_sightings, resampled
 
-__all__ = ["advance", "count_sightings", "list_sightings", "resampled"]
+__all__ = ["advance", "list_sightings", "resampled"]

@@ -76,7 +76,7 @@ def independent(bins: int, share: NDArray[np.float64], seed: int) -> Evidence:
     watched[np.arange(bins), looks] = 1
     hit = (where == looks) & (random.random(bins) < 0.95)
     seen[hit, :, looks[hit]] = 1
-    return Evidence(0, 1, watched, seen)
+    return Evidence(0, 1, watched, SightingCounts.of(seen))
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -109,7 +109,8 @@ def test_exposure_ratio_by_patches_finds_a_user_who_stays_in_a_corner() -> None:
     room, first = np.array([0, 0, 1]), [0, 2]
     parts = Parts(room, np.array([5, 5, 10]), shown, shown, SightingCounts.of(seen))
     by_room = np.add.reduceat(shown * parts.cells, first, axis=1) / 10
-    collected = Evidence(0, 1, by_room, np.add.reduceat(seen, first, axis=2), parts)
+    in_rooms = SightingCounts.of(np.add.reduceat(seen, first, axis=2))
+    collected = Evidence(0, 1, by_room, in_rooms, parts)
     presence = learned(
         ExposureRatio(detection=1.0), bins_of(collected), rooms=2, users=1, length=9999
     )
@@ -132,7 +133,9 @@ def test_a_user_never_seen_has_a_distribution_and_an_only_room_has_all(
     cls: type[Estimator],
 ) -> None:
     bins = any_evidence(2, bins=60, rooms=1)
-    bins.seen[:, 0] = 0
+    seen = bins.seen.copy()
+    seen[:, 0] = 0
+    bins = bins._replace(sightings=SightingCounts.of(seen))
     result = learned(cls(), bins, rooms=1)
     for user in result.names:
         assert [1.0] == result.share(user).tolist()
@@ -188,7 +191,7 @@ def test_old_evidence_fades_with_the_half_life(cls: type[Estimator]) -> None:
     for half_life in (None, 1.0):
         estimator = cls()
         estimator.begin(2, 1, half_life)
-        for part in pieces(bins_of(Evidence(0, 1, watched, seen)), 720):
+        for part in pieces(bins_of(Evidence(0, 1, watched, SightingCounts.of(seen))), 720):
             estimator.observe(part)
         shares.append(estimator.presence(["u0"], MONDAY).share("u0")[1])
     assert 2 / 12 == pytest.approx(shares[0], abs=0.08)

@@ -5,7 +5,7 @@ import pytest
 from tests.algorithms.presence.worlds import DAY, MONDAY, bins_of, pieces
 from tests.reference import presence as slow
 
-from fleet2d.algorithms.evidence import Evidence
+from fleet2d.algorithms.evidence import Evidence, SightingCounts
 from fleet2d.algorithms.presence.fremen import Fremen
 
 
@@ -22,7 +22,7 @@ def rhythmic(days: int, seed: int) -> Evidence:
     watched[np.arange(bins), looks] = part
     hit = (where == looks) & (random.random(bins) < part)
     seen[hit, :, looks[hit]] = 1
-    return Evidence(0, 1, watched, seen)
+    return Evidence(0, 1, watched, SightingCounts.of(seen))
 
 
 @pytest.mark.parametrize("days", [1, 4])
@@ -33,7 +33,7 @@ def test_forecasts_equal_the_definition(days: int) -> None:
     last = 1  # of the next day, which ends the days before
     extra = Evidence(
         0, 1, np.concatenate([collected.watched, collected.watched[:last]]),
-        np.concatenate([collected.seen, collected.seen[:last]]),
+        SightingCounts.of(np.concatenate([collected.seen, collected.seen[:last]])),
     )  # fmt: skip
     estimator = Fremen()
     estimator.begin(3, 1)

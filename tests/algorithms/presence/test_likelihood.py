@@ -20,7 +20,7 @@ from tests.algorithms.presence.worlds import (
     transitions,
 )
 
-from fleet2d.algorithms.evidence import Evidence
+from fleet2d.algorithms.evidence import Evidence, SightingCounts
 from fleet2d.algorithms.presence.anyone import unknown_seen, with_anyone
 from fleet2d.algorithms.presence.counts import Bins, joined
 from fleet2d.algorithms.presence.exposure_ratio import AuditOnly, ExposureRatio
@@ -39,8 +39,9 @@ def test_anyone_is_where_not_everybody_is_missing() -> None:
 
 def test_observations_of_no_user_are_unknown() -> None:
     bins = any_evidence(10, users=1)
-    bins.seen[:, 0], bins.seen[:, 1] = 0, 0
-    bins.seen[3, 1, 2] = 6
+    seen = np.zeros_like(bins.seen)
+    seen[3, 1, 2] = 6
+    bins = bins._replace(sightings=SightingCounts.of(seen))
     assert [[3, 2]] == np.argwhere(unknown_seen(bins)).tolist()
 
 
@@ -144,7 +145,7 @@ def test_pieces_of_evidence_join_to_the_whole() -> None:
     bins = any_evidence(11)
     whole = joined(pieces(bins, 7))
     columns = [
-        [*each[:-1], *each.parts[:4], *each.parts.sightings, each.parts.seen]
+        [*each[:4], *each.sightings, *each.parts[:4], *each.parts.sightings, each.parts.seen]
         for each in (bins, whole)
     ]
     for one, other in zip(*columns, strict=True):
@@ -223,7 +224,7 @@ def test_a_part_of_the_home_counts_from_when_a_robot_looks_into_it() -> None:
     where = np.repeat([0, 2], 2 * DAY)
     watched = np.eye(4)[where]
     seen = np.repeat((watched > 0).astype(np.int64)[:, None], 2, axis=1)
-    bins = with_islands(bins_of(Evidence(0, 1, watched, seen)), [0, 0, 2, 2])
+    bins = with_islands(bins_of(Evidence(0, 1, watched, SightingCounts.of(seen))), [0, 0, 2, 2])
     estimator = Likelihood()
     estimator.begin(4, 1)
     for part in pieces(bins, 360):

@@ -15,6 +15,7 @@ from tests.algorithms.presence.worlds import (
     pieces,
 )
 
+from fleet2d.algorithms.evidence import Evidence, SightingCounts
 from fleet2d.algorithms.presence.belief import BeliefSeries, Presence
 from fleet2d.algorithms.presence.chain_model import (
     Filter,
@@ -60,7 +61,7 @@ def test_the_future_changes_nothing(cls: type[Model]) -> None:
     mixed = Bins(
         bins.day, bins.minute, bins.bin_steps,
         np.concatenate([bins.watched[:60], other.watched[60:]]),
-        np.concatenate([bins.seen[:60], other.seen[60:]]),
+        SightingCounts.of(np.concatenate([bins.seen[:60], other.seen[60:]])),
     )  # fmt: skip
     one, two = (followed(cls(), b, 3, 2).track for b in (bins, mixed))
     assert np.array_equal(one.home[:60], two.home[:60])
@@ -109,17 +110,17 @@ def test_hour_of_week_distinguishes_hours() -> None:
 def test_markov_decay_is_the_row_of_the_power_since_the_last_sighting() -> None:
     watched, seen = np.ones((40, 3)), np.zeros((40, 2, 3), np.int64)
     seen[4, :, 1] = 1
-    from fleet2d.algorithms.evidence import Evidence
-
     model = MarkovDecay()
-    track = followed(model, bins_of(Evidence(0, 1, watched, seen)), 3, 1).track
+    track = followed(model, bins_of(Evidence(0, 1, watched, SightingCounts.of(seen))), 3, 1).track
     steps = steps_of(model.learner.people.model_of(0))
     for t in (4, 5, 20, 39):
         power = np.linalg.matrix_power(steps, t - 4)[1]
         belief = np.append(track.home[t, 0] * (1 - track.away[t, 0]), track.away[t, 0])
         assert np.abs(belief - power).max() < 5e-3  # a false alarm is possible, too
     # Three rooms in view in vain: the filter knows that the user is out.
-    filtered = followed(Filter(), bins_of(Evidence(0, 1, watched, seen)), 3, 1).track
+    filtered = followed(
+        Filter(), bins_of(Evidence(0, 1, watched, SightingCounts.of(seen))), 3, 1
+    ).track
     assert filtered.away[39, 0] > 0.9 > 0.4 > track.away[39, 0]
 
 
@@ -127,7 +128,7 @@ def test_markov_decay_is_the_row_of_the_power_since_the_last_sighting() -> None:
 def test_a_forecast_equals_filtering_without_evidence(cls: type[Model]) -> None:
     bins = any_evidence(6, bins=60, users=1)
     after = bins.part(30, 60)
-    blind = Bins(after.day, after.minute, 6, after.watched * 0, after.seen * 0)
+    blind = Bins(after.day, after.minute, 6, after.watched * 0, SightingCounts.of(after.seen * 0))
     model = cls()
     now = followed(model, bins.part(0, 30), 3, 1)
     home, away = model.observe(blind)

@@ -93,7 +93,7 @@ def bins_of(shown: Any, seen: Any, start: int = 0) -> Bins:
     room = np.array([0, 0, 1])
     by_room = np.stack([shown[:, :2].mean(axis=1), shown[:, 2]], axis=1)
     parts = Parts(room, np.array([4, 4, 8]), shown, shown, SightingCounts.of(seen))
-    in_rooms = np.stack([seen[..., :2].sum(axis=-1), seen[..., 2]], axis=-1)
+    in_rooms = SightingCounts.of(np.stack([seen[..., :2].sum(axis=-1), seen[..., 2]], axis=-1))
     return in_time(Evidence(start * 10, 10, by_room, in_rooms, parts), MONDAY, 6_000_000)
 
 
@@ -166,7 +166,7 @@ def crowd_of(count: int, bins: int, seed: int) -> Bins:
     assert base.by_patch is not None
     by_patch = base.by_patch._replace(sightings=SightingCounts.of(seen))
     in_rooms = np.stack([seen[..., :2].max(axis=-1), seen[..., 2]], axis=-1)
-    return base._replace(by_patch=by_patch, seen=in_rooms)
+    return base._replace(by_patch=by_patch, sightings=SightingCounts.of(in_rooms))
 
 
 @pytest.mark.parametrize("count", [1, 3, 4, 9])

@@ -6,7 +6,7 @@ from datetime import datetime
 import numpy as np
 from numpy.typing import NDArray
 
-from fleet2d.algorithms.evidence import Evidence
+from fleet2d.algorithms.evidence import Evidence, SightingCounts
 from fleet2d.algorithms.presence.counts import Bins, in_time
 
 MONDAY = datetime(2026, 1, 5)
@@ -53,7 +53,7 @@ def evidence(where: I64, rooms: int, policy: Policy, seed: int) -> Evidence:
         if sees_person:
             seen[t, :, at] = 1
             sightings[at] += 1
-    return Evidence(0, 1, watched, seen)
+    return Evidence(0, 1, watched, SightingCounts.of(seen))
 
 
 def patrol(t: int, at: int, sees_person: bool, sightings: I64, random: np.random.Generator) -> int:
@@ -97,7 +97,11 @@ def any_evidence(seed: int, bins: int = 40, users: int = 2, rooms: int = 3, step
     hit = (random.random((bins, users + 1, rooms)) < 0.15) & (watched[:, None] > 0)
     seen = np.where(hit, random.integers(1, steps + 1, hit.shape), 0)
     seen[:, -1] = np.maximum(seen[:, -1], seen[:, :-1].max(axis=1, initial=0))
-    return in_time(Evidence(0, steps, watched, seen), datetime(2026, 1, 4, 23, 40), 10_000_000)
+    return in_time(
+        Evidence(0, steps, watched, SightingCounts.of(seen)),
+        datetime(2026, 1, 4, 23, 40),
+        10_000_000,
+    )
 
 
 def main() -> None:

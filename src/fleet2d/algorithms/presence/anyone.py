@@ -10,9 +10,8 @@ F64 = NDArray[np.float64]
 
 def unknown_seen(bins: Bins) -> NDArray[np.bool_]:
     """Return where somebody was seen who was not recognized as a user: bool (bins, rooms)."""
-    users = bins.seen[:, :-1]
-    unknown: NDArray[np.bool_] = bins.seen[:, -1] > users.sum(axis=1)
-    return unknown if users.shape[1] else np.zeros_like(unknown)
+    unknown = bins.sightings.unknown
+    return unknown if bins.sightings.shape[1] > 1 else np.zeros_like(unknown)
 
 
 def with_anyone(chains: list[F64], unknown: NDArray[np.bool_]) -> F64:

@@ -28,7 +28,7 @@ class Bins(NamedTuple):
         minute: int64 (bins,), begin of the bin [minutes since midnight].
         bin_steps: Steps of a bin.
         watched: float64 (bins, rooms), as in Evidence.
-        seen: int64 (bins, users + 1, rooms), as in Evidence.
+        sightings: Where users were perceived, by rooms, as in Evidence.
         by_patch: The same by patches of rooms, as in Evidence.
     """
 
@@ -36,8 +36,13 @@ class Bins(NamedTuple):
     minute: I64
     bin_steps: int
     watched: F64
-    seen: I64
+    sightings: SightingCounts
     by_patch: Parts | None = None
+
+    @property
+    def seen(self) -> I64:
+        """As in Evidence: int64 (bins, users + 1, rooms), made anew."""
+        return self.sightings.dense
 
     @property
     def parts(self) -> Parts:
@@ -46,7 +51,7 @@ class Bins(NamedTuple):
             return self.by_patch
         rooms = self.watched.shape[1]
         room, cells = np.arange(rooms, dtype=np.int64), np.ones(rooms, np.int64)
-        return Parts(room, cells, self.watched, self.watched, SightingCounts.of(self.seen))
+        return Parts(room, cells, self.watched, self.watched, self.sightings)
 
     def part(self, begin: int, end: int) -> "Bins":
         """Return the bins from `begin` to `end` - 1."""
@@ -56,7 +61,7 @@ class Bins(NamedTuple):
             self.minute[rows],
             self.bin_steps,
             self.watched[rows],
-            self.seen[rows],
+            self.sightings.between(begin, end),
             _part(self.by_patch, rows),
         )
 
@@ -78,7 +83,7 @@ def in_time(evidence: Evidence, start: datetime, step_us: int) -> Bins:
         time_us // 60_000_000,
         evidence.bin_steps,
         evidence.watched,
-        evidence.seen,
+        evidence.sightings,
         evidence.parts,
     )
 
@@ -106,7 +111,7 @@ def joined(parts: Sequence[Bins]) -> Bins:
         np.concatenate([part.minute for part in parts]),
         first.bin_steps,
         np.concatenate([part.watched for part in parts]),
-        np.concatenate([part.seen for part in parts]),
+        SightingCounts.joined([part.sightings for part in parts]),
         first.by_patch
         and first.by_patch._replace(
             watched=np.concatenate([part.parts.watched for part in parts]),

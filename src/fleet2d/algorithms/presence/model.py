@@ -80,8 +80,8 @@ class LastSeen(Model):
 
     def observe(self, bins: Bins) -> tuple[F64, F64]:
         """Return the last room of each user after each bin."""
-        is_seen = np.any(bins.seen > 0, axis=2)
-        room = np.where(is_seen, bins.seen.argmax(axis=2), NEVER)
+        seen = bins.seen
+        room = np.where(np.any(seen > 0, axis=2), seen.argmax(axis=2), NEVER)
         room = np.concatenate([self.last[np.newaxis], room])
         newest = np.where(room != NEVER, np.arange(len(room))[:, np.newaxis], 0)
         room = np.take_along_axis(room, np.maximum.accumulate(newest, axis=0), axis=0)

@@ -28,7 +28,7 @@ class SightingShare(Estimator):
     def sums(self, bins: Bins) -> F64:
         """Return sightings per room, then bins: watched, watched without a sighting, and all."""
         seen = bins.seen.astype(np.float64)
-        is_seen = np.any(bins.seen > 0, axis=2)
+        is_seen = np.any(seen > 0, axis=2)
         has_view = np.any(bins.watched > 0, axis=1)[:, np.newaxis] | is_seen
         return np.concatenate(
             [seen, np.stack([has_view, has_view & ~is_seen, np.ones_like(is_seen)], axis=-1)],
