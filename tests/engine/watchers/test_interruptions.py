@@ -60,7 +60,7 @@ class Overrules(Waits):
 
 
 def content(event: str, **behavior: Any) -> dict[str, Any]:
-    waits = {"type": "tests.engine.watchers.test_interruptions:Waits", "event": event, **behavior}
+    waits = {"type": Waits.type_name, "event": event, **behavior}
     return scenario("3 min", robots={"astro": {"behaviors": [waits]}})
 
 
@@ -89,8 +89,8 @@ def test_plan_ends_when_the_condition_becomes_true(max_span: int | None) -> None
 
 
 def test_a_behavior_before_the_active_one_listens() -> None:
-    first = {"type": "tests.engine.watchers.test_interruptions:Overrules"}
-    rests = {"type": "tests.engine.watchers.test_interruptions:Waits", "event": "user_seen"}
+    first = {"type": Overrules.type_name}
+    rests = {"type": Waits.type_name, "event": "user_seen"}
     stored = run(scenario("3 min", robots={"astro": {"behaviors": [first, rests]}}))
 
     assert twin(180) == reactions(stored)
@@ -105,6 +105,27 @@ def test_copies_and_saved_simulations_go_on_alike() -> None:
     file.seek(0)
 
     assert 1 == len({s.run().digest for s in (simulation, other, Simulation.load(file))})
+
+
+class EveryTwelve(Interrupt):
+    """The first of every twelve steps."""
+
+    def holds(self, span: SpanView) -> np.ndarray[Any, np.dtype[np.bool_]]:
+        return (span.first + np.arange(span.poses.x.shape[1])) % 12 == 0
+
+
+@pytest.mark.parametrize("max_span", ["null", "1", "10"])
+def test_bodies_and_interrupts_do_not_disturb_each_other(max_span: str) -> None:
+    names = {"astro": EveryWeek, "bolt": EveryTwelve, "zoe": EveryWeek}
+    robots = {
+        name: {"type": Waits.type_name, "event": event.type_name} for name, event in names.items()
+    }
+    stored = run(scenario("3 min", robots=robots), f"simulation.max_span={max_span}")
+
+    twelves = list(range(13, 180, 12))
+    for name, expected in (("astro", twin(180)), ("bolt", twelves), ("zoe", twin(180))):
+        rows = table(stored, "events", event="reacts", entity=name)
+        assert expected == rows["step"].tolist()
 
 
 def test_nothing_is_done_where_no_plan_waits(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -136,7 +157,7 @@ def test_behavior_that_listens_to_an_unknown_event_is_refused(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(Overrules, "listens", frozenset({"doorbell"}))
-    first = {"type": "tests.engine.watchers.test_interruptions:Overrules"}
+    first = {"type": Overrules.type_name}
     text = raises(
         ScenarioError, lambda: Simulation(scenario(robots={"astro": {"behaviors": [first]}}))
     )

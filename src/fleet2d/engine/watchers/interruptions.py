@@ -60,13 +60,13 @@ class Interruptions(Watcher):
 
     def limit(self, bodies: Bodies, end: int) -> int:
         """Return the step after the first interruption, `end` if there is none."""
-        first = self.next_step
+        first, steps = self.next_step, end - self.next_step
         block, self._ahead = bodies.block(first, end), {}
         for wait in self._held:
             row, name = wait
             span = SpanView(self._actors[row], self._actors, self._users, first, block)
             with blame(self._actors[row].path, first):
-                self._ahead[wait] = _checked(name, self._interrupt(name).holds(span), end - first)
+                self._ahead[wait] = _checked(name, self._interrupt(name).holds(span), steps)
             begins = self._begins(wait)
             if begins.any():
                 end = min(end, first + int(begins.argmax()) + 1)
@@ -74,10 +74,10 @@ class Interruptions(Watcher):
 
     def take(self, bodies: Bodies, end: int) -> Sequence[Event]:
         """Take in the steps up to `end` - 1."""
-        count, self.next_step = end - self.next_step, end
-        self._last = [wait for wait in self._ahead if self._begins(wait)[count - 1]]
+        last, self.next_step = end - self.next_step - 1, end
+        self._last = [wait for wait in self._ahead if self._begins(wait)[last]]
         for wait, holds in self._ahead.items():
-            self._held[wait] = bool(holds[count - 1])
+            self._held[wait] = bool(holds[last])
         self._ahead = {}
         return ()
 
