@@ -16,7 +16,7 @@ import pytest
 import shapely
 from tests.engine.test_pace import Wall
 from tests.scenes import TESTS, digests, everything, flat_document, path, run, scenario, table
-from tests.thorough import THOROUGH
+from tests.thorough import THOROUGH, some
 
 import fleet2d
 from fleet2d import FloorPlan, History, Metric, Present
@@ -436,7 +436,7 @@ def test_known_failure_06_rooms_cover_the_space_are_disjoint_and_never_empty(
     plan_paths: list[Path],
 ) -> None:
     """A box that misses the floor gets the background there; a kitchen with the box of another, nothing."""
-    for file in plan_paths:
+    for file in some(plan_paths, 5):
         plan = fleet2d.load_floorplan(file)
         counts = np.bincount(plan.room_of_cell[plan.free], minlength=len(plan.rooms))
         assert (plan.room_of_cell[plan.free] >= 0).all(), file.name
@@ -480,7 +480,7 @@ def test_known_failure_07_the_area_stays_within_a_tolerance_or_it_is_an_error(
     """At 0.2 m, outlines cross and up to 22 % of the area are lost there, without a word."""
     read = 0
     refused: dict[str, str] = {}
-    for file in plan_paths[::7] if cell < 0.05 else plan_paths[::3]:
+    for file in plan_paths[::7] if cell < 0.05 else some(plan_paths[::3], 2):
         outline = shapely.Polygon(json.loads(file.read_text())["verts"])
         if not outline.is_valid:
             continue

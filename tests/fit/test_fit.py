@@ -32,7 +32,7 @@ from fleet2d.routines.persona import Persona, read_persona
 from fleet2d.streams import Draws, stream_key
 
 FIRST = datetime(2020, 3, 2)  # a Monday
-LOGS = ["casas_al/events_10_days.txt", "uci_adl_a", "homer_plus_a"]
+LOGS = ["homer_plus_a", "uci_adl_a", "casas_al/events_10_days.txt"]
 
 
 def write_life(folder: Path, days: int = 24, weekend: bool = True) -> Path:
@@ -134,7 +134,7 @@ def test_a_markov_chain_keeps_the_shares_of_time(life: Timeline) -> None:
     assert np.abs(hours - hours.mean(axis=0)).max() < 0.12  # it knows no clock
 
 
-@pytest.mark.parametrize("name", some(LOGS, 2))
+@pytest.mark.parametrize("name", some(LOGS, 3))
 def test_days_of_real_logs_held_back_are_matched_as_well_as_by_copies(
     shared_data: Path, name: str
 ) -> None:

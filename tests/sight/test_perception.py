@@ -139,8 +139,7 @@ def test_detection_follows_the_light_of_the_day() -> None:
 
 def test_detection_falls_with_the_part_of_a_body_that_a_pillar_hides() -> None:
     count = 12
-    distance, bearing = RNG.uniform(3, 5, N), RNG.uniform(0, 35, N)
-    users = around(distance, bearing)
+    users = around(RNG.uniform(3, 5, N // 4), RNG.uniform(0, 35, N // 4))
     watch = Watch(
         users,
         camera={"body_points": count},

@@ -8,12 +8,15 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from tests.scenes import flat_path, run, scenario
+from tests.thorough import some
 
 import fleet2d
 from fleet2d.errors import ArtifactError, InputError
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.view.floorplan import floorplan_axes
 from fleet2d.view.layers import draw_layer, layer_on_axes
+
+STARTS = {".png": b"\x89PNG", ".svg": b"<?xml"}
 
 
 @pytest.fixture(scope="module")
@@ -68,13 +71,17 @@ def test_larger_values_have_another_colour() -> None:
 
 
 def test_png_and_svg_are_written_the_same_twice(layer_run: Any, tmp_path: Path) -> None:
-    for name in ("explored.astro", "last_seen.astro", "dust"):
-        for ending, start in ((".png", b"\x89PNG"), (".svg", b"<?xml")):
-            first, second = tmp_path / f"a{ending}", tmp_path / f"b{ending}"
-            draw_layer(layer_run, name, first)
-            draw_layer(layer_run, name, second)
-            assert first.read_bytes().startswith(start)
-            assert first.read_bytes() == second.read_bytes()
+    cases = [
+        (name, ending)
+        for name in ("dust", "explored.astro", "last_seen.astro")
+        for ending in STARTS
+    ]
+    for name, ending in some(cases, 3):
+        first, second = tmp_path / f"a{ending}", tmp_path / f"b{ending}"
+        draw_layer(layer_run, name, first)
+        draw_layer(layer_run, name, second)
+        assert first.read_bytes().startswith(STARTS[ending])
+        assert first.read_bytes() == second.read_bytes()
 
 
 def test_a_layer_of_another_step_is_another_picture(layer_run: Any, tmp_path: Path) -> None:

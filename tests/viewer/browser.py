@@ -24,7 +24,10 @@ def chromium() -> Iterator[Any]:
     if not CHROMIUM.exists():
         reason = f"there is no {CHROMIUM}: install Debian's package chromium"
         pytest.fail(reason) if required else pytest.skip(reason)
-    sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+    if not required:
+        pytest.importorskip("playwright", reason="playwright is not installed: the extra `browser`")
+    from playwright import sync_api
+
     with sync_api.sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=str(CHROMIUM), args=ARGUMENTS)
         yield browser

@@ -1,9 +1,9 @@
 """Samples of days from a fitted persona and from a Markov chain, as minutes."""
 
+from bisect import bisect_right
 from datetime import date
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fleet2d.fit.persona import FittedPersona
 from fleet2d.fit.timeline import DAY_S, I16, MINUTES, Timeline
@@ -75,11 +75,11 @@ def sample_markov(labels: I16, count: int, days: int, seed: int = 0) -> I16:
     for label in range(count):
         if not follows[label].any():
             follows[label] = share
-    limits: NDArray[np.int64] = follows.cumsum(axis=1)
+    limits: list[list[int]] = follows.cumsum(axis=1).tolist()
     draws = Draws(stream_key(seed, "fit", "markov"), 0)
     out = np.empty(days * MINUTES, np.int16)
-    at = int(np.searchsorted(share.cumsum(), draws.below(int(share.sum())), side="right"))
+    at = bisect_right(share.cumsum().tolist(), draws.below(int(share.sum())))
     for minute in range(len(out)):
         out[minute] = at
-        at = int(np.searchsorted(limits[at], draws.below(int(limits[at, -1])), side="right"))
+        at = bisect_right(limits[at], draws.below(limits[at][-1]))
     return out.reshape(-1, MINUTES)

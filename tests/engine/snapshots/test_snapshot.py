@@ -33,19 +33,19 @@ HOUSE = {
 }
 
 
-def house(duration: str = "20 min") -> dict[str, Any]:
+def house(duration: str = "10 min") -> dict[str, Any]:
     """Doors that people open, sensors, layers, people who react, robots that give way."""
     content = everything(duration, objects=HOUSE)
     content["changes"] = [
-        {"at": "9 min", "shut": "bath"},
-        {"at": "13 min", "lock": "hall"},
-        {"at": "17 min", "unlock": "hall"},
+        {"at": "4 min", "shut": "bath"},
+        {"at": "6 min", "lock": "hall"},
+        {"at": "8 min", "unlock": "hall"},
     ]
     seen = {name: {"store": True} for name in ("explored", "last_seen")}
-    content["floorplan"]["layers"] = {**seen, "costmap": {"store": True, "every": "10 min"}}
+    content["floorplan"]["layers"] = {**seen, "costmap": {"store": True, "every": "5 min"}}
     content["users"]["cleo"] = {"behaviors": ["reactions", "meander"]}
     content["robots"]["astro"]["gives_way"] = {}
-    content["robots"]["zed"] = {"type": "find", "user": "ana", "every": "5 min", "source": "rtp"}
+    content["robots"]["zed"] = {"type": "find", "user": "ana", "every": "3 min", "source": "rtp"}
     on = {"type": "tests.engine.test_events:Heard", "on": ["sensor", "user_lost"]}
     content["algorithms"] |= {"rtp": {"type": "rtp"}, "ltp": {"type": "ltp"}, "heard": on}
     content["metrics"] |= {"rtp_score": {"of": "rtp"}, "detections": {}, "coverage": {}}
@@ -75,14 +75,15 @@ def markov() -> dict[str, Any]:
     }
 
 
+LONG = "40 min" if THOROUGH else "20 min"
 SCENES: dict[str, Callable[[], dict[str, Any]]] = {
-    "every behavior": partial(everything, "40 min"),
-    "cameras that err": partial(full, "40 min"),
+    "every behavior": partial(everything, LONG),
+    "cameras that err": partial(full, LONG),
     "doors, sensors, layers": house,
     "after every step": partial(every_step, "4 min"),
-    "no users": lambda: scenario("40 min", robots={"astro": {"type": "patrol"}}),
-    "no robots": lambda: scenario("40 min", users={"ana": {"type": "meander"}}),
-    "nobody": lambda: scenario("40 min"),
+    "no users": lambda: scenario(LONG, robots={"astro": {"type": "patrol"}}),
+    "no robots": lambda: scenario(LONG, users={"ana": {"type": "meander"}}),
+    "nobody": lambda: scenario(LONG),
     "a household": routine,
     "chains": markov,
 }
@@ -148,12 +149,12 @@ def test_a_copy_of_a_copy_of_a_copy_goes_on_to_the_same_run(scene: str) -> None:
 
 def test_copies_can_be_changed_without_the_other_noticing() -> None:
     simulation = Simulation(house())
-    simulation.advance(700)
+    simulation.advance(350)
     twins = [way(simulation) for way in WAYS.values()]
     for twin in twins:
         twin.put("ana", "kitchen")
         twin.change(open="bath")
-        twin.advance(300)
+        twin.advance(150)
         assert simulation.state != twin.state
     assert undisturbed("doors, sensors, layers") == result(simulation)
     assert undisturbed("doors, sensors, layers") != result(twins[0])
@@ -244,7 +245,7 @@ def saved(path: Path, content: dict[str, Any] | None = None, steps: int = 500) -
 
 @pytest.mark.parametrize("scene", ["cameras that err", "doors, sensors, layers"])
 def test_another_process_goes_on_from_a_file(scene: str, tmp_path: Path) -> None:
-    path = saved(tmp_path / "run.fleet2d", SCENES[scene](), 1111)
+    path = saved(tmp_path / "run.fleet2d", SCENES[scene](), 555)
     done = process("-c", LOAD, str(path), timeout=300, PYTHONHASHSEED="3")
     assert 0 == done.returncode, done.stderr
     assert undisturbed(scene)[0]["run"] == done.stdout.strip()
