@@ -63,9 +63,9 @@ class SightEvent(NamedTuple):
     Attributes:
         event: user_seen or user_lost of a robot's camera, robot_seen or robot_lost of a user's;
             robot_near, robot_coming, robot_close or robot_calls, see `Attention`; called, when a
-            robot got a command, see `Situation.command`.
-        user: The user as perceived, empty if not recognized; or the robot.
-        x: Where the user or the robot was perceived last [m].
+            robot got a command, see `Situation.command`; or the name of an interrupt.
+        user: The user as perceived, empty if not recognized; or the robot; empty for interrupts.
+        x: Where the user or the robot was perceived last; of an interrupt, where the body is [m].
         y: Likewise.
     """
 

@@ -34,10 +34,10 @@ class SpanView:
 class Interrupt(Component):
     """A condition that ends the plans that wait for it, when it becomes true.
 
-    A plan waits for it by `plan.interrupt_on(name)`, a behavior by `listens`. The behavior is asked
-    again after the first step at which the condition holds and at the step before didn't; a
-    condition that holds at the first step of the waiting plan has to end before. What holds must
-    follow from the arguments alone.
+    A plan waits for it by `plan.interrupt_on(name)`, a behavior by `listens`. It happens at a step
+    at which the condition holds, and at the step before it didn't; the behavior is asked at the
+    step after. A condition that holds when the plan begins has to end before it can happen. It has
+    no keys, and whether it holds must follow from the arguments of `holds` alone.
     """
 
     kind: ClassVar[str] = "interrupt"
