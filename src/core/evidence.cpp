@@ -161,11 +161,11 @@ Views gather_views(View<const i64, 4> cells, const PatchSizes& patches, i64 bin_
     const i64 bins = cells.shape[0], count = patches.room.size(), rooms = patches.room_cells.size();
     Views views{Array<f64, 2>::empty({bins, rooms}), Array<f64, 2>::empty({bins, count}),
                 Array<f64, 2>::empty({bins, count}), Array<u8, 2>::empty({bins, count})};
-    const i64 numbers = cells.shape[1] * 2 * count;
+    const i64 numbers = cells.shape[1] * 2 * count, stride = cells.stride[0];
     for (i64 t = 0; t < bins; ++t) {
         // Robots mostly stand: what they have in view stays the same from bin to bin.
-        const View<const i64> row(cells.data + t * numbers, {numbers});
-        if (t > 0 && same(row, View<const i64>(row.data - numbers, {numbers}))) {
+        const View<const i64> row(cells.data + t * stride, {numbers});
+        if (t > 0 && same(row, View<const i64>(row.data - stride, {numbers}))) {
             repeat(views.room_watched, t);
             repeat(views.patch_watched, t);
             repeat(views.shown, t);

@@ -23,8 +23,8 @@ struct Views {
     Array<u8, 2> shown_parts;     // (bins, patches) `shown` in parts of 255, a half to the even one
 };
 
-// Convert cells in view to shares. `cells` (bins, robots, 2, patches), contiguous, are the sum over the steps of a bin,
-// and the maximum; of several robots, the one that saw most counts.
+// Convert cells in view to shares. `cells` (bins, robots, 2, patches), each bin contiguous, are the sum over the steps
+// of a bin, and the maximum; of several robots, the one that saw most counts.
 Views gather_views(View<const i64, 4> cells, const PatchSizes& patches, i64 bin_steps);
 
 // The probabilities of a person's places in consecutive stretches of bins.

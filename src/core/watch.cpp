@@ -113,6 +113,9 @@ private:
     // Add the view of the held pose for the looks not added yet; `bin` is a row of SightRecord::binned.
     void add_held(i64 bin);
 
+    // Set the bins before `bin` that nothing was added to.
+    void leave_empty(i64 bin);
+
     const WatchSetup& setup_;
     const PoseCache& cache_;
     const SightRecord& record_;
@@ -121,6 +124,7 @@ private:
     i64 slot_ = -1;  // of the held pose; -1 for none
     i64 looks_ = 0;  // that aren't added yet
     i64 last_look_ = NEVER;
+    i64 begun_ = 0;  // bins that are set
 };
 
 void Watcher::take(const Stance& stance, i64 step) {
@@ -170,14 +174,33 @@ void Watcher::mark(const Span& span, i64 step, View<i32> cells) {
 void Watcher::add_held(i64 bin) {
     if (slot_ < 0) return;
     cache_.last[slot_] = last_look_;
-    const i64 steps = looks_ * setup_.every;
+    const i64 steps = looks_ * setup_.every, patches = record_.patches();
     const View<i32> cells = cache_.cells[slot_];
-    for (i64 patch = 0; patch < record_.patches(); ++patch) record_.exposure[patch] += steps * cells[patch];
-    if (!record_.keeps_bins() || steps == 0) return;
+    if (!record_.keeps_bins()) {
+        for (i64 patch = 0; patch < patches; ++patch) record_.exposure[patch] += steps * cells[patch];
+        return;
+    }
+    if (steps == 0) return;
     const View<i64> binned = record_.binned[bin], most = record_.most[bin];
-    for (i64 patch = 0; patch < record_.patches(); ++patch) {
-        binned[patch] += steps * cells[patch];
-        most[patch] = std::max(most[patch], i64{cells[patch]});
+    if (begun_ <= bin) {
+        leave_empty(bin);
+        begun_ = bin + 1;
+        for (i64 patch = 0; patch < patches; ++patch) binned[patch] = steps * cells[patch];
+        for (i64 patch = 0; patch < patches; ++patch) most[patch] = cells[patch];
+        return;
+    }
+    if (steps == 1) {  // a robot that walks
+        for (i64 patch = 0; patch < patches; ++patch) binned[patch] += cells[patch];
+    } else {
+        for (i64 patch = 0; patch < patches; ++patch) binned[patch] += steps * cells[patch];
+    }
+    for (i64 patch = 0; patch < patches; ++patch) most[patch] = std::max(most[patch], i64{cells[patch]});
+}
+
+void Watcher::leave_empty(i64 bin) {
+    for (; begun_ < bin; ++begun_) {
+        std::ranges::fill(record_.binned[begun_], 0);
+        std::ranges::fill(record_.most[begun_], 0);
     }
 }
 
@@ -188,13 +211,6 @@ void Watcher::watch(const Window& window, i64 body, i64 first, i64 end) {
                                   [](i64 headings) { return headings > 0; });
     const i64 first_bin = floor_div(first, bin_steps);
     i64 bin = 0, next_bin = (first_bin + 1) * bin_steps;
-    if (bins && first < end) {
-        const i64 reached = floor_div(end - 1, bin_steps) - first_bin + 1;
-        for (i64 row = 0; row < reached; ++row) {
-            std::fill(record_.binned[row].begin(), record_.binned[row].end(), 0);
-            std::fill(record_.most[row].begin(), record_.most[row].end(), 0);
-        }
-    }
     for (i64 run = window.start[body]; run < window.start[body + 1]; ++run) {
         const i64 begin = std::max(first, window.step[run]), stop = std::min(end, window.run_end(body, run));
         if (window.away[run] != 0) {
@@ -224,6 +240,13 @@ void Watcher::watch(const Window& window, i64 body, i64 first, i64 end) {
         }
     }
     add_held(bin);
+    if (!bins || first == end) return;
+    const i64 reached = floor_div(end - 1, bin_steps) - first_bin + 1;
+    leave_empty(reached);
+    for (i64 row = 0; row < reached; ++row) {
+        const View<i64> binned = record_.binned[row];
+        for (i64 patch = 0; patch < record_.patches(); ++patch) record_.exposure[patch] += binned[patch];
+    }
 }
 
 }  // namespace

@@ -957,7 +957,7 @@ def look(walls: Mesh, lenses: tuple[Any, ...], errors: tuple[Any, ...], rule: tu
         radii: int64 (bodies,), of all bodies of the window, which hide each other; None: they don't.
 
     Returns:
-        The steps done (the stopping one included); the sightings, int64 (n, SIGHTING), see
+        The steps done (the stopping one included); the sightings, int64 (SIGHTING, n), with the columns of
         `SightingColumn`; and the identities that came into view or were lost, in order of (step, identity): step, identity
         and kind (USER_SEEN or USER_LOST), int64 (m,) each.
 

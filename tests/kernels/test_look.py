@@ -209,13 +209,13 @@ def looked(
     lenses, errors, rule = kernel_args(eyes, scene)
     rule = rule._replace(stop_lost=stops[0], stop_seen=stops[1])
     before = memory.about.copy()
-    done, sightings, *events = look(
+    done, columns, *events = look(
         home.mesh, lenses, errors, rule, *scene.window(first), memory, scene.shown, scene.radii()
     )
     counts = (memory.about - before)[..., [About.IN_VIEW, About.NOTICED]]
     return Seen(
         done,
-        [tuple(row) for row in sightings.tolist()],
+        [tuple(row) for row in columns.T.tolist()],
         list(zip(*(column.tolist() for column in events), strict=True)),
         counts.tolist(),
         memory.noticed.tolist(),

@@ -55,6 +55,12 @@ bool numbers_all(View<const i64> rooms, i64 count) {
     return next == count;
 }
 
+// Whether the numbers (robots, 2, patches) of each bin lie one after the other.
+bool is_bin_whole(View<const i64, 4> cells) {
+    const auto [bins, robots, two, patches] = cells.shape;
+    return cells.stride[2] == patches && (robots <= 1 || cells.stride[1] == two * patches);
+}
+
 bool begins(View<const i64> first, i64 bins) {
     for (i64 h = 0; h < first.size(); ++h) {
         if (h == 0 ? first[h] != 0 : first[h] <= first[h - 1]) return false;
@@ -74,9 +80,10 @@ void bind_evidence(nb::module_& m) {
                     "cells must be (bins, robots, 2, patches), and of each patch its room and its cells");
             require(numbers_all(room, room_cells.size()), "rooms of patches must ascend, and leave none out");
             require(bin_steps > 0 && all_in_range(room_cells, 1, INT64_MAX), "steps and rooms must not be empty");
-            const auto whole = Array<i64, 4>::copy_of(cells);  // in one piece
             nb::gil_scoped_release unlocked;
-            Views views = gather_views(whole, {room, patch_cells, room_cells}, bin_steps);
+            Array<i64, 4> copy;
+            if (!is_bin_whole(cells)) copy = Array<i64, 4>::copy_of(cells);
+            Views views = gather_views(is_bin_whole(cells) ? cells : copy, {room, patch_cells, room_cells}, bin_steps);
             return std::make_tuple(std::move(views.room_watched), std::move(views.patch_watched),
                                    std::move(views.shown), std::move(views.shown_parts));
         },

@@ -3,8 +3,9 @@
 #include "../occlusion.hpp"
 
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <cstddef>
-#include <cstring>
 
 #include "lens.hpp"
 #include "mesh.hpp"
@@ -64,10 +65,16 @@ void check_shown(View<const u64, 3> shown, const Lenses& lenses, const Window& w
     }
 }
 
-Array<i64, 2> rows_of(const std::vector<Sighting>& sightings) {
-    auto rows = Array<i64, 2>::empty({static_cast<i64>(sightings.size()), SIGHTING});
-    if (!sightings.empty()) std::memcpy(rows.data(), sightings.data(), sightings.size() * sizeof(Sighting));
-    return rows;
+// Column by column, as they are read.
+Array<i64, 2> columns_of(const std::vector<Sighting>& sightings) {
+    auto columns = Array<i64, 2>::empty({SIGHTING, static_cast<i64>(sightings.size())});
+    for (std::size_t row = 0; row < sightings.size(); ++row) {
+        const auto numbers = std::bit_cast<std::array<i64, SIGHTING>>(sightings[row]);
+        for (std::size_t column = 0; column < SIGHTING; ++column) {
+            columns(static_cast<i64>(column), static_cast<i64>(row)) = numbers[column];
+        }
+    }
+    return columns;
 }
 
 void check_memory(const SightMemory& memory, const Lenses& lenses, const ErrorTables& errors, i64 cameras, i64 users) {
@@ -155,7 +162,7 @@ is. X to POSTURE are as perceived.)")
                 const IdentityEvent& event = result.events[static_cast<std::size_t>(i)];
                 step[i] = event.step, identity[i] = event.identity, kind[i] = static_cast<i64>(event.kind);
             }
-            return std::tuple(result.steps, rows_of(result.sightings), std::move(step), std::move(identity),
+            return std::tuple(result.steps, columns_of(result.sightings), std::move(step), std::move(identity),
                               std::move(kind));
         },
         "walls"_a, "lenses"_a, "errors"_a, "rule"_a, "window"_a, "body"_a, "first_other"_a, "memory"_a,
@@ -176,7 +183,7 @@ Args:
     radii: int64 (bodies,), of all bodies of the window, which hide each other; None: they don't.
 
 Returns:
-    The steps done (the stopping one included); the sightings, int64 (n, SIGHTING), see
+    The steps done (the stopping one included); the sightings, int64 (SIGHTING, n), with the columns of
     `SightingColumn`; and the identities that came into view or were lost, in order of (step, identity): step, identity
     and kind (USER_SEEN or USER_LOST), int64 (m,) each.
 

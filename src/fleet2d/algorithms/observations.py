@@ -44,8 +44,9 @@ class Rows:
         return sum(map(len, self._blocks))
 
     def column(self, number: int) -> NDArray[np.int64]:
-        """Return a column of all rows: int64 (n,)."""
-        return np.concatenate([block[:, number] for block in self._blocks])
+        """Return a column of all rows: int64 (n,); of a single block it is a view."""
+        columns = [block[:, number] for block in self._blocks]
+        return columns[0] if len(columns) == 1 else np.concatenate(columns)
 
     @cached_property
     def whole(self) -> NDArray[np.int64]:

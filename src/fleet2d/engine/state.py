@@ -227,7 +227,7 @@ class State:
         for cameras in self.user_cameras:
             cameras.collect()
         ends = np.cumsum([0, *map(len, blocks)])
-        rows = np.empty((ends[-1], OBSERVATION), np.int64)
+        rows = np.empty((OBSERVATION, ends[-1]), np.int64).T  # columns are read as a whole
         index: Any = slice(None)  # of each sighting among the rows
         if len(blocks) > 1:
             steps = np.concatenate([block[:, STEP_COLUMN] for block in blocks])

@@ -306,9 +306,11 @@ class Cameras(Watcher):
                 yield self.row, SightEvent(event.event, event.detail, x, y)
 
     def collect(self) -> I64:
-        """Return the sightings since the last call, int64 (n, SIGHTING)."""
+        """Return the sightings since the last call, int64 (n, SIGHTING), stored by column."""
         blocks, self._sightings = self._sightings, []
-        return np.concatenate([NOTHING, *blocks])
+        if len(blocks) == 1:
+            return blocks[0]
+        return np.concatenate(blocks) if blocks else NOTHING
 
     def _look(self, bodies: Bodies, end: int, *, stop: bool = True) -> "_Look":
         may_redo = stop or self.later is not None
@@ -340,7 +342,8 @@ class Cameras(Watcher):
             self.radii,
         )
         events = list(zip(step.tolist(), identity.tolist(), kind.tolist(), strict=True))
-        looked = end = self.next_step + count
+        sightings, looked = sightings.T, self.next_step + count
+        end = looked
         if self.later is not None:
             before = SightMemory(*old_memory)
             sightings, differs = self.later.change(sightings, self.memory, before, window, looked)

@@ -86,10 +86,13 @@ class LayerBook:
             bins_of_areas = [area.take_bins(step) for area in self.areas]
             count = step // self._bin_steps - self._logged_bins
             self._logged_bins += count
-            bins = np.zeros((count, self._robots, 2, len(self._patches.room)), np.int64)
-            for area, rows in zip(self.areas, bins_of_areas, strict=True):
-                bins[:, area.row - self._first_robot] = rows
-            log.expose_bins(bins)
+            if len(bins_of_areas) == self._robots == 1:
+                log.expose_bins(bins_of_areas[0][:, np.newaxis])  # no copy
+            else:
+                bins = np.zeros((count, self._robots, 2, len(self._patches.room)), np.int64)
+                for area, rows in zip(self.areas, bins_of_areas, strict=True):
+                    bins[:, area.row - self._first_robot] = rows
+                log.expose_bins(bins)
         if self._exposes:
             exposure = np.zeros((self._robots, len(self._home.rooms)), np.int64)
             for area in self.areas:

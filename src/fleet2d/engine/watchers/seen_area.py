@@ -69,14 +69,13 @@ class SeenArea(Watcher):
         self._lenses = stack_lenses(lenses, [False] * len(lenses), context)
         self._open_lenses = self._lenses
         grid, none = (lattice.rows, lattice.columns), (0, 0)
-        bins = (LONGEST // bin_steps + 2 if bin_steps else 0, len(patches.room))
         self._record = SightRecord(
             first=np.full(grid, NEVER, np.int64),
             last=np.full(grid if keeps_last else none, NEVER, np.int64),
             exposure=np.zeros(len(patches.room), np.int64),
             counted=np.full(grid if len(lenses) > 1 else none, NEVER, np.int64),
-            binned=np.zeros(bins, np.int64),
-            most=np.zeros(bins, np.int64),
+            binned=np.zeros(none, np.int64),
+            most=np.zeros(none, np.int64),
         )
         self._bin_steps = bin_steps
         # Cells in view, summed and at most, from bin _first_bin on.
@@ -116,21 +115,29 @@ class SeenArea(Watcher):
             first, until = self.next_step, min(end, self.next_step + LONGEST)
             self.next_step = until
             runs = bodies.runs(self.row, first, until)
-            watch(self._setup, runs, 0, first, until, self._cache, self._record)
+            record, bins = self._record, self._new_bins(first, until)
             if self._bin_steps:
-                self._collect_bins(first)
+                record = record._replace(binned=bins[:, 0], most=bins[:, 1])
+            watch(self._setup, runs, 0, first, until, self._cache, record)
+            if self._bin_steps:
+                self._collect_bins(first, bins)
         return ()
 
     def catch_up(self) -> None:
         """Look up to the present step."""
         self.take(self._bodies, self._bodies.step)
 
-    def _collect_bins(self, begin: int) -> None:
+    def _new_bins(self, begin: int, end: int) -> I64:
+        """Return the bins that steps reach, not set yet: int64 (bins, 2, patches)."""
+        if not self._bin_steps:
+            return self._bins
+        count = (end - 1) // self._bin_steps - begin // self._bin_steps + 1
+        return np.empty((count, *self._bins.shape[1:]), np.int64)
+
+    def _collect_bins(self, begin: int, bins: I64) -> None:
         """Collect the bins of the steps from `begin` to the present one."""
         first = begin // self._bin_steps - self._first_bin
-        end = (self.next_step - 1) // self._bin_steps + 1 - self._first_bin
         open_bins = self._bins[first:]  # the last bin, if it has earlier steps
-        bins = np.stack([self._record.binned[: end - first], self._record.most[: end - first]], 1)
         if len(open_bins):
             bins[0, 0] += open_bins[0, 0]
             bins[0, 1] = np.maximum(bins[0, 1], open_bins[0, 1])

@@ -91,7 +91,7 @@ class SightingErrors:
             window: The poses of all bodies, from the first step of the span on.
             end: The step after the last one of the span.
         """
-        rows, identities = rows.copy(), rows[:, IDENTITY]
+        rows, identities = rows.copy("K"), rows[:, IDENTITY]
         poses: tuple[I64, ...] = ()
         for c in range(len(self._cameras)):
             here = np.flatnonzero(rows[:, CAMERA] == c)
