@@ -34,18 +34,22 @@ std::pair<Moment, i64> Legs::turn_aside(Moment now, f64 turn_rate, const Aside& 
 }
 
 Moment Legs::walk(Moment now, View<const i64, 2> route, f64 speed, f64 turn_rate) {
-    const auto timed = time_route(route, now.time, now.heading, speed, turn_rate);
-    const View<const i64, 2> rows = timed;
-    for (i64 i = 1; i < rows.size(); ++i) mark({rows(i, 0), rows(i, 1), rows(i, 2), rows(i, 3), 0});
-    const View<const i64> last = rows[rows.size() - 1];
-    return {last[0], last[1], last[2], last[3], now.away};
+    Moment end{now.time, route(0, 0), route(0, 1), now.heading, 0};
+    walk_route(route, now.time, now.heading, speed, turn_rate, [&](i64 time, i64 x, i64 y, i64 heading) {
+        end = {time, x, y, heading, 0};
+        mark(end);
+    });
+    end.away = now.away;
+    return end;
+}
+
+Moment Legs::step_to(Moment now, Point at, f64 speed, f64 turn_rate) {
+    const i64 route[] = {now.x, now.y, at.x, at.y};
+    return now.x == at.x && now.y == at.y ? now : walk(now, {route, {2, 2}}, speed, turn_rate);
 }
 
 Moment Legs::settle(Moment now, Point at, i64 heading, f64 speed, f64 turn_rate) {
-    if (now.x != at.x || now.y != at.y) {
-        const i64 route[] = {now.x, now.y, at.x, at.y};
-        now = walk(now, {route, {2, 2}}, speed, turn_rate);
-    }
+    now = step_to(now, at, speed, turn_rate);
     return turn(now, turn_between(now.heading, heading), turn_rate);
 }
 

@@ -46,7 +46,10 @@ public:
     // Walk along a route (n, 2), as `time_route`, at home. Returns where it ends.
     Moment walk(Moment now, View<const i64, 2> route, f64 speed, f64 turn_rate);
 
-    // Walk straight to a point, and turn to a heading there. Returns where it ends.
+    // Walk straight to a point, if it is another one. Returns where it ends.
+    Moment step_to(Moment now, Point at, f64 speed, f64 turn_rate);
+
+    // The same, and turn to a heading there. Returns where it ends.
     Moment settle(Moment now, Point at, i64 heading, f64 speed, f64 turn_rate);
 
     i64 size() const { return static_cast<i64>(rows_.size()); }

@@ -153,25 +153,13 @@ void trace_track(const Breakpoints& track, i64 begin, i64 step, const PosesToFil
 Array<i64, 2> time_route(View<const i64, 2> route, i64 begin, i64 heading, f64 speed, f64 turn_rate) {
     auto result = Array<i64, 2>::empty({2 * route.size(), 4});
     const View<i64, 2> rows = result;
-    i64 now = begin, count = 0;
-    const auto add = [&](i64 i) {
-        const i64 row[] = {now, route(i, 0), route(i, 1), heading};
+    i64 count = 0;
+    const auto add = [&](i64 time, i64 x, i64 y, i64 towards) {
+        const i64 row[] = {time, x, y, towards};
         std::copy_n(row, 4, rows[count++].begin());
     };
-    add(0);
-    for (i64 i = 1; i < route.size(); ++i) {
-        const i64 dx = route(i, 0) - route(i - 1, 0), dy = route(i, 1) - route(i - 1, 1);
-        if (dx == 0 && dy == 0) continue;
-        const i64 towards = heading_of(dx, dy);
-        const i64 turn = std::abs(turn_between(heading, towards));
-        if (turn > 0) {
-            now = later(now, static_cast<f64>(turn) * 1e6 / turn_rate);
-            heading = towards;
-            add(i - 1);
-        }
-        now = later(now, distance(0, 0, dx, dy) * 1e6 / speed);
-        add(i);
-    }
+    add(begin, route(0, 0), route(0, 1), heading);
+    walk_route(route, begin, heading, speed, turn_rate, add);
     result.truncate(count);
     return result;
 }

@@ -53,6 +53,25 @@ void trace_track(const Breakpoints& track, i64 begin, i64 step, const PosesToFil
 // now + the least whole number of microseconds that is not below `us`; LATEST at most.
 i64 later(i64 now, f64 us);
 
+// Turn on the spot towards each leg of a polyline, then walk it: call `add(time, x, y, heading)` at the end of each
+// turn and of each leg. The arguments are those of `time_route`.
+template <class Add>
+void walk_route(View<const i64, 2> route, i64 now, i64 heading, f64 speed, f64 turn_rate, Add add) {
+    for (i64 i = 1; i < route.size(); ++i) {
+        const i64 dx = route(i, 0) - route(i - 1, 0), dy = route(i, 1) - route(i - 1, 1);
+        if (dx == 0 && dy == 0) continue;
+        const i64 towards = heading_of(dx, dy);
+        const i64 turn = std::abs(turn_between(heading, towards));
+        if (turn > 0) {
+            now = later(now, static_cast<f64>(turn) * 1e6 / turn_rate);
+            heading = towards;
+            add(now, route(i - 1, 0), route(i - 1, 1), heading);
+        }
+        now = later(now, distance(0, 0, dx, dy) * 1e6 / speed);
+        add(now, route(i, 0), route(i, 1), heading);
+    }
+}
+
 // Turn a polyline into breakpoints: turn on the spot towards each leg, then walk it.
 //
 // `route` is (n, 2) lattice points, `begin` [us] and `heading` the state at route[0], `speed` in

@@ -1134,9 +1134,9 @@ class Legs:
             time, x, y, heading and away at the end.
         """
 
-    def go(self, time: int, x: int, y: int, heading: int, routes: Routes, to_x: int, to_y: int, speed: float, turn_rate: float) -> tuple[int, int, int, int, int] | None:
+    def go(self, time: int, x: int, y: int, heading: int, routes: Routes, to_x: int, to_y: int, speed: float, turn_rate: float, off: tuple[int, int] | None = None) -> tuple[int, int, int, int, int] | None:
         """
-        Walk the shortest way to a point, at home.
+        Walk the shortest way to a point, at home, from the point `off` to which it first steps, if that is given.
 
         Returns:
             time, x, y, heading and away at the end; None if no way leads there, or an end isn't strictly inside.

@@ -3,6 +3,7 @@
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 from enum import StrEnum
+from functools import partial
 from itertools import chain, islice
 from typing import NamedTuple, Protocol
 
@@ -77,6 +78,9 @@ CHANGES = frozenset(
     }
 )  # fmt: skip
 
+RANKS = {kind.value: 1 for kind in SIGHTS} | {kind.value: 2 for kind in CHANGES}
+"""The order among the events of one entity at one step: plans, 0, come before the others."""
+
 
 class Event(NamedTuple):
     """An event.
@@ -96,7 +100,11 @@ class Event(NamedTuple):
     @property
     def rank(self) -> int:
         """The order among the events of one entity at one step: plans, cameras, the home."""
-        return 1 if self.event in SIGHTS else 2 if self.event in CHANGES else 0
+        return RANKS.get(self.event, 0)
+
+
+# Makes an event from a tuple of its fields without calling Python code, as a run has many.
+new_event: Callable[[tuple[int, str, str, str]], Event] = partial(tuple.__new__, Event)
 
 
 class EventSink(Protocol):

@@ -91,11 +91,14 @@ def test_legs_equal_lists(seed: int) -> None:
             assert twin.now == list(after)
         elif what == 5:
             goal = random.integers(1, 4000, 2).tolist()
-            after = legs.go(time, x, y, heading, routes, *goal, SPEED, TURN_RATE)
-            inside = all(ROOM.contains(shapely.Point(point)) for point in ((x, y), goal))
+            off = None if random.random() < 0.5 else tuple(random.integers(1, 4000, 2).tolist())
+            after = legs.go(time, x, y, heading, routes, *goal, SPEED, TURN_RATE, off)
+            begin = off or (x, y)
+            inside = all(ROOM.contains(shapely.Point(point)) for point in (begin, goal))
             assert inside == (after is not None)
             if inside:
-                twin.walk(routes.find(x, y, *goal))
+                twin.walk(np.array([(x, y), begin]))
+                twin.walk(routes.find(*begin, *goal))
                 assert twin.now == list(after)
         else:
             block = np.array([[time + 10, 3, 4, 5, 1], [time + 20, 6, 7, 8, 0]])

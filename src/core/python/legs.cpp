@@ -113,18 +113,22 @@ Returns:
         .def(
             "go",
             [](Legs& self, i64 time, i64 x, i64 y, i64 heading, Routes& routes, i64 to_x, i64 to_y, f64 speed,
-               f64 turn_rate) -> std::optional<Row> {
+               f64 turn_rate, std::optional<std::pair<i64, i64>> off) -> std::optional<Row> {
+                const auto [from_x, from_y] = off.value_or(std::pair(x, y));
+                checked(time, from_x, from_y, heading, 0);
                 const Moment now = checked(time, x, y, heading, 0);
                 check_rates(speed, turn_rate);
                 const auto route = [&] {
                     const nb::gil_scoped_release unlocked;
-                    return routes.find({x, y}, {to_x, to_y});
+                    return routes.find({from_x, from_y}, {to_x, to_y});
                 }();
                 if (route == nullptr) return {};
-                return plain(self.walk(now, *route, speed, turn_rate));
+                return plain(
+                    self.walk(self.step_to(now, {from_x, from_y}, speed, turn_rate), *route, speed, turn_rate));
             },
             "time"_a, "x"_a, "y"_a, "heading"_a, "routes"_a, "to_x"_a, "to_y"_a, "speed"_a, "turn_rate"_a,
-            R"(Walk the shortest way to a point, at home.
+            "off"_a = nb::none(),
+            R"(Walk the shortest way to a point, at home, from the point `off` to which it first steps, if that is given.
 
 Returns:
     time, x, y, heading and away at the end; None if no way leads there, or an end isn't strictly inside.)")

@@ -28,7 +28,7 @@ from fleet2d.engine.watchers.sensors import Sensors
 from fleet2d.engine.watchers.watcher import Watcher
 from fleet2d.entities.behavior import SightEvent
 from fleet2d.entities.decisions import DecidingActor
-from fleet2d.events import Event, EventKind, EventStream
+from fleet2d.events import Event, EventKind, EventStream, new_event
 from fleet2d.floorplan.home.home import Home
 from fleet2d.kernels.look import SIGHTING
 from fleet2d.kernels.look import STEP as STEP_COLUMN
@@ -147,11 +147,11 @@ class State:
         step_us, name = actor.clock.step_us, actor.name
         if begin == len(notes) or notes[begin].time_us > step * step_us:
             return
-        events = []
+        last_us, events = step * step_us, []
         for time_us, event, detail in islice(notes, begin, None):
-            if time_us > step * step_us:
+            if time_us > last_us:
                 break
-            events.append(Event(-(-time_us // step_us), name, event, detail))
+            events.append(new_event((-(-time_us // step_us), name, event, detail)))
         self.notes_emitted[row] = begin + len(events)
         self.events.emit(events)
 

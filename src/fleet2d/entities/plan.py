@@ -1,7 +1,8 @@
 """Plans: the timed paths that behaviors return, followed until they are over or interrupted."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from datetime import datetime, timedelta
+from functools import partial
 from typing import TYPE_CHECKING, NamedTuple, Self
 
 import numpy as np
@@ -32,6 +33,10 @@ class Note(NamedTuple):
     time_us: int
     event: str
     detail: str
+
+
+# Makes a note from a tuple of its fields without calling Python code, as plans have many.
+_new_note: Callable[[tuple[int, str, str]], Note] = partial(tuple.__new__, Note)
 
 
 class Plan:
@@ -118,9 +123,11 @@ class Plan:
         self.come_home()
         self._check_goes_on()
         body, space = self._body, self._body.space
-        self._get_up(space)
-        if route is None and self._go_shortest(space, x, y):
+        off = self._get_up(space)
+        if route is None and self._go_shortest(space, x, y, off):
             return self
+        if off is not None:
+            self._step_to(*off)
         if route is None:
             route = space.route((self.x, self.y), (x, y))
         if route is None:
@@ -129,18 +136,13 @@ class Plan:
         self._walk(route)
         return self
 
-    def _go_shortest(self, space: Space, x: int, y: int) -> bool:
-        """Walk to a lattice point, if a shortest route between points in the space is all it takes.
-
-        Returns:
-            Whether it does; `go_to_point` does the rest in more steps.
-        """
+    def _go_shortest(self, space: Space, x: int, y: int, off: tuple[int, int] | None) -> bool:
+        """Step `off` an object and walk a shortest route, if that is all; return whether it was."""
         body, routes = self._body, space.shortest
         if routes is None or body.drive is not None:
             return False
-        end = self.legs.go(
-            self.time_us, self.x, self.y, self.heading, routes, x, y, body.speed, body.turn_rate
-        )
+        now = self.time_us, self.x, self.y, self.heading
+        end = self.legs.go(*now, routes, x, y, body.speed, body.turn_rate, off)
         if end is not None:
             self.time_us, self.x, self.y, self.heading, _ = end
         return end is not None
@@ -201,17 +203,17 @@ class Plan:
         times = [time for time, _ in self.postures]
         return np.array(times, np.int64), np.array(codes, np.int8)
 
-    def _get_up(self, space: Space) -> None:
-        """Stand up, and step off the object that the body sits or lies on."""
+    def _get_up(self, space: Space) -> tuple[int, int] | None:
+        """Stand up; return where it steps off the object that it sits or lies on; None: nowhere."""
         self.take("stand")
         body = self._body
         approach = body.home.approach_of((self.x, self.y))
         # Chairs round a table may leave a gap in which a body fits, but which it can't walk out of.
-        if approach is None or space.part_at(self.x, self.y) == body.part:
-            return
-        if space.part_at(*approach) != body.part:
-            approach = space.nearest(*approach, body.part) or approach
-        self._step_to(*approach)
+        if approach is None or space.part_of(self.x, self.y) == body.part:
+            return None
+        if space.part_of(*approach) == body.part:
+            return approach
+        return space.nearest(*approach, body.part) or approach
 
     def _step_to(self, x: int, y: int) -> None:
         """Go straight to a lattice point; neither walls nor furniture count."""
@@ -333,7 +335,7 @@ class Plan:
                 f"{self._body.path}: there is no event {event!r}{did_you_mean(event, KINDS)} A"
                 f" behavior declares its own: records = frozenset({{{event!r}}})"
             )
-        self.notes.append(Note(self.time_us, event, detail))
+        self.notes.append(_new_note((self.time_us, event, detail)))
         return self
 
     def call(self, user: str = "") -> Self:

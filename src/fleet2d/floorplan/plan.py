@@ -248,7 +248,11 @@ class FloorPlan:
 
     def room_at(self, x: float, y: float) -> Room | None:
         """Return the room that holds a place [m], or None outside the home and inside a wall."""
-        row, column = self.lattice.cell_of(*self.lattice.point_at((x, y)))
+        return self.room_of_point(*self.lattice.point_at((x, y)))
+
+    def room_of_point(self, x: int, y: int) -> Room | None:
+        """Return the room that holds a lattice point, or None in a wall and outside."""
+        row, column = self.lattice.cell_of(x, y)
         if not (0 <= row < self.lattice.rows and 0 <= column < self.lattice.columns):
             return None
         index = int(self.room_of_place[row, column])

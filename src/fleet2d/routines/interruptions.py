@@ -257,14 +257,14 @@ class _InterruptedDay:
 
     def _interrupt_activity(self, before: str, after: str) -> None:
         """Add errands and needs to an activity at home, in order of time."""
-        needs, away = self.rules.needs, self.rules.away
-        if before != self.doing.activity and before != SLEEP:
+        needs, away, activity = self.rules.needs, self.rules.away, self.doing.activity
+        if before != activity and before != SLEEP:
             self._do_errands(before)
+        wakes, begins_anew = before == SLEEP, before == SLEEP or before in away
         for i, need in enumerate(needs):
-            chance = need.on_waking if before == SLEEP else need.on_return
-            if (before == SLEEP or before in away) and self._happens(chance):
+            if begins_anew and self._happens(need.on_waking if wakes else need.on_return):
                 self._meet(i, self.now)
-            if self.doing.activity in need.met_by:
+            if activity in need.met_by:
                 self.due[i] = self.end + self._draw_time(need.every)
         self._meet_due_needs(after)
         if after in away:

@@ -34,14 +34,20 @@ class Life:
         self._day = stream_key(seed, path, "day")
         self._needs = stream_key(seed, path, "needs")
         self._cache: dict[int, Sequence[Doing]] = {}
+        self._templates: dict[int, DayPlan] = {}
 
     def __getstate__(self) -> dict[str, object]:
         """Leave out the days, which are drawn again: they are most of the state of many people."""
-        return {**self.__dict__, "_cache": {}}
+        return {**self.__dict__, "_cache": {}, "_templates": {}}
 
     def template(self, ordinal: int) -> DayPlan:
         """Return the plan of the template that a day is drawn from."""
-        return self.persona.plans[self.persona.day(date.fromordinal(ordinal))]
+        if ordinal not in self._templates:
+            if len(self._templates) >= CACHED_DAYS:
+                del self._templates[next(iter(self._templates))]
+            name = self.persona.day(date.fromordinal(ordinal))
+            self._templates[ordinal] = self.persona.plans[name]
+        return self._templates[ordinal]
 
     def wake(self, ordinal: int) -> int:
         """Return when a day begins [s since its midnight]."""

@@ -34,7 +34,8 @@ class KeyFrames:
         self._complete_until = [-1] * len(
             basis.actors
         )  # the end of the last plan, if it was reached
-        self._walked = [1] * count  # the step before which a random walk is collected
+        self._walkers: set[int] = set()  # bodies whose present plan is a random walk
+        self._walked = [1] * count  # the step before which it is collected
         self._moved: set[int] = set()  # bodies that were put elsewhere since their last plan
         self._blocks: list[NDArray[np.int64]] = []
         self._rows = 0
@@ -67,7 +68,10 @@ class KeyFrames:
         self._emitted[row] = int(is_joined)
         self._moved.discard(row)
         actor = self._actors[row]
-        if not isinstance(actor.motion, Track):
+        if isinstance(actor.motion, Track):
+            self._walkers.discard(row)
+        else:
+            self._walkers.add(row)
             self._blocks.append(_key(step, row, self._walk_kind, moment, actor.state))
         self.pass_by(row, step)
 
@@ -112,7 +116,7 @@ class KeyFrames:
 
         The poses of a random walk are forgotten afterwards, the breakpoints of a plan are not.
         """
-        for row in range(len(self._actors)):
+        for row in sorted(self._walkers):
             self._walk_on(row, end)
         self._end = end
 

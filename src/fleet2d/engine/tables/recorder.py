@@ -20,13 +20,14 @@ from fleet2d.engine.tables.key_frames import KeyFrames
 from fleet2d.engine.tables.samples import Samples
 from fleet2d.engine.watchers.cameras import Cameras
 from fleet2d.engine.watchers.sensors import Sensors
-from fleet2d.events import HOME, Event, EventKind
+from fleet2d.events import HOME, RANKS, Event, EventKind
 
 # Events whose detail is a user, who has a column of their own.
 OF_USERS = frozenset({EventKind.USER_LOST, EventKind.USER_SEEN})
 ACTIVITY = EventKind.ACTIVITY.value
-# Rows that are collected before they are stored.
+# Rows that are collected before they are stored: so many, or more with many bodies.
 MOST_ROWS = 1 << 15
+ROWS_OF_A_BODY = 128
 
 
 def activities_of(cameras: Sequence[Cameras], users: int) -> Activities:
@@ -69,6 +70,7 @@ class Recorder:
         self._rooms = NearestRooms(basis.home.plan)
         self._camera_codes = _codes_of(cameras)
         self._count = 0  # observations and readings
+        self._most = max(MOST_ROWS, ROWS_OF_A_BODY * len(basis.actors))
         self.wall_s = 0.0
 
     def before_plan(self, row: int, step: int) -> None:
@@ -112,7 +114,7 @@ class Recorder:
         self._readings += readings
         self._count += len(observations) + len(readings)
         count = self._count + self._samples.count + self._keys.count
-        if count + len(self._events) > MOST_ROWS:
+        if count + len(self._events) > self._most:
             self.drain()
 
     def end(self, step: int, rows: int) -> None:
@@ -178,30 +180,28 @@ class Recorder:
     def _store_events(self) -> None:
         if not self._events:
             return
-        users, events = self._users, self._events
-        steps = np.array([event.step for event in events], np.int64)
-        rows = np.array([self._rows[event.entity] for event in events], np.int32)
-        ranks = np.array([event.rank for event in events], np.int8)
-        order = np.lexsort((ranks, rows, steps))
-        events = [events[i] for i in order.tolist()]
+        users = self._users
+        step, entity, kind, detail = zip(*self._events, strict=True)
         self._events = []
-        is_of_user = [event.event in OF_USERS for event in events]
+        steps = np.array(step, np.int64)
+        rows = np.array([self._rows[name] for name in entity], np.int32)
+        ranks = np.array([RANKS.get(name, 0) for name in kind], np.int8)
+        order = np.lexsort((ranks, rows, steps))
+        kinds, details = ([column[i] for i in order.tolist()] for column in (kind, detail))
+        of_users = [i for i, name in enumerate(kinds) if name in OF_USERS]
         columns: dict[str, Any] = self._times(steps[order])
         if users:
-            user = [
-                users.get(event.detail, -1) if is_user else -1
-                for event, is_user in zip(events, is_of_user, strict=True)
-            ]
-            columns["user"] = np.array(user, np.int32)
+            user = np.full(len(kinds), -1, np.int32)
+            user[of_users] = [users.get(details[i], -1) for i in of_users]
+            columns["user"] = user
+        for i in of_users:
+            details[i] = ""
         self.store.append(
             "events",
             **columns,
             entity=rows[order],
-            event=[str(event.event) for event in events],
-            detail=[
-                "" if is_user else event.detail
-                for event, is_user in zip(events, is_of_user, strict=True)
-            ],
+            event=list(map(str, kinds)),
+            detail=details,
         )
 
     def _store_readings(self) -> None:

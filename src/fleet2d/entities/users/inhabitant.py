@@ -294,7 +294,7 @@ class Inhabitant(Behavior):
                 return place
             k = next_us.index(due_us)
             if moves[k].kind == "shifts":  # the first of the moves, also of those due at once
-                until_us = min([end_us, *(other_us + 1 for other_us in next_us[1:])])
+                until_us = min(end_us, min(next_us[1:], default=end_us) + 1)
                 next_us[0] = turn_aside(plan, moves[0], bits, facing, due_us, until_us)
                 continue
             plan.stay_until(due_us)

@@ -38,7 +38,7 @@ class SmallMove(NamedTuple):
 
     def wait_us(self, bits: Bits) -> int:
         """Draw the time to the next move [us] from its quantiles."""
-        return int(self.waits_us[bits.take(WAIT_BITS)])
+        return self.waits_us.item(bits.take(WAIT_BITS))
 
 
 @lru_cache(KINDS_KEPT)

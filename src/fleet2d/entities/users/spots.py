@@ -83,7 +83,7 @@ class Spots:
 
     def room_at(self, x: int, y: int) -> "Room | None":
         """Return the room that holds a lattice point."""
-        return self._actor.home.plan.room_at(*self.in_metres(x, y))
+        return self._actor.home.plan.room_of_point(x, y)
 
     def nearest(self, rooms: list["Room"], x: int, y: int) -> "Room":
         """Return the room whose middle is nearest to a lattice point, in a straight line."""
@@ -127,12 +127,13 @@ class Spots:
             share: Rank of the body, and number of bodies that share; None: as in its household.
         """
         self._check_version()
-        indices = frozenset(room.index for room in rooms)
-        key = (tuple(kinds), indices, posture, share, self._actor.part)
-        if key not in self._at_furniture:
-            share = share or (self.rank, self.members)
-            self._at_furniture[key] = self._find_seats(kinds, indices, posture, share)
-        return self._at_furniture[key]
+        key = (tuple(kinds), *[room.index for room in rooms], posture, share, self._actor.part)
+        seats = self._at_furniture.get(key)
+        if seats is None:
+            indices = frozenset(room.index for room in rooms)
+            seats = self._find_seats(kinds, indices, posture, share or (self.rank, self.members))
+            self._at_furniture[key] = seats
+        return seats
 
     def _check_version(self) -> None:
         """Forget the places of an earlier arrangement of doors and furniture."""

@@ -130,7 +130,7 @@ class Home:
     @property
     def hinders(self) -> bool:
         """Whether routes may be closed at present that are open at other times."""
-        return bool(self.shut) or self.costs_version > 1
+        return bool(self.shut) or (COSTMAP in self.layers and self.costs_version > 1)
 
     def costed(self, space: Space) -> Space:
         """Return the space of a body that pays the costs of the costmap; the same without one.

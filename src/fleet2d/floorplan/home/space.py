@@ -109,6 +109,7 @@ class Space:
         self.cells = lru_cache(None)(self._find_cells)
         self.nearest = lru_cache(CACHED_ROUTES)(self._find_nearest)
         self.part_about = lru_cache(CACHED_ROUTES)(self._find_part)
+        self.part_of = lru_cache(CACHED_ROUTES)(self.part_at)  # of places that bodies come back to
         self.rooms_of = lru_cache(None)(self._find_rooms)
 
     def __deepcopy__(self, memo: dict[int, object]) -> "Space":
