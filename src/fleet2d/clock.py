@@ -9,6 +9,9 @@ from numpy.typing import NDArray
 from fleet2d.errors import InputError
 
 MICROSECOND = timedelta(microseconds=1)
+HOUR_US = 3_600_000_000
+DAY_US = 24 * HOUR_US
+DAY_S = 86_400
 
 
 @dataclass(frozen=True)

@@ -43,3 +43,33 @@ def test_other_weights_are_said_to_have_changed(tmp_path: Path) -> None:
     np.save(tmp_path / "weights.npy", np.full(1, 1.0000001))
     again = fleet2d.reproduce(tmp_path / "run")
     assert [f"{tmp_path / 'weights.npy'} has changed since"] == again.causes
+
+
+DRIVE = """
+from fleet2d import Drive, Moment
+
+class Glides(Drive):
+    '''Never turns.'''
+    def moments(self, route):
+        length = sum(leg.length for leg in route.legs)
+        return [Moment(length / route.speed, length, route.heading)]
+"""
+
+
+def test_a_drive_and_errors_of_a_camera_are_noted(tmp_path: Path) -> None:
+    """Components are found wherever they stand, so that a study notices that one was edited."""
+    (tmp_path / "mine.py").write_text(DRIVE)
+    (tmp_path / "blurry.py").write_text(
+        "from fleet2d import PerceptionError\n\nclass Blurry(PerceptionError):\n"
+        "    '''Nothing changes.'''\n    def distort(self, sightings):\n        return sightings\n"
+    )
+    robot = {
+        "drive": {"type": f"{tmp_path.as_posix()}/mine:Glides"},
+        "camera": {
+            "range": [0, 4],
+            "angle_deg": 90,
+            "perception": {"errors": {"b": {"type": f"{tmp_path.as_posix()}/blurry:Blurry"}}},
+        },
+    }
+    files = input_files(fleet2d.load_scenario(scenario("10 min", robots={"astro": robot})))
+    assert {tmp_path / "mine.py", tmp_path / "blurry.py"} <= set(files)

@@ -1,5 +1,6 @@
 """Sightings of one camera, made for tests of errors of perception."""
 
+from datetime import datetime
 from typing import Any, cast
 
 import numpy as np
@@ -37,6 +38,7 @@ def sightings(
         camera="camera",
         users=("ana", "ben", "cleo"),
         home=cast(Home, None),
+        start=datetime(2026, 1, 5, 23),
         step_s=1.0,
         camera_heading=np.zeros(count),
         _stream=ErrorStream(seed, "robots.r", name),

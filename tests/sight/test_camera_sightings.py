@@ -127,3 +127,9 @@ def test_bell_shaped_draws_are_those_of_the_core() -> None:
 def test_a_class_without_distort_is_refused() -> None:
     with pytest.raises(TypeError, match="distort"):
         PerceptionError()  # type: ignore[abstract]
+
+
+def test_hour_is_the_time_of_day_also_after_midnight() -> None:
+    late = sightings([1.0, 1.0, 1.0], [0.0, 0.0, 0.0], step=[0, 1800, 2 * 3600])
+
+    assert [23.0, 23.5, 1.0] == late.hour.tolist()

@@ -34,7 +34,6 @@ from fleet2d.units import micros
 OPENS_AHEAD_US = 1_000_000
 # Time after which a change that a body blocks is tried again [us].
 RETRY_US = 1_000_000
-DAY_US = 86_400_000_000
 
 I64 = NDArray[np.int64]
 

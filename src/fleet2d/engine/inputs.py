@@ -1,8 +1,10 @@
 """The input files of a run."""
 
 import inspect
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, ValuesView
 from pathlib import Path
+
+from pydantic import BaseModel
 
 from fleet2d.artifacts.manifest import Manifest, input_record, is_regular
 from fleet2d.component import Component
@@ -53,19 +55,21 @@ def changed_inputs(manifest: Manifest) -> list[str]:
 
 def components_of(scenario: Scenario) -> Iterator[Component]:
     """Yield all components of a scenario, also those within others."""
-    queue: list[Component] = [scenario.floorplan, scenario.sight.method]
-    for entity in (*scenario.users.values(), *scenario.robots.values()):
-        queue += entity.behaviors
-    queue += scenario.objects.values()
-    queue += scenario.algorithms.values()
-    queue += scenario.metrics.values()
-    queue += [entry.act for entry in scenario.script]
-    for perception in _perceptions_of(scenario):
-        queue += perception.errors.values()
-    while queue:  # components may contain others, such as an algorithm its model
+    entities = (*scenario.users.values(), *scenario.robots.values())
+    holders = [scenario, scenario.sight, *entities, *scenario.script, *_perceptions_of(scenario)]
+    queue = [component for holder in holders for component in _components_in(holder)]
+    while queue:
         component = queue.pop()
         yield component
-        queue += [value for _, value in component if isinstance(value, Component)]
+        queue += _components_in(component)
+
+
+def _components_in(holder: BaseModel) -> Iterator[Component]:
+    """Yield the components among the values of fields, and in their lists and mappings."""
+    for _, value in holder:
+        values = value.values() if isinstance(value, Mapping) else value
+        several = values if isinstance(values, list | tuple | ValuesView) else (values,)
+        yield from (item for item in several if isinstance(item, Component))
 
 
 def _perceptions_of(scenario: Scenario) -> Iterator[Perception]:

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from fleet2d.clock import DAY_S
 from fleet2d.floorplan.rooms.vocabulary import room_type
 from fleet2d.logs.log import AWAY, ActivityLog, LogError
 from fleet2d.logs.rooms import DOOR, USUAL
@@ -15,7 +16,6 @@ from fleet2d.logs.visits import UNKNOWN, LoggedVisit, VisitRule, visits_of
 from fleet2d.units import micros
 
 MINUTES = 1440
-DAY_S = 86_400
 UNKNOWN_STATE = -1
 # Silence up to this counts as staying in the room, in general and in one room.
 HOLD = timedelta(hours=3)

@@ -121,8 +121,10 @@ def format_of_file(path: Path) -> str:
 
 def _unknown_format(path: Path) -> FloorPlanError:
     marks = [f"{_as_json(*mark)} ({kind})" for kind, mark in sorted(_marks().items())]
+    endings = [f", and doesn't end in {e} ({kind})" for e, kind in sorted(_suffixes().items())]
     return FloorPlanError(
         f"{path} is not a floor plan that Fleet2D can read: it has none of {', '.join(marks)}"
+        f"{''.join(endings)}"
     )
 
 
@@ -143,10 +145,18 @@ def _format_of(content: dict[str, Any]) -> str | None:
 def format_by_suffix(path: Path) -> str | None:
     """Return the `type` of floor plan that reads files with such an ending, if any declares it."""
     suffix = path.suffix.lower()
-    if suffix in ("", *JSON, *YAML):
-        return None
+    return None if suffix in ("", *JSON, *YAML) else _suffixes().get(suffix)
+
+
+def plan_suffixes() -> tuple[str, ...]:
+    """Return the endings of files that may be floor plans, pictures left out."""
+    return (*JSON, *YAML, *sorted(_suffixes()))
+
+
+def _suffixes() -> dict[str, str]:
+    """Return the `type` of floor plan for each ending that a format declares."""
     sources = components("floorplan").items()
-    return next((k for k, source in sources if suffix in getattr(source, "suffixes", ())), None)
+    return {suffix: kind for kind, src in sources for suffix in getattr(src, "suffixes", ())}
 
 
 def _marks() -> dict[str, tuple[str, str | None]]:

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fleet2d.bounds import LOG_BYTES, LOG_DAYS, LOG_ROWS, check_file
+from fleet2d.clock import DAY_US
 from fleet2d.errors import InputError
 
-DAY_US = 86_400_000_000
 # The most lines that a note lists.
 _MOST_NAMED = 20
 # The most characters in a line of a log.

@@ -22,7 +22,8 @@ from fleet2d.bounds import (
     one_line,
     unpacked_bytes,
 )
-from fleet2d.logs.log import DAY_US, LogError, PositionLog
+from fleet2d.clock import DAY_US
+from fleet2d.logs.log import LogError, PositionLog
 from fleet2d.logs.times import parse_time
 from fleet2d.problems import did_you_mean
 from fleet2d.units import micros

@@ -5,6 +5,7 @@ from typing import Any, ClassVar
 
 from fleet2d.algorithms.algorithm import Present
 from fleet2d.algorithms.history import History
+from fleet2d.clock import DAY_S
 from fleet2d.component import register
 from fleet2d.floorplan.home.home import Home
 from fleet2d.metrics.metric import Metric
@@ -62,7 +63,7 @@ class BatteryUse(Metric):
             present = self.steps - self.docked_at[name] if name in self.docked_at else 0
             numbers[name] = {
                 "lowest": lowest,
-                "dockings": self.dockings.get(name, 0) / (self.steps * self.step_s / 86400),
+                "dockings": self.dockings.get(name, 0) / (self.steps * self.step_s / DAY_S),
                 "charging": (self.charging.get(name, 0) + present) / self.steps,
             }
             if name in self.empty_at:

@@ -9,6 +9,7 @@ from pydantic import Field
 
 from fleet2d.algorithms.algorithm import Present
 from fleet2d.algorithms.history import History
+from fleet2d.clock import DAY_S
 from fleet2d.component import register
 from fleet2d.floorplan.home.home import Home
 from fleet2d.metrics.metric import Metric
@@ -67,7 +68,7 @@ class Blocking(Metric):
         for event in history.events:
             if event.event == "reacts" and event.detail in steps_aside:
                 self.asides[steps_aside[event.detail], event.entity] += 1
-        self.days += len(history) * history.step_s / 86400
+        self.days += len(history) * history.step_s / DAY_S
 
     def result(self) -> dict[str, Any]:
         """Return {robot: {user: {blocks, seconds}}}, with asides if there were any, per day."""

@@ -5,6 +5,7 @@ from typing import Any, ClassVar
 
 from fleet2d.algorithms.algorithm import Present
 from fleet2d.algorithms.history import History
+from fleet2d.clock import DAY_S
 from fleet2d.component import register
 from fleet2d.floorplan.home.home import Home
 from fleet2d.metrics.metric import Metric
@@ -29,7 +30,7 @@ class Distance(Metric):
             between = dist(self.last[name], poses.at(0)) if name in self.last else 0.0
             self.metres[name] = self.metres.get(name, 0.0) + between + poses.distance
             self.last[name] = poses.at(-1)
-        self.days += len(history) * history.step_s / 86400
+        self.days += len(history) * history.step_s / DAY_S
 
     def result(self) -> dict[str, Any]:
         """Return {name: metres per day}."""

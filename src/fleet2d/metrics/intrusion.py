@@ -8,6 +8,7 @@ import numpy as np
 
 from fleet2d.algorithms.algorithm import Present
 from fleet2d.algorithms.history import History
+from fleet2d.clock import DAY_S
 from fleet2d.component import register
 from fleet2d.floorplan.home.home import Home
 from fleet2d.metrics.metric import Metric
@@ -50,7 +51,7 @@ class Intrusion(Metric):
             total[:] = [a + b for a, b in zip(total, minutes, strict=True)]
             for name, value in zip(rows, (pair.robot, pair.user, *minutes), strict=True):
                 rows[name].append(value)
-        self.days += len(history) * history.step_s / 86400
+        self.days += len(history) * history.step_s / DAY_S
         return {name: np.array(column) for name, column in rows.items()} if rows["robot"] else None
 
     def result(self) -> dict[str, Any]:

@@ -12,8 +12,6 @@ from fleet2d.algorithms.poses import BodyPoses
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.kernels.points import points_in_sight
 
-DAY_S = 86_400.0
-
 Bool = NDArray[np.bool_]
 
 

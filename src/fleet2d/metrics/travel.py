@@ -10,6 +10,7 @@ from pydantic import Field
 
 from fleet2d.algorithms.algorithm import Present
 from fleet2d.algorithms.history import History
+from fleet2d.clock import DAY_S
 from fleet2d.component import register
 from fleet2d.floorplan.home.home import Home
 from fleet2d.metrics.metric import Metric
@@ -64,7 +65,7 @@ class Travel(Metric):
                     self._rest(robot, place)
             assert standing is not None
             self.standing[robot] = standing
-        self.days += len(history) * history.step_s / 86400
+        self.days += len(history) * history.step_s / DAY_S
 
     def _rest(self, robot: str, place: Place) -> None:
         if robot in self.last_rest and dist(self.last_rest[robot], place) > self.apart:

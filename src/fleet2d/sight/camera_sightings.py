@@ -3,11 +3,13 @@
 import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
+from datetime import datetime
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fleet2d.clock import DAY_US, HOUR_US, midnight_of
 from fleet2d.errors import ComponentError
 from fleet2d.floorplan.home.home import Home
 from fleet2d.kernels.headings import QUARTER, TURN, UNIT, half_sines
@@ -15,6 +17,7 @@ from fleet2d.kernels.measure import rooms_at
 from fleet2d.kernels.perception import NOBODY, ONE, POSTURES, random_shares
 from fleet2d.kernels.random import BELL_STD, random_bells
 from fleet2d.streams import stream_key
+from fleet2d.units import micros
 
 I64 = NDArray[np.int64]
 F64 = NDArray[np.float64]
@@ -59,6 +62,7 @@ class CameraSightings:
         camera: Name of the camera.
         users: Names of the users: user 0 is the first.
         home: The home.
+        start: Local time of step 0.
         step_s: Length of a step [s].
         step: Step of the look: int64 (n,).
         user: Who it seems to be, -1 if not recognized: int64 (n,).
@@ -80,6 +84,7 @@ class CameraSightings:
     camera: str
     users: Sequence[str]
     home: Home
+    start: datetime
     step_s: float
     step: I64
     user: I64
@@ -112,6 +117,13 @@ class CameraSightings:
     def distance(self) -> F64:
         """Perceived distance from the camera [m]: float64 (n,)."""
         return np.sqrt((self.x - self.camera_x) ** 2 + (self.y - self.camera_y) ** 2)
+
+    @property
+    def hour(self) -> F64:
+        """Time of day of the look [hours], from 0 to 24: float64 (n,)."""
+        midnight_us = micros(self.start - midnight_of(self.start))
+        day_us = (midnight_us + self.step * round(self.step_s * 1e6)) % DAY_US
+        return day_us / HOUR_US
 
     @property
     def true_room(self) -> NDArray[np.int16]:

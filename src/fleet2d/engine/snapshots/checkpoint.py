@@ -13,7 +13,7 @@ from fleet2d.artifacts.journal import Commit
 from fleet2d.artifacts.manifest import Manifest
 from fleet2d.artifacts.settings import ArtifactSettings
 from fleet2d.artifacts.store import RunStore
-from fleet2d.clock import Clock
+from fleet2d.clock import DAY_US, Clock
 from fleet2d.engine.snapshots.snapshot import (
     Constants,
     UnstorableStateError,
@@ -26,7 +26,6 @@ from fleet2d.errors import ArtifactError, RunDirectoryError
 from fleet2d.garbage import release_memory
 from fleet2d.units import micros
 
-DAY_US = 86_400_000_000
 # Longest wall time between commits of rows [s]; they are also committed every simulated day.
 COMMIT_S = 2.0
 # `auto`: a checkpoint is written after this much computing [s], or this much wall time [s] in a run

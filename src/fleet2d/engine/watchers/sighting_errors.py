@@ -157,6 +157,7 @@ class SightingErrors:
             camera=camera,
             users=self._users,
             home=owner.home,
+            start=owner.clock.start,
             step_s=owner.clock.step_us / 1e6,
             step=looks.copy(),
             user=rows[:, IDENTITY].copy(),

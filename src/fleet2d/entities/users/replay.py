@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import BeforeValidator, Field, WithJsonSchema
 
-from fleet2d.clock import midnight_of
+from fleet2d.clock import DAY_US, midnight_of
 from fleet2d.component import register
 from fleet2d.entities.behavior import Behavior, Situation
 from fleet2d.entities.plan import Plan
@@ -15,7 +15,7 @@ from fleet2d.entities.users.follow_fixes import FixFollower, place_fixes
 from fleet2d.entities.users.follow_rooms import RoomFollower
 from fleet2d.entities.users.replay_report import report_fixes, report_rooms
 from fleet2d.logs.frame import Frame
-from fleet2d.logs.log import DAY_US, ActivityLog, LogError, PositionLog
+from fleet2d.logs.log import ActivityLog, LogError, PositionLog
 from fleet2d.logs.read import Layout, read_log
 from fleet2d.logs.rooms import map_rooms
 from fleet2d.logs.visits import LoggedVisit, VisitRule, visits_of

@@ -11,6 +11,7 @@ from pydantic import Field
 from fleet2d.algorithms.algorithm import Present
 from fleet2d.algorithms.history import History
 from fleet2d.algorithms.presence.belief import ANYONE, Presence
+from fleet2d.clock import DAY_S
 from fleet2d.component import register
 from fleet2d.floorplan.home.home import Home
 from fleet2d.metrics.metric import Metric
@@ -34,7 +35,6 @@ from fleet2d.units import PositiveDuration, Share
 F64 = NDArray[np.float64]
 I64 = NDArray[np.int64]
 
-DAY_S = 86_400
 MEAN = "mean"
 SHOWN = ("tv", "earth_mover_m", "inside", "burn_in_day")  # in the closing table
 COLUMNS = ("tv", "js", "kl", "max_gap", "mean_gap", "tau")

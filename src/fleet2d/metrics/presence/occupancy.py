@@ -9,7 +9,7 @@ from fleet2d.algorithms.algorithm import Present
 from fleet2d.algorithms.history import History
 from fleet2d.algorithms.observations import NOWHERE
 from fleet2d.algorithms.presence.belief import HOURS
-from fleet2d.clock import midnight_of
+from fleet2d.clock import HOUR_US, midnight_of
 from fleet2d.floorplan.cache import read_only
 from fleet2d.floorplan.home.home import Home
 from fleet2d.floorplan.home.space import Space
@@ -19,7 +19,6 @@ from fleet2d.units import micros
 I64 = NDArray[np.int64]
 F64 = NDArray[np.float64]
 
-HOUR_US = 3_600_000_000
 # Clearance that a person needs to walk from room to room [m].
 RADIUS = 0.2
 

@@ -12,15 +12,6 @@ from fleet2d.studies.axes.axis import Axis
 from fleet2d.studies.axes.choice import Choice
 from fleet2d.studies.axes.count import Count
 
-FLOORPLAN_SUFFIXES = (".json", ".geojson", ".yaml", ".yml")
-
-
-def _is_plan(path: Path) -> bool:
-    """Return whether a file has the ending of a floor plan."""
-    from fleet2d.floorplan.load import format_by_suffix
-
-    return path.suffix.lower() in FLOORPLAN_SUFFIXES or format_by_suffix(path) is not None
-
 
 def _texts(value: Any) -> tuple[Any, ...]:
     """Return a text or a list of texts as a tuple; each keeps the folder of its file."""
@@ -62,15 +53,18 @@ class FloorplansAxis(Axis):
         ]
 
     def _files(self) -> list[Path]:
+        from fleet2d.floorplan.load import plan_suffixes
+
         files: list[Path] = []
+        suffixes = plan_suffixes()
         for pattern in self.floorplans:
             path = folder_of(pattern) / Path(pattern).expanduser()
             candidates = path.iterdir() if path.is_dir() else path.parent.glob(path.name)
-            plans = sorted(p for p in candidates if _is_plan(p))
+            plans = sorted(p for p in candidates if p.suffix.lower() in suffixes)
             if not plans:
                 raise ScenarioError(
                     f"no floor plan matches {pattern!r} in {folder_of(pattern)}: name a folder, a"
-                    f" pattern or a file that ends in {', '.join(FLOORPLAN_SUFFIXES)}"
+                    f" pattern or a file that ends in {', '.join(suffixes)}"
                 )
             files += plans
         return files
