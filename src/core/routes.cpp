@@ -119,17 +119,6 @@ struct Search {
     }
 };
 
-Array<i64, 2> rows_of(const std::vector<Point>& points) {
-    auto rows = Array<i64, 2>::empty({static_cast<i64>(points.size()), 2});
-    i64 count = 0;
-    for (const Point point : points) {
-        rows(count, 0) = point.x;
-        rows(count, 1) = point.y;
-        ++count;
-    }
-    return rows;
-}
-
 }  // namespace
 
 RouteGraph build_route_graph(const Mesh& mesh, const Corners& corners) {
@@ -163,12 +152,12 @@ RouteGraph build_route_graph(const Mesh& mesh, const Corners& corners) {
     return graph;
 }
 
-Array<i64, 2> find_route(const Mesh& mesh, const RouteGraph& graph, Point start, Point goal) {
+std::vector<Point> find_route(const Mesh& mesh, const RouteGraph& graph, Point start, Point goal) {
     const i64 start_triangle = locate(mesh, start.x, start.y), goal_triangle = locate(mesh, goal.x, goal.y);
-    if (start_triangle == OUTSIDE || goal_triangle == OUTSIDE) return rows_of({});
+    if (start_triangle == OUTSIDE || goal_triangle == OUTSIDE) return {};
     if ((start.x == goal.x && start.y == goal.y) ||
         line_of_sight(mesh, start.x, start.y, start_triangle, goal.x, goal.y)) {
-        return rows_of({start, goal});
+        return {start, goal};
     }
     Search search{mesh, graph, goal};
     Finder finder{mesh, graph.corners(), graph.node_of_vertex};
@@ -177,29 +166,59 @@ Array<i64, 2> find_route(const Mesh& mesh, const RouteGraph& graph, Point start,
         search.open(node, gap(start, search.at(node)), -1);
     }
     const i64 last = search.run();
-    return rows_of(last < 0 ? std::vector<Point>{} : search.path(start, last));
+    return last < 0 ? std::vector<Point>{} : search.path(start, last);
 }
 
-std::size_t KnownRoutes::Hash::operator()(const Ends& ends) const {
-    const auto pair = [](Point at) { return static_cast<u64>(at.x) << 32 | static_cast<u64>(at.y); };
-    return random_bits(pair(ends.start), pair(ends.goal));
+KnownRoutes::Slot& KnownRoutes::slot_of(Small start, Small goal) {
+    const auto bits = [](Small at) { return static_cast<u64>(static_cast<u32>(at.x)) << 32 | static_cast<u32>(at.y); };
+    const std::size_t last = slots_.size() - 1;
+    std::size_t i = random_bits(bits(start), bits(goal)) & last;
+    while (slots_[i].count > 0 && !(slots_[i].start == start && slots_[i].goal == goal)) i = (i + 1) & last;
+    return slots_[i];
 }
 
-std::shared_ptr<const Array<i64, 2>> KnownRoutes::find(const Mesh& mesh, const RouteGraph& graph, Point start,
-                                                       Point goal) {
-    const Ends ends{start, goal};
+void KnownRoutes::put(Small start, Small goal, const std::vector<Point>& route) {
+    if (size_ >= MOST) {
+        size_ = 0;
+        slots_.assign(16, {});
+        points_.clear();
+    }
+    if (2 * size_ >= slots_.size()) {
+        const std::vector<Slot> slots = std::exchange(slots_, std::vector<Slot>(2 * slots_.size()));
+        for (const Slot& slot : slots) {
+            if (slot.count > 0) slot_of(slot.start, slot.goal) = slot;
+        }
+    }
+    Slot& slot = slot_of(start, goal);
+    if (slot.count > 0) return;  // another thread was quicker
+    slot = {start, goal, static_cast<u32>(points_.size()), static_cast<u32>(route.size())};
+    for (const Point at : route) points_.push_back({static_cast<i32>(at.x), static_cast<i32>(at.y)});
+    ++size_;
+}
+
+std::vector<Point> KnownRoutes::find(const Mesh& mesh, const RouteGraph& graph, Point start, Point goal) {
+    for (const i64 number : {start.x, start.y, goal.x, goal.y}) {
+        if (number != static_cast<i32>(number)) return {};  // no home is there
+    }
+    const Small from{static_cast<i32>(start.x), static_cast<i32>(start.y)};
+    const Small to{static_cast<i32>(goal.x), static_cast<i32>(goal.y)};
+    std::vector<Point> points;
+    const auto known = [&] {
+        const Slot& slot = slot_of(from, to);
+        points.reserve(slot.count);
+        for (u32 i = 0; i < slot.count; ++i) points.push_back({points_[slot.begin + i].x, points_[slot.begin + i].y});
+        return slot.count > 0;
+    };
     {
         const std::lock_guard lock(mutex_);
-        const auto known = routes_.find(ends);
-        if (known != routes_.end()) return known->second;
+        if (known()) return points;
     }
     if (!strictly_inside(mesh, start.x, start.y) || !strictly_inside(mesh, goal.x, goal.y)) return {};
-    auto route = std::make_shared<const Array<i64, 2>>(find_route(mesh, graph, start, goal));
-    if (route->size() == 0) return {};
+    points = find_route(mesh, graph, start, goal);
+    if (points.empty()) return points;
     const std::lock_guard lock(mutex_);
-    if (routes_.size() >= MOST) routes_.clear();
-    routes_.emplace(ends, route);
-    return route;
+    put(from, to, points);
+    return points;
 }
 
 }  // namespace fleet2d

@@ -6,9 +6,8 @@
 // floats (sums of correctly rounded square roots, the same on every machine).
 #pragma once
 
-#include <memory>
 #include <mutex>
-#include <unordered_map>
+#include <vector>
 
 #include "mesh.hpp"
 
@@ -39,28 +38,43 @@ struct RouteGraph {
 // Connect all corners of a space that see each other along a taut leg.
 RouteGraph build_route_graph(const Mesh& mesh, const Corners& corners);
 
-// The shortest path from `start` to `goal`, (points, 2); empty where there is none, or an end lies
+// The points of the shortest path from `start` to `goal`; empty where there is none, or an end lies
 // outside the space. Both ends are strictly inside: a goal on the border is not seen by the last corner.
 // Ties go to the lower node: nodes are sorted by position, so the path depends on the walls only.
-Array<i64, 2> find_route(const Mesh& mesh, const RouteGraph& graph, Point start, Point goal);
+std::vector<Point> find_route(const Mesh& mesh, const RouteGraph& graph, Point start, Point goal);
+
+// Points as rows, (points, 2).
+inline View<const i64, 2> rows_of(const std::vector<Point>& points) {
+    return {&points.data()->x, {static_cast<i64>(points.size()), 2}};
+}
 
 // The routes that were found last: bodies go the same ways day after day. Threads may share it.
+//
+// Of many people, the ways of one push those of another out of the processor's caches, so it is a table of few bytes.
 class KnownRoutes {
 public:
-    // As `find_route`; null where there is none, or an end isn't strictly inside.
-    std::shared_ptr<const Array<i64, 2>> find(const Mesh& mesh, const RouteGraph& graph, Point start, Point goal);
+    // As `find_route`; empty where there is none, or an end isn't strictly inside.
+    std::vector<Point> find(const Mesh& mesh, const RouteGraph& graph, Point start, Point goal);
 
 private:
-    static constexpr std::size_t MOST = 1 << 17;  // of about 200 bytes each; then it begins anew
-    struct Ends {
-        Point start, goal;
-        bool operator==(const Ends&) const = default;
+    static constexpr std::size_t MOST = 1 << 17;  // then it begins anew
+    struct Small {
+        i32 x, y;
+        bool operator==(const Small&) const = default;
     };
-    struct Hash {
-        std::size_t operator()(const Ends& ends) const;
+    struct Slot {
+        Small start, goal;
+        u32 begin, count;  // of its points; a slot without points is free
     };
+
+    // The slot of a route, or the free one where it belongs.
+    Slot& slot_of(Small start, Small goal);
+    void put(Small start, Small goal, const std::vector<Point>& route);
+
     std::mutex mutex_;
-    std::unordered_map<Ends, std::shared_ptr<const Array<i64, 2>>, Hash> routes_;
+    std::size_t size_ = 0;
+    std::vector<Slot> slots_{16};  // a power of two, at most half of them taken
+    std::vector<Small> points_;
 };
 
 }  // namespace fleet2d

@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterable, Sequence
 from enum import StrEnum
 from functools import partial
 from itertools import chain, islice
+from operator import itemgetter
 from typing import NamedTuple, Protocol
 
 from fleet2d.errors import InputError
@@ -103,6 +104,7 @@ class Event(NamedTuple):
         return RANKS.get(self.event, 0)
 
 
+STEP = itemgetter(0)
 # Makes an event from a tuple of its fields without calling Python code, as a run has many.
 new_event: Callable[[tuple[int, str, str, str]], Event] = partial(tuple.__new__, Event)
 
@@ -152,7 +154,7 @@ class EventStream:
         excess = len(self._recent) + len(events) - self.CAPACITY
         if excess > 0:
             oldest = islice(chain(self._recent, events), excess)
-            self._first_step = max(self._first_step, *(e.step + 1 for e in oldest))
+            self._first_step = max(self._first_step, max(map(STEP, oldest)) + 1)
         self._recent.extend(events)
         for sink in self.sinks:
             sink.take_events(events)

@@ -122,9 +122,9 @@ Returns:
                     const nb::gil_scoped_release unlocked;
                     return routes.find({from_x, from_y}, {to_x, to_y});
                 }();
-                if (route == nullptr) return {};
-                return plain(
-                    self.walk(self.step_to(now, {from_x, from_y}, speed, turn_rate), *route, speed, turn_rate));
+                if (route.empty()) return {};
+                const Moment off_it = self.step_to(now, {from_x, from_y}, speed, turn_rate);
+                return plain(self.walk(off_it, rows_of(route), speed, turn_rate));
             },
             "time"_a, "x"_a, "y"_a, "heading"_a, "routes"_a, "to_x"_a, "to_y"_a, "speed"_a, "turn_rate"_a,
             "off"_a = nb::none(),

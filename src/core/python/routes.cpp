@@ -40,8 +40,8 @@ auto state_of(nb::handle_t<Routes> self) {
 
 std::optional<Array<i64, 2>> find(Routes& self, i64 ax, i64 ay, i64 bx, i64 by) {
     const auto points = self.find({ax, ay}, {bx, by});
-    if (points == nullptr) return std::nullopt;
-    return Array<i64, 2>::copy_of(*points);
+    if (points.empty()) return std::nullopt;
+    return Array<i64, 2>::copy_of(rows_of(points));
 }
 
 template <auto Member>

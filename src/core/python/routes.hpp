@@ -1,7 +1,7 @@
 // Routes as Python holds them.
 #pragma once
 
-#include <memory>
+#include <vector>
 
 #include "../routes.hpp"
 #include "mesh.hpp"
@@ -14,10 +14,8 @@ public:
     // Raises ValueError: the corners aren't what `Corners` says.
     Routes(nb::handle_t<OwnedMesh> mesh, const Corners& corners);
 
-    // The shortest path, (points, 2); null where there is none, or an end isn't strictly inside the space.
-    std::shared_ptr<const Array<i64, 2>> find(Point start, Point goal) {
-        return known_.find(mesh_, graph_, start, goal);
-    }
+    // The points of the shortest path; none where there is none, or an end isn't strictly inside the space.
+    std::vector<Point> find(Point start, Point goal) { return known_.find(mesh_, graph_, start, goal); }
 
     nb::object owner() const { return owner_; }
     const RouteGraph& graph() const { return graph_; }
