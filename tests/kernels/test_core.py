@@ -282,6 +282,7 @@ CALLS: dict[str, Args] = {
     "random_below": lambda: (KEY, 4, 100),
     "random_uniform": lambda: (KEY, 4),
     "random_bell": lambda: (KEY, 4),
+    "random_bells": lambda: (KEY, np.arange(5)),
     "hides": lambda: (300, 40, 150, 30, 60),
     "near_wedge": lambda: (100, 300, 50, 60, 20),
     "in_wedge": lambda: (100, 300, 50, 60),

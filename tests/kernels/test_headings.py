@@ -18,9 +18,11 @@ from fleet2d.kernels.headings import (
     UNIT,
     cosine,
     half_sine,
+    half_sines,
     heading_of,
     sine,
     turn_between,
+    turned,
 )
 
 # Two libms differ by an ulp of the sine, times UNIT: 2**-53 * 2**30.
@@ -180,3 +182,17 @@ def test_vectors_whose_products_would_leave_64_bits_are_refused() -> None:
         with pytest.raises(ValueError, match=r"within 2\*\*31"):
             heading_of(dx, dy)
     assert [512, 3584] == [heading_of(2**31, 2**31), heading_of(2**31, -(2**31))]
+
+
+def test_the_table_of_a_whole_turn_has_the_sine_of_each_angle() -> None:
+    assert [int(half_sine(i)) for i in range(2 * TURN)] == half_sines().tolist()
+
+
+@quick
+@given(st.integers(-(2**31), 2**31), st.integers(-(2**31), 2**31), st.integers(-9000, 9000))
+def test_turned_points_are_the_nearest_to_the_exact_ones(x: int, y: int, angle: int) -> None:
+    columns = (np.array([value], np.int64) for value in (x, y, angle))
+    new_x, new_y = (int(column[0]) for column in turned(*columns))
+    along, up = int(half_sine(angle + 2 * QUARTER)), int(half_sine(angle))
+    assert abs(2 * (x * along - y * up - new_x * UNIT)) <= UNIT
+    assert abs(2 * (x * up + y * along - new_y * UNIT)) <= UNIT

@@ -10,7 +10,15 @@ from tests.reference import look as slow
 from tests.sight.watching import HALL, PILLAR, SIDE_M, UNITS_PER_M, hall, scene
 from tests.strategies import quick
 
-from fleet2d.kernels.lens import Lenses, camera_pose, hides, in_wedge, near_wedge, points_in_view
+from fleet2d.kernels.lens import (
+    Lenses,
+    camera_pose,
+    camera_poses,
+    hides,
+    in_wedge,
+    near_wedge,
+    points_in_view,
+)
 from fleet2d.sight.camera import Camera
 from fleet2d.sight.tables import stack_lenses
 
@@ -45,6 +53,17 @@ def test_a_panning_camera_looks_along_its_current_heading(seconds: float, degree
     stacked = lenses(pan={"headings_deg": [-45, 0, 45, 0], "dwell": "5 s"})
     _, _, towards = camera_pose(stacked, 0, 0, 0, 1024, round(seconds * 1e6))
     assert 1024 + degrees * 4096 // 360 == pytest.approx(towards, abs=1)
+
+
+@pytest.mark.parametrize("pan", [None, {"headings_deg": [-45, 0, 100], "dwell": "7 s"}])
+def test_poses_of_a_camera_at_many_moments_are_those_at_each(pan: dict[str, object] | None) -> None:
+    stacked = lenses(offset=[0.3, -0.2], heading_deg=77, pan=pan)
+    moments = np.arange(200) * 333_333
+    x, y, heading = 90_000 - 311 * moments // 10**6, 4 * np.arange(200), 37 * np.arange(200) % 4096
+    poses = camera_poses(stacked, 0, (x, y, heading), moments)
+    bodies = zip(x.tolist(), y.tolist(), heading.tolist(), moments.tolist(), strict=True)
+    expected = [camera_pose(stacked, 0, *body) for body in bodies]
+    assert expected == list(zip(*(column.tolist() for column in poses), strict=True))
 
 
 @quick

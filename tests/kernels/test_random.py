@@ -15,6 +15,7 @@ from fleet2d.kernels.random import (
     Bits,
     StepDraws,
     random_bell,
+    random_bells,
     random_below,
     random_bits,
     random_uniform,
@@ -182,3 +183,10 @@ def test_a_copy_of_draws_is_independent(way: Callable[[StepDraws], StepDraws]) -
     draws.below(7)
     twin = way(draws)
     assert [draws.below(10**9) for _ in range(3)] == [twin.below(10**9) for _ in range(3)]
+
+
+@quick
+@given(keys, st.lists(counters))
+def test_bell_shaped_draws_of_many_counters_are_those_of_each(key: int, many: list[int]) -> None:
+    draws = random_bells(np.uint64(key), np.array(many, np.int64))
+    assert [random_bell(key, counter) for counter in many] == draws.tolist()
