@@ -85,6 +85,7 @@ def cases() -> dict[str, dict[str, Any]]:
         "the bundled month as it is": {"extends": "bundled:base"},
         "only period, latency and 8 body points": month(None, **LOOK),
         **parts,
+        "only errors": month({"errors": {"outliers": {"share": "3 %"}}}),
         "full perception model on": month(FULL, **LOOK),
     }
 

@@ -1,4 +1,4 @@
-"""Sightings that are far off, as of people seen in mirrors or in front of another depth."""
+"""Sightings at the wrong distance, as where the depth is that of the background."""
 
 from datetime import timedelta
 
