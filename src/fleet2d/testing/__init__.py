@@ -9,11 +9,17 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from fleet2d.testing.algorithms import check_algorithm as check_algorithm
     from fleet2d.testing.claim import trial as trial
+    from fleet2d.testing.perception_errors import check_perception_error as check_perception_error
     from fleet2d.testing.trials import Trial as Trial
 
-_MODULE_OF = {"Trial": "trials", "check_algorithm": "algorithms", "trial": "claim"}
+_MODULE_OF = {
+    "Trial": "trials",
+    "check_algorithm": "algorithms",
+    "check_perception_error": "perception_errors",
+    "trial": "claim",
+}
 
-__all__ = ["Trial", "check_algorithm", "trial"]
+__all__ = ["Trial", "check_algorithm", "check_perception_error", "trial"]
 
 
 def __getattr__(name: str) -> Any:

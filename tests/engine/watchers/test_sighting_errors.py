@@ -205,6 +205,8 @@ def test_a_fault_brings_errors_to_the_looks_within_it(robot: str) -> None:
 
 def test_scenarios_without_errors_have_nothing_after_the_look() -> None:
     state = fleet2d.Simulation(looks())._state
-    assert all(cameras.later is None for cameras in state.cameras)
+    assert all(cameras.sighting_errors is None for cameras in state.cameras)
     state = fleet2d.Simulation(unsure(a={"type": "Blinking"}))._state
-    assert all(isinstance(cameras, Cameras) and cameras.later for cameras in state.cameras)
+    assert all(
+        isinstance(cameras, Cameras) and cameras.sighting_errors for cameras in state.cameras
+    )

@@ -53,7 +53,7 @@ class PerfectCameras(Cameras):
             latency=np.zeros_like(lenses.latency),
             errs=np.zeros_like(lenses.errs),
         )
-        self.rule, self.later = self.rule._replace(patience=1), None
+        self.rule, self.sighting_errors = self.rule._replace(patience=1), None
         return memory
 
 

@@ -87,7 +87,7 @@ class Cameras(Watcher):
         radii: Radii of all bodies, if they hide each other [lattice units]; None: they don't.
         memory: The memory from span to span.
         drift: The error of the owner's belief about its own pose; None: it has none.
-        later: What changes sightings after the look; None: nothing does.
+        sighting_errors: What changes sightings after the look; None: nothing does.
         perceived: The last perceived place of each identity, (identities, 2); the last row is for
             somebody unknown.
         awaited: Events that algorithms wait for: they end a span, too.
@@ -174,12 +174,12 @@ class Cameras(Watcher):
         self.errors.has_ghosts[self._dark] = 0
         injected = injected_by(self.disturbances, self.names, context)
         self.errors = self.errors._replace(injected=injected)
-        self.later = None
+        self.sighting_errors = None
         if self.drift is not None or any(p and p.errors for p in perceptions):
             from fleet2d.engine.watchers.sighting_errors import SightingErrors  # few runs need them
 
-            self.later = SightingErrors(self, perceptions)
-        self.errs = self.may_err or any(has_errors) or self.later is not None
+            self.sighting_errors = SightingErrors(self, perceptions)
+        self.errs = self.may_err or any(has_errors) or self.sighting_errors is not None
         self._draw_streams()
         if not self.activity_senses:  # later ones would not fit the tables of the run
             self._sense_activities(perceptions)
@@ -313,7 +313,7 @@ class Cameras(Watcher):
         return np.concatenate(blocks) if blocks else NOTHING
 
     def _look(self, bodies: Bodies, end: int, *, stop: bool = True) -> "_Look":
-        may_redo = stop or self.later is not None
+        may_redo = stop or self.sighting_errors is not None
         old_memory = [array.copy() for array in self.memory] if may_redo else []
         stop_lost, stop_seen = self.ends if stop else (False, False)
         home, window, points = self.owner.home, bodies.window(self.next_step, end), None
@@ -344,9 +344,11 @@ class Cameras(Watcher):
         events = list(zip(step.tolist(), identity.tolist(), kind.tolist(), strict=True))
         sightings, looked = sightings.T, self.next_step + count
         end = looked
-        if self.later is not None:
+        if self.sighting_errors is not None:
             before = SightMemory(*old_memory)
-            sightings, differs = self.later.change(sightings, self.memory, before, window, looked)
+            sightings, differs = self.sighting_errors.change(
+                sightings, self.memory, before, window, looked
+            )
             if differs:
                 patience, stops = self.rule.patience, {USER_LOST: stop_lost, USER_SEEN: stop_seen}
                 events = sight_events(sightings, self.memory, patience, self.next_step, looked)
