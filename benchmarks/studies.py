@@ -20,11 +20,11 @@ from typing import Any
 from fleet2d.studies.analysis.reader import open_study
 from fleet2d.studies.data.record import record_of
 from fleet2d.studies.driver import RunOptions, check_study, run_study
-from fleet2d.studies.engine import VariantOutcome
 from fleet2d.studies.execution.executor import Event, Executor, Finished, SerialExecutor
 from fleet2d.studies.execution.jobs import StudyJob, WorkerJob
 from fleet2d.studies.execution.local import LocalExecutor
 from fleet2d.studies.execution.schedule import TaskSchedule
+from fleet2d.studies.simulator import VariantOutcome
 
 EXAMPLES = Path(__file__).parents[1] / "examples" / "studies"
 HOUR = {"extends": "bundled:base", "simulation": {"duration": "1 h"}}

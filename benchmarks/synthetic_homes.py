@@ -132,7 +132,7 @@ def draw(real: Values, synthetic: Values, path: Path) -> None:
     """Draw the distributions of both, one panel a measure."""
     from matplotlib.figure import Figure
 
-    from fleet2d.view.floorplan import drawing_style
+    from fleet2d.pictures.floorplan import drawing_style
 
     names = [name for name in real if name in synthetic]
     columns = 5

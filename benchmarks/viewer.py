@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import fleet2d
-from fleet2d.viewer.pictures.film import write_film
+from fleet2d.viewer.scenes.film import write_film
 from fleet2d.viewer.server.live import LiveRun
 from fleet2d.viewer.server.serve import PageServer
 

@@ -410,8 +410,8 @@ UNUSED = (
     "fleet2d.algorithms.presence.fremen",
     "fleet2d.algorithms.presence.real_time",
     "fleet2d.calibrate",
-    "fleet2d.engine.judging.expect",
-    "fleet2d.engine.expectations.gauges",
+    "fleet2d.engine.expectations.expect",
+    "fleet2d.engine.gauges.gauges",
     "fleet2d.engine.resume",
     "fleet2d.entities.users.guest",
     "fleet2d.expectations",
@@ -429,7 +429,7 @@ UNUSED = (
     "fleet2d.search",
     "fleet2d.studies",
     "fleet2d.testing",
-    "fleet2d.view",
+    "fleet2d.pictures",
     "fleet2d.viewer",
 )
 # The packages of others that a run needs, and what these need in turn.

@@ -322,12 +322,12 @@ CHANGES: dict[tuple[type, str], dict[str, Any]] = {
 }  # fmt: skip
 # What is not told by tables, and which test sees it.
 ELSEWHERE = {
-    (User, "color"): "tests/view: pictures",
+    (User, "color"): "tests/pictures: pictures",
     (Robot, "localization"): "tests/entities/test_localization",
-    (Robot, "color"): "tests/view: pictures",
-    (User, "opens_doors"): "tests/engine/test_changes: there is no door in this home",
+    (Robot, "color"): "tests/pictures: pictures",
+    (User, "opens_doors"): "tests/engine/test_home_changes: there is no door in this home",
     (Robot, "gives_way"): "tests/engine/watchers/test_clearance: it meets nobody on its way here",
-    (Robot, "opens_doors"): "tests/engine/test_changes: there is no door in this home",
+    (Robot, "opens_doors"): "tests/engine/test_home_changes: there is no door in this home",
     (ArtifactSettings, "checkpoint"): "tests/engine/test_resume: a file, no table",
     (ArtifactSettings, "learned"): "tests/algorithms/test_learned: a file, no table",
     (Schedule, "cooldown"): "tests/entities/test_arbitration: there is one behavior here",
@@ -420,7 +420,7 @@ def test_known_failure_05_a_color_is_drawn(tmp_path: Path) -> None:
         content = life()
         content["users"]["ana"]["color"] = color
         fleet2d.run(content, out=tmp_path / str(number))
-        from fleet2d.view.run import draw_run
+        from fleet2d.pictures.run import draw_run
 
         target = tmp_path / f"{number}.svg"
         draw_run(fleet2d.open_run(tmp_path / str(number)), target)

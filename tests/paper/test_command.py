@@ -65,17 +65,17 @@ def test_without_matplotlib_numbers_are_still_written(
 def test_missing_matplotlib_is_named(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setitem(sys.modules, "fleet2d.view", None)
-    monkeypatch.delattr("fleet2d.view", raising=False)
+    monkeypatch.setitem(sys.modules, "fleet2d.pictures", None)
+    monkeypatch.delattr("fleet2d.pictures", raising=False)
 
     class Absent:
-        """Finds fleet2d.view and says what is missing, as that does."""
+        """Finds fleet2d.pictures and says what is missing, as that does."""
 
         def find_spec(self, name: str, *_: object) -> None:
-            if name == "fleet2d.view":
+            if name == "fleet2d.pictures":
                 raise InputError('drawing needs matplotlib: pip install "fleet2d[viz]"')
 
-    monkeypatch.delitem(sys.modules, "fleet2d.view")
+    monkeypatch.delitem(sys.modules, "fleet2d.pictures")
     monkeypatch.setattr(sys, "meta_path", [Absent(), *sys.meta_path])
     assert not paper._can_draw()
     assert 'pip install "fleet2d[viz]"' in capsys.readouterr().err

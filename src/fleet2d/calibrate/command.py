@@ -66,7 +66,7 @@ def calibrate_perception(
     from fleet2d.errors import InputError
 
     if picture is not None:
-        from fleet2d.view.floorplan import check_picture
+        from fleet2d.pictures.floorplan import check_picture
 
         check_picture(picture)
     calibration = calibrate(read_log(path))

@@ -9,7 +9,7 @@ from fleet2d.calibrate.likelihood import wilson
 from fleet2d.calibrate.log import recognized
 from fleet2d.calibrate.perception import Calibration, ProbabilityGroup
 from fleet2d.extras import extra
-from fleet2d.view.floorplan import check_picture, drawing_style, save_figure
+from fleet2d.pictures.floorplan import check_picture, drawing_style, save_figure
 
 with extra("viz", "drawing needs matplotlib"):
     from matplotlib.axes import Axes

@@ -20,8 +20,8 @@ def show_diary(name: str | None, out: Path | None, days: int, seed: int) -> list
     """
     from pydantic import TypeAdapter, ValidationError
 
+    from fleet2d.pictures.diary import diary_days, diary_lines, draw_diary
     from fleet2d.routines.persona import AnyPersona, bundled_names
-    from fleet2d.view.diary import diary_days, diary_lines, draw_diary
 
     if name is None:
         raise InputError(

@@ -8,8 +8,8 @@ from fleet2d.artifacts.store import RunStore
 from fleet2d.clock import Clock
 from fleet2d.engine.basis import Basis
 from fleet2d.engine.bodies import Bodies
-from fleet2d.engine.changes import Changes
 from fleet2d.engine.control.script import schedule
+from fleet2d.engine.home_changes import Changes
 from fleet2d.engine.interventions import Interventions
 from fleet2d.engine.learners import Learners
 from fleet2d.engine.state import InView, State
@@ -99,7 +99,7 @@ def set_up(scenario: Scenario, clock: Clock, seed: int, store: RunStore) -> Stat
         with _locate_errors(scenario, path), _prefix_errors(path):
             schedule(state, entry, 0, index)
     for name, expectation in scenario.expect.items():
-        from fleet2d.engine.judging.expect import (
+        from fleet2d.engine.expectations.expect import (
             expect,  # with much that other scenarios don't need
         )
 

@@ -12,8 +12,8 @@ from fleet2d.artifacts.ledger import Ledger
 from fleet2d.artifacts.manifest import Status
 from fleet2d.artifacts.store import RunStore
 from fleet2d.clock import Clock
+from fleet2d.engine.expectations.verdicts import Judging
 from fleet2d.engine.interventions import is_from_outside
-from fleet2d.engine.judging.verdicts import Judging
 from fleet2d.engine.lifecycle import (
     EngineFacts,
     deferred_interrupt,

@@ -13,8 +13,8 @@ from fleet2d.algorithms.log import Log
 from fleet2d.algorithms.observations import OBSERVATION
 from fleet2d.artifacts.store import RunStore
 from fleet2d.engine.bodies import Bodies
-from fleet2d.engine.changes import Changes
-from fleet2d.engine.expectations.block import Block
+from fleet2d.engine.gauges.block import Block
+from fleet2d.engine.home_changes import Changes
 from fleet2d.engine.interventions import Interventions
 from fleet2d.engine.learners import Learners
 from fleet2d.engine.tables.recorder import Recorder
@@ -34,7 +34,7 @@ from fleet2d.kernels.look import SIGHTING
 from fleet2d.kernels.look import STEP as STEP_COLUMN
 
 if TYPE_CHECKING:
-    from fleet2d.engine.expectations.run_expectations import RunExpectations
+    from fleet2d.engine.gauges.run_expectations import RunExpectations
 
 # The most steps that watchers process together: fewer if there are many bodies.
 MOST_STEPS = 1 << 16

@@ -69,7 +69,7 @@ def reproduce_paper(
 def _can_draw() -> bool:
     """Return whether pictures can be drawn; if not, print what is missing."""
     try:
-        import fleet2d.view  # noqa: F401
+        import fleet2d.pictures  # noqa: F401
     except InputError as error:
         typer.echo(f"no pictures: {error}", err=True)
         return False

@@ -11,7 +11,7 @@ from fleet2d.metrics.presence.rtp_score import GAPS
 from fleet2d.paper import feedback, ltp_gap, rtp_gap, speed
 from fleet2d.paper.months import interval
 from fleet2d.paper.result import Result
-from fleet2d.view.floorplan import check_picture, drawing_style, save_figure
+from fleet2d.pictures.floorplan import check_picture, drawing_style, save_figure
 
 with extra("viz", "drawing needs matplotlib"):
     from matplotlib.axes import Axes

@@ -70,7 +70,7 @@ class LiveView:
         with extra("viz", "drawing needs matplotlib"):
             from matplotlib.backends.backend_agg import FigureCanvasAgg
             from matplotlib.figure import Figure
-        from fleet2d.view.floorplan import figure_size, floorplan_axes
+        from fleet2d.pictures.floorplan import figure_size, floorplan_axes
 
         self.simulation = simulation
         plan = simulation.home.plan
@@ -125,7 +125,7 @@ class LiveView:
         """Return the outline of the largest visible part, float64 (n, 2) [m]."""
         import shapely
 
-        from fleet2d.view.life import SightWalls, field_of_view
+        from fleet2d.pictures.life import SightWalls, field_of_view
 
         home = self.simulation.home
         camera = self.simulation.scenario.robots[name].camera

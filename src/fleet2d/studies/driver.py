@@ -16,7 +16,6 @@ from fleet2d.studies.data.results import Counts, statuses, write_variants
 from fleet2d.studies.design.identity import code_version
 from fleet2d.studies.design.specification import Specification, read_specification
 from fleet2d.studies.design.variants import build_design
-from fleet2d.studies.engine import VariantOutcome
 from fleet2d.studies.execution.executor import Event, Executor, LostTask
 from fleet2d.studies.execution.jobs import StudyJob
 from fleet2d.studies.execution.schedule import TaskSchedule
@@ -28,6 +27,7 @@ from fleet2d.studies.plan.catalogue import (
     write_catalogue,
 )
 from fleet2d.studies.plan.study_plan import StudyPlan, check_setups, make_plan
+from fleet2d.studies.simulator import VariantOutcome
 
 PART_BYTES = 64_000_000  # size at which a journal becomes a part
 PART_S_REMOTE = 60.0  # the longest time that results for a store are on this machine only

@@ -94,10 +94,10 @@ def film(  # noqa: PLR0913 - options of the command line
     trust_dir: TrustFolders = None,
 ) -> None:
     """Make a film of a stretch of a stored run."""
+    from fleet2d.pictures.theme import themed
     from fleet2d.runs.run import open_run
-    from fleet2d.view.theme import themed
     from fleet2d.viewer.moments import steps_of
-    from fleet2d.viewer.pictures.film import write_film
+    from fleet2d.viewer.scenes.film import write_film
 
     run = open_run(directory)
     first, last = steps_of(run, begin, end)

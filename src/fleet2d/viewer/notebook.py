@@ -17,9 +17,9 @@ NOTEBOOK_DPI = 100
 
 def draw_run(run: Run, at: str | int | None, axes: Any, theme: str = "light") -> Any:
     """Draw a run, or a moment of it; see `Run.draw`."""
-    from fleet2d.view.run import run_figure
-    from fleet2d.view.theme import apply_theme, check_theme, themed
-    from fleet2d.viewer.pictures.figures import moment_figure, moment_on_axes
+    from fleet2d.pictures.run import run_figure
+    from fleet2d.pictures.theme import apply_theme, check_theme, themed
+    from fleet2d.viewer.scenes.figures import moment_figure, moment_on_axes
 
     last = run.manifest["steps"] - 1
     step = last if at is None else at if isinstance(at, int) else step_of(at, clock_of(run), "at")
@@ -34,8 +34,8 @@ def draw_plan(plan: FloorPlan, axes: Any, theme: str = "light") -> Any:
     """Draw a floor plan; see `FloorPlan.draw`."""
     from matplotlib.figure import Figure
 
-    from fleet2d.view.floorplan import drawing_style, figure_size, floorplan_axes
-    from fleet2d.view.theme import apply_theme, check_theme, themed
+    from fleet2d.pictures.floorplan import drawing_style, figure_size, floorplan_axes
+    from fleet2d.pictures.theme import apply_theme, check_theme, themed
 
     if axes is not None:
         floorplan_axes(plan, axes, title=False)

@@ -124,9 +124,9 @@ def _table(rows: list[tuple[str, str]]) -> str:
 
 def _figures(run: Run) -> list[str]:
     """Return the figures of the report as HTML."""
-    from fleet2d.view.floorplan import drawing_style
-    from fleet2d.view.run import run_figure
-    from fleet2d.viewer.pictures.figures import stretch_figure
+    from fleet2d.pictures.floorplan import drawing_style
+    from fleet2d.pictures.run import run_figure
+    from fleet2d.viewer.scenes.figures import stretch_figure
 
     steps = run.manifest["steps"]
     day = min(steps, max(1, DAY // timedelta(microseconds=run.manifest["step_us"])))
@@ -149,7 +149,7 @@ def _figures(run: Run) -> list[str]:
 
 def _both_themes(figure: Any, caption: str) -> str:
     """Return a figure as HTML, light or dark as the page is; the figure itself is darkened."""
-    from fleet2d.view.theme import darken
+    from fleet2d.pictures.theme import darken
 
     light = _png(figure)
     darken(figure)

@@ -12,7 +12,7 @@ from fleet2d.errors import ArtifactError
 from fleet2d.studies.data.journal import Journal, read_journal
 from fleet2d.studies.data.parts import tables_of
 from fleet2d.studies.data.record import VariantRecord, WorkerTask, record_of
-from fleet2d.studies.engine import VariantOutcome
+from fleet2d.studies.simulator import VariantOutcome
 
 
 def record(number: int, status: Any = "complete") -> VariantRecord:

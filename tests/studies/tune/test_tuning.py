@@ -10,11 +10,11 @@ from tests.studies.scenes import SPEED, base, small
 from fleet2d.errors import InputError, ScenarioError
 from fleet2d.studies.axes.sampling import Parameter
 from fleet2d.studies.driver import check_study
-from fleet2d.studies.engine import StagedRun
 from fleet2d.studies.execution.executor import Event, SerialExecutor
 from fleet2d.studies.execution.jobs import WorkerJob
 from fleet2d.studies.execution.local import LocalExecutor
 from fleet2d.studies.execution.schedule import TaskSchedule
+from fleet2d.studies.simulator import StagedRun
 from fleet2d.studies.tune.trials import TrialJob, TrialSchedule, TrialTask
 from fleet2d.studies.tune.tuning import TuneResult, tune
 

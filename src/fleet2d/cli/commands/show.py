@@ -60,7 +60,7 @@ def show(  # noqa: PLR0913 - options of the command line
     trust_dir: TrustFolders = None,
 ) -> None:
     """Draw a floor plan of any format, a stored run in its home, or a persona's diary."""
-    from fleet2d.view.theme import themed
+    from fleet2d.pictures.theme import themed
 
     picture = RunPicture(layer, step, reliability, at, begin, end, figure)
     with themed(theme), restrict_to(trust, trust_dir):
@@ -135,30 +135,30 @@ def _draw_run(directory: Path, out: Path | None, picture: RunPicture) -> Path:
     picture.check()
     run = open_run(directory)
     if picture.layer is not None:
-        from fleet2d.view.layers import draw_layer
+        from fleet2d.pictures.layers import draw_layer
 
         target = out or directory / f"{picture.layer}.png"
         draw_layer(run, picture.layer, target, picture.step)
     elif picture.reliability is not None:
-        from fleet2d.view.reliability import draw_reliability
+        from fleet2d.pictures.reliability import draw_reliability
 
         target = out or directory / f"{picture.reliability}-reliability.png"
         draw_reliability(run, picture.reliability, target)
     elif picture.at is not None:
         from fleet2d.viewer.moments import clock_of, step_of
-        from fleet2d.viewer.pictures.figures import draw_moment
+        from fleet2d.viewer.scenes.figures import draw_moment
 
         step = step_of(picture.at, clock_of(run))
         target = out or directory / f"step-{step}.png"
         draw_moment(run, min(step, run.manifest["steps"] - 1), target)
     elif picture == RunPicture():
-        from fleet2d.view.run import draw_run
+        from fleet2d.pictures.run import draw_run
 
         target = out or directory / "picture.png"
         draw_run(run, target)
     else:
         from fleet2d.viewer.moments import steps_of
-        from fleet2d.viewer.pictures.figures import draw_stretch
+        from fleet2d.viewer.scenes.figures import draw_stretch
 
         first, end = steps_of(run, picture.begin, picture.end)
         target = out or directory / f"{picture.figure}-{first}-{end}.png"
@@ -171,12 +171,12 @@ def _draw_floorplan(
 ) -> Path:
     """Draw a floor plan, or a field of view in it; return the path of the picture."""
     from fleet2d.floorplan.load import load_floorplan
-    from fleet2d.view.floorplan import draw_floorplan
+    from fleet2d.pictures.floorplan import draw_floorplan
 
     plan = load_floorplan(source, resolution=resolution) if source else load_floorplan()
     target = out or Path(f"{file_name(plan.name) or 'plan'}.png")
     if fov is not None:
-        from fleet2d.view.fov import draw_fov, parse_pose
+        from fleet2d.pictures.fov import draw_fov, parse_pose
 
         draw_fov(plan, parse_pose(fov), target)
     else:

@@ -1,1 +1,1 @@
-"""Expectations in a run: gauges measure their signals, block by block."""
+"""Expectations of a simulation: how they are added, and their verdicts."""

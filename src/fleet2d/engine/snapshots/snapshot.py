@@ -94,7 +94,7 @@ _NO_STATE = (
     "fleet2d.testing",
     "fleet2d.trust",
     "fleet2d.trust_options",
-    "fleet2d.view",
+    "fleet2d.pictures",
     "fleet2d.viewer",
 )
 

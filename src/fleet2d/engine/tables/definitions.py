@@ -5,8 +5,8 @@ from dataclasses import replace
 
 from fleet2d.artifacts.table import Column, TableSpec
 from fleet2d.engine.basis import Basis
-from fleet2d.engine.tables.columns import HEADING, STEP, TIME, X, Y, away_column
-from fleet2d.engine.tables.samples import trajectory_table
+from fleet2d.engine.tables.shared_columns import HEADING, STEP, TIME, X, Y, away_column
+from fleet2d.engine.tables.trajectories import trajectory_table
 from fleet2d.engine.watchers.cameras import Cameras
 from fleet2d.engine.watchers.sensors import Sensors
 from fleet2d.runs.key_kinds import KEY_KINDS

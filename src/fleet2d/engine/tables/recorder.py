@@ -17,7 +17,7 @@ from fleet2d.algorithms.observations import NearestRooms, Observations, Rows, tr
 from fleet2d.engine.basis import Basis
 from fleet2d.engine.tables.definitions import camera_names
 from fleet2d.engine.tables.key_frames import KeyFrames
-from fleet2d.engine.tables.samples import Samples
+from fleet2d.engine.tables.trajectories import Samples
 from fleet2d.engine.watchers.cameras import Cameras
 from fleet2d.engine.watchers.sensors import Sensors
 from fleet2d.events import HOME, RANKS, Event, EventKind

@@ -21,8 +21,8 @@ from fleet2d.studies.data.parts import (
     with_variant,
 )
 from fleet2d.studies.data.results import Counts, variants_table
-from fleet2d.studies.engine import run_scenario
 from fleet2d.studies.plan.catalogue import stored_scenario
+from fleet2d.studies.simulator import run_scenario
 from fleet2d.trust import Trust, restrict_stored
 
 if TYPE_CHECKING:

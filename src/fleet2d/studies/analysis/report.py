@@ -40,7 +40,7 @@ def write_report(study: "Study", folder: Path) -> Path:
         ArtifactError: No variant is complete.
         InputError: matplotlib, polars or scipy is missing, or the folder can't be created.
     """
-    from fleet2d.view.floorplan import drawing_style
+    from fleet2d.pictures.floorplan import drawing_style
 
     if not study.counts.complete:
         raise ArtifactError(f"{study.location} has no complete variant: run it first")
@@ -189,7 +189,7 @@ class _Page:
 
     def _figure(self, figure: "Figure", name: str) -> str:
         """Write a figure to a file; return it as an HTML image."""
-        from fleet2d.view.floorplan import save_figure
+        from fleet2d.pictures.floorplan import save_figure
 
         path = self.folder / "figures" / f"{name}.svg"
         path.parent.mkdir(exist_ok=True)

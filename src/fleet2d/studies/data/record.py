@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from fleet2d.artifacts.plain import plain
-from fleet2d.studies.engine import VariantOutcome
+from fleet2d.studies.simulator import VariantOutcome
 
 if TYPE_CHECKING:
     import pyarrow as pa

@@ -11,11 +11,11 @@ from typing import Any
 from fleet2d import version
 from fleet2d.errors import InputError
 from fleet2d.scenario.model import Scenario
-from fleet2d.studies.engine import files_of
+from fleet2d.studies.simulator import files_of
 
 DIGITS = 32  # hexadecimal digits of a hash
 # Packages that run, show or evaluate simulations without changing their results.
-_LEAVES = ("studies", "cli", "view", "viewer", "paper", "fit", "calibrate", "published")
+_LEAVES = ("studies", "cli", "pictures", "viewer", "paper", "fit", "calibrate", "published")
 _SUFFIXES = (".py", ".so", ".yaml", ".json")
 _NO_EFFECT = ("max_span", "speedup")  # keys of `simulation` that change no result
 

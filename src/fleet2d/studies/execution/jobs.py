@@ -10,7 +10,7 @@ from fleet2d.runs.run import Run
 from fleet2d.studies.data.record import WorkerTask, record_of
 from fleet2d.studies.design.identity import FileHashes, identity, input_hash, scenario_content
 from fleet2d.studies.design.variants import Design
-from fleet2d.studies.engine import (
+from fleet2d.studies.simulator import (
     VariantOutcome,
     check_setup,
     describe_error,

@@ -37,7 +37,7 @@ def main() -> None:
 
 
 def _work(job: Any, tasks: "queue.SimpleQueue[Any]", answers: IO[bytes]) -> None:
-    from fleet2d.studies.engine import peak_rss_mb
+    from fleet2d.studies.simulator import peak_rss_mb
 
     while (task := tasks.get()) is not None:
         send(answers, (RESULT, (task, job(task), peak_rss_mb())))

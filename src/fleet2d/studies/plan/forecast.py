@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from datetime import timedelta
 
 from fleet2d.errors import ComponentError
-from fleet2d.studies.engine import measure
 from fleet2d.studies.plan.study_plan import StudyPlan
+from fleet2d.studies.simulator import measure
 from fleet2d.sums import sum_in_order
 
 SAMPLES = 3

@@ -13,8 +13,8 @@ from fleet2d.studies.axes.choice import key_path
 from fleet2d.studies.axes.sampling import Parameter, rounded
 from fleet2d.studies.data.record import WorkerTask
 from fleet2d.studies.design.variants import Design
-from fleet2d.studies.engine import StagedRun, describe_error, flat_numbers
 from fleet2d.studies.execution.schedule import TaskSchedule
+from fleet2d.studies.simulator import StagedRun, describe_error, flat_numbers
 from fleet2d.sums import sum_in_order
 from fleet2d.trust import Trust, current_trust, restrict
 

@@ -1,0 +1,374 @@
+"""Draw a stored run: life in the home, and the room of each user in every minute of every day."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from fleet2d.palette import ACCENT_COLOR
+from fleet2d.pictures.actogram import MARKS, draw_actogram, marks_by_day, room_color, rooms_by_day
+from fleet2d.pictures.floorplan import (
+    DPI,
+    check_picture,
+    drawing_style,
+    floorplan_axes,
+    save_figure,
+    scale_depth,
+    short_name,
+)
+from fleet2d.pictures.life import (
+    MOST_PLACES,
+    CameraView,
+    best_view,
+    clear_names,
+    draw_paths,
+    draw_presence,
+    draw_sightings,
+    draw_view,
+    places_of,
+)
+from fleet2d.pictures.overlay import LINE_IN, QUIET_COLOR, Chip, Overlay
+from fleet2d.pictures.traces import BodyTrace, trace_of
+from fleet2d.runs.categories import categories
+from fleet2d.runs.run import Run
+
+MOST_BODIES = 4  # users with an actogram, and robots
+
+# Inches.
+WIDTH = 10.67  # the largest; with a narrow plan the picture is narrower
+EDGE = 0.32
+HEADER = 0.82
+FOOTER = 0.28  # below the last line of the legends
+GAP = 0.3
+DATES = 0.78  # beside the first actogram
+CAPTION = 0.42  # above each actogram
+ACTOGRAMS = {0: 0.0, 1: 4.25, 2: 4.9, 3: 5.1, 4: 5.4}
+LEFT_LEAST = (7.2, 3.7)  # least width of the plan with legend and header: alone, beside actograms
+BODY_MOST = 6.6
+BODY_LEAST = (2.3, 3.4)
+ROW_LEAST = 0.08
+TICKS = 0.24  # below each actogram
+ROW_MOST = 0.55
+SCALE_WORDS = 0.2  # below the bar of the scale
+
+SMALL = 7.5
+NOTE = 8.5
+SEPARATOR = " · "
+WIDE_SEPARATOR = "   ·   "
+
+
+@dataclass(frozen=True)
+class PlottedObservations:
+    """The observations of the users in the picture; all arrays have one row for each."""
+
+    step: NDArray[np.int64]
+    robot: NDArray[Any]
+    user: NDArray[Any]
+    xy: NDArray[np.float64]
+
+
+def draw_run(run: Run, path: Path) -> None:
+    """Draw a run to a PNG, SVG or PDF file; the same run gives the same bytes.
+
+    Left is the floor plan with the presence and paths of bodies and what robots saw; right an
+    actogram for each user, of at most four: a row per day, coloured by room.
+
+    Args:
+        run: A run, stored or in memory, complete or interrupted.
+        path: The file, whose name ends with `.png`, `.svg` or `.pdf`. An existing file is replaced.
+
+    Raises:
+        InputError: The file name has another suffix, or the file can't be written.
+        ArtifactError: The run has no floor plan.
+
+    Example:
+        >>> import fleet2d, tempfile
+        >>> run = fleet2d.run(None, "simulation.duration=2 h", seed=4)
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     draw_run(run, Path(folder) / "picture.png")
+    """
+    check_picture(path)
+    with drawing_style():
+        save_figure(_Picture(run).figure, path)
+
+
+def run_figure(run: Run) -> Figure:
+    """Return the picture of a run as a figure; see `draw_run`."""
+    with drawing_style():
+        return _Picture(run).figure
+
+
+class _Picture:
+    """The picture of a run: its data are collected, then drawn part by part."""
+
+    def __init__(self, run: Run) -> None:
+        self.run, self.plan = run, run.plan
+        manifest = run.manifest
+        self.start = datetime.fromisoformat(manifest["start"])
+        self.step_us, self.steps = manifest["step_us"], manifest["steps"]
+        self.notes: list[str] = []
+        self.users = self._traces("users", robot=False)
+        self.robots = self._traces("robots", robot=True)
+        self.notes += _notes_by_bodies([*self.users, *self.robots])
+        self.observations = _observations(run, [user.name for user in self.users])
+        self.rings = self._rings()
+        self.views = list(self._views())
+        self.panels = self.users or self.robots
+        self._lay_out()
+        self._header()
+        self._life()
+        self._actograms()
+        self._footer()
+
+    def _traces(self, bucket: str, *, robot: bool) -> list[BodyTrace]:
+        names = self.run.manifest["entities"][bucket]
+        if len(names) > MOST_BODIES:
+            self.notes.append(f"{MOST_BODIES} of {len(names)} {bucket} are shown")
+        if not self.steps:
+            return []
+        traces = []
+        for number, name in enumerate(names[:MOST_BODIES]):
+            trace = trace_of(self.run, self.plan, name, number, robot=robot)
+            if trace is not None:
+                traces.append(trace)
+        if names and not traces:
+            self.notes.append(f"where {bucket} were is not stored")
+        return traces
+
+    def _rings(self) -> dict[str, NDArray[np.float64]]:
+        """Return the places where each robot saw users; none if there are too many to draw."""
+        places_of_robot = {
+            robot.name: places_of(self.observations.xy[self.observations.robot == robot.name])
+            for robot in self.robots
+        }
+        rings = {name: places for name, places in places_of_robot.items() if len(places)}
+        count = sum(map(len, rings.values()))
+        if count > MOST_PLACES:
+            self.notes.append(f"the {count:,} places where robots saw users are not drawn")
+            return {}
+        return rings
+
+    def _views(self) -> Iterator[CameraView]:
+        for robot in self.robots:
+            camera = self._body("robots", robot.name).get("camera")
+            if camera is None:
+                continue
+            seen = self.observations
+            rows = (seen.robot == robot.name) & np.isin(seen.step, robot.step)
+            sightings: dict[int, Any] = {}
+            for step, xy in zip(seen.step[rows].tolist(), seen.xy[rows], strict=True):
+                sightings[step] = (
+                    np.vstack([sightings[step], xy]) if step in sightings else xy[None]
+                )
+            view = best_view(self.plan, robot, camera, sightings)
+            if view is not None:
+                yield view
+
+    def _body(self, bucket: str, name: str) -> dict[str, Any]:
+        body = self.run.manifest["scenario"].get(bucket, {}).get(name, {})
+        return dict(body)
+
+    def _lay_out(self) -> None:
+        """Choose the size of all parts, and create the figure."""
+        self.days = [
+            rooms_by_day(trace, self.start, self.step_us, self.steps) for trace in self.panels
+        ]
+        self._lay_out_plan()
+        self.figure = Figure(figsize=(self.width, self.body), dpi=DPI, facecolor="white")
+        self.overlay = Overlay(self.figure)
+        self.life_lines = self.overlay.lines(self.left, list(self._life_chips()), SMALL)
+        self.room_lines = self.overlay.lines(self.right - DATES, list(self._room_chips()), SMALL)
+        # With few days, the legend starts in the space below their rows.
+        days = ROW_MOST * len(self.days[0]) if self.days else 0.0
+        self.rows_high = min(self.body - CAPTION - TICKS, days)
+        spare = self.body - CAPTION - TICKS - self.rows_high
+        lines = max(len(self.life_lines), len(self.room_lines) - int(spare / LINE_IN))
+        self.note_lines = self.overlay.wrap(self.notes, SEPARATOR, NOTE, self.width - 2 * EDGE)
+        self.foot = FOOTER + LINE_IN * (lines + len(self.note_lines))
+        self.height = HEADER + self.body + self.foot
+        self.overlay.resize(self.width, self.height)
+
+    def _lay_out_plan(self) -> None:
+        """Choose the size of the plan, and with it that of the picture."""
+        x0, y0, x1, y1 = self.plan.bounds
+        edge = 0.03 * max(x1 - x0, y1 - y0)
+        left, right, low, high = x0 - edge, x1 + edge, y0 - scale_depth(self.plan), y1 + edge
+        self.right = ACTOGRAMS[len(self.panels)]
+        beside = 2 * EDGE + self.right + (GAP if self.right else 0.0)
+        most, least = WIDTH - beside, LEFT_LEAST[len(self.panels) > 0]
+        # The text under the scale bar has the same size in inches in any home.
+        scale = min(most / (right - left), (BODY_MOST - SCALE_WORDS) / (high - low))  # in/m
+        low -= SCALE_WORDS / scale
+        self.limits = (left, right, low, high)
+        self.left = min(most, max(least, scale * (right - left)))
+        days = len(self.days[0]) if self.days else 0
+        rows = float(np.clip(CAPTION + TICKS + ROW_LEAST * days, *BODY_LEAST))
+        self.body = min(BODY_MOST, max(rows, scale * (high - low)))
+        self.width = self.left + beside
+
+    def _axes(self, x: float, y: float, width: float, height: float) -> Any:
+        """Add axes at a place [in]."""
+        box = (x / self.width, y / self.height, width / self.width, height / self.height)
+        return self.figure.add_axes(box)
+
+    def _header(self) -> None:
+        scenario = self.run.manifest["scenario"]
+        top = self.height
+        name = scenario.get("name") or "run"
+        duration = _length(self.steps * self.step_us)
+        x = self.overlay.write(EDGE, top - 0.42, self.overlay.fit(name, 16, 4.0), 16, weight="bold")
+        subtitle = f"{duration} in {short_name(self.plan.name)}"
+        subtitle = self.overlay.fit(subtitle, 16, self.width - EDGE - x - 0.15)
+        self.overlay.write(x + 0.12, top - 0.42, subtitle, 16, color=QUIET_COLOR)
+        end = self.start + timedelta(microseconds=self.steps * self.step_us)
+        digest = self.run.digest
+        facts = [
+            f"{_date(self.start)} to {_date(end)}",
+            f"step {self.step_us / 1e6:g} s",
+            f"seed {self.run.manifest['seed']}",
+            f"digest {digest[:12]}" if digest else "no digest",
+        ]
+        x = self.overlay.write(EDGE, top - 0.66, WIDE_SEPARATOR.join(facts), 8.5, color=QUIET_COLOR)
+        if self.run.status != "complete":
+            self.overlay.write(
+                x + 0.2, top - 0.66, self.run.status, 8.5, color=ACCENT_COLOR, weight="bold"
+            )
+
+    def _life(self) -> None:
+        axes = self._axes(EDGE, self.foot, self.left, self.body)
+        axes.set_anchor("C")
+        floorplan_axes(self.plan, axes, title=False)
+        left, right, low, high = self.limits
+        axes.set(xlim=(left, right), ylim=(low, high))
+        clear_names(self.plan, self.views, axes)
+        for trace in (*self.robots, *self.users):
+            draw_paths(trace, axes)
+        for trace in self.users:
+            draw_presence(self.plan, trace, axes)
+        for robot in self.robots:
+            if robot.name in self.rings:
+                draw_sightings(self.rings[robot.name], robot.color, axes)
+        for view in self.views:
+            draw_view(view, float(self._body("robots", view.robot.name).get("radius", 0.15)), axes)
+        self.overlay.legend(EDGE, self.foot - 0.13, self.life_lines, SMALL)
+
+    def _life_chips(self) -> Iterator[Chip]:
+        for user in self.users:
+            yield Chip("spot", user.color, user.name)
+            if len(user.legs):
+                is_alone = len(self.users) == 1
+                label = "ways walked" if is_alone else f"ways of {user.name}"
+                yield Chip("way", user.color, label)
+        for robot in self.robots:
+            facts = filter(None, [robot.name, self._covers(robot.name)])
+            yield Chip("way", robot.color, SEPARATOR.join(facts))
+        if self.rings:
+            yield Chip("ring", self.robots[0].color, "seen here by a robot")
+        for view in self.views:
+            time = self.start + timedelta(microseconds=view.step * self.step_us)
+            yield Chip("view", None, f"what {view.robot.name} sees, {_date(time)}")
+
+    def _actograms(self) -> None:
+        count = len(self.panels)
+        if not count:
+            return
+        x = self.width - EDGE - self.right + DATES
+        gap = 0.2
+        width = (self.right - DATES - gap * (count - 1)) / count
+        height = self.rows_high
+        bottom = self.foot + self.body - CAPTION - height
+        for number, (trace, rooms) in enumerate(zip(self.panels, self.days, strict=True)):
+            left = x + number * (width + gap)
+            axes = self._axes(left, bottom, width, height)
+            steps = self.observations.step[self.observations.user == trace.name]
+            marks = marks_by_day(steps, self.start, self.step_us, len(rooms))
+            draw_actogram(self.plan, rooms, marks, self.start, axes, dates=number == 0)
+            self._caption(trace, left, bottom + height, width)
+        self.overlay.legend(x, bottom - TICKS - 0.13, self.room_lines, SMALL)
+
+    def _caption(self, trace: BodyTrace, x: float, y: float, width: float) -> None:
+        name = self.overlay.fit(trace.name, 9.5, width)
+        self.overlay.write(x, y + 0.24, name, 9.5, color=trace.color, weight="bold")
+        facts = [] if trace.robot else [f"{_percent(float(np.mean(trace.room >= 0)))} at home"]
+        share = self._metric("sightings").get(trace.name)
+        if share is not None and self.robots:
+            facts.append(f"{_percent(share)} of that seen")
+        facts += [covers] if (covers := self._covers(trace.name)) else []
+        fit = self.overlay.fit
+        while len(facts) > 1 and fit(SEPARATOR.join(facts), SMALL, width).endswith("…"):
+            facts.pop()
+        self.overlay.write(x, y + 0.09, SEPARATOR.join(facts), SMALL, color=QUIET_COLOR)
+
+    def _room_chips(self) -> Iterator[Chip]:
+        indices = {room for rooms in self.days for room in np.unique(rooms).tolist()}
+        index_of_type: dict[str, int] = {}
+        for index in sorted(index for index in indices if index >= 0):
+            index_of_type.setdefault(self.plan.rooms[index].type, index)
+        for kind, index in index_of_type.items():
+            yield Chip("room", room_color(self.plan, index), kind.replace("_", " "))
+        if -1 in indices:
+            yield Chip("away", None, "away")
+        if np.isin([user.name for user in self.users], self.observations.user).any():
+            label = f"seen by a robot: height is the share of {24 * 60 // MARKS} min"
+            yield Chip("seen", "#dfe1e4", label)
+
+    def _footer(self) -> None:
+        for number, line in enumerate(reversed(self.note_lines)):
+            self.overlay.write(EDGE, 0.2 + number * LINE_IN, line, NOTE)
+
+    def _metric(self, kind: str) -> Mapping[str, Any]:
+        """Return the result of the first metric of a type."""
+        configured = self.run.manifest["scenario"].get("metrics", {})
+        for name, result in self.run.metrics.items():
+            if configured.get(name, {}).get("type") == kind and isinstance(result, dict):
+                return result
+        return {}
+
+    def _covers(self, name: str) -> str:
+        metres = self._metric("distance").get(name)
+        if metres is None:
+            return ""
+        return f"{metres / 1000:.1f} km a day" if metres >= 1000 else f"{metres:.0f} m a day"
+
+
+def _observations(run: Run, users: list[str]) -> PlottedObservations:
+    """Return the observations of some users."""
+    if "observations" not in run.tables:
+        none = np.zeros(0, np.int64)
+        return PlottedObservations(none, none.astype(str), none.astype(str), np.zeros((0, 2)))
+    table = run.tables["observations"]
+    robot, user = (
+        np.array([*names, ""])[code]
+        for code, names in map(categories, (table["robot"], table["user"]))
+    )
+    rows = np.isin(user, users)
+    xy = np.stack([table["x"].to_numpy(), table["y"].to_numpy()], axis=1)
+    return PlottedObservations(table["step"].to_numpy()[rows], robot[rows], user[rows], xy[rows])
+
+
+def _notes_by_bodies(traces: list[BodyTrace]) -> Iterator[str]:
+    """Yield each note of traces once, with the names of the bodies that have it."""
+    for note in dict.fromkeys(trace.note for trace in traces if trace.note):
+        names = ", ".join(trace.name for trace in traces if trace.note == note)
+        yield f"{names}: {note}"
+
+
+def _date(time: datetime) -> str:
+    return f"{time:%a} {time.day} {time:%b %Y %H:%M}"
+
+
+def _length(us: int) -> str:
+    for unit, size in (("day", 86_400_000_000), ("hour", 3_600_000_000), ("minute", 60_000_000)):
+        if us >= size:
+            count = us / size
+            return f"{count:.3g} {unit}{'s' * (count != 1)}"
+    return f"{us / 1e6:g} s"
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.1f} %" if share < 0.0995 else f"{100 * share:.0f} %"

@@ -1,0 +1,195 @@
+"""Pictures of a run: a moment, a stretch, heat maps, a strip of time."""
+
+from datetime import timedelta
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import PowerNorm
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from fleet2d.clock import midnight_of
+from fleet2d.errors import InputError
+from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.palette import TEXT_COLOR
+from fleet2d.pictures.floorplan import (
+    DPI,
+    check_picture,
+    drawing_style,
+    figure_size,
+    floorplan_axes,
+    save_figure,
+)
+from fleet2d.pictures.layers import COLORS
+from fleet2d.pictures.life import blurred
+from fleet2d.pictures.run import run_figure
+from fleet2d.pictures.theme import SCALE
+from fleet2d.runs.run import Run
+from fleet2d.viewer.facts.run_facts import bodies_of
+from fleet2d.viewer.moments import clock_of
+from fleet2d.viewer.part import part_of_run
+from fleet2d.viewer.scenes.stage import Stage
+from fleet2d.viewer.scenes.strip import draw_strip, strip_rows
+
+FigureKind = Literal["life", "heat", "strip"]
+
+BLUR_M = 0.15
+SAMPLES = 40_000
+HEIGHT_IN = 7.0
+
+
+def draw_moment(run: Run, step: int, path: Path) -> None:
+    """Draw a moment: positions, what is in view and noticed, and the paths of the last minute.
+
+    Args:
+        run: The run.
+        step: The step to show.
+        path: The file: .png, .svg or .pdf. An existing file is replaced.
+
+    Raises:
+        InputError: The run has no such step, or the file can't be written.
+        ArtifactError: The run stored no key frames or no floor plan.
+    """
+    check_picture(path)
+    with drawing_style():
+        figure = moment_figure(run, step)
+        save_figure(figure, path)
+
+
+def moment_figure(run: Run, step: int) -> Figure:
+    """Return a figure of a moment; see `draw_moment`."""
+    steps = run.manifest["steps"]
+    if not 0 <= step < steps:
+        raise InputError(f"the run has no step {step}: its last is {steps - 1}")
+    width, height = figure_size(run.plan)
+    figure = Figure(figsize=(width, height * 1.15), dpi=DPI, facecolor="white")
+    FigureCanvasAgg(figure)
+    first, end = _day_around(run, step)
+    Stage(run, first, end, figure=figure).show(step)
+    return figure
+
+
+def moment_on_axes(run: Run, step: int, axes: Axes) -> None:
+    """Draw a moment on axes, in metres; see `draw_moment`."""
+    Stage(run, max(0, step - _minute(run)), step + 1, axes).show(step)
+
+
+def _minute(run: Run) -> int:
+    return max(1, round(60e6 / int(run.manifest["step_us"])))
+
+
+def draw_stretch(run: Run, first: int, end: int, path: Path, kind: FigureKind = "life") -> None:
+    """Draw a stretch of a run.
+
+    Args:
+        run: The run.
+        first: Its first step.
+        end: The step before which it ends.
+        path: The file: .png, .svg or .pdf. An existing file is replaced.
+        kind: `life`: paths and presence in the home, and rooms by day. `heat`: where people and
+            robots spent their time. `strip`: a row per body, coloured by room.
+
+    Raises:
+        InputError: The file can't be written.
+        ArtifactError: The run stored no key frames or no floor plan.
+    """
+    check_picture(path)
+    with drawing_style():
+        save_figure(stretch_figure(run, first, end, kind), path)
+
+
+def stretch_figure(run: Run, first: int, end: int, kind: FigureKind = "life") -> Figure:
+    """Return a figure of a stretch of a run; see `draw_stretch`."""
+    part = part_of_run(run, first, end)
+    if kind == "life":
+        return run_figure(part)
+    return _heat_figure(part) if kind == "heat" else strip_figure(part)
+
+
+def strip_figure(part: Run) -> Figure:
+    """Return a figure of a strip of time: a row per body."""
+    bodies = bodies_of(part.manifest["scenario"], part.manifest["entities"])
+    rows = strip_rows(part, [(body["name"], body["color"]) for body in bodies])
+    figure = Figure(figsize=(10.67, 0.7 + 0.34 * len(rows)), dpi=DPI, facecolor="white")
+    FigureCanvasAgg(figure)
+    height = figure.get_figheight()
+    axes = figure.add_axes((0.08, 0.32 / height, 0.9, 1 - 0.42 / height))
+    draw_strip(part, part.plan, rows, axes)
+    return figure
+
+
+def _heat_figure(part: Run) -> Figure:
+    """Return a figure of where people, and where robots, spent their time."""
+    entities = part.manifest["entities"]
+    groups = [(bucket, entities[bucket]) for bucket in ("users", "robots") if entities[bucket]]
+    if not groups:
+        raise InputError("nobody lives in this run: there is no heat map to draw")
+    width, height = figure_size(part.plan)
+    scale = min(1.0, HEIGHT_IN / height)
+    figure = Figure(figsize=(width * scale * len(groups), height * scale), dpi=DPI)
+    FigureCanvasAgg(figure)
+    share = 1 / len(groups)
+    for number, (bucket, names) in enumerate(groups):
+        axes = figure.add_axes((number * share, 0, share * 0.9, 1))
+        colors = draw_heat(part, names, axes)
+        label = "people" if bucket == "users" else "robots"
+        axes.set_title(f"{label}: hours per day and m²", fontsize=10, color=TEXT_COLOR, y=0.94)
+        bar = figure.add_axes(((number + 0.91) * share, 0.2, 0.012, 0.6))
+        figure.colorbar(colors, cax=bar).ax.tick_params(labelsize=7)
+    return figure
+
+
+def draw_heat(run: Run, names: list[str], axes: Axes) -> ScalarMappable:
+    """Draw where some bodies together spent their time, over their home.
+
+    Args:
+        run: The run, or a part of one.
+        names: The bodies.
+        axes: The axes to draw on, in metres.
+
+    Returns:
+        The colours of hours per day and m², for a colour bar.
+    """
+    plan = run.plan
+    floorplan_axes(plan, axes, title=False)
+    hours = _hours_per_m2(run, plan, names)
+    high = float(hours.max()) or 1.0
+    # The scale follows the square root: else hours in bed hide all other places.
+    colors = ScalarMappable(PowerNorm(0.5, 0, high), COLORS)
+    image = colors.to_rgba(hours)
+    image[..., 3] = np.clip(np.sqrt(hours / high) * 3, 0, 0.85) * plan.free
+    left, bottom = plan.lattice.origin
+    right = left + plan.lattice.columns * plan.lattice.cell
+    top = bottom + plan.lattice.rows * plan.lattice.cell
+    extent = (left, right, bottom, top)
+    axes.imshow(
+        image, extent=extent, origin="lower", interpolation="bilinear", zorder=2.1, label=SCALE
+    )
+    return colors
+
+
+def _hours_per_m2(run: Run, plan: FloorPlan, names: list[str]) -> NDArray[np.float64]:
+    step_us, steps = run.manifest["step_us"], run.manifest["steps"]
+    interval = timedelta(microseconds=int(step_us * -(-steps // SAMPLES)))
+    lattice = plan.lattice
+    time = np.zeros((lattice.rows, lattice.columns))
+    for name in names:
+        path = run.path(name, interval)
+        xy = np.stack([path.x, path.y], axis=1)[~path.away]
+        column, row = np.floor((xy - lattice.origin) / lattice.cell).astype(np.int64).T
+        row, column = np.clip(row, 0, lattice.rows - 1), np.clip(column, 0, lattice.columns - 1)
+        np.add.at(time, (row, column), 24 / max(1, len(path.x)))
+    return blurred(time, BLUR_M / lattice.cell) / lattice.cell**2
+
+
+def _day_around(run: Run, step: int) -> tuple[int, int]:
+    """Return the first step of the day of a step, and the first step after that day."""
+    clock = clock_of(run)
+    midnight = midnight_of(clock.time(step))
+    first = clock.step_at_or_after(clock.elapsed(midnight))
+    end = clock.step_at_or_after(clock.elapsed(midnight + timedelta(days=1)))
+    return max(0, first), min(clock.steps, end)

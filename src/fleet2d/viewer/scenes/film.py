@@ -1,0 +1,203 @@
+"""A stretch of a run as a film: MP4, GIF or WebP.
+
+Only frames that differ from the one before are drawn: most of a day nobody moves.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.text import Text
+from numpy.typing import NDArray
+
+from fleet2d.errors import InputError
+from fleet2d.extras import extra
+from fleet2d.pictures.floorplan import drawing_style, figure_size
+from fleet2d.pictures.theme import apply_theme
+from fleet2d.runs.run import Run
+from fleet2d.viewer.scenes.stage import Stage
+from fleet2d.viewer.scenes.stamps import TextStamps
+
+ENDINGS = (".mp4", ".gif", ".webp")
+MOST_FRAMES_A_S = 25
+HEIGHT_PX = 720
+HEIGHT_IN = 7.2
+# A GIF or WebP is written from pictures that are all in memory.
+MOST_PICTURES = 3_000
+
+Pixels = NDArray[np.uint8]
+
+
+def write_film(
+    run: Run,
+    path: Path,
+    first: int,
+    end: int,
+    *,
+    speed: float = 60.0,
+    height: int = HEIGHT_PX,
+    on_progress: Callable[[int, int], None] | None = None,
+) -> int:
+    """Write a stretch of a run as a film; return its number of different frames.
+
+    Args:
+        run: The run.
+        path: The file: .mp4, .gif or .webp. An existing file is replaced.
+        first: First step.
+        end: The step before which to end.
+        speed: Simulated time over the time of the film.
+        height: The height of the film [pixels].
+        on_progress: Called now and then with the number of finished frames, and of all frames.
+
+    Raises:
+        InputError: The file name has another suffix, a number is out of range, or the file can't be
+            written.
+        ArtifactError: The run stored no key frames or no floor plan.
+    """
+    _check(path, speed, height)
+    # Steps between two frames: a second of film has at most MOST_FRAMES_A_S frames.
+    stride = max(1, round(speed * 1e6 / run.manifest["step_us"] / MOST_FRAMES_A_S))
+    rate = Fraction(speed).limit_denominator(1000) * 1_000_000
+    rate /= run.manifest["step_us"] * stride
+    with drawing_style():
+        figure = _figure(run, height)
+        stage = Stage(run, first, end, figure=figure, stride=stride)
+        apply_theme(figure)
+        moments = np.flatnonzero(stage.changes())
+        total = -(-(end - first) // stride)
+        frames = _frames(stage, first, moments, on_progress)
+        _store(path, frames, total, rate)
+    return len(moments)
+
+
+def _store(path: Path, frames: Iterator[tuple[int, Pixels]], total: int, rate: Fraction) -> None:
+    """Write a film under another name, and rename it when it is complete."""
+    unfinished = path.with_name(f".{path.name}.unfinished{path.suffix}")
+    write = _write_mp4 if path.suffix.lower() == ".mp4" else _write_pictures
+    try:
+        write(unfinished, frames, total, rate)
+        unfinished.replace(path)
+    except OSError as error:
+        raise InputError(f"{path} can't be written: {error.strerror or error}") from error
+    finally:
+        with suppress(OSError):
+            unfinished.unlink(missing_ok=True)
+
+
+def _check(path: Path, speed: float, height: int) -> None:
+    if path.suffix.lower() not in ENDINGS:
+        raise InputError(
+            f"{path}: a film is written as .mp4, .gif or .webp, not as"
+            f" {path.suffix or 'no ending'!r}"
+        )
+    if not 0.1 <= speed <= 1e6:
+        raise InputError(f"--speed {speed:g}: choose from 0.1 to 1,000,000 times real time")
+    if not 120 <= height <= 2160:
+        raise InputError(f"--height {height}: choose from 120 to 2160 pixels")
+
+
+def _figure(run: Run, height: int) -> Figure:
+    """Return an empty figure whose width and height are even, as encoders require."""
+    plan_width, plan_height = figure_size(run.plan)
+    rows = height - height % 2
+    aspect = min(max(plan_width / plan_height, 1.0), 1.9)
+    columns = min(2 * round(rows * aspect / 2), 3840)
+    dpi = rows / HEIGHT_IN  # text grows with the film
+    figure = Figure(figsize=(columns / dpi, rows / dpi), dpi=dpi, facecolor="white")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def _frames(
+    stage: Stage,
+    first: int,
+    moments: NDArray[np.int64],
+    on_progress: Callable[[int, int], None] | None,
+) -> Iterator[tuple[int, Pixels]]:
+    """Yield the number and the pixels of each frame that differs from the one before."""
+    canvas: Any = stage.figure.canvas
+    for _, artist in (*stage.body_artists, *stage.clock_artists):
+        artist.set_animated(True)
+    canvas.draw()
+    background = canvas.copy_from_bbox(stage.figure.bbox)
+    scene = background
+    width, height = canvas.get_width_height()
+    stamps = TextStamps(width, height, stage.figure.dpi)
+
+    def draw(artists: Sequence[tuple[Axes | None, Artist]]) -> None:
+        pixels = np.asarray(canvas.buffer_rgba())
+        for axes, artist in artists:
+            if isinstance(artist, Text):
+                stamps.paste(artist, pixels)
+            elif axes is not None:
+                axes.draw_artist(artist)
+
+    for number, moment in enumerate(moments.tolist()):
+        if stage.show(first + moment * stage.stride):
+            canvas.restore_region(background)
+            draw(stage.body_artists)
+            scene = canvas.copy_from_bbox(stage.figure.bbox)
+        else:
+            canvas.restore_region(scene)
+        draw(stage.clock_artists)
+        if on_progress and number % 50 == 0:
+            on_progress(number, len(moments))
+        yield moment, np.asarray(canvas.buffer_rgba())
+
+
+def _write_mp4(
+    path: Path, frames: Iterator[tuple[int, Pixels]], total: int, rate: Fraction
+) -> None:
+    with extra("film", "an MP4 film needs PyAV"):
+        import av
+    with av.open(str(path), "w", options={"movflags": "faststart"}) as container:
+        stream: Any = None
+        frame: Any = None
+        for number, pixels in frames:
+            frame = av.VideoFrame.from_ndarray(pixels, format="rgba")
+            if stream is None:
+                stream = container.add_stream("libx264", rate=rate)
+                stream.width, stream.height, stream.pix_fmt = frame.width, frame.height, "yuv420p"
+                stream.time_base = 1 / rate
+                stream.codec_context.time_base = 1 / rate
+                stream.options = {"preset": "veryfast", "crf": "20", "tune": "animation"}
+            frame.pts, frame.time_base = number, 1 / rate
+            container.mux(stream.encode(frame))
+        if frame is not None and frame.pts < total - 1:  # the last picture stays to the end
+            frame.pts = total - 1
+            container.mux(stream.encode(frame))
+        if stream is not None:
+            container.mux(stream.encode(None))
+
+
+def _write_pictures(
+    path: Path, frames: Iterator[tuple[int, Pixels]], total: int, rate: Fraction
+) -> None:
+    """Write a GIF or WebP, whose pictures have durations of their own."""
+    from PIL import Image
+
+    numbers: list[int] = []
+    pictures: list[Any] = []
+    for number, pixels in frames:
+        if len(pictures) >= MOST_PICTURES:
+            raise InputError(
+                f"{path.suffix[1:].upper()} films have at most {MOST_PICTURES} pictures: choose a"
+                " higher --speed, a shorter stretch, or .mp4"
+            )
+        picture = Image.fromarray(pixels).convert("RGB")
+        numbers.append(number)
+        is_gif = path.suffix.lower() == ".gif"
+        pictures.append(picture.quantize(128, dither=Image.Dither.NONE) if is_gif else picture)
+    lengths = np.diff([*numbers, total]) * float(1000 / rate)
+    durations = [max(20, round(length)) for length in lengths.tolist()]
+    options = {"append_images": pictures[1:], "duration": durations, "loop": 0, "save_all": True}
+    if path.suffix.lower() == ".webp":
+        options |= {"quality": 80, "method": 2}
+    pictures[0].save(path, **options)

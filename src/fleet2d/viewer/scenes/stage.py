@@ -1,0 +1,302 @@
+"""A home with everybody in it at a step of a run, for pictures and for the frames of films."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from datetime import timedelta
+from typing import Any
+
+import numpy as np
+import shapely
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle
+from matplotlib.patheffects import withStroke
+from numpy.typing import NDArray
+
+from fleet2d.palette import ACCENT_COLOR, TEXT_COLOR, VIEW_COLOR, VIEW_EDGE
+from fleet2d.pictures.floorplan import floorplan_axes
+from fleet2d.pictures.life import RIM_COLOR, SightWalls, field_of_view
+from fleet2d.pictures.overlay import QUIET_COLOR
+from fleet2d.runs.run import Run
+from fleet2d.runs.trajectory import Trajectory
+from fleet2d.viewer.facts.contract import BodyFacts
+from fleet2d.viewer.facts.run_facts import bodies_of
+from fleet2d.viewer.facts.walls import WallsHistory, doors_of
+from fleet2d.viewer.part import part_of_run
+from fleet2d.viewer.scenes.strip import draw_strip, strip_rows
+
+TAIL = timedelta(minutes=1)  # length of the paths behind bodies
+LEAST_RADIUS_M = 0.2
+NOSE = 1.6  # length of the line of the heading [radii]
+STRIP_ROWS = 6
+ABOVE_M = 0.6  # space above the plan
+
+
+@dataclass
+class BodyArtists:
+    """A body on the stage: its facts, its path, and its artists."""
+
+    facts: BodyFacts
+    path: Trajectory
+    disc: Circle
+    nose: Any
+    name: Any
+    views: list[PolyCollection]
+    view_key: object = None
+
+
+class Stage:
+    """A home with everybody in it, from one step of a run to another.
+
+    Attributes:
+        figure: The figure.
+        stride: The number of steps between two moments that can be shown.
+        bodies: The users and robots.
+    """
+
+    def __init__(
+        self,
+        run: Run,
+        first: int,
+        end: int,
+        axes: Axes | None = None,
+        *,
+        figure: Figure | None = None,
+        stride: int = 1,
+    ) -> None:
+        """Draw everything that doesn't move.
+
+        Args:
+            run: The whole run.
+            first: The first step that can be shown.
+            end: The step after the last that can be shown.
+            axes: Axes for the plan alone; or
+            figure: an empty figure, for the plan and a strip of the time between both steps.
+            stride: The number of steps between two moments that can be shown.
+
+        Raises:
+            ArtifactError: The run stored no key frames or no floor plan.
+        """
+        self.stride, self._first = stride, first
+        self._run, self._plan = run, run.plan
+        self._part = part_of_run(run, first, end)
+        self._step_us = run.manifest["step_us"]
+        self._walls = WallsHistory(run, doors_of(run))
+        self._change_steps = [change["step"] for change in self._walls.changes]
+        self._strip: Axes | None = None
+        if axes is None:
+            assert figure is not None
+            axes, self._strip = self._lay_out(figure)
+        self._axes, self.figure = axes, axes.figure
+        floorplan_axes(self._plan, self._axes, title=False)
+        _, _, _, top = self._plan.bounds
+        self._axes.set_ylim(top=top + ABOVE_M)
+        facts_of_bodies = bodies_of(run.manifest["scenario"], run.manifest["entities"])
+        self.bodies = [self._artists(facts) for facts in facts_of_bodies]
+        self._paths = LineCollection([], lw=1.6, alpha=0.7, zorder=3.4)
+        self._sightings = LineCollection([], lw=1.0, ls=(0, (2, 1.5)), color=VIEW_EDGE, zorder=3.6)
+        for lines in (self._paths, self._sightings):
+            self._axes.add_collection(lines, autolim=False)
+        self._clock, self._away = self._write_head(axes)
+        self._cursor = None if self._strip is None else self._fill_strip(self._strip)
+        self._observations = _ObservationsByStep(self._part)
+        self._scene: object = None
+
+    @property
+    def body_artists(self) -> list[tuple[Axes, Artist]]:
+        """The artists of bodies, of their paths and of their views, in the order of drawing."""
+        artists: list[Artist] = [view for body in self.bodies for view in body.views]
+        artists += [self._paths, self._sightings]
+        for body in self.bodies:
+            artists += [body.disc, body.nose, body.name]
+        return [(self._axes, artist) for artist in artists]
+
+    @property
+    def clock_artists(self) -> list[tuple[Axes | None, Artist]]:
+        """The artists that change while nobody moves: the cursor of the strip, and the texts."""
+        cursor = [] if self._cursor is None else [(self._strip, self._cursor)]
+        return [*cursor, (None, self._clock), (None, self._away)]
+
+    def show(self, step: int) -> bool:
+        """Show a step of the run; return whether any body, path or view differs from before."""
+        index = (step - self._first) // self.stride
+        last_scene = self._scene
+        poses = [self._place(body, index, step) for body in self.bodies]
+        views = [body.view_key for body in self.bodies]
+        lines = [line.tobytes() for line in self._draw_paths(index)]
+        self._scene = (poses, views, lines, self._draw_sightings(step, index))
+        path = self.bodies[0].path if self.bodies else None
+        if path is not None:
+            time = path.time[index]
+            if self._cursor is not None:
+                self._cursor.set_xdata([time, time])
+            moment = time.astype(object)
+            self._clock.set_text(f"{moment:%a} {moment.day} {moment:%b %H:%M}")
+        away = [body.facts["name"] for body in self.bodies if body.path.away[index]]
+        self._away.set_text(f"away: {', '.join(away)}" if away else "")
+        return self._scene != last_scene
+
+    def changes(self) -> NDArray[np.bool_]:
+        """Return whether each moment differs from the one before: bool (moments,)."""
+        if not self.bodies:
+            return np.ones(1, np.bool_)
+        changed = np.zeros(len(self.bodies[0].path.step), np.bool_)
+        for body in self.bodies:
+            path = body.path
+            for values in (path.x, path.y, path.heading, path.away):
+                changed[1:] |= values[1:] != values[:-1]
+        minute = self.bodies[0].path.time.astype("M8[m]")
+        changed[1:] |= minute[1:] != minute[:-1]
+        changed[0] = True
+        return changed
+
+    def _write_head(self, axes: Axes) -> tuple[Any, Any]:
+        """Return the texts above the plan: the clock, and the names of those who are away."""
+        write, style, high = self.figure.text, dict[str, Any](va="top"), 0.975
+        if self._strip is None:
+            write, high = axes.text, 1.0
+            style = {"va": "bottom", "transform": axes.transAxes}
+        clock = write(0.02, high, "", fontsize=13, weight="bold", color=TEXT_COLOR, **style)
+        away = write(0.98, high, "", fontsize=9, color=QUIET_COLOR, ha="right", **style)
+        return clock, away
+
+    def _fill_strip(self, strip: Axes) -> Any:
+        """Draw the strip; return its cursor."""
+        colors = [(body.facts["name"], body.facts["color"]) for body in self.bodies[:STRIP_ROWS]]
+        rows = strip_rows(self._part, colors)
+        draw_strip(self._part, self._plan, rows, strip)
+        return strip.axvline(0, color=ACCENT_COLOR, lw=1.2, zorder=4)
+
+    def _lay_out(self, figure: Figure) -> tuple[Axes, Axes]:
+        rows = len(self._run.manifest["entities"]["users"])
+        rows += len(self._run.manifest["entities"]["robots"])
+        height = 0.075 + 0.032 * min(rows, STRIP_ROWS)
+        plan = figure.add_axes((0.0, height, 1.0, 0.94 - height))
+        strip = figure.add_axes((0.09, 0.055, 0.88, height - 0.06))
+        return plan, strip
+
+    def _artists(self, facts: BodyFacts) -> BodyArtists:
+        interval = timedelta(microseconds=self._step_us * self.stride)
+        path = self._part.path(facts["name"], interval)
+        color = facts["color"]
+        radius = max(facts["radius"], LEAST_RADIUS_M)
+        disc = Circle((0, 0), radius, facecolor=color, edgecolor="white", lw=0.9, zorder=4.3)
+        self._axes.add_patch(disc)
+        (nose,) = self._axes.plot([], [], color=color, lw=2.2, zorder=4.2, solid_capstyle="round")
+        name = self._axes.text(0, 0, facts["name"], fontsize=8.5, weight="bold", color=color)
+        name.set(ha="center", va="bottom", zorder=5, clip_on=True)
+        name.set_path_effects([withStroke(linewidth=2.0, foreground=RIM_COLOR)])
+        views = [PolyCollection([], facecolors=VIEW_COLOR, alpha=0.4, zorder=2.2) for _ in range(2)]
+        views[1].set(facecolor="none", edgecolor=VIEW_EDGE, lw=0.8, alpha=1.0, zorder=3.2)
+        for view in views if facts["cameras"] else ():
+            self._axes.add_collection(view, autolim=False)
+        return BodyArtists(facts, path, disc, nose, name, views if facts["cameras"] else [])
+
+    def _place(self, body: BodyArtists, index: int, step: int) -> tuple[float, float, float] | None:
+        """Move a body to its pose, which is returned; hide it and return None while it is away."""
+        path = body.path
+        x, y, heading = float(path.x[index]), float(path.y[index]), float(path.heading[index])
+        is_home = not bool(path.away[index])
+        for artist in (body.disc, body.nose, body.name, *body.views):
+            artist.set_visible(is_home)
+        if not is_home:
+            return None
+        radius = body.disc.get_radius()
+        body.disc.center = (x, y)
+        body.nose.set_data(
+            [x, x + NOSE * radius * np.cos(heading)], [y, y + NOSE * radius * np.sin(heading)]
+        )
+        body.name.set_position((x, y + 1.5 * radius))
+        if body.views:
+            self._draw_view(body, (x, y, heading), step)
+        return x, y, heading
+
+    def _draw_view(self, body: BodyArtists, pose: tuple[float, float, float], step: int) -> None:
+        """Draw the regions that the cameras of a body see, if they changed."""
+        number = int(np.searchsorted(self._change_steps, step, side="right")) - 1
+        walls = self._walls.changes[max(0, number)]["walls"]
+        key = (pose, walls, self._pans(body.facts, step))
+        if key == body.view_key:
+            return
+        body.view_key = key
+        sight = SightWalls(self._walls.mesh(walls), self._plan.lattice)
+        outlines = list(self._outlines(body.facts, pose, sight, step))
+        for view in body.views:
+            view.set_verts(outlines)
+
+    def _pans(self, facts: BodyFacts, step: int) -> tuple[float, ...]:
+        return tuple(
+            camera["pan"][step * self._step_us // camera["pan_us"] % len(camera["pan"])]
+            if camera["pan"]
+            else 0.0
+            for camera in facts["cameras"]
+        )
+
+    def _outlines(
+        self, facts: BodyFacts, pose: tuple[float, float, float], sight: SightWalls, step: int
+    ) -> Iterator[NDArray[np.float64]]:
+        x, y, heading = pose
+        pans = self._pans(facts, step)
+        for camera, pan in zip(facts["cameras"], pans, strict=True):
+            forward, left = camera["forward"], camera["left"]
+            eye = np.array(
+                [
+                    x + forward * np.cos(heading) - left * np.sin(heading),
+                    y + forward * np.sin(heading) + left * np.cos(heading),
+                ]
+            )
+            lens = {
+                "range": (camera["near"], camera["far"]),
+                "angle_deg": float(np.rad2deg(camera["angle"])),
+            }
+            region = field_of_view(sight, eye, heading + camera["heading"] + pan, lens)
+            for part in shapely.get_parts(region):
+                yield shapely.get_coordinates(part.exterior)
+
+    def _draw_paths(self, index: int) -> list[NDArray[np.float64]]:
+        """Draw the paths of the last minute; return them, each float64 (n, 2) [m]."""
+        moments = max(1, TAIL // timedelta(microseconds=self._step_us * self.stride))
+        span = slice(max(0, index - moments), index + 1)
+        lines, colors = [], []
+        for body in self.bodies:
+            path = body.path
+            xy = np.stack([path.x[span], path.y[span]], axis=1)[~path.away[span]]
+            if len(xy) > 1 and (xy != xy[0]).any():
+                lines.append(xy)
+                colors.append(body.disc.get_facecolor())
+        self._paths.set_segments(lines)
+        self._paths.set_color(colors or "none")
+        return lines
+
+    def _draw_sightings(self, step: int, index: int) -> list[Any]:
+        """Draw lines from robots to the places where they notice users; return them."""
+        xy = {b.facts["name"]: (b.path.x[index], b.path.y[index]) for b in self.bodies}
+        index_in_part = step - self._first
+        sightings = self._observations.between(index_in_part, index_in_part + self.stride)
+        lines = [[xy[robot], place] for robot, place in sightings if robot in xy]
+        self._sightings.set_segments(lines)
+        return lines
+
+
+class _ObservationsByStep:
+    """The observations of robots, by step."""
+
+    def __init__(self, part: Run) -> None:
+        self._step = np.zeros(0, np.int64)
+        if "observations" not in part.tables:
+            return
+        table = part.tables["observations"]
+        self._step = table["step"].to_numpy()
+        self._robot = table["robot"].cast("string").to_numpy(zero_copy_only=False)
+        self._xy = np.stack([table["x"].to_numpy(), table["y"].to_numpy()], axis=1)
+
+    def between(self, first: int, end: int) -> list[tuple[str, tuple[float, float]]]:
+        """Return (robot, place [m]) of the observations from step `first` to before step `end`."""
+        low, high = np.searchsorted(self._step, [first, end]).tolist()
+        places = {
+            (str(self._robot[i]), round(float(self._xy[i, 0]), 2), round(float(self._xy[i, 1]), 2))
+            for i in range(low, high)
+        }
+        return [(robot, (x, y)) for robot, x, y in sorted(places)]
