@@ -485,8 +485,8 @@ except SystemExit:
         env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
     )  # fmt: skip
     young, middle, old = json.loads(done.stdout)
-    assert young < 60  # 180 before
-    assert (middle < 6, old) == (True, 0)
+    assert young < 20  # 180 before
+    assert (middle < 3, old) == (True, 0)
 
 
 def test_importing_does_not_load_the_compiler() -> None:

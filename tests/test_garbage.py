@@ -1,6 +1,7 @@
 """Garbage is looked for rarely during a run, so a run must leave none behind that is large."""
 
 import gc
+import platform
 import subprocess
 import sys
 import weakref
@@ -93,3 +94,20 @@ def test_objects_of_a_failed_import_are_collected_as_usual(usual: tuple[int, int
         raise ImportError
     assert usual == gc.get_threshold()
     assert frozen == gc.get_freeze_count()
+
+
+@pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="another allocator")
+def test_memory_of_freed_arrays_is_used_again_without_new_pages() -> None:
+    code = """
+import resource, sys
+import numpy as np
+from fleet2d.garbage import keep_free_memory
+if sys.argv[1] == "keep":
+    keep_free_memory()
+faults = [resource.getrusage(resource.RUSAGE_SELF).ru_minflt for _ in range(2) if np.ones(2_500_000).all()]
+print(faults[1] - faults[0])
+"""
+    kept, usual = (
+        int(subprocess.check_output([sys.executable, "-c", code, word])) for word in ("keep", "")
+    )
+    assert 10 * kept < usual

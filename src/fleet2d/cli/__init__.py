@@ -6,7 +6,7 @@ import sys
 from typing import NoReturn
 
 from fleet2d.errors import Fleet2DError, InputError
-from fleet2d.garbage import rare_collections
+from fleet2d.garbage import keep_free_memory, rare_collections
 
 
 def main() -> NoReturn:
@@ -15,6 +15,7 @@ def main() -> NoReturn:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     # To look for pydantic's plugins takes as long as to import it.
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
+    keep_free_memory()
     try:
         with rare_collections():
             from fleet2d.cli.app import app
