@@ -2,6 +2,7 @@
 The compiled core of Fleet2D: arrays and integers in, arrays and integers out.
 """
 
+from collections.abc import Sequence
 import enum
 from typing import Any, overload
 
@@ -1457,3 +1458,36 @@ def earth_mover(start: numpy.typing.NDArray[numpy.float64], end: numpy.typing.ND
     Returns:
         float64 (n,).
     """
+
+class Interruptions:
+    """
+    Needs and errands of a person, as numbers: times in seconds, chances of 1024.
+
+    Args:
+        needs: Of each the steps, each with its activity, chance, and 256 quantiles of its duration; 256 quantiles of the
+            time to the next one, and in sleep, or None; its chances on waking, before bed, before leaving and on return;
+            the patience; begin and length of its hours, or None; and the activities that meet it.
+        errands: Of each its step, and the activities after and before which it is done; None: all.
+        away: Activities out of the home.
+        uninterruptible: Activities that needs don't interrupt.
+        sleep: The activity that is sleep.
+        activities: Number of activities.
+    """
+
+    def __init__(self, needs: Sequence[tuple[Sequence[tuple[int, int, Sequence[int]]], Sequence[int], Sequence[int] | None, tuple[int, int, int, int], int, tuple[int, int] | None, Sequence[int]]], errands: Sequence[tuple[tuple[int, int, Sequence[int]], Sequence[int] | None, Sequence[int] | None]], away: Sequence[int], uninterruptible: Sequence[int], sleep: int, activities: int) -> None: ...
+
+    def interrupt(self, draws: StepDraws, day: Sequence[tuple[int, int, int]]) -> list[tuple[int, int, int, int, int]]:
+        """
+        Put interruptions into a day.
+
+        Args:
+            draws: The draws of the day's interruptions.
+            day: Activity, begin and end of each planned doing, without a gap.
+
+        Returns:
+            The number of the planned doing, -1 for an interruption; activity, begin, end and role of each part.
+        """
+
+    def __getstate__(self) -> tuple[list[tuple[list[tuple[int, int, list[int]]], list[int], list[int] | None, tuple[int, int, int, int], int, tuple[int, int] | None, list[int]]], list[tuple[tuple[int, int, list[int]], list[int] | None, list[int] | None]], list[int], list[int], int, int]: ...
+
+    def __setstate__(self, arg: tuple[Sequence[tuple[Sequence[tuple[int, int, Sequence[int]]], Sequence[int], Sequence[int] | None, tuple[int, int, int, int], int, tuple[int, int] | None, Sequence[int]]], Sequence[tuple[tuple[int, int, Sequence[int]], Sequence[int] | None, Sequence[int] | None]], Sequence[int], Sequence[int], int, int], /) -> None: ...

@@ -219,6 +219,13 @@ def model() -> StayModel:
     return StayModel(np.full(3, 0.9), follow, spread, np.array([0.1, 0.0, 0.0]), first, 0.8)
 
 
+def needs_and_errands() -> tuple[Any, ...]:
+    """Return a need and an errand of somebody who does four activities, the third of them sleep."""
+    often = list(range(1000, 1256))
+    need = ([(3, 1024, often)], often, often, (512, 512, 512, 512), 900, (3600, 80_000), [1])
+    return [need], [((3, 300, often), None, [1])], [], [1], 2, 4
+
+
 def people() -> StayModel:
     """Return the model of five people, a group and one more."""
     *arrays, first, detection = model()
@@ -390,6 +397,12 @@ CALLS: dict[str, Args] = {
     "Routes.find": lambda: (_core.Routes(MESH, corners()), 100, 500, 1000, 500),
     "distance": lambda: (1, 2, 3, 4),
     "advance": lambda: (np.array([0.5, 0.5]), np.array([[0.9, 0.1], [0.3, 0.7]]), 5),
+    "Interruptions": needs_and_errands,
+    "Interruptions.interrupt": lambda: (
+        _core.Interruptions(*needs_and_errands()),
+        _core.StepDraws(7, 3),
+        [(0, 0, 30_000), (1, 30_000, 60_000), (2, 60_000, 90_000)],
+    ),
     "list_sightings": lambda: (
         np.arange(6),
         np.array([0, 1, -1, 0, 1, 0]),
@@ -610,7 +623,8 @@ def test_too_few_and_too_many_arguments_are_refused(name: str) -> None:
             named(name)(*wrong)
 
 
-TUPLES = sorted({(name, at[:-1]) for name, at in [*ARRAYS, *INTEGERS] if len(at) > 1})
+PARENTS = sorted({(name, at[:-1]) for name, at in [*ARRAYS, *INTEGERS] if len(at) > 1})
+TUPLES = [(name, at) for name, at in PARENTS if isinstance(leaf(CALLS[name](), at), tuple)]
 
 
 @each(TUPLES)
@@ -816,6 +830,8 @@ def use_all_methods(instance: Any) -> None:
         instance.track()
     elif isinstance(instance, _core.StepDraws):
         instance.below(10)
+    elif isinstance(instance, _core.Interruptions):
+        instance.interrupt(_core.StepDraws(7, 3), [(0, 0, 30_000), (2, 30_000, 60_000)])
     elif isinstance(instance, _core.Window):
         for body in range(len(instance.start) - 1):
             instance.dense(body, instance.first, min(instance.end, instance.first + 99))
@@ -850,6 +866,7 @@ def legs() -> _core.Legs:
 
 
 STATES: dict[str, Callable[[], Any]] = {
+    "Interruptions": lambda: _core.Interruptions(*needs_and_errands()),
     "Legs": legs,
     "Mesh": lambda: _core.Mesh(MESH.vertices, MESH.triangles, MESH.neighbors),
     "Routes": lambda: _core.Routes(MESH, corners()),

@@ -1,17 +1,35 @@
 """Interruptions: needs and errands come up in a day, and leave its plan as it is."""
 
+import pickle
 import statistics
-from itertools import pairwise
+from itertools import accumulate, pairwise
 from typing import Any
 
+import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from pydantic import ValidationError
 from tests.routines.days import DAY_S, MONDAY
 
-from fleet2d.routines.interruptions import MOST, without_interruptions
+from fleet2d.routines.interruption_rules import (
+    CERTAIN,
+    ErrandRule,
+    InterruptionRules,
+    InterruptionStep,
+    NeedRule,
+    in_numbers,
+)
+from fleet2d.routines.interruptions import (
+    MOST,
+    _InterruptedDay,
+    interrupt,
+    without_interruptions,
+)
 from fleet2d.routines.life import Life
 from fleet2d.routines.persona import Persona, bundled_names, bundled_persona
 from fleet2d.routines.planner import INTERRUPTS, RESUMES, SLEEP, Doing
+from fleet2d.streams import Draws
 
 HOUR = 3600
 IDLE = {"days": {"any_day": {"on": "daily", "wake": "07:00", "sleep": "23:00"}}}
@@ -27,6 +45,51 @@ def of(needs: Any = None, errands: Any = None, **more: Any) -> Life:
 
 def days(lived: Life, count: int = 100) -> list[list[Doing]]:
     return [list(lived.day(MONDAY + i)) for i in range(count)]
+
+
+QUANTILES = st.integers(1, 20_000).map(
+    lambda longest: tuple(1 + i * longest // 256 for i in range(256))
+)
+CHANCES = st.sampled_from([0, 100, 700, CERTAIN])
+PLACES = ("rest", "toilet", "cook", "work", "walk", "sleep", "wash_hands")
+GROUPS = st.frozensets(st.sampled_from(PLACES))
+STEPS = st.builds(InterruptionStep, st.sampled_from(PLACES[:3]), CHANCES, QUANTILES, st.just(False))
+NEEDS = st.builds(
+    NeedRule,
+    st.lists(STEPS, min_size=1, max_size=3).map(tuple), QUANTILES, st.none() | QUANTILES,
+    CHANCES, CHANCES, CHANCES, CHANCES, st.integers(0, 4000),
+    st.none() | st.tuples(st.integers(0, 86_399), st.integers(0, 86_399)), GROUPS,
+)  # fmt: skip
+ERRANDS = st.builds(ErrandRule, STEPS, GROUPS, GROUPS)
+DAYS = st.lists(st.tuples(st.sampled_from(PLACES), st.integers(1, 20_000)), min_size=1, max_size=12)
+
+
+@given(st.lists(NEEDS, max_size=3), st.lists(ERRANDS, max_size=3), GROUPS, DAYS, st.integers(0, 99))
+def test_the_core_interrupts_a_day_as_python_does(
+    needs: Any, errands: Any, firm: Any, lengths: Any, number: int
+) -> None:
+    numbers = {name: number for number, name in enumerate(PLACES)}
+    away = frozenset({"work", "walk"})
+    core = in_numbers(needs, errands, away, firm, numbers)
+    rules = InterruptionRules(
+        tuple(needs), tuple(errands), away, firm, frozenset(), PLACES, numbers, core
+    )
+    ends = list(accumulate((length for _, length in lengths), initial=25_000))
+    day = [Doing(name, *span) for (name, _), span in zip(lengths, pairwise(ends), strict=True)]
+    slow = _InterruptedDay(rules, Draws(np.uint64(5), number), day, None).result
+    assert slow == interrupt(rules, Draws(np.uint64(5), number), day)
+    copies = rules._replace(core=pickle.loads(pickle.dumps(core)))
+    assert slow == interrupt(copies, Draws(np.uint64(5), number), day)
+
+
+@pytest.mark.parametrize("name", bundled_names())
+def test_the_days_of_bundled_personas_are_those_of_python(name: str) -> None:
+    lived = life(bundled_persona(name))
+    rules = lived.persona.interruptions
+    for ordinal in range(MONDAY, MONDAY + 60):
+        plan = lived.draw_uninterrupted(ordinal, lived.template(ordinal))
+        slow = _InterruptedDay(rules, Draws(np.uint64(9), ordinal), plan, None).result
+        assert slow == interrupt(rules, Draws(np.uint64(9), ordinal), plan)
 
 
 @pytest.mark.parametrize("name", bundled_names())

@@ -36,4 +36,5 @@ NB_MODULE(_core, m) {
     bind_timelines(m);
     bind_signals(m);
     bind_flows(m);
+    bind_interruptions(m);
 }

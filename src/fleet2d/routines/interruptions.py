@@ -4,153 +4,35 @@ Each interruption lies within one activity, which is resumed afterwards: all act
 begin and end as planned. A day's interruptions are a function of its date and its plan alone.
 """
 
-from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from collections.abc import Sequence
 
 from fleet2d.kernels.random import Bits
-from fleet2d.routines.activity import Activity, seconds
-from fleet2d.routines.laws import Law
-from fleet2d.routines.needs import Errand, Need
-from fleet2d.routines.occupancy import Occupancy
-from fleet2d.routines.planner import DAY_S, FINISHES, INTERRUPTS, RESUMES, SLEEP, Doing
+from fleet2d.routines.interruption_rules import (
+    CERTAIN,
+    CHANCE_BITS,
+    QUANTILE_BITS,
+    InterruptionRules,
+    InterruptionStep,
+    Quantiles,
+)
+from fleet2d.routines.occupancy import ANY_ROOM, Occupancy
+from fleet2d.routines.planner import (
+    DAY_S,
+    FINISHES,
+    INTERRUPTS,
+    PLANNED,
+    RESUMES,
+    SLEEP,
+    Doing,
+)
 from fleet2d.streams import Draws
 
-# Probabilities have this many bits, and laws 2 to this power quantiles: few bits of a draw suffice.
-CHANCE_BITS, QUANTILE_BITS = 10, 8
-CERTAIN = 1 << CHANCE_BITS
 # The least duration of the rest of an activity after an interruption [s].
 SHORTEST_REST_S = 60
 # Within this time before waking, no need interrupts sleep [s].
 LAST_SLEEP_S = 1800
 # The most doings of a day, whose numbers are part of the addresses of random draws.
 MOST = 480
-
-
-Quantiles = tuple[int, ...]
-
-
-class InterruptionStep(NamedTuple):
-    """One activity of an interruption.
-
-    Attributes:
-        activity: The activity.
-        chance: Its probability, in parts of CERTAIN.
-        takes: Quantiles of its duration [s].
-        exclusive: Whether it needs a room that no other member of the household uses.
-    """
-
-    activity: str
-    chance: int
-    takes: Quantiles
-    exclusive: bool
-
-
-class NeedRule(NamedTuple):
-    """A need in the form used here; probabilities in parts of CERTAIN, times in seconds."""
-
-    steps: tuple[InterruptionStep, ...]
-    every: Quantiles
-    asleep: Quantiles | None
-    on_waking: int
-    before_bed: int
-    before_leaving: int
-    on_return: int
-    patience: int
-    window: tuple[int, int] | None
-    met_by: frozenset[str]
-
-
-class ErrandRule(NamedTuple):
-    """An errand in the form used here."""
-
-    step: InterruptionStep
-    after: frozenset[str]
-    before: frozenset[str]
-
-
-class InterruptionRules(NamedTuple):
-    """What interrupts the days of a person.
-
-    Attributes:
-        needs: The needs of the person.
-        errands: The errands of the person.
-        away: Activities out of the home.
-        uninterruptible: Activities that needs don't interrupt.
-        private: Exclusive activities, which are done alone in their room.
-    """
-
-    needs: tuple[NeedRule, ...]
-    errands: tuple[ErrandRule, ...]
-    away: frozenset[str]
-    uninterruptible: frozenset[str]
-    private: frozenset[str]
-
-
-def interruption_rules(
-    needs: Mapping[str, Need], errands: Mapping[str, Errand], activities: Mapping[str, Activity]
-) -> InterruptionRules:
-    """Return the rules of needs and errands.
-
-    Args:
-        needs: The needs, by name.
-        errands: The errands, by name.
-        activities: All activities that a day may have, with those of needs and errands.
-    """
-    need_rules = tuple(_need_rule(name, need, activities) for name, need in needs.items())
-    errand_rules = tuple(
-        ErrandRule(
-            _step(errand.activity or name, errand.probability, errand.takes, activities),
-            frozenset(errand.after),
-            frozenset(errand.before),
-        )
-        for name, errand in errands.items()
-    )
-    return InterruptionRules(
-        need_rules,
-        errand_rules,
-        frozenset(name for name, activity in activities.items() if activity.away),
-        frozenset(n for n, a in activities.items() if a.exclusive or not a.interruptible),
-        frozenset(name for name, activity in activities.items() if activity.exclusive),
-    )
-
-
-def _need_rule(name: str, need: Need, activities: Mapping[str, Activity]) -> NeedRule:
-    steps = [_step(need.activity or name, 1.0, need.takes, activities)]
-    steps += [_step(then, chance, None, activities) for then, chance in need.then.items()]
-    window = None
-    if need.between is not None:
-        first = seconds(need.between[0])
-        window = first, (seconds(need.between[1]) - first) % DAY_S
-    return NeedRule(
-        tuple(steps),
-        _quantiles(need.every.table()),
-        None if need.asleep is None else _quantiles(need.asleep.table()),
-        _chance(need.on_waking),
-        _chance(need.before_bed),
-        _chance(need.before_leaving),
-        _chance(need.on_return),
-        seconds(need.patience),
-        window,
-        frozenset(need.met_by),
-    )
-
-
-def _chance(share: float) -> int:
-    """Return a probability in parts of CERTAIN."""
-    return round(share * CERTAIN)
-
-
-def _step(
-    name: str, chance: float, takes: object, activities: Mapping[str, Activity]
-) -> InterruptionStep:
-    activity = activities[name]
-    law = (takes or activity.takes).table()  # type: ignore[attr-defined]
-    return InterruptionStep(name, _chance(chance), _quantiles(law), activity.exclusive)
-
-
-def _quantiles(law: Law) -> Quantiles:
-    """Return quantiles of a law between its bounds [s]."""
-    return tuple(max(1, value) for value in law.quantiles(1 << QUANTILE_BITS))
 
 
 def interrupt(
@@ -164,7 +46,23 @@ def interrupt(
         day: The planned day, without a gap.
         occupancy: When others use private rooms; None: never.
     """
-    return _InterruptedDay(rules, draws, day, occupancy).result
+    if occupancy is not None:
+        return _InterruptedDay(rules, draws, day, occupancy).result
+    rows = [(rules.numbers[doing.activity], doing.begin, doing.end) for doing in day]
+    return [
+        Doing(rules.names[activity], begin, end, "", ANY_ROOM, role)
+        if planned < 0
+        else _part(day[planned], begin, end, role)
+        for planned, activity, begin, end, role in rules.core.interrupt(draws, rows)
+    ]
+
+
+def _part(doing: Doing, begin: int, end: int, role: int) -> Doing:
+    """Return a part of a planned doing."""
+    if begin == doing.begin and end == doing.end:
+        return doing
+    role = doing.role if role == PLANNED else role
+    return Doing(doing.activity, begin, end, doing.task, doing.room, role)
 
 
 def without_interruptions(day: Sequence[Doing]) -> list[Doing]:
@@ -184,7 +82,7 @@ def without_interruptions(day: Sequence[Doing]) -> list[Doing]:
 
 
 class _InterruptedDay:
-    """A day to which interruptions are added, doing by doing.
+    """A day of a member of a household to which interruptions are added, doing by doing.
 
     Attributes:
         result: The doings so far.

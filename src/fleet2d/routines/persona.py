@@ -20,7 +20,7 @@ from fleet2d.errors import ScenarioError
 from fleet2d.paths import folder_of
 from fleet2d.problems import did_you_mean, problem, problem_at, shown, suggest
 from fleet2d.routines.activity import Activity, AnyDurationLaw, catalogue, find_activity
-from fleet2d.routines.interruptions import InterruptionRules, interruption_rules
+from fleet2d.routines.interruption_rules import InterruptionRules, interruption_rules
 from fleet2d.routines.manners import Manners
 from fleet2d.routines.needs import (
     AnyErrand,

@@ -9,7 +9,8 @@ from fleet2d.entities.users.inhabitant import Inhabitant, rooms_at
 from fleet2d.entities.users.spots import Spots
 from fleet2d.routines import survey
 from fleet2d.routines.activity import catalogue
-from fleet2d.routines.interruptions import interrupt, interruption_rules
+from fleet2d.routines.interruption_rules import interruption_rules
+from fleet2d.routines.interruptions import interrupt
 from fleet2d.routines.laws import draw_weighted
 from fleet2d.routines.needs import activities_of, usual_errands, usual_needs
 from fleet2d.routines.planner import REST, Doing

@@ -1,0 +1,5 @@
+"""Interruptions of a person's day, as numbers."""
+
+from fleet2d._core import Interruptions
+
+__all__ = ["Interruptions"]
