@@ -77,6 +77,7 @@ def test_stays_out_of_the_bathroom_while_it_is_occupied(trial: Trial) -> None:
     "simulation.duration=10 d",
     "algorithms.ltp.period=6 h",
     "robots.astro.battery=null",
+    "robots.astro.gives_way=null",
     "robots.astro.behaviors=[{type: patrol, cooldown: 3 h, dwell: 0 s}]",
 )
 def test_learns_the_bedroom_within_ten_days(trial: Trial) -> None:

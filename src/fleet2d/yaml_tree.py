@@ -179,7 +179,7 @@ class TreeWalk:
             VALUES.check(self._values, "it", least="more than ")
         if len(parents) >= self._most_depth:
             DEPTH.check(len(parents) + 1, "it", least="at least ")
-        if any(node is parent for parent in parents):
+        if node in parents:  # nodes are equal only to themselves
             raise NodeError(node, "a value can't contain itself")
 
     def scalar(self, node: yaml.ScalarNode) -> Any:
@@ -188,12 +188,12 @@ class TreeWalk:
         Raises:
             NodeError: It has an unknown tag, or can't be read as what its tag says.
         """
-        kind, text = node.tag.removeprefix(TAG), one_line(node.value)
         if node.tag not in _PLAIN:
             raise NodeError(node, f"the tag {one_line(node.tag)!r} can't be used here")
         try:
             return self._scalars.construct_object(node)
         except (ValueError, LookupError, TypeError, AttributeError, OverflowError):
+            kind, text = node.tag.removeprefix(TAG), one_line(node.value)
             size = f" of {len(node.value)} characters" if len(node.value) > len(text) else ""
             raise NodeError(node, f"{text!r}{size} is not a valid {kind}") from None
 

@@ -15,7 +15,7 @@ from typing import Any
 
 import pytest
 from tests.scenes import OWN, digests, everything, fleet2d_process, scenario
-from tests.thorough import THOROUGH
+from tests.thorough import THOROUGH, some
 
 import fleet2d
 from fleet2d import Algorithm
@@ -222,7 +222,7 @@ def test_killed_at_random_moments_and_resumed_it_is_the_same(tmp_path: Path, for
     assert len(resumed) > 1 or KILLS < 10
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", some([signal.SIGTERM, signal.SIGINT], 2))
 def test_a_signal_is_heard_and_the_run_goes_on_later(tmp_path: Path, number: int) -> None:
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
     command = ["-m", "fleet2d.cli", "run", "simulation.duration=20000 d", "--seed", "4"]
