@@ -10,8 +10,9 @@ from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 from tests.fuzz.judge import judge
 from tests.fuzz.readers import READERS
+from tests.thorough import examples
 
-EXAMPLES = 24
+EXAMPLES = examples(60)
 FINDS = sorted((Path(__file__).parent / "finds").glob("*-*"))
 """Contents that a reader has failed at, as NAME OF THE READER-NUMBER."""
 
