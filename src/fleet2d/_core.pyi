@@ -1491,3 +1491,38 @@ class Interruptions:
     def __getstate__(self) -> tuple[list[tuple[list[tuple[int, int, list[int]]], list[int], list[int] | None, tuple[int, int, int, int], int, tuple[int, int] | None, list[int]]], list[tuple[tuple[int, int, list[int]], list[int] | None, list[int] | None]], list[int], list[int], int, int]: ...
 
     def __setstate__(self, arg: tuple[Sequence[tuple[Sequence[tuple[int, int, Sequence[int]]], Sequence[int], Sequence[int] | None, tuple[int, int, int, int], int, tuple[int, int] | None, Sequence[int]]], Sequence[tuple[tuple[int, int, Sequence[int]], Sequence[int] | None, Sequence[int] | None]], Sequence[int], Sequence[int], int, int], /) -> None: ...
+
+class DayPlanner:
+    """
+    Draws days of a template; times in seconds since midnight.
+
+    A law is its quantiles, its least and largest value, and the positions of these among the quantiles.
+
+    Args:
+        sleep: The law of going to bed.
+        least_sleep: The least duration of sleep.
+        jobs: Of each the activity, the law of its beginning, or None, and of its duration; its latest end; the jobs before
+            it; its chance per million; whether it is needed; -1 on waking, 1 before bed, else 0.
+        pastimes: Of each the activity, the weight, the law of its duration, and from when to when it may begin.
+        rest: The activity without any.
+        asleep: The activity that is sleep.
+    """
+
+    def __init__(self, sleep: tuple[Sequence[int], int, int, int, int], least_sleep: int, jobs: Sequence[tuple[int, tuple[Sequence[int], int, int, int, int] | None, tuple[Sequence[int], int, int, int, int], int, Sequence[int], int, bool, int]], pastimes: Sequence[tuple[int, int, tuple[Sequence[int], int, int, int, int], int, int]], rest: int, asleep: int) -> None: ...
+
+    def plan(self, draws: StepDraws, wake: int, next_wake: int) -> list[tuple[int, int, int, int]]:
+        """
+        Draw a day.
+
+        Args:
+            draws: The day's draws.
+            wake: When it begins.
+            next_wake: When the next day begins.
+
+        Returns:
+            Activity, begin, end, and number of the job, or -1, of each doing; none if the jobs fit in no order.
+        """
+
+    def __getstate__(self) -> tuple[tuple[list[int], int, int, int, int], int, list[tuple[int, tuple[list[int], int, int, int, int] | None, tuple[list[int], int, int, int, int], int, list[int], int, bool, int]], list[tuple[int, int, tuple[list[int], int, int, int, int], int, int]], int, int]: ...
+
+    def __setstate__(self, arg: tuple[tuple[Sequence[int], int, int, int, int], int, Sequence[tuple[int, tuple[Sequence[int], int, int, int, int] | None, tuple[Sequence[int], int, int, int, int], int, Sequence[int], int, bool, int]], Sequence[tuple[int, int, tuple[Sequence[int], int, int, int, int], int, int]], int, int], /) -> None: ...

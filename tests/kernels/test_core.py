@@ -226,6 +226,20 @@ def needs_and_errands() -> tuple[Any, ...]:
     return [need], [((3, 300, often), None, [1])], [], [1], 2, 4
 
 
+def day_plan() -> tuple[Any, ...]:
+    """Return the plan of a day: two jobs, the second after the first, and a pastime."""
+
+    def law(shortest: int, longest: int) -> tuple[Any, ...]:
+        return ([shortest, longest], shortest, longest, 0, 1 << 24)
+
+    jobs = [
+        (2, law(30_000, 40_000), law(600, 1200), 80_000, [], 900_000, False, 0),
+        (3, None, law(60, 120), 1 << 40, [0], 1_000_000, True, 0),
+    ]
+    pastimes = [(4, 7, law(900, 7200), 0, 90_000)]
+    return law(80_000, 86_000), 3600, jobs, pastimes, 0, 1
+
+
 def people() -> StayModel:
     """Return the model of five people, a group and one more."""
     *arrays, first, detection = model()
@@ -397,6 +411,13 @@ CALLS: dict[str, Args] = {
     "Routes.find": lambda: (_core.Routes(MESH, corners()), 100, 500, 1000, 500),
     "distance": lambda: (1, 2, 3, 4),
     "advance": lambda: (np.array([0.5, 0.5]), np.array([[0.9, 0.1], [0.3, 0.7]]), 5),
+    "DayPlanner": day_plan,
+    "DayPlanner.plan": lambda: (
+        _core.DayPlanner(*day_plan()),
+        _core.StepDraws(7, 3),
+        25_000,
+        110_000,
+    ),
     "Interruptions": needs_and_errands,
     "Interruptions.interrupt": lambda: (
         _core.Interruptions(*needs_and_errands()),
@@ -830,6 +851,8 @@ def use_all_methods(instance: Any) -> None:
         instance.track()
     elif isinstance(instance, _core.StepDraws):
         instance.below(10)
+    elif isinstance(instance, _core.DayPlanner):
+        instance.plan(_core.StepDraws(7, 3), 25_000, 110_000)
     elif isinstance(instance, _core.Interruptions):
         instance.interrupt(_core.StepDraws(7, 3), [(0, 0, 30_000), (2, 30_000, 60_000)])
     elif isinstance(instance, _core.Window):
@@ -866,6 +889,7 @@ def legs() -> _core.Legs:
 
 
 STATES: dict[str, Callable[[], Any]] = {
+    "DayPlanner": lambda: _core.DayPlanner(*day_plan()),
     "Interruptions": lambda: _core.Interruptions(*needs_and_errands()),
     "Legs": legs,
     "Mesh": lambda: _core.Mesh(MESH.vertices, MESH.triangles, MESH.neighbors),

@@ -15,7 +15,7 @@ from tests.thorough import THOROUGH, examples
 from fleet2d.routines.interruptions import without_interruptions
 from fleet2d.routines.life import Life
 from fleet2d.routines.persona import Persona, bundled_names, bundled_persona
-from fleet2d.routines.planner import Doing
+from fleet2d.routines.planner import Doing, plan_day
 
 HOUR = 3600
 
@@ -261,6 +261,23 @@ def test_any_template_is_either_refused_or_kept(do: dict[str, Any], seed: int) -
     for i in range(20):
         day, after = lived.day(MONDAY + i), lived.day(MONDAY + i + 1)
         assert [] == violations(persona, MONDAY + i, day, after)
+        same_in_python(lived, MONDAY + i)
+
+
+def same_in_python(lived: Life, ordinal: int) -> None:
+    """Check that the core plans the same day as Python does for members of households."""
+    plan, span = lived.template(ordinal), (lived.wake(ordinal), lived.wake(ordinal + 1) + DAY_S)
+    core, python = lived.draws(ordinal), lived.draws(ordinal)
+    assert plan.core is not None
+    assert plan_day(plan._replace(core=None), python, *span) == plan_day(plan, core, *span)
+    assert python.below(1 << 30) == core.below(1 << 30)
+
+
+@pytest.mark.parametrize("name", bundled_names())
+def test_the_core_plans_days_as_python_does(name: str) -> None:
+    lived = life(bundled_persona(name))
+    for ordinal in range(MONDAY, MONDAY + 60):
+        same_in_python(lived, ordinal)
 
 
 def test_sleep_over_midnight_belongs_to_the_day_before() -> None:

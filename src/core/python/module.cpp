@@ -37,4 +37,5 @@ NB_MODULE(_core, m) {
     bind_signals(m);
     bind_flows(m);
     bind_interruptions(m);
+    bind_planner(m);
 }

@@ -346,4 +346,4 @@ def _with_job(plan: DayPlan, job: Job) -> DayPlan:
         jobs.append(job)
     else:
         jobs[index] = job._replace(after=jobs[index].after)
-    return plan._replace(jobs=tuple(jobs))
+    return plan._replace(jobs=tuple(jobs), core=None)

@@ -24,6 +24,7 @@ from fleet2d.routines.planner import (
     RESUMES,
     SLEEP,
     Doing,
+    new_doing,
 )
 from fleet2d.streams import Draws
 
@@ -50,7 +51,7 @@ def interrupt(
         return _InterruptedDay(rules, draws, day, occupancy).result
     rows = [(rules.numbers[doing.activity], doing.begin, doing.end) for doing in day]
     return [
-        Doing(rules.names[activity], begin, end, "", ANY_ROOM, role)
+        new_doing((rules.names[activity], begin, end, "", ANY_ROOM, role))
         if planned < 0
         else _part(day[planned], begin, end, role)
         for planned, activity, begin, end, role in rules.core.interrupt(draws, rows)
@@ -62,7 +63,7 @@ def _part(doing: Doing, begin: int, end: int, role: int) -> Doing:
     if begin == doing.begin and end == doing.end:
         return doing
     role = doing.role if role == PLANNED else role
-    return Doing(doing.activity, begin, end, doing.task, doing.room, role)
+    return new_doing((doing.activity, begin, end, doing.task, doing.room, role))
 
 
 def without_interruptions(day: Sequence[Doing]) -> list[Doing]:

@@ -11,9 +11,11 @@ If the jobs of a day don't fit, another order is drawn, a few times; then one jo
 those that aren't needed every day, the one that is done on the fewest days.
 """
 
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
+from fleet2d.kernels.planner import DayPlanner
 from fleet2d.routines.laws import Law, draw_weighted
 from fleet2d.routines.occupancy import ANY_ROOM, Occupancy
 from fleet2d.streams import Draws
@@ -51,6 +53,10 @@ class Doing(NamedTuple):
     task: str = ""
     room: int = ANY_ROOM
     role: int = PLANNED
+
+
+# Makes a doing from a tuple of its fields without calling Python code, as days have many.
+new_doing: Callable[[tuple[str, int, int, str, int, int]], Doing] = partial(tuple.__new__, Doing)
 
 
 class Job(NamedTuple):
@@ -108,6 +114,9 @@ class DayPlan(NamedTuple):
         jobs: The tasks.
         fills: The pastimes.
         recorded: The recorded days, if the template has some.
+        core: The same plan by numbers of activities, for days in which nobody else uses private
+            rooms; None: there is none.
+        names: The activities by number.
     """
 
     name: str
@@ -117,6 +126,26 @@ class DayPlan(NamedTuple):
     jobs: tuple[Job, ...]
     fills: tuple[Fill, ...]
     recorded: "Recording | None" = None
+    core: DayPlanner | None = None
+    names: tuple[str, ...] = ()
+
+    def in_core(self) -> "DayPlan":
+        """Return the plan with what draws days in the core."""
+        if any(fill.takes.shortest < 1 for fill in self.fills):
+            return self._replace(core=None)
+        activities = [*(job.activity for job in self.jobs), *(fill.activity for fill in self.fills)]
+        names = tuple(dict.fromkeys((REST, SLEEP, *activities)))
+        number = {name: number for number, name in enumerate(names)}
+        jobs = [
+            (
+                number[job.activity], job.starts, job.takes, job.until, job.after, job.chance,
+                job.needed, job.place,
+            )
+            for job in self.jobs
+        ]  # fmt: skip
+        fills = [(number[f.activity], f.weight, f.takes, f.first, f.last) for f in self.fills]
+        core = DayPlanner(self.sleep, self.least_sleep, jobs, fills, number[REST], number[SLEEP])
+        return self._replace(core=core, names=names)
 
 
 class Chain(NamedTuple):
@@ -148,6 +177,14 @@ def plan_day(
     Returns:
         The doings from `wake` to `next_wake`, without a gap.
     """
+    if occupancy is None and plan.core is not None:
+        rows = plan.core.plan(draws, wake, next_wake)
+        if not rows:
+            raise _too_full(plan)
+        return [
+            new_doing((plan.names[activity], begin, end, _task(plan, job), ANY_ROOM, PLANNED))
+            for activity, begin, end, job in rows
+        ]
     chain = _feasible_chain(plan, draws, wake, next_wake)
     day: list[Doing] = []
     now = wake
@@ -172,6 +209,18 @@ def plan_day(
     return day
 
 
+def _task(plan: DayPlan, job: int) -> str:
+    """Return the name of a job by its number; none below 0."""
+    return plan.jobs[job].task if job >= 0 else ""
+
+
+def _too_full(plan: DayPlan) -> RuntimeError:
+    return RuntimeError(
+        f"the tasks of day {plan.name!r} fit in no order between waking and bedtime:"
+        " shorten some, widen their times, or give some a probability below 1"
+    )
+
+
 def _next_begin(job: Job, now: int, preferred: int) -> int:
     """Return when a job begins: at the preferred time, or `now` if that is a little earlier."""
     begin = max(now, preferred)
@@ -191,10 +240,7 @@ def _feasible_chain(plan: DayPlan, draws: Draws, wake: int, next_wake: int) -> C
         if tries % ORDERS == 0:
             job = _least_needed(plan.jobs, chosen)
             if job is None:
-                raise RuntimeError(
-                    f"the tasks of day {plan.name!r} fit in no order between waking and bedtime:"
-                    " shorten some, widen their times, or give some a probability below 1"
-                )
+                raise _too_full(plan)
             chosen.remove(job)
 
 

@@ -71,7 +71,8 @@ def _day_plan(persona: "Persona", name: str, day: "DayTemplate") -> DayPlan:
     jobs = tuple(_job(persona, task, day.do[task], order, dawn) for task in order)
     leisure = persona.leisure if day.leisure is None else day.leisure
     fills = tuple(_fill(persona, activity, p, dawn) for activity, p in leisure.items())
-    return DayPlan(name, wake, sleep, seconds(day.sleep.at_least), jobs, fills)
+    plan = DayPlan(name, wake, sleep, seconds(day.sleep.at_least), jobs, fills)
+    return plan.in_core()
 
 
 def _recorded_plan(name: str, day: "DayTemplate") -> DayPlan:
