@@ -85,7 +85,7 @@ class SightingCounts(NamedTuple):
     def unknown(self) -> NDArray[np.bool_]:
         """Whether somebody was perceived who wasn't recognized as a user: bool (bins, places).
 
-        True where people were perceived at more steps than those of all users together.
+        True where somebody was perceived at more steps than all users were recognized, added up.
         """
         bins, users, places = self.shape
         signed = np.where(self.user == users - 1, self.steps, -self.steps)

@@ -87,7 +87,7 @@ class InputRecord(_Record):
 
 
 class FileRecord(_Record):
-    """A file of the run directory."""
+    """The size and the digest of a file of the run directory."""
 
     bytes: Count
     sha256: Sha256

@@ -176,7 +176,7 @@ def _unsealed_tables(manifest: Manifest) -> dict[str, str]:
 
 
 def _without_seal(root: Path, manifest: Manifest) -> Verification:
-    """Compare the content of the tables of a run of format 1, which has no other digests."""
+    """Compare the tables of a run of format 1 with their digests, the only ones that it has."""
     digests = {name: table.digest or "" for name, table in manifest.tables.items()}
     tables = changed_tables(digests, lambda name: digest_of_file(root / f"{name}.parquet"))
     differing = {f"{name}.parquet": "was changed" for name in tables}

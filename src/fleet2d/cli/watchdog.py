@@ -19,7 +19,7 @@ FIRST_S = 30.0
 
 @contextmanager
 def watched(first_s: float = FIRST_S) -> Iterator[None]:
-    """Print the component that has been running for long to stderr, with the line of its code."""
+    """Print to stderr each component that runs longer than `first_s`, and the line it is at."""
     is_over = threading.Event()
     thread_id = threading.get_ident()
     thread = threading.Thread(

@@ -114,7 +114,10 @@ class WaitForPeople:
         return (step - self.since) * self._step_us
 
     def stand_still(self, now: Situation, person: str, gives_way: GivesWay) -> Plan:
-        """Stand still until it goes round or gives up, if nobody moves."""
+        """Return a plan to stand still until the next look at whether the way is free.
+
+        At the latest it ends when the robot goes round the person, or gives up.
+        """
         plan, look, patience = now.plan(), self._look_after(now.step), micros(gives_way.patience)
         if now.step == self.since:
             plan.note("gives_way", person)

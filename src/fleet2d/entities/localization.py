@@ -171,7 +171,7 @@ class Drift:
         return int(random_bell(self._keys[purpose], interval))
 
     def _jumps_at(self, interval: int) -> int:
-        """Return the time within an interval at which the error jumps [us]; its end: never."""
+        """Return when the error jumps in an interval [us]; the interval's length if it doesn't."""
         if random_uniform(self._keys["jumps"], interval) >= self._jump_chance:
             return self._every_us
         return int(random_below(self._keys["when"], interval, self._every_us))

@@ -21,7 +21,11 @@ MONDAY = date(2017, 1, 2).toordinal()
 def sample_persona(
     fitted: FittedPersona, timeline: Timeline, days: int, seed: int = 0
 ) -> tuple[I16, I16]:
-    """Return the states and the places of days drawn from a persona, int16 (days, 1440) each."""
+    """Return days drawn from a persona: for each minute a state and a place.
+
+    Returns:
+        Indices of `timeline.states`, and of `timeline.places`; int16 (days, 1440) each.
+    """
     life = Life(fitted.persona, seed, "fit")
     key = stream_key(seed, "fit", "up at night")
     places = timeline.places

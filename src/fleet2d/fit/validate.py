@@ -39,9 +39,9 @@ class Validation(NamedTuple):
     activities: tuple[Distances, ...]
 
     def worse_than_copying(self) -> list[str]:
-        """Return a line for each measure by which copied days are nearer to the held-back ones.
+        """Return a line for each measure in which the persona is worse than days copied from a log.
 
-        The measures compare in which rooms somebody is; nearer than days of the persona is worse.
+        The measures compare in which rooms somebody is with the days held back.
         """
         persona, copies = self.rooms[0], self.rooms[1]
         keys = {"dwell times (KS)": "ks", "hours": "hours", "time shares": "share"}
@@ -82,7 +82,7 @@ def validate(
 def _fold(
     timeline: Timeline, rest: Sequence[LivedDay], held: Sequence[LivedDay], seed: int, model: Model
 ) -> tuple[tuple[Distances, ...], tuple[Distances, ...]]:
-    """Return the distances of rooms and of activities between days held back and the models."""
+    """Return how far the days of each model are from days held back: in rooms, in activities."""
     fitted = fit_persona(timeline, rest, model=model)
     states, rooms = sample_persona(fitted, timeline, SAMPLED, seed)
     rest_days, held_days = ([day.number for day in part] for part in (rest, held))

@@ -20,12 +20,12 @@ Int64 = NDArray[np.int64]
 
 
 class PoseCache(NamedTuple):
-    """The cached poses, in an open hash table whose length is a power of two, at most half full.
+    """What cameras see at each pose: an open hash table of 2**n slots, at most half full.
 
     Attributes:
         pose: int64 (slots, 4), x, y [lattice units], heading, and pan position of the cameras.
         last: int64 (slots,), last step with the pose, -1 for an empty slot.
-        settled: int64 (slots,), the last such step that is in `SightRecord.last`.
+        settled: int64 (slots,), the last of these steps that `SightRecord.last` has counted.
         cells: int32 (slots, patches), number of cells of each patch in view.
         used: int64 (1,), number of used slots.
     """

@@ -44,7 +44,7 @@ class ReachTime(Metric):
     radius: Length = Field(default=0.15, gt=0, le=2)
 
     def start(self, home: Home) -> None:
-        """Begin counting."""
+        """Begin with no calls."""
         self.seconds: dict[tuple[str, str], list[float]] = {}
         self.unreached: dict[tuple[str, str], int] = {}
 
@@ -78,7 +78,11 @@ class ReachTime(Metric):
                 seconds.append(length / lattice.units_per_m / self.speed)
 
     def result(self) -> dict[str, Any]:
-        """Return {robot: {user: {mean, p90, calls, unreached}}}; p90 as numpy's linear quantile."""
+        """Return {robot: {user: {mean, p90, calls, unreached}}}.
+
+        `mean` and `p90` are of the times that the robot would take [s]; p90 is interpolated
+        linearly. `calls` is the number of calls, `unreached` that of those without a route.
+        """
         results: dict[str, Any] = {}
         for (robot, user), seconds in self.seconds.items():
             numbers: dict[str, Any] = {"calls": len(seconds) + self.unreached[robot, user]}

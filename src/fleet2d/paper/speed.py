@@ -58,13 +58,13 @@ PAPER_CACHE = PaperNumber("6 h to build the cache")
 
 @dataclass(frozen=True)
 class SpeedRow:
-    """A row of the table.
+    """A row of the table of speeds: a scenario to time, and the paper's number for it.
 
     Attributes:
         case: The name of the scenario.
         overrides: Changes of the bundled base scenario.
         paper: The paper's number.
-        frames: The frames to draw; None: none.
+        frames: The frames to draw while it runs, as if watched; None: none.
     """
 
     case: str

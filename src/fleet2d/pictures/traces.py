@@ -100,7 +100,10 @@ def _from_key_frames(run: Run, plan: FloorPlan, name: str, color: str, *, robot:
 
 
 def _legs_of(run: Run, plan: FloorPlan, name: str) -> tuple[F64, str]:
-    """Return the legs between the key frames of a body; of a random walk, the first ones."""
+    """Return the legs between the key frames of a body, and a remark if some are left out.
+
+    Of a random walk, the first `LEGS` legs are returned, and none of a long one.
+    """
     keys = _rows(run, "key_frames", name, ("x", "y", "heading", "away"), "kind")
     if (keys["kind"] == "walk").any():
         step_us, steps = run.manifest["step_us"], run.manifest["steps"]

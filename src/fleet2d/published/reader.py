@@ -93,7 +93,7 @@ class ConfigReader:
         return float(value)
 
     def integer(self, keys: Keys, least: int, below: int = 2**63) -> int | None:
-        """Return a whole number, or None."""
+        """Return a whole number; None if the key is missing."""
         value = self.get(keys)
         if value is None:
             return None

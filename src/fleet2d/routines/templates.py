@@ -124,7 +124,10 @@ def _fill(persona: "Persona", activity: str, pastime: "Pastime", dawn: int) -> F
 
 
 def starts(timing: "Timing", dawn: int) -> Law:
-    """Return the law of a begin [s], in a day that begins at `dawn` or later."""
+    """Return the distribution of the time at which an activity begins [s since midnight].
+
+    The day begins at `dawn` or later.
+    """
     if timing.at is None:
         if timing.between is None:
             return uniform(dawn, dawn + DAY_S)

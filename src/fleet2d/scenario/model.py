@@ -218,7 +218,7 @@ def load_scenario(
 
 
 def scenario_of(document: Document, folder: Path) -> Scenario:
-    """Check a composed scenario as a whole.
+    """Check a composed scenario as a whole, and return it.
 
     Args:
         document: What `compose` returns.

@@ -195,7 +195,7 @@ def describe_components() -> list[ComponentDescription]:
 
 
 def _parts_of(cls: type[Settings]) -> list[type[Settings]]:
-    """Return the groups of keys inside of a class, outermost first, without components."""
+    """Return the classes of settings nested in a class, outermost first, without components."""
     parts: list[type[Settings]] = []
     for field in cls.model_fields.values():
         for part in _settings_in(field.annotation):

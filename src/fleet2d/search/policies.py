@@ -78,7 +78,7 @@ def exact(problem: SearchProblem) -> list[int]:
 
 
 def receding(problem: SearchProblem, horizon: int = HORIZON) -> list[int]:
-    """Return the exact order of the first sites of :func:`greedy`, then the others as they are.
+    """Return the order of :func:`greedy`, with its first `horizon` sites in the best order.
 
     Meant to be computed again after every look, with the probabilities after that look: only its
     first site is used.

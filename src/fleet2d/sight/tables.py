@@ -204,7 +204,7 @@ def _fill_identity(table: I64, confusion: I64, model: Identity, context: TableCo
 
 
 def _whole(sums: list[int], shares: Mapping[str, float], order: Sequence[str]) -> list[int]:
-    """Round cumulative probabilities that should end at 1 up to 1, from the last outcome on."""
+    """Set cumulative probabilities to 1 from the last possible outcome on, despite rounding."""
     last = max((i for i, name in enumerate(order) if shares.get(name)), default=len(order))
     return [*sums[:last], *[ONE] * (len(sums) - last)]
 

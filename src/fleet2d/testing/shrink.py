@@ -82,7 +82,7 @@ class Shrinker:
         return case
 
     def _fewer(self, case: FailingCase) -> FailingCase:
-        """Leave out people, robots, objects, algorithms and metrics, one after the other."""
+        """Leave out the people, robots, objects, algorithms and metrics not needed to fail."""
         for section in SECTIONS:
             for name in getattr(case.variant.scenario, section):
                 variant = _without_entry(case.variant, section, name)

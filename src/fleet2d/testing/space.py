@@ -116,7 +116,7 @@ def read_space(content: Mapping[str, Any]) -> SearchSpace:
     """
     ranges, choices = dict[str, Parameter](), dict[str, tuple[Choice, ...]]()
     if not content:
-        raise InputError("nothing to search over: name an axis, {home: {synthetic: 20}}")
+        raise InputError("nothing to search over: name an axis, such as home={synthetic: 20}")
     for name, axis in content.items():
         try:
             if isinstance(axis, list):

@@ -176,7 +176,7 @@ class DayCounts:
         self.add_hours(slot[first], np.add.reduceat(values, first, axis=0))
 
     def add_hours(self, hours: I64, sums: F64) -> None:
-        """Add the sums of the next hours, in order of time.
+        """Add sums of hours to the counts; the hours follow those added before, in order of time.
 
         Args:
             hours: int64 (hours,), as ordinal * 24 + hour of the day.

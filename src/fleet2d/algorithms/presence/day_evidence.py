@@ -1,4 +1,4 @@
-"""Evidence of a day, as the chains of users need it: what is the same for all is stored once."""
+"""Evidence of a day for the Markov chain of each user; the views that all share are stored once."""
 
 from collections.abc import Sequence
 from itertools import pairwise

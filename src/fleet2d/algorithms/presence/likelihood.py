@@ -185,7 +185,7 @@ class Likelihood(Estimator):
         return people
 
     def _look_into(self, bins: Bins, people: People) -> None:
-        """Note which rooms were watched, and let people be in the parts of the home they are in."""
+        """Note the watched rooms; people can only be in rooms that are joined with one of them."""
         is_watched = self.is_watched | bins.watched.any(axis=0)
         if np.array_equal(is_watched, self.is_watched):
             return

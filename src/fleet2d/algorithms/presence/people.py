@@ -49,7 +49,10 @@ class StateLayout(NamedTuple):
 
     @property
     def anywhere(self) -> F64:
-        """The uninformed distribution, equal for rooms and away: (stages, patches + 1)."""
+        """The distribution before any evidence: (stages, patches + 1), the last column is away.
+
+        Each room and away have equal shares, which their patches and the stages divide.
+        """
         spread = self.spread * self.possible[self.room]
         return np.tile(spread / (self.possible.sum() * self.stages), (self.stages, 1))
 
@@ -157,8 +160,8 @@ class People:
         """Begin with the prior.
 
         Args:
-            layout: The states.
-            prior: What is assumed of each person.
+            layout: The states that a person can be in: patches of rooms, and away, in each stage.
+            prior: The transition probabilities that are assumed before any evidence.
             count: Number of people.
             longest: Largest number of consecutive bins with equal evidence that are merged.
         """

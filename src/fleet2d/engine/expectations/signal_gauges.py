@@ -83,7 +83,7 @@ def gauge_of(signal: Measurement, state: State, step_us: int) -> Gauge:
 
 
 def row_of(state: State, name: str) -> int:
-    """Return the row of a body."""
+    """Return the row of a body in `state.actors` and in arrays of poses."""
     return next(row for row, actor in enumerate(state.actors) if actor.name == name)
 
 

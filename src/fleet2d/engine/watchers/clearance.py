@@ -24,7 +24,7 @@ I64 = NDArray[np.int64]
 
 
 class Clearance(Watcher):
-    """The robots of a run that give way.
+    """Ends plans of robots that give way, when a person comes too near or goes away.
 
     Attributes:
         robots: The robots that give way, by their rows among the bodies.

@@ -73,7 +73,7 @@ class Interruptions(Watcher):
         return end
 
     def take(self, bodies: Bodies, end: int) -> Sequence[Event]:
-        """Take in the steps up to `end` - 1."""
+        """Note which interrupts happen at step `end` - 1, and which conditions hold there."""
         last, self.next_step = end - self.next_step - 1, end
         self._last = [wait for wait in self._ahead if self._begins(wait)[last]]
         for wait, holds in self._ahead.items():

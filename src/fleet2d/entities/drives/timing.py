@@ -108,8 +108,8 @@ def _checked(drive: Drive, route: Route, length: float) -> Iterator[Moment]:
         yield moment
     if last.metres < length - NEAR_M:
         raise ComponentError(
-            f"the drive {drive.type_name} ended with {last}, on a route of {length:.6g} m: its last"
-            " moment has to be at the end of the route"
+            f"the drive {drive.type_name} ended after {last.metres:.6g} m of a route of"
+            f" {length:.6g} m: its last moment has to be at the end of the route"
         )
 
 

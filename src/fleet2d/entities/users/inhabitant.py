@@ -67,7 +67,7 @@ class Inhabitant(Behavior):
     small_moves: bool = True
 
     def day(self, ordinal: int) -> Sequence[Doing]:
-        """Return the doings of the day of a date's ordinal, until the next day begins."""
+        """Return what the inhabitant does on a day, given by its ordinal, until the next begins."""
         raise NotImplementedError
 
     def wait_for(self, room: int, clock: "Clock", begin_us: int, takes_us: int) -> int | None:

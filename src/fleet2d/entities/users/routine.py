@@ -57,7 +57,10 @@ class Routine(Inhabitant):
     @model_validator(mode="after")
     def _is_one_person(self) -> Self:
         if self.persona is not None and self.household is not None:
-            raise problem("a member of a household has the persona that the household gives it")
+            raise problem(
+                "a member of a household has the persona that the household gives it: leave out"
+                " persona or household"
+            )
         if self.household is not None and (self.away or self.visits):
             raise problem(
                 "the absences and visits of a member of a household belong in the household's"

@@ -65,7 +65,7 @@ class PixelBox:
 
     @classmethod
     def around(cls, runs: NDArray[np.int64]) -> "PixelBox":
-        """Return the smallest box that holds all runs.
+        """Return the smallest box that holds all runs of pixels.
 
         Raises:
             FloorPlanError: It is too large for a home.

@@ -85,7 +85,7 @@ class BeliefReader:
         if track.begin != begin or last != ends[-1]:
             raise ComponentError(
                 f"the output of algorithms.{self.name} is about the steps {track.begin} to {last},"
-                f" but this metric's period has the whole bins {begin} to {int(ends[-1])}: give"
-                " both the same period"
+                f" but this metric needs steps {begin} to {int(ends[-1])}, the whole bins of its"
+                " period: give both the same period"
             )
         return track.home, track.away

@@ -11,7 +11,7 @@ from fleet2d.viewer.facts.walls import door_facts
 
 
 def live_facts(simulation: Simulation) -> RunFacts:
-    """Return the facts of a running simulation, which has no tables yet."""
+    """Return what the page receives about a running simulation, which has no tables yet."""
     scenario = plain(simulation.scenario.resolved())
     clock = simulation.clock
     entities = {

@@ -54,7 +54,7 @@ def strip_rows(run: Run, colors: Sequence[tuple[str, str]]) -> list[StripRow]:
 def draw_strip(
     run: Run, plan: FloorPlan, rows: Sequence[StripRow], axes: Axes, *, names: bool = True
 ) -> None:
-    """Draw a strip of a run, or of a part of one.
+    """Draw a strip of time: a row for each body, coloured by the room that it is in.
 
     Args:
         run: The run, for its sightings.
