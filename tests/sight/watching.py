@@ -65,7 +65,7 @@ class Watch:
     memory: SightMemory | None = None
 
     def look(self) -> Int64:
-        """Return all sightings."""
+        """Return all sightings, a row each."""
         count, steps = self.users.shape[:2]
         camera = Camera.model_validate(
             {"range": [0, 9], "angle_deg": 360, **self.camera, "perception": self.perception}
@@ -96,7 +96,7 @@ class Watch:
         lenses = stack_lenses([lens], [True], scene)
         done, sightings, *_ = look(self.walls, lenses, errors, rule, window, 0, 1, self.memory)
         assert done == steps
-        return sightings
+        return sightings.T
 
 
 def _lattice(poses: Float64) -> list[Int64]:
