@@ -142,18 +142,22 @@ class State:
 
     def emit_notes(self, row: int, step: int) -> None:
         """Emit the notes of a body's plan up to a step as events."""
+        self.events.emit(self._due_notes(row, step))
+
+    def _due_notes(self, row: int, step: int) -> Sequence[Event]:
+        """Return the notes of a body's plan up to a step, once, as events."""
         actor = self.actors[row]
         notes, begin = actor.plan.notes, self.notes_emitted[row]
         step_us, name = actor.clock.step_us, actor.name
         if begin == len(notes) or notes[begin].time_us > step * step_us:
-            return
+            return ()
         last_us, events = step * step_us, []
         for time_us, event, detail in islice(notes, begin, None):
             if time_us > last_us:
                 break
             events.append(new_event((-(-time_us // step_us), name, event, detail)))
         self.notes_emitted[row] = begin + len(events)
-        self.events.emit(events)
+        return events
 
     def next_note(self, step: int, kinds: Set[str]) -> int | None:
         """Return the next step from `step` on at which a plan has an event of these kinds."""
@@ -189,8 +193,8 @@ class State:
         first = self.settled
         if first >= end:
             return
-        for row in range(len(self.actors)):
-            self.emit_notes(row, end - 1)
+        rows = range(len(self.actors))
+        self.events.emit([event for row in rows for event in self._due_notes(row, end - 1)])
         for watcher in self.watchers:
             self.take(watcher, end)
         observations, readings = self._observations(), self.sensors.collect()

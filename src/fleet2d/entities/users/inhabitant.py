@@ -138,6 +138,7 @@ class Inhabitant(Behavior):
         react to robots plan less far ahead, as they are interrupted more often.
         """
         plan, clock = now.plan(), now.actor.clock
+        self.is_hindered = now.home.hinders  # by shut doors, for all of the plan
         midnight_us = clock.elapsed(datetime.fromordinal(now.time.toordinal() + 1))
         last_us = min(plan.time_us + AHEAD_US, midnight_us) if now.actor.attention else midnight_us
         for which, day_us, doing in self._doings(now.time):
@@ -191,7 +192,7 @@ class Inhabitant(Behavior):
         last = self.last
         if which == last.given_up:
             doing = doing._replace(activity=REST)
-        setting = self.seated(self._at_present(self._in_its_room(doing)), which)
+        setting = self.seated(self._in_its_room(doing), which)
         if not (setting.rooms or setting.activity.away):
             if plan.time_us <= plan.began[0] * self.clock.step_us:
                 plan.note("way_blocked", doing.activity).stay_until(end_us)
@@ -235,12 +236,12 @@ class Inhabitant(Behavior):
         return setting._replace(stores=self.spots.reachable(setting.stores))
 
     def _in_its_room(self, doing: Doing) -> Setting:
-        """Return the setting of a doing, in the room that its household chose for it, if any."""
+        """Return the present setting of a doing, in the room that its household chose, if any."""
         setting = self.settings[doing.activity]
-        if doing.room == ANY_ROOM:
-            return setting
-        room = next((room for room in self.reachable_rooms if room.index == doing.room), None)
-        return setting if room is None else self._within(setting, room)
+        if doing.room != ANY_ROOM:
+            room = next((room for room in self.reachable_rooms if room.index == doing.room), None)
+            setting = setting if room is None else self._within(setting, room)
+        return self._at_present(setting) if self.is_hindered else setting
 
     def _within(self, setting: Setting, room: "Room") -> Setting:
         """Return the setting of an activity, in one room only."""
