@@ -17,6 +17,7 @@ import importlib
 import pkgutil
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
 
@@ -151,16 +152,23 @@ class Component(Settings, metaclass=ComponentClass):
     def __setattr__(self, name: str, value: Any) -> None:
         """Refuse to change configuration; store all other attributes as run state."""
         cls = type(self)
-        if name in cls.model_fields or name in cls.__class_vars__:
-            noun = "configuration" if name in cls.model_fields else "a ClassVar"
+        fields, private = _names_of(cls)
+        if name in fields or name in cls.__class_vars__:
+            noun = "configuration" if name in fields else "a ClassVar"
             raise AttributeError(
                 f"{name} is {noun} of {cls.__name__} and can't be changed in a run; store what "
                 "changes in another attribute"
             )
-        if name in cls.__private_attributes__:
+        if name in private:
             super().__setattr__(name, value)
         else:
             object.__setattr__(self, name, value)
+
+
+@lru_cache(maxsize=1000)
+def _names_of(cls: type[Component]) -> tuple[frozenset[str], frozenset[str]]:
+    """Return the names of the fields and the private attributes of a component, quickly."""
+    return frozenset(cls.model_fields), frozenset(cls.__private_attributes__)
 
 
 C = TypeVar("C", bound=type[Component])

@@ -9,7 +9,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fleet2d.artifacts.encoding import RAMPS, RAW, RUNS, decode, encode
+from fleet2d.artifacts.encoding import (
+    RAMPS,
+    RAW,
+    RUNS,
+    decode,
+    decode_times,
+    encode,
+    encode_times,
+)
 from fleet2d.artifacts.journal import FOLDER, JOURNAL_NAME, last_commit
 from fleet2d.artifacts.ledger import Ledger
 from fleet2d.artifacts.lock import LOCK_NAME, RunLock
@@ -67,6 +75,50 @@ def test_arrays_come_back_to_the_last_bit(values: Any, ramps: bool, encoding: st
     back = decode(encoded, values.dtype, len(values))
     assert values.tobytes() == back.tobytes()
     assert values.dtype == back.dtype
+
+
+STEPS = np.random.default_rng(0).integers(0, 5, 1000).cumsum()
+
+
+@pytest.mark.parametrize(
+    ("times", "steps", "fits"),
+    [
+        (STEPS * 1_000_000 + 5, STEPS, True),
+        (STEPS * -3, STEPS, True),
+        (np.r_[STEPS[:-1] * 7, STEPS[-1] * 7 + 1], STEPS, False),
+        (np.r_[STEPS[:500] * 7, STEPS[500] * 7 + 1, STEPS[501:] * 7], STEPS, False),
+        (STEPS[:10] * 7, STEPS[:10], False),  # few
+        (STEPS, np.zeros(1000, np.int64), False),
+        (STEPS * 7, STEPS[::-1].copy(), False),
+        (np.r_[-(2**63), np.arange(998), 2**63 - 1], np.r_[np.zeros(999, np.int64), 1], False),
+    ],
+)
+def test_times_that_are_multiples_of_steps_come_back(times: Any, steps: Any, fits: bool) -> None:
+    encoded = encode_times(times, steps)
+    assert fits == (encoded is not None)
+    if encoded is not None:
+        assert times.tobytes() == decode_times(encoded, steps).tobytes()
+
+
+def test_times_without_steps_are_stored_by_themselves(tmp_path: Path) -> None:
+    """The column of times may come first, or have missing values."""
+    steps = np.arange(1000, dtype=np.int64)
+    times = np.datetime64("2026-01-05T00:00", "us") + steps * 1_000_000
+    late = np.where(steps % 9 == 0, np.datetime64("NaT"), times)
+    columns = [
+        Column("step", "step"),
+        Column("time", "time"),
+        Column("late", "time", nullable=True),
+    ]
+    for name, order in (("after", columns), ("before", columns[::-1])):
+        store = RunStore(tmp_path / name, [TableSpec("t", tuple(order))])
+        store.open()
+        store.append("t", step=steps, time=times, late=late)
+        store.commit(1)
+        table = open_run(kill(store)).arrow("t")
+        assert steps.tolist() == table["step"].to_pylist()
+        assert times.tolist() == table["time"].to_pylist()
+        assert late.tolist() == table["late"].to_pylist()
 
 
 def test_few_bytes_can_not_ask_for_all_memory() -> None:

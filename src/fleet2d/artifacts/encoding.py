@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+import struct
 import sys
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-RAW, RUNS, RAMPS = "raw", "runs", "ramps"
+RAW, RUNS, RAMPS, STEPS = "raw", "runs", "ramps", "steps"
 
 Encoded = tuple[str, int, list[bytes]]
-"""The encoding (raw, runs or ramps), the number of runs, and the bytes."""
+"""The encoding (raw, runs, ramps or steps), the number of runs, and the bytes."""
 
 # Fewer values than this are stored raw: it isn't worth looking for runs.
 FEW = 256
+_LINE = struct.Struct("<qq")
 _BITS = {1: np.uint8, 2: np.uint16, 4: np.uint32, 8: np.uint64}
 
 
@@ -42,6 +44,41 @@ def encode(values: NDArray[Any], *, ramps: bool = False) -> Encoded:
             parts = [*first, _bytes(series[starts]), _bytes(lengths)]
             return (RAMPS if ramps else RUNS), len(starts), parts
     return RAW, len(values), [_bytes(values)]
+
+
+def encode_times(times: NDArray[np.int64], steps: NDArray[np.int64]) -> Encoded | None:
+    """Return times by the steps of the same rows; None if steps of one length don't give them.
+
+    Example:
+        >>> steps = np.arange(300) ** 2
+        >>> encoded = encode_times(5 + 60 * steps, steps)
+        >>> np.array_equal(decode_times(encoded, steps), 5 + 60 * steps)
+        True
+    """
+    if len(times) < FEW or steps[-1] <= steps[0]:
+        return None
+    length = (int(times[-1]) - int(times[0])) // (int(steps[-1]) - int(steps[0]))
+    try:
+        content = _LINE.pack(length, int(times[0]) - length * int(steps[0]))
+    except struct.error:  # beyond 64 bits
+        return None
+    encoded = STEPS, 1, [content]
+    return encoded if np.array_equal(decode_times(encoded, steps), times) else None
+
+
+def decode_times(encoded: Encoded, steps: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return the times that `encode_times` encoded.
+
+    Raises:
+        ValueError: The bytes don't encode times.
+    """
+    try:
+        length, first = _LINE.unpack(b"".join(encoded[2]))
+    except struct.error as error:
+        raise ValueError(str(error)) from None
+    times = steps * np.int64(length)
+    times += np.int64(first)
+    return times
 
 
 def decode(encoded: Encoded, dtype: np.dtype[Any], rows: int) -> NDArray[Any]:

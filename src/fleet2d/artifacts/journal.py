@@ -18,17 +18,27 @@ from pathlib import Path
 from typing import Any, BinaryIO, Literal, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fleet2d.artifacts import files
 from fleet2d.artifacts.chunk import Chunk, ColumnChunk, Dictionary, new_dictionaries
-from fleet2d.artifacts.encoding import FEW, RAW, Encoded, decode, encode
+from fleet2d.artifacts.encoding import (
+    FEW,
+    RAW,
+    STEPS,
+    Encoded,
+    decode,
+    decode_times,
+    encode,
+    encode_times,
+)
 from fleet2d.artifacts.table import DTYPES, Column, TableSpec
 from fleet2d.errors import ArtifactError
 
 FOLDER = "unfinished"
 """The folder in a run directory for files that are needed until the run is complete."""
 JOURNAL_NAME = "journal"
-MAGIC = b"fleet2d journal 1\n"
+MAGIC = b"fleet2d journal 2\n"
 
 Kind = Literal["table", "rows", "commit"]
 _KINDS: tuple[Kind, ...] = ("table", "rows", "commit")
@@ -123,20 +133,23 @@ class JournalWriter:
             self._append("table", asdict(spec), [])
         arrays: list[bytes] = []
         columns = []
+        steps = None
         for column in spec.columns:
-            ramps = column.kind in ("step", "time")
-            parts: list[list[Any] | None] = []
+            parts: list[Any] = []  # raw values: their size; others: encoding, runs and size
             for values in chunk[column.name]:
                 if values is None:
                     parts.append(None)
                     continue
                 if len(values) < FEW and _IS_LITTLE_ENDIAN:  # most tables have few rows a day
-                    parts.append([RAW, len(values), values.nbytes])
+                    parts.append(values.nbytes)
                     arrays.append(values.tobytes())
                     continue
-                encoding, runs, content = encode(values, ramps=ramps and values.dtype != np.bool_)
-                parts.append([encoding, runs, sum(map(len, content))])
+                encoding, runs, content = _encoded(column, values, steps)
+                length = sum(map(len, content))
+                parts.append(length if encoding == RAW else [encoding, runs, length])
                 arrays += content
+            if column.kind == "step":
+                steps = chunk[column.name].values
             columns.append(parts)
         added_words = {}
         for name, dictionary in words.items():
@@ -181,11 +194,10 @@ class JournalWriter:
 
     def _append(self, kind: Kind, description: Mapping[str, Any], arrays: list[bytes]) -> None:
         text = _to_json(description).encode()
-        content = b"".join(arrays)
-        number = _KINDS.index(kind)
-        header = _HEADER.pack(number, len(text), len(content), _checksum(number, text, content))
-        self._buffer += [header, text, content]
-        self._size += len(text) + len(content)
+        size, number = sum(map(len, arrays)), _KINDS.index(kind)
+        header = _HEADER.pack(number, len(text), size, _checksum(number, text, *arrays))
+        self._buffer += [header, text, *arrays]
+        self._size += len(text) + size
         if self._size > _BUFFER_BYTES:
             self._write()
 
@@ -282,8 +294,20 @@ def _whole_frames(file: BinaryIO) -> Iterator[tuple[Kind, Any, bytes, int]]:
         yield _KINDS[number], description, content, file.tell()
 
 
-def _checksum(number: int, text: bytes, content: bytes) -> int:
-    return zlib.crc32(content, zlib.crc32(text, number + len(text)))
+def _checksum(number: int, text: bytes, *arrays: bytes) -> int:
+    checksum = zlib.crc32(text, number + len(text))
+    for content in arrays:
+        checksum = zlib.crc32(content, checksum)
+    return checksum
+
+
+def _encoded(column: Column, values: NDArray[Any], steps: NDArray[np.int64] | None) -> Encoded:
+    """Return an array of a column, given the steps of the same rows if they come before it."""
+    if values.dtype == np.bool_:
+        return encode(values)
+    if column.kind == "time" and steps is not None and (times := encode_times(values, steps)):
+        return times
+    return encode(values, ramps=column.kind in ("step", "time"))
 
 
 def _spec_of(description: Mapping[str, Any]) -> TableSpec:
@@ -295,7 +319,8 @@ def _spec_of(description: Mapping[str, Any]) -> TableSpec:
 
 
 def _chunk_of(spec: TableSpec, description: Mapping[str, Any], content: bytes) -> Chunk:
-    chunk, position, rows = {}, 0, int(description["rows"])
+    chunk, position, rows = dict[str, ColumnChunk](), 0, int(description["rows"])
+    steps = np.empty(0, np.int64)
     if not 0 <= rows <= _MOST_ROWS:
         raise ValueError(f"{rows} rows at once")
     for column, parts in zip(spec.columns, description["columns"], strict=True):
@@ -304,17 +329,23 @@ def _chunk_of(spec: TableSpec, description: Mapping[str, Any], content: bytes) -
             if part is None:
                 arrays.append(None)
                 continue
-            encoding, runs, size = part
+            encoding, runs, size = (RAW, 0, part) if isinstance(part, int) else part
             arrays.append((encoding, runs, [content[position : position + size]]))
             position += size
-        chunk[column.name] = _column_of(column, arrays, rows)
+        chunk[column.name] = _column_of(column, arrays, rows, steps)
+        if column.kind == "step":
+            steps = chunk[column.name].values
     return chunk
 
 
-def _column_of(column: Column, arrays: list[Encoded | None], rows: int) -> ColumnChunk:
+def _column_of(
+    column: Column, arrays: list[Encoded | None], rows: int, steps: NDArray[np.int64]
+) -> ColumnChunk:
     values, valid, lengths = arrays
     assert values is not None
     flags = None if valid is None else decode(valid, np.dtype(np.bool_), rows)
+    if values[0] == STEPS and column.kind == "time" and len(steps) == rows:
+        return ColumnChunk(decode_times(values, steps), flags)
     if lengths is None:
         return ColumnChunk(decode(values, DTYPES[column.kind], rows), flags)
     sizes = decode(lengths, np.dtype(np.int64), rows)
