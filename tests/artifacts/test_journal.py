@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from fleet2d.artifacts.encoding import (
-    RAMPS,
+    GROWTH,
     RAW,
     RUNS,
     decode,
@@ -56,12 +56,15 @@ def kill(store: RunStore) -> Path:
 
 
 @pytest.mark.parametrize(
-    ("values", "ramps", "encoding"),
+    ("values", "grows", "encoding"),
     [
         (np.zeros(1000), False, RUNS),
         (np.repeat([1.0, np.nan, -0.0], 400), False, RUNS),
-        (np.arange(1000) * 7, True, RAMPS),
-        (np.r_[np.arange(500), np.arange(9000, 9500)], True, RAMPS),
+        (np.arange(1000) * 7, True, GROWTH),
+        (np.r_[np.arange(500), np.arange(9000, 9500)], True, GROWTH),
+        (np.arange(1000) * 2**20, True, GROWTH),
+        (np.arange(1000) * 2**40, True, RAW),
+        (np.arange(1000)[::-1].copy(), True, RAW),
         (np.random.default_rng(0).normal(size=1000), False, RAW),
         (np.arange(3), True, RAW),
         (np.zeros(0, np.int32), False, RAW),
@@ -69,8 +72,8 @@ def kill(store: RunStore) -> Path:
         (np.array([-(2**63), 2**63 - 1, 5] * 500), True, RAW),
     ],
 )
-def test_arrays_come_back_to_the_last_bit(values: Any, ramps: bool, encoding: str) -> None:
-    encoded = encode(values, ramps=ramps)
+def test_arrays_come_back_to_the_last_bit(values: Any, grows: bool, encoding: str) -> None:
+    encoded = encode(values, grows=grows)
     assert encoding == encoded[0]
     back = decode(encoded, values.dtype, len(values))
     assert values.tobytes() == back.tobytes()
@@ -124,6 +127,12 @@ def test_times_without_steps_are_stored_by_themselves(tmp_path: Path) -> None:
 def test_few_bytes_can_not_ask_for_all_memory() -> None:
     with pytest.raises(ValueError, match="don't make"):
         decode((RUNS, 1, [b"\0" * 8, b"\xff\xff\xff\xff"]), np.dtype(np.int64), 1000)
+
+
+@pytest.mark.parametrize("encoded", [(GROWTH, 3, [b"\0" * 20]), (GROWTH, 1, []), ("zip", 1, [b""])])
+def test_what_encodes_nothing_is_refused(encoded: Any) -> None:
+    with pytest.raises((ValueError, TypeError, IndexError)):
+        decode(encoded, np.dtype(np.int64), 1000)
 
 
 @pytest.mark.parametrize("flush_rows", [30, 250, 2**17])

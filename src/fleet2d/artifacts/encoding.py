@@ -1,4 +1,4 @@
-"""Arrays as bytes for the journal: repeated values and constant steps take few bytes."""
+"""Arrays as bytes for the journal: repeated and slowly growing values take few bytes."""
 
 from __future__ import annotations
 
@@ -9,23 +9,24 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-RAW, RUNS, RAMPS, STEPS = "raw", "runs", "ramps", "steps"
+RAW, RUNS, GROWTH, STEPS = "raw", "runs", "growth", "steps"
 
 Encoded = tuple[str, int, list[bytes]]
-"""The encoding (raw, runs, ramps or steps), the number of runs, and the bytes."""
+"""The encoding (raw, runs, growth or steps), the number of runs or bytes of a value, the bytes."""
 
 # Fewer values than this are stored raw: it isn't worth looking for runs.
 FEW = 256
+_SIZES = {1: np.uint8, 2: np.uint16, 4: np.uint32}
 _LINE = struct.Struct("<qq")
 _BITS = {1: np.uint8, 2: np.uint16, 4: np.uint32, 8: np.uint64}
 
 
-def encode(values: NDArray[Any], *, ramps: bool = False) -> Encoded:
+def encode(values: NDArray[Any], *, grows: bool = False) -> Encoded:
     """Return values as bytes.
 
     Args:
         values: Of any plain type, (n,).
-        ramps: Whether many consecutive values are likely to differ by the same amount, as times do.
+        grows: Whether whole numbers are likely to grow by little, as steps do.
 
     Example:
         >>> encoded = encode(np.full(1000, 7))
@@ -33,16 +34,25 @@ def encode(values: NDArray[Any], *, ramps: bool = False) -> Encoded:
         (('runs', 1), 12, np.int64(7000))
     """
     if len(values) >= FEW and values.dtype != np.uint8:  # text
-        series = values[1:] - values[:-1] if ramps else values
-        bits = series.view(_BITS[values.itemsize])
+        if grows:
+            return _growth(values)
+        bits = values.view(_BITS[values.itemsize])
         changes = (bits[1:] != bits[:-1]).nonzero()[0]
         if 4 * len(changes) < len(values):
             starts = np.empty(len(changes) + 2, np.int64)
-            starts[0], starts[1:-1], starts[-1] = 0, changes + 1, len(series)
+            starts[0], starts[1:-1], starts[-1] = 0, changes + 1, len(values)
             lengths, starts = (starts[1:] - starts[:-1]).astype(np.uint32), starts[:-1]
-            first = [_bytes(values[:1])] if ramps else []
-            parts = [*first, _bytes(series[starts]), _bytes(lengths)]
-            return (RAMPS if ramps else RUNS), len(starts), parts
+            return RUNS, len(starts), [_bytes(values[starts]), _bytes(lengths)]
+    return RAW, len(values), [_bytes(values)]
+
+
+def _growth(values: NDArray[Any]) -> Encoded:
+    """Return the first value, and by how much each of the others is above the one before."""
+    growth = values[1:] - values[:-1]
+    least, most = growth.min(), growth.max()
+    for size, kind in _SIZES.items():
+        if 0 <= least and most < 1 << 8 * size:
+            return GROWTH, size, [_bytes(values[:1]), _bytes(growth.astype(kind))]
     return RAW, len(values), [_bytes(values)]
 
 
@@ -97,17 +107,18 @@ def decode(encoded: Encoded, dtype: np.dtype[Any], rows: int) -> NDArray[Any]:
     little_endian = dtype.newbyteorder("<")
     if encoding == RAW:
         values = np.frombuffer(content, little_endian)
-    elif encoding in (RUNS, RAMPS):
-        head = dtype.itemsize * (encoding == RAMPS)
-        middle = head + runs * dtype.itemsize
+    elif encoding == GROWTH:
+        growth = np.frombuffer(content[dtype.itemsize :], f"<u{runs}")
+        values = np.empty(len(growth) + 1, dtype)
+        values[0], values[1:] = np.frombuffer(content[: dtype.itemsize], little_endian)[0], growth
+        values = np.cumsum(values)
+    elif encoding == RUNS:
+        middle = runs * dtype.itemsize
         lengths = np.frombuffer(content[middle:], "<u4")
         # Before anything is repeated: a few bytes must not request all memory.
-        if len(lengths) != runs or int(lengths.sum(dtype=np.int64)) != rows - (encoding == RAMPS):
+        if len(lengths) != runs or int(lengths.sum(dtype=np.int64)) != rows:
             raise ValueError(f"{runs} runs don't make {rows} values")
-        values = np.repeat(np.frombuffer(content[head:middle], little_endian), lengths)
-        if encoding == RAMPS:
-            first = np.frombuffer(content[:head], little_endian)
-            values = np.cumsum(np.concatenate([first, values]))
+        values = np.repeat(np.frombuffer(content[:middle], little_endian), lengths)
     else:
         raise ValueError(f"unknown encoding {encoding!r}")
     if len(values) != rows:

@@ -307,7 +307,7 @@ def _encoded(column: Column, values: NDArray[Any], steps: NDArray[np.int64] | No
         return encode(values)
     if column.kind == "time" and steps is not None and (times := encode_times(values, steps)):
         return times
-    return encode(values, ramps=column.kind in ("step", "time"))
+    return encode(values, grows=column.kind in ("step", "time"))
 
 
 def _spec_of(description: Mapping[str, Any]) -> TableSpec:
