@@ -8,9 +8,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from tests.scenes import scenario
 from tests.thorough import THOROUGH
 
+import fleet2d
 from fleet2d.artifacts.manifest import FORMAT, Manifest
+from fleet2d.artifacts.plain import canonical
 from fleet2d.artifacts.seal import verify_run
 from fleet2d.errors import ArtifactError, Fleet2DError, RunDirectoryError
 from fleet2d.runs.run import open_run
@@ -112,6 +115,17 @@ def test_any_change_of_bytes_is_noticed_and_its_file_named(run: Path) -> None:
 def test_a_changed_field_is_named(run: Path, change: Any, field: str) -> None:
     edited(run, change)
     assert [f"manifest.json: {field}"] == list(verify_run(run).differing)
+
+
+def test_another_order_of_users_is_a_change(tmp_path: Path) -> None:
+    users = {"zoe": {"type": "meander"}, "ana": {"type": "meander"}}
+    fleet2d.run(scenario("1 min", users=users), out=tmp_path / "run")
+    path = tmp_path / "run" / "manifest.json"
+    content = json.loads(path.read_text())
+    content["scenario"]["users"] = dict(reversed(content["scenario"]["users"].items()))
+    path.write_text(canonical(content))
+
+    assert ["manifest.json: scenario.users"] == list(verify_run(tmp_path / "run").differing)
 
 
 def test_a_table_may_not_hide_from_the_seal(run: Path) -> None:

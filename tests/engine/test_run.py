@@ -34,6 +34,23 @@ def test_a_run_whose_seed_was_drawn_is_reproduced(tmp_path: Path) -> None:
     assert fleet2d.reproduce(tmp_path / "run").same
 
 
+def test_the_order_of_keys_is_kept_for_who_repeats_a_run(tmp_path: Path) -> None:
+    """Manifests had sorted keys: people who weren't listed by name lived another life."""
+    shares = {"kitchen": 0.3, "bedroom": 0.3, "away": 0.2, "bathroom": 0.2}
+    sampled = {"type": "room_sampling", "shares": shares, "dwell": "3 min"}
+    users = {"zoe": sampled, "ben": sampled, "ana": {"type": "meander"}}
+    stored = fleet2d.run(scenario("1 h", users=users), out=tmp_path / "run")
+    result = fleet2d.reproduce(tmp_path / "run")
+    by_name = {**sampled, "shares": dict(sorted(shares.items()))}
+    other = fleet2d.run(
+        scenario("1 h", users={"ana": users["ana"], "ben": by_name, "zoe": by_name})
+    )
+
+    assert ([], stored.digest) == (result.differing, result.digest)
+    assert ["zoe", "ben", "ana"] == list(stored.manifest["scenario"]["users"])
+    assert other.digest != stored.digest
+
+
 def test_reproducing_leaves_the_run_as_it_was(stored: Path) -> None:
     before = {path.name: path.read_bytes() for path in stored.iterdir()}
     fleet2d.reproduce(stored)

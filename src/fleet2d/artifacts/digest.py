@@ -142,7 +142,7 @@ def _little_endian(values: NDArray[Any]) -> memoryview:
     return values.view(np.uint8).data
 
 
-def sha256_of(content: Any) -> str:
-    """Return the SHA-256 of plain JSON data, whatever the order of its keys."""
-    text = json.dumps(content, sort_keys=True, separators=(",", ":"), allow_nan=False)
+def sha256_of(content: Any, *, ordered: bool = False) -> str:
+    """Return the SHA-256 of plain JSON data; the order of its keys counts only if `ordered`."""
+    text = json.dumps(content, sort_keys=not ordered, separators=(",", ":"), allow_nan=False)
     return hashlib.sha256(text.encode()).hexdigest()

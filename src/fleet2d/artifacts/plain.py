@@ -35,6 +35,20 @@ def plain(value: Any) -> Any:
     return str(value)
 
 
-def canonical(content: Any) -> str:
-    """Return the one text that a file of some content has."""
-    return json.dumps(content, indent=2, sort_keys=True, allow_nan=False) + "\n"
+def canonical(content: Mapping[str, Any]) -> str:
+    """Return the one text that a manifest of some content has: its keys are sorted.
+
+    Only the keys within sections of the scenario stay in their order, which has an effect: users,
+    for example, decide in the order in which they are listed.
+    """
+    ordered = _sorted({key: value for key, value in content.items() if key != "scenario"})
+    if "scenario" in content:
+        ordered["scenario"] = dict(sorted(content["scenario"].items()))
+    return json.dumps(dict(sorted(ordered.items())), indent=2, allow_nan=False) + "\n"
+
+
+def _sorted(value: Any) -> Any:
+    """Return plain data with all keys sorted."""
+    if isinstance(value, Mapping):
+        return {key: _sorted(value[key]) for key in sorted(value)}
+    return [_sorted(entry) for entry in value] if isinstance(value, list) else value

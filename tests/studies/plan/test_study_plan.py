@@ -45,6 +45,13 @@ def test_what_changes_results_changes_identities() -> None:
     assert not set(identities()) & set(identities(base=base("3 min")))
 
 
+def test_another_order_of_robots_is_another_scenario() -> None:
+    robots = {name: {"type": "patrol", "camera": {"range": [0, 4]}} for name in ("astro", "bolt")}
+    other = dict(reversed(robots.items()))
+
+    assert not set(identities(base=base(robots=robots))) & set(identities(base=base(robots=other)))
+
+
 def test_a_module_of_ones_own_is_part_of_the_identity(tmp_path: Path) -> None:
     module = tmp_path / "mine.py"
     text = "from fleet2d import Algorithm\nclass Nothing(Algorithm):\n    pass\n"
