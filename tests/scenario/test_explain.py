@@ -1,5 +1,6 @@
 """Validation errors in plain words."""
 
+from datetime import timedelta
 from pathlib import Path
 from typing import Any, Literal
 
@@ -31,6 +32,7 @@ class Outer(Settings):
     span: tuple[float, float] = (0.0, 4.5)
     filled: tuple[int, ...] = Field(default=(1,), min_length=1)
     entries: dict[str, int] = Field(default={})
+    plain: timedelta = timedelta(0)
 
     @model_validator(mode="after")
     def _judge(self) -> "Outer":
@@ -62,6 +64,8 @@ class Outer(Settings):
         ({"span": [1, 2, 3]}, "a.yaml:1: span: expected a list like [0, 4.5], got [1, 2, 3]"),
         ({"span": [1]}, "a.yaml:1: span: expected a list like [0, 4.5], got [1]"),
         ({"span": [1, "x"]}, "a.yaml:1: span.1: expected a number, got 'x'"),
+        ({"plain": "1 h"}, "a.yaml:1: plain: expected seconds, as the field is a timedelta; a field "
+                           "of type Duration reads 5 min, too, got '1 h'"),
         ({"entries": {"a": "x"}}, "a.yaml:1: entries.a: expected a whole number, got 'x'"),
         ({"inner": {"sise": 1}}, "a.yaml:2: inner.sise: unknown key 'sise': did you mean 'size'? "
                                  "Allowed here: size"),

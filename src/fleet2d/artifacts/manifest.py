@@ -218,7 +218,7 @@ class Manifest(BaseModel):
         ]
 
     def describe_end(self, run: ManifestFacts) -> None:
-        """Set the fields that are known after the last step."""
+        """Set the fields that are known after the last step; tables and digest are set already."""
         self.steps = run.state.bodies.step
         self.simulated_s = self.steps * run.clock.step_us / 1e6
         self.metrics = dict(run.results)

@@ -251,6 +251,8 @@ class RunStore:
     def close_tables(self) -> dict[str, str]:
         """Write all rows, complete all files, and return the digest of each table.
 
+        After that the manifest has the tables and the digest of the run.
+
         Raises:
             ArtifactError: They can't be written; the run is marked as failed.
         """
@@ -261,10 +263,13 @@ class RunStore:
             self._flush(entry)
         if self._root is not None:
             self._finish_files(self._root)
-        self._digests = {
+        digests = {
             name: entry.digest.hexdigest(entry.buffer.words) for name, entry in self._tables.items()
         }
-        return self._digests
+        tables = {name: self._tables[name].record(digests[name]) for name in sorted(digests)}
+        self.manifest.tables, self.manifest.digest = tables, run_digest(digests)
+        self._digests = digests
+        return digests
 
     def close(self, status: Status = "complete") -> dict[str, str]:
         """End the run: close the tables if they are open, then write the manifest.
@@ -279,10 +284,6 @@ class RunStore:
             raise ArtifactError("the run directory is not open: call open() before close()")
         digests = self.close_tables()
         self.manifest.status = status
-        self.manifest.tables = {
-            name: self._tables[name].record(digests[name]) for name in sorted(digests)
-        }
-        self.manifest.digest = run_digest(digests)
         if self._root is not None:
             with self._writing(FILE_NAME):
                 self.manifest.seal = make_seal(self.manifest, self._root)

@@ -30,6 +30,7 @@ _EXPECTED = {
     "mapping": "a mapping of keys",
     "datetime": "a date and time, like 2026-01-05 or 2026-01-05T08:00",
     "date": "a date, like 2026-01-05",
+    "time_delta": "seconds, as the field is a timedelta; a field of type Duration reads 5 min, too",
     "literal_error": "{expected}",
     "enum": "{expected}",
     "greater_than_equal": "{ge} or more",
