@@ -13,7 +13,10 @@ struct Lanes;
 #if defined(__GNUC__) && !defined(__clang__) && defined(__x86_64__)
 // The most people side by side. Clang inlines only what a function with `flatten` calls itself, so that four people
 // would be slower than one after the other.
-inline int widest() { return __builtin_cpu_supports("avx2") ? 4 : 1; }
+inline int widest() {
+    if (__builtin_cpu_supports("avx512f")) return 8;
+    return __builtin_cpu_supports("avx2") ? 4 : 1;
+}
 
 // Do work on W people with the instructions for as many; all that it calls is inlined for that.
 template <int W, class Work>
@@ -24,6 +27,11 @@ void side_by_side(Work work) {
 template <int W, class Work>
     requires(W == 4)
 __attribute__((target("avx2"), flatten)) void side_by_side(Work work) {
+    work();
+}
+template <int W, class Work>
+    requires(W == 8)
+__attribute__((target("avx512f"), flatten)) void side_by_side(Work work) {
     work();
 }
 

@@ -86,6 +86,7 @@ void in_groups(i64 people, Work work) {
     const auto go_on = [&]<int W>(Filtered<W> filtered) {
         for (; widest() >= W && first + W <= people; first += W) work(filtered, first);
     };
+    go_on(Filtered<8>());
     go_on(Filtered<4>());
     go_on(Filtered<1>());
 }

@@ -40,7 +40,7 @@ def states(random: np.random.Generator, people: int, stages: int) -> Any:
     return values / values.sum(axis=(1, 2), keepdims=True)
 
 
-@given(st.integers(0, 10_000), st.integers(1, 2), st.integers(1, 6))
+@given(st.integers(0, 10_000), st.integers(1, 2), st.integers(1, 13))
 def test_people_side_by_side_are_the_products_of_their_own_matrices(
     seed: int, stages: int, people: int
 ) -> None:
