@@ -51,7 +51,9 @@ public:
         missed_ = Array<Lanes<W>>::empty({count});
         follow_ = Array<Lanes<W>, 2>::empty({nodes_, columns});
         spread_ = Array<Lanes<W>>::empty({patches_});
-        same_ = Array<bool, 2>::filled({W + 1, patches_}, true);
+        part_ = Array<Lanes<W>>::empty({patches_});
+        same_ = Array<Lanes<W>>::filled({patches_}, 1.0);
+        row_of_view_.fill(-1);
         for (int lane = 0; lane < W; ++lane) pack(lane);
     }
 
@@ -84,8 +86,10 @@ public:
 
     bool is_idle(int lane) const { return idle_[lane]; }
     View<const u8> shown(int lane) const { return shown_[lane]; }
-    // (patches,) whether the part of each patch in view is the same as before.
-    View<const bool> same(int lane) const { return same_[has_other_view_[lane] ? lane : W]; }
+    // (patches,) the part of each patch in view, from 0 to 1.
+    View<const Lanes<W>> part() const { return part_; }
+    // (patches,) 1 where that is the same as before, else 0. A product with it takes or leaves a probability exactly.
+    View<const Lanes<W>> same() const { return same_; }
     View<const Lanes<W>, 2> follow() const { return follow_; }
     View<const Lanes<W>> spread() const { return spread_; }
 
@@ -132,16 +136,20 @@ private:
     void compare_views(i64 t, int lane) {
         const Stretches& own = group_.stretches[lane];
         const i64 last = std::min(t, own.size() - 1);
-        shown_[lane] = own.shown(last);
+        const View<const u8> now = shown_[lane] = own.shown(last);
+        if (row_of_view_[lane] != own.view[last]) {
+            row_of_view_[lane] = own.view[last];
+            for (i64 p = 0; p < patches_; ++p) part_[p][lane] = part_in_view(now[p]);
+        }
+        const bool had_other_view = has_other_view_[lane];
         has_other_view_[lane] = t == 0 || (t == last && own.view[t] != own.view[t - 1]);
-        if (!has_other_view_[lane]) return;
-        const View<bool> same = same_[lane];
-        const View<const u8> now = shown_[lane];
         if (t == 0) {
-            for (i64 p = 0; p < patches_; ++p) same[p] = now[p] == group_.shown[lane][p];
-        } else {
+            for (i64 p = 0; p < patches_; ++p) same_[p][lane] = now[p] == group_.shown[lane][p];
+        } else if (has_other_view_[lane]) {
             const View<const u8> before = own.shown(t - 1);
-            for (i64 p = 0; p < patches_; ++p) same[p] = now[p] == before[p];
+            for (i64 p = 0; p < patches_; ++p) same_[p][lane] = now[p] == before[p];
+        } else if (had_other_view) {
+            for (i64 p = 0; p < patches_; ++p) same_[p][lane] = 1.0;
         }
     }
 
@@ -152,9 +160,9 @@ private:
     Array<Lanes<W>> missed_;                // (lengths,)
     Array<Lanes<W>, 2> follow_;             // (nodes, rooms + 1)
     Array<Lanes<W>> spread_;                // (patches,)
-    Array<bool, 2> same_;                   // (lanes + 1, patches), the last row always true
+    Array<Lanes<W>> part_, same_;           // (patches,)
     std::array<View<const u8>, W> shown_;
-    std::array<i64, W> row_{};  // of the tables
+    std::array<i64, W> row_of_view_{}, row_{};  // of the views, and of the tables
     std::array<bool, W> idle_{}, has_other_view_{};
 };
 
@@ -281,12 +289,12 @@ private:
         if (!filtered_.visible[t][room]) return false;
         // Without a view `in_view` becomes 0; but the initial distribution may have states in view.
         const auto [begin, end] = model_.patches_of(room);
-        for (int lane = 0; lane < W; ++lane) {
-            const View<const bool> same = steps_.same(lane);
-            for (i64 stage = 0; stage < stages_; ++stage) {
-                const View<const Lanes<W>> in_view = filtered_.in_view[t][stage];
-                for (i64 p = begin; p < end; ++p) {
-                    if (same[p] && in_view[p][lane] != 0.0) return true;
+        for (i64 stage = 0; stage < stages_; ++stage) {
+            const View<const Lanes<W>> in_view = filtered_.in_view[t][stage], same = steps_.same();
+            for (i64 p = begin; p < end; ++p) {
+                const Lanes<W> kept = same[p] * in_view[p];
+                for (int lane = 0; lane < W; ++lane) {
+                    if (kept[lane] != 0.0) return true;
                 }
             }
         }
@@ -318,7 +326,7 @@ private:
                 flow.onward = over[k - 1] * steps_.follow()(k - 1, model_.next_stage());
             }
             if (before[room] || after[room]) {
-                for (int lane = 0; lane < W; ++lane) flow_visible(t, stage, room, flow, lane);
+                flow_visible(t, stage, room, flow);
             } else {
                 flow_hidden(flow, likely, end - begin, steps_.spread().data + begin, was + begin,
                             last == nullptr ? nullptr : last + begin, now + begin);
@@ -339,25 +347,22 @@ private:
         }
     }
 
-    // The same of one person for a room that is visible, or was.
-    void flow_visible(i64 t, i64 stage, i64 room, const Flow& flow, int lane) {
+    // The same for a room that is visible, or was.
+    void flow_visible(i64 t, i64 stage, i64 room, const Flow& flow) {
         const i64 earlier = std::max(stage - 1, i64{0});  // flow.onward is 0 at the first stage
         const View<const Lanes<W>, 2> in_view = filtered_.in_view[t], hidden = filtered_.hidden[t];
         const View<const Lanes<W>> was_in_view = in_view[stage], was_hidden = hidden[stage], spread = steps_.spread();
         const View<const Lanes<W>> last_in_view = in_view[earlier], last_hidden = hidden[earlier];
         const View<Lanes<W>> now_in_view = filtered_.in_view[t + 1][stage], now_hidden = filtered_.hidden[t + 1][stage];
-        const View<const u8> view = steps_.shown(lane);
-        const View<const bool> same = steps_.same(lane);
-        const f64 came = flow.came[lane], rest = flow.rest[lane], onward = flow.onward[lane];
-        const f64 if_in_view = filtered_.likely(t, 0)[lane], if_hidden = filtered_.likely(t, 1)[lane];
+        const View<const Lanes<W>> part = steps_.part(), same = steps_.same();
+        const Lanes<W> if_in_view = filtered_.likely(t, 0), if_hidden = filtered_.likely(t, 1), one = 1.0;
         const auto [begin, end] = model_.patches_of(room);
         for (i64 p = begin; p < end; ++p) {
-            const f64 shown = part_in_view(view[p]);
-            const f64 stay_in_view = rest * was_in_view[p][lane] + onward * last_in_view[p][lane];
-            const f64 stay_hidden = rest * was_hidden[p][lane] + onward * last_hidden[p][lane];
-            const f64 drawn = came * spread[p][lane] + (same[p] ? 0.0 : stay_in_view + stay_hidden);
-            now_in_view[p][lane] = (shown * drawn + (same[p] ? stay_in_view : 0.0)) * if_in_view;
-            now_hidden[p][lane] = ((1.0 - shown) * drawn + (same[p] ? stay_hidden : 0.0)) * if_hidden;
+            const Lanes<W> stay_in_view = flow.rest * was_in_view[p] + flow.onward * last_in_view[p];
+            const Lanes<W> stay_hidden = flow.rest * was_hidden[p] + flow.onward * last_hidden[p];
+            const Lanes<W> drawn = flow.came * spread[p] + (one - same[p]) * (stay_in_view + stay_hidden);
+            now_in_view[p] = (part[p] * drawn + same[p] * stay_in_view) * if_in_view;
+            now_hidden[p] = ((one - part[p]) * drawn + same[p] * stay_hidden) * if_hidden;
         }
     }
 

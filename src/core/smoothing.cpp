@@ -175,10 +175,9 @@ private:
             if (!visible[room]) continue;
             const auto [begin, end] = model_.patches_of(room);
             for (i64 p = begin; p < end; ++p) {
-                Lanes<W> shown;
-                for (std::size_t lane = 0; lane < W; ++lane) shown[lane] = part_in_view(steps_.shown(lane)[p]);
+                const Lanes<W> part = steps_.part()[p];
                 for (i64 stage = 0; stage < stages_; ++stage) {
-                    comes_(stage, p) = shown * in_view_(stage, p) + (Lanes<W>(1.0) - shown) * hidden_(stage, p);
+                    comes_(stage, p) = part * in_view_(stage, p) + (Lanes<W>(1.0) - part) * hidden_(stage, p);
                 }
             }
         }
@@ -253,9 +252,7 @@ private:
                 then == stage ? steps_.rest[k] : steps_.over[k] * steps_.follow()(k, model_.next_stage());
             Lanes<W> total;
             if (visible[room]) {
-                for (int lane = 0; lane < W; ++lane) {
-                    total[lane] = stay_visible(t, stage, then, room, chance[lane], lane);
-                }
+                total = stay_visible(t, stage, then, room, chance);
             } else {
                 total = stay_hidden(end - begin, chance, then == stage, go_[k], comes.data + begin, was.data + begin,
                                     to.data + begin);
@@ -270,21 +267,22 @@ private:
         }
     }
 
-    // The same of one person for a room that was visible; returns the probability of staying.
-    f64 stay_visible(i64 t, i64 stage, i64 then, i64 room, f64 chance, int lane) {
+    // The same for a room that was visible; returns the probability of staying.
+    Lanes<W> stay_visible(i64 t, i64 stage, i64 then, i64 room, const Lanes<W>& chance) {
         const View<const Lanes<W>> was_in_view = filtered_.in_view[t][stage], was_hidden = filtered_.hidden[t][stage];
         const View<Lanes<W>> to_in_view = ahead_in_view_[stage], to_hidden = ahead_hidden_[stage];
         const View<const Lanes<W>> in_view = in_view_[then], hidden = hidden_[then], comes = comes_[then];
-        const View<const bool> same = steps_.same(lane);
-        const f64 go = go_[node(room, stage)][lane];
+        const View<const Lanes<W>> same = steps_.same();
+        const Lanes<W> go = go_[node(room, stage)];
         const auto [begin, end] = model_.patches_of(room);
-        f64 total = 0.0;
+        Lanes<W> total = 0.0;
         for (i64 p = begin; p < end; ++p) {
-            const f64 if_in_view = chance * (same[p] ? in_view[p] : comes[p])[lane];
-            const f64 if_hidden = chance * (same[p] ? hidden[p] : comes[p])[lane];
-            to_in_view[p][lane] = (then == stage ? go : to_in_view[p][lane]) + if_in_view;
-            to_hidden[p][lane] = (then == stage ? go : to_hidden[p][lane]) + if_hidden;
-            total += was_in_view[p][lane] * if_in_view + was_hidden[p][lane] * if_hidden;
+            const Lanes<W> drawn = (Lanes<W>(1.0) - same[p]) * comes[p];
+            const Lanes<W> if_in_view = chance * (same[p] * in_view[p] + drawn);
+            const Lanes<W> if_hidden = chance * (same[p] * hidden[p] + drawn);
+            to_in_view[p] = (then == stage ? go : to_in_view[p]) + if_in_view;
+            to_hidden[p] = (then == stage ? go : to_hidden[p]) + if_hidden;
+            total += was_in_view[p] * if_in_view + was_hidden[p] * if_hidden;
         }
         return total;
     }

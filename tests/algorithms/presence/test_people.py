@@ -169,7 +169,7 @@ def crowd_of(count: int, bins: int, seed: int) -> Bins:
     return base._replace(by_patch=by_patch, sightings=SightingCounts.of(in_rooms))
 
 
-@pytest.mark.parametrize("count", [1, 3, 4, 9])
+@pytest.mark.parametrize("count", [1, 3, 4, 13])
 @pytest.mark.parametrize("stages", [1, 3])
 def test_people_learn_together_as_each_alone_to_the_last_bit(count: int, stages: int) -> None:
     bins = crowd_of(count, 300, count)
