@@ -36,8 +36,25 @@ def steps_in_places(history: History, state: Present) -> I64:
     if len(users) == 1:
         counts[-1] = counts[0]
     else:
-        counts[-1] = _anybody(history, state).sum(axis=0)
+        visits = [history.poses(user).visits for user in users]
+        begin, end, room = (np.concatenate(column) for column in zip(*visits, strict=True))
+        is_home = room != NOWHERE
+        begin, end, room = begin[is_home], end[is_home], room[is_home].astype(np.int64)
+        counts[-1, :-1] = _steps_in_any(begin, end, room, rooms)
+        counts[-1, -1] = len(history) - _steps_in_any(begin, end, 0 * room, 1)[0]
     return counts
+
+
+def _steps_in_any(begin: I64, end: I64, group: I64, groups: int) -> I64:
+    """Return the number of steps in any stretch of each group, whose stretches may overlap."""
+    span = int(end.max(initial=0)) + 1
+    ends = np.concatenate([2 * (group * span + begin) + 1, 2 * (group * span + end)])
+    ends.sort()  # odd: a beginning; each group has as many ends as beginnings
+    is_in_any = np.cumsum(2 * (ends & 1) - 1)[:-1] > 0
+    at = ends >> 1
+    steps = np.zeros(groups, np.int64)
+    np.add.at(steps, at[:-1] // span, np.where(is_in_any, np.diff(at), 0))
+    return steps
 
 
 def steps_by_hour(history: History, state: Present) -> I64:
