@@ -213,7 +213,8 @@ class DayCounts:
         self.week[monday : monday + 24] += hours
         weight = self.faded(next_day - day)
         self.finished = (self.finished + total) * weight
-        self.week = self.week * weight
+        if weight < 1.0:
+            self.week *= weight  # in place: of many users it is large
 
     def faded(self, days: int) -> float:
         """Return the weight of a day after a number of further days, by repeated products."""
