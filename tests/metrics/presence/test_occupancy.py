@@ -40,7 +40,7 @@ class History:
 rooms_of_user = st.lists(st.integers(-1, ROOMS - 1), min_size=STEPS, max_size=STEPS)
 
 
-@given(st.lists(rooms_of_user, min_size=1, max_size=4))
+@given(st.lists(rooms_of_user, max_size=4))
 def test_steps_in_places_are_those_of_all_hours(users: list[list[int]]) -> None:
     names = tuple(map(str, range(len(users))))
     home = SimpleNamespace(rooms=range(ROOMS))

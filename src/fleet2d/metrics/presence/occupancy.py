@@ -33,7 +33,9 @@ def steps_in_places(history: History, state: Present) -> I64:
     counts = np.zeros((len(users) + 1, rooms + 1), np.int64)
     for row, user in enumerate(users):
         counts[row] = history.poses(user).time_in_rooms
-    if len(users) == 1:
+    if not users:
+        counts[-1, -1] = len(history)
+    elif len(users) == 1:
         counts[-1] = counts[0]
     else:
         visits = [history.poses(user).visits for user in users]
