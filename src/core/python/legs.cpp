@@ -114,16 +114,16 @@ Returns:
             "go",
             [](Legs& self, i64 time, i64 x, i64 y, i64 heading, Routes& routes, i64 to_x, i64 to_y, f64 speed,
                f64 turn_rate, std::optional<std::pair<i64, i64>> off) -> std::optional<Row> {
-                const auto [from_x, from_y] = off.value_or(std::pair(x, y));
-                checked(time, from_x, from_y, heading, 0);
+                const std::pair from = off.value_or(std::pair(x, y));
+                checked(time, from.first, from.second, heading, 0);
                 const Moment now = checked(time, x, y, heading, 0);
                 check_rates(speed, turn_rate);
                 const auto route = [&] {
                     const nb::gil_scoped_release unlocked;
-                    return routes.find({from_x, from_y}, {to_x, to_y});
+                    return routes.find({from.first, from.second}, {to_x, to_y});
                 }();
                 if (route.empty()) return {};
-                const Moment off_it = self.step_to(now, {from_x, from_y}, speed, turn_rate);
+                const Moment off_it = self.step_to(now, {from.first, from.second}, speed, turn_rate);
                 return plain(self.walk(off_it, rows_of(route), speed, turn_rate));
             },
             "time"_a, "x"_a, "y"_a, "heading"_a, "routes"_a, "to_x"_a, "to_y"_a, "speed"_a, "turn_rate"_a,
