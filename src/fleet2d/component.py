@@ -232,9 +232,10 @@ def lookup(kind: str, name: str) -> type[Component]:
         raise ScenarioError(
             f"there is no floorplan {name!r}: to read a file write {{type: {reader}, path: {name}}}"
         )
+    near = did_you_mean(name, [*known, *_ALIASES.get(kind, ())])
     raise ScenarioError(
-        f"there is no {kind} {name!r}{did_you_mean(name, [*known, *_ALIASES.get(kind, ())])} "
-        f"There are: {', '.join(known) or 'none'}; your own is written 'package.module:Class'"
+        f"there is no {kind.replace('_', ' ')} {name!r}{near} There are:"
+        f" {', '.join(known) or 'none'}; your own is written 'package.module:Class'"
     )
 
 

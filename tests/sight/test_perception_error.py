@@ -58,7 +58,7 @@ def test_a_scenario_is_read_back_as_it_was() -> None:
 @pytest.mark.parametrize(
     ("errors", "message"),
     [
-        ({"outlier": {}}, "errors.outlier: there is no perception_error 'outlier': did you mean"),
+        ({"outlier": {}}, "errors.outlier: there is no perception error 'outlier': did you mean"),
         ({"outliers": {"shrae": 1}}, "outliers.shrae: unknown key 'shrae': did you mean 'share'"),
         ({"outliers": {"share": 2}}, "errors.outliers.share: "),
         ({"9": "outliers"}, "the name '9' must be letters, digits"),

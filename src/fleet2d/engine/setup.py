@@ -99,9 +99,8 @@ def set_up(scenario: Scenario, clock: Clock, seed: int, store: RunStore) -> Stat
         with _locate_errors(scenario, path), _prefix_errors(path):
             schedule(state, entry, 0, index)
     for name, expectation in scenario.expect.items():
-        from fleet2d.engine.expectations.expect import (
-            expect,  # with much that other scenarios don't need
-        )
+        # It imports much that other scenarios don't need.
+        from fleet2d.engine.expectations.expect import expect
 
         with _locate_errors(scenario, f"expect.{name}"):
             expect(state, scenario, clock, name, expectation, 0)
