@@ -29,6 +29,18 @@ def test_a_day_has_no_gap_and_ends_asleep() -> None:
         assert [0] == [job for _, _, _, job in rows if job >= 0]
 
 
+@pytest.mark.parametrize(
+    ("first", "last", "begins"), [(0, 25_000, 1), (25_000, 25_000, 1), (0, 24_999, 0)]
+)
+def test_a_pastime_may_begin_at_the_bounds_of_its_window(
+    first: int, last: int, begins: int
+) -> None:
+    planner = plan(jobs=[], pastimes=[(3, 1, LAW, first, last)])
+    rows = planner.plan(StepDraws(1, 2), 25_000, 110_000)
+
+    assert begins == sum(activity == 3 for activity, *_ in rows)
+
+
 def test_a_needed_job_that_fits_nowhere_leaves_no_day() -> None:
     late = (2, None, LAW, 1000, [], 1_000_000, True, -1)
     assert [] == plan(jobs=[late]).plan(StepDraws(1, 2), 25_000, 110_000)
