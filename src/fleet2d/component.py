@@ -18,7 +18,6 @@ import pkgutil
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
-from pathlib import PurePath
 from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
 
 from pydantic import (
@@ -226,12 +225,6 @@ def lookup(kind: str, name: str) -> type[Component]:
         cls.type_name = name
         return cls
     known = sorted(components(kind))
-    by_suffix = {".json": "houseexpo", ".yaml": "ros", ".yml": "ros"}
-    reader = by_suffix.get(PurePath(name).suffix.lower())
-    if kind == "floorplan" and reader in known:
-        raise ScenarioError(
-            f"there is no floorplan {name!r}: to read a file write {{type: {reader}, path: {name}}}"
-        )
     near = did_you_mean(name, [*known, *_ALIASES.get(kind, ())])
     raise ScenarioError(
         f"there is no {kind.replace('_', ' ')} {name!r}{near} There are:"

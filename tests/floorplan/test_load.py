@@ -9,10 +9,11 @@ import pytest
 
 from fleet2d import component
 from fleet2d.errors import FloorPlanError
-from fleet2d.floorplan.load import format_of_file, is_floorplan, load_floorplan
+from fleet2d.floorplan.load import advise_type, format_of_file, is_floorplan, load_floorplan
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.source import FloorPlanSource
 from fleet2d.floorplan.synthetic.source import Synthetic
+from fleet2d.paths import Text
 
 # How many rooms the file has (None: it names none), and its free space without specks [m2].
 MAPS = {
@@ -63,6 +64,33 @@ def test_synthetic_home_is_named_by_its_seed() -> None:
     assert Synthetic(seed=7).load() == load_floorplan("synthetic:7")
     with pytest.raises(FloorPlanError, match=r"synthetic:0, synthetic:1"):
         load_floorplan("synthetic7")
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "advice"),
+    [
+        ("he.json", '{"verts": []}', "{type: houseexpo, path: he.json}"),
+        ("vacuum.json", '{"__class": "ValetudoMap"}', "{type: valetudo, path: vacuum.json}"),
+        ("own.yaml", "format: fleet2d-floorplan", "{type: native, path: own.yaml}"),
+        ("map.yaml", "image: map.pgm", "{type: ros, path: map.yaml}"),
+        ("odd.json", '{"walls": []}', "it has none of"),
+        ("absent.json", None, "one of geojson, houseexpo, native, valetudo"),
+        ("absent.yml", None, "one of geojson, houseexpo, native, ros, valetudo"),
+        ("absent.png", None, "{type: image, path: absent.png}"),
+    ],
+)
+def test_advice_about_a_file_named_as_a_type_follows_its_content(
+    name: str, content: str | None, advice: str, tmp_path: Path
+) -> None:
+    if content is not None:
+        (tmp_path / name).write_text(content)
+
+    assert advice in advise_type(Text(name, tmp_path))
+
+
+@pytest.mark.parametrize("name", ["synthetic", "acme.home", "mine.json:Home"])
+def test_no_advice_about_what_names_no_file(name: str) -> None:
+    assert advise_type(name) == ""
 
 
 def test_format_is_recognized_by_the_ending_that_it_declares(

@@ -15,6 +15,7 @@ from fleet2d.floorplan.formats.native import native_plan
 from fleet2d.floorplan.formats.native_file import FORMAT
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.source import YAML, FloorPlanSource, read_document, read_yaml
+from fleet2d.paths import folder_of
 from fleet2d.problems import suggest
 
 USUAL_CELL_M = 0.05
@@ -117,6 +118,39 @@ def format_of_file(path: Path) -> str:
     if kind is None:
         raise _unknown_format(path)
     return kind
+
+
+def advise_type(name: str) -> str:
+    """Return how to read a file that is named as the `type` of a floor plan; "" if it isn't a file.
+
+    A relative path starts from the folder of the scenario.
+
+    >>> advise_type("sketch.png")
+    'to read a file write {type: image, path: sketch.png}'
+    """
+    path = folder_of(name) / Path(name).expanduser()
+    is_type = path.suffix == "" or ":" in name  # then the formats needn't be imported
+    if is_type or path.suffix.lower() not in (*plan_suffixes(), *IMAGES):
+        return ""
+    kinds = _types_by_suffix(path)
+    if path.is_file() and len(kinds) > 1:
+        try:
+            kinds = [format_of_file(path)]
+        except FloorPlanError as error:
+            return str(error)
+    if len(kinds) == 1:
+        return f"to read a file write {{type: {kinds[0]}, path: {name}}}"
+    return f"to read a file write {{type: TYPE, path: {name}}} with one of {', '.join(kinds)}"
+
+
+def _types_by_suffix(path: Path) -> list[str]:
+    """Return the `type` of each floor plan that reads files with such an ending."""
+    if path.suffix.lower() in IMAGES:
+        return ["image"]
+    kind = format_by_suffix(path)
+    if kind is not None:
+        return [kind]
+    return sorted([*_marks(), "ros"] if path.suffix.lower() in YAML else _marks())
 
 
 def _unknown_format(path: Path) -> FloorPlanError:

@@ -16,6 +16,7 @@ from fleet2d.entities.objects.home_object import HomeObject
 from fleet2d.entry_names import CheckNames, NameAsType
 from fleet2d.errors import ScenarioError
 from fleet2d.floorplan.home.change import HomeChange
+from fleet2d.floorplan.load import advise_type
 from fleet2d.floorplan.source import FloorPlanSource
 from fleet2d.interventions.script import Entry
 from fleet2d.metrics.metric import Metric
@@ -43,6 +44,14 @@ def _parse_local_time(value: Any) -> Any:
             f" {moment.isoformat()}"
         )
     return moment
+
+
+def _refuse_file_as_type(value: Any) -> Any:
+    """Refuse the name of a file in place of a floor plan's type, with advice on how to read it."""
+    name = value.get("type") if isinstance(value, Mapping) else value
+    if isinstance(name, str) and (advice := advise_type(name)):
+        raise problem_at(("type",), f"there is no floorplan {name!r}: {advice}", name)
+    return value
 
 
 class SimulationSettings(Settings):
@@ -115,7 +124,7 @@ class Scenario(Settings):
 
     name: str | None = None
     simulation: SimulationSettings
-    floorplan: Annotated[FloorPlanSource, OneOf("floorplan")]
+    floorplan: Annotated[FloorPlanSource, OneOf("floorplan"), BeforeValidator(_refuse_file_as_type)]
     users: Annotated[dict[str, Annotated[User, ShortForm()]], CheckNames] = Field(default={})
     robots: Annotated[dict[str, Annotated[Robot, ShortForm()]], CheckNames] = Field(default={})
     objects: Annotated[dict[str, Annotated[HomeObject, OneOf("object")]], CheckNames] = Field(
