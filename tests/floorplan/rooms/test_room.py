@@ -46,6 +46,25 @@ def test_uncovered_cells_are_unknown() -> None:
     assert {"bedroom_0": 18 * 26, "unknown_0": 18 * 26} == {k: r.cells for k, r in rooms.items()}
 
 
+def test_gaps_between_regions_are_noted() -> None:
+    """A builder whose rooms end at the walls left all doorways to a room of type unknown."""
+    kitchen, hall = region("Kitchen", 0, 0, 1, 3), region("Hall", 1.2, 0, 2, 3)
+
+    _, rooms, notes = assign(kitchen, hall, region("Gym", 2.1, 0, 4, 3))
+
+    assert 3 * 26 == rooms["unknown_0"].cells
+    assert [
+        "small gaps between rooms that no region covers, such as doorways: 2, the first at (1.05,"
+        " 1.45) m; they make a room of type unknown, so let the regions meet there"
+    ] == notes
+
+
+def test_space_beside_one_region_and_large_space_between_regions_are_no_gaps() -> None:
+    _, _, notes = assign(region("Kitchen", 0, 0, 1, 3), region("Hall", 1.5, 0, 3.7, 3))
+
+    assert [] == notes
+
+
 def test_rooms_are_numbered_by_type_in_file_order() -> None:
     _, rooms, _ = assign(
         region("Bedroom", 2, 0, 4, 3), region("Toilet", 0, 0, 1, 3), region("Bedroom", 1, 0, 2, 3)

@@ -1,5 +1,6 @@
 """Rooms: disjoint sets of cells that cover all free space, with their names and types."""
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -10,12 +11,16 @@ from shapely import Polygon
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.geometry.lattice import UNITS_PER_CELL, Lattice
 from fleet2d.floorplan.names import number_names
+from fleet2d.floorplan.rooms.adjacency import open_borders
 from fleet2d.floorplan.rooms.regions import LabelledRegion, Region, paint_regions, snap_regions
 from fleet2d.floorplan.rooms.vocabulary import UNKNOWN
 from fleet2d.kernels.chambers import label_frames
 from fleet2d.kernels.fields import squared_distance
+from fleet2d.kernels.masks import label_parts
 
 NO_ROOM = -1
+MAX_GAP_M2 = 0.8
+"""Free space between two regions that no region covers is a gap if its area is below this."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +64,7 @@ def assign_rooms(
 
     Returns:
         The room of each cell, int16 (rows, columns), -1 where not free; the rooms in the file's
-        order; and a sentence for each region that is not a room.
+        order; and a sentence for each region that is not a room, and about gaps between regions.
 
     Raises:
         FloorPlanError: Two regions ask for the same name.
@@ -69,9 +74,40 @@ def assign_rooms(
     counts = np.bincount(painted[free], minlength=len(merged) + 1)
     notes = [dropped_note(lattice, merged[k]) for k in range(len(merged)) if counts[k] == 0]
     if counts[-1]:
+        notes += _gap_notes(lattice, painted, len(merged))
         merged = [*merged, Region((), Polygon())]
     room_of_cell, rooms = make_rooms(lattice, painted, merged)
     return room_of_cell, rooms, notes
+
+
+def _gap_notes(lattice: Lattice, painted: NDArray[np.int64], regions: int) -> list[str]:
+    """Return a sentence about small gaps between regions, such as doorways, if there are any.
+
+    Args:
+        lattice: The plan's lattice.
+        painted: Region of each cell, `regions` for free cells of none, -1 where not free.
+        regions: Number of regions.
+    """
+    part = label_parts(painted == regions, False)
+    sizes = np.bincount(part[part >= 0])
+    if regions + len(sizes) > np.iinfo(np.int16).max:
+        return []  # a plan in shreds
+    divided = np.where(part >= 0, regions + part, painted).astype(np.int16)
+    borders = Counter(max(link.rooms) - regions for link in open_borders(lattice, divided, ()))
+    gaps = [
+        gap
+        for gap, count in sorted(borders.items())
+        if gap >= 0 and count > 1 and sizes[gap] * lattice.cell**2 < MAX_GAP_M2
+    ]
+    if not gaps:
+        return []
+    row, column = np.argwhere(part == gaps[0]).mean(axis=0).astype(int).tolist()
+    x, y = lattice.to_metres(lattice.cell_centre(row, column)).tolist()
+    return [
+        f"small gaps between rooms that no region covers, such as doorways: {len(gaps)}, the first"
+        f" at ({x:.2f}, {y:.2f}) m; they make a room of type {UNKNOWN}, so let the regions meet"
+        " there"
+    ]
 
 
 def make_rooms(
