@@ -4,6 +4,7 @@ import json
 import socket
 import sys
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -12,7 +13,7 @@ from tests.studies.scenes import base
 
 import fleet2d as package
 from fleet2d import cli
-from fleet2d.errors import ScenarioError
+from fleet2d.errors import ComponentError, ScenarioError
 from fleet2d.studies.analysis.reader import open_study
 from fleet2d.trust import Trust, check_code, code_of, restrict
 
@@ -173,6 +174,65 @@ def test_a_scenario_whose_code_is_named_is_watched(fleet2d: Cli) -> None:
         _, _, err = fleet2d(*view)
     assert f"port {port} can't be used" in err  # all but that is well
     assert Path("ran").exists()
+
+
+INTERRUPT = """
+from pathlib import Path
+import numpy as np
+import fleet2d
+
+Path("ran").touch()
+
+class Never(fleet2d.Interrupt):
+    def holds(self, span):
+        return np.zeros(span.poses.x.shape[1], bool)
+"""
+
+
+def half_a_run(name: str) -> package.Simulation:
+    """A driven robot whose plan waits for an interrupt; the file in which it is isn't loaded."""
+    Path("theirs.py").write_text(INTERRUPT)
+    simulation = package.Simulation("simulation.duration=20 min", seed=4, out="half")
+    simulation.drive("astro")
+    simulation.decide("astro", simulation.plan("astro").stay().interrupt_on("home_empty"))
+    simulation.advance(200)
+    waits = simulation._state.interruptions._held
+    waits[next(iter(waits))[0], name] = False
+    return simulation
+
+
+@pytest.mark.parametrize(("command", "status"), [("resume", "interrupted"), ("reproduce", "complete")])  # fmt: skip
+def test_an_interrupt_that_only_a_plan_from_outside_names_is_listed(
+    fleet2d: Cli, tmp_path: Path, command: str, status: str
+) -> None:
+    """A run directory from elsewhere named its code there, and `resume` ran it without a word."""
+    half_a_run("home_empty").finish()
+    path = Path("half/manifest.json")
+    manifest = json.loads(path.read_text())
+    manifest["interventions"][1]["plan"]["interrupts"] = [f"{tmp_path}/theirs:Never"]
+    path.write_text(json.dumps({**manifest, "status": status}))
+    code, _, err = fleet2d(command, "half")
+    assert (2, False) == (code, Path("ran").exists())
+    assert f"{tmp_path}/theirs.py (interventions.1.plan.interrupts.0)" in err
+
+
+def test_an_interrupt_that_only_a_checkpoint_names_asks_for_trust(
+    fleet2d: Cli, tmp_path: Path
+) -> None:
+    """Its code is imported when the run goes on, after the run was set up and looked harmless."""
+    half_a_run(f"{tmp_path}/theirs:Never").finish()
+    code, _, err = fleet2d("resume", "half")
+    assert (1, False) == (code, Path("ran").exists())
+    assert f"would run {tmp_path}/theirs.py: name it by --trust if you trust it" in err
+
+
+def test_a_simulation_takes_its_trust_into_threads(fleet2d: Cli, tmp_path: Path) -> None:
+    """`view` simulates in a thread, which has no command line that it could ask."""
+    with restrict(Trust()):
+        simulation = half_a_run(f"{tmp_path}/theirs:Never")
+    with ThreadPoolExecutor() as threads, pytest.raises(ComponentError, match="would run"):
+        threads.submit(simulation.advance, 200).result()
+    assert not Path("ran").exists()
 
 
 @pytest.mark.parametrize("name", ["mine:Über", "a/b/mine.py:C", "mine:A.B", "../x:Y", "ü.ö:ä"])

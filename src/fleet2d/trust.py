@@ -111,13 +111,24 @@ def check_code(title: str, content: object) -> None:
         raise ScenarioError(refusal)
 
 
-def refuse_untrusted(directory: Path, scenario: Mapping[str, Any], trust: Trust) -> None:
-    """Refuse a stored scenario that would run code that isn't trusted.
+def refuse_untrusted(
+    directory: Path,
+    scenario: Mapping[str, Any],
+    interventions: Sequence[Mapping[str, Any]],
+    trust: Trust,
+) -> None:
+    """Refuse a stored run that would run code that isn't trusted.
+
+    Args:
+        directory: The run directory.
+        scenario: Its scenario, plain data.
+        interventions: Its interventions, whose plans may name interrupts of the user's own.
+        trust: What is trusted.
 
     Raises:
         RunDirectoryError: The message lists the code; none of it has run.
     """
-    if refusal := _refusal(str(directory), scenario, trust):
+    if refusal := _refusal(str(directory), {**scenario, "interventions": interventions}, trust):
         raise RunDirectoryError(refusal)
 
 

@@ -75,7 +75,7 @@ def reproduce_trusting(directory: str | Path, trust: Trust) -> Reproduction:
     root, content = Path(directory), old.manifest
     manifest = Manifest.read(root)
     causes = [f"{path} has changed since" for path in changed_inputs(manifest)]
-    refuse_untrusted(root, content["scenario"], trust)
+    refuse_untrusted(root, content["scenario"], content["interventions"], trust)
     seal = verify_run(root)
     causes += [
         f"{name} in {directory} {change} after the run" for name, change in seal.differing.items()
@@ -107,7 +107,7 @@ def judge_again(run: Run, expectation: Expectation | str, name: str = "") -> Ver
         )
     content, trust = run.manifest, Trust.of(())
     if run.directory is not None:
-        refuse_untrusted(run.directory, content["scenario"], trust)
+        refuse_untrusted(run.directory, content["scenario"], content["interventions"], trust)
     with restrict(trust) if run.directory is not None else nullcontext():
         simulation = _simulation(content, None)
         label = simulation.expect(expectation, JUDGED)

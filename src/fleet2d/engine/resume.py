@@ -78,7 +78,7 @@ def _reopen(root: Path, ledger: Ledger, trust: Trust) -> tuple[Simulation, str]:
             f"{paths[0]} has changed since the run began: put it back as it was, or run the"
             " scenario again"
         )
-    refuse_untrusted(root, manifest.scenario, trust)
+    refuse_untrusted(root, manifest.scenario, manifest.interventions, trust)
     with restrict(trust):
         scenario = load_scenario(manifest.scenario)
         try:

@@ -36,6 +36,7 @@ from fleet2d.errors import ArtifactError, InputError
 from fleet2d.garbage import rare_collections
 from fleet2d.runs.run import LEARNED_NAME, Run, run_of
 from fleet2d.scenario.model import Scenario, load_scenario
+from fleet2d.trust import current_trust, restrict
 
 # Fewer steps are simulated without a handler for Ctrl-C.
 SHORT = 100
@@ -97,6 +98,7 @@ class Simulation(Judging):
         self.scenario, simulation = scenario, scenario.simulation
         self.seed = secrets.randbelow(2**53) if simulation.seed is None else simulation.seed
         self.clock = Clock(simulation.start, simulation.step_us, simulation.steps)
+        self._trust = current_trust()  # a plan may name code that is imported only when it begins
         self._store = store
         self._state = set_up(self.scenario, self.clock, self.seed, self._store)
         # The scenario's own script repeats its interventions itself.
@@ -329,6 +331,7 @@ class Simulation(Judging):
         self._began = began
         self._set_pace()
         with ExitStack() as stack:
+            stack.enter_context(restrict(self._trust))
             if end - self.step >= SHORT:  # fewer end before a user could press Ctrl-C
                 stack.enter_context(rare_collections())
                 stack.enter_context(deferred_interrupt(self._stop))
