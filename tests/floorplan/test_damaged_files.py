@@ -5,6 +5,8 @@ import json
 import math
 import zlib
 from collections.abc import Callable, Iterator
+from functools import partial
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -15,134 +17,43 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from tests.thorough import examples
 
+from fleet2d.component import components, lookup
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.formats.drawing import read_image
-from fleet2d.floorplan.formats.geojson import read_geojson
-from fleet2d.floorplan.formats.houseexpo import read_houseexpo
-from fleet2d.floorplan.formats.native import read_native
 from fleet2d.floorplan.formats.ros import read_ros
-from fleet2d.floorplan.formats.valetudo import read_valetudo
 from fleet2d.floorplan.load import load_floorplan
 from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.floorplan.source import FloorPlanSource
 
 Place = tuple[Any, ...]
 
-SQUARE = [[0.0, 0.0], [4.0, 0.0], [4.0, 3.0], [0.0, 3.0]]
-NATIVE: dict[str, Any] = {
-    "format": "fleet2d-floorplan",
-    "version": 1,
-    "name": "flat",
-    "free": [{"outline": SQUARE, "holes": [[[1, 1], [1, 2], [2, 2], [2, 1]]]}],
-    "rooms": [
-        {"name": "den", "type": "office", "labels": ["office"], "polygon": SQUARE},
-        {"type": "kitchen", "region": [{"outline": [[0, 0], [1, 0], [1, 3], [0, 3]]}]},
-    ],
-    "doorways": [{"name": "gate", "start": [0, 1.5], "end": [1, 1.5], "leaf": False}],
-    "objects": [
-        {
-            "name": "bed", "type": "bed", "footprint": [[2.5, 1], [3.5, 1], [3.5, 2], [2.5, 2]],
-            "blocks": "path", "heading": 0.5,
-            "uses": [{"x": 3, "y": 2.4, "heading": 1, "posture": "lie", "approach": [3, 2.5]}],
-        },
-    ],
-    "no_go": [[[0, 0], [1, 0], [1, 1]]],
-    "entrance": [0.5, 0.5],
-}  # fmt: skip
-HOUSEEXPO: dict[str, Any] = {
-    "id": "house",
-    "verts": SQUARE,
-    "bbox": {"min": [0, 0], "max": [4, 3]},
-    "room_category": {"Kitchen": [[0, 0, 2, 3]], "Office": [[2, 0, 4, 3], [3, 0, 4, 1]]},
-    "room_num": 2,
-}
-GEOJSON: dict[str, Any] = {
-    "type": "FeatureCollection",
-    "name": "flat",
-    "units": "m",
-    "features": [
-        {
-            "type": "Feature",
-            "properties": {"kind": "room", "name": "Kitchen", "type": "kitchen"},
-            "geometry": {"type": "Polygon", "coordinates": [[*SQUARE, SQUARE[0]]]},
-        },
-        {
-            "type": "Feature",
-            "feature_type": "unit",
-            "properties": {"category": "lounge", "name": {"en": "Lounge"}, "level_id": "0"},
-            "geometry": {
-                "type": "MultiPolygon",
-                "coordinates": [[[[4, 0], [8, 0], [8, 3], [4, 3], [4, 0]]]],
-            },
-        },
-        {
-            "type": "Feature",
-            "properties": {"kind": "door", "name": "door"},
-            "geometry": {"type": "LineString", "coordinates": [[4, 1], [4, 2]]},
-        },
-        {
-            "type": "Feature",
-            "properties": {"kind": "wall"},
-            "geometry": {"type": "LineString", "coordinates": [[5, 1], [6, 2]]},
-        },
-        {
-            "type": "Feature",
-            "properties": {
-                "kind": "object", "type": "bed", "blocks": "path", "heading": 1,
-                "uses": [{"x": 7, "y": 2, "heading": 1}],
-            },
-            "geometry": {"type": "Point", "coordinates": [7, 2, 0]},
-        },
-        {
-            "type": "Feature",
-            "properties": {"kind": "entrance"},
-            "geometry": {"type": "Point", "coordinates": [0, 1]},
-        },
-    ],
-}  # fmt: skip
-VALETUDO: dict[str, Any] = {
-    "__class": "ValetudoMap",
-    "metaData": {"version": 2},
-    "size": {"x": 600, "y": 400},
-    "pixelSize": 5,
-    "layers": [
-        {
-            "type": "segment",
-            "metaData": {"segmentId": "1", "name": "Kitchen", "area": 3000},
-            "dimensions": {"pixelCount": 600},
-            "compressedPixels": [n for y in range(20) for n in (5, y + 5, 30)],
-        },
-        {"type": "wall", "metaData": {}, "pixels": [6, 6, 7, 6]},
-    ],
-    "entities": [
-        {"type": "charger_location", "points": [60, 60]},
-        {"type": "path", "points": [60, 60, 90, 90]},
-        {"type": "no_go_area", "points": [50, 50, 80, 50, 80, 80, 50, 80]},
-        {"type": "virtual_wall", "points": [50, 90, 90, 90]},
-    ],
-}
-ROS: dict[str, Any] = {
-    "image": "map.pgm",
-    "resolution": 0.1,
-    "origin": [-1.0, 2.0, 0.3],
-    "occupied_thresh": 0.65,
-    "free_thresh": 0.196,
-    "negate": 0,
-    "mode": "trinary",
-}
 PIXELS = np.full((30, 40), 205, np.uint8)
 PIXELS[2:-2, 2:-2] = 0
 PIXELS[4:-4, 4:-4] = 254
 PGM = b"P5\n# map\n40 30\n255\n" + PIXELS.tobytes()
 
 Read = Callable[[Path], FloorPlan]
-FORMATS: dict[str, tuple[str, dict[str, Any], Read]] = {
-    "native": ("plan.json", NATIVE, read_native),
-    "native as YAML": ("plan.yaml", NATIVE, read_native),
-    "houseexpo": ("house.json", HOUSEEXPO, read_houseexpo),
-    "geojson": ("flat.geojson", GEOJSON, read_geojson),
-    "valetudo": ("vacuum.json", VALETUDO, read_valetudo),
-    "ros": ("map.yaml", ROS, read_ros),
-}
+
+
+def read_as(kind: str, path: Path) -> FloorPlan:
+    """Read a file by the reader of a format."""
+    source = lookup("floorplan", kind).model_construct(path=path)
+    assert isinstance(source, FloorPlanSource)
+    return source.load()
+
+
+def formats() -> dict[str, tuple[str, dict[str, Any], Read]]:
+    """Name, content and reader of the `SAMPLE` of each format's test, by the format."""
+    names = [path.stem for path in sorted(Path(__file__).parent.glob("formats/test_*.py"))]
+    modules = {name: import_module(f"tests.floorplan.formats.{name}") for name in names}
+    kinds = {name.removeprefix("test_"): module for name, module in modules.items()}
+    samples = {k: m.SAMPLE for k, m in kinds.items() if hasattr(m, "SAMPLE")}
+    samples["native as YAML"] = ("plan.yaml", samples["native"][1])
+    return {k: (*sample, partial(read_as, k.split()[0])) for k, sample in samples.items()}
+
+
+FORMATS = formats()
+ROS = FORMATS["ros"][1]
 
 
 def write(folder: Path, name: str, content: object) -> Path:
@@ -170,6 +81,12 @@ def refusal(read: Callable[..., object], path: Path, *arguments: Any) -> str:
         read(path, *arguments)
     assert path.name in str(caught.value)
     return str(caught.value)
+
+
+def test_every_format_of_documents_has_a_sample() -> None:
+    kinds = {k for k, source in components("floorplan").items() if getattr(source, "mark", None)}
+
+    assert set() == kinds - set(FORMATS), "give tests/floorplan/formats/test_NAME.py a SAMPLE"
 
 
 @every_format

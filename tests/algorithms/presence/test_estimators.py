@@ -15,9 +15,10 @@ from fleet2d.algorithms.presence.exposure_ratio import AuditOnly, ExposureRatio
 from fleet2d.algorithms.presence.fremen import Fremen
 from fleet2d.algorithms.presence.likelihood import Likelihood
 from fleet2d.algorithms.presence.sighting_share import SightingShare
+from fleet2d.component import components
 from fleet2d.errors import ComponentError
 
-ALL = [SightingShare, ExposureRatio, AuditOnly, Likelihood, Fremen]
+ALL = list(components("presence_estimator").values())
 
 
 def learned(estimator: Estimator, bins, rooms: int = 3, users: int = 2, length: int = 7):

@@ -16,6 +16,52 @@ from fleet2d.floorplan.save import geojson_document, save_floorplan
 
 Ring = list[list[float]]
 
+# A file with all that the format has; `test_damaged_files.py` damages it.
+SAMPLE: tuple[str, dict[str, Any]] = ("flat.geojson", {
+    "type": "FeatureCollection",
+    "name": "flat",
+    "units": "m",
+    "features": [
+        {
+            "type": "Feature",
+            "properties": {"kind": "room", "name": "Kitchen", "type": "kitchen"},
+            "geometry": {"type": "Polygon", "coordinates": [[[0, 0], [4, 0], [4, 3], [0, 3], [0, 0]]]},
+        },
+        {
+            "type": "Feature",
+            "feature_type": "unit",
+            "properties": {"category": "lounge", "name": {"en": "Lounge"}, "level_id": "0"},
+            "geometry": {
+                "type": "MultiPolygon",
+                "coordinates": [[[[4, 0], [8, 0], [8, 3], [4, 3], [4, 0]]]],
+            },
+        },
+        {
+            "type": "Feature",
+            "properties": {"kind": "door", "name": "door"},
+            "geometry": {"type": "LineString", "coordinates": [[4, 1], [4, 2]]},
+        },
+        {
+            "type": "Feature",
+            "properties": {"kind": "wall"},
+            "geometry": {"type": "LineString", "coordinates": [[5, 1], [6, 2]]},
+        },
+        {
+            "type": "Feature",
+            "properties": {
+                "kind": "object", "type": "bed", "blocks": "path", "heading": 1,
+                "uses": [{"x": 7, "y": 2, "heading": 1}],
+            },
+            "geometry": {"type": "Point", "coordinates": [7, 2, 0]},
+        },
+        {
+            "type": "Feature",
+            "properties": {"kind": "entrance"},
+            "geometry": {"type": "Point", "coordinates": [0, 1]},
+        },
+    ],
+})  # fmt: skip
+
 
 def box(x0: float, y0: float, x1: float, y1: float) -> dict[str, Any]:
     return {"type": "Polygon", "coordinates": [[[x0, y0], [x1, y0], [x1, y1], [x0, y1], [x0, y0]]]}

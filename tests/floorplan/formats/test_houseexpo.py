@@ -16,6 +16,18 @@ from fleet2d.kernels.masks import label_parts
 
 SQUARE = [[0, 0], [4, 0], [4, 3], [0, 3]]
 
+# A file with all that the format has; `test_damaged_files.py` damages it.
+SAMPLE: tuple[str, dict[str, Any]] = (
+    "house.json",
+    {
+        "id": "house",
+        "verts": SQUARE,
+        "bbox": {"min": [0, 0], "max": [4, 3]},
+        "room_category": {"Kitchen": [[0, 0, 2, 3]], "Office": [[2, 0, 4, 3], [3, 0, 4, 1]]},
+        "room_num": 2,
+    },
+)
+
 
 @pytest.fixture(scope="module")
 def plans(shared_data: Path) -> list[Path]:

@@ -22,6 +22,28 @@ PLAN = {"format": "fleet2d-floorplan", "version": 1, "name": "flat", "free": [{"
 BED = {"type": "bed", "footprint": [[1, 1], [3, 1], [3, 2], [1, 2]]}
 USE = {"x": 2, "y": 1.5, "heading": 0.5}
 
+# A file with all that the format has; `test_damaged_files.py` damages it.
+SAMPLE: tuple[str, dict[str, Any]] = ("plan.json", {
+    "format": "fleet2d-floorplan",
+    "version": 1,
+    "name": "flat",
+    "free": [{"outline": [[0, 0], [4, 0], [4, 3], [0, 3]], "holes": [[[1, 1], [1, 2], [2, 2], [2, 1]]]}],
+    "rooms": [
+        {"name": "den", "type": "office", "labels": ["office"], "polygon": [[0, 0], [4, 0], [4, 3], [0, 3]]},
+        {"type": "kitchen", "region": [{"outline": [[0, 0], [1, 0], [1, 3], [0, 3]]}]},
+    ],
+    "doorways": [{"name": "gate", "start": [0, 1.5], "end": [1, 1.5], "leaf": False}],
+    "objects": [
+        {
+            "name": "bed", "type": "bed", "footprint": [[2.5, 1], [3.5, 1], [3.5, 2], [2.5, 2]],
+            "blocks": "path", "heading": 0.5,
+            "uses": [{"x": 3, "y": 2.4, "heading": 1, "posture": "lie", "approach": [3, 2.5]}],
+        },
+    ],
+    "no_go": [[[0, 0], [1, 0], [1, 1]]],
+    "entrance": [0.5, 0.5],
+})  # fmt: skip
+
 
 def write(folder: Path, content: object) -> Path:
     path = folder / "plan.json"

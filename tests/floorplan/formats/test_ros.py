@@ -23,6 +23,20 @@ ROOM[1:-1, 1:-1] = OCCUPIED
 ROOM[2:-2, 2:-2] = FREE  # 30 x 40 pixels of 5 cm: 3 m2
 ROOM[2:12, 2:22] = OCCUPIED  # the upper left quarter or so: 0.5 m2 less
 
+# A file with all that the format has; `test_damaged_files.py` damages it.
+SAMPLE: tuple[str, dict[str, Any]] = (
+    "map.yaml",
+    {
+        "image": "map.pgm",
+        "resolution": 0.1,
+        "origin": [-1.0, 2.0, 0.3],
+        "occupied_thresh": 0.65,
+        "free_thresh": 0.196,
+        "negate": 0,
+        "mode": "trinary",
+    },
+)
+
 
 def pgm(pixels: NDArray[np.uint8]) -> bytes:
     rows, columns = pixels.shape

@@ -31,6 +31,32 @@ MAPS = (
 )
 PIXEL_AREA = 0.05**2
 
+# A file with all that the format has; `test_damaged_files.py` damages it.
+SAMPLE: tuple[str, dict[str, Any]] = (
+    "vacuum.json",
+    {
+        "__class": "ValetudoMap",
+        "metaData": {"version": 2},
+        "size": {"x": 600, "y": 400},
+        "pixelSize": 5,
+        "layers": [
+            {
+                "type": "segment",
+                "metaData": {"segmentId": "1", "name": "Kitchen", "area": 3000},
+                "dimensions": {"pixelCount": 600},
+                "compressedPixels": [n for y in range(20) for n in (5, y + 5, 30)],
+            },
+            {"type": "wall", "metaData": {}, "pixels": [6, 6, 7, 6]},
+        ],
+        "entities": [
+            {"type": "charger_location", "points": [60, 60]},
+            {"type": "path", "points": [60, 60, 90, 90]},
+            {"type": "no_go_area", "points": [50, 50, 80, 50, 80, 80, 50, 80]},
+            {"type": "virtual_wall", "points": [50, 90, 90, 90]},
+        ],
+    },
+)
+
 
 def runs(x0: int, y0: int, x1: int, y1: int) -> list[int]:
     """A box of pixels, the last row and column not in it, as Valetudo writes it."""
