@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from tests.scenes import Cli, fleet2d_process
 
+from fleet2d.artifacts.store import RunStore
 from fleet2d.engine.snapshots import arrays
 from fleet2d.engine.snapshots.snapshot import read_state
 from fleet2d.errors import ArtifactError
@@ -140,6 +141,19 @@ def hostile() -> dict[str, bytes]:
 def test_a_checkpoint_made_up_on_purpose_is_refused(name: str) -> None:
     with pytest.raises(ArtifactError):
         read_state(io.BytesIO(hostile()[name]), {})
+
+
+def test_a_checkpoint_can_not_bring_a_store_of_another_directory() -> None:
+    """A run in a directory would have closed that one in the end, over its manifest."""
+    forged = pickle.dumps(RunStore(None))
+    assert "no state" in str(_refusal(forged, {}))
+    assert "store.RunStore, which can't be part" in str(_refusal(forged, {"store": RunStore(None)}))
+
+
+def _refusal(content: bytes, constants: dict[str, object]) -> ArtifactError:
+    with pytest.raises(ArtifactError) as caught:
+        read_state(io.BytesIO(content), constants)
+    return caught.value
 
 
 @pytest.mark.parametrize(

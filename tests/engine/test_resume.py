@@ -141,6 +141,28 @@ def test_what_can_not_be_gone_on_with_says_why(tmp_path: Path) -> None:
     assert "interrupted" == simulation.finish().status
 
 
+@pytest.mark.parametrize(
+    "name", ["run.lock", "manifest.json.partial", "unfinished", "unfinished/checkpoint.partial"]
+)
+def test_a_run_with_a_link_in_it_is_not_gone_on_with(tmp_path: Path, name: str) -> None:
+    """A run directory from elsewhere led to another file, which the lock or the manifest replaced."""
+    simulation = fleet2d.Simulation(scenario("1 min"), out=tmp_path / "run")
+    simulation.advance(30)
+    simulation.finish()
+    precious = tmp_path / "precious"
+    precious.mkdir()
+    (precious / "journal").write_text("mine")
+    link = tmp_path / "run" / name
+    if link.is_dir():
+        shutil.rmtree(link)
+    link.symlink_to(precious if name == FOLDER else precious / "journal")
+    with pytest.raises(RunDirectoryError, match=f"{name} is a link"):
+        fleet2d.resume(tmp_path / "run")
+    assert "mine" == (precious / "journal").read_text()
+    link.unlink()
+    assert "complete" == fleet2d.resume(tmp_path / "run").status
+
+
 def test_an_input_that_changed_is_not_gone_on_with(tmp_path: Path) -> None:
     found = content()
     plan = Path(shutil.copy(found["floorplan"]["path"], tmp_path / "plan.json"))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
 
@@ -44,6 +45,26 @@ def _check_writable(directory: Path, nearest: Path) -> None:
         raise RunDirectoryError(
             f"{directory} can't be written: you may not write in {nearest}; choose another --out"
         )
+
+
+def refuse_links(directory: Path, folders: Iterable[str]) -> None:
+    """Refuse a run directory with links: who goes on writing there would change what they lead to.
+
+    Args:
+        directory: The run directory, which may itself be reached by a link.
+        folders: Names of the folders in it.
+
+    Raises:
+        RunDirectoryError: There is a link in it, or in one of the folders.
+        OSError: A folder can't be read.
+    """
+    for folder in (directory, *(directory / name for name in folders)):
+        for path in sorted(folder.iterdir()) if folder.is_dir() else ():
+            if path.is_symlink():
+                raise RunDirectoryError(
+                    f"{path} is a link, so the run would be written elsewhere: remove it, or"
+                    " replace it by what it leads to"
+                )
 
 
 def make_directories(directory: Path) -> list[Path]:

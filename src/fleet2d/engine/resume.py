@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
-from fleet2d.artifacts.directory import cannot_write
-from fleet2d.artifacts.journal import JOURNAL_NAME, last_commit
+from fleet2d.artifacts.directory import cannot_write, refuse_links
+from fleet2d.artifacts.journal import FOLDER, JOURNAL_NAME, last_commit
 from fleet2d.artifacts.ledger import Ledger, remove_leftovers
 from fleet2d.artifacts.manifest import FILE_NAME, Manifest
 from fleet2d.artifacts.store import RunStore
@@ -14,7 +14,7 @@ from fleet2d.engine.inputs import changed_inputs
 from fleet2d.engine.simulation import Simulation
 from fleet2d.engine.snapshots.checkpoint import Checkpoint, UnusableCheckpointError
 from fleet2d.errors import RunDirectoryError
-from fleet2d.runs.run import Run
+from fleet2d.runs.run import LEARNED_NAME, Run
 from fleet2d.scenario.model import load_scenario
 from fleet2d.trust import Trust, refuse_untrusted, restrict
 
@@ -56,6 +56,7 @@ def reopen(directory: str | Path, trust: Trust) -> tuple[Simulation, str]:
     Manifest.read(root)  # before anything is written there
     ledger = Ledger(root)
     try:
+        refuse_links(root, (FOLDER, LEARNED_NAME))
         ledger.lock()
     except OSError as error:
         raise cannot_write(root, error) from error

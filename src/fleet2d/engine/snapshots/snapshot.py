@@ -98,6 +98,9 @@ _NO_STATE = (
     "fleet2d.viewer",
 )
 
+# Packages of tables that are written: the state of a run in a directory names its store only.
+_STORES = frozenset({"fleet2d.artifacts.store", "fleet2d.artifacts.table_writer"})
+
 # Objects that are written as a module and a name.
 _REFERENCES = (type, FunctionType, BuiltinFunctionType)
 
@@ -323,7 +326,8 @@ class _StateReader(pickle.Unpickler):
         if not is_scenario_module(module):  # it may be one under another name in this process
             top, dot, rest = public_name(module).partition(".")
             module = self._packages.get(top, top) + dot + rest
-        if not may_refer(module, name, self._packages):
+        is_other_store = module in _STORES and "store" in self._constants
+        if is_other_store or not may_refer(module, name, self._packages):
             raise ArtifactError(
                 f"the file refers to {module}.{name}, which can't be part of a state"
             )
