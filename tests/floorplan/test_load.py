@@ -1,6 +1,7 @@
 """All real maps against the numbers of their own files."""
 
 import json
+import re
 from pathlib import Path
 from typing import ClassVar
 
@@ -74,8 +75,8 @@ def test_synthetic_home_is_named_by_its_seed() -> None:
         ("own.yaml", "format: fleet2d-floorplan", "{type: native, path: own.yaml}"),
         ("map.yaml", "image: map.pgm", "{type: ros, path: map.yaml}"),
         ("odd.json", '{"walls": []}', "it has none of"),
-        ("absent.json", None, "one of geojson, houseexpo, native, valetudo"),
-        ("absent.yml", None, "one of geojson, houseexpo, native, ros, valetudo"),
+        ("absent.json", None, r"{type: TYPE, path: absent.json} with one of .*geojson, .*valetudo"),
+        ("absent.yml", None, r"{type: TYPE, path: absent.yml} with one of .*native, .*ros, .*"),
         ("absent.png", None, "{type: image, path: absent.png}"),
     ],
 )
@@ -85,7 +86,7 @@ def test_advice_about_a_file_named_as_a_type_follows_its_content(
     if content is not None:
         (tmp_path / name).write_text(content)
 
-    assert advice in advise_type(Text(name, tmp_path))
+    assert re.search(advice, advise_type(Text(name, tmp_path)))
 
 
 @pytest.mark.parametrize("name", ["synthetic", "acme.home", "mine.json:Home"])

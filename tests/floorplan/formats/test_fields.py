@@ -3,7 +3,7 @@
 from typing import Any, Literal
 
 import pytest
-from pydantic import TypeAdapter
+from pydantic import BaseModel, TypeAdapter
 
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.formats.fields import (
@@ -61,6 +61,28 @@ def test_missing_key_and_what_is_no_object_are_refused() -> None:
         validate(SHELF, {}, "shelves[2]")
     with pytest.raises(FloorPlanError, match="is not an object with the keys name, level"):
         validate(SHELF, [])
+
+
+class House(BaseModel):
+    """An object that may have other keys, too."""
+
+    walls: dict[str, Shelf]
+    name: Text
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ({"walls": {}, "other": 1}, "the plan has no key 'name'"),
+        ({"walls": {"east": {}}, "name": "home"}, "walls.east has no key 'name'"),
+        ([], "the plan is []: an object is expected"),
+    ],
+)
+def test_missing_key_is_refused_beside_unknown_ones(content: object, message: str) -> None:
+    with pytest.raises(FloorPlanError) as caught:
+        validate(TypeAdapter(House), content)
+
+    assert message == str(caught.value)
 
 
 def test_only_the_first_wrong_item_of_a_long_list_is_an_error() -> None:

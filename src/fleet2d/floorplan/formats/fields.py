@@ -45,9 +45,6 @@ class FileModel(DescribedModel):
         for key in content:
             if key not in fields:
                 raise problem(f"has an unknown key {key!r}{suggest(key, fields, 'Known')}")
-        for key, field in fields.items():
-            if field.is_required() and key not in content:
-                raise problem(f"has no key {key!r}")
         return content
 
 
@@ -56,6 +53,7 @@ class FileModel(DescribedModel):
 _EXPECTED = {
     "list_type": "a list",
     "dict_type": "an object",
+    "model_type": "an object",
     "bool_type": "true or false",
     "int_type": "a whole number",
     "float_type": "a number",
@@ -84,7 +82,8 @@ def validate(kind: TypeAdapter[T], content: object, where: str = "") -> T:
         return kind.validate_python(content)
     except ValidationError as error:
         line = error.errors(include_url=False)[0]
-        place = where + _place(line["loc"], content)
+        location = line["loc"][:-1] if line["type"] == "missing" else line["loc"]
+        place = where + _place(location, content)
         raise FloorPlanError(f"{place.lstrip('.') or 'the plan'} {_sentence(line)}") from None
 
 
@@ -106,6 +105,8 @@ def _sentence(line: ErrorDetails) -> str:
     """Return what is wrong with a value, as the rest of a sentence that begins with its place."""
     if line["type"] == "problem":
         return line["msg"]
+    if line["type"] == "missing":
+        return f"has no key {line['loc'][-1]!r}"
     context = line.get("ctx", {})
     expected = _EXPECTED.get(line["type"], "").format(**context)
     if line["type"] == "literal_error":
