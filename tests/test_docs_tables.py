@@ -123,3 +123,14 @@ def test_options_of_the_table_of_commands_exist() -> None:
         assert options - {"--help"} <= has, words
     missing = set(group.list_commands(typer.Context(group))) - seen
     assert not missing, f"add to the table in docs/cli.md: {sorted(missing)}"
+
+
+def test_page_on_security_says_of_every_command_whether_it_runs_code() -> None:
+    text = (DOCS / "security.md").read_text(encoding="utf-8")
+    table = text.split("| command | runs code", 1)[1].split("\n\n", 1)[0]
+    group = typer.main.get_command(app)
+    stated = {name.split()[0] for name in re.findall(r"`([^`]+)`", table)}
+
+    missing = set(group.list_commands(typer.Context(group))) - stated
+
+    assert not missing, f"add to the table in docs/security.md: {sorted(missing)}"
