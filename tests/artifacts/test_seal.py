@@ -195,6 +195,17 @@ def test_the_seal_covers_a_run_of_plain_tables(tmp_path: Path) -> None:
         (lambda m: m.update(notes=[["x" * 10_000]]), ["notes.0", "…"]),
         (lambda m: m.update(metrics=[]), ["metrics", "[]"]),
         (lambda m: m.update(digest="abc"), ["digest", "'abc'"]),
+        # Pages, reports and pictures read these; they ended in tracebacks.
+        (lambda m: m.update(step_us=0), ["step_us is 0"]),
+        (lambda m: m.update(start=""), ["start is empty"]),
+        (lambda m: m.update(start="2026-01-05T00:00:00+01:00"), ["start", "without a time zone"]),
+        (lambda m: m.update(steps=10**15), ["end after the year 9999"]),
+        (lambda m: m["scenario"]["users"]["ana"].update(radius=[0.2]), ["scenario.users.ana.radius"]),
+        (lambda m: m["scenario"]["robots"]["astro"]["camera"].update(range=[1]), ["robots.astro.camera.range"]),
+        (lambda m: m["scenario"]["robots"]["astro"]["camera"].update(angle_deg=1e9), ["camera.angle_deg"]),
+        (lambda m: m["scenario"]["robots"]["astro"].update(behaviors=[["patrol"]]), ["astro.behaviors.0"]),
+        (lambda m: m.update(interventions=[{"do": "put", "step": "3"}]), ["interventions.0.step"]),
+        (lambda m: m.update(expectations={"quiet": {}}), ["expectations.quiet.expectation"]),
     ],
 )  # fmt: skip
 def test_an_edited_manifest_is_refused_with_the_field(

@@ -1,5 +1,6 @@
 """A run that ended early, however it did, is gone on with to the digest of an undisturbed one."""
 
+import json
 import multiprocessing
 import os
 import random
@@ -129,6 +130,19 @@ def test_what_was_done_to_a_run_is_done_again(tmp_path: Path) -> None:
     assert expected == digests(fleet2d.resume(cut_off(simulation)))
 
 
+def test_what_was_only_scheduled_is_done_after_a_new_beginning(tmp_path: Path) -> None:
+    """The manifest of an interrupted run had lost what was to be done at its next step."""
+    text = "simulation.duration=10 min"
+    twin = fleet2d.Simulation(text, seed=4)
+    simulation = fleet2d.Simulation(text, seed=4, out=tmp_path / "run")
+    for each in (twin, simulation):
+        each.advance(60)
+        each.put("astro", "kitchen")
+    simulation.finish()
+    shutil.rmtree(tmp_path / "run" / FOLDER)
+    assert twin.run().digest == fleet2d.resume(tmp_path / "run").digest
+
+
 def test_what_can_not_be_gone_on_with_says_why(tmp_path: Path) -> None:
     fleet2d.run(scenario("1 min"), out=tmp_path / "whole")
     with pytest.raises(RunDirectoryError, match="complete run: there is nothing"):
@@ -161,6 +175,39 @@ def test_a_run_with_a_link_in_it_is_not_gone_on_with(tmp_path: Path, name: str) 
     assert "mine" == (precious / "journal").read_text()
     link.unlink()
     assert "complete" == fleet2d.resume(tmp_path / "run").status
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "words"),
+    [
+        ("rows", [[0, 1, 2, 3]], r"plan: rows\.0"),
+        ("rows", [], "can't be followed"),
+        ("rows", [[0, -5, 0, 0, 0]], "should be in the home"),
+        ("rows", [[10**9, 12257, 7521, 0, 0]], "the first at 0 us or before"),
+        ("rows", [[0, 12257, 7521, 0, 7]], "away must be 0 or 1"),
+        ("walk", [1, 2], "plan: walk"),
+        ("notes", [[0, "calls"]], r"plan: notes\.0"),
+        ("postures", [[0, 99]], "99 is the number of no posture"),
+        ("interrupts", ["never"], "no event 'never' interrupts"),
+        ("asks_us", "soon", "plan: asks_us"),
+    ],
+)
+def test_an_edited_plan_of_a_driven_robot_is_refused(
+    tmp_path: Path, key: str, value: Any, words: str
+) -> None:
+    """A manifest holds the plans of controllers as numbers; edited ones ended in tracebacks."""
+    simulation = fleet2d.Simulation("simulation.duration=10 min", seed=4, out=tmp_path / "run")
+    simulation.drive("astro")
+    simulation.decide("astro", simulation.plan("astro").go_to("kitchen").stay())
+    simulation.advance(60)
+    simulation.finish()
+    shutil.rmtree(tmp_path / "run" / FOLDER)
+    path = tmp_path / "run" / "manifest.json"
+    manifest = json.loads(path.read_text())
+    manifest["interventions"][1]["plan"][key] = value
+    path.write_text(json.dumps(manifest))
+    with pytest.raises(Fleet2DError, match=words):
+        fleet2d.resume(tmp_path / "run")
 
 
 def test_an_input_that_changed_is_not_gone_on_with(tmp_path: Path) -> None:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Protocol
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
 from fleet2d.artifacts.files import write_atomically
+from fleet2d.artifacts.manifest_parts import Count, ManifestParts, time_problem
 from fleet2d.artifacts.plain import canonical, plain
 from fleet2d.artifacts.strict_json import read_json
 from fleet2d.artifacts.table import Kind
@@ -45,12 +46,11 @@ VARIES = "varies"
 
 def _check_time(text: str) -> str:
     """Refuse text that is not a local time."""
-    if text:
-        dt.datetime.fromisoformat(text)
+    if text and dt.datetime.fromisoformat(text).tzinfo is not None:
+        raise ValueError("it should be a local time, without a time zone")
     return text
 
 
-Count = Annotated[int, Field(ge=0, lt=2**62)]
 Sha256 = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
 # The name of a table is that of its file: it must not lead out of the directory.
 TableName = Annotated[str, Field(pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.\-]*$")]
@@ -223,7 +223,9 @@ class Manifest(BaseModel):
         self.simulated_s = self.steps * run.clock.step_us / 1e6
         self.metrics = dict(run.results)
         self.wall_s = dict(run.wall_s)
-        self.interventions = run.state.interventions.done
+        interventions = run.state.interventions
+        is_over = self.steps >= run.clock.steps
+        self.interventions = interventions.done if is_over else interventions.records
         speedup = run.pace.speedup_until(self.simulated_s) if run.pace else 0.0
         if run.pace and speedup < 0.98 * run.pace.speedup:
             self.notes.append(
@@ -300,9 +302,16 @@ class Manifest(BaseModel):
         if missing := sorted(_REQUIRED - content.keys()):
             raise _damaged(path, f"it lacks {', '.join(missing)}")
         try:
-            return cls.model_validate(content)
+            manifest = cls.model_validate(content)
+            ManifestParts.model_validate(content)
         except ValidationError as error:
             raise _damaged(path, _problems(error)) from None
+        # Tables that no simulation stored have no scenario, and no times.
+        if manifest.scenario and (
+            reason := time_problem(manifest.start, manifest.step_us, manifest.steps)
+        ):
+            raise _damaged(path, reason)
+        return manifest
 
 
 # The fields of format 1, which every manifest has; those added since may be absent.

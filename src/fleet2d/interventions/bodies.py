@@ -1,6 +1,8 @@
 """Interventions on bodies, people and robots alike: put, send, hold, release, drive."""
 
-from typing import Any
+from typing import Annotated, Any
+
+from pydantic import AfterValidator
 
 from fleet2d.component import register
 from fleet2d.entities import orders
@@ -8,7 +10,7 @@ from fleet2d.entities.actor import Actor
 from fleet2d.entities.furniture import furniture_of
 from fleet2d.entities.motion import Pose
 from fleet2d.entities.place import Place, Point, RoomChoice, is_point, matching_rooms
-from fleet2d.entities.plan_data import plan_of
+from fleet2d.entities.plan_data import check_data, plan_of
 from fleet2d.errors import PlacementError
 from fleet2d.interventions.intervention import Intervention, body
 from fleet2d.interventions.world import World
@@ -150,7 +152,7 @@ class Decide(BodyIntervention):
         plan: The plan, as `data_of` returns it.
     """
 
-    plan: dict[str, Any]
+    plan: Annotated[dict[str, Any], AfterValidator(check_data)]
 
     def begin(self, world: World) -> None:
         """Let the body follow the plan from the present step on."""

@@ -4,12 +4,16 @@ import re
 from dataclasses import dataclass, field
 from typing import Any
 
+from pydantic import ValidationError
+
+from fleet2d.artifacts.manifest import FILE_NAME
 from fleet2d.entities.objects.door import Door
 from fleet2d.errors import ArtifactError, Fleet2DError
 from fleet2d.floorplan.arrangement import move_object
 from fleet2d.floorplan.home.home import Home
 from fleet2d.floorplan.rooms.doorways import Doorway
 from fleet2d.kernels.mesh import Mesh
+from fleet2d.problems import refusal
 from fleet2d.runs.run import Run
 from fleet2d.viewer.facts.contract import DoorFacts, WallsChange
 
@@ -27,12 +31,19 @@ class HomeDoors:
 
 
 def doors_of(run: Run) -> HomeDoors:
-    """Return the doors of a run's scenario."""
+    """Return the doors of a run's scenario.
+
+    Raises:
+        ScenarioError: The manifest describes one wrongly.
+    """
     doors = HomeDoors()
     for name, settings in run.manifest["scenario"].get("objects", {}).items():
         if settings.get("type") != "door":
             continue
-        door = Door(**{key: value for key, value in settings.items() if key != "type"})
+        try:
+            door = Door(**{key: value for key, value in settings.items() if key != "type"})
+        except ValidationError as error:
+            raise refusal(f"{FILE_NAME}: scenario.objects.{name}", error) from None
         doorway = door.find(run.plan)
         doors.names.append(name)
         doors.doorways.append(doorway)
