@@ -38,6 +38,7 @@ def test_verdict_says_what_is_kept(bounds: ModuleType) -> None:
     assert ["", "aim", "must", "MISSED"] == [less.verdict(x) for x in (None, 1, 2, 2.1)]
     assert ["aim", "must", "MISSED"] == [more.verdict(x) for x in (90, 80, 70)]
     assert ("–", "2 s", "1 s", "–") == less.row(None)
+    assert "a | **2.1 s** | 2 s | 1 s | –" == bounds.Bound("", "a", "s", 2, 1).cells(2.1)
 
 
 def test_page_has_every_bound(bounds: ModuleType) -> None:
@@ -47,6 +48,8 @@ def test_page_has_every_bound(bounds: ModuleType) -> None:
         _, *rest = bound.row(None)
         assert f"| {bound.what} |" in page
         assert f" | {' | '.join(rest)} |" in page
+        if bound.command:
+            assert f"| {bound.cells(bound.figure)} |" in page
 
 
 def test_code_of_a_bound_sets_its_figure(
