@@ -1,12 +1,13 @@
 """What it costs that a run survives: journal, checkpoints and seal, as a share of the base month.
 
-    python benchmarks/journal.py [--pairs 8] [--days 30]
+    python benchmarks/journal.py [--months 12] [--days 30]
     python benchmarks/journal.py --instructions
 
-The same month with and without them, in turn in one process, by processor time: the least of each,
-so that what else the machine does counts little. With `--instructions` both are counted by valgrind
-(cachegrind), which differs by less than 0.01 % from time to time, but leaves out what the system
-does. And how fast `verify` reads, beside reading alone.
+All calls for them in a month are timed by processor time, and compared with the rest of the month:
+two months, one of them without the calls, differ by chance more than by what the calls cost. With
+`--instructions` such months are compared, by instructions: valgrind (cachegrind) counts them, which
+differs by less than 0.01 % from time to time, but leaves out what the system does. And how fast
+`verify` reads, beside reading alone.
 """
 
 import argparse
@@ -17,6 +18,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
@@ -25,9 +27,11 @@ from unittest.mock import patch
 
 import fleet2d
 from fleet2d.artifacts import store
-from fleet2d.artifacts.journal import JournalWriter
+from fleet2d.artifacts.buffer import TableBuffer
 from fleet2d.artifacts.ledger import Ledger
 from fleet2d.artifacts.seal import verify_run
+from fleet2d.artifacts.store import RunStore
+from fleet2d.artifacts.table_writer import TableWriter
 from fleet2d.engine.snapshots.checkpoint import CheckpointWriter
 
 
@@ -37,7 +41,7 @@ def without(*names: str) -> Iterator[None]:
     nothing: Callable[..., None] = lambda *_, **__: None  # noqa: E731
     parts: dict[str, list[Any]] = {
         "journal": [
-            patch.object(JournalWriter, "add", nothing),
+            patch.object(TableWriter, "log", nothing),
             patch.object(Ledger, "commit", nothing),
         ],
         "checkpoints": [patch.object(CheckpointWriter, "after_span", nothing)],
@@ -50,11 +54,74 @@ def without(*names: str) -> Iterator[None]:
         yield
 
 
+class Calls:
+    """Processor time of calls, without that of calls in them."""
+
+    def __init__(self) -> None:
+        """Start with none."""
+        self.seconds: Counter[str] = Counter()
+        self._inner = 0.0
+
+    def timed(self, name: str, function: Callable[..., Any]) -> Callable[..., Any]:
+        """Return a function that adds to the time of a name."""
+
+        def call(*args: Any, **options: Any) -> Any:
+            before, self._inner = self._inner, 0.0
+            began = time.process_time()
+            try:
+                return function(*args, **options)
+            finally:
+                took = time.process_time() - began
+                self.seconds[name] += took - self._inner
+                self._inner = before + took
+
+        return call
+
+
+@contextmanager
+def timed_calls() -> Iterator[Counter[str]]:
+    """Time the journal, the checkpoints, and the seal."""
+    calls = Calls()
+    parts: dict[str, list[tuple[Any, str]]] = {
+        "journal": [
+            (TableWriter, "log"),
+            *((Ledger, name) for name in ("begin", "commit", "end")),
+            (RunStore, "commit"),
+        ],
+        "checkpoints": [(CheckpointWriter, "checkpoint")],
+        "seal": [(store, "make_seal")],
+        "neither": [(TableBuffer, "code_words")],  # a run without a journal does it later
+    }
+    with ExitStack() as stack:
+        for name, functions in parts.items():
+            for owner, function in functions:
+                timed = calls.timed(name, getattr(owner, function))
+                stack.enter_context(patch.object(owner, function, timed))
+        yield calls.seconds
+
+
 def month(folder: Path, days: int) -> float:
     """Return the processor time of a stored month [s]."""
     began = time.process_time()
     fleet2d.run(f"simulation.duration={days} d", seed=4, out=folder)
     return time.process_time() - began
+
+
+def share_of_time(root: Path, months: int, days: int) -> str:
+    """Return how long the calls take, by the month in which they took least."""
+    rounds = []
+    for number in range(months):
+        with timed_calls() as seconds:
+            whole = month(root / str(number), days)
+        rounds.append((sum(seconds.values()) - seconds.pop("neither"), whole, seconds))
+    cost, whole, seconds = min(rounds, key=lambda entry: entry[0] / entry[1])
+    shares = sorted(cost / (whole - cost) for cost, whole, _ in rounds)
+    parts = ", ".join(f"{name} {1e3 * value:.1f} ms" for name, value in seconds.items())
+    return (
+        f"journal, checkpoints and seal: {shares[0]:.1%} of the rest of the month in the best of"
+        f" {months}, {statistics.median(shares):.1%} in the median; {1e3 * cost:.1f} ms ({parts})"
+        f" of {1e3 * whole:.0f} ms"
+    )
 
 
 def count(code: str) -> int:
@@ -93,7 +160,7 @@ checkpoint.COMMIT_S = checkpoint.COMPUTING_S = checkpoint.WAITING_S = ledger.SYN
 def main() -> None:
     """Measure, and print shares and rates."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--pairs", type=int, default=8)
+    parser.add_argument("--months", type=int, default=12)
     parser.add_argument("--days", type=int, default=30)
     parser.add_argument("--instructions", action="store_true")
     chosen = parser.parse_args()
@@ -101,27 +168,9 @@ def main() -> None:
         share = share_of_instructions(chosen.days)
         print(f"journal, checkpoints and seal: {share:.2%} of the month's instructions")
         return
-    left_out = {
-        "journal, checkpoints and seal": ("journal", "checkpoints", "seal"),
-        "journal and checkpoints": ("journal", "checkpoints"),
-        "seal": ("seal",),
-    }
     with tempfile.TemporaryDirectory() as folder:
         month(Path(folder) / "first", chosen.days)
-        for what, names in left_out.items():
-            took: dict[tuple[str, ...], list[float]] = {(): [], names: []}
-            for pair in range(chosen.pairs):
-                for which in (names, ()) if pair % 2 else ((), names):
-                    with without(*which):
-                        target = Path(folder) / f"{what}-{pair}-{len(which)}"
-                        took[which].append(month(target, chosen.days))
-            least, median = (
-                pick(took[()]) / pick(took[names]) - 1 for pick in (min, statistics.median)
-            )
-            print(
-                f"{what}: {least:.1%} of the month by the least of {chosen.pairs} each,"
-                f" {median:.1%} by their medians"
-            )
+        print(share_of_time(Path(folder), chosen.months, chosen.days))
         root = Path(folder) / "first"
         size = sum(path.stat().st_size for path in root.rglob("*") if path.is_file())
         rates = []

@@ -1526,3 +1526,14 @@ class DayPlanner:
     def __getstate__(self) -> tuple[tuple[list[int], int, int, int, int], int, list[tuple[int, tuple[list[int], int, int, int, int] | None, tuple[list[int], int, int, int, int], int, list[int], int, bool, int]], list[tuple[int, int, tuple[list[int], int, int, int, int], int, int]], int, int]: ...
 
     def __setstate__(self, arg: tuple[tuple[Sequence[int], int, int, int, int], int, Sequence[tuple[int, tuple[Sequence[int], int, int, int, int] | None, tuple[Sequence[int], int, int, int, int], int, Sequence[int], int, bool, int]], Sequence[tuple[int, int, tuple[Sequence[int], int, int, int, int], int, int]], int, int], /) -> None: ...
+
+def encode_arrays(arrays: Sequence[numpy.typing.NDArray[Any]]) -> bytes:
+    """
+    Return arrays as bytes: values that repeat or grow slowly take few.
+
+    Args:
+        arrays: Arrays (n,) of int32, int64, float64, bool, or uint8 for text.
+
+    Returns:
+        For each array a header and its values; see `fleet2d.artifacts.encoding`.
+    """

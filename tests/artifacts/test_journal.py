@@ -1,23 +1,20 @@
 """The journal: every whole commit can be read back, whatever happens to the bytes behind it."""
 
+import json
 import os
+import random
 import subprocess
 import sys
+from collections import Counter
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from tests.thorough import examples
 
-from fleet2d.artifacts.encoding import (
-    GROWTH,
-    RAW,
-    RUNS,
-    decode,
-    decode_times,
-    encode,
-    encode_times,
-)
+from fleet2d.artifacts import journal
 from fleet2d.artifacts.journal import FOLDER, JOURNAL_NAME, last_commit
 from fleet2d.artifacts.ledger import Ledger
 from fleet2d.artifacts.lock import LOCK_NAME, RunLock
@@ -55,54 +52,6 @@ def kill(store: RunStore) -> Path:
     return store.directory
 
 
-@pytest.mark.parametrize(
-    ("values", "grows", "encoding"),
-    [
-        (np.zeros(1000), False, RUNS),
-        (np.repeat([1.0, np.nan, -0.0], 400), False, RUNS),
-        (np.arange(1000) * 7, True, GROWTH),
-        (np.r_[np.arange(500), np.arange(9000, 9500)], True, GROWTH),
-        (np.arange(1000) * 2**20, True, GROWTH),
-        (np.arange(1000) * 2**40, True, RAW),
-        (np.arange(1000)[::-1].copy(), True, RAW),
-        (np.random.default_rng(0).normal(size=1000), False, RAW),
-        (np.arange(3), True, RAW),
-        (np.zeros(0, np.int32), False, RAW),
-        (np.ones(1000, bool), False, RUNS),
-        (np.array([-(2**63), 2**63 - 1, 5] * 500), True, RAW),
-    ],
-)
-def test_arrays_come_back_to_the_last_bit(values: Any, grows: bool, encoding: str) -> None:
-    encoded = encode(values, grows=grows)
-    assert encoding == encoded[0]
-    back = decode(encoded, values.dtype, len(values))
-    assert values.tobytes() == back.tobytes()
-    assert values.dtype == back.dtype
-
-
-STEPS = np.random.default_rng(0).integers(0, 5, 1000).cumsum()
-
-
-@pytest.mark.parametrize(
-    ("times", "steps", "fits"),
-    [
-        (STEPS * 1_000_000 + 5, STEPS, True),
-        (STEPS * -3, STEPS, True),
-        (np.r_[STEPS[:-1] * 7, STEPS[-1] * 7 + 1], STEPS, False),
-        (np.r_[STEPS[:500] * 7, STEPS[500] * 7 + 1, STEPS[501:] * 7], STEPS, False),
-        (STEPS[:10] * 7, STEPS[:10], False),  # few
-        (STEPS, np.zeros(1000, np.int64), False),
-        (STEPS * 7, STEPS[::-1].copy(), False),
-        (np.r_[-(2**63), np.arange(998), 2**63 - 1], np.r_[np.zeros(999, np.int64), 1], False),
-    ],
-)
-def test_times_that_are_multiples_of_steps_come_back(times: Any, steps: Any, fits: bool) -> None:
-    encoded = encode_times(times, steps)
-    assert fits == (encoded is not None)
-    if encoded is not None:
-        assert times.tobytes() == decode_times(encoded, steps).tobytes()
-
-
 def test_times_without_steps_are_stored_by_themselves(tmp_path: Path) -> None:
     """The column of times may come first, or have missing values."""
     steps = np.arange(1000, dtype=np.int64)
@@ -122,17 +71,6 @@ def test_times_without_steps_are_stored_by_themselves(tmp_path: Path) -> None:
         assert steps.tolist() == table["step"].to_pylist()
         assert times.tolist() == table["time"].to_pylist()
         assert late.tolist() == table["late"].to_pylist()
-
-
-def test_few_bytes_can_not_ask_for_all_memory() -> None:
-    with pytest.raises(ValueError, match="don't make"):
-        decode((RUNS, 1, [b"\0" * 8, b"\xff\xff\xff\xff"]), np.dtype(np.int64), 1000)
-
-
-@pytest.mark.parametrize("encoded", [(GROWTH, 3, [b"\0" * 20]), (GROWTH, 1, []), ("zip", 1, [b""])])
-def test_what_encodes_nothing_is_refused(encoded: Any) -> None:
-    with pytest.raises((ValueError, TypeError, IndexError)):
-        decode(encoded, np.dtype(np.int64), 1000)
 
 
 @pytest.mark.parametrize("flush_rows", [30, 250, 2**17])
@@ -203,6 +141,81 @@ def test_a_cut_or_damaged_journal_reads_up_to_the_last_whole_commit(tmp_path: Pa
         assert full[: len(rows)] == rows
         seen.add(commit.step)
     assert {0, 1, 2, 3} <= seen
+
+
+Frame = tuple[str, Any, bytes]
+
+
+def with_frames(path: Path, change: Callable[[list[Frame]], None]) -> None:
+    """Change the frames of a journal; their checksums are right afterwards."""
+    frames = [frame[:3] for frame in journal._frames(path)]
+    change(frames)
+    content = journal.MAGIC
+    for kind, description, arrays in frames:
+        number, text = journal._KINDS.index(kind), json.dumps(description).encode()
+        checksum = journal._checksum(number, text, arrays)
+        content += journal._HEADER.pack(number, len(text), len(arrays), checksum) + text + arrays
+    path.write_bytes(content)
+
+
+def put_into(value: Any, rng: random.Random) -> Any:
+    """Return JSON data with another value at a random place, or without one."""
+    if isinstance(value, list | dict) and value and rng.random() < 0.8:
+        key = rng.choice(range(len(value)) if isinstance(value, list) else list(value))
+        value = value.copy()
+        if rng.random() < 0.2:
+            del value[key]
+        else:
+            value[key] = put_into(value[key], rng)
+        return value
+    return rng.choice([None, -1, 0, 2**62, 1e300, "x", [], {}, True, [1], 10**30, "every_kind"])
+
+
+def test_forged_frames_read_or_are_refused(tmp_path: Path) -> None:
+    """Right checksums around wrong content: codes beyond the words, a text cut inside a letter,
+    two tables of one name, a time after the year 9999."""
+    directory = kill(begin_run(tmp_path / "run"))
+    path = directory / FOLDER / JOURNAL_NAME
+    content, rng = path.read_bytes(), random.Random(1)
+
+    def forge(frames: list[Frame]) -> None:
+        for _ in range(rng.choice([1, 1, 2])):
+            at = rng.randrange(len(frames))
+            kind, description, arrays = frames[at]
+            if rng.random() < 0.5:
+                frames[at] = kind, put_into(description, rng), arrays
+            elif arrays:
+                changed = bytearray(arrays)
+                end = min(len(changed), rng.choice([60, 10**6]))  # the first headers, or anything
+                changed[rng.randrange(end)] = rng.choice([0, 1, 2, 3, 4, 255])
+                frames[at] = kind, description, bytes(changed)
+
+    results = Counter[str]()
+    for _ in range(examples(600)):
+        path.write_bytes(content)
+        with_frames(path, forge)
+        try:
+            run = open_run(directory)
+            for name in run.tables:
+                run.arrow(name).to_pylist()
+            results["read"] += 1
+        except (ArtifactError, RunDirectoryError):
+            results["refused"] += 1
+    assert min(results["read"], results["refused"]) > 20
+
+
+def test_two_tables_of_one_name_are_refused(tmp_path: Path) -> None:
+    directory = kill(begin_run(tmp_path / "run"))
+    path = directory / FOLDER / JOURNAL_NAME
+
+    def rename(frames: list[Frame]) -> None:
+        for kind, description, _ in frames:
+            if kind == "table":
+                description["name"] = "every_kind"
+
+    with_frames(path, rename)
+    with pytest.raises(ArtifactError, match=r"journal is damaged \(two tables have the name"):
+        open_run(directory).arrow("every_kind")
 
 
 def test_a_flipped_byte_ends_the_journal_before_it(tmp_path: Path) -> None:

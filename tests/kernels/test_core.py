@@ -452,6 +452,7 @@ CALLS: dict[str, Args] = {
         2,
         np.array([0, 4]),
     ),
+    "encode_arrays": lambda: ([np.arange(3), np.zeros(2, bool)],),
     "merge_bins": lambda: (
         np.arange(5),
         np.zeros(5, np.int64),
@@ -606,6 +607,8 @@ def each(cases: list[tuple[str, Path_]]) -> pytest.MarkDecorator:
 @each(ARRAYS)
 def test_arrays_of_another_type_are_refused(name: str, places: list[Path_]) -> None:
     for at in places:
+        if name == "encode_arrays":  # takes arrays of many types
+            continue
         array = leaf(CALLS[name](), at)
         other = np.int32 if array.dtype != np.int32 else np.int64
         wrong: list[Any] = [

@@ -38,4 +38,5 @@ NB_MODULE(_core, m) {
     bind_flows(m);
     bind_interruptions(m);
     bind_planner(m);
+    bind_encoding(m);
 }

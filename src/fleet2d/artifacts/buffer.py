@@ -54,7 +54,11 @@ class TableBuffer:
         self.words = new_dictionaries(spec)
         self._capacity = 0
         self._first_capacity = _FIRST_CAPACITY
-        self._values: dict[str, Any] = {}
+        self._values: dict[str, NDArray[Any]] = {}
+        self._strings: dict[str, list[str | None]] = {
+            column.name: [] for column in spec.columns if column.takes_strings
+        }
+        self._coded = 0  # rows whose words have codes in `_values`
         self._valid: dict[str, NDArray[np.bool_]] = {}
         self._names = frozenset(spec.names)
 
@@ -121,16 +125,20 @@ class TableBuffer:
         self._make_room(b)
         for column in self.spec.columns:
             name, values = column.name, batch.values[column.name]
-            buffered = self._values[name]
-            if isinstance(buffered, np.ndarray):
-                buffered[a:b] = values if np.ndim(values) == 0 else values[start:stop]
-            else:
-                del buffered[a:]  # an interrupted call may have added some
+            if column.takes_strings:
+                strings = self._strings[name]
+                # An interrupted call may have added some.
+                del strings[a:]
                 is_list = isinstance(values, list)
-                buffered.extend(values[start:stop] if is_list else [values] * (b - a))
-            if column.nullable and name in self._valid:
+                strings.extend(values[start:stop] if is_list else [values] * (b - a))
+                continue
+            self._values[name][a:b] = values if np.ndim(values) == 0 else values[start:stop]
+            if column.nullable:
                 valid = batch.valid[name]
-                self._valid[name][a:b] = valid if np.ndim(valid) == 0 else valid[start:stop]
+                valid = valid if np.ndim(valid) == 0 else valid[start:stop]
+                self._valid[name][a:b] = valid
+                if valid is not True:
+                    np.copyto(self._values[name][a:b], 0, where=~valid)
         self.rows = b
         return stop
 
@@ -142,44 +150,71 @@ class TableBuffer:
                 longer needs them by then.
         """
         chunk = self.peek()
-        self.rows = 0
+        self.rows = self._coded = 0
         if not reuse:
             # The next rows are likely to be as many.
             self._first_capacity = max(self._first_capacity, self._capacity)
             self._capacity, self._values, self._valid = 0, {}, {}
-        for column in self.spec.columns:
-            if column.takes_strings:
-                self._values[column.name] = []
+        for strings in self._strings.values():
+            strings.clear()
         return chunk
 
-    def peek(self, start: int = 0) -> Chunk:
-        """Return the rows from `start` on, without removing them; arrays are not copied."""
-        return {column.name: self._rows_of(column, start) for column in self.spec.columns}
+    def peek(self) -> Chunk:
+        """Return the rows without removing them; arrays are not copied."""
+        if not self.rows:
+            return {column.name: empty_chunk(column) for column in self.spec.columns}
+        self.code_words()
+        return {column.name: self._rows_of(column, 0) for column in self.spec.columns}
+
+    def arrays(self, start: int) -> list[NDArray[Any]]:
+        """Return the rows from `start` on, at least one, as the journal takes them.
+
+        Returns:
+            Of each column which values are not missing, if it is nullable, and its values; of texts
+            the lengths, which of them are not missing, and their bytes.
+        """
+        self.code_words()
+        rows = slice(start, self.rows)
+        arrays: list[NDArray[Any]] = []
+        for column in self.spec.columns:
+            if column.kind == "string":
+                text, valid, lengths = self._rows_of(column, start)
+                arrays += [a for a in (lengths, valid, text) if a is not None]
+                continue
+            if column.nullable:
+                arrays.append(self._valid[column.name][rows])
+            arrays.append(self._values[column.name][rows])
+        return arrays
 
     def _rows_of(self, column: Column, start: int) -> ColumnChunk:
-        """Encode what one column holds from row `start` on."""
-        if self.rows <= start:
-            return empty_chunk(column)
-        values = self._values[column.name][start : self.rows]
+        """Return what one column holds from row `start` on."""
+        name, rows = column.name, slice(start, self.rows)
         if column.kind == "string":
-            return encode_strings(values, column.nullable)
-        if column.is_growing:
-            return encode_words(values, self.words[column.name], column.nullable)
-        if not column.nullable:
-            return ColumnChunk(values)
-        valid = self._valid[column.name][start : self.rows]
-        if not valid.all():
-            values[~valid] = 0
-        return ColumnChunk(values, valid)
+            return encode_strings(self._strings[name][rows], column.nullable)
+        valid = self._valid[name][rows] if column.nullable else None
+        return ColumnChunk(self._values[name][rows], valid)
+
+    def code_words(self) -> None:
+        """Turn the words of columns whose dictionary grows into codes."""
+        if self._coded == self.rows:
+            return
+        rows = slice(self._coded, self.rows)
+        for column in self.spec.columns:
+            name = column.name
+            if column.is_growing:
+                words = encode_words(self._strings[name][rows], self.words[name], column.nullable)
+                self._values[name][rows] = words.values
+                if column.nullable:
+                    self._valid[name][rows] = words.valid
+        self._coded = self.rows
 
     def _make_room(self, rows: int) -> None:
         """Allocate memory for `rows` rows or more; it doubles, so that small appends are cheap."""
-        if rows <= self._capacity and self._values:
+        if rows <= self._capacity:
             return
         capacity = min(self.limit, max(rows, 2 * self._capacity, self._first_capacity))
         for column in self.spec.columns:
-            if column.takes_strings:
-                self._values.setdefault(column.name, [])
+            if column.kind == "string":
                 continue
             _grow(self._values, column.name, capacity, self.rows, DTYPES[column.kind])
             if column.nullable:

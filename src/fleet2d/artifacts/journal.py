@@ -13,6 +13,7 @@ import struct
 import sys
 import zlib
 from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, BinaryIO, Literal, NamedTuple
@@ -22,23 +23,16 @@ from numpy.typing import NDArray
 
 from fleet2d.artifacts import files
 from fleet2d.artifacts.chunk import Chunk, ColumnChunk, Dictionary, new_dictionaries
-from fleet2d.artifacts.encoding import (
-    FEW,
-    RAW,
-    STEPS,
-    Encoded,
-    decode,
-    decode_times,
-    encode,
-    encode_times,
-)
+from fleet2d.artifacts.encoding import ArrayReader
 from fleet2d.artifacts.table import DTYPES, Column, TableSpec
 from fleet2d.errors import ArtifactError
+from fleet2d.kernels.encoding import encode_arrays
 
 FOLDER = "unfinished"
 """The folder in a run directory for files that are needed until the run is complete."""
 JOURNAL_NAME = "journal"
-MAGIC = b"fleet2d journal 2\n"
+# Journals are read where they were written: numbers are in the byte order of the machine.
+MAGIC = f"fleet2d journal 3 {sys.byteorder}\n".encode()
 
 Kind = Literal["table", "rows", "commit"]
 _KINDS: tuple[Kind, ...] = ("table", "rows", "commit")
@@ -48,7 +42,8 @@ _HEADER = struct.Struct("<BIQI")
 _BUFFER_BYTES = 1 << 22
 # Rows in one frame at most: a few damaged bytes must not request all memory.
 _MOST_ROWS = 1 << 20
-_IS_LITTLE_ENDIAN = sys.byteorder == "little"
+# The years 1 to 9999 [us since 1970], which `datetime` can express.
+_FIRST_TIME, _END_OF_TIME = -62_135_596_800_000_000, 253_402_300_800_000_000
 _to_json = json.JSONEncoder(separators=(",", ":")).encode
 
 
@@ -97,7 +92,8 @@ class JournalWriter:
         self.path, self.end = path, start
         self._tables: dict[str, _LoggedTable] = {}
         self._buffer: list[bytes] = []
-        self._size = 0
+        self._size = 0  # bytes in the buffer
+        self._written = start
         flags = os.O_WRONLY if start else os.O_WRONLY | os.O_CREAT | os.O_EXCL
         self._handle = os.open(path, flags, 0o666)
         try:
@@ -106,7 +102,7 @@ class JournalWriter:
                 os.lseek(self._handle, 0, os.SEEK_END)
             else:
                 files.write_all(self._handle, MAGIC)
-                self.end = len(MAGIC)
+                self.end = self._written = len(MAGIC)
         except OSError:
             os.close(self._handle)
             raise
@@ -120,9 +116,19 @@ class JournalWriter:
         table.words = {name: len(words) for name, words in entry.words.items()}
 
     def add(
-        self, spec: TableSpec, chunk: Chunk, rows: int, words: Mapping[str, Dictionary]
+        self,
+        spec: TableSpec,
+        arrays: list[NDArray[Any]],
+        rows: int,
+        words: Mapping[str, Dictionary],
     ) -> None:
         """Append rows; readers see them after the next commit.
+
+        Args:
+            spec: The table.
+            arrays: The rows; see `TableBuffer.arrays`.
+            rows: Their number.
+            words: The dictionaries of columns whose dictionary grows, up to these rows.
 
         Raises:
             OSError: They can't be written.
@@ -130,35 +136,17 @@ class JournalWriter:
         table = self._tables.get(spec.name)
         if table is None:
             table = self._tables[spec.name] = _LoggedTable(len(self._tables), spec, 0, {})
-            self._append("table", asdict(spec), [])
-        arrays: list[bytes] = []
-        columns = []
-        steps = None
-        for column in spec.columns:
-            parts: list[Any] = []  # raw values: their size; others: encoding, runs and size
-            for values in chunk[column.name]:
-                if values is None:
-                    parts.append(None)
-                    continue
-                if len(values) < FEW and _IS_LITTLE_ENDIAN:  # most tables have few rows a day
-                    parts.append(values.nbytes)
-                    arrays.append(values.tobytes())
-                    continue
-                encoding, runs, content = _encoded(column, values, steps)
-                length = sum(map(len, content))
-                parts.append(length if encoding == RAW else [encoding, runs, length])
-                arrays += content
-            if column.kind == "step":
-                steps = chunk[column.name].values
-            columns.append(parts)
+            self._append("table", _to_json(asdict(spec)))
         added_words = {}
         for name, dictionary in words.items():
             known, count = table.words.get(name, 0), len(dictionary) - (None in dictionary)
-            added_words[name] = dictionary.in_order()[known:] if count > known else []
-            table.words[name] = count
+            if count > known:
+                added_words[name] = dictionary.in_order()[known:]
+                table.words[name] = count
         table.rows += rows
-        size = {"table": table.number, "rows": rows}
-        self._append("rows", {**size, "columns": columns, "words": added_words}, arrays)
+        # Most parts of a table have no new words, and no need of an encoder.
+        added = _to_json(added_words) if added_words else "{}"
+        self._append("rows", f"[{table.number},{rows},{added}]", encode_arrays(arrays))
 
     def commit(self, step: int) -> Commit:
         """Commit all rows so far, and write them to the file.
@@ -170,9 +158,9 @@ class JournalWriter:
             OSError: It can't be written; the commit before it is still the last one.
         """
         rows = {name: table.rows for name, table in self._tables.items()}
-        self._append("commit", {"step": step, "rows": rows}, [])
+        self._append("commit", f"[{step},[{','.join(map(str, rows.values()))}]]")
         self._write()
-        self.end = os.lseek(self._handle, 0, os.SEEK_CUR)
+        self.end = self._written
         return Commit(step, rows, self.end)
 
     def sync(self) -> None:
@@ -192,12 +180,11 @@ class JournalWriter:
             os.close(self._handle)
             self._handle = -1
 
-    def _append(self, kind: Kind, description: Mapping[str, Any], arrays: list[bytes]) -> None:
-        text = _to_json(description).encode()
-        size, number = sum(map(len, arrays)), _KINDS.index(kind)
-        header = _HEADER.pack(number, len(text), size, _checksum(number, text, *arrays))
-        self._buffer += [header, text, *arrays]
-        self._size += len(text) + size
+    def _append(self, kind: Kind, description: str, content: bytes = b"") -> None:
+        text, number = description.encode(), _KINDS.index(kind)
+        header = _HEADER.pack(number, len(text), len(content), _checksum(number, text, content))
+        self._buffer += [header, text, content]
+        self._size += len(text) + len(content)
         if self._size > _BUFFER_BYTES:
             self._write()
 
@@ -205,6 +192,7 @@ class JournalWriter:
         content = b"".join(self._buffer)
         self._buffer, self._size = [], 0
         files.write_all(self._handle, content)
+        self._written += len(content)
 
 
 class LoggedRows(NamedTuple):
@@ -230,9 +218,14 @@ def last_commit(path: Path) -> Commit | None:
         ArtifactError: The file can't be read, or is not a journal.
     """
     commit = None
-    for kind, description, _, end in _frames(path):
-        if kind == "commit":
-            commit = Commit(int(description["step"]), dict(description["rows"]), end)
+    names: list[str] = []
+    with _naming_damage(path):
+        for kind, description, _, end in _frames(path):
+            if kind == "table":
+                names.append(_spec_of(description).name)
+            if kind == "commit":
+                step, rows = description
+                commit = Commit(int(step), dict(zip(names, map(int, rows), strict=True)), end)
     return commit
 
 
@@ -248,20 +241,30 @@ def read_journal(path: Path, end: int) -> Iterator[LoggedRows]:
     """
     specs: list[TableSpec] = []
     words: list[dict[str, Dictionary]] = []
-    try:
+    with _naming_damage(path):
         for kind, description, content, stop in _frames(path):
             if stop > end:
                 break
             if kind == "table":
                 specs.append(_spec_of(description))
+                if specs[-1].name in [spec.name for spec in specs[:-1]]:
+                    raise ValueError(f"two tables have the name {specs[-1].name}")
                 words.append(new_dictionaries(specs[-1]))
             if kind == "rows":
-                spec, dictionaries = specs[description["table"]], words[description["table"]]
-                for name, added_words in description["words"].items():
-                    dictionaries[name].enter(added_words)
-                chunk = _chunk_of(spec, description, content)
-                yield LoggedRows(spec, chunk, description["rows"], dictionaries)
-    except (KeyError, IndexError, TypeError, ValueError) as error:
+                number, rows, added_words = description
+                spec, dictionaries = specs[number], words[number]
+                for name, column_words in added_words.items():
+                    dictionaries[name].enter(column_words)
+                chunk = _chunk_of(spec, rows, content, dictionaries)
+                yield LoggedRows(spec, chunk, rows, dictionaries)
+
+
+@contextmanager
+def _naming_damage(path: Path) -> Iterator[None]:
+    """Name the file if a frame with a right checksum has a wrong content."""
+    try:
+        yield
+    except (AttributeError, KeyError, IndexError, TypeError, ValueError) as error:
         raise ArtifactError(f"{path} is damaged ({error}): run the scenario again") from error
 
 
@@ -281,10 +284,10 @@ def _frames(path: Path) -> Iterator[tuple[Kind, Any, bytes, int]]:
 def _whole_frames(file: BinaryIO) -> Iterator[tuple[Kind, Any, bytes, int]]:
     size = os.fstat(file.fileno()).st_size
     while len(header := file.read(_HEADER.size)) == _HEADER.size:
-        number, text_bytes, array_bytes, checksum = _HEADER.unpack(header)
-        if number >= len(_KINDS) or file.tell() + text_bytes + array_bytes > size:
+        number, text_bytes, content_bytes, checksum = _HEADER.unpack(header)
+        if number >= len(_KINDS) or file.tell() + text_bytes + content_bytes > size:
             return
-        text, content = file.read(text_bytes), file.read(array_bytes)
+        text, content = file.read(text_bytes), file.read(content_bytes)
         if _checksum(number, text, content) != checksum:
             return
         try:
@@ -294,20 +297,8 @@ def _whole_frames(file: BinaryIO) -> Iterator[tuple[Kind, Any, bytes, int]]:
         yield _KINDS[number], description, content, file.tell()
 
 
-def _checksum(number: int, text: bytes, *arrays: bytes) -> int:
-    checksum = zlib.crc32(text, number + len(text))
-    for content in arrays:
-        checksum = zlib.crc32(content, checksum)
-    return checksum
-
-
-def _encoded(column: Column, values: NDArray[Any], steps: NDArray[np.int64] | None) -> Encoded:
-    """Return an array of a column, given the steps of the same rows if they come before it."""
-    if values.dtype == np.bool_:
-        return encode(values)
-    if column.kind == "time" and steps is not None and (times := encode_times(values, steps)):
-        return times
-    return encode(values, grows=column.kind in ("step", "time"))
+def _checksum(number: int, text: bytes, content: bytes) -> int:
+    return zlib.crc32(content, zlib.crc32(text, number + len(text)))
 
 
 def _spec_of(description: Mapping[str, Any]) -> TableSpec:
@@ -315,41 +306,52 @@ def _spec_of(description: Mapping[str, Any]) -> TableSpec:
         Column(**{**column, "categories": tuple(column["categories"])})
         for column in description["columns"]
     ]
-    return TableSpec(description["name"], tuple(columns), description["description"])
+    spec = TableSpec(description["name"], tuple(columns), description["description"])
+    for column in columns:
+        texts = column.name, column.unit, column.description, *column.categories, spec.description
+        if not all(isinstance(text, str) for text in texts):
+            raise TypeError(f"a column is described by {texts}")
+    return spec
 
 
-def _chunk_of(spec: TableSpec, description: Mapping[str, Any], content: bytes) -> Chunk:
-    chunk, position, rows = dict[str, ColumnChunk](), 0, int(description["rows"])
-    steps = np.empty(0, np.int64)
+def _chunk_of(spec: TableSpec, rows: int, content: bytes, words: dict[str, Dictionary]) -> Chunk:
     if not 0 <= rows <= _MOST_ROWS:
         raise ValueError(f"{rows} rows at once")
-    for column, parts in zip(spec.columns, description["columns"], strict=True):
-        arrays: list[Encoded | None] = []
-        for part in parts:
-            if part is None:
-                arrays.append(None)
-                continue
-            encoding, runs, size = (RAW, 0, part) if isinstance(part, int) else part
-            arrays.append((encoding, runs, [content[position : position + size]]))
-            position += size
-        chunk[column.name] = _column_of(column, arrays, rows, steps)
-        if column.kind == "step":
-            steps = chunk[column.name].values
-    return chunk
+    reader = ArrayReader(content)
+    return {
+        column.name: _column_of(column, reader, rows, words.get(column.name))
+        for column in spec.columns
+    }
 
 
 def _column_of(
-    column: Column, arrays: list[Encoded | None], rows: int, steps: NDArray[np.int64]
+    column: Column, reader: ArrayReader, rows: int, words: Dictionary | None
 ) -> ColumnChunk:
-    values, valid, lengths = arrays
-    assert values is not None
-    flags = None if valid is None else decode(valid, np.dtype(np.bool_), rows)
-    if values[0] == STEPS and column.kind == "time" and len(steps) == rows:
-        return ColumnChunk(decode_times(values, steps), flags)
+    is_text = column.kind == "string"
+    lengths = reader.read(np.dtype(np.int64), rows) if is_text else None
+    valid = reader.read(np.dtype(np.bool_), rows) if column.nullable else None
     if lengths is None:
-        return ColumnChunk(decode(values, DTYPES[column.kind], rows), flags)
-    sizes = decode(lengths, np.dtype(np.int64), rows)
-    if values[0] != RAW:
-        raise ValueError(f"text is encoded as {values[0]!r}")
-    text = decode(values, np.dtype(np.uint8), int(sizes.sum()))
-    return ColumnChunk(text, flags, sizes)
+        values = reader.read(DTYPES[column.kind], rows)
+        present = values if valid is None else values[valid]
+        if column.kind == "category":
+            _check_range(present, 0, len(column.categories if words is None else words))
+        if column.kind == "time":
+            _check_range(present, _FIRST_TIME, _END_OF_TIME)
+        return ColumnChunk(values, valid)
+    text = reader.read(np.dtype(np.uint8), int(lengths.sum()))
+    _check_text(text.tobytes(), lengths)
+    return ColumnChunk(text, valid, lengths)
+
+
+def _check_range(values: NDArray[Any], first: int, end: int) -> None:
+    if values.size and not first <= values.min() <= values.max() < end:
+        raise ValueError(f"{values.min()} to {values.max()}, expected {first} to {end - 1}")
+
+
+def _check_text(text: bytes, lengths: NDArray[np.int64]) -> None:
+    if lengths.size and lengths.min() < 0:
+        raise ValueError(f"a text of {lengths.min()} bytes")
+    end = 0
+    for length in lengths.tolist():
+        text[end : end + length].decode()
+        end += length

@@ -49,7 +49,7 @@ class TableWriter:
         first, buffer = self.logged, self.buffer
         if ledger is None or first == buffer.rows:
             return
-        ledger.journal.add(buffer.spec, buffer.peek(first), buffer.rows - first, buffer.words)
+        ledger.journal.add(buffer.spec, buffer.arrays(first), buffer.rows - first, buffer.words)
         self.logged = buffer.rows
 
     def file_in(self, root: Path) -> ParquetTable:
