@@ -19,7 +19,7 @@ def routine(
     log: Annotated[Path, typer.Argument(help="A log of rooms and activities, or its folder.")],
     out: Annotated[Path, typer.Option(help="The persona to write.")] = Path("persona.yaml"),
     layout: Annotated[
-        str, typer.Option("--format", help="casas, uci_adl, homer; auto recognizes it.")
+        str, typer.Option("--format", help="Its layout, see docs/replay.md; auto recognizes it.")
     ] = "auto",
     picture: Annotated[
         Path | None, typer.Option(help="Picture of the fit to write, .png or .svg.")
@@ -63,14 +63,16 @@ def fit_routine(
     from fleet2d.fit.persona import fit_persona, to_yaml
     from fleet2d.fit.timeline import read_timeline
     from fleet2d.fit.validate import validate
+    from fleet2d.logs.layouts import layout_names
     from fleet2d.logs.log import ActivityLog, LogError
     from fleet2d.logs.read import read_log
 
-    if layout not in ("auto", "casas", "uci_adl", "homer"):
-        raise LogError(f"--format: expected auto, casas, uci_adl or homer, got {layout!r}")
+    layouts = ["auto", *layout_names()]
+    if layout not in layouts:
+        raise LogError(f"--format: expected one of {', '.join(layouts)}, got {layout!r}")
     if model not in ("recorded", "laws"):
         raise LogError(f"--model: expected recorded or laws, got {model!r}")
-    log = read_log(path, layout, sort=sort)  # type: ignore[arg-type]
+    log = read_log(path, layout, sort=sort)
     if not isinstance(log, ActivityLog):
         raise LogError(f"{path} is a log of positions: a persona is fitted to a log of rooms")
     timeline = read_timeline(log)

@@ -73,7 +73,7 @@ class ActivityLog:
 
     Attributes:
         path: The file, or the folder of files, that it was read from.
-        layout: The layout it is written in: casas, uci_adl or homer.
+        layout: The layout it is written in, such as casas.
         first_day: The date of its first day; None where the log has no dates.
         readings: The readings.
         notes: Oddities in the log, and how they were resolved.

@@ -3,16 +3,15 @@
 from collections.abc import Mapping
 from itertools import islice
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
-from fleet2d.logs.casas import LINE as CASAS_LINE
-from fleet2d.logs.casas import read_casas
-from fleet2d.logs.homer import AGENDA, read_homer
+from fleet2d.logs.layouts import layout_names, layout_of
 from fleet2d.logs.log import ActivityLog, LogError, PositionLog, log_lines
-from fleet2d.logs.uci_adl import HEAD, read_uci_adl
-from fleet2d.logs.uci_adl import LINE as UCI_LINE
 
-Layout = Literal["auto", "casas", "uci_adl", "homer", "positions"]
+if TYPE_CHECKING:
+    Layout = str
+else:
+    Layout = Literal[("auto", *layout_names(), "positions")]
 FIRST_LINES = 20
 
 
@@ -28,7 +27,7 @@ def read_log(
     """Read a log: a smart home's events, an activity script, or position fixes.
 
     Args:
-        path: The file; or the folder, for a home that has several (uci_adl, homer).
+        path: The file; or the folder, for a home that has several.
         layout: The layout; "auto" recognizes it by its content.
         id: The tag to read, of positions; see `read_positions`.
         columns: The names of the columns of positions; see `read_positions`.
@@ -51,38 +50,37 @@ def read_log(
         raise LogError(
             f"{path} is of the layout {layout}: id, columns and time_zone are for positions"
         )
-    if layout == "casas":
-        return read_casas(path, sort=sort)
-    return read_uci_adl(path, sort=sort) if layout == "uci_adl" else read_homer(path, sort=sort)
+    return layout_of(layout).read(path, sort=sort)
 
 
-def _recognize(path: Path) -> Layout:
+def _recognize(path: Path) -> str:
     """Return the layout of a file or folder.
 
     Raises:
         LogError: It is of no known layout.
     """
     if path.is_dir():
-        files = sorted(path.glob("*.txt"))
-        if any(file.name.endswith(("_ADLs.txt", "_Sensors.txt")) for file in files):
-            return "uci_adl"
-        if files and _recognize(files[0]) == "homer":
-            return "homer"
-        raise LogError(
-            f"{path}: a folder holds the files of one home, as …_Sensors.txt and …_ADLs.txt, or the"
-            " days of a HOMER+ household; for other layouts name the file"
-        )
+        layouts = map(_recognize_lines, sorted(path.glob("*.txt")))
+        layout = next((name for name in layouts if name and layout_of(name).FOLDERS), None)
+        if layout is None:
+            several = [name for name in layout_names() if layout_of(name).FOLDERS]
+            raise LogError(
+                f"{path}: no .txt file in this folder is of a layout with several files"
+                f" ({', '.join(several)}): for other layouts name the file"
+            )
+        return layout
     if path.suffix.lower() in (".parquet", ".pq"):
         return "positions"
-    for _, line in islice(log_lines(path), FIRST_LINES):
-        if AGENDA.fullmatch(line):
-            return "homer"
-        if UCI_LINE.fullmatch(line) or HEAD.fullmatch(line):
-            return "uci_adl"
-        if CASAS_LINE.fullmatch(line):
-            return "casas"
-    if path.suffix.lower() == ".csv":
-        return "positions"
-    raise LogError(
-        f"{path} has no known layout: give 'format' (casas, uci_adl, homer or positions)"
-    )
+    layout = _recognize_lines(path) or ("positions" if path.suffix.lower() == ".csv" else None)
+    if layout is None:
+        names = ", ".join(layout_names())
+        raise LogError(f"{path} has no known layout: give 'format' ({names} or positions)")
+    return layout
+
+
+def _recognize_lines(file: Path) -> str | None:
+    """Return the layout that one of the first lines of a file shows, if one does."""
+    layouts = {name: layout_of(name) for name in layout_names()}
+    lines = (line for _, line in islice(log_lines(file), FIRST_LINES))
+    shown = (name for line in lines for name, layout in layouts.items() if layout.matches(line))
+    return next(shown, None)

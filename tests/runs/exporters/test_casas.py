@@ -8,7 +8,7 @@ from tests.engine.watchers.test_sensors import household, plan  # noqa: F401  (a
 from tests.scenes import run, scenario
 
 from fleet2d.errors import RunDirectoryError
-from fleet2d.logs.casas import read_casas
+from fleet2d.logs.layouts import casas
 from fleet2d.runs.exporters.casas import export
 
 
@@ -30,7 +30,7 @@ def test_file_has_a_line_per_reading_in_the_columns_of_casas(plan: str, tmp_path
 def test_reader_of_casas_logs_reads_it(plan: str, tmp_path: Path) -> None:  # noqa: F811
     path = tmp_path / "log.txt"
     export(run(household(plan)), path)
-    assert read_casas(path)
+    assert casas.read(path)
 
 
 def test_run_without_sensors_is_refused_with_what_to_do(tmp_path: Path) -> None:

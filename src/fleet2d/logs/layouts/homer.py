@@ -30,6 +30,7 @@ ACTION = re.compile(r"\[(\w+)\]((?: <\w+> \(\d+\))*) \[\d+\]")
 THING = re.compile(r"<(\w+)> \((\d{1,9})\d*\)")
 MINUTE = re.compile(r"\d+(?:\.\d+)?")
 ROOM = re.compile(r"bathroom|bedroom|dining_room|home_office|kitchen|living_?room|hallway")
+FOLDERS = True
 ADDED = 1000  # objects from this number on were added later, in any room
 MINUTE_US = 60_000_000
 MOST_MINUTES = 1e6  # later times are cut to the end of their activity in any case
@@ -54,7 +55,12 @@ class _ScriptedActivity:
     steps: list[tuple[int, list[tuple[str, int]], int]] = field(default_factory=list)
 
 
-def read_homer(path: Path, *, sort: bool = False) -> ActivityLog:
+def matches(line: str) -> bool:
+    """Return whether a line is of an agenda."""
+    return AGENDA.fullmatch(line) is not None
+
+
+def read(path: Path, *, sort: bool = False) -> ActivityLog:
     """Read the days of a household: one file, or a folder whose files follow each other by name.
 
     Raises:

@@ -19,9 +19,17 @@ from fleet2d.logs.times import parse_time, since
 LINE = re.compile(r"(\d{4}-\d\d?-\d\d?)\s+(\d+:\S+)\s+(\S+)\s+(\S+)\s+(\S+)(?:\s+(.*))?")
 ON = frozenset({"ON", "OPEN", "PRESENT"})
 OFF = frozenset({"OFF", "CLOSE", "CLOSED", "ABSENT"})
+DATE = re.compile(r"\d{4}-\d\d?-\d\d?")
+FOLDERS = False
 
 
-def read_casas(path: Path, *, sort: bool = False) -> ActivityLog:
+def matches(line: str) -> bool:
+    """Return whether a line is an event of a sensor: a time and a room, not two times."""
+    match = LINE.fullmatch(line)
+    return match is not None and not DATE.fullmatch(match[3])
+
+
+def read(path: Path, *, sort: bool = False) -> ActivityLog:
     """Read the events of a home; those that switch on become readings of an instant.
 
     Raises:

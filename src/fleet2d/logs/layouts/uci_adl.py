@@ -23,6 +23,7 @@ from fleet2d.logs.times import parse_time, since
 _TIME = r"(\d{4}-\d\d?-\d\d?\s+\d+:\S+)"
 LINE = re.compile(rf"{_TIME}\s+{_TIME}\s+(.*)")
 HEAD = re.compile(r"(Start time\s+End time.*|[-\s]+)")
+FOLDERS = True
 LEAVING = frozenset({"leaving", "leave_home", "away", "out"})
 
 
@@ -35,7 +36,12 @@ class _Row(NamedTuple):
     line: int
 
 
-def read_uci_adl(path: Path, *, sort: bool = False) -> ActivityLog:
+def matches(line: str) -> bool:
+    """Return whether a line is an interval, or of the head of a table."""
+    return (LINE.fullmatch(line) or HEAD.fullmatch(line)) is not None
+
+
+def read(path: Path, *, sort: bool = False) -> ActivityLog:
     """Read a home's sensors and activities.
 
     Raises:

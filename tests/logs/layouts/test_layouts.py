@@ -1,0 +1,41 @@
+"""Layouts are found by the names of their modules, and tell their lines from those of others."""
+
+from pathlib import Path
+
+import pytest
+from tests.logs.test_read import ADLS, CASAS, HOMER, SENSORS
+
+from fleet2d.logs import LogError, read_log
+from fleet2d.logs.layouts import layout_names, layout_of
+
+SAMPLES = {"casas": [CASAS], "homer": [HOMER], "uci_adl": [ADLS, SENSORS]}
+
+
+@pytest.mark.parametrize("name", layout_names())
+def test_a_layout_has_all_that_reading_needs(name: str) -> None:
+    layout = layout_of(name)
+
+    assert isinstance(layout.FOLDERS, bool)
+    assert not layout.matches("hello world")
+
+
+@pytest.mark.parametrize(("name", "text"), [(n, t) for n, ts in SAMPLES.items() for t in ts])
+def test_no_line_shows_two_layouts(name: str, text: str) -> None:
+    lines = text.splitlines()
+    shown = {other for other in layout_names() for line in lines if layout_of(other).matches(line)}
+
+    assert {name} == shown
+
+
+def test_a_folder_is_recognized_beside_other_texts_in_it(tmp_path: Path) -> None:
+    (tmp_path / "about.txt").write_text("Real days of one person.\n")
+    (tmp_path / "home_ADLs.txt").write_text(ADLS)
+
+    assert "uci_adl" == read_log(tmp_path).layout
+
+
+def test_a_folder_of_another_layout_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "events.txt").write_text(CASAS)
+
+    with pytest.raises(LogError, match=r"several files \(homer, uci_adl\): for other layouts"):
+        read_log(tmp_path)
