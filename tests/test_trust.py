@@ -235,6 +235,21 @@ def test_a_simulation_takes_its_trust_into_threads(fleet2d: Cli, tmp_path: Path)
     assert not Path("ran").exists()
 
 
+def test_a_file_that_a_component_imports_is_listed_and_must_be_named(
+    fleet2d: Cli, tmp_path: Path
+) -> None:
+    """`--trust mine.py` ran what lay beside it, which nobody was asked to read."""
+    Path("theirs.py").write_text(INTERRUPT)
+    Path("mine.py").write_text(f"{CODE}\nimport theirs\n".replace('Path("ran").touch()', ""))
+    run = ("study", "run", "study.yaml", *SERIAL, "--trust", "mine.py")
+    code, _, err = fleet2d(*run)
+    assert (2, False) == (code, Path("ran").exists())
+    assert f"--trust {tmp_path}/theirs.py" in err
+    assert f"--trust {tmp_path}/mine.py" not in err
+    assert 0 == fleet2d(*run, "--trust", "theirs.py")[0]
+    assert Path("ran").exists()
+
+
 @pytest.mark.parametrize("name", ["mine:Über", "a/b/mine.py:C", "mine:A.B", "../x:Y", "ü.ö:ä"])
 def test_no_name_of_code_hides_from_the_list(name: str) -> None:
     assert [["a.0.type"]] == list(code_of({"a": [{"type": name}]}).values())

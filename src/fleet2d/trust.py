@@ -148,7 +148,7 @@ def _refusal(title: str, content: object, trust: Trust) -> str:
         [
             f"{title} has components of its own, which would run:",
             *lines,
-            f"None of it has run. Read it; if you trust it, and what it imports, say so: {options}",
+            f"None of it has run. Read it; if you trust it, say so: {options}",
         ]
     )
 

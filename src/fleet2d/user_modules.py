@@ -2,25 +2,32 @@
 
 import hashlib
 import importlib
+import inspect
 import re
 import sys
 import traceback
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from importlib.machinery import PathFinder
 from pathlib import Path
 from types import ModuleType
 from typing import Any
+from weakref import WeakKeyDictionary
 
 from fleet2d.errors import ScenarioError
 from fleet2d.paths import folder_of
 from fleet2d.problems import did_you_mean
 from fleet2d.trust import check_trust
+from fleet2d.user_imports import with_imports
 
 _PREFIX = "fleet2d_scenario_"
 # The folders of scenarios by the packages that their modules are imported into, and the reverse.
 _FOLDERS: dict[str, Path] = {}
 _PACKAGES: dict[Path, str] = {}
+# The folders of the modules that are being imported now, innermost last.
+_SEARCHED: list[Path] = []
+# The folders of components in modules that a scenario's modules imported from beside them.
+_BESIDE: WeakKeyDictionary[type, Path] = WeakKeyDictionary()
 
 
 class BrokenModule(ScenarioError):
@@ -39,9 +46,11 @@ def importable(folder: Path) -> Iterator[None]:
     """
     old_modules = set(sys.modules)
     sys.path.insert(0, str(folder))
+    _SEARCHED.append(folder)
     try:
         yield
     finally:
+        _SEARCHED.pop()
         sys.path.remove(str(folder))
         for name in set(sys.modules) - old_modules:
             file = getattr(sys.modules[name], "__file__", None)
@@ -135,7 +144,7 @@ def _short_path(file: str, folder: Path) -> str:
 
 
 def files_of(folder: Path, name: str) -> list[Path]:
-    """Return the files that importing a module would run and that aren't loaded yet.
+    """Return the files that importing a module would run, unless it is loaded already.
 
     For a module that doesn't exist it is the file that the module would have.
     """
@@ -151,8 +160,33 @@ def files_of(folder: Path, name: str) -> list[Path]:
     for full_name in (name, f"{_PACKAGES.get(folder)}.{name}"):
         if getattr(sys.modules.get(full_name), "__file__", None) in (str(file), str(package)):
             return []
-    parents = [folder.joinpath(*parts[:n], "__init__.py") for n in range(1, len(parts))]
-    return [*(path for path in parents if path.is_file()), file if file.is_file() else package]
+    return _files_in(folder, name)
+
+
+def _files_in(folder: Path, name: str) -> list[Path]:
+    """Return the files of a module in a folder and of its packages, and what they import there."""
+    return with_imports(_own_files(folder, name), folder)
+
+
+def _own_files(folder: Path, name: str) -> list[Path]:
+    """Return the files of a module in a folder and of its packages."""
+    parts = name.split(".")
+    packages = [folder.joinpath(*parts[:n], "__init__.py") for n in range(1, len(parts) + 1)]
+    file = folder.joinpath(*parts).with_suffix(".py")
+    return [path for path in (*packages, file) if path.is_file()]
+
+
+def source_files(cls: type) -> list[Path]:
+    """Return the file of a user's own class, and the files beside it that it imports."""
+    package, _, name = cls.__module__.partition(".")
+    if package in _FOLDERS:
+        return _files_in(_FOLDERS[package], name)
+    if cls in _BESIDE:
+        return _files_in(_BESIDE[cls], cls.__module__)
+    source = None
+    with suppress(TypeError, OSError):  # a class of an interactive session
+        source = inspect.getsourcefile(cls)
+    return [Path(source)] if source and Path(source).is_file() else []
 
 
 def _import_module(folder: Path, name: str) -> ModuleType:
@@ -189,4 +223,9 @@ def class_path(cls: type) -> str:
     package, _, module = cls.__module__.partition(".")
     if package in _FOLDERS:
         return f"{_FOLDERS[package].as_posix()}/{module}:{cls.__qualname__}"
+    # A module that imports another one beside it: that one will be known by its folder, too.
+    file = getattr(sys.modules.get(cls.__module__), "__file__", None)
+    if file and _SEARCHED and Path(file) in _own_files(_SEARCHED[-1], cls.__module__):
+        _BESIDE[cls] = _SEARCHED[-1]
+        return f"{_SEARCHED[-1].as_posix()}/{cls.__module__}:{cls.__qualname__}"
     return f"{cls.__module__}:{cls.__qualname__}"

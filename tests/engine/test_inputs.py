@@ -1,10 +1,12 @@
 """The files that a run depends on: what components read, and the modules of a user's own."""
 
+import json
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from tests.scenes import flat_path, scenario
+import pytest
+from tests.scenes import flat_path, process, scenario
 
 import fleet2d
 from fleet2d.engine.inputs import input_files
@@ -43,6 +45,66 @@ def test_other_weights_are_said_to_have_changed(tmp_path: Path) -> None:
     np.save(tmp_path / "weights.npy", np.full(1, 1.0000001))
     again = fleet2d.reproduce(tmp_path / "run")
     assert [f"{tmp_path / 'weights.npy'} has changed since"] == again.causes
+
+
+WAITS = """
+from fleet2d import Behavior
+{imports}
+
+class Waits(Behavior):
+    def decide(self, now):
+        return now.plan().interrupt_on({crowded}).stay()
+"""
+CROWDED = """
+import numpy as np
+from fleet2d import Interrupt
+
+class Crowded(Interrupt):
+    def holds(self, span):
+        return np.zeros(span.poses.x.shape[1], bool)
+"""
+
+
+@pytest.mark.parametrize("is_imported", [True, False])
+def test_an_interrupt_that_only_a_plan_names_is_noted(tmp_path: Path, is_imported: bool) -> None:
+    """It may be imported beside the behavior, or named in a text: then it is known at the end."""
+    crowded = tmp_path / "crowd.py"
+    crowded.write_text(CROWDED)
+    name = "Crowded" if is_imported else repr(f"{tmp_path.as_posix()}/crowd:Crowded")
+    imports = "from crowd import Crowded" if is_imported else ""
+    (tmp_path / "mine.py").write_text(WAITS.format(imports=imports, crowded=name))
+    waits = {"type": f"{tmp_path.as_posix()}/mine:Waits"}
+    content = scenario("10 min", robots={"astro": {"behaviors": [waits]}})
+    assert is_imported == (crowded in input_files(fleet2d.load_scenario(content)))
+    fleet2d.run(content, out=tmp_path / "run")
+    assert [] == fleet2d.reproduce(tmp_path / "run").causes
+    crowded.write_text(f"{CROWDED}\n# edited")
+    assert [f"{crowded} has changed since"] == fleet2d.reproduce(tmp_path / "run").causes
+
+
+def test_a_component_of_a_file_beside_is_named_by_its_folder(tmp_path: Path) -> None:
+    """Its manifest said "waits:Waits", which only a process in that folder could import."""
+    (tmp_path / "mine.py").write_text("from waits import Waits as Mine")
+    (tmp_path / "waits.py").write_text(WAITS.format(imports="", crowded="'home_empty'"))
+    waits = {"type": f"{tmp_path.as_posix()}/mine:Mine"}
+    fleet2d.run(scenario("1 min", robots={"astro": {"behaviors": [waits]}}), out=tmp_path / "run")
+    assert fleet2d.reproduce(tmp_path / "run", trust=[tmp_path]).same
+    content = json.loads((tmp_path / "run" / "manifest.json").read_text())["scenario"]
+    (behavior,) = content["robots"]["astro"]["behaviors"]
+    assert f"{tmp_path.as_posix()}/waits:Waits" == behavior["type"]
+
+
+def test_a_class_without_a_file_is_no_input() -> None:
+    """One typed at a prompt; its run ended in a traceback."""
+    code = (
+        "import fleet2d\n"
+        "class Idle(fleet2d.Algorithm):\n"
+        "    def update(self, history, state): pass\n"
+        "run = fleet2d.run('algorithms.idle.type=__main__:Idle', duration='10 min', seed=4)\n"
+        "print(run.manifest['inputs'])"
+    )
+    done = process("-c", f"exec(compile({code!r}, '<stdin>', 'exec'))")
+    assert (0, "[]\n") == (done.returncode, done.stdout), done.stderr
 
 
 DRIVE = """

@@ -6,6 +6,7 @@ import datetime as dt
 import hashlib
 import stat
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Protocol
 
@@ -217,12 +218,22 @@ class Manifest(BaseModel):
             ),
         ]
 
+    def add_inputs(self, paths: Iterable[Path]) -> bool:
+        """Add files that were read after the run began; return whether any was new."""
+        known = {record.path for record in self.inputs}
+        new_paths = sorted({path for path in paths if str(path) not in known})
+        for path in new_paths:
+            with suppress(OSError):  # its code ran anyway
+                self.inputs.append(input_record(path))
+        return bool(new_paths)
+
     def describe_end(self, run: ManifestFacts) -> None:
         """Set the fields that are known after the last step; tables and digest are set already."""
         self.steps = run.state.bodies.step
         self.simulated_s = self.steps * run.clock.step_us / 1e6
         self.metrics = dict(run.results)
         self.wall_s = dict(run.wall_s)
+        self.add_inputs(run.state.interruptions.files)
         interventions = run.state.interventions
         is_over = self.steps >= run.clock.steps
         self.interventions = interventions.done if is_over else interventions.records

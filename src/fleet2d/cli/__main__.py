@@ -2,4 +2,5 @@
 
 from fleet2d.cli import main
 
-main()
+if __name__ == "__main__":  # a scenario may name it as the module of a component
+    main()

@@ -1,6 +1,5 @@
 """The input files of a run."""
 
-import inspect
 from collections.abc import Iterator, Mapping, ValuesView
 from pathlib import Path
 
@@ -11,10 +10,11 @@ from fleet2d.component import Component
 from fleet2d.errors import RunDirectoryError
 from fleet2d.scenario.model import Scenario
 from fleet2d.sight.perception import Perception
+from fleet2d.user_modules import source_files
 
 
 def input_files(scenario: Scenario) -> list[Path]:
-    """Return the files that components read, and the modules of the user's own ones, sorted.
+    """Return the files that components read, and those of the user's own modules, sorted.
 
     The files of a component are those of its method `files`, and all paths among its fields.
     """
@@ -24,9 +24,7 @@ def input_files(scenario: Scenario) -> list[Path]:
         files |= set(files_of()) if files_of else set()
         files |= {value for _, value in component if isinstance(value, Path) and value.is_file()}
         if not type(component).__module__.startswith("fleet2d."):
-            source = inspect.getsourcefile(type(component))
-            if source:
-                files.add(Path(source))
+            files |= set(source_files(type(component)))
     return sorted(files)
 
 

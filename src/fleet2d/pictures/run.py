@@ -1,6 +1,6 @@
 """Draw a stored run: life in the home, and the room of each user in every minute of every day."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from pathlib import Path
@@ -295,7 +295,7 @@ class _Picture:
         name = self.overlay.fit(trace.name, 9.5, width)
         self.overlay.write(x, y + 0.24, name, 9.5, color=trace.color, weight="bold")
         facts = [] if trace.robot else [f"{_percent(float(np.mean(trace.room >= 0)))} at home"]
-        share = self._metric("sightings").get(trace.name)
+        share = self._number("sightings", trace.name)
         if share is not None and self.robots:
             facts.append(f"{_percent(share)} of that seen")
         facts += [covers] if (covers := self._covers(trace.name)) else []
@@ -321,16 +321,17 @@ class _Picture:
         for number, line in enumerate(reversed(self.note_lines)):
             self.overlay.write(EDGE, 0.2 + number * LINE_IN, line, NOTE)
 
-    def _metric(self, kind: str) -> Mapping[str, Any]:
-        """Return the result of the first metric of a type."""
+    def _number(self, kind: str, body: str) -> float | None:
+        """Return what the first metric of a type says of a body; None if it says no number."""
         configured = self.run.manifest["scenario"].get("metrics", {})
         for name, result in self.run.metrics.items():
             if configured.get(name, {}).get("type") == kind and isinstance(result, dict):
-                return result
-        return {}
+                value = result.get(body)
+                return value if isinstance(value, int | float) else None
+        return None
 
     def _covers(self, name: str) -> str:
-        metres = self._metric("distance").get(name)
+        metres = self._number("distance", name)
         if metres is None:
             return ""
         return f"{metres / 1000:.1f} km a day" if metres >= 1000 else f"{metres:.0f} m a day"

@@ -157,7 +157,7 @@ class CheckpointWriter:
         state.settle(step)
         state.recorder.drain()
         began = time.perf_counter()
-        self._store_interventions(state)
+        self._store_news(state)
         commit = self._store.commit(step, sync=sync)
         state.recorder.wall_s += time.perf_counter() - began
         self._next_commit = time.monotonic() + COMMIT_S
@@ -196,10 +196,11 @@ class CheckpointWriter:
             time.monotonic() + WAITING_S,
         )
 
-    def _store_interventions(self, state: State) -> None:
-        """Update the interventions in the manifest."""
+    def _store_news(self, state: State) -> None:
+        """Update the interventions and the inputs in the manifest."""
         manifest = self._store.manifest
+        has_inputs = manifest.add_inputs(state.interruptions.files)
         records = state.interventions.records
-        if len(records) != len(manifest.interventions):
+        if has_inputs or len(records) != len(manifest.interventions):
             manifest.interventions = records
             self._store.keep("manifest.json", manifest.to_json())

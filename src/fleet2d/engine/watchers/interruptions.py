@@ -5,6 +5,7 @@ the body decides right after it.
 """
 
 from collections.abc import Iterator, Sequence
+from pathlib import Path
 from typing import cast
 
 import numpy as np
@@ -20,6 +21,7 @@ from fleet2d.entities.behavior import SightEvent
 from fleet2d.entities.entity import Robot, User
 from fleet2d.errors import ComponentError
 from fleet2d.events import Event
+from fleet2d.user_modules import source_files
 
 # The events of cameras, which are watchers of their own.
 SIGHT_EVENTS = frozenset({*User.sight_events, *Robot.sight_events})
@@ -42,6 +44,17 @@ class Interruptions(Watcher):
     def __getstate__(self) -> dict[str, object]:
         """Leave out the interrupts, which follow from their names."""
         return {**self.__dict__, "_interrupts": {}}
+
+    @property
+    def files(self) -> list[Path]:
+        """The files of the user's own interrupts for which plans waited."""
+        own = {type(i) for i in self._interrupts.values()}
+        return [
+            path
+            for cls in own
+            if not cls.__module__.startswith("fleet2d.")
+            for path in source_files(cls)
+        ]
 
     @property
     def waits(self) -> bool:
