@@ -132,6 +132,7 @@ void put_floats(View<const u64> values, Writer& writer) {
 }
 
 void put_codes(View<const u32> values, Writer& writer) {
+    if (put_runs(values, values.size(), writer)) return;  // nothing is shorter
     u32 bits = 0;
     for (const u32 value : values) bits |= value;
     const i64 width = width_of(bits), size = values.size() * width;
