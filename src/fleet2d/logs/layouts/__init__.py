@@ -28,8 +28,8 @@ class LogLayout(Protocol):
 def layout_names() -> list[str]:
     """Return the names of all layouts, sorted.
 
-    >>> layout_names()
-    ['casas', 'homer', 'uci_adl']
+    >>> "casas" in layout_names()
+    True
     """
     return sorted(module.name for module in pkgutil.iter_modules(__path__))
 

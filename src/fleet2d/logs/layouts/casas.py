@@ -19,14 +19,16 @@ from fleet2d.logs.times import parse_time, since
 LINE = re.compile(r"(\d{4}-\d\d?-\d\d?)\s+(\d+:\S+)\s+(\S+)\s+(\S+)\s+(\S+)(?:\s+(.*))?")
 ON = frozenset({"ON", "OPEN", "PRESENT"})
 OFF = frozenset({"OFF", "CLOSE", "CLOSED", "ABSENT"})
-DATE = re.compile(r"\d{4}-\d\d?-\d\d?")
+NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?")
 FOLDERS = False
 
 
 def matches(line: str) -> bool:
-    """Return whether a line is an event of a sensor: a time and a room, not two times."""
+    """Return whether a line is an event of a sensor that switches or measures."""
     match = LINE.fullmatch(line)
-    return match is not None and not DATE.fullmatch(match[3])
+    if match is None:
+        return False
+    return match[5].upper() in ON | OFF or NUMBER.fullmatch(match[5]) is not None
 
 
 def read(path: Path, *, sort: bool = False) -> ActivityLog:
