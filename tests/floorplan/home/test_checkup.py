@@ -1,5 +1,6 @@
 """The check-up finds each fault in a home that has it, and none in a home without faults."""
 
+import json
 from pathlib import Path
 
 import pytest
@@ -8,6 +9,7 @@ from tests.homes import plan_files
 from typer.testing import CliRunner
 
 from fleet2d.cli.app import app
+from fleet2d.floorplan.formats.native import native_document
 from fleet2d.floorplan.furniture.catalogue import stand_furniture
 from fleet2d.floorplan.home.checkup import Finding, checkup
 from fleet2d.floorplan.load import load_floorplan
@@ -229,6 +231,20 @@ def test_command_prints_findings_and_draws_them(tmp_path: Path) -> None:
     assert 0 == result.exit_code
     assert result.output.startswith("family_home: 186.1 m2, 14 rooms\nok: nothing wrong or odd")
     assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+def test_command_does_not_deny_what_its_notes_say(tmp_path: Path) -> None:
+    rooms = [shapely.box(0, 0, 4, 3), shapely.box(4.1, 0, 8, 3)]
+    free = shapely.union_all([*rooms, shapely.box(4, 1, 4.1, 1.9)])
+    regions = [LabelledRegion((name,), room) for name, room in zip("ab", rooms, strict=True)]
+    file = tmp_path / "flat.json"
+    document = native_document(FloorPlan.build("flat", free, regions))
+    document["rooms"] = [room for room in document["rooms"] if room["type"] != "unknown"]
+    file.write_text(json.dumps(document))
+
+    result = CliRunner().invoke(app, ["validate", str(file), "--out", str(tmp_path / "flat.png")])
+
+    assert "ok: nothing wrong; the notes tell what is odd in the file\nnote: small" in result.output
 
 
 def test_command_says_what_a_large_robot_cannot_do(tmp_path: Path) -> None:

@@ -74,7 +74,8 @@ def _check_floorplan(
     for number, finding in enumerate(findings, start=1):
         typer.echo(f"{number:>3} {finding.severity}: {finding.text}")
     if not findings:
-        typer.echo("ok: nothing wrong or odd was found")
+        odd = "; the notes tell what is odd in the file" if plan.notes else " or odd was found"
+        typer.echo(f"ok: nothing wrong{odd}")
     for note in plan.notes:
         typer.echo(f"note: {note}")
     typer.echo(target)
