@@ -6,6 +6,11 @@
 
 namespace fleet2d {
 
+i64 Waits::draw(StepDraws& draws, Bits& bits) const {
+    const u64 count = static_cast<u64>(std::bit_width(quantiles.size())) - 1;
+    return quantiles[static_cast<std::size_t>(bits.take(draws, count))];
+}
+
 Moment Legs::turn(Moment now, i64 headings, f64 turn_rate) {
     const i64 sign = headings > 0 ? 1 : -1;
     for (i64 left = std::abs(headings); left > 0;) {
@@ -19,16 +24,15 @@ Moment Legs::turn(Moment now, i64 headings, f64 turn_rate) {
 }
 
 std::pair<Moment, i64> Legs::turn_aside(Moment now, f64 turn_rate, const Aside& aside, i64 next, i64 until,
-                                        const Draw& draw) {
-    const u64 wait_bits = static_cast<u64>(std::bit_width(static_cast<u64>(aside.waits.size())) - 1);
+                                        StepDraws& draws, Bits& bits) {
     while (next < until) {
         if (next > now.time) {
             now.time = next;
             mark(now);
         }
-        const i64 side = draw(aside.side_bits) - (i64{1} << aside.side_bits) / 2;
+        const i64 side = bits.take(draws, aside.side_bits) - (i64{1} << aside.side_bits) / 2;
         now = turn(now, turn_between(now.heading, (aside.facing + side) & (TURN - 1)), turn_rate);
-        next = now.time + aside.waits[draw(wait_bits)];
+        next = now.time + aside.waits.draw(draws, bits);
     }
     return {now, next};
 }

@@ -2,11 +2,11 @@
 #pragma once
 
 #include <array>
-#include <functional>
 #include <utility>
 #include <vector>
 
 #include "motion.hpp"
+#include "random.hpp"
 
 namespace fleet2d {
 
@@ -18,15 +18,19 @@ struct Moment {
     i64 away;     // 1 = not at home
 };
 
-// How a body turns aside now and then.
-struct Aside {
-    i64 facing;             // 1/4096 turn
-    u64 side_bits;          // headings are within 2**(side_bits - 1) of that
-    View<const i64> waits;  // quantiles of the time between two turns [us], a power of two of them
+// Quantiles of the time between two events [us]: a power of two of them, not all 0.
+struct Waits {
+    std::vector<i64> quantiles;
+
+    i64 draw(StepDraws& draws, Bits& bits) const;
 };
 
-// Draws an integer in [0, 2**bits).
-using Draw = std::function<i64(u64 bits)>;
+// How a body turns aside now and then.
+struct Aside {
+    i64 facing;          // 1/4096 turn
+    u64 side_bits;       // headings are within 2**(side_bits - 1) of that
+    const Waits& waits;  // between two turns
+};
 
 class Legs {
 public:
@@ -37,11 +41,11 @@ public:
     // two breakpoints, so that the shorter way is the one meant. Returns where it ends.
     Moment turn(Moment now, i64 headings, f64 turn_rate);
 
-    // Turn aside at random moments: first at `next` [us], and then after waits [us] drawn from `waits`, a power of two
-    // of them, as long as that is before `until`. Each turn is to a heading within 2**(side_bits - 1) of `facing`.
-    // Returns where it ends, and when the next turn is due.
+    // Turn aside at random moments: first at `next` [us], and then after waits, as long as that is before `until`.
+    // Each turn is to a heading within 2**(side_bits - 1) of `facing`. Returns where it ends, and when the next turn
+    // is due.
     std::pair<Moment, i64> turn_aside(Moment now, f64 turn_rate, const Aside& aside, i64 next, i64 until,
-                                      const Draw& draw);
+                                      StepDraws& draws, Bits& bits);
 
     // Walk along a route (n, 2), as `time_route`, at home. Returns where it ends.
     Moment walk(Moment now, View<const i64, 2> route, f64 speed, f64 turn_rate);

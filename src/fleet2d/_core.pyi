@@ -1110,23 +1110,6 @@ class Legs:
             time, x, y, heading and away at the end.
         """
 
-    def turn_aside(self, now: tuple[int, int, int, int, int], turn_rate: float, facing: int, next_until: tuple[int, int], side_bits: int, waits: numpy.typing.NDArray[numpy.int64], bits: Bits) -> tuple[int, int, int]:
-        """
-        Turn aside on the spot at random moments.
-
-        Args:
-            now: Time [us], x, y [lattice], heading [1/4096 turn], away.
-            turn_rate: Headings a second.
-            facing: Heading about which it turns.
-            next_until: When it turns first, and before when [us].
-            side_bits: Headings are within 2**(side_bits - 1) of `facing`.
-            waits: int64 (n,), quantiles of the time between two turns [us]; n is a power of two.
-            bits: Where draws come from.
-
-        Returns:
-            Time and heading at the end, and when the next turn is due.
-        """
-
     def walk(self, time: int, heading: int, route: numpy.typing.NDArray[numpy.int64], speed: float, turn_rate: float) -> tuple[int, int, int, int, int]:
         """
         Turn towards each leg of a route (n, 2) and walk it, at home, as `time_route` does.
@@ -1526,6 +1509,83 @@ class DayPlanner:
     def __getstate__(self) -> tuple[tuple[list[int], int, int, int, int], int, list[tuple[int, tuple[list[int], int, int, int, int] | None, tuple[list[int], int, int, int, int], int, list[int], int, bool, int]], list[tuple[int, int, tuple[list[int], int, int, int, int], int, int]], int, int]: ...
 
     def __setstate__(self, arg: tuple[tuple[Sequence[int], int, int, int, int], int, Sequence[tuple[int, tuple[Sequence[int], int, int, int, int] | None, tuple[Sequence[int], int, int, int, int], int, Sequence[int], int, bool, int]], Sequence[tuple[int, int, tuple[Sequence[int], int, int, int, int], int, int]], int, int], /) -> None: ...
+
+class Waits:
+    """
+    Times between two events.
+
+    Args:
+        quantiles: int64 (n,), quantiles [us]; n is a power of two.
+    """
+
+    def __init__(self, quantiles: numpy.typing.NDArray[numpy.int64]) -> None: ...
+
+class Scene:
+    """
+    Where and how somebody does an activity.
+
+    Args:
+        setting: What `seats` of the home is asked with.
+        activity: The number of the activity.
+        away: Whether it is done out of the home.
+        choose: How a room is chosen: 0 the same each time, 1 the nearest, 2 any, 3 the one where somebody is.
+        posture: The number of the posture; 0 is standing.
+        rooms: The rooms where it is done; none: it is blocked, or out of the home.
+        seats: The places at furniture where it is done; none: anywhere in the rooms.
+        stores: The rooms from which things are fetched.
+        moves: The kind of each small move, 0 turns, 1 walks, 2 trips to fetch something, and the times between them.
+        fetch_takes: The law of how long somebody is away to fetch something [s]; None: nothing is fetched.
+    """
+
+    def __init__(self, setting: object | None, activity: int, away: bool, choose: int, posture: int, rooms: Sequence[int], seats: Sequence[int], stores: Sequence[int], moves: Sequence[tuple[int, Waits]], fetch_takes: tuple[Sequence[int], int, int, int, int] | None) -> None: ...
+
+class LastStint:
+    """What somebody did last, where, and what that interrupted."""
+
+    def __init__(self) -> None: ...
+
+    def __getstate__(self) -> tuple[int, tuple[int, int, int] | None, tuple[int, int, int] | None]: ...
+
+    def __setstate__(self, arg: tuple[int, tuple[int, int, int] | None, tuple[int, int, int] | None], /) -> None: ...
+
+class Resident:
+    """
+    Somebody who does activities in a home.
+
+    Args:
+        key: Of the stream of draws.
+        speed: Lattice units a second.
+        turn_rate: Headings a second.
+        routes: Routes of the home; None: `walk` finds all ways.
+        steps_off: Points on furniture, and where somebody steps first who leaves them: x, y, x, y [lattice].
+    """
+
+    def __init__(self, key: int | numpy.uint64, speed: float, turn_rate: float, routes: Routes | None, steps_off: Sequence[tuple[int, int, int, int]]) -> None: ...
+
+    def live(self, home: object, walk: object, legs: Legs, now: tuple[int, int, int, int, int], posture: int, stints: Sequence[tuple[Scene, int, int, int, bool]], until: int, continues: bool, last: LastStint) -> tuple[tuple[int, int, int, int, int], int, list[tuple[int, int]], list[tuple[int, int, int]]]:
+        """
+        Do activities, one after the other, until the last one is over or one is blocked.
+
+        Args:
+            home: What is asked about the home: spots(room), seats(setting, room), seat(number), nearest(rooms, x, y),
+                room_at(x, y), wait(room, now, takes) and way_out().
+            walk: Goes to a place where no route is known: from what this returns, and the place's number at furniture, or -1,
+                x and y, it returns the new end of the plan, and the posture.
+            legs: Where breakpoints are added.
+            now: The end of the plan: time [us], x, y [lattice], heading [1/4096 turn], away.
+            posture: The posture then.
+            stints: Scene, address of draws, end [us], role, and whether it is done wherever somebody is, of each.
+            until: After that, none begins [us].
+            continues: Whether the first one may be a part of the last one.
+            last: What was done last; it is updated.
+
+        Returns:
+            The new end of the plan; the posture; when postures are taken; time, kind and detail of what happens: 0 an activity
+            begins, 1 the way is blocked, 2 furniture is used, 3 the home is left, 4 or entered.
+        """
+
+    def go(self, home: object, walk: object, legs: Legs, now: tuple[int, int, int, int, int], posture: int, scene: Scene, draws: StepDraws) -> tuple[tuple[int, int, int, int, int], int, list[tuple[int, int]], list[tuple[int, int, int]]]:
+        """Go to where an activity is done, and take its posture; see `live`."""
 
 def encode_arrays(arrays: Sequence[numpy.typing.NDArray[Any]]) -> bytes:
     """

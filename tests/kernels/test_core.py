@@ -240,6 +240,50 @@ def day_plan() -> tuple[Any, ...]:
     return law(80_000, 86_000), 3600, jobs, pastimes, 0, 1
 
 
+class OneRoom:
+    """A home of one room, in which all routes are known."""
+
+    def spots(self, room: int) -> list[tuple[int, int]]:
+        return [(100, 500), (1000, 500)]
+
+    def seats(self, setting: object, room: int) -> list[int]:
+        return [0]
+
+    def seat(self, number: int) -> tuple[int, ...]:
+        return 300, 900, 7, 1, 300, 880
+
+    def nearest(self, rooms: list[int], x: int, y: int) -> int:
+        return rooms[0]
+
+    def room_at(self, x: int, y: int) -> int:
+        return 0
+
+    def wait(self, room: int, now: int, takes: int) -> int | None:
+        return 0
+
+    def way_out(self) -> tuple[int, int]:
+        return 100, 500
+
+    @staticmethod
+    def walk(course: Any, place: tuple[int, int, int]) -> tuple[Any, int]:
+        (time, *_), *_ = course
+        return (time, 100, 500, 7, 0), 0
+
+
+def resident() -> _core.Resident:
+    return _core.Resident(KEY, 1000.0, 500.0, _core.Routes(MESH, corners()), [])
+
+
+def small_moves() -> list[tuple[int, _core.Waits]]:
+    return [(kind, _core.Waits(np.array([100_000, 900_000]))) for kind in range(3)]
+
+
+def scene_of(activity: int) -> _core.Scene:
+    """Return the scene of an activity, on a spot or at furniture."""
+    seats, takes = [0] * activity, ([0, 1], 0, 1, 0, 1)
+    return _core.Scene(None, activity, False, 0, 1, [0], seats, [0], small_moves(), takes)
+
+
 def people() -> StayModel:
     """Return the model of five people, a group and one more."""
     *arrays, first, detection = model()
@@ -497,18 +541,34 @@ CALLS: dict[str, Args] = {
         500.0,
     ),
     "Legs.settle": lambda: (_core.Legs(), 5, 100, 100, 7, 300, 200, 9, 1000.0, 500.0),
-    "Legs.turn_aside": lambda: (
-        _core.Legs(),
-        (5, 100, 100, 7, 0),
-        500.0,
-        30,
-        (40, 4000),
-        8,
-        np.array([100, 200, 300, 400]),
-        _core.Bits(_core.StepDraws(KEY, 4)),
-    ),
     "Legs.rows": lambda: (_core.Legs(),),
     "Legs.track": lambda: (_core.Legs(),),
+    "Waits": lambda: (np.array([100, 200, 300, 400]),),
+    "Scene": lambda: (None, 3, False, 2, 1, [0, 1], [], [1], small_moves(), ([5, 9], 5, 9, 0, 1)),
+    "LastStint": lambda: (),
+    "Resident": lambda: (KEY, 1000.0, 500.0, _core.Routes(MESH, corners()), [(9, 9, 100, 500)]),
+    "Resident.live": lambda: (
+        resident(),
+        OneRoom(),
+        OneRoom.walk,
+        _core.Legs(),
+        (5, 100, 500, 7, 0),
+        0,
+        [(scene_of(activity), activity, SECOND, 0, False) for activity in range(2)],
+        3 * SECOND,
+        False,
+        _core.LastStint(),
+    ),
+    "Resident.go": lambda: (
+        resident(),
+        OneRoom(),
+        OneRoom.walk,
+        _core.Legs(),
+        (5, 100, 500, 7, 1),
+        0,
+        scene_of(1),
+        _core.StepDraws(7, 3),
+    ),
     "StepDraws": lambda: (KEY, 4),
     "StepDraws.below": lambda: (_core.StepDraws(KEY, 4), 100),
     "StepDraws.uniform": lambda: (_core.StepDraws(KEY, 4),),
@@ -704,9 +764,8 @@ def same(one: Any, other: Any) -> bool:
         return all(same(a, b) for a, b in zip(one, other, strict=True))
     if isinstance(one, np.ndarray):
         return one.dtype == other.dtype and np.array_equal(one, other)
-    return type(one) is type(other) and (
-        one == other or isinstance(one, _core.Mesh | _core.Window | _core.Routes | _core.Timelines)
-    )
+    unlike = _core.Mesh | _core.Window | _core.Routes | _core.Timelines | _core.Waits
+    return type(one) is type(other) and (one == other or isinstance(one, unlike))
 
 
 READ = [(name, at) for name, at in ARRAYS if at not in WRITTEN.get(name, ())]
@@ -812,8 +871,8 @@ COUNTS: set[tuple[str, Path_]] = {
     ("list_sightings", (4,)),
     ("list_sightings", (5,)),
     ("list_sightings", (6,)),
-    ("Legs.turn_aside", (4, 0)),
-    ("Legs.turn_aside", (4, 1)),
+    ("Resident.live", (6, 0, 2)),
+    ("Resident.live", (6, 1, 2)),
     ("Timelines", (0,)),
     ("Timelines.pose", (2,)),
     ("Timelines.poses", (1,)),
@@ -854,6 +913,9 @@ def use_all_methods(instance: Any) -> None:
         instance.track()
     elif isinstance(instance, _core.StepDraws):
         instance.below(10)
+    elif isinstance(instance, _core.LastStint):
+        args = CALLS["Resident.live"]()
+        _core.Resident.live(*args[:-2], True, instance)
     elif isinstance(instance, _core.DayPlanner):
         instance.plan(_core.StepDraws(7, 3), 25_000, 110_000)
     elif isinstance(instance, _core.Interruptions):
@@ -891,9 +953,17 @@ def legs() -> _core.Legs:
     return result
 
 
+def last_stint() -> _core.LastStint:
+    """Return what was done last by somebody who was interrupted."""
+    args = CALLS["Resident.live"]()
+    _core.Resident.live(*args)
+    return args[-1]
+
+
 STATES: dict[str, Callable[[], Any]] = {
     "DayPlanner": lambda: _core.DayPlanner(*day_plan()),
     "Interruptions": lambda: _core.Interruptions(*needs_and_errands()),
+    "LastStint": last_stint,
     "Legs": legs,
     "Mesh": lambda: _core.Mesh(MESH.vertices, MESH.triangles, MESH.neighbors),
     "Routes": lambda: _core.Routes(MESH, corners()),

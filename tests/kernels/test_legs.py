@@ -12,7 +12,6 @@ from tests.kernels.test_routes import routes_of
 
 from fleet2d.kernels.headings import TURN, turn_between
 from fleet2d.kernels.motion import Legs, time_route
-from fleet2d.kernels.random import Bits, StepDraws
 
 SPEED, TURN_RATE = 768.0, 1023.7
 # With a pillar, and less than the places that the tests go to.
@@ -38,16 +37,6 @@ class InLists:
             heading = (heading + (part if headings > 0 else -part)) % TURN
             self.rows.append([time + ceil(part * 1e6 / TURN_RATE), x, y, heading, away])
 
-    def turn_aside(self, facing: int, next_us: int, until_us: int, waits: list, bits: Bits) -> int:
-        while next_us < until_us:
-            time, *pose = self.now
-            if next_us > time:
-                self.rows.append([next_us, *pose])
-            side = bits.take(10) - 512
-            self.turn(turn_between(self.now[3], (facing + side) % TURN))
-            next_us = self.now[0] + waits[bits.take(3)]
-        return next_us
-
     def settle(self, x: int, y: int, heading: int) -> None:
         if [x, y] != self.now[1:3]:
             self.walk(np.array([self.now[1:3], [x, y]]))
@@ -63,9 +52,7 @@ def test_legs_equal_lists(seed: int) -> None:
     random, legs, twin = np.random.default_rng(seed), Legs(), InLists()
     routes = routes_of(home_of([ROOM]))
     legs.mark(*twin.now)
-    waits = random.integers(0, 10**7, 8)
-    bits, twin_bits = (Bits(StepDraws(7, seed)) for _ in range(2))
-    for what in random.integers(0, 7, 80).tolist():
+    for what in random.integers(0, 6, 80).tolist():
         time, x, y, heading, away = now = twin.now
         if what == 0:
             twin.rows.append([time + int(random.integers(0, 10**9)), x, y, heading, away])
@@ -79,17 +66,11 @@ def test_legs_equal_lists(seed: int) -> None:
             twin.walk(route)
             assert twin.now == list(legs.walk(time, heading, route, SPEED, TURN_RATE))
         elif what == 3:
-            facing, begin = int(random.integers(TURN)), time + int(random.integers(-9, 10**7))
-            until = begin + int(random.integers(0, 10**8))
-            next_us = twin.turn_aside(facing, begin, until, waits.tolist(), twin_bits)
-            after = legs.turn_aside(tuple(now), TURN_RATE, facing, (begin, until), 10, waits, bits)
-            assert (*twin.now[::3], next_us) == after
-        elif what == 4:
             place = random.choice([x, *random.integers(0, 4000, 2)], 2).tolist()
             twin.settle(*place, towards := int(random.integers(TURN)))
             after = legs.settle(time, x, y, heading, *place, towards, SPEED, TURN_RATE)
             assert twin.now == list(after)
-        elif what == 5:
+        elif what == 4:
             goal = random.integers(1, 4000, 2).tolist()
             off = None if random.random() < 0.5 else tuple(random.integers(1, 4000, 2).tolist())
             after = legs.go(time, x, y, heading, routes, *goal, SPEED, TURN_RATE, off)

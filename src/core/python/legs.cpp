@@ -1,12 +1,9 @@
-#include "../legs.hpp"
+#include "legs.hpp"
 
 #include <nanobind/stl/optional.h>
 
-#include <bit>
-
 #include "arrays.hpp"
 #include "motion.hpp"
-#include "random.hpp"
 #include "routes.hpp"
 #include "subjects.hpp"
 
@@ -14,29 +11,12 @@ namespace fleet2d {
 
 namespace {
 
-constexpr i64 MOST = i64{1} << 29;  // coordinates and headings: their squares fit in 64 bits
-using Row = std::tuple<i64, i64, i64, i64, i64>;
-
-Moment checked(i64 time, i64 x, i64 y, i64 heading, i64 away) {
-    require(-LATEST <= time && time <= LATEST, "time must be at most 2**61 us");
-    for (const i64 number : {x, y, heading})
-        require(-MOST < number && number < MOST, "a pose must be within 2**29 of 0");
-    require(away == 0 || away == 1, "away must be 0 or 1");
-    return {time, x, y, heading, away};
-}
-
 void add_checked(Legs& legs, View<const i64, 2> rows) {
     require(rows.shape[1] == 5, "rows must be (n, 5)");
     for (i64 i = 0; i < rows.size(); ++i) {
         legs.mark(checked(rows(i, 0), rows(i, 1), rows(i, 2), rows(i, 3), rows(i, 4)));
     }
 }
-
-void check_rates(f64 speed, f64 turn_rate) {
-    require(speed > 0 && turn_rate > 0, "speed and turn_rate must be above 0");
-}
-
-Row plain(const Moment& now) { return {now.time, now.x, now.y, now.heading, now.away}; }
 
 }  // namespace
 
@@ -65,43 +45,10 @@ void bind_legs(nb::module_& m) {
 Returns:
     time, x, y, heading and away at the end.)")
         .def(
-            "turn_aside",
-            [](Legs& self, Row now, f64 turn_rate, i64 facing, std::pair<i64, i64> next_until, u64 side_bits,
-               View<const i64> waits, OwnedBits& bits) {
-                const auto [next, until] = next_until;
-                const auto [time, x, y, heading, away] = now;
-                require(turn_rate > 0, "turn_rate must be above 0");
-                require(-MOST < facing && facing < MOST, "facing must be within 2**29 of 0");
-                require(0 < side_bits && side_bits <= Bits::MOST, "side_bits must be 1 to 30");
-                require(-LATEST <= next && next <= LATEST && -LATEST <= until && until <= LATEST,
-                        "next and until must be at most 2**61 us");
-                require(std::has_single_bit(static_cast<u64>(waits.size())) && all_in_range(waits, 0, LATEST) &&
-                            std::any_of(waits.begin(), waits.end(), [](i64 wait) { return wait > 0; }),
-                        "waits must be a power of two of times of 0 us or more, not all 0");
-                const auto draw = [&bits](u64 count) { return bits.bits.take(bits.draws, count); };
-                const auto [end, due] = self.turn_aside(checked(time, x, y, heading, away), turn_rate,
-                                                        {facing, side_bits, waits}, next, until, draw);
-                return std::tuple(end.time, end.heading, due);
-            },
-            "now"_a, "turn_rate"_a, "facing"_a, "next_until"_a, "side_bits"_a, "waits"_a, "bits"_a,
-            R"(Turn aside on the spot at random moments.
-
-Args:
-    now: Time [us], x, y [lattice], heading [1/4096 turn], away.
-    turn_rate: Headings a second.
-    facing: Heading about which it turns.
-    next_until: When it turns first, and before when [us].
-    side_bits: Headings are within 2**(side_bits - 1) of `facing`.
-    waits: int64 (n,), quantiles of the time between two turns [us]; n is a power of two.
-    bits: Where draws come from.
-
-Returns:
-    Time and heading at the end, and when the next turn is due.)")
-        .def(
             "walk",
             [](Legs& self, i64 time, i64 heading, View<const i64, 2> route, f64 speed, f64 turn_rate) {
                 require(route.size() > 0 && route.shape[1] == 2, "route must be (n, 2), one point or more");
-                require(all_in_range(route, -MOST, MOST), "route must be within 2**29 of 0");
+                require(all_in_range(route, -FARTHEST_POINT, FARTHEST_POINT), "route must be within 2**29 of 0");
                 check_rates(speed, turn_rate);
                 return plain(self.walk(checked(time, 0, 0, heading, 0), route, speed, turn_rate));
             },
@@ -113,7 +60,7 @@ Returns:
         .def(
             "go",
             [](Legs& self, i64 time, i64 x, i64 y, i64 heading, Routes& routes, i64 to_x, i64 to_y, f64 speed,
-               f64 turn_rate, std::optional<std::pair<i64, i64>> off) -> std::optional<Row> {
+               f64 turn_rate, std::optional<std::pair<i64, i64>> off) -> std::optional<MomentRow> {
                 const std::pair from = off.value_or(std::pair(x, y));
                 checked(time, from.first, from.second, heading, 0);
                 const Moment now = checked(time, x, y, heading, 0);

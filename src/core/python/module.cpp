@@ -38,5 +38,6 @@ NB_MODULE(_core, m) {
     bind_flows(m);
     bind_interruptions(m);
     bind_planner(m);
+    bind_residents(m);
     bind_encoding(m);
 }

@@ -3,18 +3,16 @@
 #include <nanobind/stl/vector.h>
 
 #include "arrays.hpp"
+#include "laws.hpp"
 #include "subjects.hpp"
 
 namespace fleet2d {
 namespace {
 
-constexpr i64 LONGEST = i64{1} << 36;  // s: products with fractions of a position fit in 64 bits
-constexpr i64 NEVER = i64{1} << 41;    // s
-constexpr i64 LATEST = i64{1} << 20;   // s since midnight
-constexpr i64 MOST = i64{1} << 31;     // bounds of draws are below it
+constexpr i64 NEVER = i64{1} << 41;   // s
+constexpr i64 LATEST = i64{1} << 20;  // s since midnight
 
 using Numbers = std::vector<i64>;
-using LawRow = std::tuple<Numbers, i64, i64, i64, i64>;
 using JobRow = std::tuple<i64, std::optional<LawRow>, LawRow, i64, Numbers, i64, bool, i64>;
 using PastimeRow = std::tuple<i64, i64, LawRow, i64, i64>;
 using DoingRow = std::tuple<i64, i64, i64, i64>;
@@ -24,19 +22,6 @@ struct OwnedPlan {
     DayPlan plan;
     std::tuple<LawRow, i64, std::vector<JobRow>, std::vector<PastimeRow>, i64, i64> made_of;
 };
-
-bool is_time(i64 number) { return -LONGEST < number && number < LONGEST; }
-
-Law law_of(const LawRow& row) {
-    const auto& [knots, shortest, longest, first, last] = row;
-    require(!knots.empty() && std::is_sorted(knots.begin(), knots.end()), "quantiles must ascend, one or more");
-    require(is_time(knots.front()) && is_time(knots.back()) && is_time(shortest) && is_time(longest),
-            "times must be within 2**36 s");
-    const i64 top = (static_cast<i64>(knots.size()) - 1) << Law::BITS;
-    require(0 <= first && first <= top && 0 <= last && last <= top && last - first < MOST,
-            "positions must be among the quantiles, less than 2**31 apart");
-    return {knots, shortest, longest, first, last};
-}
 
 Job job_of(const JobRow& row, i64 number) {
     const auto& [activity, starts, takes, until, after, chance, needed, place] = row;
@@ -50,7 +35,7 @@ Job job_of(const JobRow& row, i64 number) {
 
 Pastime pastime_of(const PastimeRow& row) {
     const auto& [activity, weight, takes, first, last] = row;
-    require(0 < weight && weight < MOST, "weights must be 1 to 2**31 - 1");
+    require(0 < weight && weight < MOST_DRAWN, "weights must be 1 to 2**31 - 1");
     Pastime pastime{activity, weight, law_of(takes), first, last};
     require(pastime.takes.shortest > 0, "pastimes must take 1 s or more");
     return pastime;
@@ -66,7 +51,7 @@ OwnedPlan plan_of(LawRow sleep, i64 least_sleep, std::vector<JobRow> jobs, std::
     for (const PastimeRow& row : pastimes) {
         plan.pastimes.push_back(pastime_of(row));
         weights += plan.pastimes.back().weight;
-        require(weights < MOST, "the sum of all weights must be below 2**31");
+        require(weights < MOST_DRAWN, "the sum of all weights must be below 2**31");
     }
     return {std::move(plan), {std::move(sleep), least_sleep, std::move(jobs), std::move(pastimes), rest, asleep}};
 }

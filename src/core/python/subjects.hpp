@@ -34,6 +34,7 @@ void bind_signals(nanobind::module_& m);
 void bind_flows(nanobind::module_& m);
 void bind_interruptions(nanobind::module_& m);
 void bind_planner(nanobind::module_& m);
+void bind_residents(nanobind::module_& m);
 void bind_encoding(nanobind::module_& m);
 
 }  // namespace fleet2d

@@ -204,6 +204,19 @@ class Body:
         self._places[2][name, place] = at
         return at
 
+    def step_off(self, x: int, y: int) -> tuple[int, int] | None:
+        """Return where it steps off the object on which it is at a lattice point; None: nowhere."""
+        approach = self.home.approach_of((x, y))
+        # Chairs round a table may leave a gap in which a body fits, but which it can't walk out of.
+        if approach is None:
+            return None
+        space = self.space
+        if space.part_of(x, y) == self.part:
+            return None
+        if space.part_of(*approach) == self.part:
+            return approach
+        return space.nearest(*approach, self.part) or approach
+
     def stream(self, purpose: str) -> np.uint64:
         """Return the key of its random stream for a purpose."""
         return stream_key(self.seed, self.path, purpose)

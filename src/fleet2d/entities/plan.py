@@ -36,7 +36,7 @@ class Note(NamedTuple):
 
 
 # Makes a note from a tuple of its fields without calling Python code, as plans have many.
-_new_note: Callable[[tuple[int, str, str]], Note] = partial(tuple.__new__, Note)
+new_note: Callable[[tuple[int, str, str]], Note] = partial(tuple.__new__, Note)
 
 
 class Plan:
@@ -90,11 +90,6 @@ class Plan:
         return self._body.clock.step_us
 
     @property
-    def turn_rate(self) -> float:
-        """How fast the body turns on the spot [1/4096 turn per second]."""
-        return self._body.turn_rate
-
-    @property
     def time(self) -> datetime:
         """The local time up to which it is planned."""
         return self._body.clock.start + timedelta(microseconds=self.time_us)
@@ -123,7 +118,8 @@ class Plan:
         self.come_home()
         self._check_goes_on()
         body, space = self._body, self._body.space
-        off = self._get_up(space)
+        self.take("stand")
+        off = body.step_off(self.x, self.y)
         if route is None and self._go_shortest(space, x, y, off):
             return self
         if off is not None:
@@ -203,18 +199,6 @@ class Plan:
         times = [time for time, _ in self.postures]
         return np.array(times, np.int64), np.array(codes, np.int8)
 
-    def _get_up(self, space: Space) -> tuple[int, int] | None:
-        """Stand up; return where it steps off the object that it sits or lies on; None: nowhere."""
-        self.take("stand")
-        body = self._body
-        approach = body.home.approach_of((self.x, self.y))
-        # Chairs round a table may leave a gap in which a body fits, but which it can't walk out of.
-        if approach is None or space.part_of(self.x, self.y) == body.part:
-            return None
-        if space.part_of(*approach) == body.part:
-            return approach
-        return space.nearest(*approach, body.part) or approach
-
     def _step_to(self, x: int, y: int) -> None:
         """Go straight to a lattice point; neither walls nor furniture count."""
         if (x, y) != (self.x, self.y):
@@ -261,7 +245,9 @@ class Plan:
         self._check_goes_on()
         if headings:
             now = self.time_us, self.x, self.y, self.heading, self.away
-            self.time_us, _, _, self.heading, _ = self.legs.turn(*now, headings, self.turn_rate)
+            self.time_us, _, _, self.heading, _ = self.legs.turn(
+                *now, headings, self._body.turn_rate
+            )
 
     def stay(self, duration: timedelta | None = None, *, until: datetime | None = None) -> Self:
         """Stay for a duration, or until a local time; without either, for good.
@@ -335,7 +321,7 @@ class Plan:
                 f"{self._body.path}: there is no event {event!r}{did_you_mean(event, KINDS)} A"
                 f" behavior declares its own: records = frozenset({{{event!r}}})"
             )
-        self.notes.append(_new_note((self.time_us, event, detail)))
+        self.notes.append(new_note((self.time_us, event, detail)))
         return self
 
     def call(self, user: str = "") -> Self:

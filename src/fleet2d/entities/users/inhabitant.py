@@ -2,7 +2,6 @@
 
 from bisect import bisect_right
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from datetime import datetime, timedelta
 from operator import attrgetter
 from typing import TYPE_CHECKING
@@ -11,13 +10,13 @@ from fleet2d.entities.behavior import Behavior, Situation
 from fleet2d.entities.kinds import is_kind
 from fleet2d.entities.place import matching_rooms
 from fleet2d.entities.plan import Plan
-from fleet2d.entities.users.setting import SECOND_US, Setting, settle_at, small_move, turn_aside
-from fleet2d.entities.users.spots import Seat, Spot, Spots
+from fleet2d.entities.users.known_home import KnownHome, Stint
+from fleet2d.entities.users.setting import MOVE_KINDS, SECOND_US, Setting, SmallMove
+from fleet2d.entities.users.spots import Spots
 from fleet2d.errors import PlacementError
-from fleet2d.kernels.random import Bits
 from fleet2d.routines.activity import Activity, seconds
 from fleet2d.routines.occupancy import ANY_ROOM
-from fleet2d.routines.planner import NO_GAP_S, PLANNED, REST, RESUMES, SLEEP, Doing
+from fleet2d.routines.planner import NO_GAP_S, REST, SLEEP, Doing
 from fleet2d.streams import Draws
 
 if TYPE_CHECKING:
@@ -27,34 +26,11 @@ if TYPE_CHECKING:
     from fleet2d.floorplan.plan import Room
 
 # Draws of a doing are addressed by the day's ordinal times this, plus the doing's number. A day has
-# fewer doings than half of it.
+# fewer doings than half of it: the core adds the other half for the part of one after midnight.
 DOINGS_A_DAY = 1024
-# Added to the address for the part of a doing after midnight.
-AFTER_MIDNIGHT = DOINGS_A_DAY // 2
 END = attrgetter("end")
-# Within this time before the end of a doing, no small move begins.
-NEARLY_OVER_US = 90 * SECOND_US
 # How far ahead people plan who may be interrupted by robots at any time.
 AHEAD_US = 1800 * SECOND_US
-
-
-@dataclass
-class _Last:
-    """The last doing that was planned; doings are identified by day's ordinal and number.
-
-    Attributes:
-        doing: Which doing it is.
-        place: Where it is done.
-        base: Where the planned doing that it interrupts is done.
-        step: The step up to which it was planned.
-        given_up: The doing that is not to be continued.
-    """
-
-    doing: tuple[int, int] | None = None
-    place: Spot | Seat | None = None
-    base: Spot | Seat | None = None
-    step: int = -1
-    given_up: tuple[int, int] | None = None
 
 
 class Inhabitant(Behavior):
@@ -96,9 +72,11 @@ class Inhabitant(Behavior):
             PlacementError: The home has none of an activity's rooms.
         """
         self.key = actor.stream("activity")
-        self.last = _Last()
         self.clock = actor.clock
         self.spots = spots
+        self.known_home = KnownHome(self, actor)
+        self.planned_until = -1  # the step up to which the last plan goes
+        self.given_up: tuple[int, int] | None = None  # the doing that is not to be continued
         self.reachable_rooms = actor.reachable_rooms()
         self.settings = {name: self._setting(actor, a) for name, a in activities.items()}
         self._leave_out(actor)
@@ -117,7 +95,7 @@ class Inhabitant(Behavior):
         if setting.activity.away:
             plan.leave_home()
         elif setting.rooms:
-            self._go(plan.come_home(), setting, Draws(self.key, plan.time_us))
+            self.known_home.go(plan.come_home(), activity, setting, Draws(self.key, plan.time_us))
         else:
             raise PlacementError(f"{activity} can't be done at present: shut doors are in the way")
 
@@ -141,15 +119,14 @@ class Inhabitant(Behavior):
         self.is_hindered = now.home.hinders  # by shut doors, for all of the plan
         midnight_us = clock.elapsed(datetime.fromordinal(now.time.toordinal() + 1))
         last_us = min(plan.time_us + AHEAD_US, midnight_us) if now.actor.attention else midnight_us
+        stints = []
         for which, day_us, doing in self._doings(now.time):
-            if plan.time_us >= last_us or day_us + doing.begin * SECOND_US >= midnight_us:
+            if day_us + doing.begin * SECOND_US >= last_us:
                 break
             end_us = min(day_us + doing.end * SECOND_US, midnight_us)
-            if plan.time_us >= end_us:  # the way to the last doing took longer than this one lasts
-                continue
-            if not self._do(plan, doing, which, end_us):
-                break
-        self.last.step = clock.step_at_or_after(plan.time_us)
+            stints.append(self._stint(doing, which, end_us))
+        self.known_home.live(plan, stints, last_us, continues=now.step == self.planned_until)
+        self.planned_until = clock.step_at_or_after(plan.time_us)
         return plan
 
     def furniture(self, actor: "Actor", kind: str) -> str | None:
@@ -163,7 +140,7 @@ class Inhabitant(Behavior):
 
     def give_up(self, now: Situation) -> None:
         """Rest for the remaining time of the present doing, from the next plan on."""
-        self.last.given_up = next(self._doings(now.time))[0]
+        self.given_up = next(self._doings(now.time))[0]
 
     def _doings(self, time: datetime) -> Iterator[tuple[tuple[int, int], int, Doing]]:
         """Yield the doings that are not over at a time.
@@ -182,43 +159,14 @@ class Inhabitant(Behavior):
                 yield (ordinal, i), day_us, day[i]
             ordinal += 1
 
-    def _do(self, plan: Plan, doing: Doing, which: tuple[int, int], end_us: int) -> bool:
-        """Add a doing to a plan, until `end_us`; `which` is the address of its random draws.
-
-        Returns:
-            Whether it can be done. If shut doors block all of its rooms, the plan ends before it,
-            as they may be open when it begins; if it begins now, the body stays where it is.
-        """
-        last = self.last
-        if which == last.given_up:
+    def _stint(self, doing: Doing, which: tuple[int, int], end_us: int) -> Stint:
+        """Return a doing as the core needs it; `which` is the address of its random draws."""
+        if which == self.given_up:
             doing = doing._replace(activity=REST)
         setting = self.seated(self._in_its_room(doing), which)
-        if not (setting.rooms or setting.activity.away):
-            if plan.time_us <= plan.began[0] * self.clock.step_us:
-                plan.note("way_blocked", doing.activity).stay_until(end_us)
-            return False
-        is_continued = last.doing == which and plan.began[0] == last.step
+        stays = doing.activity == REST and doing.end - doing.begin < NO_GAP_S
         number = which[0] * DOINGS_A_DAY + which[1]
-        draws = Draws(self.key, number + AFTER_MIDNIGHT if is_continued else number)
-        if not is_continued:
-            last.place = None
-            last.base = None if doing.role == PLANNED else last.base
-            if setting.activity.away:
-                plan.leave_home()
-            elif doing.activity != REST or doing.end - doing.begin >= NO_GAP_S:
-                if doing.role == RESUMES and last.base is not None:
-                    last.place = last.base
-                    settle_at(plan, setting, last.base)
-                else:
-                    last.place = self._go(plan, setting, draws)
-                if doing.role == PLANNED:
-                    last.base = last.place
-            plan.note("activity", doing.activity)
-        if last.place is not None and self.small_moves and setting.small_moves:
-            last.place = self._move_about(plan, setting, last.place, end_us, draws)
-        last.doing = which
-        plan.stay_until(end_us)
-        return True
+        return doing.activity, setting, number, end_us, doing.role, stays
 
     def seated(self, setting: Setting, which: tuple[int, int]) -> Setting:
         """Return the setting with only the places at furniture that it has for the doing."""
@@ -245,96 +193,9 @@ class Inhabitant(Behavior):
 
     def _within(self, setting: Setting, room: "Room") -> Setting:
         """Return the setting of an activity, in one room only."""
-        return setting._replace(rooms=[room], seats=self._seats(setting.activity, room))
-
-    def _seats(self, activity: Activity, room: "Room") -> list[Seat]:
-        """Return its places for an activity at the furniture in a room."""
-        return self.spots.at_furniture(activity.objects, (room,), activity.posture)
-
-    def _go(self, plan: Plan, setting: Setting, draws: Draws) -> Spot | Seat:
-        """Go to where the activity is done: a place at its furniture, else a spot in its room."""
-        choose, rooms, seats = setting.activity.choose, setting.rooms, setting.seats
-        if choose == "here":
-            return self._stay_in_the_room(plan, setting, draws)
-        if choose == "nearest" and len(rooms) > 1:
-            rooms = [self.spots.nearest(rooms, plan.x, plan.y)]
-            seats = self._seats(setting.activity, rooms[0])
-        room = draws.choice(rooms)
-        if choose == "each_time":
-            seats = self._seats(setting.activity, room)
-        places: Sequence[Spot | Seat] = seats or self.spots.in_room(room)
-        place = draws.choice(places)
-        settle_at(plan, setting, place)
-        return place
-
-    def _stay_in_the_room(self, plan: Plan, setting: Setting, draws: Draws) -> Spot | Seat:
-        """Use the furniture of the room that the body is in, or else stay on the spot."""
-        plan.come_home()
-        room = self.spots.room_at(plan.x, plan.y)
-        seats = [] if room is None else self._seats(setting.activity, room)
-        place = draws.choice(seats) if seats else Spot(plan.x, plan.y)
-        settle_at(plan, setting, place)
-        return place
-
-    def _move_about(
-        self, plan: Plan, setting: Setting, place: Spot | Seat, end_us: int, draws: Draws
-    ) -> Spot | Seat:
-        """Turn, move and fetch things at the activity's rates until it is nearly over.
-
-        Returns:
-            The place of the body at the end.
-        """
-        bits = Bits(draws)
-        moves = setting.small_moves
-        next_us = [plan.time_us + move.wait_us(bits) for move in moves]
-        facing = plan.heading
-        end_us -= NEARLY_OVER_US
-        while True:
-            due_us = min(next_us)
-            if due_us >= end_us:
-                return place
-            k = next_us.index(due_us)
-            if moves[k].kind == "shifts":  # the first of the moves, also of those due at once
-                until_us = min(end_us, min(next_us[1:], default=end_us) + 1)
-                next_us[0] = turn_aside(plan, moves[0], bits, facing, due_us, until_us)
-                continue
-            plan.stay_until(due_us)
-            if moves[k].kind == "moves":
-                place = self._go_elsewhere(plan, setting, place, draws)
-            else:
-                self._fetch(plan, setting, place, end_us, draws)
-            facing = plan.heading
-            next_us[k] = plan.time_us + moves[k].wait_us(bits)
-
-    def _go_elsewhere(
-        self, plan: Plan, setting: Setting, place: Spot | Seat, draws: Draws
-    ) -> Spot | Seat:
-        """Go from the furniture to a spot in the room, or from a spot to the furniture or another.
-
-        Returns:
-            The place of the body then.
-        """
-        if setting.seats and isinstance(place, Spot):
-            return self._go(plan, setting, draws)
-        spot = draws.choice(self.spots.in_room(draws.choice(setting.rooms)))
-        spot.walk(plan)
-        return spot
-
-    def _fetch(
-        self, plan: Plan, setting: Setting, place: Spot | Seat, end_us: int, draws: Draws
-    ) -> None:
-        """Go to another room, stay there shortly, and come back, if there is time for it."""
-        if not setting.stores:
-            return
-        takes_us = setting.fetch_takes.draw(draws) * SECOND_US
-        room = draws.choice(setting.stores)
-        spot = draws.choice(self.spots.in_room(room))
-        wait_us = self.wait_for(room.index, self.clock, plan.time_us, takes_us)
-        if wait_us is not None and plan.time_us + wait_us + takes_us < end_us:
-            plan.stay_until(plan.time_us + wait_us)
-            spot.walk(plan)
-            plan.stay(timedelta(microseconds=takes_us))
-            settle_at(plan, setting, place)
+        activity = setting.activity
+        seats = self.spots.at_furniture(activity.objects, (room,), activity.posture)
+        return setting._replace(rooms=[room], seats=seats)
 
     def _setting(self, actor: "Actor", activity: Activity) -> Setting:
         if activity.away:
@@ -345,9 +206,9 @@ class Inhabitant(Behavior):
             else self._all_rooms(actor, activity.rooms)
         )
         small_moves = [
-            small_move(kind, seconds(mean))
-            for kind in ("shifts", "moves", "fetches")
-            if (mean := getattr(activity, kind)) is not None
+            SmallMove(kind, max(1, seconds(mean)))
+            for kind in MOVE_KINDS
+            if self.small_moves and (mean := getattr(activity, kind)) is not None
         ]
         return Setting(
             activity,

@@ -40,10 +40,6 @@ class Seat(NamedTuple):
     thing: str
     place: int
 
-    def walk(self, plan: "Plan") -> None:
-        """Go there and use it."""
-        plan.use(self.thing, self.place)
-
 
 class Spots:
     """The spots of one body.

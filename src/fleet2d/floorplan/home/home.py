@@ -1,6 +1,6 @@
 """The home of a run: its floor plan, what stands in it now, and the space that bodies have."""
 
-from collections.abc import Callable, Collection, Hashable, Sequence
+from collections.abc import Callable, Collection, Hashable, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
 from typing import Any, Self, TypeVar
@@ -197,22 +197,26 @@ class Home:
         """Return the room of the plan that holds the middle of an object."""
         return self._shapes.room_of(thing)
 
-    def approach_of(self, place: tuple[int, int]) -> tuple[int, int] | None:
-        """Return the point from which a body steps to a place of use [lattice]; None for others."""
-        if not self.objects:
-            return None
+    @property
+    def approaches(self) -> Mapping[tuple[int, int], tuple[int, int]]:
+        """The point from which a body steps to each place of use at present, by place [lattice]."""
         if self._places[0] != self.version:
-            lattice = self.plan.lattice
+            point_at = self.plan.lattice.point_at
+            uses = (use for thing in self.objects for use in thing.uses)
             self._places = (
                 self.version,
                 {
-                    lattice.point_at((use.x, use.y)): lattice.point_at(use.approach)
-                    for thing in self.objects
-                    for use in thing.uses
-                    if use.approach is not None
+                    point_at((u.x, u.y)): point_at(u.approach)
+                    for u in uses
+                    if u.approach is not None
                 },
             )
-        return self._places[1].get(place)
+        return self._places[1]
+
+    def approach_of(self, place: tuple[int, int]) -> tuple[int, int] | None:
+        """Return the point from which a body steps to a place of use [lattice]; None for others."""
+        version, approaches = self._places
+        return (approaches if version == self.version else self.approaches).get(place)
 
     def way_out(self, space: Space, part: int) -> tuple[int, int]:
         """Return the lattice point where a body in a part of the space leaves the home.

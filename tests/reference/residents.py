@@ -1,0 +1,150 @@
+"""Slow, obvious twin of residents: activities leg by leg of a plan, as a person does them."""
+
+from collections.abc import Sequence
+from datetime import timedelta
+from typing import Any
+
+from fleet2d.entities.plan import Plan
+from fleet2d.entities.users.known_home import KnownHome
+from fleet2d.entities.users.setting import Setting
+from fleet2d.entities.users.spots import Seat, Spot
+from fleet2d.kernels.headings import TURN, turn_between
+from fleet2d.kernels.random import Bits
+from fleet2d.routines.laws import exponential
+from fleet2d.routines.planner import PLANNED, RESUMES
+from fleet2d.streams import Draws
+
+SECOND_US = 1_000_000
+AnyPlace = Spot | Seat
+
+
+class SlowHome(KnownHome):
+    """A home in which a person does activities by Python alone."""
+
+    def __init__(self, person: Any, actor: Any) -> None:
+        super().__init__(person, actor)
+        self.number = -1
+        self.place: AnyPlace | None = None
+        self.base: AnyPlace | None = None
+
+    def live(self, plan: Plan, stints: Sequence[Any], until_us: int, *, continues: bool) -> None:
+        began_us = plan.time_us
+        for name, setting, number, end_us, role, stays in stints:
+            if plan.time_us >= until_us:
+                return
+            if plan.time_us >= end_us:
+                continue
+            if not setting.rooms and not setting.activity.away:
+                if plan.time_us == began_us:
+                    plan.note("way_blocked", name).stay_until(end_us)
+                return
+            again = continues and number == self.number
+            draws = Draws(self._person.key, number + 512 * again)
+            if not again:
+                self.begin(plan, name, setting, role, stays, draws)
+            if self.place is not None and setting.small_moves:
+                self.place = self.move_about(plan, setting, self.place, end_us, draws)
+            self.number = number
+            plan.stay_until(end_us)
+
+    def begin(
+        self, plan: Plan, name: str, setting: Setting, role: int, stays: bool, draws: Draws
+    ) -> None:
+        self.place = None
+        if role == PLANNED:
+            self.base = None
+        if setting.activity.away:
+            plan.leave_home()
+        elif not stays:
+            if role == RESUMES and self.base is not None:
+                self.place = self.base
+                self.settle(plan, setting, self.base)
+            else:
+                self.place = self.choose(plan, setting, draws)
+            if role == PLANNED:
+                self.base = self.place
+        plan.note("activity", name)
+
+    def go(self, plan: Plan, activity: str, setting: Setting, draws: Draws) -> None:
+        self.choose(plan, setting, draws)
+
+    def choose(self, plan: Plan, setting: Setting, draws: Draws) -> AnyPlace:
+        """Go to where an activity is done."""
+        kind, spots = setting.activity.choose, self._person.spots
+        rooms, seats = setting.rooms, setting.seats
+        place: AnyPlace
+        if kind == "here":
+            plan.come_home()
+            room = spots.room_at(plan.x, plan.y)
+            seats = [] if room is None else self.seats_in(setting, room)
+            place = draws.choice(seats) if seats else Spot(plan.x, plan.y)
+        else:
+            if kind == "nearest" and len(rooms) > 1:
+                rooms = [spots.nearest(rooms, plan.x, plan.y)]
+                seats = self.seats_in(setting, rooms[0])
+            room = draws.choice(rooms)
+            if kind == "each_time":
+                seats = self.seats_in(setting, room)
+            place = draws.choice(seats or spots.in_room(room))
+        self.settle(plan, setting, place)
+        return place
+
+    def seats_in(self, setting: Setting, room: Any) -> list[Seat]:
+        activity = setting.activity
+        return self._person.spots.at_furniture(activity.objects, (room,), activity.posture)
+
+    def settle(self, plan: Plan, setting: Setting, place: AnyPlace) -> None:
+        if isinstance(place, Seat):
+            plan.use(*place)
+        else:
+            place.walk(plan)
+        if setting.activity.posture != "stand":
+            plan.take(setting.activity.posture)
+
+    def move_about(
+        self, plan: Plan, setting: Setting, place: AnyPlace, end_us: int, draws: Draws
+    ) -> AnyPlace:
+        """Turn, move and fetch things, each after times of its own."""
+        bits, end_us, facing = Bits(draws), end_us - 90 * SECOND_US, plan.heading
+        means = {move.kind: move.mean_s for move in setting.small_moves}
+
+        def wait(kind: str) -> int:
+            return exponential(means[kind]).knots[bits.take(7)] * SECOND_US
+
+        due = {kind: plan.time_us + wait(kind) for kind in means}
+        while min(due.values()) < end_us:
+            kind = min(due, key=lambda kind: due[kind])
+            if kind == "shifts":
+                others = [time for other, time in due.items() if other != kind]
+                while due[kind] < min([end_us, *(time + 1 for time in others)]):
+                    plan.stay_until(due[kind])
+                    towards = (facing + bits.take(10) - 512) % TURN
+                    plan._turn(turn_between(plan.heading, towards))
+                    due[kind] = plan.time_us + wait(kind)
+                continue
+            plan.stay_until(due[kind])
+            if kind == "fetches":
+                self.fetch(plan, setting, place, end_us, draws)
+            elif setting.seats and isinstance(place, Spot):
+                place = self.choose(plan, setting, draws)
+            else:
+                place = draws.choice(self._person.spots.in_room(draws.choice(setting.rooms)))
+                place.walk(plan)
+            facing = plan.heading
+            due[kind] = plan.time_us + wait(kind)
+        return place
+
+    def fetch(
+        self, plan: Plan, setting: Setting, place: AnyPlace, end_us: int, draws: Draws
+    ) -> None:
+        if not setting.stores:
+            return
+        takes_us = setting.fetch_takes.draw(draws) * SECOND_US
+        room = draws.choice(setting.stores)
+        spot = draws.choice(self._person.spots.in_room(room))
+        wait_us = self.wait(room.index, plan.time_us, takes_us)
+        if wait_us is not None and plan.time_us + wait_us + takes_us < end_us:
+            plan.stay_until(plan.time_us + wait_us)
+            spot.walk(plan)
+            plan.stay(timedelta(microseconds=takes_us))
+            self.settle(plan, setting, place)
