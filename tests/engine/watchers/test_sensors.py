@@ -1,7 +1,7 @@
 """Sensors: on and off at the right step, past no wall, in any span, in a table of their own."""
 
 import json
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import pytest
@@ -12,7 +12,8 @@ from tests.scenes import digests, run, table
 
 import fleet2d
 from fleet2d import Algorithm, InputError
-from fleet2d.entities.objects.sensor import SensorState
+from fleet2d.entities.objects.sensor import Sensor, SensorState, SensorView
+from fleet2d.floorplan.home.home import Home
 
 
 @pytest.fixture
@@ -56,6 +57,23 @@ class Collector(Algorithm):
         return {"said": len(history.readings.step), "on": int(history.readings.on.sum())}
 
 
+class Latch(Sensor):
+    """Reports that a door is shut."""
+
+    of: str
+    words: ClassVar[tuple[str, str]] = ("SHUT", "FREE")
+
+    def watch(self, door: int) -> None:
+        self.door = door
+
+    def place(self, home: Home) -> str:
+        return home.rooms[home.doors[self.door].rooms[1]].name
+
+    def sense(self, view: SensorView, home: Home) -> tuple[np.ndarray, np.ndarray]:
+        steps = np.arange(view.steps if self.door in home.shut else 0) + view.first
+        return steps, np.full(len(steps), -1)
+
+
 def household(plan: str) -> dict[str, Any]:
     day = visits(
         ("00:05", [6, 1.45], "Step_Out"),
@@ -97,6 +115,15 @@ def test_contact_sensor_follows_the_door(plan: str) -> None:
     ]
     assert doors == readings(stored, "contact")
     assert len(doors) >= 4
+
+
+def test_own_sensor_of_a_door_follows_it(plan: str) -> None:
+    content = household(plan)
+    content["objects"]["latch"] = {"type": f"{__name__}:Latch", "of": "door"}
+    stored = run(content)
+
+    changes = [(step, "FREE" if word == "OPEN" else "SHUT") for step, word in readings(stored, "contact")]  # fmt: skip
+    assert [(0, "SHUT"), *changes] == readings(stored, "latch")
 
 
 def test_plug_is_on_while_somebody_stays_at_the_stove_and_a_little_after(plan: str) -> None:

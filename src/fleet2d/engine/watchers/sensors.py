@@ -4,6 +4,7 @@ from bisect import bisect_right
 from collections.abc import Iterable, Sequence
 from copy import copy
 from operator import itemgetter
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
@@ -12,7 +13,6 @@ from fleet2d.blame import blame
 from fleet2d.engine.basis import Basis
 from fleet2d.engine.bodies import Bodies, PoseBlock
 from fleet2d.engine.watchers.watcher import Watcher
-from fleet2d.entities.objects.contact_sensor import ContactSensor
 from fleet2d.entities.objects.sensor import (
     Sensor,
     SensorFault,
@@ -24,6 +24,16 @@ from fleet2d.entities.objects.sensor import (
 from fleet2d.errors import ScenarioError
 from fleet2d.events import Event, EventKind
 from fleet2d.problems import suggest
+
+
+@runtime_checkable
+class OfDoor(Protocol):
+    """A sensor of the door `of`; `watch` sets the number of that door in the home."""
+
+    of: str
+
+    def watch(self, door: int) -> None:
+        """Set the door."""
 
 
 class Sensors(Watcher):
@@ -49,7 +59,7 @@ class Sensors(Watcher):
         for name, item in basis.scenario.objects.items():
             if isinstance(item, Sensor):
                 sensor = item.model_copy(deep=True)
-                if isinstance(sensor, ContactSensor):
+                if isinstance(sensor, OfDoor):
                     sensor.watch(_door(name, sensor.of, doors))
                 sensor.start(home, step_us)
                 self.names.append(name)
