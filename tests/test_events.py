@@ -3,6 +3,7 @@
 import copy
 import pickle
 from collections.abc import Sequence
+from contextlib import nullcontext
 from typing import Any
 
 import numpy as np
@@ -101,6 +102,20 @@ def test_a_function_listens_and_stays_behind_when_a_stream_is_copied() -> None:
         assert [[event(1)], [event(2)]] == copied.sinks[0].taken
     assert [event(1)] == heard == stream.since(0)
     assert 1 == len(sink.taken)
+
+
+@pytest.mark.parametrize("count", [0, 1, 4, 5, 9])
+def test_a_copied_stream_has_the_same_events_and_keeps_as_many(count: int) -> None:
+    stream = Short()
+    for step in range(count):
+        stream.emit([Event(step, "ana", EventKind.FOUND if step % 2 else "waves", f"é{step}")])
+    for copied in (copy.deepcopy(stream), pickle.loads(pickle.dumps(stream))):
+        assert list(stream._recent) == list(copied._recent)
+        assert {Event} >= {type(event) for event in copied._recent}
+        copied.emit([event(20), event(21)])
+        assert [*stream._recent, event(20), event(21)][-5:] == list(copied._recent)
+        with pytest.raises(InputError) if count > 3 else nullcontext():
+            copied.since(0)
 
 
 def test_plans_come_before_cameras_and_the_home_comes_last() -> None:

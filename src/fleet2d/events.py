@@ -1,12 +1,13 @@
 """Events: what happens in a run, for its tables, algorithms and scripts."""
 
-from collections import deque
-from collections.abc import Callable, Iterable, Sequence
+from array import array
+from collections import defaultdict, deque
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from enum import StrEnum
 from functools import partial
 from itertools import chain, islice
 from operator import itemgetter
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 from fleet2d.errors import InputError
 
@@ -145,7 +146,12 @@ class EventStream:
     def __getstate__(self) -> dict[str, object]:
         """Leave out the functions: they belong to the caller, not to the run."""
         sinks = [sink for sink in self.sinks if not isinstance(sink, Listener)]
-        return {**self.__dict__, "sinks": sinks}
+        return {**self.__dict__, "sinks": sinks, "_recent": _packed(self._recent)}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Restore the events."""
+        events = _unpacked(*state["_recent"])
+        self.__dict__ |= {**state, "_recent": deque(events, maxlen=self.CAPACITY)}
 
     def emit(self, events: Sequence[Event]) -> None:
         """Pass events on to all sinks."""
@@ -171,3 +177,21 @@ class EventStream:
                 " more often, or read the table 'events'"
             )
         return sorted((e for e in self._recent if e.step >= step), key=lambda e: (e.step, e.rank))
+
+
+def _packed(events: Iterable[Event]) -> tuple[bytes, list[str]]:
+    """Return the steps and texts of events as numbers, and the texts: a checkpoint has many."""
+    index: defaultdict[str, int] = defaultdict()
+    index.default_factory = index.__len__
+    steps, *texts = list(zip(*events, strict=True)) or [()]
+    columns = [steps, *(map(index.__getitem__, column) for column in texts)]
+    return array("q", chain.from_iterable(columns)).tobytes(), list(index)
+
+
+def _unpacked(numbers: bytes, texts: list[str]) -> Iterator[Event]:
+    """Return events from what `_packed` returned."""
+    values = array("q", numbers)
+    count = len(values) // len(Event._fields)
+    steps, *columns = (values[k * count : (k + 1) * count] for k in range(len(Event._fields)))
+    codes = (map(texts.__getitem__, column) for column in columns)
+    return map(new_event, zip(steps, *codes, strict=True))
