@@ -7,7 +7,7 @@ Example:
     >>> from fleet2d.kernels.encoding import encode_arrays
     >>> content = encode_arrays([np.full(1000, 7)])
     >>> len(content), int(ArrayReader(content).read(np.dtype(np.int64), 1000).sum())
-    (25, 7000)
+    (23, 7000)
 """
 
 from __future__ import annotations
