@@ -1,7 +1,10 @@
 """Errors of components: which component failed, and at which step."""
 
+import signal
 import sys
 import traceback
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -34,6 +37,9 @@ class blame:  # noqa: N801  (used as a function)
     interrupts: ClassVar[bool] = True
     """Whether Ctrl-C raises KeyboardInterrupt; if not, a component must have raised it."""
 
+    pressed: ClassVar[bool | None] = None
+    """Whether Ctrl-C was pressed; None: unknown, as nothing notes it."""
+
     def __init__(self, path: str, step: int | None) -> None:
         self.path, self.step = path, step
 
@@ -44,9 +50,7 @@ class blame:  # noqa: N801  (used as a function)
     def __exit__(self, kind: Any, error: BaseException | None, trace: Any) -> None:
         """Replace an exception by one that names the component."""
         blame.now = self._outer
-        if error is None or isinstance(error, ArtifactError | GeneratorExit | MemoryError):
-            return
-        if isinstance(error, KeyboardInterrupt) and blame.interrupts:
+        if error is None or isinstance(error, ArtifactError) or may_be_ctrl_c(error):
             return
         if isinstance(error, InputError) and self.step is None:
             return
@@ -56,15 +60,43 @@ class blame:  # noqa: N801  (used as a function)
             if time in str(error):
                 return
             raise ComponentError(f"{error} ({time})") from error
-        message = str(error) if is_ours else f"{type(error).__name__}: {_text(error)}"
+        message = str(error) if is_ours else f"{type(error).__name__}: {text_of(error)}"
         raise ComponentError(f"{self.path} failed {time}: {message}{_place(error)}") from error
 
 
-def _text(error: BaseException) -> str:
+def may_be_ctrl_c(error: BaseException) -> bool:
+    """Whether Ctrl-C may have raised an exception, and not the code of a component."""
+    is_unclear = blame.interrupts and blame.pressed is not False
+    return isinstance(error, KeyboardInterrupt) and is_unclear
+
+
+@contextmanager
+def noted_ctrl_c() -> Iterator[None]:
+    """Note whether Ctrl-C is pressed, so that an interrupt without it is a component's own."""
+    before = signal.getsignal(signal.SIGINT)
+    if before not in (signal.default_int_handler, signal.SIG_IGN):  # a program's own
+        yield
+        return
+
+    def on_signal(_: int, __: object) -> None:
+        blame.pressed = True
+        raise KeyboardInterrupt
+
+    blame.pressed = False
+    if before is not signal.SIG_IGN:
+        signal.signal(signal.SIGINT, on_signal)
+    try:
+        yield
+    finally:
+        blame.pressed = None
+        signal.signal(signal.SIGINT, before)
+
+
+def text_of(error: BaseException) -> str:
     """Return the message of an error, even if its own code fails."""
     try:
         return str(error)
-    except Exception as failure:  # noqa: BLE001 - it is the user's code
+    except BaseException as failure:  # noqa: BLE001 - it is the user's code
         return f"(its message can't be written: {type(failure).__name__})"
 
 

@@ -33,9 +33,10 @@ from pydantic import (
 from pydantic.fields import FieldInfo
 from pydantic_core import CoreSchema, InitErrorDetails, core_schema
 
+from fleet2d.blame import may_be_ctrl_c, text_of
 from fleet2d.component_class import ComponentClass
 from fleet2d.descriptions import DescribedModel
-from fleet2d.errors import ScenarioError
+from fleet2d.errors import Fleet2DError, ScenarioError
 from fleet2d.problems import did_you_mean, problem, problem_at, rewrite, shown, unknown_key
 from fleet2d.user_modules import BrokenModule, class_path, import_class
 
@@ -351,7 +352,15 @@ class OneOf(Codec):
         except ScenarioError as error:
             group = error.cause if isinstance(error, BrokenModule) else ""
             raise problem_at(("type",), str(error), name, group) from error
-        return cls.model_validate(fields, context=info.context)
+        try:
+            return cls.model_validate(fields, context=info.context)
+        except (ValueError, AssertionError, Fleet2DError):
+            raise
+        except BaseException as error:  # a validator of the user's own may raise anything
+            if may_be_ctrl_c(error):
+                raise
+            reason = f"{type(error).__name__}: {text_of(error)}"
+            raise problem(f"{name} failed while its keys were checked: {reason}") from error
 
     def dump(self, value: Component, info: SerializationInfo) -> dict[str, Any]:
         """Return a mapping that validates to an equal component."""

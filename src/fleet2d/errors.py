@@ -2,6 +2,7 @@
 
 # A longer line of a message quotes input, and is shortened to its head and tail [characters].
 _LONGEST, _HEAD, _TAIL = 1000, 600, 300
+_MOST_LINES = 200
 
 
 class Fleet2DError(Exception):
@@ -13,7 +14,7 @@ class Fleet2DError(Exception):
     """
 
     def __init__(self, *args: object) -> None:
-        """Shorten very long lines of the message."""
+        """Shorten very long lines of the message, and very many."""
         super().__init__(*(_cut(arg) if isinstance(arg, str) else arg for arg in args))
 
 
@@ -21,6 +22,8 @@ def _cut(text: str) -> str:
     if len(text) <= _LONGEST:
         return text
     lines = text.split("\n")
+    if len(lines) > _MOST_LINES:
+        lines[_MOST_LINES:] = [f"... {len(lines) - _MOST_LINES} more lines"]
     return "\n".join(
         line if len(line) <= _LONGEST else f"{line[:_HEAD]}...{line[-_TAIL:]}" for line in lines
     )

@@ -3,6 +3,7 @@
 import hashlib
 import importlib
 import inspect
+import os
 import re
 import sys
 import traceback
@@ -14,6 +15,7 @@ from types import ModuleType
 from typing import Any
 from weakref import WeakKeyDictionary
 
+from fleet2d.blame import may_be_ctrl_c, text_of
 from fleet2d.errors import ScenarioError
 from fleet2d.paths import folder_of
 from fleet2d.problems import did_you_mean
@@ -42,14 +44,17 @@ class BrokenModule(ScenarioError):
 def importable(folder: Path) -> Iterator[None]:
     """Search imports in ``folder``, too, and remove its modules from `sys.modules` afterwards.
 
+    If a module changes the current folder, this is undone: other paths are relative to it.
+
     Two scenarios may each have a ``helpers.py``: each imports its own.
     """
-    old_modules = set(sys.modules)
+    old_modules, current_folder = set(sys.modules), Path.cwd()
     sys.path.insert(0, str(folder))
     _SEARCHED.append(folder)
     try:
         yield
     finally:
+        os.chdir(current_folder)
         _SEARCHED.pop()
         sys.path.remove(str(folder))
         for name in set(sys.modules) - old_modules:
@@ -78,7 +83,9 @@ def import_class(name: str, *, is_plugin: bool = False) -> object:
         check_trust(name, files_of(folder, module_name))
     try:
         module = _import_module(folder, module_name)
-    except (Exception, SystemExit) as error:  # the user's module may raise anything
+    except BaseException as error:  # the user's module may raise anything
+        if may_be_ctrl_c(error):
+            raise
         unknown = public_name(error.name or "") if isinstance(error, ModuleNotFoundError) else ""
         if unknown and f"{module_name}.".startswith(f"{unknown}."):
             raise ScenarioError(
@@ -123,7 +130,7 @@ def _no_class(module: ModuleType, qualname: str, folder: Path) -> str:
 
 def _failure(error: BaseException, folder: Path) -> str:
     """Return where in the user's files an import failed, and how."""
-    message = f"{type(error).__name__}: {public_name(str(error))}"
+    message = f"{type(error).__name__}: {public_name(text_of(error))}"
     if isinstance(error, SyntaxError) and error.filename:
         file = _short_path(error.filename, folder)
         return f"{file}:{error.lineno}: {type(error).__name__}: {error.msg}"

@@ -27,6 +27,13 @@ class Text(Exception):
         raise RuntimeError
 
 
+class Exits(Exception):
+    """An error whose message ends the program."""
+
+    def __str__(self) -> str:
+        raise SystemExit(0)
+
+
 class Ends(Algorithm):
     """Does what its key says in the second hour."""
 
@@ -40,7 +47,11 @@ class Ends(Algorithm):
             "exit with words": SystemExit("bye"),
             "interrupt": KeyboardInterrupt(),
             "text": Text(),
+            "exit in the text": Exits(),
             "recursion": RecursionError(),
+            "memory": MemoryError("too much"),
+            "generator": GeneratorExit(),
+            "lines": ValueError("\n".join(map(str, range(10_000)))),
         }[self.how]
 
 
@@ -61,7 +72,11 @@ def name(cls: type) -> str:
         ("exit with words", "SystemExit: bye"),
         ("interrupt", "KeyboardInterrupt"),
         ("text", "Text: (its message can't be written: RuntimeError)"),
+        ("exit in the text", "Exits: (its message can't be written: SystemExit)"),
         ("recursion", "RecursionError"),
+        ("memory", "MemoryError: too much"),
+        ("generator", "GeneratorExit"),
+        ("lines", "ValueError: 0\n1\n"),
     ],
 )
 def test_code_that_ends_the_run_is_named_and_the_run_kept(
@@ -71,6 +86,7 @@ def test_code_that_ends_the_run_is_named_and_the_run_kept(
     with pytest.raises(ComponentError) as caught:
         fleet2d.run(small(algorithms=algorithms), seed=4, out=tmp_path / "run")
     assert str(caught.value).startswith("algorithms.ends failed at step 7199: " + what)
+    assert len(str(caught.value).splitlines()) <= 201
     stored = open_run(tmp_path / "run")
     assert "failed" == stored.status
     assert 1 == stored.arrow("ends").num_rows
@@ -133,6 +149,110 @@ def test_an_exit_at_import_is_an_error(
     Path("mine.py").write_text(f"class C: pass\n{code}\n")
     with pytest.raises(ScenarioError, match=r"can't import 'mine:C': mine\.py:2: SystemExit"):
         import_class("mine:C")
+
+
+ODD = """
+import os, sys
+import fleet2d
+from pydantic import model_validator
+
+class Odd(fleet2d.Algorithm):
+    how: str = ""
+
+    @model_validator(mode="after")
+    def _is_fine(self):
+        self.do("check")
+        return self
+
+    def do(self, when):
+        if self.how == when:
+            sys.exit(0)
+        if self.how == f"{when}: interrupt":
+            raise KeyboardInterrupt
+
+    def files(self):
+        self.do("files")
+        return []
+
+    def start(self, home):
+        self.do("start")
+
+    def update(self, history, state):
+        if self.how == "chdir":
+            os.chdir("/")
+        return {"n": 1.0}
+
+    def remember(self):
+        if self.how == "remember":
+            raise fleet2d.errors.ScenarioError("mine")
+        return {}
+"""
+
+
+@pytest.mark.parametrize(
+    ("how", "words"),
+    [
+        ("check", "mine:Odd failed while its keys were checked: SystemExit: 0"),
+        ("files", "mine:Odd failed when it was started: SystemExit: 0"),
+        ("start", "algorithms.odd failed when it was started: SystemExit: 0"),
+        ("start: interrupt", "algorithms.odd failed when it was started: KeyboardInterrupt"),
+        ("check: interrupt", "mine:Odd failed while its keys were checked: KeyboardInterrupt"),
+    ],
+)
+def test_code_that_ends_the_program_before_the_run_is_named(
+    tmp_path: Path, how: str, words: str
+) -> None:
+    """Some ended it with code 0 or 130, without a word."""
+    (tmp_path / "mine.py").write_text(ODD)
+    override = f"algorithms.odd={{type: mine:Odd, how: '{how}'}}"
+    done = fleet2d_process("run", "simulation.duration=1 h", override, cwd=tmp_path)
+    assert done.returncode in (1, 2)
+    assert words in done.stderr
+
+
+@pytest.mark.parametrize("code", ["raise KeyboardInterrupt", "class B(BaseException): pass\nraise B"])  # fmt: skip
+def test_no_exception_at_import_ends_the_program(tmp_path: Path, code: str) -> None:
+    (tmp_path / "mine.py").write_text(code)
+    done = fleet2d_process("run", "metrics.odd.type=mine:Odd", cwd=tmp_path)
+    assert 2 == done.returncode
+    assert "can't import 'mine:Odd': mine.py:" in done.stderr
+
+
+@pytest.mark.parametrize("is_at_import", [True, False])
+def test_a_run_is_stored_where_it_was_begun(tmp_path: Path, is_at_import: bool) -> None:
+    """A component that changes the current folder had its run stored, and then not found."""
+    (tmp_path / "mine.py").write_text(f"{ODD}\nos.chdir('/')" if is_at_import else ODD)
+    override = "algorithms.odd={type: mine:Odd, how: chdir, period: 10 min}"
+    keep = "artifacts.learned=true"
+    done = fleet2d_process(
+        "run", "simulation.duration=1 h", override, keep, "--out", "a", cwd=tmp_path
+    )
+    assert 0 == done.returncode, done.stderr
+    assert "complete" == open_run(tmp_path / "a").status
+    assert (tmp_path / "a/learned/ltp.npz").is_file()
+
+
+def test_an_error_of_remember_is_noted(tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text(ODD)
+    odd = {"type": f"{tmp_path.as_posix()}/mine:Odd", "how": "remember"}
+    content = small(algorithms={"odd": odd}, artifacts={"learned": True})
+    run = fleet2d.run(content, "simulation.duration=1 h", seed=4, out=tmp_path / "run")
+    assert "complete" == run.status
+    assert "what algorithms.odd has learned is not stored: mine" == run.notes[-1]
+
+
+class WithoutPeriod(Algorithm):
+    """Declares a key of its base class anew."""
+
+    period: int | None = None  # type: ignore[assignment]
+
+    def update(self, history: Any, state: Any) -> None:
+        """Do nothing."""
+
+
+def test_an_impossible_period_of_a_class_is_named() -> None:
+    with pytest.raises(ComponentError, match=r"algorithms\.odd failed when it was started: TypeE"):
+        fleet2d.run(small(algorithms={"odd": {"type": name(WithoutPeriod)}}), seed=4)
 
 
 class Writes(Metric):

@@ -6,6 +6,7 @@ from pathlib import Path
 from pydantic import BaseModel
 
 from fleet2d.artifacts.manifest import Manifest, input_record, is_regular
+from fleet2d.blame import blame
 from fleet2d.component import Component
 from fleet2d.errors import RunDirectoryError
 from fleet2d.scenario.model import Scenario
@@ -21,7 +22,9 @@ def input_files(scenario: Scenario) -> list[Path]:
     files: set[Path] = set()
     for component in components_of(scenario):
         files_of = getattr(component, "files", None)
-        files |= set(files_of()) if files_of else set()
+        if files_of:
+            with blame(component.type_name, None):
+                files |= set(files_of())
         files |= {value for _, value in component if isinstance(value, Path) and value.is_file()}
         if not type(component).__module__.startswith("fleet2d."):
             files |= set(source_files(type(component)))

@@ -18,7 +18,7 @@ from fleet2d.algorithms.output import FROZEN, WITHHELD, Outputs, to_columns
 from fleet2d.artifacts.table import Column, Kind, TableSpec
 from fleet2d.blame import blame
 from fleet2d.engine.basis import Basis
-from fleet2d.errors import ComponentError, ScenarioError
+from fleet2d.errors import ComponentError, Fleet2DError, ScenarioError
 from fleet2d.events import HOME, Event
 from fleet2d.metrics.metric import Metric
 from fleet2d.problems import suggest
@@ -213,13 +213,14 @@ class Learners:
                     with blame(learner.path, None):
                         state = learner.component.remember()
                         save_learned(state, directory / f"{learner.name}.npz", learner.path)
-                except (ComponentError, OSError) as error:
+                except (Fleet2DError, OSError) as error:
                     notes.append(f"what {learner.path} has learned is not stored: {error}")
         return notes
 
     def _add(self, name: str, path: str, component: Algorithm | Metric) -> None:
         step_us = self.clock.step_us
-        every = 0 if component.on else whole_steps(component.period, step_us, f"{path}.period")
+        with blame(path, None):
+            every = 0 if component.on else whole_steps(component.period, step_us, f"{path}.period")
         origin, component = component, component.model_copy(deep=True)
         with blame(path, None):
             component.start(self.home)

@@ -319,8 +319,9 @@ class Simulation(Judging):
 
     def _store_learned(self) -> None:
         """Store what algorithms have learned; failures are noted in the manifest."""
-        if self._store.directory is not None and self.scenario.artifacts.learned:
-            notes = self._state.learners.remember(self._store.directory / LEARNED_NAME)
+        root = self._store._root  # not the relative path: a component may have changed the folder
+        if root is not None and self.scenario.artifacts.learned:
+            notes = self._state.learners.remember(root / LEARNED_NAME)
             self._store.manifest.notes += notes
 
     def _run_to(

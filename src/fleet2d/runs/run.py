@@ -324,9 +324,17 @@ def run_of(store: RunStore) -> Run:
     """
     if not store.is_closed:
         raise ArtifactError("the run is not closed yet: close() it before reading it")
-    if store.directory is not None:
-        return open_run(store.directory)
-    return Run(None, store.manifest, store.names, store.arrow)
+    if store.directory is None or store._root is None:
+        return Run(None, store.manifest, store.names, store.arrow)
+    return open_run(store.directory if _is_at(store.directory, store._root) else store._root)
+
+
+def _is_at(path: Path, root: Path) -> bool:
+    """Whether a path still leads to a directory: components may have changed the current one."""
+    try:
+        return path.absolute() == root
+    except OSError:  # there is no current directory any more
+        return False
 
 
 def _open_prefix(root: Path, manifest: Manifest, prefix: Prefix) -> Run:
