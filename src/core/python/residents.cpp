@@ -99,13 +99,14 @@ struct OwnedResident {
     std::map<std::pair<i64, i64>, Point> steps_off;
     std::map<i64, std::vector<Point>> spots;
     std::map<i64, Seat> seats;
+    std::optional<Point> way_out;
 };
 
 OwnedResident resident_of(u64 key, f64 speed, f64 turn_rate, nb::object routes,
                           const std::vector<std::tuple<i64, i64, i64, i64>>& steps_off) {
     check_rates(speed, turn_rate);
     Routes* ways = routes.is_none() ? nullptr : &nb::cast<Routes&>(routes);
-    OwnedResident resident{key, speed, turn_rate, std::move(routes), ways, {}, {}, {}};
+    OwnedResident resident{key, speed, turn_rate, std::move(routes), ways, {}, {}, {}, {}};
     for (const auto& [x, y, to_x, to_y] : steps_off) {
         point_of(x, y);
         resident.steps_off.emplace(std::pair(x, y), point_of(to_x, to_y));
@@ -158,8 +159,11 @@ public:
         return wait;
     }
     Point way_out() override {
-        const auto [x, y] = nb::cast<std::pair<i64, i64>>(home_.attr("way_out")());
-        return point_of(x, y);
+        if (!own_.way_out) {
+            const auto [x, y] = nb::cast<std::pair<i64, i64>>(home_.attr("way_out")());
+            own_.way_out = point_of(x, y);
+        }
+        return *own_.way_out;
     }
     Point step_off(Point at) override {
         const auto off = own_.steps_off.find({at.x, at.y});

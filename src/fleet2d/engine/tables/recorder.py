@@ -91,9 +91,11 @@ class Recorder:
         """Collect events."""
         if "events" in self._tables:
             self._events += events
-        for step, entity, event, detail in events:
-            if event == ACTIVITY and entity in self._users:
-                self.activities.begin(self._users[entity], step, detail)
+        begun = [event for event in events if event[2] == ACTIVITY and event[1] in self._users]
+        if not self.activities.are_perceived:  # then only the present one is asked for
+            begun = list({event[1]: event for event in begun}.values())
+        for step, entity, _, detail in begun:
+            self.activities.begin(self._users[entity], step, detail)
 
     def take(
         self, first: int, end: int, observations: NDArray[np.int64], readings: Sequence[SensorRow]

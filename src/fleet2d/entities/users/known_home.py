@@ -14,6 +14,7 @@ from fleet2d.streams import Draws
 if TYPE_CHECKING:
     from fleet2d.entities.actor import Actor
     from fleet2d.entities.users.inhabitant import Inhabitant
+    from fleet2d.floorplan.plan import Room
 
 T = TypeVar("T", bound=Hashable)
 
@@ -57,11 +58,12 @@ class KnownHome:
         self._seats: Numbering[Seat] = Numbering()  # which `_last` refers to
         self._names: Numbering[str] = Numbering()  # of activities
         self._scenes: dict[str, tuple[Setting, Scene]] = {}
+        self._rooms: dict[int, Room] = {}
         self._resident: tuple[object, Resident | None] = None, None
 
     def __getstate__(self) -> dict[str, object]:
         """Leave out caches, which are made again."""
-        return {**self.__dict__, "_scenes": {}, "_resident": (None, None)}
+        return {**self.__dict__, "_scenes": {}, "_rooms": {}, "_resident": (None, None)}
 
     def live(self, plan: Plan, stints: Sequence[Stint], until_us: int, *, continues: bool) -> None:
         """Add activities to a plan, until the last one is over or shut doors block one.
@@ -93,16 +95,12 @@ class KnownHome:
 
     def spots(self, room: int) -> Sequence[Spot]:
         """Return the points of a room where the body stands."""
-        rooms = self._actor.home.rooms
-        return self._person.spots.in_room(next(r for r in rooms if r.index == room))
+        return self._person.spots.in_room(self._rooms[room])
 
     def seats(self, setting: Setting, room: int) -> list[int]:
         """Return the numbers of the places for an activity at the furniture in a room."""
-        activity = setting.activity
-        rooms = [r for r in self._actor.home.rooms if r.index == room]
-        return self._numbers_of(
-            self._person.spots.at_furniture(activity.objects, rooms, activity.posture)
-        )
+        spots, activity, rooms = self._person.spots, setting.activity, (self._rooms[room],)
+        return self._numbers_of(spots.at_furniture(activity.objects, rooms, activity.posture))
 
     def seat(self, number: int) -> tuple[int, int, int, int, int, int]:
         """Return a place at furniture: x, y, heading, posture, and x, y from where one gets there.
@@ -115,8 +113,7 @@ class KnownHome:
 
     def nearest(self, rooms: Sequence[int], x: int, y: int) -> int:
         """Return the room whose middle is nearest to a lattice point, in a straight line."""
-        choice = {room.index: room for room in self._actor.home.rooms}
-        return self._person.spots.nearest([choice[room] for room in rooms], x, y).index
+        return self._person.spots.nearest([self._rooms[room] for room in rooms], x, y).index
 
     def room_at(self, x: int, y: int) -> int:
         """Return the room that holds a lattice point; -1 for none."""
@@ -148,6 +145,7 @@ class KnownHome:
             ]
             resident = Resident(self._person.key, *rates, routes, steps_off)
             self._resident = present, resident
+            self._rooms = {room.index: room for room in actor.home.rooms}
             self._scenes.clear()
         return resident
 
