@@ -3,12 +3,15 @@
 import json
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from tests.artifacts.tables import EVERY_KIND, rows_of_every_kind, stored
 
+from fleet2d.artifacts.arrow import spec_of
 from fleet2d.artifacts.store import RunStore
 from fleet2d.errors import ArtifactError, RunDirectoryError
 from fleet2d.runs.run import Run, open_run, run_of
@@ -155,3 +158,27 @@ def test_run_says_where_and_how(directory: Path) -> None:
     run: Run = open_run(directory)
 
     assert f"<Run {directory}: complete, tables every_kind>" == repr(run)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda t: t.drop_columns(["x"]), "but .*x.* were stored"),
+        (lambda t: t.rename_columns([f"{name}s" for name in t.column_names]), "were stored"),
+        (lambda t: t.append_column("more", [range(t.num_rows)]), "more, but"),
+        (lambda t: t.set_column(0, t.column_names[0], t["x"]), "column .* is double"),
+    ],
+)
+def test_a_table_with_other_columns_than_were_stored_is_not_read(
+    directory: Path, change: Any, words: str
+) -> None:
+    """Pictures and paths expected the columns of the manifest, and ended in tracebacks."""
+    path = directory / "every_kind.parquet"
+    pq.write_table(change(pq.read_table(path)), path)
+    with pytest.raises(ArtifactError, match=words):
+        open_run(directory).arrow("every_kind")
+
+
+def test_a_table_of_others_is_not_taken_for_one_of_ours() -> None:
+    with pytest.raises(ArtifactError, match="was not stored by Fleet2D"):
+        spec_of(pa.schema([("step", pa.int64())], {"fleet2d.table": "events"}))

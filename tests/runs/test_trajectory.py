@@ -2,9 +2,11 @@
 
 from datetime import timedelta
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
 from tests.thorough import some
 
@@ -241,3 +243,13 @@ def test_a_person_who_walks_at_random_can_be_put_elsewhere(
         assert np.array_equal(path.y, stored["y"].to_numpy())
     room = run.plan.rooms[int(run.path("ana", every=timedelta(seconds=1)).room[at[0]])]
     assert "kitchen" == room.type or len(at) > 1
+
+
+def test_key_frames_out_of_order_are_damaged(tmp_path: Path) -> None:
+    """The kernel's refusal was shown as a traceback."""
+    fleet2d.run("simulation.duration=2 h", seed=4, out=tmp_path / "run")
+    path = tmp_path / "run" / "key_frames.parquet"
+    table = pq.read_table(path)
+    pq.write_table(table.take(np.random.default_rng(1).permutation(table.num_rows)), path)
+    with pytest.raises(ArtifactError, match=r"can't be followed .* it is damaged"):
+        fleet2d.open_run(tmp_path / "run").path("astro")

@@ -54,7 +54,7 @@ def spec_of(schema: pa.Schema) -> TableSpec:
         columns = [_column_of(field) for field in schema]
         name = schema.metadata[b"fleet2d.table"].decode()
         return TableSpec(name, tuple(columns), schema.metadata[b"description"].decode())
-    except (KeyError, TypeError, ValueError) as error:
+    except (AttributeError, KeyError, TypeError, ValueError) as error:
         raise ArtifactError("this table was not stored by Fleet2D: read it with pyarrow") from error
 
 
@@ -262,19 +262,40 @@ class ParquetTable:
         return True
 
 
-def read_parquet(path: Path) -> pa.Table:
+def read_parquet(path: Path, kinds: Mapping[str, Kind] | None = None) -> pa.Table:
     """Read a table from its file; the chunks of a category column share one dictionary.
+
+    Args:
+        path: The file.
+        kinds: The columns that it should have, and their kinds; None: any.
 
     Raises:
         ArtifactError: The file is missing, cut off or otherwise damaged.
     """
     with _opened(path) as file:
+        if kinds is not None:
+            _check_columns(path, file.schema_arrow, kinds)
         TABLE_BYTES.check(unpacked_bytes(file), path, ArtifactError, least="about ")
         try:
             table = file.read()
         except (OSError, pa.ArrowException) as error:
             raise _damaged(path, error) from error
     return with_categories(table)
+
+
+def _check_columns(path: Path, schema: pa.Schema, kinds: Mapping[str, Kind]) -> None:
+    """Refuse a table with other columns than the manifest says, which no reader expects."""
+    if schema.names != list(kinds):
+        raise ArtifactError(
+            f"{path} has the columns {', '.join(schema.names)}, but {', '.join(kinds)} were stored:"
+            " the file was changed"
+        )
+    for field, kind in zip(schema, kinds.values(), strict=True):
+        if field.type != _TYPES[kind]:
+            raise ArtifactError(
+                f"{path}: the column {field.name} is {field.type}, but {_TYPES[kind]} was stored:"
+                " the file was changed"
+            )
 
 
 def read_row_groups(path: Path) -> Iterator[pa.Table]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from datetime import timedelta
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -281,7 +282,7 @@ def open_run(directory: Path | str) -> Run:
     Raises:
         RunDirectoryError: There is no run in that directory, or its manifest is damaged.
     """
-    from fleet2d.artifacts.arrow import count_rows, read_parquet
+    from fleet2d.artifacts.arrow import count_rows
 
     root = Path(directory)
     if not root.is_dir():
@@ -313,7 +314,15 @@ def open_run(directory: Path | str) -> Run:
             if rows != stored_rows:
                 notes.append(f"table {name!r} has {rows} rows, but {stored_rows} were stored")
         names.append(name)
-    return Run(root, manifest, names, lambda name: read_parquet(root / f"{name}.parquet"), notes)
+    return Run(root, manifest, names, partial(_read_table, root, manifest), notes)
+
+
+def _read_table(root: Path, manifest: Manifest, name: str) -> pa.Table:
+    from fleet2d.artifacts.arrow import read_parquet
+
+    record = manifest.tables.get(name)
+    kinds = {column.name: column.kind for column in record.columns} if record else None
+    return read_parquet(root / f"{name}.parquet", kinds)
 
 
 def run_of(store: RunStore) -> Run:

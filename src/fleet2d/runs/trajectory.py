@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fleet2d.bounds import one_line
 from fleet2d.clock import Clock
 from fleet2d.entities.actor import Actor
 from fleet2d.entities.meander import Meander
@@ -83,11 +84,17 @@ def rebuild_path(run: "Run", plan: FloorPlan, entity: str, every: timedelta) -> 
     stride = whole_steps(every, clock.step_us, "every", ArtifactError)
     if "key_frames" not in run.tables:
         raise ArtifactError("the run stored no key frames: run it with artifacts.key_frames=true")
-    keys = _keys_of(run, plan, entity, clock)
-    steps = np.arange(0, clock.steps, stride, dtype=np.int64)
-    out = empty_poses(len(steps))
-    out.x[:] = -1  # outside of the plan: what damaged key frames leave out
-    _trace(run, plan, entity, clock, keys, stride, out)
+    try:
+        keys = _keys_of(run, plan, entity, clock)
+        steps = np.arange(0, clock.steps, stride, dtype=np.int64)
+        out = empty_poses(len(steps))
+        out.x[:] = -1  # outside of the plan: what damaged key frames leave out
+        _trace(run, plan, entity, clock, keys, stride, out)
+    except (KeyError, ValueError, OverflowError, MemoryError) as error:
+        raise ArtifactError(
+            f"key_frames.parquet can't be followed ({one_line(error, 100)}): it is damaged;"
+            " `fleet2d verify` says which files have changed"
+        ) from error
     rows, columns = plan.room_of_place.shape
     cells = out.y // SUB, out.x // SUB
     inside = (0 <= cells[0]) & (cells[0] < rows) & (0 <= cells[1]) & (cells[1] < columns)
