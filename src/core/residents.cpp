@@ -87,7 +87,7 @@ Place Resident::go(const Scene& scene, StepDraws& draws) {
     const std::vector<i64>* seats = &scene.seats;
     std::vector<i64> nearest;
     if (scene.choose == Choice::NEAREST && scene.rooms.size() > 1) {
-        nearest.push_back(home_.nearest(scene.rooms, {course_.now.x, course_.now.y}));
+        nearest.push_back(home_.nearest(scene, {course_.now.x, course_.now.y}));
         seats = &home_.seats(scene, nearest[0]);
     }
     const i64 room = chosen(nearest.empty() ? scene.rooms : nearest, draws);

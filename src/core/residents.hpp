@@ -101,8 +101,8 @@ public:
     // The places at furniture in a room for an activity.
     virtual const std::vector<i64>& seats(const Scene& scene, i64 room) = 0;
     virtual const Seat& seat(i64 number) = 0;
-    // The room of some that is nearest to a point.
-    virtual i64 nearest(const std::vector<i64>& rooms, Point at) = 0;
+    // The room for an activity that is nearest to a point.
+    virtual i64 nearest(const Scene& scene, Point at) = 0;
     // The room that holds a point; -1: none.
     virtual i64 room_at(Point at) = 0;
     // How long to wait before a room may be used for a time [us]; none: not now.

@@ -1567,7 +1567,7 @@ class Resident:
         Do activities, one after the other, until the last one is over or one is blocked.
 
         Args:
-            home: What is asked about the home: spots(room), seats(setting, room), seat(number), nearest(rooms, x, y),
+            home: What is asked about the home: spots(room), seats(setting, room), seat(number), nearest(setting, x, y),
                 room_at(x, y), wait(room, now, takes) and way_out().
             walk: Goes to a place where no route is known: from what this returns, and the place's number at furniture, or -1,
                 x and y, it returns the new end of the plan, and the posture.

@@ -75,11 +75,14 @@ def test_activities_equal_those_done_leg_by_leg(data: st.DataObject, who: tuple[
             end_us += data.draw(st.sampled_from([0, 1, 7, 100, 1800, 9000])) * SECOND_US
             number = data.draw(st.integers(0, 1))
             role, stays = data.draw(st.integers(0, 3)), data.draw(st.booleans())
-            stints.append((f"a{number}", data.draw(any_setting), number, end_us, role, stays))
+            scene = f"a{number}", data.draw(any_setting)
+            stints.append((scene, number, end_us, role, stays))
         until_us = end_us - data.draw(st.sampled_from([0, 0, 3600])) * SECOND_US
         continues = data.draw(st.booleans())
         for plan, home in zip(plans, homes, strict=True):
-            home.live(plan, stints, until_us, continues=continues)
+            home.update()
+            rows = [(home.scene(*scene), *numbers) for scene, *numbers in stints]
+            home.live(plan, rows, until_us, continues=continues)
         one, other = ((vars(plan), plan.legs.rows().tolist()) for plan in plans)
         assert other[1] == one[1]
         for name in ("time_us", "x", "y", "heading", "away", "notes", "posture", "postures"):

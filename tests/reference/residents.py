@@ -27,9 +27,12 @@ class SlowHome(KnownHome):
         self.place: AnyPlace | None = None
         self.base: AnyPlace | None = None
 
+    def scene(self, name: str, setting: Setting) -> Any:
+        return name, setting
+
     def live(self, plan: Plan, stints: Sequence[Any], until_us: int, *, continues: bool) -> None:
         began_us = plan.time_us
-        for name, setting, number, end_us, role, stays in stints:
+        for (name, setting), number, end_us, role, stays in stints:
             if plan.time_us >= until_us:
                 return
             if plan.time_us >= end_us:
@@ -137,7 +140,7 @@ class SlowHome(KnownHome):
     def fetch(
         self, plan: Plan, setting: Setting, place: AnyPlace, end_us: int, draws: Draws
     ) -> None:
-        if not setting.stores:
+        if not setting.stores or setting.fetch_takes is None:
             return
         takes_us = setting.fetch_takes.draw(draws) * SECOND_US
         room = draws.choice(setting.stores)

@@ -59,7 +59,9 @@ Waits waits_of(View<const i64> quantiles) {
 // A scene, and what Python knows it by.
 struct OwnedScene : Scene {
     nb::object setting;
-    mutable std::map<i64, Numbers> seats_in;  // by room, as they were asked for
+    // What was asked for: places at furniture by room, and the nearest room by point.
+    mutable std::map<i64, Numbers> seats_in;
+    mutable std::map<std::pair<i64, i64>, i64> nearest_to;
 };
 
 OwnedScene scene_of(nb::object setting, i64 activity, bool away, i64 choose, i64 posture, Numbers rooms, Numbers seats,
@@ -77,6 +79,7 @@ OwnedScene scene_of(nb::object setting, i64 activity, bool away, i64 choose, i64
                       {},
                       std::nullopt},
                      std::move(setting),
+                     {},
                      {}};
     require(moves.size() <= MOST_MOVES, "there are three kinds of small moves");
     for (const auto& [kind, waits] : moves) {
@@ -99,6 +102,7 @@ struct OwnedResident {
     std::map<std::pair<i64, i64>, Point> steps_off;
     std::map<i64, std::vector<Point>> spots;
     std::map<i64, Seat> seats;
+    std::map<std::pair<i64, i64>, i64> rooms_at;
     std::optional<Point> way_out;
 };
 
@@ -106,7 +110,7 @@ OwnedResident resident_of(u64 key, f64 speed, f64 turn_rate, nb::object routes,
                           const std::vector<std::tuple<i64, i64, i64, i64>>& steps_off) {
     check_rates(speed, turn_rate);
     Routes* ways = routes.is_none() ? nullptr : &nb::cast<Routes&>(routes);
-    OwnedResident resident{key, speed, turn_rate, std::move(routes), ways, {}, {}, {}, {}};
+    OwnedResident resident{key, speed, turn_rate, std::move(routes), ways, {}, {}, {}, {}, {}};
     for (const auto& [x, y, to_x, to_y] : steps_off) {
         point_of(x, y);
         resident.steps_off.emplace(std::pair(x, y), point_of(to_x, to_y));
@@ -149,10 +153,13 @@ public:
         checked(0, x, y, heading, 0);
         return own_.seats[number] = {{x, y}, heading, checked_posture(posture), point_of(from_x, from_y)};
     }
-    i64 nearest(const Numbers& rooms, Point at) override {
-        return nb::cast<i64>(home_.attr("nearest")(rooms, at.x, at.y));
+    i64 nearest(const Scene& scene, Point at) override {
+        const auto& own = static_cast<const OwnedScene&>(scene);
+        return known(own.nearest_to, at, [&] { return home_.attr("nearest")(own.setting, at.x, at.y); });
     }
-    i64 room_at(Point at) override { return nb::cast<i64>(home_.attr("room_at")(at.x, at.y)); }
+    i64 room_at(Point at) override {
+        return known(own_.rooms_at, at, [&] { return home_.attr("room_at")(at.x, at.y); });
+    }
     std::optional<i64> wait(i64 room, i64 now, i64 takes) override {
         const auto wait = nb::cast<std::optional<i64>>(home_.attr("wait")(room, now, takes));
         require(!wait || (0 <= *wait && *wait <= LATEST), "waits must be 0 us or more");
@@ -181,6 +188,16 @@ public:
     }
 
 private:
+    using ByPoint = std::map<std::pair<i64, i64>, i64>;
+
+    // The room of a point, which is asked for once.
+    template <class Ask>
+    static i64 known(ByPoint& rooms, Point at, Ask ask) {
+        const auto room = rooms.find({at.x, at.y});
+        if (room != rooms.end()) return room->second;
+        return rooms[{at.x, at.y}] = nb::cast<i64>(ask());
+    }
+
     OwnedResident& own_;
     nb::handle home_, walk_;
 };
@@ -284,7 +301,7 @@ Args:
              R"(Do activities, one after the other, until the last one is over or one is blocked.
 
 Args:
-    home: What is asked about the home: spots(room), seats(setting, room), seat(number), nearest(rooms, x, y),
+    home: What is asked about the home: spots(room), seats(setting, room), seat(number), nearest(setting, x, y),
         room_at(x, y), wait(room, now, takes) and way_out().
     walk: Goes to a place where no route is known: from what this returns, and the place's number at furniture, or -1,
         x and y, it returns the new end of the plan, and the posture.

@@ -119,6 +119,7 @@ class Inhabitant(Behavior):
         self.is_hindered = now.home.hinders  # by shut doors, for all of the plan
         midnight_us = clock.elapsed(datetime.fromordinal(now.time.toordinal() + 1))
         last_us = min(plan.time_us + AHEAD_US, midnight_us) if now.actor.attention else midnight_us
+        self.known_home.update()
         stints = []
         for which, day_us, doing in self._doings(now.time):
             if day_us + doing.begin * SECOND_US >= last_us:
@@ -166,7 +167,7 @@ class Inhabitant(Behavior):
         setting = self.seated(self._in_its_room(doing), which)
         stays = doing.activity == REST and doing.end - doing.begin < NO_GAP_S
         number = which[0] * DOINGS_A_DAY + which[1]
-        return doing.activity, setting, number, end_us, doing.role, stays
+        return self.known_home.scene(doing.activity, setting), number, end_us, doing.role, stays
 
     def seated(self, setting: Setting, which: tuple[int, int]) -> Setting:
         """Return the setting with only the places at furniture that it has for the doing."""
@@ -199,7 +200,7 @@ class Inhabitant(Behavior):
 
     def _setting(self, actor: "Actor", activity: Activity) -> Setting:
         if activity.away:
-            return Setting(activity, [], [], [], (), activity.fetch_takes.table())
+            return Setting(activity, [], [], [], (), None)
         rooms = (
             self._own_rooms(actor, activity.rooms)
             if activity.choose == "own"
@@ -216,7 +217,7 @@ class Inhabitant(Behavior):
             self.spots.at_furniture(activity.objects, rooms, activity.posture),
             self._own_rooms(actor, activity.fetches_from) if activity.fetches else [],
             tuple(small_moves),
-            activity.fetch_takes.table(),
+            activity.fetch_takes.table() if activity.fetches else None,
         )
 
     def _bed(

@@ -26,8 +26,8 @@ PlanEnd = tuple[int, int, int, int, int]
 """Time [us], x, y [lattice], heading [1/4096 turn], and whether the body is away."""
 Course = tuple[PlanEnd, int, list[tuple[int, int]], list[tuple[int, int, int]]]
 """The end of a plan, its posture, and the postures and notes that were added; see `Resident`."""
-Stint = tuple[str, Setting, int, int, int, bool]
-"""A time in which an activity is done: its name and setting, and what `Resident.live` needs."""
+Stint = tuple[Scene, int, int, int, bool]
+"""A time in which an activity is done; see `Resident.live`."""
 
 
 class Numbering(Generic[T]):
@@ -74,22 +74,40 @@ class KnownHome:
             until_us: None begins then, or later [us since the start].
             continues: Whether the first one may be a part of the last one of the plan before.
         """
-        resident, scene = self._present_resident(), self._scene
-        rows = [
-            (scene(name, setting), number, end_us, role, stays)
-            for name, setting, number, end_us, role, stays in stints
-        ]
-        walk, now = partial(self._walk, plan), _end_of(plan)
-        self._take(
-            plan,
-            resident.live(self, walk, plan.legs, *now, rows, until_us, continues, self._last),
-        )
+        live, walk, now = self.update().live, partial(self._walk, plan), _end_of(plan)
+        course = live(self, walk, plan.legs, *now, stints, until_us, continues, self._last)
+        self._take(plan, course)
 
     def go(self, plan: Plan, activity: str, setting: Setting, draws: Draws) -> None:
         """Go to where an activity is done, and take its posture."""
-        resident, scene = self._present_resident(), self._scene(activity, setting)
-        walk, now = partial(self._walk, plan), _end_of(plan)
-        self._take(plan, resident.go(self, walk, plan.legs, *now, scene, draws))
+        go, walk, now = self.update().go, partial(self._walk, plan), _end_of(plan)
+        self._take(plan, go(self, walk, plan.legs, *now, self.scene(activity, setting), draws))
+
+    def update(self) -> Resident:
+        """Forget an earlier arrangement of doors and furniture; return the body for the core."""
+        actor = self._actor
+        space, rates = actor.space, (actor.speed, actor.turn_rate)
+        present = actor.home.version, space, actor.part, rates
+        of, resident = self._resident
+        if resident is None or of != present:
+            routes = space.shortest if actor.drive is None else None
+            steps_off = [
+                (*at, *off)
+                for at in actor.home.approaches
+                if (off := actor.step_off(*at)) is not None
+            ]
+            resident = Resident(self._person.key, *rates, routes, steps_off)
+            self._resident = present, resident
+            self._rooms = {room.index: room for room in actor.home.rooms}
+            self._scenes.clear()
+        return resident
+
+    def scene(self, name: str, setting: Setting) -> Scene:
+        """Return the setting of an activity as the core needs it, after an `update`."""
+        known = self._scenes.get(name)
+        if known is None or known[0] is not setting:
+            known = self._scenes[name] = setting, self._make_scene(name, setting)
+        return known[1]
 
     # What the core asks for.
 
@@ -111,9 +129,9 @@ class KnownHome:
         at = self._actor.place_at(*self._seats.things[number])
         return at.x, at.y, at.heading, POSTURES.index(at.posture), *at.approach
 
-    def nearest(self, rooms: Sequence[int], x: int, y: int) -> int:
+    def nearest(self, setting: Setting, x: int, y: int) -> int:
         """Return the room whose middle is nearest to a lattice point, in a straight line."""
-        return self._person.spots.nearest([self._rooms[room] for room in rooms], x, y).index
+        return self._person.spots.nearest(setting.rooms, x, y).index
 
     def room_at(self, x: int, y: int) -> int:
         """Return the room that holds a lattice point; -1 for none."""
@@ -128,37 +146,10 @@ class KnownHome:
         """Return the lattice point where the body leaves the home."""
         return self._actor.way_out
 
-    # What is prepared for it.
-
-    def _present_resident(self) -> Resident:
-        """Return the body for the core, with the home as it is at present."""
-        actor = self._actor
-        space, rates = actor.space, (actor.speed, actor.turn_rate)
-        present = actor.home.version, space, actor.part, rates
-        of, resident = self._resident
-        if resident is None or of != present:
-            routes = space.shortest if actor.drive is None else None
-            steps_off = [
-                (*at, *off)
-                for at in actor.home.approaches
-                if (off := actor.step_off(*at)) is not None
-            ]
-            resident = Resident(self._person.key, *rates, routes, steps_off)
-            self._resident = present, resident
-            self._rooms = {room.index: room for room in actor.home.rooms}
-            self._scenes.clear()
-        return resident
-
-    def _scene(self, name: str, setting: Setting) -> Scene:
-        """Return the setting of an activity as the core needs it."""
-        known = self._scenes.get(name)
-        if known is None or known[0] is not setting:
-            known = self._scenes[name] = setting, self._make_scene(name, setting)
-        return known[1]
+    # What is prepared for it, and taken from it.
 
     def _make_scene(self, name: str, setting: Setting) -> Scene:
         activity = setting.activity
-        fetches = bool(setting.stores) and any(m.kind == "fetches" for m in setting.small_moves)
         return Scene(
             setting,
             self._names.of(name),
@@ -169,7 +160,7 @@ class KnownHome:
             self._numbers_of(setting.seats),
             [room.index for room in setting.stores],
             [(MOVE_KINDS.index(move.kind), move.waits()) for move in setting.small_moves],
-            setting.fetch_takes if fetches else None,
+            setting.fetch_takes,
         )
 
     def _numbers_of(self, seats: Sequence[Seat]) -> list[int]:

@@ -50,7 +50,7 @@ class Setting(NamedTuple):
         seats: The places at furniture where it is done; none: anywhere in the rooms.
         stores: The rooms from which the body fetches things.
         small_moves: The small moves within the activity.
-        fetch_takes: The law of how long the body is away to fetch something [s].
+        fetch_takes: The law of how long the body is away to fetch something [s], if it does.
     """
 
     activity: Activity
@@ -58,4 +58,4 @@ class Setting(NamedTuple):
     seats: list[Seat]
     stores: list["Room"]
     small_moves: tuple[SmallMove, ...]
-    fetch_takes: Law
+    fetch_takes: Law | None
