@@ -39,8 +39,8 @@ class RunStore:
 
     Attributes:
         directory: The run directory; None: the run is only in memory.
-        manifest: The content of `manifest.json`. The store sets status, tables and digest, the
-            engine all else.
+        root: Its absolute path, which stays right if the current directory changes.
+        manifest: The content of `manifest.json`; the store sets status, tables and digest.
 
     Example:
         >>> from fleet2d.artifacts.table import Column
@@ -63,14 +63,14 @@ class RunStore:
         """Write nothing yet: `open` does."""
         self.directory = None if directory is None else Path(directory)
         self.manifest = manifest or Manifest()
-        self._root = None if self.directory is None else self.directory.absolute()
+        self.root = None if self.directory is None else self.directory.absolute()
         self._flush_rows = flush_rows
         self._tables: dict[str, TableWriter] = {}
         self._new_directories: list[Path] = []
         self._digests: dict[str, str] | None = None
         self._is_open = directory is None
         self._failure: ArtifactError | None = None
-        self._ledger = None if self._root is None else Ledger(self._root)
+        self._ledger = None if self.root is None else Ledger(self.root)
         for spec in specs:
             self.add_table(spec)
 
@@ -95,16 +95,16 @@ class RunStore:
             RunDirectoryError: The directory can't be used; no new file remains.
             ArtifactError: The disk is full.
         """
-        if self._is_open or self.directory is None or self._root is None:
+        if self._is_open or self.directory is None or self.root is None:
             return
         self.check()
         try:
-            self._new_directories = make_directories(self._root)
-            self._lock_directory(self._root)
+            self._new_directories = make_directories(self.root)
+            self._lock_directory(self.root)
             self._is_open = True
             self._ledger_of().begin()
             self.manifest.status = "running"
-            self.manifest.write(self._root)
+            self.manifest.write(self.root)
         except OSError as error:
             self.discard()
             raise cannot_write(self.directory, error) from error
@@ -127,12 +127,12 @@ class RunStore:
         Raises:
             ArtifactError: The journal is damaged, or the directory can't be written.
         """
-        assert self._root is not None
+        assert self.root is not None
         self._ledger, self._is_open = ledger, True
         with self._writing("the directory"):
             self.manifest.status = "running"
-            self.manifest.write(self._root)
-            for path in (*self._root.glob("*.parquet"), *self._root.glob(f"*.parquet{PARTIAL}")):
+            self.manifest.write(self.root)
+            for path in (*self.root.glob("*.parquet"), *self.root.glob(f"*.parquet{PARTIAL}")):
                 path.unlink()  # the journal has all of their rows
             for entry in ledger.resume(commit):
                 self.add_table(entry.spec)
@@ -147,9 +147,9 @@ class RunStore:
         Raises:
             ArtifactError: It can't be written.
         """
-        assert self._root is not None
+        assert self.root is not None
         with self._writing(name):
-            write_atomically(self._root / name, content.encode())
+            write_atomically(self.root / name, content.encode())
 
     def keep_checkpoint(self, write: Callable[[int], None]) -> None:
         """Replace the checkpoint of the run; see `Ledger.keep_checkpoint`.
@@ -173,7 +173,7 @@ class RunStore:
         Raises:
             ArtifactError: They can't be written; the run is marked as failed.
         """
-        if self._root is None:
+        if self.root is None:
             return None
         self._check_usable()
         with self._writing("the journal"):
@@ -261,8 +261,8 @@ class RunStore:
             return self._digests
         for entry in self._tables.values():
             self._flush(entry)
-        if self._root is not None:
-            self._finish_files(self._root)
+        if self.root is not None:
+            self._finish_files(self.root)
         digests = {
             name: entry.digest.hexdigest(entry.buffer.words) for name, entry in self._tables.items()
         }
@@ -284,11 +284,11 @@ class RunStore:
             raise ArtifactError("the run directory is not open: call open() before close()")
         digests = self.close_tables()
         self.manifest.status = status
-        if self._root is not None:
+        if self.root is not None:
             with self._writing(FILE_NAME):
-                self.manifest.seal = make_seal(self.manifest, self._root)
-                self.manifest.write(self._root)
-                sync_directory(self._root)
+                self.manifest.seal = make_seal(self.manifest, self.root)
+                self.manifest.write(self.root)
+                sync_directory(self.root)
             self._ledger_of().end(keep=status != "complete")
         return digests
 
@@ -297,11 +297,11 @@ class RunStore:
         for entry in self._tables.values():
             if entry.file is not None:
                 entry.file.abandon()
-        if self._root is not None and self._is_open:
+        if self.root is not None and self._is_open:
             self._ledger_of().end()
-            remove_leftovers(self._root)
+            remove_leftovers(self.root)
             for name in (FILE_NAME, *(f"{table}.parquet" for table in self._tables)):
-                for path in (self._root / name, self._root / f"{name}{PARTIAL}"):
+                for path in (self.root / name, self.root / f"{name}{PARTIAL}"):
                     with suppress(OSError):
                         path.unlink()
             remove_directories(self._new_directories)
@@ -319,15 +319,15 @@ class RunStore:
             return
         with self._writing("the journal"):
             entry.log(self._ledger)
-        chunk = entry.buffer.take(reuse=self._root is not None)
+        chunk = entry.buffer.take(reuse=self.root is not None)
         entry.logged = 0
         entry.digest.update(chunk, rows)
-        if self._root is None:
+        if self.root is None:
             entry.chunks.append((chunk, rows))
             return
         name = entry.buffer.spec.name
         with self._writing(f"{name}.parquet", entry):
-            entry.file_in(self._root).write(chunk, rows, entry.buffer.words)
+            entry.file_in(self.root).write(chunk, rows, entry.buffer.words)
 
     def _ledger_of(self) -> Ledger:
         assert self._ledger is not None, "a run in memory has no ledger"
@@ -382,12 +382,12 @@ class RunStore:
         self._ledger_of().end(keep=True, undo=True)
         self.manifest.status = "failed"
         self.manifest.notes.append(reason)
-        return _try_write(self.manifest, self._root) or (
+        return _try_write(self.manifest, self.root) or (
             # The file is lost anyway; its space is enough for a manifest on a full disk.
             entry is not None
             and entry.file is not None
             and entry.file.empty()
-            and _try_write(self.manifest, self._root)
+            and _try_write(self.manifest, self.root)
         )
 
 

@@ -319,7 +319,7 @@ class Simulation(Judging):
 
     def _store_learned(self) -> None:
         """Store what algorithms have learned; failures are noted in the manifest."""
-        root = self._store._root  # not the relative path: a component may have changed the folder
+        root = self._store.root
         if root is not None and self.scenario.artifacts.learned:
             notes = self._state.learners.remember(root / LEARNED_NAME)
             self._store.manifest.notes += notes

@@ -333,9 +333,9 @@ def run_of(store: RunStore) -> Run:
     """
     if not store.is_closed:
         raise ArtifactError("the run is not closed yet: close() it before reading it")
-    if store.directory is None or store._root is None:
+    if store.directory is None or store.root is None:
         return Run(None, store.manifest, store.names, store.arrow)
-    return open_run(store.directory if _is_at(store.directory, store._root) else store._root)
+    return open_run(store.directory if _is_at(store.directory, store.root) else store.root)
 
 
 def _is_at(path: Path, root: Path) -> bool:
