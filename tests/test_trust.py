@@ -111,6 +111,15 @@ def test_a_study_whose_code_is_named_runs(fleet2d: Cli) -> None:
     assert Path("ran").exists()
 
 
+def test_a_study_of_a_bundled_scenario_has_no_code(fleet2d: Cli) -> None:
+    """Its name has the form of a component's, `bundled.py` and the class `base`."""
+    study = {"base": "bundled:base", "axes": {"simulation.seed": [1]}, "replicates": 1}
+    Path("study.yaml").write_text(yaml.safe_dump(study))
+    assert 0 == fleet2d("study", "run", "study.yaml", "--dry-run")[0]
+    Path("bundled.py").touch()
+    assert "bundled.py" in fleet2d("study", "run", "study.yaml", "--dry-run")[2]
+
+
 def test_workers_trust_what_the_command_line_trusts(fleet2d: Cli) -> None:
     command = ("study", "run", "study.yaml", "--workers", "1", "--trust-dir", ".")
     assert (0, "1 of 1 variants complete in studies/study\n", "") == fleet2d(*command)

@@ -171,6 +171,8 @@ def code_of(scenario: object) -> dict[Path, list[str]]:
             files = files_of((folder_of(name) / (parent + slash)).resolve(), module)
         except (OSError, ValueError):
             continue  # it is not a path: the import will fail
+        if name.startswith("bundled:") and not any(file.is_file() for file in files):
+            continue  # a scenario that comes with Fleet2D
         for file in files:
             code.setdefault(file, []).append(key)
     return code
