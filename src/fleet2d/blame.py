@@ -70,6 +70,12 @@ def may_be_ctrl_c(error: BaseException) -> bool:
     return isinstance(error, KeyboardInterrupt) and is_unclear
 
 
+def end_by_signal(*_: object) -> None:
+    """Raise KeyboardInterrupt, which is no component's own: a handler of signals."""
+    blame.pressed = True
+    raise KeyboardInterrupt
+
+
 @contextmanager
 def noted_ctrl_c() -> Iterator[None]:
     """Note whether Ctrl-C is pressed, so that an interrupt without it is a component's own."""
@@ -78,13 +84,9 @@ def noted_ctrl_c() -> Iterator[None]:
         yield
         return
 
-    def on_signal(_: int, __: object) -> None:
-        blame.pressed = True
-        raise KeyboardInterrupt
-
     blame.pressed = False
     if before is not signal.SIG_IGN:
-        signal.signal(signal.SIGINT, on_signal)
+        signal.signal(signal.SIGINT, end_by_signal)
     try:
         yield
     finally:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 import shapely
-from tests.scenes import fleet2d_process, scenario
+from tests.scenes import fleet2d_process, process, scenario
 
 import fleet2d
 from fleet2d import Algorithm, Behavior, Metric
@@ -208,6 +208,43 @@ def test_code_that_ends_the_program_before_the_run_is_named(
     done = fleet2d_process("run", "simulation.duration=1 h", override, cwd=tmp_path)
     assert done.returncode in (1, 2)
     assert words in done.stderr
+
+
+STOPS = """
+import os, signal
+import fleet2d
+
+class Stops(fleet2d.Algorithm):
+    def start(self, home):
+        os.kill(os.getpid(), getattr(signal, os.environ["STOP"]))
+
+    def update(self, history, state):
+        pass
+"""
+
+
+@pytest.mark.parametrize(
+    ("number", "command"),
+    [
+        ("SIGINT", ("run", "algorithms.own.type=mine:Stops")),
+        ("SIGINT", ("study", "run", "study.yaml", "--executor", "serial", "--trust", "mine.py")),
+        ("SIGTERM", ("study", "run", "study.yaml", "--executor", "serial", "--trust", "mine.py")),
+    ],
+)
+def test_a_signal_during_the_code_of_a_component_is_not_its_error(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: str, command: tuple[str, ...]
+) -> None:
+    monkeypatch.setenv("STOP", number)
+    (tmp_path / "mine.py").write_text(STOPS)
+    algorithms = {"own": {"type": "mine:Stops"}}
+    base = {"extends": "bundled:base", "algorithms": algorithms}
+    study = {"base": base, "axes": {"simulation.seed": [1]}, "replicates": 1}
+    (tmp_path / "study.yaml").write_text(json.dumps(study))
+    code = (
+        "import signal; signal.signal(signal.SIGINT, signal.default_int_handler);"
+        f" import sys; sys.argv = ['fleet2d', *{command!r}]; from fleet2d.cli import main; main()"
+    )
+    assert 130 == process("-c", code, cwd=tmp_path).returncode
 
 
 @pytest.mark.parametrize("code", ["raise KeyboardInterrupt", "class B(BaseException): pass\nraise B"])  # fmt: skip

@@ -138,7 +138,9 @@ def test_what_is_no_place_is_refused(place: Any) -> None:
     assert "users.ana.start" in str(caught.value)
 
 
-@pytest.mark.parametrize("place", [[float("nan"), 1.0], [1.0, float("inf")], [1e9, 1.0]])
+@pytest.mark.parametrize(
+    "place", [[float("nan"), 1.0], [1.0, float("inf")], [1e9, 1.0], [10**400, 1]]
+)
 def test_points_out_of_this_world_are_refused(place: Any) -> None:
     with pytest.raises(InputError) as caught:
         fleet2d.load_scenario(scenario(users={"ana": {"start": place}}))

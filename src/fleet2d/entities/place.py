@@ -3,7 +3,7 @@
 import difflib
 from collections.abc import Mapping, Sequence
 from numbers import Real
-from typing import Annotated
+from typing import Annotated, Any
 
 from pydantic import BeforeValidator, PlainSerializer, WithJsonSchema
 
@@ -38,16 +38,22 @@ def parse_place(value: object) -> RoomChoice | Point:
     if isinstance(value, Sequence) and value and not isinstance(value, str):
         if all(isinstance(item, str) and item for item in value):
             return tuple(value)
-        if len(value) == 2 and all(isinstance(v, Real) and not isinstance(v, bool) for v in value):
-            x, y = float(value[0]), float(value[1])
-            if abs(x) < 1e6 and abs(y) < 1e6:  # NaN fails this, too
-                return x, y
+        if len(value) == 2 and all(map(_is_coordinate, value)):
+            return float(value[0]), float(value[1])
     raise problem(
         f"expected a place, got {value!r}: give a room, kind of room or piece of furniture like"
         " 'kitchen' or 'sofa', that of a person like {object: bed, of: ana},"
         " a list of them to try in turn like [dining_room, kitchen, any], or a point [x, y] in"
         " metres"
     )
+
+
+def _is_coordinate(value: Any) -> bool:
+    """Whether a value is a coordinate within 1000 km [m]; NaN is none."""
+    if not isinstance(value, Real) or isinstance(value, bool):
+        return False
+    size: Any = abs(value)
+    return bool(size < 1e6)
 
 
 def _dump(place: RoomChoice | Point) -> str | list[str] | list[float]:

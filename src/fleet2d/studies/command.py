@@ -7,10 +7,11 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
+from fleet2d.blame import end_by_signal
 from fleet2d.errors import InputError
 from fleet2d.trust_options import TrustFiles, TrustFolders, restrict_to
 
@@ -218,11 +219,7 @@ def _interruptible(location: str | Path) -> Iterator[None]:
     Raises:
         Exit: It was interrupted.
     """
-
-    def interrupt(*_: Any) -> None:
-        raise KeyboardInterrupt
-
-    handler = signal.signal(signal.SIGTERM, interrupt)
+    handler = signal.signal(signal.SIGTERM, end_by_signal)
     try:
         yield
     except KeyboardInterrupt:

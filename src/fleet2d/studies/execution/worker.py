@@ -8,6 +8,7 @@ import queue
 import sys
 import threading
 import traceback
+from contextlib import suppress
 from typing import IO, Any
 
 from fleet2d.garbage import rare_collections
@@ -24,16 +25,26 @@ def main() -> None:
     tasks: queue.SimpleQueue[Any] = queue.SimpleQueue()
     stream = sys.stdin.buffer
     try:
-        folder, sys.path[:] = receive(stream)
-        os.chdir(folder)
-        with rare_collections():  # of the modules that the job needs
-            job = receive(stream)
+        job = _receive_job(stream)
+    except EOFError:  # the driver has ended
+        return
     except BaseException:  # noqa: BLE001 - imports may raise anything
-        send(answers, (BROKEN, traceback.format_exc()))
+        with suppress(OSError):
+            send(answers, (BROKEN, traceback.format_exc()))
         return
     threading.Thread(target=_listen, args=(stream, tasks), daemon=True).start()
-    send(answers, (READY, None))
-    _work(job, tasks, answers)
+    try:
+        send(answers, (READY, None))
+        _work(job, tasks, answers)
+    except BrokenPipeError:
+        os._exit(0)  # the driver has ended
+
+
+def _receive_job(stream: IO[bytes]) -> Any:
+    folder, sys.path[:] = receive(stream)
+    os.chdir(folder)
+    with rare_collections():  # of the modules that the job needs
+        return receive(stream)
 
 
 def _work(job: Any, tasks: "queue.SimpleQueue[Any]", answers: IO[bytes]) -> None:
