@@ -1,6 +1,7 @@
 """Whatever a file would unfold to, it is refused with the bound that it breaks, and how to raise it."""
 
 import io
+import json
 import os
 import struct
 import zipfile
@@ -175,6 +176,12 @@ def bomb(name: str, folder: Path) -> tuple[Path, Callable[[Path], Any], str]:
             features = ",".join(['{"type":"Feature","properties":{},"geometry":null}'] * 101)
             path.write_text(f'{{"type": "FeatureCollection", "features": [{features}]}}')
             return path, load_floorplan, "POLYGONS"
+        case "parts.geojson":
+            squares = [[[[n, 0], [n + 1, 0], [n + 1, 1], [n, 0]]] for n in range(101)]
+            geometry = {"type": "MultiPolygon", "coordinates": squares}
+            room = {"type": "Feature", "properties": {"type": "room"}, "geometry": geometry}
+            path.write_text(json.dumps({"type": "FeatureCollection", "features": [room]}))
+            return path, load_floorplan, "POLYGONS"
         case "house.json":
             boxes = ",".join(["[0, 0, 2, 2]"] * 101)
             path.write_text(f'{{"verts":[[0,0],[4,0],[4,3]],"room_category":{{"Den":[{boxes}]}}}}')
@@ -201,7 +208,8 @@ def bomb(name: str, folder: Path) -> tuple[Path, Callable[[Path], Any], str]:
     "name",
     [
         "map.png", "map.pgm", "learned.npz", "table.parquet", "fixes.parquet", "plan.json",
-        "plan.geojson", "house.json", "long.json", "events.txt", "adl.txt", "fixes.csv",
+        "plan.geojson", "parts.geojson", "house.json", "long.json", "events.txt", "adl.txt",
+        "fixes.csv",
     ],
 )  # fmt: skip
 def test_a_file_that_unfolds_to_gigabytes_is_refused(tmp_path: Path, name: str) -> None:

@@ -103,6 +103,7 @@ def read_features(content: dict[str, Any], level: str | None, notes: list[str]) 
     features: list[Feature] = []
     floors: list[dict[str, Any]] = []
     ignored: Counter[str] = Counter()
+    parts = 0
     for number, item in enumerate(items):
         where = f"features[{number}]"
         if not isinstance(item, dict):
@@ -117,6 +118,8 @@ def read_features(content: dict[str, Any], level: str | None, notes: list[str]) 
             ignored[name] += 1
         else:
             shape = _shape(item.get("geometry"), kind, where, notes)
+            parts += int(shapely.get_num_geometries(shape))
+            POLYGONS.check(parts, "it", FloorPlanError, least="at least ")
             features.append(Feature(kind, where, shape, properties, _level(properties)))
     if ignored:
         names = ", ".join(f"{name} ({count})" for name, count in ignored.items())
