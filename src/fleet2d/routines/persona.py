@@ -247,6 +247,8 @@ class Persona(Settings):
 
     @model_validator(mode="after")
     def _is_complete(self) -> Self:
+        if any(self is loaded for loaded in _LOADED.values()):  # it was checked then
+            return self
         for name, day in self.days.items():
             for task, fields in day.do.items():
                 self._check_activity(fields.activity or task, ("days", name, "do", task))
@@ -389,8 +391,7 @@ def bundled_persona(name: str) -> Persona:
 
 def _dump(persona: Persona, dump: SerializerFunctionWrapHandler) -> Any:
     """Write a bundled persona by its name, and others in full: no run depends on their files."""
-    name = next((name for name, loaded in _LOADED.items() if loaded is persona), None)
-    return name or dump(persona)
+    return next((n for n, loaded in _LOADED.items() if loaded is persona), None) or dump(persona)
 
 
 AnyPersona = Annotated[

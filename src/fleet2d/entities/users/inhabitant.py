@@ -164,10 +164,13 @@ class Inhabitant(Behavior):
         """Return a doing as the core needs it; `which` is the address of its random draws."""
         if which == self.given_up:
             doing = doing._replace(activity=REST)
-        setting = self.seated(self._in_its_room(doing), which)
-        stays = doing.activity == REST and doing.end - doing.begin < NO_GAP_S
-        number = which[0] * DOINGS_A_DAY + which[1]
-        return self.known_home.scene(doing.activity, setting), number, end_us, doing.role, stays
+        activity, begin, end, _, room, role = doing
+        setting = self.settings[activity]
+        if room != ANY_ROOM or self.is_hindered:
+            setting = self._in_room(setting, room)
+        scene = self.known_home.scene(activity, self.seated(setting, which))
+        stays = activity == REST and end - begin < NO_GAP_S
+        return scene, which[0] * DOINGS_A_DAY + which[1], end_us, role, stays
 
     def seated(self, setting: Setting, which: tuple[int, int]) -> Setting:
         """Return the setting with only the places at furniture that it has for the doing."""
@@ -184,11 +187,10 @@ class Inhabitant(Behavior):
             setting = setting._replace(rooms=rooms, seats=seats)
         return setting._replace(stores=self.spots.reachable(setting.stores))
 
-    def _in_its_room(self, doing: Doing) -> Setting:
-        """Return the present setting of a doing, in the room that its household chose, if any."""
-        setting = self.settings[doing.activity]
-        if doing.room != ANY_ROOM:
-            room = next((room for room in self.reachable_rooms if room.index == doing.room), None)
+    def _in_room(self, setting: Setting, index: int) -> Setting:
+        """Return the present setting of an activity; in a room that its household chose, if any."""
+        if index != ANY_ROOM:
+            room = next((room for room in self.reachable_rooms if room.index == index), None)
             setting = setting if room is None else self._within(setting, room)
         return self._at_present(setting) if self.is_hindered else setting
 
