@@ -31,6 +31,7 @@ from fleet2d.yaml_tree import parse
 SMALL = {
     "VALUES": 20_000, "FILE_BYTES": 1_000_000, "LEARNED_BYTES": 1 << 20, "TABLE_BYTES": 1 << 20,
     "FIXES": 1 << 16, "JSON_VALUES": 10_000, "CORNERS": 1000, "POLYGONS": 100,
+    "CROSSINGS": 100,
 }  # fmt: skip
 """Bounds for these tests: the usual ones would take long to reach."""
 
@@ -182,6 +183,14 @@ def bomb(name: str, folder: Path) -> tuple[Path, Callable[[Path], Any], str]:
             room = {"type": "Feature", "properties": {"type": "room"}, "geometry": geometry}
             path.write_text(json.dumps({"type": "FeatureCollection", "features": [room]}))
             return path, load_floorplan, "POLYGONS"
+        case "star.json" | "star.geojson":
+            turns = np.arange(101) * (50 / 101 * 2 * np.pi)  # each edge crosses nearly all others
+            corners = (5 + 5 * np.stack([np.cos(turns), np.sin(turns)], axis=1)).tolist()
+            geometry = {"type": "Polygon", "coordinates": [[*corners, corners[0]]]}
+            room = {"type": "Feature", "properties": {"type": "room"}, "geometry": geometry}
+            geojson = {"type": "FeatureCollection", "features": [room]}
+            path.write_text(json.dumps({"verts": corners} if name == "star.json" else geojson))
+            return path, load_floorplan, "CROSSINGS"
         case "house.json":
             boxes = ",".join(["[0, 0, 2, 2]"] * 101)
             path.write_text(f'{{"verts":[[0,0],[4,0],[4,3]],"room_category":{{"Den":[{boxes}]}}}}')
@@ -208,7 +217,7 @@ def bomb(name: str, folder: Path) -> tuple[Path, Callable[[Path], Any], str]:
     "name",
     [
         "map.png", "map.pgm", "learned.npz", "table.parquet", "fixes.parquet", "plan.json",
-        "plan.geojson", "parts.geojson", "house.json", "long.json", "events.txt", "adl.txt",
+        "plan.geojson", "parts.geojson", "star.json", "star.geojson", "house.json", "long.json", "events.txt", "adl.txt",
         "fixes.csv",
     ],
 )  # fmt: skip

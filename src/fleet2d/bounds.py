@@ -96,6 +96,8 @@ POLYGONS = Bound("POLYGONS", 5_000, "polygons and lines")
 """Polygons of a floor plan: rooms, furniture, features, doorways."""
 CORNERS = Bound("CORNERS", 200_000, "corners")
 """Corners of all polygons of a floor plan."""
+CROSSINGS = Bound("CROSSINGS", 100_000, "places where it crosses itself")
+"""Crossings of the outline of one room, wall or home with itself, which are repaired."""
 LOG_ROWS = Bound("LOG_ROWS", 5_000_000, "rows")
 """Rows of a log of rooms, activities or detections."""
 FIXES = Bound("FIXES", 20_000_000, "fixes")
@@ -111,7 +113,7 @@ VARIANTS = Bound("VARIANTS", 1_000_000, "values")
 
 BOUNDS = (
     FILE_BYTES, PICTURE_BYTES, LOG_BYTES, DEPTH, VALUES, JSON_VALUES, PIXELS, POLYGONS, CORNERS,
-    LOG_ROWS, FIXES, LOG_DAYS, LEARNED_BYTES, TABLE_BYTES, VARIANTS,
+    CROSSINGS, LOG_ROWS, FIXES, LOG_DAYS, LEARNED_BYTES, TABLE_BYTES, VARIANTS,
 )  # fmt: skip
 """All bounds."""
 
