@@ -1,12 +1,14 @@
 """Errors of components: which component failed, and at which step."""
 
+import os
 import signal
 import sys
+import threading
 import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NoReturn
 
 from fleet2d.errors import ArtifactError, ComponentError, InputError
 
@@ -34,6 +36,9 @@ class blame:  # noqa: N801  (used as a function)
     now: ClassVar["blame | None"] = None
     """The innermost component whose code is running, for the watchdog."""
 
+    last: ClassVar["blame | None"] = None
+    """The component whose code was called last."""
+
     interrupts: ClassVar[bool] = True
     """Whether Ctrl-C raises KeyboardInterrupt; if not, a component must have raised it."""
 
@@ -43,9 +48,14 @@ class blame:  # noqa: N801  (used as a function)
     def __init__(self, path: str, step: int | None) -> None:
         self.path, self.step = path, step
 
+    @property
+    def time(self) -> str:
+        """When it is running, in words."""
+        return "when it was started" if self.step is None else f"at step {self.step}"
+
     def __enter__(self) -> None:
         """Make this the running component."""
-        self._outer, blame.now = blame.now, self
+        self._outer, blame.now, blame.last = blame.now, self, self
 
     def __exit__(self, kind: Any, error: BaseException | None, trace: Any) -> None:
         """Replace an exception by one that names the component."""
@@ -55,7 +65,7 @@ class blame:  # noqa: N801  (used as a function)
         if isinstance(error, InputError) and self.step is None:
             return
         is_ours = isinstance(error, ComponentError)
-        time = "when it was started" if self.step is None else f"at step {self.step}"
+        time = self.time
         if is_ours and self.path in str(error):
             if time in str(error):
                 return
@@ -92,6 +102,34 @@ def noted_ctrl_c() -> Iterator[None]:
     finally:
         blame.pressed = None
         signal.signal(signal.SIGINT, before)
+
+
+@contextmanager
+def guarded_exit() -> Iterator[None]:
+    """Make `os._exit` of a component's code an error, which else ends the program without a word.
+
+    In another thread it still ends the program, with exit code 1 and a message.
+    """
+    leave, program = os._exit, os.getpid()
+
+    def guarded(status: int) -> NoReturn:
+        caller = sys._getframe(1)
+        package = caller.f_globals.get("__name__", "").partition(".")[0]
+        if os.getpid() != program or package == "fleet2d":  # a child process ends like this
+            leave(status)
+        if threading.current_thread() is threading.main_thread():
+            raise SystemExit(f"os._exit({status})")
+        place = f"{Path(caller.f_code.co_filename).name}:{caller.f_lineno}"
+        last = f"; {blame.last.path} was called last, {blame.last.time}" if blame.last else ""
+        message = f"error: a thread ended the program by os._exit({status}) ({place}){last}"
+        os.write(sys.__stderr__.fileno() if sys.__stderr__ else 2, f"{message}\n".encode())
+        leave(1)
+
+    os._exit = guarded
+    try:
+        yield
+    finally:
+        os._exit = leave
 
 
 def text_of(error: BaseException) -> str:

@@ -1,6 +1,7 @@
 """Code of a user that ends, interrupts, prints, waits or writes where it shouldn't."""
 
 import json
+import subprocess
 import time
 from datetime import timedelta
 from pathlib import Path
@@ -95,7 +96,7 @@ def test_code_that_ends_the_run_is_named_and_the_run_kept(
 
 
 MODULE = """
-import os, sys
+import os, sys, threading, time
 import fleet2d
 
 print("imported")
@@ -109,6 +110,14 @@ class Prints(fleet2d.Algorithm):
         if self.how == "exit" and state.step > 3600:
             sys.exit(0)
         if self.how == "gone" and state.step > 7000:
+            os._exit(0)
+        if self.how == "gone in a thread" and state.step > 90_000:
+            threading.Thread(target=lambda: os._exit(0)).start()
+            time.sleep(60)
+        if self.how == "gone as a thread" and state.step > 90_000:
+            threading.Thread(target=os._exit, args=(0,)).start()
+            time.sleep(60)
+        if self.how == "forks" and not os.fork():
             os._exit(0)
         return {"n": 1.0}
 """
@@ -132,13 +141,39 @@ def test_an_exit_in_an_update_is_exit_code_1(tmp_path: Path) -> None:
     assert "failed" == open_run(tmp_path / "a").status
 
 
-def test_a_process_that_is_gone_leaves_a_run_to_go_on_with(tmp_path: Path) -> None:
-    (tmp_path / "mine.py").write_text(MODULE)
-    override = "algorithms.own={type: mine:Prints, how: gone}"
-    fleet2d_process("run", "simulation.duration=3 h", override, "--out", "a", cwd=tmp_path)
+def run_prints(folder: Path, how: str, duration: str = "3 h") -> subprocess.CompletedProcess[str]:
+    (folder / "mine.py").write_text(MODULE)
+    override = f"algorithms.own={{type: mine:Prints, how: {how}}}"
+    arguments = ("run", f"simulation.duration={duration}", override, "--out", "a")
+    return fleet2d_process(*arguments, cwd=folder)
+
+
+def test_an_exit_without_clean_up_is_exit_code_1_too(tmp_path: Path) -> None:
+    done = run_prints(tmp_path, "gone")
+    assert 1 == done.returncode
+    assert "algorithms.own failed at step 7199: SystemExit: os._exit(0) (mine.py:" in done.stderr
+    assert "failed" == open_run(tmp_path / "a").status
+
+
+@pytest.mark.parametrize(
+    ("how", "place"), [("in a thread", "mine.py:18"), ("as a thread", "threading.py:")]
+)
+def test_a_thread_that_ends_the_program_is_named_and_leaves_the_run(
+    tmp_path: Path, how: str, place: str
+) -> None:
+    """It ended with code 0, without a word. What was committed can be read."""
+    done = run_prints(tmp_path, f"gone {how}", "2 d")
+    assert 1 == done.returncode
+    assert f"a thread ended the program by os._exit(0) ({place}" in done.stderr
+    assert "; algorithms.own was called last, at step 9" in done.stderr
     stored = open_run(tmp_path / "a")
     assert "running" == stored.status
-    assert any("resume" in note for note in stored.notes) or stored.manifest["steps"] == 0
+    assert 86_400 == stored.manifest["steps"]
+    assert any("fleet2d resume" in note for note in stored.notes)
+
+
+def test_a_child_process_of_a_component_may_end(tmp_path: Path) -> None:
+    assert 0 == run_prints(tmp_path, "forks").returncode
 
 
 @pytest.mark.parametrize("code", ["import sys; sys.exit(0)", "raise SystemExit", "exit(3)"])
