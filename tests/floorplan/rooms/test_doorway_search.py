@@ -13,6 +13,7 @@ from tests.thorough import examples
 from fleet2d.floorplan.geometry.gates import Segment
 from fleet2d.floorplan.geometry.mesh import build_mesh
 from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.floorplan.rooms import doorway_search
 from fleet2d.floorplan.rooms.doorway_search import MAX_DOOR_M, MIN_DOOR_M, find_passages
 
 UNITS = 1280.0
@@ -108,6 +109,19 @@ def test_opening_that_is_no_gap_in_a_wall_counts_only_on_request() -> None:
 
     assert [] == passages(free)
     assert MAX_DOOR_M < width(passages(free, gaps_only=False)[0])
+
+
+@pytest.mark.parametrize("batch", [1, 3, 10**6])
+def test_passages_do_not_depend_on_how_many_corners_are_looked_at_together(
+    batch: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A comb of 4,000 teeth took 1.7 GB: all pairs of its corners at once."""
+    teeth = [(1 + k / 10, 3.5, 1.05 + k / 10, 4.5 + (k % 7) / 20) for k in range(30)]
+    free = rooms(LEFT, RIGHT, (3.9, 2, 4.2, 2.9), *teeth)
+    whole = passages(free, gaps_only=False)
+    monkeypatch.setattr(doorway_search, "BATCH", batch)
+    assert whole == passages(free, gaps_only=False)
+    assert whole
 
 
 def test_moved_and_mirrored_plan_has_the_same_passages() -> None:

@@ -6,7 +6,7 @@ These are the critical lines of Thrun, "Learning metric-topological maps for ind
 navigation" (Artificial Intelligence 99, 1998), found on the walls themselves instead of on a grid.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,6 +20,7 @@ from fleet2d.kernels.mesh import Mesh
 
 I64 = NDArray[np.int64]
 F64 = NDArray[np.float64]
+Corners = NDArray[np.intp]
 
 MIN_DOOR_M, MAX_DOOR_M = 0.5, 1.4
 """Widths of doorways, from what a person fits through to a double door."""
@@ -43,6 +44,8 @@ ASIDE_M = 0.06
 """How far beside the line of an opening that wall may be."""
 SIDEWAYS = (-1, 0, 1)
 TINY = 1e-9
+BATCH = 64
+"""Corners that are looked at together: very jagged walls have millions of pairs of them."""
 PER_CORNER = 6
 """Number of passages that are checked for each corner, the shortest first."""
 
@@ -81,8 +84,14 @@ def find_passages(
         corners or within a unit of a wall.
     """
     walls = _walls(polygons)
-    lines = np.concatenate([_corner_to_corner(walls, units_per_m), _to_walls(walls, units_per_m)])
-    lines = _shortest_first(lines)
+    corners = np.flatnonzero(walls.reflex)
+    batches = np.array_split(corners, -(-len(corners) // BATCH) or 1)
+    lines = _shortest_first(
+        np.concatenate([
+            *_corner_to_corner(walls, corners, batches, units_per_m),
+            *_to_walls(walls, batches, units_per_m),
+        ])
+    )  # fmt: skip
     lines = lines[_all_free(mesh, lines)]
     for side in (1, -1):
         lines = lines[_opens(mesh, lines, side, units_per_m)]
@@ -106,39 +115,42 @@ def _walls(polygons: Sequence[Polygon]) -> _Walls:
     return _Walls(start, end, before, reflex)
 
 
-def _corner_to_corner(walls: _Walls, units_per_m: float) -> I64:
-    """Return lines between corners that stand out, int64 (n, 4)."""
-    chosen = np.flatnonzero(walls.reflex)
-    tree = shapely.STRtree(np.asarray(shapely.points(walls.start[chosen])))
-    first, second = tree.query(_around(walls.start[chosen], units_per_m))
-    in_order = first < second
-    first, second = chosen[first[in_order]], chosen[second[in_order]]
-    length2 = _length2(np.hstack([walls.start[first], walls.start[second]]).astype(np.int64))
-    near = length2 <= (MAX_OPENING_M * units_per_m) ** 2
-    first, second = first[near], second[near]
-    shortest = _ends_well(walls, first, walls.start[second])
-    shortest &= _ends_well(walls, second, walls.start[first])
-    lines = np.hstack([walls.start[first[shortest]], walls.start[second[shortest]]])
-    return _of_width(lines.astype(np.int64), units_per_m)
+def _corner_to_corner(
+    walls: _Walls, corners: Corners, batches: Sequence[Corners], units_per_m: float
+) -> Iterator[I64]:
+    """Yield lines between corners that stand out, int64 (n, 4), for each batch of corners."""
+    tree = shapely.STRtree(np.asarray(shapely.points(walls.start[corners])))
+    for batch in batches:
+        first, second = tree.query(_around(walls.start[batch], units_per_m))
+        first, second = batch[first], corners[second]
+        in_order = first < second
+        first, second = first[in_order], second[in_order]
+        length2 = _length2(np.hstack([walls.start[first], walls.start[second]]).astype(np.int64))
+        near = length2 <= (MAX_OPENING_M * units_per_m) ** 2
+        first, second = first[near], second[near]
+        shortest = _ends_well(walls, first, walls.start[second])
+        shortest &= _ends_well(walls, second, walls.start[first])
+        lines = np.hstack([walls.start[first[shortest]], walls.start[second[shortest]]])
+        yield _shortest_first(_of_width(lines.astype(np.int64), units_per_m))
 
 
-def _to_walls(walls: _Walls, units_per_m: float) -> I64:
-    """Return lines from corners that stand out to the nearest point of a wall, int64 (n, 4)."""
-    chosen = np.flatnonzero(walls.reflex)
+def _to_walls(walls: _Walls, batches: Sequence[Corners], units_per_m: float) -> Iterator[I64]:
+    """Yield lines from corners that stand out to the nearest point of a wall, int64 (n, 4)."""
     lines_of = np.asarray(shapely.linestrings(np.stack([walls.start, walls.end], axis=1)))
     tree = shapely.STRtree(lines_of)
-    near, wall = tree.query(_around(walls.start[chosen], units_per_m))
-    corner = chosen[near]
-    at, along = walls.start[wall], walls.end[wall] - walls.start[wall]
-    away = walls.start[corner] - at
-    share = (away * along).sum(axis=1) / (along * along).sum(axis=1)
-    inside = along[:, 0] * away[:, 1] - along[:, 1] * away[:, 0] > 0
-    inside &= (share > 0) & (share < 1)
-    corner, at, along, share = corner[inside], at[inside], along[inside], share[inside]
-    foot = 2 * np.rint((at + share[:, None] * along) / 2)
-    shortest = _ends_well(walls, corner, foot)
-    lines = np.hstack([walls.start[corner[shortest]], foot[shortest]])
-    return _of_width(lines.astype(np.int64), units_per_m)
+    for batch in batches:
+        near, wall = tree.query(_around(walls.start[batch], units_per_m))
+        corner = batch[near]
+        at, along = walls.start[wall], walls.end[wall] - walls.start[wall]
+        away = walls.start[corner] - at
+        share = (away * along).sum(axis=1) / (along * along).sum(axis=1)
+        inside = along[:, 0] * away[:, 1] - along[:, 1] * away[:, 0] > 0
+        inside &= (share > 0) & (share < 1)
+        corner, at, along, share = corner[inside], at[inside], along[inside], share[inside]
+        foot = 2 * np.rint((at + share[:, None] * along) / 2)
+        shortest = _ends_well(walls, corner, foot)
+        lines = np.hstack([walls.start[corner[shortest]], foot[shortest]])
+        yield _shortest_first(_of_width(lines.astype(np.int64), units_per_m))
 
 
 def _around(points: F64, units_per_m: float) -> NDArray[np.object_]:
