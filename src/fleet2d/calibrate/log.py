@@ -2,7 +2,8 @@
 
 import csv
 import math
-from collections.abc import Callable, Mapping
+from array import array
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
@@ -19,6 +20,15 @@ LEAST_ROWS = 50
 MOST_METRES = 100.0  # a larger distance in a home is in another unit
 MOST_DEGREES = 360.0
 TRUE, FALSE = frozenset({"1", "true", "yes"}), frozenset({"0", "false", "no"})
+ANGLES = (
+    "bearing",
+    "bearing_deg",
+    "bearing_rad",
+    "orientation",
+    "orientation_deg",
+    "orientation_rad",
+)
+COLUMNS = frozenset({"distance", "detected", *ANGLES, "identity", "true_identity"})
 UNKNOWN = frozenset({"", "unknown", "none", "null"})
 
 
@@ -60,23 +70,9 @@ def read_log(path: Path) -> DetectionLog:
         InputError: The file can't be read, lacks a column, or has a wrong value; the message names
             the line and the column.
     """
-    try:
-        check_file(path, LOG_BYTES)
-        with path.open(encoding="utf-8-sig", newline="") as file:
-            reader = csv.DictReader(file)
-            columns = [name.strip() for name in reader.fieldnames or ()]
-            reader.fieldnames = columns
-            rows = [(reader.line_num, row) for row in islice(reader, LOG_ROWS.most + 1)]
-        LOG_ROWS.check(len(rows), path, least="at least ")
-    except UnicodeDecodeError:
-        raise InputError(f"{path} is not text in UTF-8: save it as a CSV file in UTF-8") from None
-    except (OSError, csv.Error) as error:
-        why = getattr(error, "strerror", None) or error
-        raise InputError(f"{path} can't be read: {why}") from None
-    _check_columns(path, columns)
-    table = _LogTable(path, columns, rows)
-    if len(rows) < LEAST_ROWS:
-        raise InputError(f"{path} has {len(rows)} rows: a fit needs at least {LEAST_ROWS}")
+    table = _read_table(path)
+    if len(table) < LEAST_ROWS:
+        raise InputError(f"{path} has {len(table)} rows: a fit needs at least {LEAST_ROWS}")
     has_identity = table.has("identity") and table.has("true_identity")
     log = DetectionLog(
         path,
@@ -88,7 +84,7 @@ def read_log(path: Path) -> DetectionLog:
         table.names("identity") if has_identity else None,
     )
     if log.true_identity is not None and (log.true_identity == "").any():
-        line = rows[int(np.argmax(log.true_identity == ""))][0]
+        line = table.lines[int(np.argmax(log.true_identity == ""))]
         raise InputError(f"{path}:{line}: true_identity is empty: who it was must be known")
     if log.detected.all() or not log.detected.any():
         every = "all" if log.detected.any() else "none"
@@ -104,6 +100,25 @@ def recognized(log: DetectionLog) -> NDArray[np.bool_]:
     assert log.identity is not None
     assert log.true_identity is not None
     return np.equal(log.true_identity, log.identity)[log.detected]
+
+
+def _read_table(path: Path) -> "_LogTable":
+    try:
+        check_file(path, LOG_BYTES)
+        with path.open(encoding="utf-8-sig", newline="") as file:
+            reader = csv.reader(file)
+            columns = [name.strip() for name in next(reader, [])]
+            _check_columns(path, columns)
+            table = _LogTable(path, columns)
+            for row in islice(filter(None, reader), LOG_ROWS.most + 1):
+                table.add(reader.line_num, row)
+        LOG_ROWS.check(len(table), path, least="at least ")
+    except UnicodeDecodeError:
+        raise InputError(f"{path} is not text in UTF-8: save it as a CSV file in UTF-8") from None
+    except (OSError, csv.Error) as error:
+        why = getattr(error, "strerror", None) or error
+        raise InputError(f"{path} can't be read: {why}") from None
+    return table
 
 
 def _check_columns(path: Path, columns: list[str]) -> None:
@@ -124,32 +139,41 @@ def _check_columns(path: Path, columns: list[str]) -> None:
 
 
 class _LogTable:
-    """The rows of a file, and which line each is on."""
+    """The columns of a file that have a meaning, and which line each row is on."""
 
-    def __init__(
-        self, path: Path, columns: list[str], rows: list[tuple[int, dict[str, str]]]
-    ) -> None:
-        self.path, self.columns, self.rows = path, columns, rows
+    def __init__(self, path: Path, columns: list[str]) -> None:
+        self.path = path
+        self.lines = array("q")  # a log has millions of rows
+        self._cells: dict[str, list[str]] = {name: [] for name in columns if name in COLUMNS}
+        self._places = [(columns.index(name), cells) for name, cells in self._cells.items()]
+
+    def __len__(self) -> int:
+        return len(self.lines)
+
+    def add(self, line: int, row: list[str]) -> None:
+        """Add a row; what it lacks is empty."""
+        self.lines.append(line)
+        for place, cells in self._places:
+            cells.append(row[place].strip() if place < len(row) else "")
 
     def has(self, column: str) -> bool:
-        return column in self.columns
+        return column in self._cells
 
     def column(self, name: str, read: Callable[[str], float]) -> F64:
         """Return a column of numbers."""
-        values = np.empty(len(self.rows))
-        for i, (line, row) in enumerate(self.rows):
-            text = _cell(row, name)
+        values = np.empty(len(self))
+        for i, text in enumerate(self._cells[name]):
             try:
                 values[i] = read(text)
             except ValueError as error:
                 raise InputError(
-                    f"{self.path}:{line}: {name}: expected {error}, got {one_line(text)!r}"
+                    f"{self.path}:{self.lines[i]}: {name}: expected {error}, got {one_line(text)!r}"
                 ) from None
         return values
 
     def names(self, name: str) -> NDArray[np.str_]:
         """Return a column of names of people; empty for unknown people."""
-        texts = [_cell(row, name) for _, row in self.rows]
+        texts = self._cells[name]
         return np.array(["" if text.lower() in UNKNOWN else text for text in texts])
 
     def angle(self, name: str) -> F64 | None:
@@ -170,10 +194,6 @@ class _LogTable:
                 f" {name}_rad"
             )
         return None
-
-
-def _cell(row: Mapping[str, str | None], name: str) -> str:
-    return (row.get(name) or "").strip()
 
 
 def _number(text: str) -> float:
