@@ -288,3 +288,23 @@ def test_a_full_disk_keeps_what_was_committed(
     run = open_run(tmp_path / "run")
     assert 300 == run.arrow("every_kind").num_rows
     Ledger(tmp_path / "run").lock()  # nobody holds it any more
+
+
+@pytest.mark.parametrize("status", ["complete", "interrupted"])
+def test_a_disk_that_fails_when_the_journal_is_closed_ends_no_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, status: Any
+) -> None:
+    """Network file systems report late that they are full; nothing of the journal is needed."""
+    store = begin_run(tmp_path / "run")
+    close = os.close
+
+    def fail(handle: int) -> None:
+        close(handle)
+        raise OSError(5, "Input/output error")
+
+    assert store._ledger is not None
+    handle = store._ledger.journal._handle
+    monkeypatch.setattr("fleet2d.artifacts.journal.os.close", lambda h: (fail if h == handle else close)(h))  # fmt: skip
+    store.close(status)
+    assert status == open_run(tmp_path / "run").status
+    Ledger(tmp_path / "run").lock()  # nobody holds it any more

@@ -13,7 +13,7 @@ import struct
 import sys
 import zlib
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, BinaryIO, Literal, NamedTuple
@@ -171,14 +171,12 @@ class JournalWriter:
         """Close the file; with `undo`, remove what was written since the last commit."""
         if self._handle < 0:
             return
-        try:
-            if undo:
-                os.ftruncate(self._handle, self.end)
-        except OSError:
-            pass  # readers ignore it anyway
-        finally:
-            os.close(self._handle)
-            self._handle = -1
+        handle, self._handle = self._handle, -1
+        if undo:
+            with suppress(OSError):  # readers ignore it anyway
+                os.ftruncate(handle, self.end)
+        with suppress(OSError):  # what has to be on the disk was synced before
+            os.close(handle)
 
     def _append(self, kind: Kind, description: str, content: bytes = b"") -> None:
         text, number = description.encode(), _KINDS.index(kind)
