@@ -65,13 +65,12 @@ class blame:  # noqa: N801  (used as a function)
         if isinstance(error, InputError) and self.step is None:
             return
         is_ours = isinstance(error, ComponentError)
-        time = self.time
         if is_ours and self.path in str(error):
-            if time in str(error):
+            if self.time in str(error):
                 return
-            raise ComponentError(f"{error} ({time})") from error
+            raise ComponentError(f"{error} ({self.time})") from error
         message = str(error) if is_ours else f"{type(error).__name__}: {text_of(error)}"
-        raise ComponentError(f"{self.path} failed {time}: {message}{_place(error)}") from error
+        raise ComponentError(f"{self.path} failed {self.time}: {message}{_place(error)}") from error
 
 
 def may_be_ctrl_c(error: BaseException) -> bool:
@@ -87,7 +86,7 @@ def end_by_signal(*_: object) -> None:
 
 
 @contextmanager
-def noted_ctrl_c() -> Iterator[None]:
+def ctrl_c_watch() -> Iterator[None]:
     """Note whether Ctrl-C is pressed, so that an interrupt without it is a component's own."""
     before = signal.getsignal(signal.SIGINT)
     if before not in (signal.default_int_handler, signal.SIG_IGN):  # a program's own
@@ -105,7 +104,7 @@ def noted_ctrl_c() -> Iterator[None]:
 
 
 @contextmanager
-def guarded_exit() -> Iterator[None]:
+def exit_guard() -> Iterator[None]:
     """Make `os._exit` of a component's code an error, which else ends the program without a word.
 
     In another thread it still ends the program, with exit code 1 and a message.
@@ -122,7 +121,7 @@ def guarded_exit() -> Iterator[None]:
         place = f"{Path(caller.f_code.co_filename).name}:{caller.f_lineno}"
         last = f"; {blame.last.path} was called last, {blame.last.time}" if blame.last else ""
         message = f"error: a thread ended the program by os._exit({status}) ({place}){last}"
-        os.write(sys.__stderr__.fileno() if sys.__stderr__ else 2, f"{message}\n".encode())
+        os.write(2, f"{message}\n".encode())
         leave(1)
 
     os._exit = guarded

@@ -217,7 +217,7 @@ def last_commit(path: Path) -> Commit | None:
     """
     commit = None
     names: list[str] = []
-    with _naming_damage(path):
+    with _damage_of(path):
         for kind, description, _, end in _frames(path):
             if kind == "table":
                 names.append(_spec_of(description).name)
@@ -239,7 +239,7 @@ def read_journal(path: Path, end: int) -> Iterator[LoggedRows]:
     """
     specs: list[TableSpec] = []
     words: list[dict[str, Dictionary]] = []
-    with _naming_damage(path):
+    with _damage_of(path):
         for kind, description, content, stop in _frames(path):
             if stop > end:
                 break
@@ -258,7 +258,7 @@ def read_journal(path: Path, end: int) -> Iterator[LoggedRows]:
 
 
 @contextmanager
-def _naming_damage(path: Path) -> Iterator[None]:
+def _damage_of(path: Path) -> Iterator[None]:
     """Name the file if a frame with a right checksum has a wrong content."""
     try:
         yield

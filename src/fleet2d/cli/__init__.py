@@ -5,7 +5,7 @@ import os
 import sys
 from typing import NoReturn
 
-from fleet2d.blame import guarded_exit, noted_ctrl_c
+from fleet2d.blame import exit_guard, ctrl_c_watch
 from fleet2d.errors import Fleet2DError, InputError
 from fleet2d.garbage import keep_free_memory, rare_collections
 
@@ -18,7 +18,7 @@ def main() -> NoReturn:
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     keep_free_memory()
     try:
-        with noted_ctrl_c(), guarded_exit(), rare_collections():
+        with ctrl_c_watch(), exit_guard(), rare_collections():
             from fleet2d.cli.app import app
 
             gc.freeze()  # modules live to the end: the collector needn't scan them

@@ -40,21 +40,19 @@ class Interruptions(Watcher):
         self._ahead: dict[Wait, NDArray[np.bool_]] = {}  # whether it holds in the present span
         self._last: list[Wait] = []
         self._interrupts: dict[str, Interrupt] = {}
+        self._files: dict[type[Interrupt], list[Path]] = {}  # of each class of the user's own
 
     def __getstate__(self) -> dict[str, object]:
         """Leave out the interrupts, which follow from their names."""
-        return {**self.__dict__, "_interrupts": {}}
+        return {**self.__dict__, "_interrupts": {}, "_files": {}}
 
     @property
     def files(self) -> list[Path]:
         """The files of the user's own interrupts for which plans waited."""
-        own = {type(i) for i in self._interrupts.values()}
-        return [
-            path
-            for cls in own
-            if not cls.__module__.startswith("fleet2d.")
-            for path in source_files(cls)
-        ]
+        for cls in {type(interrupt) for interrupt in self._interrupts.values()}:
+            if cls not in self._files and not cls.__module__.startswith("fleet2d."):
+                self._files[cls] = source_files(cls)  # it reads them: once, not at every commit
+        return [path for files in self._files.values() for path in files]
 
     @property
     def waits(self) -> bool:

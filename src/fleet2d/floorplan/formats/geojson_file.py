@@ -20,7 +20,7 @@ from shapely.geometry.base import BaseGeometry
 from fleet2d.bounds import POLYGONS
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.formats.fields import MAX_COORDINATE_M, clean_coordinate, shown_value
-from fleet2d.floorplan.geometry.repair import repaired
+from fleet2d.floorplan.geometry.repair import repair
 from fleet2d.floorplan.rooms.vocabulary import room_type
 from fleet2d.problems import suggest
 
@@ -145,7 +145,7 @@ def in_metres(
     for feature in features:
         shape = shapely.transform(feature.shape, move)
         if not shape.is_valid:  # rounding may close a narrow place
-            shape = repaired(shape)
+            shape = repair(shape)
         if shape.is_empty:
             notes.append(f"{feature.where}, {feature.kind}, has no extent: ignored")
         else:
@@ -278,7 +278,7 @@ def _shape(geometry: object, kind: str, where: str, notes: list[str]) -> BaseGeo
         return shape
     at = shapely.is_valid_reason(shape).rpartition("[")[2].rstrip("]").replace(" ", ", ")
     notes.append(f"{where} touches or crosses itself at ({at}): everything inside it is used")
-    return repaired(shape)
+    return repair(shape)
 
 
 # --- Units -------------------------------------------------------------------------------------

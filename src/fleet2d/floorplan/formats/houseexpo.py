@@ -11,7 +11,7 @@ from shapely.geometry import MultiPolygon
 from fleet2d.component import register
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.formats.fields import BoxSides, Listed, Point, Ring, list_of, validate
-from fleet2d.floorplan.geometry.repair import repaired
+from fleet2d.floorplan.geometry.repair import repair
 from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
 from fleet2d.floorplan.source import FloorPlanSource, in_file, read_json
 from fleet2d.paths import InputPath
@@ -91,7 +91,7 @@ def _free_space(corners: list[Point]) -> tuple[Polygon | MultiPolygon, list[str]
     # Traced outlines touch themselves where a passage is no wider than a pixel, and may cross. All
     # that they go round is inside ("structure" is nonzero winding): even-odd would put a wall into
     # the room where a loop overlaps itself.
-    sound = repaired(outline)
+    sound = repair(outline)
     at = shapely.is_valid_reason(outline).rpartition("[")[2].rstrip("]").replace(" ", ", ")
     parts = [part for part in shapely.get_parts(sound) if part.geom_type == "Polygon"]
     note = f"the outline touches or crosses itself at ({at}) m: everything inside it is free"

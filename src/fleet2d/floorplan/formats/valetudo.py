@@ -33,7 +33,7 @@ from fleet2d.floorplan.formats.valetudo_file import (
     read_layers,
     read_points,
 )
-from fleet2d.floorplan.geometry.repair import repaired
+from fleet2d.floorplan.geometry.repair import repair
 from fleet2d.floorplan.names import distinct_names
 from fleet2d.floorplan.objects import PlacedObject, UsePlace
 from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
@@ -260,7 +260,7 @@ def _no_go_shape(corners: NDArray[np.float64], kind: str) -> BaseGeometry:
         return LineString(corners).buffer(0.5, cap_style="flat", join_style="mitre")
     if len(corners) < 3:
         return Polygon()
-    return repaired(Polygon(corners))
+    return repair(Polygon(corners))
 
 
 def _parts_in_metres(shape: BaseGeometry, pixel_m: float) -> list[Polygon]:

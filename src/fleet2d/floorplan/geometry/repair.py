@@ -13,7 +13,7 @@ from fleet2d.errors import FloorPlanError
 _EDGES = 64
 
 
-def repaired(shape: BaseGeometry) -> BaseGeometry:
+def repair(shape: BaseGeometry) -> BaseGeometry:
     """Return the area that an invalid shape encloses: all that its outlines go round is inside.
 
     Raises:
@@ -21,7 +21,7 @@ def repaired(shape: BaseGeometry) -> BaseGeometry:
 
     Example:
         >>> bow = shapely.Polygon([(0, 0), (2, 2), (2, 0), (0, 2)])
-        >>> repaired(bow).area
+        >>> repair(bow).area
         2.0
     """
     _check_crossings(shape)
