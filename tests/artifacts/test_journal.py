@@ -15,12 +15,14 @@ import pytest
 from tests.thorough import examples
 
 from fleet2d.artifacts import journal
+from fleet2d.artifacts.encoding import ArrayReader
 from fleet2d.artifacts.journal import FOLDER, JOURNAL_NAME, last_commit
 from fleet2d.artifacts.ledger import Ledger
 from fleet2d.artifacts.lock import LOCK_NAME, RunLock
 from fleet2d.artifacts.store import RunStore
-from fleet2d.artifacts.table import Column, TableSpec
+from fleet2d.artifacts.table import DTYPES, Column, TableSpec
 from fleet2d.errors import ArtifactError, RunDirectoryError
+from fleet2d.kernels.encoding import encode_arrays
 from fleet2d.runs.run import open_run, run_of
 
 from .tables import EVERY_KIND, part, rows_of_every_kind, stored
@@ -148,7 +150,7 @@ Frame = tuple[str, Any, bytes]
 
 def with_frames(path: Path, change: Callable[[list[Frame]], None]) -> None:
     """Change the frames of a journal; their checksums are right afterwards."""
-    frames = [frame[:3] for frame in journal._frames(path)]
+    frames: list[Frame] = [frame[:3] for frame in journal._frames(path)]
     change(frames)
     content = journal.MAGIC
     for kind, description, arrays in frames:
@@ -202,6 +204,68 @@ def test_forged_frames_read_or_are_refused(tmp_path: Path) -> None:
         except (ArtifactError, RunDirectoryError):
             results["refused"] += 1
     assert min(results["read"], results["refused"]) > 20
+
+
+def changed_rows(arrays: bytes, rows: int, name: str, change: Callable[[Any], Any]) -> bytes:
+    """Encode rows of EVERY_KIND again, with the values of one column changed."""
+    reader = ArrayReader(arrays)
+    parts: list[Any] = []
+    for column in EVERY_KIND.columns:
+        is_text = column.kind == "string"
+        lengths = reader.read(np.dtype(np.int64), rows) if is_text else None
+        valid = reader.read(np.dtype(np.bool_), rows) if column.nullable else None
+        dtype = np.dtype(np.uint8) if is_text else DTYPES[column.kind]
+        values = reader.read(dtype, rows if lengths is None else int(lengths.sum()))
+        if column.name == name:
+            values, lengths = change((values, lengths)) if is_text else (change(values), lengths)
+        parts += [part for part in (lengths, valid, values) if part is not None]
+    return encode_arrays(parts)
+
+
+def put_all(values: Any, value: Any) -> Any:
+    values[:] = value
+    return values
+
+
+def negative_length(text: Any) -> Any:
+    values, lengths = text
+    lengths[0], lengths[1] = -1, lengths[0] + lengths[1] + 1
+    return values, lengths
+
+
+def moved_border(text: Any) -> Any:
+    """Let one text end inside a letter of two bytes, and the next begin there."""
+    values, lengths = text
+    at = next(k for k in range(len(lengths)) if values[lengths[:k].sum()] >= 0xC0 and lengths[k])
+    lengths[at - 1] += 1
+    lengths[at] -= 1
+    return values, lengths
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "words"),
+    [
+        ("room", lambda values: put_all(values, 3), "expected 0 to 2"),
+        ("what", lambda values: put_all(values, -1), "expected 0 to "),
+        ("time", lambda values: put_all(values, 2**60), "expected -62135596800000000 to"),
+        ("said", negative_length, "a text of -1 bytes"),
+        ("said", moved_border, "can't decode byte"),
+    ],
+)
+def test_rows_that_no_run_stores_are_refused(
+    tmp_path: Path, name: str, change: Callable[[Any], Any], words: str
+) -> None:
+    directory = kill(begin_run(tmp_path / "run"))
+    path = directory / FOLDER / JOURNAL_NAME
+
+    def forge(frames: list[Frame]) -> None:
+        at = next(k for k, frame in enumerate(frames) if frame[0] == "rows")
+        kind, description, arrays = frames[at]
+        frames[at] = kind, description, changed_rows(arrays, description[1], name, change)
+
+    with_frames(path, forge)
+    with pytest.raises(ArtifactError, match=f"journal is damaged .*{words}"):
+        open_run(directory).arrow("every_kind")
 
 
 def test_two_tables_of_one_name_are_refused(tmp_path: Path) -> None:

@@ -125,6 +125,62 @@ def test_what_is_asked_for_is_used() -> None:
     assert ((1000, 5, 5, 0, 0), 0, [], [(7, 0, 0)]) == (end, posture, postures, notes)
 
 
+class Rooms(Room):
+    """A home of rooms with a spot each."""
+
+    def spots(self, room: int) -> list[tuple[int, int]]:
+        return [(5 + room, 5)]
+
+
+def walks_of(
+    stints: list[tuple[Scene, int, int, int, bool]], **answers: Any
+) -> list[tuple[int, int]]:
+    """Return the spots to which somebody walks, 7 us each, who does activities from 0 on."""
+    spots = []
+
+    def walk(course: Any, place: tuple[int, int, int]) -> Any:
+        spots.append(place[1:])
+        return (course[0][0] + 7, *place[1:], 0, 0), 0
+
+    resident, until = Resident(1, 100.0, 100.0, None, []), stints[-1][2]
+    now = (0, 0, 0, 0, 0)
+    resident.live(Rooms(**answers), walk, Legs(), now, 0, stints, until, False, LastStint())
+    return spots
+
+
+def test_who_was_interrupted_returns_to_where_the_planned_activity_was_done() -> None:
+    scenes = [Scene(None, 0, False, 0, 0, [room], [], [], [], None) for room in range(3)]
+    planned, interrupts, resumes = 0, 1, 2
+    rows = [(scenes[0], 0, 100, planned), (scenes[1], 1, 200, interrupts)]
+    rows += [(scenes[2], 2, 300, resumes)]
+    assert [(5, 5), (6, 5), (5, 5)] == walks_of([(*row, False) for row in rows])
+
+
+EVERY_10_S = Waits(np.array([10 * SECOND_US] * 2))
+DUE_US = 7 + 10 * SECOND_US
+
+
+def test_no_move_begins_in_the_last_ninety_seconds() -> None:
+    walks = {}
+    for more_us in (0, 1):
+        moves = Scene(None, 0, False, 0, 0, [0, 1], [], [], [(1, EVERY_10_S)], None)
+        end_us = DUE_US + 90 * SECOND_US + more_us
+        walks[more_us] = [len(walks_of([(moves, number, end_us, 0, False)])) for number in range(9)]
+    assert {1} == set(walks[0])
+    assert {1, 2} == set(walks[1])  # some stay in their room
+
+
+@pytest.mark.parametrize(("more_us", "walks"), [(0, 1), (1, 3)])
+@pytest.mark.parametrize("wait_us", [0, 20 * SECOND_US])
+def test_nothing_is_fetched_without_time_to_wait_and_return(
+    wait_us: int, more_us: int, walks: int
+) -> None:
+    takes_5_s = ([5, 5], 5, 5, 0, 1 << 24)
+    fetches = Scene(None, 0, False, 0, 0, [0], [], [1], [(2, EVERY_10_S)], takes_5_s)
+    end_us = DUE_US + wait_us + 5 * SECOND_US + 90 * SECOND_US + more_us
+    assert walks == len(walks_of([(fetches, 0, end_us, 0, False)], wait=wait_us))
+
+
 @pytest.mark.parametrize(
     ("place", "value", "message"),
     [

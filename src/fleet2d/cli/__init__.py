@@ -5,7 +5,7 @@ import os
 import sys
 from typing import NoReturn
 
-from fleet2d.blame import exit_guard, ctrl_c_watch
+from fleet2d.blame import ctrl_c_watch, exit_guard
 from fleet2d.errors import Fleet2DError, InputError
 from fleet2d.garbage import keep_free_memory, rare_collections
 
