@@ -19,20 +19,19 @@ from typing import Any
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.geometry.gates import Gates
 from fleet2d.floorplan.geometry.mesh import build_mesh
 from fleet2d.floorplan.load import load_floorplan
 from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.kernels import I64, Bool
 from fleet2d.kernels.chambers import pairs_in_sight
 from fleet2d.kernels.mesh import CELL_CENTRE, SUB, Mesh
 from fleet2d.kernels.points import points_in_sight
 from fleet2d.kernels.region import region_contains_points, visible_region
 from fleet2d.kernels.seen import Reach, cells_in_view, mark_spans
 
-I64 = NDArray[np.int64]
 Turn = Callable[[Any], Any]
 
 FILES = ("houseexpo/*.json", "ros_maps/*/map.yaml", "valetudo/*.json")
@@ -42,7 +41,7 @@ ALL_ROUND = Reach(0, 1 << 40, 4096)
 RESULTS = ("line of sight", "the line back", "visible region", "cells in view")
 
 
-def seen_past_every_wall(walls: I64, doors: I64, x: int, y: int, points: I64) -> NDArray[np.bool_]:
+def seen_past_every_wall(walls: I64, doors: I64, x: int, y: int, points: I64) -> Bool:
     """Return which points are visible by the strict rule: every wall and every door is tried."""
     eye = np.array([[x, y]])
     if not inside(walls, eye)[0]:
@@ -52,7 +51,7 @@ def seen_past_every_wall(walls: I64, doors: I64, x: int, y: int, points: I64) ->
     return np.concatenate([inside(walls, p) & ~touches_any(solid, x, y, p) for p in parts])
 
 
-def inside(walls: I64, points: I64) -> NDArray[np.bool_]:
+def inside(walls: I64, points: I64) -> Bool:
     """Return for which points a ray to the right crosses an odd number of walls."""
     ax, ay, bx, by = walls.T
     x, y = points.T[:, :, None]
@@ -61,7 +60,7 @@ def inside(walls: I64, points: I64) -> NDArray[np.bool_]:
     return np.asarray(crossed.sum(axis=1) % 2 == 1)
 
 
-def touches_any(walls: I64, qx: int, qy: int, points: I64) -> NDArray[np.bool_]:
+def touches_any(walls: I64, qx: int, qy: int, points: I64) -> Bool:
     """Return for which points the closed segment from q to the point touches a wall."""
     ax, ay, bx, by = walls.T
     px, py = points.T[:, :, None]

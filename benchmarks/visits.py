@@ -10,13 +10,12 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fleet2d.fit.timeline import read_seconds, runs
+from fleet2d.kernels import I16
 from fleet2d.logs.log import AWAY, ActivityLog, LogError
 from fleet2d.logs.read import read_log
 
-I16 = NDArray[np.int16]
 DAY_S, HOUR_S = 86_400, 3_600
 # A shorter time in a room is not counted as a visit [s].
 PASSING_S = 15

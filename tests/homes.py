@@ -7,17 +7,15 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 import shapely
 from shapely.geometry import Polygon
 from tests.thorough import some
 
 from fleet2d.floorplan.geometry.mesh import build_mesh, snap_polygon
+from fleet2d.kernels import F64, I64
 from fleet2d.kernels.mesh import Mesh, rasterize_cells
 
-Int64 = npt.NDArray[np.int64]
-Float64 = npt.NDArray[np.float64]
-Turn = Callable[[Float64], Float64]
+Turn = Callable[[F64], F64]
 
 SUB = 64
 CELL_M = 0.05
@@ -35,19 +33,19 @@ class Home(NamedTuple):
     """
 
     polygons: list[Polygon]
-    walls: Int64
+    walls: I64
     mesh: Mesh
     rows: int
     columns: int
 
     @property
-    def cells(self) -> Int64:
+    def cells(self) -> I64:
         """The centres of all free cells: int64 (n, 2), x and y."""
         rows, columns = np.nonzero(rasterize_cells(self.mesh, self.rows, self.columns) >= 0)
         return np.stack([columns, rows], axis=1).astype(np.int64) * SUB + 33
 
 
-def walls_of(polygons: Sequence[Polygon]) -> Int64:
+def walls_of(polygons: Sequence[Polygon]) -> I64:
     """Return every wall of the polygons: int64 (w, 4), free space on its left, none ends flat."""
     walls: list[list[int]] = []
     for polygon in polygons:
@@ -106,9 +104,7 @@ def turns(home: Home) -> Iterator[Turn]:
     for mirrored in (False, True):
         for quarters in range(4):
 
-            def turn(
-                points: Float64, quarters: int = quarters, mirrored: bool = mirrored
-            ) -> Float64:
+            def turn(points: F64, quarters: int = quarters, mirrored: bool = mirrored) -> F64:
                 x, y = points[:, 0], points[:, 1]
                 for _ in range(quarters):
                     x, y = size - y, x
@@ -137,7 +133,7 @@ def shuffled(mesh: Mesh, rng: np.random.Generator, rounds: int = 8) -> Mesh:
     return meshed(mesh, triangles)
 
 
-def _turns_left(vertices: Int64, a: int, b: int, c: int) -> bool:
+def _turns_left(vertices: I64, a: int, b: int, c: int) -> bool:
     (ax, ay), (bx, by), (cx, cy) = (vertices[i].tolist() for i in (a, b, c))
     return bool((bx - ax) * (cy - ay) - (by - ay) * (cx - ax) > 0)
 
@@ -149,7 +145,7 @@ def meshed(mesh: Mesh, triangles: list[list[int]]) -> Mesh:
     return Mesh(mesh.vertices, np.array(triangles, np.int32), np.array(neighbors, np.int32))
 
 
-def awkward_points(home: Home, rng: np.random.Generator, count: int) -> Int64:
+def awkward_points(home: Home, rng: np.random.Generator, count: int) -> I64:
     """Return about seven times `count` points, most of them where rounding would go wrong.
 
     Centres of free cells, middles of inner edges of the mesh, points in line with two corners,
@@ -176,7 +172,7 @@ def awkward_points(home: Home, rng: np.random.Generator, count: int) -> Int64:
     ).astype(np.int64)
 
 
-def behind_corners(home: Home, eye: Int64, rng: np.random.Generator, count: int) -> Int64:
+def behind_corners(home: Home, eye: I64, rng: np.random.Generator, count: int) -> I64:
     """Return points in line with `eye` and a corner: before the corner, behind it, and at it."""
     corners = rng.choice(home.mesh.vertices, count)
     away = corners - eye

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fleet2d.errors import InputError
+from fleet2d.kernels import I64
 
 MICROSECOND = timedelta(microseconds=1)
 HOUR_US = 3_600_000_000
@@ -39,11 +40,11 @@ class Clock:
         """Return the local time of a step."""
         return self.start + step * self.step_us * MICROSECOND
 
-    def times(self, steps: NDArray[np.int64]) -> NDArray[np.datetime64]:
+    def times(self, steps: I64) -> NDArray[np.datetime64]:
         """Return the local times of steps, datetime64[us]."""
         return self.moments(steps * self.step_us)
 
-    def moments(self, elapsed_us: NDArray[np.int64]) -> NDArray[np.datetime64]:
+    def moments(self, elapsed_us: I64) -> NDArray[np.datetime64]:
         """Return the local times of moments given in microseconds since the start."""
         return np.datetime64(self.start, "us") + elapsed_us.astype("m8[us]")
 

@@ -4,11 +4,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from fleet2d.calibrate.log import DetectionLog
-
-Float64 = npt.NDArray[np.float64]
+from fleet2d.kernels import F64
 
 TRUE = {
     "top": 0.93, "distance midpoint": 4.0, "distance width": 0.6,
@@ -16,11 +14,11 @@ TRUE = {
 }  # fmt: skip
 
 
-def falling(x: Float64, midpoint: float, width: float) -> Float64:
+def falling(x: F64, midpoint: float, width: float) -> F64:
     return 1 / (1 + np.exp((x - midpoint) / width))
 
 
-def shares(distance: Float64, bearing: Float64 | None, turned: Float64 | None) -> Float64:
+def shares(distance: F64, bearing: F64 | None, turned: F64 | None) -> F64:
     """Return the probability of each row to be noticed."""
     p = TRUE["top"] * falling(distance, TRUE["distance midpoint"], TRUE["distance width"])
     if bearing is not None:

@@ -2,11 +2,12 @@
 
 import numpy as np
 import pytest
-from tests.calibrate.logs import TRUE, Float64, shares, simulated
+from tests.calibrate.logs import TRUE, shares, simulated
 from tests.thorough import some
 
 from fleet2d.calibrate.factors import Constant, Falling, Orientation
 from fleet2d.calibrate.likelihood import ProductLikelihood, wilson
+from fleet2d.kernels import F64
 
 
 def test_derivatives_of_the_factors_are_those_of_finite_differences() -> None:
@@ -99,10 +100,10 @@ class Known:
     most: tuple[float, ...] = ()
     starts: tuple[tuple[float, ...], ...] = ((),)
 
-    def __init__(self, factor: Float64) -> None:
+    def __init__(self, factor: F64) -> None:
         self._factor = factor
 
-    def shares(self, theta: Float64) -> tuple[Float64, Float64]:
+    def shares(self, theta: F64) -> tuple[F64, F64]:
         return self._factor, np.zeros((len(self._factor), 0))
 
     def natural(self, index: int, value: float) -> float:

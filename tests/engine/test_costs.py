@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 import shapely
-from numpy.typing import NDArray
 from tests.scenes import TESTS, digests, everything, flat_document, path, run, scenario
 
 from fleet2d import Algorithm, Behavior, History, Home, Present
 from fleet2d.engine.simulation import Simulation
 from fleet2d.errors import InputError
+from fleet2d.kernels import Bool
 from fleet2d.runs.layers import read_layer
 
 HERE = f"{TESTS.as_posix()}/engine/test_costs"
@@ -45,9 +45,9 @@ def flat_with_a_rug(folder: Path, costmap: Any, **more: Any) -> dict[str, Any]:
     return {**content, **more}
 
 
-def on_the_rug(stored: Any, name: str = "astro", margin: float = 0.0) -> NDArray[np.bool_]:
+def on_the_rug(stored: Any, name: str = "astro", margin: float = 0.0) -> Bool:
     poses = path(stored, name)
-    inside: NDArray[np.bool_] = shapely.contains_xy(RUG.buffer(margin), poses.x, poses.y)
+    inside: Bool = shapely.contains_xy(RUG.buffer(margin), poses.x, poses.y)
     return inside
 
 

@@ -5,13 +5,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from tests.scenes import OWN, path, run, scenario
 
 from fleet2d.engine.simulation import Simulation
 from fleet2d.entities.motion import RandomWalk
 from fleet2d.floorplan.home.home import Home
 from fleet2d.floorplan.objects import POSTURES
+from fleet2d.kernels import F64
 
 
 def walker(duration: str = "30 min", step: str = "1 s", **fields: Any) -> dict[str, Any]:
@@ -22,7 +22,7 @@ def walker(duration: str = "30 min", step: str = "1 s", **fields: Any) -> dict[s
     return content
 
 
-def walk(content: dict[str, Any]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def walk(content: dict[str, Any]) -> tuple[F64, F64]:
     """Return the metres and the turn [deg] of each step."""
     poses = path(run(content), "ben")
     metres = np.sqrt(np.diff(poses.x) ** 2 + np.diff(poses.y) ** 2)

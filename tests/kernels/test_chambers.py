@@ -2,10 +2,10 @@ import numpy as np
 import shapely
 from hypothesis import given
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 from tests.reference.chambers import nearest_labels
 
 from fleet2d.floorplan.geometry.mesh import build_mesh
+from fleet2d.kernels import I32, Bool
 from fleet2d.kernels.chambers import (
     fill_from_neighbors,
     label_frames,
@@ -17,7 +17,7 @@ from fleet2d.kernels.sight import line_of_sight
 
 
 @st.composite
-def labelled(draw: st.DrawFn) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
+def labelled(draw: st.DrawFn) -> tuple[I32, Bool]:
     rows, columns = draw(st.integers(1, 9)), draw(st.integers(1, 9))
     cells = st.lists(st.integers(-6, 3), min_size=rows * columns, max_size=rows * columns)
     drawn = np.array(draw(cells)).reshape(rows, columns)
@@ -26,7 +26,7 @@ def labelled(draw: st.DrawFn) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
 
 @given(labelled())
 def test_labels_spread_as_growing_them_step_by_step_does(
-    drawn: tuple[NDArray[np.int32], NDArray[np.bool_]],
+    drawn: tuple[I32, Bool],
 ) -> None:
     labels, mask = drawn
 
@@ -48,7 +48,7 @@ def test_pairs_see_each_other_as_one_by_one() -> None:
 
 @given(labelled())
 def test_frames_are_the_boxes_of_the_cells_of_each_label(
-    drawn: tuple[NDArray[np.int32], NDArray[np.bool_]],
+    drawn: tuple[I32, Bool],
 ) -> None:
     labels, _ = drawn
     frames = label_frames(labels, 4)
@@ -64,7 +64,7 @@ def test_frames_are_the_boxes_of_the_cells_of_each_label(
 
 @given(labelled())
 def test_cells_without_a_label_take_the_first_that_touches_them(
-    drawn: tuple[NDArray[np.int32], NDArray[np.bool_]],
+    drawn: tuple[I32, Bool],
 ) -> None:
     labels = np.pad(drawn[0], 1, constant_values=-1).astype(np.int16)
     around = ((0, -1), (0, 1), (-1, 0), (1, 0), (-1, -1), (-1, 1), (1, -1), (1, 1))

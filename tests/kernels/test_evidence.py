@@ -4,16 +4,14 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from fleet2d.algorithms.presence.anyone import with_anyone
+from fleet2d.kernels import F64, I64, Bool
 from fleet2d.kernels.evidence import gather_views, sum_places
 from fleet2d.kernels.people import PeoplePlaces
 
-F64 = NDArray[np.float64]
 
-
-def views(seed: int, robots: int) -> tuple[NDArray[np.int64], ...]:
+def views(seed: int, robots: int) -> tuple[I64, ...]:
     """Return cells in view of some robots, many bins alike, and the patches that they are of."""
     random = np.random.default_rng(seed)
     room = np.repeat(np.arange(5), random.integers(1, 4, 5))
@@ -56,20 +54,20 @@ def test_half_a_part_is_rounded_to_the_even_one() -> None:
     assert [0, 2, 2, 254] == parts[:, 0].tolist()
 
 
-def values(chains: F64, unknown: NDArray[np.bool_], users: int) -> F64:
+def values(chains: F64, unknown: Bool, users: int) -> F64:
     """Return what adds up of each bin, as an estimator in NumPy has it."""
     rows = with_anyone(list(chains), unknown) if users else chains[0][:, None]
     return np.concatenate([rows, rows * (1 - rows), np.ones((*rows.shape[:2], 1))], axis=2)
 
 
-def together(stretches: list[tuple[F64, NDArray[np.int64]]]) -> PeoplePlaces:
+def together(stretches: list[tuple[F64, I64]]) -> PeoplePlaces:
     """Return the stretches of people one after the other."""
     places, bins = (np.concatenate(parts) for parts in zip(*stretches, strict=True))
     begin = np.cumsum([0, *(len(lengths) for _, lengths in stretches)])
     return PeoplePlaces(places, bins, begin)
 
 
-def chain_of(random: np.random.Generator, bins: int) -> tuple[F64, NDArray[np.int64]]:
+def chain_of(random: np.random.Generator, bins: int) -> tuple[F64, I64]:
     """Return probabilities of places in stretches of up to five bins, and their lengths."""
     cuts = np.cumsum(random.integers(1, 6, bins))
     lengths = np.diff([0, *cuts[cuts < bins], bins])

@@ -5,7 +5,6 @@ from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 import shapely
 from hypothesis import given
@@ -17,6 +16,7 @@ from tests.reference.random import key_of_word
 from tests.strategies import homes, quick, seeds
 
 from fleet2d.floorplan.geometry.lattice import Lattice
+from fleet2d.kernels import I64, U64
 from fleet2d.kernels.lens import Lenses, in_wedge
 from fleet2d.kernels.look import USER_LOST, USER_SEEN, LookRule, SightMemory, look, new_memory
 from fleet2d.kernels.perception import MOST_GHOSTS, About, ErrorTables, UserDraw
@@ -24,8 +24,6 @@ from fleet2d.kernels.timelines import Window
 from fleet2d.sight.camera import Camera, Lens
 from fleet2d.sight.perception import Perception
 from fleet2d.sight.tables import TableContext, error_tables, stack_lenses
-
-Int64 = npt.NDArray[np.int64]
 
 ANGLES = [1, 90, 180, 181, 359, 360]
 EIGHTHS = [0, 512, 1024, 1536, 2048, 2560, 3072, 3584]
@@ -55,13 +53,13 @@ class Scene:
             7 units larger [lattice units]; 0: nobody hides anybody.
     """
 
-    robot: Int64
-    users: Int64
-    keys: npt.NDArray[np.uint64]
+    robot: I64
+    users: I64
+    keys: U64
     strangers: int = 0
     is_first: bool = True
     perceptions: Sequence[Perception | None] = ()
-    shown: npt.NDArray[np.uint64] | None = None
+    shown: U64 | None = None
     thickness: int = 0
 
     def part(self, begin: int, end: int) -> "Scene":
@@ -86,7 +84,7 @@ class Scene:
             return window, one, 2 * one + 1
         return window, 2 * one + other, one
 
-    def radii(self) -> Int64 | None:
+    def radii(self) -> I64 | None:
         """Return the radii of all bodies of the window, None if they don't hide each other."""
         count = len(self.users) + 1 + 3 * self.strangers
         return self.thickness + 7 * np.arange(count) if self.thickness else None
@@ -256,7 +254,7 @@ def looked_slowly(
     return Seen(*result, [k.noticed for k in known], [int(k.seen) for k in known])
 
 
-def rested(rng: np.random.Generator, poses: Int64, moves: float) -> Int64:
+def rested(rng: np.random.Generator, poses: I64, moves: float) -> I64:
     """Return poses (steps, …) of which each lasts: another one comes with a probability."""
     steps = np.arange(len(poses))
     return poses[np.maximum.accumulate(np.where(rng.random(len(poses)) < moves, steps, 0))]

@@ -3,17 +3,15 @@ from itertools import pairwise
 import numpy as np
 import pytest
 import shapely
-from numpy.typing import NDArray
 
+from fleet2d.kernels import I32, Bool
 from fleet2d.kernels.masks import count_steps, label_parts, trace_rings
-
-Mask = NDArray[np.bool_]
 
 SHAPES = [(1, 1), (1, 9), (9, 1), (2, 2), (6, 7), (14, 11)]
 SHARES = [0.0, 0.2, 0.5, 0.6, 0.9, 1.0]
 
 
-def masks(shape: tuple[int, int], share: float, count: int = 10) -> list[Mask]:
+def masks(shape: tuple[int, int], share: float, count: int = 10) -> list[Bool]:
     rng = np.random.default_rng([*shape, int(100 * share)])
     return [rng.random(shape) < share for _ in range(count)]
 
@@ -27,7 +25,7 @@ def near(row: int, column: int, diagonal: bool) -> list[tuple[int, int]]:
     return sides + corners if diagonal else sides
 
 
-def slow_label_parts(mask: Mask, diagonal: bool) -> NDArray[np.int32]:
+def slow_label_parts(mask: Bool, diagonal: bool) -> I32:
     """Let every pixel take the lowest number around it until nothing changes."""
     pixels = [(int(r), int(c)) for r, c in np.argwhere(mask)]
     number = {pixel: k for k, pixel in enumerate(pixels)}
@@ -45,7 +43,7 @@ def slow_label_parts(mask: Mask, diagonal: bool) -> NDArray[np.int32]:
     return out
 
 
-def slow_count_steps(start: Mask, mask: Mask) -> NDArray[np.int32]:
+def slow_count_steps(start: Bool, mask: Bool) -> I32:
     """Walk one step further from all that is reached, again and again."""
     out = np.where(start & mask, 0, -1).astype(np.int32)
     for step in range(1, mask.size + 1):
@@ -55,12 +53,12 @@ def slow_count_steps(start: Mask, mask: Mask) -> NDArray[np.int32]:
     return out
 
 
-def rings_of(mask: Mask) -> list[NDArray[np.int32]]:
+def rings_of(mask: Bool) -> list[I32]:
     corners, starts = trace_rings(mask)
     return [corners[a:b] for a, b in pairwise(starts.tolist())]
 
 
-def unit_sides(rings: list[NDArray[np.int32]]) -> list[tuple[int, ...]]:
+def unit_sides(rings: list[I32]) -> list[tuple[int, ...]]:
     """Cut rings into directed sides of one pixel."""
     sides: list[tuple[int, ...]] = []
     for ring in rings:
@@ -75,7 +73,7 @@ def unit_sides(rings: list[NDArray[np.int32]]) -> list[tuple[int, ...]]:
     return sides
 
 
-def slow_sides(mask: Mask) -> set[tuple[int, ...]]:
+def slow_sides(mask: Bool) -> set[tuple[int, ...]]:
     """Go round every pixel, and drop what two pixels share."""
     sides = set()
     for y, x in np.argwhere(mask).tolist():

@@ -6,7 +6,6 @@ from itertools import islice, pairwise
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 import shapely
 from hypothesis import given
@@ -17,6 +16,7 @@ from tests.reference import motion as slow
 from tests.reference.sight import is_inside, touches_any_wall
 from tests.strategies import homes, quick, seeds
 
+from fleet2d.kernels import I64
 from fleet2d.kernels.headings import TURN
 from fleet2d.kernels.motion import (
     Breakpoints,
@@ -26,8 +26,6 @@ from fleet2d.kernels.motion import (
     trace_meander,
     trace_track,
 )
-
-Int64 = npt.NDArray[np.int64]
 
 DAY_US = 86_400_000_000
 
@@ -183,7 +181,7 @@ def test_trace_track_refuses_invalid_input(track: Breakpoints, step: int, messag
         trace_track(track, 0, step, poses(4))
 
 
-def timed(route: list[tuple[int, int]], speed: float, rate: float, heading: int = 0) -> Int64:
+def timed(route: list[tuple[int, int]], speed: float, rate: float, heading: int = 0) -> I64:
     """Return the breakpoints of a route that begins at 1 s."""
     return time_route(np.array(route, np.int64), 1_000_000, heading, speed, rate)
 
@@ -268,7 +266,7 @@ def test_endless_time_route_ends_at_the_last_possible_time() -> None:
 # --- The random walk ---
 
 
-def walked(walls: Home, space: Home, rule: WalkRule, first: int, start: Int64, count: int) -> Int64:
+def walked(walls: Home, space: Home, rule: WalkRule, first: int, start: I64, count: int) -> I64:
     """Return the poses of a walk: int64 (count, 3)."""
     out = poses(count)
     trace_meander(walls.mesh, space.mesh, rule, first, tuple(start.tolist()), out)
@@ -288,7 +286,7 @@ def shrunk(home: Home, reach: int) -> Home | None:
     return home_of(parts) if parts else None
 
 
-def inner_points(home: Home, rng: np.random.Generator, count: int) -> Int64:
+def inner_points(home: Home, rng: np.random.Generator, count: int) -> I64:
     """Return points strictly inside: int64 (n, 2)."""
     tried = rng.integers(0, [64 * home.columns, 64 * home.rows], (40 * count, 2))
     inside = tried[is_inside(home.walls, tried)]
@@ -296,7 +294,7 @@ def inner_points(home: Home, rng: np.random.Generator, count: int) -> Int64:
     return np.asarray(inside[:count][off_wall], np.int64)
 
 
-def check_walk(space: Home, steps: Int64, rule: WalkRule) -> int:
+def check_walk(space: Home, steps: I64, rule: WalkRule) -> int:
     """Check that no step leaves the space, crosses a wall, turns or strides too far."""
     moves = np.diff(steps[:, :2], axis=0)
     moved = np.flatnonzero(moves.any(axis=1))

@@ -3,13 +3,13 @@
 import math
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from tests.sight.watching import scene
 from tests.strategies import quick
 
+from fleet2d.kernels import I64
 from fleet2d.kernels import perception as k
 from fleet2d.kernels.headings import heading_of
 from fleet2d.sight.camera import Camera
@@ -20,7 +20,7 @@ KEY = np.uint64(12345)
 VECTOR = st.tuples(st.integers(-9000, 9000), st.integers(-9000, 9000))
 
 
-def table_of(**perception: object) -> npt.NDArray[np.int64]:
+def table_of(**perception: object) -> I64:
     """Return the table of one camera that sees as far as 10 m."""
     lens = Camera(range=(0.0, 10.0)).lens(1280, 10**6)
     return error_tables([lens], [Perception.model_validate(perception)], scene()).table

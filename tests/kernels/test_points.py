@@ -5,17 +5,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 from hypothesis import given
-from numpy.typing import NDArray
 from shapely.geometry import Polygon
 from tests.homes import all_homes, awkward_points, behind_corners, home_of
 from tests.reference.sight import visible
 from tests.strategies import homes, quick, seeds
 
+from fleet2d.kernels import I64
 from fleet2d.kernels.headings import half_sine
 from fleet2d.kernels.points import points_in_reach, points_in_sight
 from fleet2d.kernels.seen import Reach
-
-Int64 = NDArray[np.int64]
 
 HALVES = [1, 700, 1229, 2047, 2048, 2049, 3000, 4095, 4096]
 
@@ -76,7 +74,7 @@ def test_points_in_sight_are_those_that_no_wall_hides_in_real_homes(shared_data:
 
 
 @pytest.mark.parametrize("points", [np.array([[33, 33, 1]]), np.array([[33, 2**40]])])
-def test_points_that_are_none_are_refused(points: Int64) -> None:
+def test_points_that_are_none_are_refused(points: I64) -> None:
     home = home_of([Polygon([(0, 0), (640, 0), (640, 640), (0, 640)])])
 
     with pytest.raises(ValueError, match="points"):

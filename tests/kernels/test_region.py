@@ -4,7 +4,6 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 import shapely
 from hypothesis import given
@@ -21,6 +20,7 @@ from tests.homes import (
 from tests.reference.sight import visible_area
 from tests.strategies import homes, quick, seeds
 
+from fleet2d.kernels import F64, I32
 from fleet2d.kernels.mesh import Mesh, rasterize_cells, strictly_inside
 from fleet2d.kernels.points import points_in_sight
 from fleet2d.kernels.region import (
@@ -31,12 +31,10 @@ from fleet2d.kernels.region import (
     visible_region,
 )
 
-Int32 = npt.NDArray[np.int32]
-
 ROOM = home_of([shapely.box(128, 128, 1280, 640).difference(shapely.box(500, 300, 700, 400))])
 
 
-def canonical(mesh: Mesh, right: Int32, wall: Int32) -> list[tuple[int, int, int]]:
+def canonical(mesh: Mesh, right: I32, wall: I32) -> list[tuple[int, int, int]]:
     """Return the pieces by vertices only: on the right border, and at both ends of the wall."""
     corners = mesh.triangles[wall // 3]
     starts = np.take_along_axis(corners, wall[:, None] % 3, 1)[:, 0]
@@ -44,7 +42,7 @@ def canonical(mesh: Mesh, right: Int32, wall: Int32) -> list[tuple[int, int, int
     return list(zip(right.tolist(), starts.tolist(), ends.tolist(), strict=True))
 
 
-def area_of(mesh: Mesh, x: int, y: int) -> tuple[float, npt.NDArray[np.float64]]:
+def area_of(mesh: Mesh, x: int, y: int) -> tuple[float, F64]:
     """Return the area of a region, and the corners of its outline."""
     outline, area = region_outline(mesh, x, y, *visible_region(mesh, x, y))
     return area, outline

@@ -5,7 +5,6 @@ import pickle
 from collections.abc import Callable
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 import shapely
 from hypothesis import given
@@ -14,9 +13,8 @@ from tests.homes import Home, home_of, shuffled
 from tests.reference.routes import graph_of, length_of, region_of, shortest, straight_ways
 from tests.strategies import homes, quick, seeds
 
+from fleet2d.kernels import I64
 from fleet2d.kernels.routes import Corners, Routes, distance
-
-Int64 = npt.NDArray[np.int64]
 
 
 def corners_of(home: Home) -> Corners:
@@ -51,12 +49,12 @@ def routes_of(home: Home) -> Routes:
     return Routes(home.mesh, corners_of(home))
 
 
-def legs_of(routes: Routes) -> list[Int64]:
+def legs_of(routes: Routes) -> list[I64]:
     """Return all legs, as arrays that can be compared."""
     return [routes.leg_start, routes.leg_end, routes.leg_length]
 
 
-def some_points(home: Home, rng: np.random.Generator, count: int) -> Int64:
+def some_points(home: Home, rng: np.random.Generator, count: int) -> I64:
     """Return points inside: centres of cells, and points in line with corners."""
     region = region_of(home.mesh.vertices, home.mesh.triangles)
     anywhere = rng.integers(0, [64 * home.columns, 64 * home.rows], (20 * count, 2))
@@ -240,7 +238,7 @@ def test_routes_keep_their_mesh_and_can_be_pickled() -> None:
         ("simple", lambda a: a[:-1]),
     ],
 )
-def test_routes_refuse_corners_that_are_none(field: str, change: Callable[[Int64], Int64]) -> None:
+def test_routes_refuse_corners_that_are_none(field: str, change: Callable[[I64], I64]) -> None:
     home = crowded(1)
     corners = corners_of(home)
 

@@ -3,7 +3,6 @@
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 import shapely
 from hypothesis import given
@@ -12,12 +11,11 @@ from tests.homes import Home, all_homes, awkward_points, home_of, shuffled, tran
 from tests.reference import seen as slow
 from tests.strategies import homes, quick, seeds
 
+from fleet2d.kernels import Bool
 from fleet2d.kernels.headings import half_sine
 from fleet2d.kernels.mesh import Mesh, rasterize_cells
 from fleet2d.kernels.points import points_in_reach, points_in_sight
 from fleet2d.kernels.seen import Reach, cells_in_view, mark_spans
-
-Bool = npt.NDArray[np.bool_]
 
 SINES = np.array([half_sine(half) for half in range(8192)], np.int64)
 HALVES = [1, 700, 1229, 2047, 2048, 2049, 3000, 4095, 4096]

@@ -3,7 +3,6 @@
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 import shapely
 from hypothesis import given
@@ -22,6 +21,7 @@ from tests.homes import (
 from tests.reference.sight import vertices_seen, visible, visible_exactly
 from tests.strategies import homes, quick, seeds
 
+from fleet2d.kernels import I64, Bool
 from fleet2d.kernels.chambers import pairs_in_sight
 from fleet2d.kernels.mesh import Mesh, locate
 from fleet2d.kernels.sight import (
@@ -31,18 +31,15 @@ from fleet2d.kernels.sight import (
     vertices_seen_from_vertex,
 )
 
-Int64 = npt.NDArray[np.int64]
-Bool = npt.NDArray[np.bool_]
-
 EYES, POINTS = 2, 24
 
 
-def _sees_each(mesh: Mesh, eye: Int64, points: Int64) -> Bool:
+def _sees_each(mesh: Mesh, eye: I64, points: I64) -> Bool:
     """Return which points the eye sees."""
     return pairs_in_sight(mesh, np.broadcast_to(eye, points.shape), points)
 
 
-def _is_seen_by_each(mesh: Mesh, eye: Int64, points: Int64) -> Bool:
+def _is_seen_by_each(mesh: Mesh, eye: I64, points: I64) -> Bool:
     """Return which points see the eye."""
     return pairs_in_sight(mesh, points, np.broadcast_to(eye, points.shape))
 

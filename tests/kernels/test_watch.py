@@ -3,7 +3,6 @@
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 import shapely
 from hypothesis import given
@@ -13,6 +12,7 @@ from tests.reference import seen as slow
 from tests.strategies import quick, seeds
 
 from fleet2d.floorplan.geometry.lattice import Lattice
+from fleet2d.kernels import I16, I64
 from fleet2d.kernels.headings import half_sine
 from fleet2d.kernels.lens import Lenses, camera_pose
 from fleet2d.kernels.motion import Poses
@@ -37,8 +37,8 @@ FLAT = home_of(
 class Seen(NamedTuple):
     """What a robot has seen: first and last step of each cell, exposure of rooms, also by bins."""
 
-    first: npt.NDArray[np.int64]
-    last: npt.NDArray[np.int64]
+    first: I64
+    last: I64
     exposure: list[int]
     binned: list[list[int]]
     most: list[list[int]]
@@ -53,7 +53,7 @@ def lenses_of(*cameras: Camera) -> Lenses:
     )
 
 
-def rooms_of(home: Home) -> npt.NDArray[np.int16]:
+def rooms_of(home: Home) -> I16:
     """Return three rooms: strips of columns, with cells of no room between."""
     rooms = np.full((home.rows, home.columns), -1, np.int16)
     for room in range(ROOMS):

@@ -2,13 +2,11 @@
 
 import numpy as np
 from matplotlib.colors import to_rgb
-from numpy.typing import NDArray
 
 from fleet2d.engine.simulation import Simulation
+from fleet2d.kernels import U8
 from fleet2d.palette import ROBOT_COLORS, USER_COLORS
 from fleet2d.paper.watched import FrameSeries, LiveView, time_frames
-
-Frame = NDArray[np.uint8]
 
 
 def at_hour(hour: int) -> Simulation:
@@ -17,7 +15,7 @@ def at_hour(hour: int) -> Simulation:
     return simulation
 
 
-def count_pixels(frame: Frame, color: str) -> int:
+def count_pixels(frame: U8, color: str) -> int:
     """Return the number of pixels that have almost a colour."""
     rgb = np.array(to_rgb(color)) * 255
     return int((np.abs(frame[..., :3] - rgb).max(axis=-1) < 6).sum())

@@ -1,10 +1,11 @@
 """Slow, obvious twins of `fleet2d.kernels.chambers`."""
 
 import numpy as np
-from numpy.typing import NDArray
+
+from fleet2d.kernels import I32, Bool
 
 
-def nearest_labels(labels: NDArray[np.int32], mask: NDArray[np.bool_]) -> NDArray[np.int32]:
+def nearest_labels(labels: I32, mask: Bool) -> I32:
     """Grow all labels by one step across sides at a time; the lowest wins."""
     out = np.where(mask, labels, -1).astype(np.int32)
     rows, columns = labels.shape

@@ -1,12 +1,13 @@
 """The slow, obvious twin of ways over cells of different cost: no queue, all steps until none helps."""
 
 import numpy as np
-from numpy.typing import NDArray
+
+from fleet2d.kernels import I32, I64
 
 FAR = 10**12
 
 
-def cost_distance(cost: NDArray[np.int32], goal: tuple[int, int]) -> NDArray[np.int64]:
+def cost_distance(cost: I32, goal: tuple[int, int]) -> I64:
     """Return what the cheapest way from each cell to the goal costs, -1 where none leads."""
     rows, columns = cost.shape
     found = np.full(cost.shape, FAR)

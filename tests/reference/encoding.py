@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fleet2d.artifacts.encoding import GROWTH, HEADER, LINE, NARROW, RAW, RUNS
+from fleet2d.kernels import I64
 
 WHOLE = 2**64
 
@@ -22,7 +23,7 @@ def encode_arrays(arrays: Sequence[NDArray[Any]]) -> bytes:
     return content
 
 
-def _encode(values: NDArray[Any], previous: NDArray[np.int64] | None) -> bytes:
+def _encode(values: NDArray[Any], previous: I64 | None) -> bytes:
     raw, runs, narrow = _raw(values), _runs(values), _narrow(values)
     if values.dtype == np.uint8:
         return raw
@@ -67,7 +68,7 @@ def _runs(values: NDArray[Any]) -> bytes:
     return _with_header(RUNS, len(groups), content)
 
 
-def _growth(values: NDArray[np.int64]) -> bytes | None:
+def _growth(values: I64) -> bytes | None:
     if len(values) == 0:
         return None
     growth = [(int(b) - int(a)) % WHOLE for a, b in pairwise(values)]
@@ -76,7 +77,7 @@ def _growth(values: NDArray[np.int64]) -> bytes | None:
     return _with_header(GROWTH, 0, content)
 
 
-def _line(values: NDArray[np.int64], previous: NDArray[np.int64] | None) -> bytes | None:
+def _line(values: I64, previous: I64 | None) -> bytes | None:
     """The line through the first and the last value, if all are on it, modulo 2^64."""
     if previous is None or len(previous) != len(values) or len(values) < 3:
         return None

@@ -3,10 +3,11 @@
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
+
+from fleet2d.kernels import I64, Bool
 
 
-def squared_distance(mask: NDArray[np.bool_]) -> NDArray[np.int64]:
+def squared_distance(mask: Bool) -> I64:
     """Compare every cell with every cell outside the mask."""
     rows, columns = mask.shape
     outside = np.argwhere(~mask)

@@ -8,15 +8,13 @@ from fractions import Fraction
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 from tests.reference.headings import DIGITS, alignment, cosine, sine
 from tests.reference.motion import half_up
 from tests.reference.random import random_bell, random_below, random_bits
 from tests.reference.sight import visible
 
-from fleet2d.kernels import perception
+from fleet2d.kernels import I64, perception
 
-Int64 = npt.NDArray[np.int64]
 Point = tuple[int, int]
 LOST, SEEN = 0, 1
 Method = Callable[[int, int, int], int]
@@ -194,7 +192,7 @@ class Errors:
         )
         return dx - away[0], dy - away[1], (user.heading + turn) % 4096, posture
 
-    def ghosts(self, walls: Int64, eye: Eye, at: Body, heading: int, now: int) -> list[Ghost]:
+    def ghosts(self, walls: I64, eye: Eye, at: Body, heading: int, now: int) -> list[Ghost]:
         """Return the false positives of a look."""
         if not self.tables.has_ghosts[self.camera]:
             return []
@@ -216,7 +214,7 @@ class Errors:
         return found
 
     def _place(
-        self, walls: Int64, eye: Eye, at: Body, heading: int, source: int, key: int
+        self, walls: I64, eye: Eye, at: Body, heading: int, source: int, key: int
     ) -> tuple[int, int] | None:
         """Return where a false positive of a source appears, if it does."""
         here = np.array([at.x, at.y])
@@ -258,7 +256,7 @@ class Look(NamedTuple):
 
 
 def look(
-    walls: Int64,
+    walls: I64,
     eyes: list[Eye],
     robot: list[Body],
     users: list[list[Body]],
@@ -379,7 +377,7 @@ def _count_shown(
 
 
 def _points_in_view(
-    walls: Int64, eye: Eye, at: Body, heading: int, user: Body, points: Sequence[Point]
+    walls: I64, eye: Eye, at: Body, heading: int, user: Body, points: Sequence[Point]
 ) -> set[int]:
     """Return which points of a body are in range, in the wedge, and behind no wall."""
     in_view = set()

@@ -5,12 +5,12 @@ from collections.abc import Iterator, Sequence
 from fractions import Fraction
 
 import numpy as np
-import numpy.typing as npt
 from tests.reference.headings import cosine, sine
 from tests.reference.random import random_bell, random_below
 from tests.reference.sight import visible
 
-Int64 = npt.NDArray[np.int64]
+from fleet2d.kernels import I64
+
 Row = tuple[int, int, int, int, int]
 """A breakpoint: time [us], x, y, heading, away."""
 Pose = tuple[int, int, int, int]
@@ -62,8 +62,8 @@ def least_walk_us(squared: int, speed: Fraction) -> int:
 
 
 def walk(
-    walls: Int64,
-    space: Int64,
+    walls: I64,
+    space: I64,
     key: int,
     stride: int,
     sway: int,
@@ -94,5 +94,5 @@ def walk(
         step += 1
 
 
-def _sees(walls: Int64, here: Int64, there: Int64) -> bool:
+def _sees(walls: I64, here: I64, there: I64) -> bool:
     return bool(visible(walls, here, there[None])[0])

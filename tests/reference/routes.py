@@ -4,27 +4,26 @@ import heapq
 import math
 
 import numpy as np
-import numpy.typing as npt
 import shapely
 
-Int64 = npt.NDArray[np.int64]
-Bool = npt.NDArray[np.bool_]
+from fleet2d.kernels import I64, Bool
+
 Graph = list[list[tuple[int, float]]]
 
 
-def region_of(vertices: Int64, triangles: Int64) -> shapely.Geometry:
+def region_of(vertices: I64, triangles: I64) -> shapely.Geometry:
     """Return the closed free space that triangles fill."""
     region = shapely.union_all(shapely.polygons(vertices[triangles]))
     shapely.prepare(region)
     return region
 
 
-def straight_ways(region: shapely.Geometry, starts: Int64, ends: Int64) -> Bool:
+def straight_ways(region: shapely.Geometry, starts: I64, ends: I64) -> Bool:
     """Return which segments lie in closed free space."""
     return np.asarray(shapely.covers(region, shapely.linestrings(np.stack([starts, ends], axis=1))))
 
 
-def graph_of(region: shapely.Geometry, corners: Int64) -> Graph:
+def graph_of(region: shapely.Geometry, corners: I64) -> Graph:
     """Return for each corner the corners that a straight way leads to, and how long it is."""
     graph: Graph = [[] for _ in corners]
     i, j = np.triu_indices(len(corners), 1)
@@ -36,9 +35,7 @@ def graph_of(region: shapely.Geometry, corners: Int64) -> Graph:
     return graph
 
 
-def shortest(
-    region: shapely.Geometry, corners: Int64, graph: Graph, start: Int64, goal: Int64
-) -> float:
+def shortest(region: shapely.Geometry, corners: I64, graph: Graph, start: I64, goal: I64) -> float:
     """Return the length of the shortest path in closed free space; infinity if there is none."""
     if straight_ways(region, start[None], goal[None])[0]:
         return math.dist(start, goal)
@@ -61,12 +58,12 @@ def shortest(
     return best
 
 
-def length_of(path: Int64) -> float:
+def length_of(path: I64) -> float:
     """Return the length of a polyline."""
     return sum(math.dist(a, b) for a, b in zip(path.tolist(), path.tolist()[1:], strict=False))
 
 
-def parts_of(neighbors: Int64) -> list[set[int]]:
+def parts_of(neighbors: I64) -> list[set[int]]:
     """Return the triangles of each connected part, by merging sets until nothing changes."""
     parts = [{i, *(int(n) for n in row if n >= 0)} for i, row in enumerate(neighbors)]
     merged = True

@@ -1,13 +1,12 @@
 """The slow, obvious twin of the seen area: every cell's centre is asked for by itself."""
 
 import numpy as np
-import numpy.typing as npt
 from tests.reference.sight import visible
 
-Int64 = npt.NDArray[np.int64]
+from fleet2d.kernels import I64, Bool
 
 
-def half_planes(heading: int, half_angle: int, away: Int64, sines: Int64) -> npt.NDArray[np.bool_]:
+def half_planes(heading: int, half_angle: int, away: I64, sines: I64) -> Bool:
     """Return which vectors (n, 2) lie within `half_angle` [1/8192 turn] of a heading, or on it.
 
     The borders are those of a table of sines over a whole turn at that resolution.
@@ -22,14 +21,14 @@ def half_planes(heading: int, half_angle: int, away: Int64, sines: Int64) -> npt
 
 
 def cells_in_view(
-    walls: Int64,
+    walls: I64,
     shape: tuple[int, int],
     pose: tuple[int, int, int],
     near: int,
     far: int,
     half_angle: int,
-    sines: Int64,
-) -> npt.NDArray[np.bool_]:
+    sines: I64,
+) -> Bool:
     """Return bool (rows, columns): the cells whose centre is in view of (x, y, heading)."""
     x, y, heading = pose
     rows, columns = np.indices(shape)

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from fractions import Fraction
 
 import numpy as np
-import numpy.typing as npt
 
-Int64 = npt.NDArray[np.int64]
+from fleet2d.kernels import I64, Bool
+
 Point = tuple[int, int]
 
 
@@ -33,18 +33,18 @@ def segments_touch(p: Point, q: Point, a: Point, b: Point) -> bool:
     return all(overlap)
 
 
-def is_inside(walls: Int64, points: Int64) -> npt.NDArray[np.bool_]:
+def is_inside(walls: I64, points: I64) -> Bool:
     """Return for each point whether a ray to the right crosses an odd number of walls."""
     x, y = points[:, None, 0], points[:, None, 1]
     ax, ay, bx, by = walls.T
     spans = (ay > y) != (by > y)
     turn = (bx - ax) * (y - ay) - (by - ay) * (x - ax)
     left_of_rising = np.where(by > ay, turn > 0, turn < 0)
-    odd: npt.NDArray[np.bool_] = (spans & left_of_rising).sum(axis=1) % 2 == 1
+    odd: Bool = (spans & left_of_rising).sum(axis=1) % 2 == 1
     return odd
 
 
-def touches_any_wall(walls: Int64, eye: Int64, points: Int64) -> npt.NDArray[np.bool_]:
+def touches_any_wall(walls: I64, eye: I64, points: I64) -> Bool:
     """Return for each point whether the closed segment from `eye` to it touches a wall."""
     (qx, qy), (px, py) = eye, points.T[:, :, None]
     ax, ay, bx, by = walls.T
@@ -61,11 +61,11 @@ def touches_any_wall(walls: Int64, eye: Int64, points: Int64) -> npt.NDArray[np.
         <= np.minimum(np.maximum(qy, py), np.maximum(ay, by))
     )
     touches = (side_a * side_b <= 0) & (side_q * side_p <= 0) & boxes_meet
-    found: npt.NDArray[np.bool_] = touches.any(axis=1)
+    found: Bool = touches.any(axis=1)
     return found
 
 
-def visible(walls: Int64, eye: Int64, points: Int64) -> npt.NDArray[np.bool_]:
+def visible(walls: I64, eye: I64, points: I64) -> Bool:
     """Return for each point whether it is visible from `eye` by the strict rule."""
     if not is_inside(walls, eye[None])[0]:
         return np.zeros(len(points), bool)
@@ -77,7 +77,7 @@ def visible_exactly(walls: Sequence[Sequence[int]], eye: Point, point: Point) ->
     return not any(segments_touch(eye, point, (w[0], w[1]), (w[2], w[3])) for w in walls)
 
 
-def on_any_wall(walls: Int64, points: Int64) -> npt.NDArray[np.bool_]:
+def on_any_wall(walls: I64, points: I64) -> Bool:
     """Return for each point whether it lies on a wall, ends included."""
     return np.array([touches_any_wall(walls, point, point[None])[0] for point in points], bool)
 
@@ -103,7 +103,7 @@ def _is_between(p: Point, q: Point, c: Point) -> bool:
     return 0 < along < (q[0] - p[0]) ** 2 + (q[1] - p[1]) ** 2
 
 
-def vertices_seen(walls: Int64, start: Point) -> set[Point]:
+def vertices_seen(walls: I64, start: Point) -> set[Point]:
     """Return the ends of walls that a straight way leads to, from a point that isn't outside.
 
     Between its ends the way meets no wall, unless it runs along one from end to end or to one end.
@@ -126,7 +126,7 @@ def _covers(a: Point, b: Point, point: Point) -> bool:
     return segments_touch(a, b, point, point)
 
 
-def visible_area(walls: Int64, eye: Point) -> Fraction:
+def visible_area(walls: I64, eye: Point) -> Fraction:
     """Return the exact area visible from a point strictly inside.
 
     Between two neighboring directions in which a wall ends, one wall is the nearest all the way.

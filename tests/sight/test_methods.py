@@ -16,10 +16,11 @@ from fleet2d.errors import InputError
 from fleet2d.floorplan.home.home import Home
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.rooms.doorways import DoorLine
+from fleet2d.kernels import Bool
 from fleet2d.kernels.mesh import SUB
 from fleet2d.kernels.seen import Reach
 from fleet2d.sight.flashlight import Flashlight
-from fleet2d.sight.fov import Bool, FieldOfView
+from fleet2d.sight.fov import FieldOfView
 from fleet2d.sight.line_of_sight import LineOfSight
 from fleet2d.sight.visibility_polygon import VisibilityPolygon
 

@@ -9,19 +9,9 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 import shapely
-from tests.sight.watching import (
-    PILLAR,
-    SIDE_M,
-    UNITS_PER_M,
-    Float64,
-    Int64,
-    Watch,
-    agree,
-    around,
-    changed,
-    hall,
-)
+from tests.sight.watching import PILLAR, SIDE_M, UNITS_PER_M, Watch, agree, around, changed, hall
 
+from fleet2d.kernels import F64, I64, Bool
 from fleet2d.kernels.look import HEADING, IDENTITY, POSTURE, STEP, TRUE_X, TRUE_Y, USER, X, Y
 
 N = 60_000
@@ -31,7 +21,7 @@ BEARING = RNG.uniform(-180, 180, N)
 FACING = RNG.uniform(-180, 180, N)
 
 
-def noticed(watch: Watch, user: int = 0) -> npt.NDArray[np.bool_]:
+def noticed(watch: Watch, user: int = 0) -> Bool:
     """Return for each step whether a user is noticed."""
     rows = watch.look()
     result = np.zeros(watch.users.shape[1], bool)
@@ -39,9 +29,7 @@ def noticed(watch: Watch, user: int = 0) -> npt.NDArray[np.bool_]:
     return result
 
 
-def check_by(
-    values: Float64, edges: npt.ArrayLike, hits: npt.NDArray[np.bool_], expected: Float64
-) -> None:
+def check_by(values: F64, edges: npt.ArrayLike, hits: Bool, expected: F64) -> None:
     """Check rates in each bin of a quantity."""
     group = np.digitize(values, np.asarray(edges))
     for g in np.unique(group):
@@ -241,7 +229,7 @@ def test_misses_of_two_users_are_independent() -> None:
 NOBODY_THERE = around(np.full(N, 9.9), np.zeros(N))
 
 
-def ghosts(**more: Any) -> Int64:
+def ghosts(**more: Any) -> I64:
     """Return the false positives of a camera that sees up to 3 m, in a hall with nobody near."""
     camera = {"range": [1, 3], "angle_deg": 120, **more.pop("camera", {})}
     rows = Watch(NOBODY_THERE, camera=camera, **more).look()
@@ -373,7 +361,7 @@ def test_an_identity_lasts_as_long_as_its_track() -> None:
 # --- Where, and how -------------------------------------------------------------------------------
 
 
-def polar(rows: Int64) -> tuple[Float64, Float64, Float64]:
+def polar(rows: I64) -> tuple[F64, F64, F64]:
     """Return true distance [m], and the errors in distance [m] and bearing [deg]."""
     eye = SIDE_M / 2
     true, perceived = (
@@ -385,7 +373,7 @@ def polar(rows: Int64) -> tuple[Float64, Float64, Float64]:
     return distance, np.hypot(*perceived.T) - distance, turn
 
 
-def check_noise(values: Float64, std: Float64 | float) -> None:
+def check_noise(values: F64, std: F64 | float) -> None:
     """Check that values are bell-shaped noise of a standard deviation, without a bias."""
     z = values / std
     n = len(z)

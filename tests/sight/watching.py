@@ -11,6 +11,7 @@ import shapely
 from tests.homes import home_of
 
 from fleet2d.floorplan.geometry.lattice import Lattice
+from fleet2d.kernels import F64, I8, I64
 from fleet2d.kernels.look import LookRule, SightMemory, look, new_memory
 from fleet2d.kernels.mesh import Mesh
 from fleet2d.kernels.perception import MOST_GHOSTS
@@ -19,9 +20,6 @@ from fleet2d.sight.camera import Camera
 from fleet2d.sight.perception import Perception
 from fleet2d.sight.tables import TableContext, error_tables, stack_lenses
 from fleet2d.streams import stream_key
-
-Int64 = npt.NDArray[np.int64]
-Float64 = npt.NDArray[np.float64]
 
 UNITS_PER_M = 1280  # cells of 5 cm
 SIDE_M = 20.0
@@ -50,11 +48,11 @@ class Watch:
     Poses are x, y [m] and heading [deg]; the robot is in the middle of the hall and looks along +x.
     """
 
-    users: Float64
+    users: F64
     camera: Mapping[str, Any] = field(default_factory=dict)
     perception: Mapping[str, Any] = field(default_factory=dict)
-    robot: Float64 | None = None
-    posture: npt.NDArray[np.int8] | None = None
+    robot: F64 | None = None
+    posture: I8 | None = None
     names: Sequence[str] = ("ana", "ben", "cleo", "dora")
     step_s: float = 1.0
     start_h: float = 0.0
@@ -64,7 +62,7 @@ class Watch:
     radius: float = 0.2
     memory: SightMemory | None = None
 
-    def look(self) -> Int64:
+    def look(self) -> I64:
         """Return all sightings, a row each."""
         count, steps = self.users.shape[:2]
         camera = Camera.model_validate(
@@ -99,13 +97,13 @@ class Watch:
         return sightings.T
 
 
-def _lattice(poses: Float64) -> list[Int64]:
+def _lattice(poses: F64) -> list[I64]:
     """Return x, y and heading as the kernels have them."""
     x, y = (np.rint(poses[..., i] * UNITS_PER_M).astype(np.int64) for i in (0, 1))
     return [x, y, np.rint(poses[..., 2] / 360 * 4096).astype(np.int64) % 4096]
 
 
-def around(distance: Float64, bearing_deg: Float64, facing_deg: Float64 | float = 0.0) -> Float64:
+def around(distance: F64, bearing_deg: F64, facing_deg: F64 | float = 0.0) -> F64:
     """Return poses (1, n, 3) of a user at distances and bearings from the middle of the hall."""
     angle = np.deg2rad(bearing_deg)
     x = SIDE_M / 2 + distance * np.cos(angle)

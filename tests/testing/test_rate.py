@@ -4,16 +4,16 @@ from itertools import product
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from fleet2d.errors import InputError
+from fleet2d.kernels import Bool
 from fleet2d.testing.rate import RateTest, rate_test
 
 DECISIONS = 10_000
 CLAIMS = [(100, 0.95), (30, 0.9), (60, 0.5), (40, 1.0), (300, 0.98)]
 
 
-def decisions(test: RateTest, rate: float, seed: int) -> NDArray[np.bool_]:
+def decisions(test: RateTest, rate: float, seed: int) -> Bool:
     """10,000 decisions about lives that hold with a rate: True where the claim is accepted."""
     draws = np.random.Generator(np.random.Philox(seed)).random((DECISIONS, test.seeds)) >= rate
     failures = np.cumsum(draws, axis=1)

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from fleet2d.kernels import I64, U64
 from fleet2d.kernels.look import CAMERA, SIGHTING, STEP, USER
 from fleet2d.kernels.perception import ONE, random_shares
 
-I64 = NDArray[np.int64]
 Names = NDArray[np.object_]  # str, or None where no activity is known
 
 # A row of observations is a row of the sight kernel, followed by the robot's index.
@@ -33,7 +33,7 @@ class ActivitySense:
     """
 
     latency: int
-    keys: NDArray[np.uint64]
+    keys: U64
     confusion: Mapping[str, Mapping[str, float]] | None
 
 

@@ -8,10 +8,9 @@ from numpy.typing import NDArray
 
 from fleet2d.algorithms.patches import Patches
 from fleet2d.floorplan.cache import read_only
+from fleet2d.kernels import F64, I64, U8, Bool
 from fleet2d.kernels.evidence import gather_views
 from fleet2d.kernels.presence import list_sightings
-
-I64 = NDArray[np.int64]
 
 # Length of a bin [us]; one step where a step is longer.
 BIN_US = 60_000_000
@@ -82,7 +81,7 @@ class SightingCounts(NamedTuple):
         return read_only(seen)
 
     @property
-    def unknown(self) -> NDArray[np.bool_]:
+    def unknown(self) -> Bool:
         """Whether somebody was perceived who wasn't recognized as a user: bool (bins, places).
 
         True where somebody was perceived at more steps than all users were recognized, added up.
@@ -108,12 +107,12 @@ class Parts(NamedTuple):
             parts; None: it has one part.
     """
 
-    room: NDArray[np.int64]
-    cells: NDArray[np.int64]
-    watched: NDArray[np.float64]
-    shown: NDArray[np.float64]
+    room: I64
+    cells: I64
+    watched: F64
+    shown: F64
     sightings: SightingCounts
-    shown_parts: NDArray[np.uint8] | None = None
+    shown_parts: U8 | None = None
     island: I64 | None = None
 
     @property
@@ -145,7 +144,7 @@ class Evidence(NamedTuple):
 
     begin: int
     bin_steps: int
-    watched: NDArray[np.float64]
+    watched: F64
     sightings: SightingCounts
     parts: Parts | None = None
 
@@ -175,8 +174,8 @@ def steps_of_bin(step_us: int) -> int:
 class SightingRows(NamedTuple):
     """Users that were perceived, in order of time; arrays of one length."""
 
-    step: NDArray[np.int64]
-    user: NDArray[np.int64]  # index of the recognized user, below 0 if not recognized
+    step: I64
+    user: I64  # index of the recognized user, below 0 if not recognized
     room: NDArray[np.integer[Any]]  # NOWHERE for none
 
 
@@ -184,7 +183,7 @@ def gather(
     first: int,
     bin_steps: int,
     patches: Patches,
-    cells: NDArray[np.int64],
+    cells: I64,
     sightings: SightingRows,
     users: int,
 ) -> Evidence:

@@ -4,7 +4,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fleet2d.algorithms.evidence import Evidence
 from fleet2d.algorithms.frozen import frozen
@@ -13,6 +12,7 @@ from fleet2d.algorithms.observations import Looks, Observations, Truth, truth
 from fleet2d.algorithms.poses import BodyPoses
 from fleet2d.errors import ComponentError
 from fleet2d.events import Event
+from fleet2d.kernels import I32, I64, Bool
 
 
 @dataclass(frozen=True)
@@ -25,9 +25,9 @@ class Readings:
         on: bool (n,), True where the sensor went on (or open), False where off (or shut).
     """
 
-    step: NDArray[np.int64]
-    sensor: NDArray[np.int32]
-    on: NDArray[np.bool_]
+    step: I64
+    sensor: I32
+    on: Bool
 
 
 @dataclass(frozen=True)
@@ -122,7 +122,7 @@ class History:
         return frozen(self.log.looks(self.first, self.end, self.log.users))
 
     @cached_property
-    def exposure(self) -> NDArray[np.int64]:
+    def exposure(self) -> I64:
         """Cells of each room in view of each robot, summed over the steps: (robots, rooms).
 
         Divided by the room's number of cells and by the number of steps, it is the mean share of

@@ -4,7 +4,6 @@ from collections.abc import Callable, Mapping, Sequence, Set
 from typing import NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fleet2d.algorithms.activities import Activities
 from fleet2d.algorithms.blocks import Blocks
@@ -15,6 +14,7 @@ from fleet2d.algorithms.poses import BodyPoses, Path
 from fleet2d.errors import ComponentError
 from fleet2d.events import HOME, Event, EventKind
 from fleet2d.floorplan.home.home import Home
+from fleet2d.kernels import I64
 from fleet2d.kernels.look import IDENTITY, STEP, X, Y
 from fleet2d.kernels.timelines import Window
 
@@ -58,8 +58,8 @@ class Log:
         self._events: list[Event] = []
         self.readings: list[SensorRow] = []
         self.cameras: list[tuple[int, str]] = []  # index of the robot, and name of the camera
-        self._looks: dict[int, NDArray[np.int64]] = {}
-        self._exposures: dict[int, NDArray[np.int64]] = {}
+        self._looks: dict[int, I64] = {}
+        self._exposures: dict[int, I64] = {}
         self.bin_steps = 0  # steps of a bin of evidence; 0: no component needs evidence
         self._bins = Blocks()  # int64 (n, robots, 2, patches), by bin
         self._next_bin = 0
@@ -123,7 +123,7 @@ class Log:
             self._poses[key] = BodyPoses(self.home, path)
         return self._poses[key]
 
-    def observe(self, rows: NDArray[np.int64]) -> None:
+    def observe(self, rows: I64) -> None:
         """Store the observations of a span: int64 (n, OBSERVATION), in order of step."""
         if len(rows):
             self._observations.append(int(rows[0, STEP]), int(rows[-1, STEP]) + 1, rows)
@@ -139,7 +139,7 @@ class Log:
         """Return the observations of the steps from `first` to `end` - 1."""
         return Observations(self.home.plan, self._rooms, self.seen(first, end), self.activities)
 
-    def count_looks(self, step: int, counts: Sequence[NDArray[np.int64]]) -> None:
+    def count_looks(self, step: int, counts: Sequence[I64]) -> None:
         """Store how often each robot's cameras have looked and noticed before `step`."""
         if counts:
             self._looks[step] = np.concatenate(counts)
@@ -156,11 +156,11 @@ class Log:
         names = tuple(name for _, name in self.cameras)
         return Looks(robots, names, counts[..., 0], counts[..., 1])
 
-    def expose(self, step: int, exposure: NDArray[np.int64]) -> None:
+    def expose(self, step: int, exposure: I64) -> None:
         """Store how much of each room each robot has had in view before `step`."""
         self._exposures[step] = exposure
 
-    def expose_bins(self, bins: NDArray[np.int64]) -> None:
+    def expose_bins(self, bins: I64) -> None:
         """Store what each robot has had in view in the next bins: int64 (n, robots, 2, patches).
 
         Entry 0 is the number of cells of each patch in view, summed over the steps of the bin;
@@ -192,7 +192,7 @@ class Log:
         sightings = SightingRows(rows.column(STEP), rows.column(IDENTITY), patch)
         return gather(first, self.bin_steps, self.patches, bins, sightings, users)
 
-    def exposure(self, first: int, end: int) -> NDArray[np.int64]:
+    def exposure(self, first: int, end: int) -> I64:
         """Return how much of each room each robot had in view in the steps `first` to `end` - 1.
 
         It is only summed if a component declared before the run that it needs it.
@@ -204,9 +204,7 @@ class Log:
         return _known_at(self._exposures, end, none) - _known_at(self._exposures, first, none)
 
 
-def _known_at(
-    sums: Mapping[int, NDArray[np.int64]], step: int, zero: NDArray[np.int64]
-) -> NDArray[np.int64]:
+def _known_at(sums: Mapping[int, I64], step: int, zero: I64) -> I64:
     """Return the sums up to before a step."""
     if step in sums or step == 0 or not sums:  # without cameras there are no sums
         return sums.get(step, zero)

@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fleet2d.errors import ComponentError
 from fleet2d.floorplan.home.change import HomeChanges
+from fleet2d.kernels import F64
 from fleet2d.problems import suggest
 
 WITHHELD = "withheld"
@@ -56,9 +57,7 @@ class RoomDistribution:
                 f"a room distribution needs finite weights of 0 or more, got {values}"
             )
         total = values.sum()
-        self.share: NDArray[np.float64] = (
-            values / total if total > 0 else np.full(len(values), 1 / len(values))
-        )
+        self.share: F64 = values / total if total > 0 else np.full(len(values), 1 / len(values))
 
     def __repr__(self) -> str:
         """Show the shares."""

@@ -4,11 +4,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fleet2d.algorithms.observations import NOWHERE
 from fleet2d.floorplan.cache import read_only
 from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.kernels import F64, I16, I64
 from fleet2d.kernels.mesh import label_triangles, rasterize_cells
 
 # Side of a patch [m], approximately; larger where a room would have more than about MOST_PATCHES.
@@ -28,20 +28,20 @@ class Patches:
             the parts; None: it is in one part.
     """
 
-    of_cell: NDArray[np.int16]
-    room: NDArray[np.int64]
-    cells: NDArray[np.int64]
-    island: NDArray[np.int64] | None = None
+    of_cell: I16
+    room: I64
+    cells: I64
+    island: I64 | None = None
 
     @cached_property
-    def first(self) -> NDArray[np.int64]:
+    def first(self) -> I64:
         """The first patch of each room: int64 (rooms,)."""
         return read_only(np.flatnonzero(np.diff(self.room, prepend=-1)))
 
     @cached_property
-    def room_cells(self) -> NDArray[np.int64]:
+    def room_cells(self) -> I64:
         """Number of cells of each room, at least 1: int64 (rooms,)."""
-        cells: NDArray[np.int64] = np.maximum(np.add.reduceat(self.cells, self.first), 1)
+        cells: I64 = np.maximum(np.add.reduceat(self.cells, self.first), 1)
         return read_only(cells)
 
 
@@ -86,7 +86,7 @@ def patches_of(plan: FloorPlan) -> Patches:
     return Patches(read_only(of_cell), read_only(room), cells, islands(plan))
 
 
-def islands(plan: FloorPlan) -> NDArray[np.int64] | None:
+def islands(plan: FloorPlan) -> I64 | None:
     """Return the part of the free space that holds each room: int64 (rooms,).
 
     Rooms with floor in the same part, and parts with floor in the same room, count as one. None if
@@ -110,9 +110,7 @@ def islands(plan: FloorPlan) -> NDArray[np.int64] | None:
     return read_only(island)
 
 
-def _divide(
-    place: NDArray[np.int64], room: NDArray[np.int64], side: NDArray[np.float64], count: int
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _divide(place: I64, room: I64, side: F64, count: int) -> tuple[I64, I64]:
     """Divide the extent of each room along one axis into equal parts.
 
     Args:
@@ -129,5 +127,5 @@ def _divide(
     np.maximum.at(high, room, place)
     extent = np.maximum(high - low + 1, 1)
     parts = np.maximum(1, np.rint(extent / side)).astype(np.int64)
-    part: NDArray[np.int64] = (place - low[room]) * parts[room] // extent[room]
+    part: I64 = (place - low[room]) * parts[room] // extent[room]
     return part, parts

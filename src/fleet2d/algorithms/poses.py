@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from fleet2d.algorithms.frozen import frozen
 from fleet2d.algorithms.observations import NOWHERE
 from fleet2d.floorplan.home.home import Home
+from fleet2d.kernels import F64, I16, I64, U8, Bool
 from fleet2d.kernels.headings import in_radians
 from fleet2d.kernels.measure import count_together, rooms_at, sum_moves
 from fleet2d.kernels.motion import Poses
@@ -28,23 +29,23 @@ class Path(Protocol):
         """One past the last step."""
 
     @property
-    def step(self) -> NDArray[np.int64]:
+    def step(self) -> I64:
         """First step of each run."""
 
     @property
-    def x(self) -> NDArray[np.int64]:
+    def x(self) -> I64:
         """Position along x of each run [lattice units]."""
 
     @property
-    def y(self) -> NDArray[np.int64]:
+    def y(self) -> I64:
         """Position along y of each run [lattice units]."""
 
     @property
-    def heading(self) -> NDArray[np.int64]:
+    def heading(self) -> I64:
         """Heading of each run [1/4096 turn]."""
 
     @property
-    def away(self) -> NDArray[np.uint8]:
+    def away(self) -> U8:
         """Not 0 for runs away from home."""
 
 
@@ -59,12 +60,12 @@ class BodyPoses:
         return self._runs.end - self._runs.first
 
     @cached_property
-    def _lengths(self) -> NDArray[np.int64]:
+    def _lengths(self) -> I64:
         """Number of steps of each run of equal pose."""
         return np.diff(self._runs.step, append=self._runs.end)
 
     @cached_property
-    def xy(self) -> NDArray[np.float64]:
+    def xy(self) -> F64:
         """Positions: float64 (n, 2) [m]; while away, the place at which the body left."""
         lattice = self._home.plan.lattice
         xy = lattice.to_metres(np.stack([self._runs.x, self._runs.y], axis=-1))
@@ -79,40 +80,40 @@ class BodyPoses:
         return x, y
 
     @property
-    def x(self) -> NDArray[np.float64]:
+    def x(self) -> F64:
         """Positions along x [m]."""
         return self.xy[:, 0]
 
     @property
-    def y(self) -> NDArray[np.float64]:
+    def y(self) -> F64:
         """Positions along y [m]."""
         return self.xy[:, 1]
 
     @cached_property
-    def heading(self) -> NDArray[np.float64]:
+    def heading(self) -> F64:
         """Headings, counter-clockwise from +x, 0 to 2 pi [rad]."""
-        radians: NDArray[np.float64] = in_radians(self._runs.heading)
+        radians: F64 = in_radians(self._runs.heading)
         return _shared(np.repeat(radians, self._lengths))
 
     @cached_property
-    def away(self) -> NDArray[np.bool_]:
+    def away(self) -> Bool:
         """Whether the body is away from home: bool (n,)."""
         return _shared(np.repeat(self._runs.away.astype(bool), self._lengths))
 
     @cached_property
-    def room(self) -> NDArray[np.int16]:
+    def room(self) -> I16:
         """Index of the room, NOWHERE while the body is away: int16 (n,)."""
         return _shared(np.repeat(self._rooms, self._lengths))
 
     @cached_property
-    def _rooms(self) -> NDArray[np.int16]:
+    def _rooms(self) -> I16:
         """Index of the room of each run."""
         runs = self._runs
         room = rooms_at(self._home.plan.room_of_place, runs.x, runs.y)
         return np.where(runs.away != 0, np.int16(NOWHERE), room)
 
     @cached_property
-    def visits(self) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int16]]:
+    def visits(self) -> tuple[I64, I64, I16]:
         """Stretches of steps in one room: begin, end and room of each, each (stretches,).
 
         Steps are counted from `first`; the room is NOWHERE while the body is away.
@@ -123,7 +124,7 @@ class BodyPoses:
         return frozen((begin, np.append(begin, len(self))[1:], rooms[first]))
 
     @cached_property
-    def time_in_rooms(self) -> NDArray[np.int64]:
+    def time_in_rooms(self) -> I64:
         """Number of steps in each room, and last away: int64 (rooms + 1,)."""
         begin, end, room = self.visits
         counts = np.zeros(len(self._home.rooms) + 1, np.int64)

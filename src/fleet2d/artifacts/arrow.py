@@ -19,6 +19,7 @@ from fleet2d.artifacts.files import PARTIAL
 from fleet2d.artifacts.table import DTYPES, Column, Kind, TableSpec
 from fleet2d.bounds import TABLE_BYTES, unpacked_bytes
 from fleet2d.errors import ArtifactError
+from fleet2d.kernels import Bool
 
 # Bytes of text in one array: Arrow counts them by 32 bits.
 MOST_TEXT = 2**31 - 1
@@ -117,9 +118,7 @@ def _array_of(chunk: ColumnChunk, column: Column, dictionary: pa.Array | None) -
     return _wrapped(chunk.values, _TYPES[column.kind], missing)
 
 
-def _wrapped(
-    values: NDArray[Any], kind: pa.DataType, missing: NDArray[np.bool_] | None
-) -> pa.Array:
+def _wrapped(values: NDArray[Any], kind: pa.DataType, missing: Bool | None) -> pa.Array:
     """Wrap values as they lie in memory.
 
     `pa.array` would do, but it imports pandas where that is installed: a quarter of a second.
@@ -133,7 +132,7 @@ def _strings(words: Sequence[str]) -> pa.Array:
     return _array_of(encode_strings(words, nullable=False), Column("words", "string"), None)
 
 
-def _bits(flags: NDArray[np.bool_]) -> pa.Buffer:
+def _bits(flags: Bool) -> pa.Buffer:
     return pa.py_buffer(np.packbits(flags, bitorder="little"))
 
 

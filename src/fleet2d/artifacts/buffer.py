@@ -19,6 +19,7 @@ from fleet2d.artifacts.chunk import (
 )
 from fleet2d.artifacts.table import DTYPES, Column, TableSpec
 from fleet2d.errors import ArtifactError
+from fleet2d.kernels import Bool
 
 FLUSH_ROWS = 2**16
 """Rows that a table holds back at most, and rows of a Parquet row group at most."""
@@ -59,7 +60,7 @@ class TableBuffer:
             column.name: [] for column in spec.columns if column.takes_strings
         }
         self._coded = 0  # rows whose words have codes in `_values`
-        self._valid: dict[str, NDArray[np.bool_]] = {}
+        self._valid: dict[str, Bool] = {}
         self._names = frozenset(spec.names)
 
     def __getstate__(self) -> dict[str, Any]:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from fleet2d.artifacts.table import DTYPES, Column, TableSpec
 from fleet2d.errors import ArtifactError
+from fleet2d.kernels import I64, Bool
 
 
 class ColumnChunk(NamedTuple):
@@ -22,8 +23,8 @@ class ColumnChunk(NamedTuple):
     """
 
     values: NDArray[Any]
-    valid: NDArray[np.bool_] | None = None
-    lengths: NDArray[np.int64] | None = None
+    valid: Bool | None = None
+    lengths: I64 | None = None
 
 
 Chunk = dict[str, ColumnChunk]
@@ -84,5 +85,5 @@ def encode_words(strings: Sequence[str | None], words: Dictionary, nullable: boo
     return ColumnChunk(codes, _valid(strings) if nullable else None)
 
 
-def _valid(strings: Sequence[str | None]) -> NDArray[np.bool_]:
+def _valid(strings: Sequence[str | None]) -> Bool:
     return np.fromiter((string is not None for string in strings), np.bool_, len(strings))

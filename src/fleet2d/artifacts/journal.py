@@ -26,6 +26,7 @@ from fleet2d.artifacts.chunk import Chunk, ColumnChunk, Dictionary, new_dictiona
 from fleet2d.artifacts.encoding import ArrayReader
 from fleet2d.artifacts.table import DTYPES, Column, TableSpec
 from fleet2d.errors import ArtifactError
+from fleet2d.kernels import I64
 from fleet2d.kernels.encoding import encode_arrays
 
 FOLDER = "unfinished"
@@ -346,7 +347,7 @@ def _check_range(values: NDArray[Any], first: int, end: int) -> None:
         raise ValueError(f"{values.min()} to {values.max()}, expected {first} to {end - 1}")
 
 
-def _check_text(text: bytes, lengths: NDArray[np.int64]) -> None:
+def _check_text(text: bytes, lengths: I64) -> None:
     if lengths.size and lengths.min() < 0:
         raise ValueError(f"a text of {lengths.min()} bytes")
     end = 0

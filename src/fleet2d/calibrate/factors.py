@@ -3,9 +3,8 @@
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-F64 = NDArray[np.float64]
+from fleet2d.kernels import F64
 
 SURE = 12.0  # logits from here on count as a share of 1
 

@@ -12,15 +12,14 @@ from functools import cache
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fleet2d.extras import extra
+from fleet2d.kernels import F64, Bool
 
 with extra("calibrate", "calibration needs scipy"):
     from scipy.optimize import brentq
     from scipy.stats import binomtest
 
-F64 = NDArray[np.float64]
 
 CHI_SQUARE_95 = 3.8414588206941236  # one degree of freedom
 NEVER = 1e-12  # the least distance of probabilities from 0 and 1
@@ -98,7 +97,7 @@ class Fit:
 class ProductLikelihood:
     """The likelihood of outcomes whose probability is a product of factors."""
 
-    def __init__(self, factors: Sequence[Factor], outcomes: NDArray[np.bool_]) -> None:
+    def __init__(self, factors: Sequence[Factor], outcomes: Bool) -> None:
         self.factors, self.outcomes = factors, outcomes
         self.least = np.array([v for factor in factors for v in factor.least])
         self.most = np.array([v for factor in factors for v in factor.most])
@@ -144,7 +143,7 @@ class ProductLikelihood:
         hit = self.outcomes
         return float(np.log(shares[hit]).sum() + np.log1p(-shares[~hit]).sum())
 
-    def _climb(self, theta: F64, free: NDArray[np.bool_]) -> Fit:
+    def _climb(self, theta: F64, free: Bool) -> Fit:
         """Return the maximum over the free parameters, by damped Fisher scoring from `theta`."""
         theta = np.clip(theta, self.least, self.most)
         shares, slopes = self._model(theta)

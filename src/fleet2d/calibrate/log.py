@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from fleet2d.bounds import LOG_BYTES, LOG_ROWS, check_file, one_line
 from fleet2d.errors import InputError
-
-F64 = NDArray[np.float64]
+from fleet2d.kernels import F64, Bool
 
 LEAST_ROWS = 50
 MOST_METRES = 100.0  # a larger distance in a home is in another unit
@@ -48,7 +47,7 @@ class DetectionLog:
 
     path: Path
     distance: F64
-    detected: NDArray[np.bool_]
+    detected: Bool
     bearing: F64 | None = None
     orientation: F64 | None = None
     true_identity: NDArray[np.str_] | None = None
@@ -95,7 +94,7 @@ def read_log(path: Path) -> DetectionLog:
     return log
 
 
-def recognized(log: DetectionLog) -> NDArray[np.bool_]:
+def recognized(log: DetectionLog) -> Bool:
     """Return for each detection of a log with identities whether the person was recognized."""
     assert log.identity is not None
     assert log.true_identity is not None

@@ -5,12 +5,12 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from fleet2d.calibrate.factors import Constant, Falling, Orientation
 from fleet2d.calibrate.likelihood import Factor, Fit, ParameterEstimate, ProductLikelihood, wilson
 from fleet2d.calibrate.log import DetectionLog, recognized
+from fleet2d.kernels import F64, I64, Bool
 from fleet2d.sums import sum_in_order
 
 GROUPS = 10
@@ -148,7 +148,7 @@ def calibrate(log: DetectionLog) -> Calibration:
 
 
 def fit_probability(
-    outcomes: NDArray[np.bool_], top: Constant, candidates: dict[str, Factor]
+    outcomes: Bool, top: Constant, candidates: dict[str, Factor]
 ) -> FittedProbability:
     """Fit the product of a constant and of those factors that improve the fit significantly."""
     factors = dict(candidates)
@@ -168,9 +168,9 @@ def fit_probability(
     )
 
 
-def group_rows(shares: NDArray[np.float64], outcomes: NDArray[np.bool_]) -> list[ProbabilityGroup]:
+def group_rows(shares: F64, outcomes: Bool) -> list[ProbabilityGroup]:
     """Return groups of equal size of the rows, sorted by their predicted probability."""
-    parts: Sequence[NDArray[np.int64]] = np.array_split(np.argsort(shares, kind="stable"), GROUPS)
+    parts: Sequence[I64] = np.array_split(np.argsort(shares, kind="stable"), GROUPS)
     return [
         ProbabilityGroup(
             len(part), float(shares[part].mean()), wilson(int(outcomes[part].sum()), len(part))

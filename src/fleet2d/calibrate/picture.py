@@ -3,20 +3,18 @@
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fleet2d.calibrate.likelihood import wilson
 from fleet2d.calibrate.log import recognized
 from fleet2d.calibrate.perception import Calibration, ProbabilityGroup
 from fleet2d.extras import extra
+from fleet2d.kernels import F64, Bool
 from fleet2d.pictures.floorplan import check_picture, drawing_style, save_figure
 
 with extra("viz", "drawing needs matplotlib"):
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-F64 = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 BINS = 12
 LEAST = 10  # the least mean number of rows per bin
@@ -38,7 +36,7 @@ def draw_fit(calibration: Calibration, target: Path) -> None:
 def _figure(calibration: Calibration) -> Figure:
     """Return a figure with a panel for each quantity, and one of predicted against observed."""
     log, shares = calibration.log, calibration.detection.fit.shares
-    panels: list[tuple[str, str, F64, Flags, F64]] = []
+    panels: list[tuple[str, str, F64, Bool, F64]] = []
     for label, values in (
         ("distance [m]", log.distance),
         ("angle off the optical axis [deg]", log.bearing),
@@ -63,7 +61,7 @@ def _figure(calibration: Calibration) -> Figure:
     return figure
 
 
-def _draw_shares(axes: Axes, values: F64, detected: Flags, shares: F64) -> None:
+def _draw_shares(axes: Axes, values: F64, detected: Bool, shares: F64) -> None:
     """Draw observed shares with their intervals, and the mean fitted share of the same rows."""
     bins = min(BINS, max(1, len(values) // LEAST))
     edges = np.quantile(values, np.linspace(0, 1, bins + 1))

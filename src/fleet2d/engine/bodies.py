@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 from fleet2d.entities.body import NEVER
 from fleet2d.entities.motion import Pose, RandomWalk
 from fleet2d.entities.plan import Plan
+from fleet2d.kernels import I8, I64, U8
 from fleet2d.kernels.motion import Breakpoints, Poses
 from fleet2d.kernels.timelines import Timelines, Window
 
-I64 = NDArray[np.int64]
 STANDING = np.zeros(1, np.int8), np.zeros(0, np.int64)
 
 
@@ -30,8 +30,8 @@ class PoseBlock(NamedTuple):
     x: I64
     y: I64
     heading: I64
-    away: NDArray[np.uint8]
-    posture: NDArray[np.int8]
+    away: U8
+    posture: I8
 
 
 def poses_of(block: PoseBlock, row: int) -> Poses:
@@ -73,7 +73,7 @@ class Bodies:
         """Return the pose of a body at a step that isn't forgotten."""
         return Pose(*self._timelines.pose(row, step))
 
-    def poses(self, step: int) -> tuple[I64, I64, I64, NDArray[np.uint8]]:
+    def poses(self, step: int) -> tuple[I64, I64, I64, U8]:
         """Return x, y, heading and away of all bodies at a step, (bodies,) each."""
         return self._timelines.poses(step)
 

@@ -12,7 +12,6 @@ from typing import NamedTuple
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 
 from fleet2d.clock import midnight_of
 from fleet2d.engine.basis import Basis
@@ -27,6 +26,7 @@ from fleet2d.floorplan.home.change import HomeChange
 from fleet2d.floorplan.home.home import lattice_footprint
 from fleet2d.floorplan.home.space import grow_shape
 from fleet2d.floorplan.rooms.vocabulary import PRIORITY, usual_type
+from fleet2d.kernels import F64
 from fleet2d.problems import suggest
 from fleet2d.units import micros
 
@@ -34,8 +34,6 @@ from fleet2d.units import micros
 OPENS_AHEAD_US = 1_000_000
 # Time after which a change that a body blocks is tried again [us].
 RETRY_US = 1_000_000
-
-I64 = NDArray[np.int64]
 
 
 class DueChange(NamedTuple):
@@ -235,10 +233,10 @@ class Changes:
 
     # Bodies in the way
 
-    def _door_shape(self, door: int) -> NDArray[np.float64]:
+    def _door_shape(self, door: int) -> F64:
         return np.array(self.home.door_line(door), np.float64)
 
-    def _is_blocked(self, shape: NDArray[np.float64], actors: Sequence[Actor]) -> bool:
+    def _is_blocked(self, shape: F64, actors: Sequence[Actor]) -> bool:
         """Whether a body stands where a shape [lattice units] is to be."""
         units = self.home.plan.lattice.units_per_m
         for actor in actors:
@@ -248,7 +246,7 @@ class Changes:
                     return True
         return False
 
-    def _stop(self, step: int, actors: Sequence[Actor], shape: NDArray[np.float64] | None) -> None:
+    def _stop(self, step: int, actors: Sequence[Actor], shape: F64 | None) -> None:
         """Let bodies decide anew whose way is blocked, or that walk at random along the walls."""
         units = self.home.plan.lattice.units_per_m
         for actor in actors:
@@ -260,7 +258,7 @@ class Changes:
                 if way is not None and way.intersects(zone):
                     actor.ask(step)
 
-    def _passes(self, actor: Actor, shape: NDArray[np.float64]) -> bool:
+    def _passes(self, actor: Actor, shape: F64) -> bool:
         """Whether a shape is a door that the body opens."""
         if not actor.entity.opens_doors or len(shape) > 2:
             return False
@@ -357,5 +355,5 @@ class Changes:
             )
 
 
-def _corners(shape: shapely.Polygon) -> NDArray[np.float64]:
+def _corners(shape: shapely.Polygon) -> F64:
     return np.asarray(shape.exterior.coords)

@@ -6,7 +6,6 @@ from itertools import islice, pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fleet2d.algorithms.activities import ROBOT
 from fleet2d.algorithms.log import Log
@@ -30,6 +29,7 @@ from fleet2d.entities.behavior import SightEvent
 from fleet2d.entities.decisions import DecidingActor
 from fleet2d.events import Event, EventKind, EventStream, new_event
 from fleet2d.floorplan.home.home import Home
+from fleet2d.kernels import I64
 from fleet2d.kernels.look import SIGHTING
 from fleet2d.kernels.look import STEP as STEP_COLUMN
 
@@ -225,7 +225,7 @@ class State:
             self.log.forget(before)
         self.bodies.forget(min(before, self.settled))
 
-    def _observations(self) -> NDArray[np.int64]:
+    def _observations(self) -> I64:
         """Return the sightings of all robots, in order of step and robot."""
         blocks = [cameras.collect() for cameras in self.cameras]
         for cameras in self.user_cameras:

@@ -3,7 +3,6 @@
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fleet2d.component import Settings
 from fleet2d.entities.body import Body
@@ -11,12 +10,11 @@ from fleet2d.entities.furniture import stop_at
 from fleet2d.entities.motion import Motion, Track
 from fleet2d.entities.place import Place
 from fleet2d.entities.plan import Note, Plan
+from fleet2d.kernels import F64, I64
 from fleet2d.units import PositiveDuration, Share, micros
 
 # The table of events gets a row `battery` when the charge has changed by this much.
 RECORDED_CHANGE = 0.05
-
-I64 = NDArray[np.int64]
 
 
 class Battery(Settings):
@@ -50,7 +48,7 @@ class Course(NamedTuple):
     begins: I64
     rates: list[float]
 
-    def levels(self, moments: I64) -> NDArray[np.float64]:
+    def levels(self, moments: I64) -> F64:
         """Return the charge, float64 (n,), at moments from `begins[0]` on [us], int64 (n,)."""
         level, rows = self.level, []
         for i, rate in enumerate(self.rates):
@@ -60,7 +58,7 @@ class Course(NamedTuple):
                 level = min(1.0, max(0.0, level + change))
         piece = np.searchsorted(self.begins, moments, side="right") - 1
         since = moments - self.begins[piece]
-        levels: NDArray[np.float64] = np.array(rows)[piece] + np.array(self.rates)[piece] * since
+        levels: F64 = np.array(rows)[piece] + np.array(self.rates)[piece] * since
         return levels.clip(0.0, 1.0)
 
 

@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fleet2d.entities.actor import Actor
 from fleet2d.entities.behavior import Situation
@@ -12,11 +11,10 @@ from fleet2d.entities.motion import Track
 from fleet2d.entities.plan import Note, Plan
 from fleet2d.entities.resume import heading_at, next_stop
 from fleet2d.floorplan.home.costmap import CLOSED
+from fleet2d.kernels import I64
 from fleet2d.kernels.headings import TURN, turn_between
 from fleet2d.kernels.mesh import SUB
 from fleet2d.kernels.motion import Breakpoints
-
-I64 = NDArray[np.int64]
 
 
 def plan_after_a_step(now: Situation, interrupted: Plan, notes: Sequence[Note] = ()) -> Plan:

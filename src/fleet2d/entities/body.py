@@ -6,7 +6,6 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fleet2d.blame import blame
 from fleet2d.clock import Clock
@@ -22,10 +21,9 @@ from fleet2d.floorplan.home.home import Home
 from fleet2d.floorplan.home.space import Space
 from fleet2d.floorplan.objects import PlacedObject, Posture
 from fleet2d.floorplan.plan import Room
+from fleet2d.kernels import F64, I64
 from fleet2d.kernels.headings import TURN
 from fleet2d.streams import Draws, stream_key
-
-I64 = NDArray[np.int64]
 
 NEVER = 1 << 62
 """The step of what never happens."""
@@ -40,7 +38,7 @@ class RunBodies(Protocol):
     """
 
     step: int
-    ask_at: NDArray[np.int64]
+    ask_at: I64
 
     def pose(self, row: int) -> Pose:
         """Return where a body is at the present step."""
@@ -237,7 +235,7 @@ class Body:
         rows[:, 0] += begin_us
         return rows
 
-    def seconds(self, metres: NDArray[np.float64]) -> NDArray[np.float64]:
+    def seconds(self, metres: F64) -> F64:
         """Return what it thinks that ways of some lengths take, without turns [s]."""
         lattice = self.home.plan.lattice
         if self.drive is None:

@@ -4,7 +4,6 @@ from datetime import timedelta
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from fleet2d.component import Settings
@@ -13,6 +12,7 @@ from fleet2d.entities.body import Body
 from fleet2d.entities.plan import Plan
 from fleet2d.entities.resume import resumed, without_next_stop
 from fleet2d.floorplan.home.costmap import CLOSED, route_by_cost
+from fleet2d.kernels import I64
 from fleet2d.units import Length, PositiveDuration, micros
 
 # Time between two looks whether the way is clear again: a tenth of the time waited so far, within
@@ -25,8 +25,6 @@ JUST_WAITED = timedelta(seconds=15)
 # which it counts as touching [m].
 PASSING = 0.1
 TOUCHING = 0.03
-
-I64 = NDArray[np.int64]
 
 
 class GivesWay(Settings):

@@ -4,10 +4,10 @@ from datetime import timedelta
 from typing import NamedTuple, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from fleet2d.component import Settings
+from fleet2d.kernels import I64, U8
 from fleet2d.kernels.headings import TURN, turned
 from fleet2d.kernels.random import BELL_STD, random_bell, random_below, random_uniform
 from fleet2d.kernels.timelines import Window
@@ -22,8 +22,6 @@ FINE = 1 << 16
 PURPOSES = (
     "drift x", "drift y", "turn", "left x", "left y", "jump x", "jump y", "jumps", "when",
 )  # fmt: skip
-
-I64 = NDArray[np.int64]
 
 
 class Localization(Settings):
@@ -85,7 +83,7 @@ class Runs(NamedTuple):
     x: I64
     y: I64
     heading: I64
-    away: NDArray[np.uint8]
+    away: U8
 
 
 class Drift:

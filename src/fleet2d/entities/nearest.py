@@ -4,11 +4,9 @@ from functools import cached_property
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 
 from fleet2d.entities.body import Body
-
-I64 = NDArray[np.int64]
+from fleet2d.kernels import I64
 
 
 class Nearest:

@@ -6,7 +6,6 @@ from functools import partial
 from typing import TYPE_CHECKING, NamedTuple, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fleet2d.entities.furniture import seat_at
 from fleet2d.entities.motion import Motion, RandomWalk, Track
@@ -14,6 +13,7 @@ from fleet2d.errors import ComponentError, NoWayError
 from fleet2d.events import KINDS
 from fleet2d.floorplan.home.space import Space, straight_way
 from fleet2d.floorplan.objects import POSTURES, PlacedObject, Posture
+from fleet2d.kernels import I8, I64
 from fleet2d.kernels.headings import TURN, turn_between
 from fleet2d.kernels.motion import Breakpoints, Legs, WalkRule
 from fleet2d.problems import did_you_mean
@@ -23,8 +23,6 @@ if TYPE_CHECKING:
     from fleet2d.component import Component
     from fleet2d.entities.body import Body
     from fleet2d.entities.place import Point, RoomChoice
-
-I64 = NDArray[np.int64]
 
 
 class Note(NamedTuple):
@@ -193,7 +191,7 @@ class Plan:
         changes = reversed(self.postures)
         return next((code for time, code in changes if time <= time_us), self._posture_before)
 
-    def posture_times(self) -> tuple[I64, NDArray[np.int8]]:
+    def posture_times(self) -> tuple[I64, I8]:
         """Return when the posture changes [us], int64 (n,), and the postures, int8 (n + 1,)."""
         codes = [self._posture_before, *(code for _, code in self.postures)]
         times = [time for time, _ in self.postures]

@@ -4,13 +4,13 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
 from fleet2d.entities.motion import RandomWalk
 from fleet2d.entities.plan import Note, Plan
 from fleet2d.errors import ComponentError
 from fleet2d.floorplan.objects import POSTURES
+from fleet2d.kernels import I64
 from fleet2d.kernels.mesh import SUB
 from fleet2d.kernels.motion import Legs, WalkRule
 from fleet2d.problems import problem, refusal
@@ -105,7 +105,7 @@ def plan_of(body: "Body", step: int, data: Mapping[str, Any]) -> Plan:
     return plan
 
 
-def _check_rows(body: "Body", begin_us: int, rows: NDArray[np.int64]) -> None:
+def _check_rows(body: "Body", begin_us: int, rows: I64) -> None:
     """Refuse breakpoints that a body can't follow from a moment on."""
     size = body.home.plan.room_of_place.shape
     x, y = rows[:, 1] // SUB, rows[:, 2] // SUB

@@ -3,16 +3,16 @@
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fleet2d.entities.body import Body
 from fleet2d.entities.motion import Track
 from fleet2d.entities.plan import Note, Plan
 from fleet2d.errors import NoWayError
+from fleet2d.kernels import I64
 from fleet2d.kernels.headings import TURN, turn_between
 from fleet2d.kernels.motion import Breakpoints
 
-Detour = Callable[[tuple[int, int], tuple[int, int]], NDArray[np.int64] | None]
+Detour = Callable[[tuple[int, int], tuple[int, int]], I64 | None]
 
 
 def resumed(

@@ -13,7 +13,8 @@ from fleet2d.expectations.formatting import call_text
 from fleet2d.expectations.scene import Scene
 from fleet2d.expectations.signals import Measurement, Signal, SignalComparison
 from fleet2d.expectations.temporal import Always
-from fleet2d.expectations.trace import I64, Trace, joined
+from fleet2d.expectations.trace import Trace, joined
+from fleet2d.kernels import I64
 
 
 @dataclass(frozen=True, eq=False)

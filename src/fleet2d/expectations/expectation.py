@@ -17,7 +17,8 @@ import numpy as np
 from fleet2d.clock import Clock
 from fleet2d.errors import InputError
 from fleet2d.expectations.scene import Scene
-from fleet2d.expectations.trace import F64, I64, Trace, combine, spells
+from fleet2d.expectations.trace import Trace, combine, spells
+from fleet2d.kernels import F64, I64
 from fleet2d.units import micros
 
 INFINITE = float("inf")

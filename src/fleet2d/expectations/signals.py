@@ -11,7 +11,8 @@ from fleet2d.errors import InputError
 from fleet2d.expectations.expectation import INFINITE, TINY, Expectation, RunSignals, truth
 from fleet2d.expectations.formatting import argument_text, call_text, number_text
 from fleet2d.expectations.scene import Scene
-from fleet2d.expectations.trace import F64, Trace
+from fleet2d.expectations.trace import Trace
+from fleet2d.kernels import F64
 from fleet2d.units import Quantity
 
 BODY = ("user or robot", "bodies")

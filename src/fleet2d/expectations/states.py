@@ -11,7 +11,8 @@ from fleet2d.expectations.expectation import RunSignals
 from fleet2d.expectations.formatting import call_text
 from fleet2d.expectations.scene import Scene
 from fleet2d.expectations.signals import BODY, Condition, Measurement, WordSignal
-from fleet2d.expectations.trace import I64, Trace
+from fleet2d.expectations.trace import Trace
+from fleet2d.kernels import I64
 from fleet2d.problems import did_you_mean
 
 

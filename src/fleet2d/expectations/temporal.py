@@ -16,8 +16,9 @@ from fleet2d.expectations.expectation import (
 )
 from fleet2d.expectations.formatting import call_text
 from fleet2d.expectations.scene import Scene
-from fleet2d.expectations.trace import I64, Trace, combine, constant, pulses, spells
+from fleet2d.expectations.trace import Trace, combine, constant, pulses, spells
 from fleet2d.expectations.violation import Violation, violations_of
+from fleet2d.kernels import I64
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,12 +4,8 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fleet2d.kernels import signals
-
-I64 = NDArray[np.int64]
-F64 = NDArray[np.float64]
+from fleet2d.kernels import F64, I64, signals
 
 
 class Trace(NamedTuple):

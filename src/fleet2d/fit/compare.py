@@ -3,15 +3,13 @@
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fleet2d.fit.timeline import I16, MINUTES, runs
+from fleet2d.fit.timeline import MINUTES, runs
+from fleet2d.kernels import F64, I16
 from fleet2d.sums import sum_in_order
 
 HOURS = 24
 FEWEST_STAYS = 5  # the fewest stays at a place whose durations are compared
-
-Floats = NDArray[np.float64]
 
 
 class Distances(NamedTuple):
@@ -53,19 +51,19 @@ def distances(real: I16, other: I16, count: int) -> Distances:
     )
 
 
-def shares(labels: I16, count: int) -> Floats:
+def shares(labels: I16, count: int) -> F64:
     """Return the share of each label in the known time, float64 (count,)."""
     known = labels[labels >= 0]
     return np.bincount(known, minlength=count) / max(len(known), 1)
 
 
-def by_hour(labels: I16, count: int) -> Floats:
+def by_hour(labels: I16, count: int) -> F64:
     """Return the shares of the labels in each hour of the day, (24, count)."""
     hours = labels.reshape(len(labels), HOURS, MINUTES // HOURS)
     return np.stack([shares(hours[:, hour], count) for hour in range(HOURS)])
 
 
-def dwell_times(labels: I16, count: int) -> list[Floats]:
+def dwell_times(labels: I16, count: int) -> list[F64]:
     """Return the durations of the complete stays at each label [min], sorted."""
     times: list[list[int]] = [[] for _ in range(count)]
     for day in labels:
@@ -77,7 +75,7 @@ def dwell_times(labels: I16, count: int) -> list[Floats]:
     return [np.sort(np.array(lengths, np.float64)) for lengths in times]
 
 
-def ks_distance(a: Floats, b: Floats) -> float:
+def ks_distance(a: F64, b: F64) -> float:
     """Return the Kolmogorov-Smirnov distance of two sorted samples; 1 if either is empty.
 
     >>> ks_distance(np.array([1.0, 2.0]), np.array([1.0, 3.0]))
@@ -91,7 +89,7 @@ def ks_distance(a: Floats, b: Floats) -> float:
     return float(np.abs(below_a - below_b).max())
 
 
-def wasserstein(a: Floats, b: Floats) -> float:
+def wasserstein(a: F64, b: F64) -> float:
     """Return the Wasserstein distance of two sorted samples; an empty one counts as a single 0.
 
     >>> wasserstein(np.array([1.0, 2.0]), np.array([2.0, 5.0]))
@@ -104,6 +102,6 @@ def wasserstein(a: Floats, b: Floats) -> float:
     return float((np.abs(below_a - below_b) * np.diff(points)).sum())
 
 
-def _variation(a: Floats, b: Floats) -> float:
+def _variation(a: F64, b: F64) -> float:
     """Return the total variation between two distributions."""
     return float(np.abs(a - b).sum() / 2)

@@ -3,9 +3,9 @@
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fleet2d.fit.timeline import MINUTES, Timeline, is_sleep, runs
+from fleet2d.kernels import I16, Bool
 
 # Being up for up to this long in the night doesn't end the night [min].
 UP_AT_NIGHT = 60
@@ -66,7 +66,7 @@ def find_days(timeline: Timeline) -> list[LivedDay]:
     return days
 
 
-def _nights(asleep: NDArray[np.bool_], days: int) -> dict[int, tuple[int, int]]:
+def _nights(asleep: Bool, days: int) -> dict[int, tuple[int, int]]:
     """Return begin and end [min] of the night after each day: the longest sleep, if several.
 
     Night -1 is the one before the first day.
@@ -87,7 +87,7 @@ def _nights(asleep: NDArray[np.bool_], days: int) -> dict[int, tuple[int, int]]:
     return nights
 
 
-def _runs(flat: NDArray[np.int16], begin: int, end: int, midnight: int) -> tuple[Stretch, ...]:
+def _runs(flat: I16, begin: int, end: int, midnight: int) -> tuple[Stretch, ...]:
     return tuple(
         Stretch(state, begin - midnight + first, length)
         for state, first, length in runs(flat[begin:end])

@@ -7,7 +7,8 @@ import numpy as np
 
 from fleet2d.clock import DAY_S
 from fleet2d.fit.persona import FittedPersona
-from fleet2d.fit.timeline import I16, MINUTES, Timeline
+from fleet2d.fit.timeline import MINUTES, Timeline
+from fleet2d.kernels import I16
 from fleet2d.routines.activity import Activity, seconds
 from fleet2d.routines.laws import KNOTS, exponential
 from fleet2d.routines.life import Life

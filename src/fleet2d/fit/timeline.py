@@ -6,10 +6,10 @@ from datetime import timedelta
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fleet2d.clock import DAY_S
 from fleet2d.floorplan.rooms.vocabulary import room_type
+from fleet2d.kernels import I16
 from fleet2d.logs.log import AWAY, ActivityLog, LogError
 from fleet2d.logs.rooms import DOOR, USUAL
 from fleet2d.logs.visits import UNKNOWN, LoggedVisit, VisitRule, visits_of
@@ -23,8 +23,6 @@ STILL = timedelta(hours=12)
 OUT = timedelta(minutes=10)  # a longer silence at the front door counts as being out
 # An activity in a room with less time and fewer runs than this loses its name.
 RARE_MINUTES, RARE_RUNS = 30, 4
-
-I16 = NDArray[np.int16]
 
 
 class ActivityPlace(NamedTuple):

@@ -9,7 +9,8 @@ from fleet2d.fit.compare import Distances, distances
 from fleet2d.fit.days import LivedDay, find_days
 from fleet2d.fit.persona import Model, fit_persona
 from fleet2d.fit.sample import sample_days, sample_markov, sample_persona
-from fleet2d.fit.timeline import I16, Timeline
+from fleet2d.fit.timeline import Timeline
+from fleet2d.kernels import I16
 from fleet2d.logs.log import LogError
 
 MODELS = (

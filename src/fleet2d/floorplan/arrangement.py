@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 from shapely import Polygon
 
 from fleet2d.floorplan.geometry.lattice import Lattice
 from fleet2d.floorplan.names import number_names
 from fleet2d.floorplan.objects import PlacedObject, Point
+from fleet2d.kernels import F64
 from fleet2d.kernels.headings import TURN, UNIT, cosine, in_radians, sine
 
 
@@ -51,7 +51,7 @@ def move_object(
     pivot = lattice.to_lattice(((x0 + x1) / 2, (y0 + y1) / 2))
     goal = lattice.to_lattice(to)
 
-    def transform(xy: NDArray[np.float64]) -> NDArray[np.float64]:
+    def transform(xy: F64) -> F64:
         dx, dy = (lattice.to_lattice(xy) - pivot).T
         c, s = cosine(turn), sine(turn)
         half = UNIT // 2

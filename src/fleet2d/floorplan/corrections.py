@@ -6,7 +6,6 @@ from typing import Self
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 from pydantic import Field, model_validator
 from shapely import MultiPolygon, Polygon
 
@@ -18,6 +17,7 @@ from fleet2d.floorplan.rooms.doorways import DoorLine, name_doorways
 from fleet2d.floorplan.rooms.regions import LabelledRegion, Region, cells_in, snap_regions
 from fleet2d.floorplan.rooms.room import Room, make_rooms
 from fleet2d.floorplan.rooms.vocabulary import usual_type
+from fleet2d.kernels import I64
 from fleet2d.kernels.chambers import fill_from_neighbors
 from fleet2d.problems import problem
 from fleet2d.units import Length
@@ -124,9 +124,7 @@ def _rename(region: Region, correction: RoomCorrection) -> Region:
     return Region((kind,), region.shape, name, kind)
 
 
-def _region_at(
-    plan: FloorPlan, painted: NDArray[np.int64], correction: RoomCorrection, where: str
-) -> int:
+def _region_at(plan: FloorPlan, painted: I64, correction: RoomCorrection, where: str) -> int:
     """Return the index of the region that holds the place of a correction."""
     x, y = correction.at or (0.0, 0.0)
     row, column = plan.lattice.cell_of(*plan.lattice.point_at((x, y)))
@@ -141,9 +139,7 @@ def _region_at(
     )
 
 
-def _draw(
-    plan: FloorPlan, painted: NDArray[np.int64], correction: RoomCorrection, index: int, where: str
-) -> NDArray[np.int64]:
+def _draw(plan: FloorPlan, painted: I64, correction: RoomCorrection, index: int, where: str) -> I64:
     """Return the regions of the cells, with those inside the polygon set to `index`."""
     shape = _shape(correction.polygon or ())
     (region,) = snap_regions(plan.lattice, [LabelledRegion((), shape)])

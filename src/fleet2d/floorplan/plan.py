@@ -9,7 +9,6 @@ from typing import Any, Self
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 from shapely import MultiPolygon, Polygon
 
 from fleet2d.bounds import CORNERS, POLYGONS
@@ -32,6 +31,7 @@ from fleet2d.floorplan.rooms.doorways import DoorLine, Doorway, fit_lines, name_
 from fleet2d.floorplan.rooms.regions import LabelledRegion
 from fleet2d.floorplan.rooms.room import NO_ROOM, Room
 from fleet2d.floorplan.rooms.vocabulary import room_type
+from fleet2d.kernels import I16, Bool
 from fleet2d.kernels.chambers import fill_from_neighbors
 from fleet2d.kernels.mesh import Mesh, rasterize_cells, strictly_inside
 from fleet2d.leaves import views
@@ -75,8 +75,8 @@ class FloorPlan:
     lattice: Lattice
     polygons: Sequence[Polygon]
     mesh: Mesh
-    free: NDArray[np.bool_]
-    room_of_cell: NDArray[np.int16]
+    free: Bool
+    room_of_cell: I16
     rooms: tuple[Room, ...]
     entrance: tuple[float, float] | None = None
     doorways: tuple[Doorway, ...] = ()
@@ -134,7 +134,7 @@ class FloorPlan:
             polygons, passages = search_passages(lattice, polygons, regions_are)
         polygons = canonical_order(polygons)
         mesh = build_mesh(polygons, lattice.columns, lattice.rows)
-        cells: NDArray[np.bool_] = rasterize_cells(mesh, lattice.rows, lattice.columns) >= 0
+        cells: Bool = rasterize_cells(mesh, lattice.rows, lattice.columns) >= 0
         if not cells.any():
             raise FloorPlanError(
                 f"the free space of {name} holds no cell of {cell:g} m: choose a smaller"
@@ -206,7 +206,7 @@ class FloorPlan:
         return shapely.transform(MultiPolygon(self.polygons), self.lattice.to_metres)
 
     @cached_property
-    def room_of_place(self) -> NDArray[np.int16]:
+    def room_of_place(self) -> I16:
         """Index of the room of a place in each cell, int16 (rows, columns), -1 inside walls.
 
         Like `room_of_cell`, but a cell that a wall cuts, so that its centre isn't free, has the

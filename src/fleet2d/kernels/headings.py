@@ -15,7 +15,6 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fleet2d._core import (
     HALF_TURN,
@@ -29,6 +28,7 @@ from fleet2d._core import (
     sine,
     turn_between,
 )
+from fleet2d.kernels import I64
 
 __all__ = [
     "HALF_TURN",
@@ -47,14 +47,12 @@ __all__ = [
 ]
 
 
-def in_radians(heading: int | NDArray[np.int64]) -> Any:
+def in_radians(heading: int | I64) -> Any:
     """Return headings in radians, 0 to 2 pi."""
     return heading * (2 * math.pi / TURN)
 
 
-def turned(
-    x: NDArray[np.int64], y: NDArray[np.int64], angle: NDArray[np.int64]
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def turned(x: I64, y: I64, angle: I64) -> tuple[I64, I64]:
     """Return points turned about the origin, rounded: x and y.
 
     Args:
@@ -72,7 +70,7 @@ def turned(
 
 
 @cache
-def half_sines() -> NDArray[np.int64]:
+def half_sines() -> I64:
     """Return UNIT times the sines of a whole turn: entry i is the angle i * 2 pi / 8192."""
     rising = SINES[:-1]
     falling = SINES[:0:-1]

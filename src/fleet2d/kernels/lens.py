@@ -2,10 +2,8 @@
 
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from fleet2d._core import camera_pose, hides, in_wedge, near_wedge, points_in_view
+from fleet2d.kernels import I64
 from fleet2d.kernels.headings import TURN, turned
 
 __all__ = [
@@ -17,8 +15,6 @@ __all__ = [
     "near_wedge",
     "points_in_view",
 ]
-
-I64 = NDArray[np.int64]
 
 
 class Lenses(NamedTuple):

@@ -3,9 +3,9 @@
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fleet2d._core import USER_LOST, USER_SEEN, About, SightingColumn, look
+from fleet2d.kernels import I8, I32, I64, U8
 
 __all__ = [
     "CAMERA",
@@ -31,8 +31,6 @@ __all__ = [
     "new_memory",
 ]
 
-I64 = NDArray[np.int64]
-U8 = NDArray[np.uint8]
 
 # The columns of a sighting. Where a camera was wrong about a person, USER is NOBODY; where it
 # didn't recognize one, IDENTITY is. X to POSTURE are as perceived.
@@ -58,7 +56,7 @@ class UserPoses(NamedTuple):
     y: I64
     heading: I64
     away: U8
-    posture: NDArray[np.int8]
+    posture: I8
 
 
 class SightMemory(NamedTuple):
@@ -78,8 +76,8 @@ class SightEvents(NamedTuple):
     """Identities that come into view or are lost, in order of (step, identity)."""
 
     step: I64
-    user: NDArray[np.int32]
-    kind: NDArray[np.int32]  # USER_SEEN | USER_LOST
+    user: I32
+    kind: I32  # USER_SEEN | USER_LOST
 
 
 class LookRule(NamedTuple):

@@ -8,9 +8,9 @@ shorter way, both at constant rate; before the first and after the last one it s
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fleet2d._core import Legs, time_route, trace_meander, trace_track
+from fleet2d.kernels import I64, U8
 
 __all__ = [
     "Breakpoints",
@@ -24,8 +24,6 @@ __all__ = [
     "trace_track",
 ]
 
-I64 = NDArray[np.int64]
-
 
 class Breakpoints(NamedTuple):
     """The arrays of a track, all of one length."""
@@ -34,7 +32,7 @@ class Breakpoints(NamedTuple):
     x: I64
     y: I64
     heading: I64
-    away: NDArray[np.uint8]
+    away: U8
 
 
 class Poses(NamedTuple):
@@ -43,7 +41,7 @@ class Poses(NamedTuple):
     x: I64
     y: I64
     heading: I64
-    away: NDArray[np.uint8]
+    away: U8
 
 
 class WalkRule(NamedTuple):

@@ -3,13 +3,11 @@
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fleet2d._core import follow_people, smooth_people
+from fleet2d.kernels import F64, I64, U8
 
 __all__ = ["PeopleEvidence", "PeoplePlaces", "follow_people", "smooth_people"]
-
-I64 = NDArray[np.int64]
 
 
 class PeopleEvidence(NamedTuple):
@@ -27,7 +25,7 @@ class PeopleEvidence(NamedTuple):
 
     minute: I64
     view: I64
-    views: NDArray[np.uint8]
+    views: U8
     begin: I64
     bin: I64
     patch: I64
@@ -43,11 +41,11 @@ class PeoplePlaces(NamedTuple):
         begin: int64 (people + 1,), offsets of each person's stretches.
     """
 
-    probability: NDArray[np.float64]
+    probability: F64
     bins: I64
     begin: I64
 
-    def by_bin(self, person: int) -> NDArray[np.float64]:
+    def by_bin(self, person: int) -> F64:
         """Return the probability of one person's places in each bin: float64 (bins, rooms + 1)."""
         own = slice(self.begin[person], self.begin[person + 1])
         return np.repeat(self.probability[own], self.bins[own], axis=0)

@@ -7,7 +7,6 @@ every draw is a comparison of integers: the same on every machine.
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fleet2d._core import (
     AT_BEARING,
@@ -51,6 +50,7 @@ from fleet2d._core import (
     steady_chance,
     turn_and_stretch,
 )
+from fleet2d.kernels import I64, U64
 
 __all__ = [
     "AT_BEARING",
@@ -95,9 +95,6 @@ __all__ = [
     "steady_chance",
     "turn_and_stretch",
 ]
-
-I64 = NDArray[np.int64]
-U64 = NDArray[np.uint64]
 
 
 class ErrorTables(NamedTuple):

@@ -8,10 +8,8 @@ floats (sums of correctly rounded square roots, the same on every machine).
 
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from fleet2d._core import Routes, distance
+from fleet2d.kernels import I64, Bool
 
 __all__ = ["Corners", "Routes", "distance"]
 
@@ -19,7 +17,7 @@ __all__ = ["Corners", "Routes", "distance"]
 class Corners(NamedTuple):
     """The reflex corners of a space: the nodes of its route graph."""
 
-    vertex: NDArray[np.int64]  # (nodes,) the vertex of the mesh at each, ascending
-    before: NDArray[np.int64]  # (nodes, 2) the vertex of the border before the corner [lattice]
-    after: NDArray[np.int64]  # (nodes, 2) and the one after it
-    simple: NDArray[np.bool_]  # (nodes,) False where several walls meet: no one before and after
+    vertex: I64  # (nodes,) the vertex of the mesh at each, ascending
+    before: I64  # (nodes, 2) the vertex of the border before the corner [lattice]
+    after: I64  # (nodes, 2) and the one after it
+    simple: Bool  # (nodes,) False where several walls meet: no one before and after

@@ -6,17 +6,11 @@ models, and the decisions of robots that follow from them, are the same on every
 
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from fleet2d import _core
 from fleet2d._core import WHOLE_PATCH, follow
+from fleet2d.kernels import F64, I64, U8
 
 __all__ = ["WHOLE_PATCH", "Moments", "StayModel", "Stretches", "follow", "merge_bins"]
-
-F64 = NDArray[np.float64]
-I64 = NDArray[np.int64]
-U8 = NDArray[np.uint8]
 
 
 class Stretches(NamedTuple):

@@ -8,15 +8,12 @@ The cells themselves are computed again when the last steps are needed.
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fleet2d._core import NEVER, Mesh, settle, watch
+from fleet2d.kernels import I16, I32, I64
 from fleet2d.kernels.lens import Lenses
 
 __all__ = ["NEVER", "PoseCache", "SightRecord", "WatchSetup", "empty_pose_cache", "settle", "watch"]
-
-Int32 = NDArray[np.int32]
-Int64 = NDArray[np.int64]
 
 
 class PoseCache(NamedTuple):
@@ -30,11 +27,11 @@ class PoseCache(NamedTuple):
         used: int64 (1,), number of used slots.
     """
 
-    pose: Int64
-    last: Int64
-    settled: Int64
-    cells: Int32
-    used: Int64
+    pose: I64
+    last: I64
+    settled: I64
+    cells: I32
+    used: I64
 
 
 class SightRecord(NamedTuple):
@@ -53,12 +50,12 @@ class SightRecord(NamedTuple):
             likewise.
     """
 
-    first: Int64
-    last: Int64
-    exposure: Int64
-    counted: Int64
-    binned: Int64
-    most: Int64
+    first: I64
+    last: I64
+    exposure: I64
+    counted: I64
+    binned: I64
+    most: I64
 
 
 class WatchSetup(NamedTuple):
@@ -76,7 +73,7 @@ class WatchSetup(NamedTuple):
 
     walls: Mesh
     lenses: Lenses
-    patch_of_cell: NDArray[np.int16]
+    patch_of_cell: I16
     step_us: int
     every: int
     bin_steps: int

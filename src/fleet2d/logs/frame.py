@@ -3,10 +3,10 @@
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from fleet2d.component import Settings
+from fleet2d.kernels import F64
 from fleet2d.problems import problem
 from fleet2d.sums import sum_in_order
 from fleet2d.units import AngleDeg, Length
@@ -60,20 +60,20 @@ class Frame(Settings):
             raise problem("matches: two different places are needed at least")
         return self
 
-    def to_plan(self, xy: NDArray[np.float64]) -> NDArray[np.float64]:
+    def to_plan(self, xy: F64) -> F64:
         """Return positions of the log, float64 (n, 2), as positions in the plan [m]."""
         (ax, ay), (bx, by) = self._factor()
         x, y = xy[:, 0], -xy[:, 1] if self.flip_y else xy[:, 1]
         return np.stack([ax * x - ay * y + bx, ay * x + ax * y + by], 1)
 
-    def turn_headings(self, heading: NDArray[np.float64]) -> NDArray[np.float64]:
+    def turn_headings(self, heading: F64) -> F64:
         """Return headings of the log [turns], float64 (n,), as headings in the plan [turns]."""
         ax, ay = self._factor()[0]
         turn = np.arctan2(ay, ax) / (2 * np.pi)  # callers round headings to 1/4096 turn
         sign = -1.0 if self.flip_y else 1.0
         return np.asarray(sign * heading + turn)
 
-    def errors(self) -> NDArray[np.float64]:
+    def errors(self) -> F64:
         """Return the distance between each match's place in the plan and its fit [m], (n,)."""
         log = np.array([match.log for match in self.matches], np.float64).reshape(-1, 2)
         plan = np.array([match.plan for match in self.matches], np.float64).reshape(-1, 2)

@@ -8,12 +8,10 @@ from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from fleet2d.bounds import LOG_BYTES, LOG_DAYS, LOG_ROWS, check_file
 from fleet2d.clock import DAY_US
 from fleet2d.errors import InputError
+from fleet2d.kernels import F64, I64
 
 # The most lines that a note lists.
 _MOST_NAMED = 20
@@ -113,9 +111,9 @@ class PositionLog:
     path: Path
     layout: str
     first_day: date | None
-    time_us: NDArray[np.int64]
-    xy: NDArray[np.float64]
-    heading: NDArray[np.float64]
+    time_us: I64
+    xy: F64
+    heading: F64
     notes: tuple[str, ...] = ()
 
     @property

@@ -23,6 +23,7 @@ from fleet2d.bounds import (
     unpacked_bytes,
 )
 from fleet2d.clock import DAY_US
+from fleet2d.kernels import F64, I64, Bool
 from fleet2d.logs.log import LogError, PositionLog
 from fleet2d.logs.times import parse_time
 from fleet2d.problems import did_you_mean
@@ -42,7 +43,6 @@ EARLIEST_US, LATEST_US = -2_208_988_800_000_000, 7_258_118_400_000_000
 
 MOST_NUMBER = 8e18  # of nanoseconds since 1970
 QUARTER_HOUR_US = 900_000_000
-I64 = NDArray[np.int64]
 
 
 def read_positions(
@@ -182,7 +182,7 @@ def _of_tag(
     return table.filter(pa.array(is_tag)), line[is_tag], notes
 
 
-def _numbers(table: pa.Table, name: str, path: Path, line: I64) -> NDArray[np.float64]:
+def _numbers(table: pa.Table, name: str, path: Path, line: I64) -> F64:
     """Return a column of numbers, float64 (n,); NaN where it is empty."""
     column = table[name]
     if pa.types.is_string(column.type) or pa.types.is_large_string(column.type):
@@ -269,7 +269,7 @@ def _scale_numbers(numbers: NDArray[Any], path: Path, line: I64) -> tuple[I64, b
     return np.round(numbers * scale).astype(np.int64), size >= 1e8
 
 
-def _in_zone(utc_us: I64, name: str) -> tuple[I64, NDArray[np.bool_]]:
+def _in_zone(utc_us: I64, name: str) -> tuple[I64, Bool]:
     """Return the local times of a zone [us], and which of them are in a repeated hour."""
     try:
         zone = ZoneInfo(name)

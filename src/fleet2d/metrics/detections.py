@@ -4,12 +4,12 @@ from collections.abc import Mapping
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fleet2d.algorithms.algorithm import Present
 from fleet2d.algorithms.history import History
 from fleet2d.component import register
 from fleet2d.floorplan.home.home import Home
+from fleet2d.kernels import I64
 from fleet2d.metrics.metric import Metric
 
 UNKNOWN = "unknown"  # name in the confusion of a person not recognized
@@ -40,8 +40,8 @@ class Detections(Metric):
 
     def start(self, home: Home) -> None:
         """Begin counting."""
-        self.looks: NDArray[np.int64] | None = None  # (robots, users, 2): in view, noticed
-        self.confusion: NDArray[np.int64]  # (robots, users + 1, users + 1): true, perceived
+        self.looks: I64 | None = None  # (robots, users, 2): in view, noticed
+        self.confusion: I64  # (robots, users + 1, users + 1): true, perceived
         self.names: tuple[tuple[str, ...], tuple[str, ...]] = ((), ())
 
     def update(self, history: History, state: Present) -> Any:
@@ -61,7 +61,7 @@ class Detections(Metric):
         self.confusion += confusion
         return self._rows(looks, confusion)
 
-    def _rows(self, looks: NDArray[np.int64], confusion: NDArray[np.int64]) -> Any:
+    def _rows(self, looks: I64, confusion: I64) -> Any:
         """Return a row for each robot and user, and last for nobody: the false positives."""
         robots, users = self.names
         if not (robots and users):
@@ -91,9 +91,7 @@ class Detections(Metric):
             for r, robot in enumerate(robots)
         }
 
-    def _summary(
-        self, looks: NDArray[np.int64], counts: NDArray[np.int64], users: tuple[str, ...]
-    ) -> dict[str, Any]:
+    def _summary(self, looks: I64, counts: I64, users: tuple[str, ...]) -> dict[str, Any]:
         numbers: dict[str, Any] = {}
         real, total = int(counts[:-1].sum()), int(counts.sum())
         if total:

@@ -4,15 +4,13 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fleet2d.algorithms.algorithm import Present
 from fleet2d.algorithms.history import History
 from fleet2d.algorithms.poses import BodyPoses
 from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.kernels import F64, I64, Bool
 from fleet2d.kernels.points import points_in_sight
-
-Bool = NDArray[np.bool_]
 
 
 class RobotUserPair(NamedTuple):
@@ -36,7 +34,7 @@ class RobotUserPair(NamedTuple):
         return ~(self.robot_poses.away | self.user_poses.away)
 
     @property
-    def distance(self) -> NDArray[np.float64]:
+    def distance(self) -> F64:
         """Distance between the centres at each step [m]: float64 (steps,), infinite while away."""
         gap = self.robot_poses.xy - self.user_poses.xy
         return np.where(self.at_home, np.sqrt((gap * gap).sum(axis=1)), np.inf)
@@ -49,7 +47,7 @@ def pairs_of(history: History, state: Present) -> Iterator[RobotUserPair]:
             yield RobotUserPair(robot, user, history.poses(robot), history.poses(user))
 
 
-def in_sight(plan: FloorPlan, pair: RobotUserPair, steps: NDArray[np.int64]) -> Bool:
+def in_sight(plan: FloorPlan, pair: RobotUserPair, steps: I64) -> Bool:
     """Return whether no wall of the plan is between the two at each of some steps: bool (n,).
 
     Doors count as open, and furniture as too low to block the view.

@@ -5,7 +5,6 @@ from datetime import timedelta
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from fleet2d.algorithms.algorithm import Present
@@ -13,6 +12,7 @@ from fleet2d.algorithms.history import History
 from fleet2d.component import register
 from fleet2d.events import Event
 from fleet2d.floorplan.home.home import Home
+from fleet2d.kernels import F64
 from fleet2d.kernels.points import points_in_sight
 from fleet2d.metrics.metric import Metric
 from fleet2d.metrics.survival import kaplan_meier, quantile, restricted_mean
@@ -116,7 +116,7 @@ class TimeToFind(Metric):
         self.end, self.step_s = history.end, history.step_s
         return _rows(ended)
 
-    def _driven(self, history: History, robot: str) -> NDArray[np.float64]:
+    def _driven(self, history: History, robot: str) -> F64:
         """Return the distance driven by a robot up to each step of the period [m]."""
         xy = history.poses(robot).xy
         moves = np.diff(xy, axis=0, prepend=[self.last.get(robot, tuple(xy[0].tolist()))])

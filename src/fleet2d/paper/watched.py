@@ -13,9 +13,8 @@ import numpy as np
 from fleet2d.extras import extra
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from fleet2d.engine.simulation import Simulation
+    from fleet2d.kernels import F64, U8
 
 SECONDS_PER_HOUR = 3600
 
@@ -103,7 +102,7 @@ class LiveView:
             self._axes.add_patch(artist)
         self._poses: dict[str, tuple[float, float, float]] = {}
 
-    def frame(self) -> "NDArray[np.uint8]":
+    def frame(self) -> "U8":
         """Return the picture of the current step: RGBA, uint8 (height, width, 4)."""
         self._canvas.restore_region(self._background)
         state = self.simulation.state
@@ -121,7 +120,7 @@ class LiveView:
                 self._axes.draw_artist(body)
         return np.asarray(self._canvas.buffer_rgba())
 
-    def _outline(self, name: str, x: float, y: float, heading: float) -> "NDArray[np.float64]":
+    def _outline(self, name: str, x: float, y: float, heading: float) -> "F64":
         """Return the outline of the largest visible part, float64 (n, 2) [m]."""
         import shapely
 

@@ -7,10 +7,10 @@ from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.colors import to_rgb
 from matplotlib.patches import Rectangle
-from numpy.typing import NDArray
 
 from fleet2d.clock import midnight_of
 from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.kernels import F64, I16, I64
 from fleet2d.palette import OTHER_COLOR, ROOM_COLORS, TEXT_COLOR
 from fleet2d.pictures.overlay import HATCH_COLOR, QUIET_COLOR
 from fleet2d.pictures.traces import BodyTrace
@@ -28,9 +28,6 @@ FAINTEST = 0.06  # the least height of a mark, as a share of that: a single sigh
 
 NOT_SIMULATED = -2
 
-Rooms = NDArray[np.int16]
-Shares = NDArray[np.float64]
-
 
 def room_color(plan: FloorPlan, index: int) -> tuple[float, float, float]:
     """Return the colour of a room in an actogram: deeper than on the floor plan."""
@@ -39,7 +36,7 @@ def room_color(plan: FloorPlan, index: int) -> tuple[float, float, float]:
     return red, green, blue
 
 
-def rooms_by_day(trace: BodyTrace, start: datetime, step_us: int, steps: int) -> Rooms:
+def rooms_by_day(trace: BodyTrace, start: datetime, step_us: int, steps: int) -> I16:
     """Return the room in each minute of each day, int16 (days, BINS); -1 away, -2 not simulated."""
     midnight = micros(start - midnight_of(start))
     days = -(-(midnight + steps * step_us) // DAY_US)
@@ -50,7 +47,7 @@ def rooms_by_day(trace: BodyTrace, start: datetime, step_us: int, steps: int) ->
     return rooms.reshape(days, BINS).astype(np.int16)
 
 
-def marks_by_day(seen: NDArray[np.int64], start: datetime, step_us: int, days: int) -> Shares:
+def marks_by_day(seen: I64, start: datetime, step_us: int, days: int) -> F64:
     """Return the share of each interval of each day with sightings: float64 (days, MARKS).
 
     Args:
@@ -66,11 +63,11 @@ def marks_by_day(seen: NDArray[np.int64], start: datetime, step_us: int, days: i
     # All steps that start before an edge have ended by then, except possibly the last.
     last_start = np.append(begins, -step_us)[started - 1]
     overhang = np.where(started > 0, np.maximum(last_start + step_us - edges, 0), 0)
-    shares: Shares = np.diff(started * step_us - overhang) / (DAY_US // MARKS)
+    shares: F64 = np.diff(started * step_us - overhang) / (DAY_US // MARKS)
     return shares.reshape(days, MARKS)
 
 
-def mark_boxes(marks: Shares, lift: float = 0.0) -> NDArray[np.float64]:
+def mark_boxes(marks: F64, lift: float = 0.0) -> F64:
     """Return the marks of an actogram as boxes, float64 (n, 4, 2): hour of the day, row.
 
     The height of a mark is the share of its interval in which somebody was seen, so that the ink is
@@ -88,7 +85,7 @@ def mark_boxes(marks: Shares, lift: float = 0.0) -> NDArray[np.float64]:
     return corners.reshape(-1, 4, 2)
 
 
-def hours_shown(rooms: Rooms) -> tuple[float, float]:
+def hours_shown(rooms: I16) -> tuple[float, float]:
     """Return the hours of the day to show: all, or those of a run within one day."""
     simulated = np.flatnonzero((rooms != NOT_SIMULATED).any(axis=0))
     if len(rooms) > 1 or len(simulated) == 0:
@@ -100,7 +97,7 @@ def hours_shown(rooms: Rooms) -> tuple[float, float]:
 
 
 def draw_actogram(
-    plan: FloorPlan, rooms: Rooms, marks: Shares, start: datetime, axes: Axes, *, dates: bool
+    plan: FloorPlan, rooms: I16, marks: F64, start: datetime, axes: Axes, *, dates: bool
 ) -> None:
     """Draw an actogram.
 
@@ -133,7 +130,7 @@ def draw_actogram(
     _label(axes, start, days, dates=dates)
 
 
-def _draw_marks(marks: Shares, axes: Axes, lift: float) -> None:
+def _draw_marks(marks: F64, axes: Axes, lift: float) -> None:
     """Draw a dark mark at the bottom of a row where somebody was seen."""
     boxes = PolyCollection([*mark_boxes(marks, lift)], facecolors=TEXT_COLOR, lw=0, zorder=2)
     boxes.set_snap(False)  # marks lower than a pixel are fainter, not a pixel high

@@ -5,14 +5,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from types import MappingProxyType
 
-import numpy as np
 import shapely
 from matplotlib.axes import Axes
-from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
 from fleet2d.floorplan.home.checkup import Finding
 from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.kernels import F64
 from fleet2d.palette import TEXT_COLOR
 from fleet2d.pictures.floorplan import check_picture, figure_size, floorplan_axes, picture
 
@@ -69,7 +68,7 @@ def _mark(axes: Axes, number: int, finding: Finding) -> None:
         )  # fmt: skip
 
 
-def _outlines(shape: BaseGeometry | None) -> list[NDArray[np.float64]]:
+def _outlines(shape: BaseGeometry | None) -> list[F64]:
     if shape is None:
         return []
     lines = []

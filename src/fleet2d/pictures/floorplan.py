@@ -18,7 +18,6 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.patches import PathPatch, Rectangle
 from matplotlib.path import Path as Outline
-from numpy.typing import NDArray
 
 from fleet2d.artifacts.files import write_atomically
 from fleet2d.errors import InputError
@@ -26,6 +25,7 @@ from fleet2d.floorplan.geometry.lattice import UNITS_PER_CELL
 from fleet2d.floorplan.home.standing import grown_cells
 from fleet2d.floorplan.plan import FloorPlan, Room, rings
 from fleet2d.floorplan.rooms.room import NO_ROOM
+from fleet2d.kernels import I16, Bool
 from fleet2d.kernels.fields import squared_distance
 from fleet2d.palette import (
     ACCENT_COLOR,
@@ -234,7 +234,7 @@ def _draw_borders(plan: FloorPlan, axes: Axes) -> None:
     axes.add_collection(LineCollection(list(corners), lw=0.6, color=color, ls=dashes, zorder=1.5))
 
 
-def _spread(room_of_cell: NDArray[np.int16]) -> NDArray[np.int16]:
+def _spread(room_of_cell: I16) -> I16:
     """Enlarge rooms by two cells into walls, so that their colour reaches slanted walls."""
     grown = np.pad(room_of_cell, 1, constant_values=NO_ROOM)
     for _ in range(2):
@@ -287,7 +287,7 @@ def _draw_entrance(entrance: tuple[float, float], axes: Axes) -> None:
     )
 
 
-def _empty_floor(plan: FloorPlan) -> NDArray[np.int16]:
+def _empty_floor(plan: FloorPlan) -> I16:
     """Return the room of each cell without an object, else -1: int16 (rows, columns)."""
     empty = plan.room_of_cell.copy()
     for item in plan.objects:
@@ -296,7 +296,7 @@ def _empty_floor(plan: FloorPlan) -> NDArray[np.int16]:
     return empty
 
 
-def _write_room(plan: FloorPlan, room: Room, empty: NDArray[np.int16], axes: Axes) -> None:
+def _write_room(plan: FloorPlan, room: Room, empty: I16, axes: Axes) -> None:
     """Write the name and area of a room in the middle of its empty floor.
 
     The text is as large as fits, and upright in narrow rooms.
@@ -325,7 +325,7 @@ def _write_room(plan: FloorPlan, room: Room, empty: NDArray[np.int16], axes: Axe
             return
 
 
-def _middle(cells: NDArray[np.bool_]) -> tuple[int, int]:
+def _middle(cells: Bool) -> tuple[int, int]:
     """Return the (row, column) in the middle of the cells that are deepest inside."""
     rows, columns = np.nonzero(cells)
     top, left = int(rows.min()), int(columns.min())
@@ -339,9 +339,7 @@ def _middle(cells: NDArray[np.bool_]) -> tuple[int, int]:
     return int(rows[nearest]), int(columns[nearest])
 
 
-def _clear_lengths(
-    cell: float, inside: NDArray[np.bool_], row: int, column: int
-) -> tuple[float, float]:
+def _clear_lengths(cell: float, inside: Bool, row: int, column: int) -> tuple[float, float]:
     """Return the lengths along x and y that are free on both sides of a cell [m]."""
     lengths = []
     for line, index in ((inside[row], column), (inside[:, column], row)):

@@ -12,12 +12,12 @@ from matplotlib.collections import LineCollection
 from matplotlib.colors import to_rgb
 from matplotlib.patches import Circle, Polygon
 from matplotlib.patheffects import withStroke
-from numpy.typing import NDArray
 
 from fleet2d.errors import PlacementError
 from fleet2d.floorplan.geometry.lattice import Lattice
 from fleet2d.floorplan.home.home import Home
 from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.kernels import F64, Bool
 from fleet2d.kernels.mesh import Mesh
 from fleet2d.palette import VIEW_COLOR, VIEW_EDGE
 from fleet2d.pictures.traces import BodyTrace
@@ -33,8 +33,6 @@ MOST_PLACES = 260  # places of sightings that are drawn; more would hide the pla
 CLEAR_M = 0.5  # twice the space between a name and a robot
 FAR_ENOUGH_M = 2.0
 RIM_COLOR = "#ffffffb0"  # around names
-
-F64 = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -89,7 +87,7 @@ def draw_presence(plan: FloorPlan, trace: BodyTrace, axes: Axes) -> None:
     axes.imshow(image, extent=extent, origin="lower", interpolation="bilinear", zorder=3)
 
 
-def opacity(time: F64, free: NDArray[np.bool_]) -> F64:
+def opacity(time: F64, free: Bool) -> F64:
     """Return the opacity of each cell for the time that a body spent there.
 
     It depends on the time relative to the mean over all free cells: equal times give a faint tint

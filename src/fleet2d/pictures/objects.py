@@ -8,10 +8,10 @@ import shapely
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PathCollection
 from matplotlib.path import Path as Outline
-from numpy.typing import NDArray
 
 from fleet2d.floorplan.objects import PlacedObject
 from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.kernels import F64
 from fleet2d.palette import DOOR_COLOR
 
 EDGE_COLOR = "#6d737c"
@@ -100,7 +100,7 @@ def label_objects(plan: FloorPlan, axes: Axes) -> None:
         axes.text(middle.x, middle.y, label, fontsize=size, rotation=rotation, zorder=4, **style)
 
 
-def _symbol(item: PlacedObject) -> list[NDArray[np.float64]]:
+def _symbol(item: PlacedObject) -> list[F64]:
     """Return the lines inside a footprint [m]."""
     forward = np.array([np.cos(item.heading), np.sin(item.heading)])
     left = np.array([-forward[1], forward[0]])

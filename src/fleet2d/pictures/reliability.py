@@ -5,10 +5,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fleet2d.algorithms.presence.belief import ANYONE
 from fleet2d.errors import ArtifactError
+from fleet2d.kernels import F64, I64
 from fleet2d.metrics.presence.scores import (
     calibration_error,
     classwise_error,
@@ -23,8 +23,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 LIKELIEST_COLOR, EVERY_COLOR = "#b5305c", "#2c6fb0"
-F64 = NDArray[np.float64]
-I64 = NDArray[np.int64]
 
 
 class Forecasts(NamedTuple):

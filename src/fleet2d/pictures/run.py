@@ -10,6 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from fleet2d.kernels import F64, I64
 from fleet2d.palette import ACCENT_COLOR
 from fleet2d.pictures.actogram import MARKS, draw_actogram, marks_by_day, room_color, rooms_by_day
 from fleet2d.pictures.floorplan import (
@@ -66,10 +67,10 @@ WIDE_SEPARATOR = "   ·   "
 class PlottedObservations:
     """The observations of the users in the picture; all arrays have one row for each."""
 
-    step: NDArray[np.int64]
+    step: I64
     robot: NDArray[Any]
     user: NDArray[Any]
-    xy: NDArray[np.float64]
+    xy: F64
 
 
 def draw_run(run: Run, path: Path) -> None:
@@ -140,7 +141,7 @@ class _Picture:
             self.notes.append(f"where {bucket} were is not stored")
         return traces
 
-    def _rings(self) -> dict[str, NDArray[np.float64]]:
+    def _rings(self) -> dict[str, F64]:
         """Return the places where each robot saw users; none if there are too many to draw."""
         places_of_robot = {
             robot.name: places_of(self.observations.xy[self.observations.robot == robot.name])

@@ -18,9 +18,10 @@ from matplotlib.image import AxesImage
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.text import Text
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from fleet2d.errors import InputError
+from fleet2d.kernels import F64
 
 Theme = Literal["light", "dark"]
 THEMES: tuple[Theme, ...] = get_args(Theme)
@@ -88,7 +89,7 @@ def darken(figure: Figure) -> None:
         _darken_artist(artist)
 
 
-def dark_colors(colors: ArrayLike) -> NDArray[np.float64]:
+def dark_colors(colors: ArrayLike) -> F64:
     """Return colours of the dark theme: RGBA in 0 to 1, float64 (n, 4).
 
     Args:
@@ -99,12 +100,12 @@ def dark_colors(colors: ArrayLike) -> NDArray[np.float64]:
         >>> [to_hex(color) for color in dark_colors(["white", "#2d3138"])]
         ['#181818', '#e2e7f1']
     """
-    rgba: NDArray[np.float64] = to_rgba_array(colors).copy()
+    rgba: F64 = to_rgba_array(colors).copy()
     rgba[:, :3] = _dark(rgba[:, :3])
     return rgba
 
 
-def _dark(rgb: NDArray[np.float64]) -> NDArray[np.float64]:
+def _dark(rgb: F64) -> F64:
     """Convert colours of the light theme to the dark one: RGB, float64 (n, 3)."""
     linear = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
     lab = np.cbrt(linear @ _CONES.T) @ _LAB.T

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from fleet2d.errors import ArtifactError
 from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.kernels import F64, I16, I64, Bool
 from fleet2d.palette import body_color
 from fleet2d.runs.categories import categories
 from fleet2d.runs.run import Run
@@ -25,9 +26,6 @@ WALKED_STEPS = 4_000_000
 JOINED_US = 5_000_000
 # A position so near to the way between its neighbours is on it: somewhat more than rounding.
 STRAIGHT_M = 0.003
-
-F64 = NDArray[np.float64]
-I64 = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -54,7 +52,7 @@ class BodyTrace:
     step: I64
     xy: F64
     heading: F64
-    room: NDArray[np.int16]
+    room: I16
     legs: F64
     note: str = ""
 
@@ -160,14 +158,14 @@ def _rows(
     return rows
 
 
-def _legs_between(xy: F64, away: NDArray[np.bool_]) -> F64:
+def _legs_between(xy: F64, away: Bool) -> F64:
     """Return the legs between positions, without those from and to an absence: (n, 2, 2) [m]."""
     legs = np.stack([xy[:-1], xy[1:]], axis=1)
     home = ~away.astype(bool)
     return legs[(legs[:, 0] != legs[:, 1]).any(axis=1) & home[:-1] & home[1:]]
 
 
-def _are_ends(xy: F64, state: F64) -> NDArray[np.bool_]:
+def _are_ends(xy: F64, state: F64) -> Bool:
     """Return which positions aren't just passed on a straight way, as where a robot brakes.
 
     Args:

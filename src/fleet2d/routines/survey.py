@@ -25,8 +25,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fleet2d.kernels import F64, I32
 from fleet2d.routines.laws import KNOTS, Law, lognormal, position
 from fleet2d.streams import Draws
 
@@ -43,8 +43,6 @@ ONE = 1 << 24
 WARM_UP_WEEKS = 2
 SLEEP_S = (8 * 3600, 3600)  # mean and deviation; the survey's mean is of nights cut at 04:00
 SPREAD = 0.6  # standard deviation of an episode's duration, relative to its mean
-
-F64 = NDArray[np.float64]
 
 
 class Episode(NamedTuple):
@@ -76,8 +74,8 @@ class SurveyGroup(NamedTuple):
 
     name: str
     facts: dict[str, Any]
-    leave: NDArray[np.int32]
-    enter: NDArray[np.int32]
+    leave: I32
+    enter: I32
     people: F64
 
 

@@ -3,10 +3,11 @@
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+
+from fleet2d.kernels import I64
 
 
-def categories(column: Any) -> tuple[NDArray[np.int64], list[str]]:
+def categories(column: Any) -> tuple[I64, list[str]]:
     """Return the category of each row as a number, and the names of the categories.
 
     Args:

@@ -15,6 +15,7 @@ from fleet2d.entities.motion import Pose
 from fleet2d.errors import ArtifactError
 from fleet2d.floorplan.home.home import Home
 from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.kernels import F64, I16, I64, Bool
 from fleet2d.kernels.headings import TURN, in_radians
 from fleet2d.kernels.mesh import SUB
 from fleet2d.kernels.motion import (
@@ -36,8 +37,6 @@ if TYPE_CHECKING:
 # The sections of a scenario that bodies depend on; the components of all others are not imported.
 _BODIES = ("simulation", "floorplan", "users", "robots")
 
-I64 = NDArray[np.int64]
-
 
 @dataclass(frozen=True)
 class Trajectory:
@@ -55,11 +54,11 @@ class Trajectory:
 
     step: I64
     time: NDArray[np.datetime64]
-    x: NDArray[np.float64]
-    y: NDArray[np.float64]
-    heading: NDArray[np.float64]
-    away: NDArray[np.bool_]
-    room: NDArray[np.int16]
+    x: F64
+    y: F64
+    heading: F64
+    away: Bool
+    room: I16
 
 
 def rebuild_path(run: "Run", plan: FloorPlan, entity: str, every: timedelta) -> Trajectory:

@@ -8,8 +8,8 @@ from collections.abc import Callable
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fleet2d.kernels import F64, I8
 from fleet2d.search.problem import SearchProblem
 from fleet2d.streams import Draws
 
@@ -112,11 +112,11 @@ _ORDERS: dict[str, Callable[[SearchProblem], list[int]]] = {
 
 
 def after_empty_looks(
-    prior: NDArray[np.float64],
-    age: NDArray[np.float64],
+    prior: F64,
+    age: F64,
     memory: float,
-    detect: NDArray[np.float64] | float = 1.0,
-) -> NDArray[np.float64]:
+    detect: F64 | float = 1.0,
+) -> F64:
     """Return the probabilities of the sites after looks without success, not normalized.
 
     A look that finds the target with probability d reduces the probability of its site by the part
@@ -156,9 +156,7 @@ def _step_by_step(problem: SearchProblem, worth: Callable[[float, float], float]
     return order
 
 
-def _solve(
-    ways: NDArray[np.float64], reach: NDArray[np.float64], gain: NDArray[np.float64]
-) -> tuple[NDArray[np.int8], int]:
+def _solve(ways: F64, reach: F64, gain: F64) -> tuple[I8, int]:
     """Return the best next site by (subset of sites done, last site), and the best first site.
 
     Args:

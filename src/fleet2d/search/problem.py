@@ -10,11 +10,10 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from fleet2d.kernels import F64
 from fleet2d.sums import sum_in_order
-
-F64 = NDArray[np.float64]
 
 
 class SearchProblem(NamedTuple):

@@ -12,16 +12,13 @@ from numpy.typing import ArrayLike, NDArray
 from fleet2d.clock import DAY_US, HOUR_US, midnight_of
 from fleet2d.errors import ComponentError
 from fleet2d.floorplan.home.home import Home
+from fleet2d.kernels import F64, I16, I64, Bool
 from fleet2d.kernels.headings import QUARTER, TURN, UNIT, half_sines
 from fleet2d.kernels.measure import rooms_at
 from fleet2d.kernels.perception import NOBODY, ONE, POSTURES, random_shares
 from fleet2d.kernels.random import BELL_STD, random_bells
 from fleet2d.streams import stream_key
 from fleet2d.units import micros
-
-I64 = NDArray[np.int64]
-F64 = NDArray[np.float64]
-Bool = NDArray[np.bool_]
 
 FARTHEST_M = 10_000.0
 """Largest coordinate of a perceived position [m]."""
@@ -126,11 +123,11 @@ class CameraSightings:
         return day_us / HOUR_US
 
     @property
-    def true_room(self) -> NDArray[np.int16]:
+    def true_room(self) -> I16:
         """Room of the true position, an index of `home.rooms`, -1 in none: int16 (n,)."""
         plan = self.home.plan
         x, y = plan.lattice.to_lattice(np.stack([self.true_x, self.true_y], axis=1)).T
-        rooms: NDArray[np.int16] = rooms_at(plan.room_of_place, x.copy(), y.copy())
+        rooms: I16 = rooms_at(plan.room_of_place, x.copy(), y.copy())
         return rooms
 
     def replace(

@@ -6,11 +6,11 @@ from itertools import pairwise
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, GetJsonSchemaHandler, model_serializer, model_validator
 from pydantic_core import CoreSchema
 
 from fleet2d.component import Settings
+from fleet2d.kernels import F64, I64
 from fleet2d.kernels.perception import ONE
 from fleet2d.problems import problem, problem_at
 from fleet2d.units import Share
@@ -95,11 +95,11 @@ class Curve(Settings):
         """Return the probability at x."""
         return float(self._shares(np.array([x], np.float64))[0])
 
-    def chances(self, x: Sequence[float]) -> NDArray[np.int64]:
+    def chances(self, x: Sequence[float]) -> I64:
         """Return the probabilities at many x [2**-31]: int64 (n,)."""
         return np.rint(self._shares(np.array(x, np.float64)) * ONE).astype(np.int64)
 
-    def _shares(self, at: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _shares(self, at: F64) -> F64:
         """Return the probabilities at many x, the same on every machine: float64 (n,)."""
         if self.midpoint is not None and self.width is not None:
             return self.top / (1 + exponential((at - self.midpoint) / self.width))
@@ -138,7 +138,7 @@ def decay(steps: Decimal) -> float:
         return float(_exp(-steps))
 
 
-def exponential(x: NDArray[np.float64]) -> NDArray[np.float64]:
+def exponential(x: F64) -> F64:
     """Return exp(x), with x clipped to -LIMIT … LIMIT, the same on every machine.
 
     np.exp differs between machines in the last bit; sums and products don't.

@@ -4,14 +4,14 @@ from collections import OrderedDict
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from fleet2d.component import register
 from fleet2d.floorplan.home.home import Home
+from fleet2d.kernels import I64, U8, Bool
 from fleet2d.kernels.headings import TURN
 from fleet2d.kernels.mesh import SUB, Mesh
-from fleet2d.sight.fov import I64, Bool, FieldOfView, Reach
+from fleet2d.sight.fov import FieldOfView, Reach
 from fleet2d.sight.visibility_polygon import filled_cells
 
 # Memory of an entry besides its bits: keys, tuple and array.
@@ -25,7 +25,7 @@ class CellBits(NamedTuple):
     column: int
     rows: int
     columns: int
-    bits: NDArray[np.uint8]
+    bits: U8
 
 
 @register("sight", "flashlight")

@@ -4,16 +4,13 @@ from abc import abstractmethod
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fleet2d.component import Component
 from fleet2d.floorplan.home.home import Home
+from fleet2d.kernels import I64, Bool
 from fleet2d.kernels.mesh import CELL_CENTRE, SUB
 from fleet2d.kernels.points import points_in_reach
 from fleet2d.kernels.seen import Reach
-
-Bool = NDArray[np.bool_]
-I64 = NDArray[np.int64]
 
 __all__ = ["Bool", "FieldOfView", "Reach"]
 

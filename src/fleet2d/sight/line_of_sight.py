@@ -2,8 +2,9 @@
 
 from fleet2d.component import register
 from fleet2d.floorplan.home.home import Home
+from fleet2d.kernels import I64, Bool
 from fleet2d.kernels.points import points_in_sight
-from fleet2d.sight.fov import I64, Bool, FieldOfView
+from fleet2d.sight.fov import FieldOfView
 
 
 @register("sight", "line_of_sight")

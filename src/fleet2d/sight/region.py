@@ -8,11 +8,10 @@ import numpy.typing as npt
 
 from fleet2d.errors import PlacementError
 from fleet2d.floorplan.geometry.lattice import Lattice
+from fleet2d.kernels import F64, Bool
 from fleet2d.kernels.mesh import Mesh
 from fleet2d.kernels.region import region_contains_points, region_outline
 from fleet2d.kernels.region import visible_region as visible_region_fast
-
-Float64 = npt.NDArray[np.float64]
 
 
 class WallPlan(Protocol):
@@ -70,7 +69,7 @@ class VisibleRegion:
             )
 
     @cached_property
-    def _outline(self) -> tuple[Float64, float]:
+    def _outline(self) -> tuple[F64, float]:
         return region_outline(self._mesh, *self.eye, self.right, self.wall)
 
     @property
@@ -78,13 +77,13 @@ class VisibleRegion:
         """The area of the region [m²]."""
         return self._outline[1] / self._lattice.units_per_m**2
 
-    def polygon(self) -> Float64:
+    def polygon(self) -> F64:
         """Return the corners of the outline, counter-clockwise: float64 (n, 2) [m]."""
         outline, _ = self._outline
         differs = (outline != np.roll(outline, 1, axis=0)).any(axis=1)
         return self._lattice.to_metres(outline[differs])
 
-    def contains(self, points: npt.ArrayLike) -> npt.NDArray[np.bool_]:
+    def contains(self, points: npt.ArrayLike) -> Bool:
         """Return which points are visible.
 
         Args:

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 from decimal import Decimal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fleet2d.errors import ScenarioError
 from fleet2d.floorplan.geometry.lattice import Lattice
+from fleet2d.kernels import I64
 from fleet2d.kernels.headings import HALF_TURN, TURN
 from fleet2d.kernels.lens import Lenses
 from fleet2d.kernels.perception import (
@@ -47,8 +47,6 @@ from fleet2d.sight.perception import POSTURES as POSTURE_NAMES
 from fleet2d.sight.perception import Attributes, Detection, FalsePositives, Identity, Perception
 from fleet2d.sums import sum_in_order
 from fleet2d.units import micros
-
-I64 = NDArray[np.int64]
 
 SUM_ERROR = 1e-6  # largest excess over 1 of a sum of probabilities
 

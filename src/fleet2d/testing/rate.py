@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fleet2d.errors import InputError
+from fleet2d.kernels import F64, I64
 from fleet2d.sums import sum_in_order
 
 MOST_SEEDS = 10_000
@@ -44,8 +44,8 @@ class RateTest:
     holds: float
     error: float
     alternative: float
-    accept: NDArray[np.int64]
-    refuse: NDArray[np.int64]
+    accept: I64
+    refuse: I64
 
     def decide(self, seeds: int, failures: int) -> bool | None:
         """Return whether the claim is accepted; None while more seeds are needed."""
@@ -131,9 +131,7 @@ def _bounded(seeds: int, holds: float, other: float, error: float) -> RateTest:
     return RateTest(seeds, holds, error, other, accept, refuse)
 
 
-def _steps(
-    accept: NDArray[np.int64], refuse: NDArray[np.int64], rate: float
-) -> "list[tuple[float, float, NDArray[np.float64]]]":
+def _steps(accept: I64, refuse: I64, rate: float) -> "list[tuple[float, float, F64]]":
     """Return (accepted, refused, undecided by failures) after each seed: exact probabilities."""
     width = int(refuse[:-1].max()) + 2
     failures = np.arange(width)
@@ -149,9 +147,7 @@ def _steps(
     return steps
 
 
-def _walk(
-    accept: NDArray[np.int64], refuse: NDArray[np.int64], rate: float
-) -> tuple[float, list[float]]:
+def _walk(accept: I64, refuse: I64, rate: float) -> tuple[float, list[float]]:
     """Return the probability of acceptance, and the probability that each seed is needed."""
     accepted, undecided = 0.0, 1.0
     needed = []
@@ -162,9 +158,7 @@ def _walk(
     return accepted, needed
 
 
-def _ending(
-    accept: NDArray[np.int64], refuse: NDArray[np.int64], rate: float
-) -> tuple[float, NDArray[np.float64]]:
+def _ending(accept: I64, refuse: I64, rate: float) -> tuple[float, F64]:
     """Return the probability of refusal before the last seed, and of each number of failures."""
     steps = _steps(accept, refuse, rate)
     refused = sum(refused_now for _, refused_now, _ in steps[:-1])

@@ -5,10 +5,10 @@ from datetime import timedelta
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fleet2d.artifacts.manifest import Manifest
 from fleet2d.errors import ArtifactError
+from fleet2d.kernels import I64
 from fleet2d.runs.categories import categories
 from fleet2d.runs.run import Run
 from fleet2d.viewer.moments import clock_of
@@ -49,7 +49,7 @@ def part_of_run(run: Run, first: int, end: int) -> Run:
     return part
 
 
-def key_frame_rows(table: Any, first: int, end: int) -> NDArray[np.int64]:
+def key_frame_rows(table: Any, first: int, end: int) -> I64:
     """Return the rows of a table of key frames that define the poses between two steps."""
     step = table["step"].to_numpy()
     entity, names = categories(table["entity"])

@@ -4,7 +4,6 @@ from datetime import timedelta
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from pydantic import ValidationError
 from tests.algorithms.presence.worlds import MONDAY, any_evidence, bins_of, pieces
 from tests.reference import presence as slow
@@ -17,6 +16,7 @@ from fleet2d.algorithms.presence.likelihood import Likelihood
 from fleet2d.algorithms.presence.sighting_share import SightingShare
 from fleet2d.component import components
 from fleet2d.errors import ComponentError
+from fleet2d.kernels import F64
 
 ALL = list(components("presence_estimator").values())
 
@@ -67,7 +67,7 @@ def test_an_audit_longer_than_from_one_to_the_next_is_refused() -> None:
         AuditOnly(every=timedelta(minutes=30), length=timedelta(hours=1))
 
 
-def independent(bins: int, share: NDArray[np.float64], seed: int) -> Evidence:
+def independent(bins: int, share: F64, seed: int) -> Evidence:
     """A person drawn anew each bin, and looks that don't care: what ratios assume. Last is away."""
     random = np.random.default_rng(seed)
     rooms = len(share) - 1

@@ -5,8 +5,6 @@ import pytest
 from tests.algorithms.presence.worlds import (
     DAY,
     DETECTION,
-    F64,
-    I64,
     MONDAY,
     any_evidence,
     bins_of,
@@ -26,6 +24,7 @@ from fleet2d.algorithms.presence.counts import Bins, joined
 from fleet2d.algorithms.presence.exposure_ratio import AuditOnly, ExposureRatio
 from fleet2d.algorithms.presence.likelihood import Likelihood
 from fleet2d.algorithms.presence.sighting_share import SightingShare
+from fleet2d.kernels import F64, I64
 from fleet2d.metrics.presence.distances import total_variation
 
 

@@ -4,17 +4,15 @@ from collections.abc import Callable
 from datetime import datetime
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fleet2d.algorithms.evidence import Evidence, SightingCounts
 from fleet2d.algorithms.presence.counts import Bins, in_time
+from fleet2d.kernels import F64, I64
 
 MONDAY = datetime(2026, 1, 5)
 DAY = 1440
 DETECTION = 0.95
 
-I64 = NDArray[np.int64]
-F64 = NDArray[np.float64]
 Policy = Callable[[int, int, bool, I64, np.random.Generator], int]
 """From bin, room now, whether the person was seen, sightings per room so far, to the next room."""
 

@@ -15,6 +15,7 @@ from tests.scenes import AGENDA, OWN, digests, run, scenario, table
 import fleet2d
 from fleet2d.errors import InputError, RunDirectoryError, ScenarioError
 from fleet2d.expectations import Verdict, always, distance, eventually, judge, moving, seen
+from fleet2d.kernels import F64, Bool
 from fleet2d.runs.run import Run
 
 STEPS = 12 * 60
@@ -76,7 +77,7 @@ def finished(max_span: int | None) -> tuple[Run, dict[str, Verdict]]:
     return simulation.run(), simulation.verdicts()
 
 
-def stretches(wrong: NDArray[np.bool_]) -> list[tuple[int, int]]:
+def stretches(wrong: Bool) -> list[tuple[int, int]]:
     """Return the stretches of steps that are marked, step by step."""
     found: list[list[int]] = []
     for step in np.flatnonzero(wrong).tolist():
@@ -95,13 +96,13 @@ def body(name: str) -> dict[str, NDArray[Any]]:
     return table(finished(None)[0], "trajectories", entity=name)
 
 
-def apart(one: str, other: str) -> NDArray[np.float64]:
+def apart(one: str, other: str) -> F64:
     a, b = body(one), body(other)
     gap = np.hypot(a["x"] - b["x"], a["y"] - b["y"])
     return np.where(a["away"] | b["away"], np.inf, gap)
 
 
-def moves(name: str) -> NDArray[np.float64]:
+def moves(name: str) -> F64:
     at = body(name)
     way = np.hypot(np.diff(at["x"], prepend=at["x"][0]), np.diff(at["y"], prepend=at["y"][0]))
     return np.nan_to_num(way)
@@ -111,7 +112,7 @@ def room(name: str) -> NDArray[Any]:
     return np.array([str(value).rsplit("_", 1)[0] for value in body(name)["room"]])
 
 
-def to_room(name: str, kind: str) -> NDArray[np.float64]:
+def to_room(name: str, kind: str) -> F64:
     """Return how far a body is from the cells of a room, by trying each of them."""
     plan, at = finished(None)[0].plan, body(name)
     index = next(r.index for r in plan.rooms if r.type == kind)

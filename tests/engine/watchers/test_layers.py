@@ -8,7 +8,6 @@ from typing import Any, ClassVar
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from tests.homes import walls_of
 from tests.reference import seen as slow
 from tests.scenes import TESTS, digests, everything, flat_document, path, run, scenario
@@ -17,6 +16,7 @@ import fleet2d
 from fleet2d import Algorithm, Behavior, History, Home, Metric, Present
 from fleet2d.engine.simulation import Simulation
 from fleet2d.errors import ArtifactError, Fleet2DError, InputError
+from fleet2d.kernels import I64
 from fleet2d.kernels.headings import half_sine
 from fleet2d.runs.layers import layer_names, layer_steps, read_layer
 
@@ -92,7 +92,7 @@ def watched(duration: str = "10 min", **more: Any) -> dict[str, Any]:
     return content
 
 
-def by_brute_force(stored: Any, robot: str, camera: Mapping[str, Any]) -> NDArray[np.int64]:
+def by_brute_force(stored: Any, robot: str, camera: Mapping[str, Any]) -> I64:
     """Return how often each cell was in view, first and last: (3, rows, columns)."""
     plan, poses = stored.plan, path(stored, robot)
     walls = walls_of(plan.polygons)

@@ -19,8 +19,8 @@ from tests.scenes import OWN, table
 from tests.sight.watching import agree
 
 import fleet2d
+from fleet2d.kernels import F64, Bool
 
-Float64 = npt.NDArray[np.float64]
 Rows = dict[str, npt.NDArray[Any]]
 
 EYE, HEADING_DEG, MOUNT_DEG = (5.0, 5.0), 30, 20
@@ -116,14 +116,14 @@ def of(rows: Rows, robot: str, **where: str) -> Rows:
     return {name: values[keep] for name, values in rows.items()}
 
 
-def from_eye(x: Float64, y: Float64) -> tuple[Float64, Float64]:
+def from_eye(x: F64, y: F64) -> tuple[F64, F64]:
     """Return distances [m] and bearings off the optical axis, left positive [deg]."""
     dx, dy = x - EYE[0], y - EYE[1]
     bearing = np.rad2deg(np.arctan2(dy, dx)) - HEADING_DEG - MOUNT_DEG
     return np.hypot(dx, dy), (bearing + 180) % 360 - 180
 
 
-def hits(rows: Rows, robot: str, user: str) -> tuple[Rows, npt.NDArray[np.bool_]]:
+def hits(rows: Rows, robot: str, user: str) -> tuple[Rows, Bool]:
     """Return the looks at which a user was in view, and in which of them a robot noticed."""
     looks = of(rows, "sharp", true_user=user)
     result = of(rows, robot, true_user=user)["step"]
@@ -131,9 +131,7 @@ def hits(rows: Rows, robot: str, user: str) -> tuple[Rows, npt.NDArray[np.bool_]
     return looks, np.isin(looks["step"], result)
 
 
-def check_by(
-    values: Float64, edges: npt.ArrayLike, happened: npt.NDArray[np.bool_], share: Float64
-) -> None:
+def check_by(values: F64, edges: npt.ArrayLike, happened: Bool, share: F64) -> None:
     """Check rates in each bin of a quantity; each bin must be there."""
     group = np.digitize(values, np.asarray(edges))
     for g in range(len(np.asarray(edges)) + 1):

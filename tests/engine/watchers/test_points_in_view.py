@@ -4,7 +4,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from tests.scenes import TESTS, digests, everything, flat_path, run, scenario, table
 
 import fleet2d
@@ -12,13 +11,14 @@ from fleet2d import Behavior
 from fleet2d.engine.watchers.points_in_view import points_seen
 from fleet2d.errors import ComponentError, Fleet2DError, InputError
 from fleet2d.floorplan.home.home import Home
+from fleet2d.kernels import U64, Bool
 from fleet2d.kernels.lens import Lenses, camera_pose
 from fleet2d.kernels.look import UserPoses
 from fleet2d.kernels.motion import Poses
 from fleet2d.kernels.seen import Reach
 from fleet2d.sight.camera import Camera
 from fleet2d.sight.flashlight import Flashlight
-from fleet2d.sight.fov import Bool, FieldOfView
+from fleet2d.sight.fov import FieldOfView
 from fleet2d.sight.line_of_sight import LineOfSight
 from fleet2d.sight.tables import TableContext, stack_lenses
 from fleet2d.sight.visibility_polygon import VisibilityPolygon
@@ -170,7 +170,7 @@ def test_own_method_that_fails_is_blamed(method: str, why: str) -> None:
 
 def seen_one_by_one(
     method: FieldOfView, home: Home, lenses: Lenses, robot: Poses, crowd: UserPoses, first: int
-) -> NDArray[np.uint64]:
+) -> U64:
     """Return what `points_seen` does, asking about every body in every step."""
     cameras, bodies = lenses.widest.shape
     seen = np.zeros((cameras, bodies, len(robot.x)), np.uint64)

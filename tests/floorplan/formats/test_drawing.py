@@ -4,7 +4,6 @@ from typing import Any
 import numpy as np
 import pytest
 import shapely
-from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from fleet2d.component import lookup
@@ -12,6 +11,7 @@ from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.formats.drawing import Image, read_image
 from fleet2d.floorplan.load import load_floorplan
 from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.kernels import U8
 
 WALL, PAPER = 20, 250
 
@@ -22,14 +22,14 @@ HOME[14:66, 62:106] = PAPER  # as large
 HOME[34:46, 58:62] = PAPER  # a door between them
 
 
-def draw(folder: Path, pixels: NDArray[np.uint8] = HOME) -> Path:
+def draw(folder: Path, pixels: U8 = HOME) -> Path:
     path = folder / "flat.pgm"
     rows, columns = pixels.shape
     path.write_bytes(f"P5\n{columns} {rows}\n255\n".encode() + pixels.tobytes())
     return path
 
 
-def read(folder: Path, pixels: NDArray[np.uint8] = HOME, **options: Any) -> FloorPlan:
+def read(folder: Path, pixels: U8 = HOME, **options: Any) -> FloorPlan:
     return read_image(draw(folder, pixels), 0.05, **options)
 
 
@@ -113,9 +113,7 @@ def test_transparent_paper_is_paper(tmp_path: Path) -> None:
         (np.where(np.arange(120) == 60, PAPER, HOME).astype(np.uint8), "outer walls without gaps"),
     ],
 )
-def test_drawing_that_encloses_nothing_is_refused(
-    tmp_path: Path, pixels: NDArray[np.uint8], message: str
-) -> None:
+def test_drawing_that_encloses_nothing_is_refused(tmp_path: Path, pixels: U8, message: str) -> None:
     if pixels.shape == HOME.shape:
         pixels[:, 56:66] = PAPER
     with pytest.raises(FloorPlanError, match=message) as caught:

@@ -5,7 +5,6 @@ from typing import Any
 import numpy as np
 import pytest
 import shapely
-from numpy.typing import NDArray
 from pydantic import ValidationError
 
 import fleet2d
@@ -15,6 +14,7 @@ from fleet2d.floorplan.formats.ros import Ros, read_ros
 from fleet2d.floorplan.home.space import Space
 from fleet2d.floorplan.load import load_floorplan
 from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.kernels import U8
 
 FREE, UNKNOWN, OCCUPIED = 254, 205, 0
 
@@ -38,12 +38,12 @@ SAMPLE: tuple[str, dict[str, Any]] = (
 )
 
 
-def pgm(pixels: NDArray[np.uint8]) -> bytes:
+def pgm(pixels: U8) -> bytes:
     rows, columns = pixels.shape
     return f"P5\n# a comment\n{columns} {rows}\n255\n".encode() + pixels.tobytes()
 
 
-def write(folder: Path, pixels: NDArray[np.uint8] = ROOM, **changes: Any) -> Path:
+def write(folder: Path, pixels: U8 = ROOM, **changes: Any) -> Path:
     """Write a map; a change to None leaves the key out."""
     keys = {
         "image": "map.pgm",

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 import shapely
 from hypothesis import assume, given, settings
-from numpy.typing import NDArray
 from tests.homes import Home, all_homes, awkward_points, home_of
 from tests.reference.sight import is_inside, touches_any_wall
 from tests.strategies import homes, seeds
@@ -17,11 +16,11 @@ from fleet2d.floorplan.geometry.gates import Gates, Segment
 from fleet2d.floorplan.geometry.lattice import Lattice
 from fleet2d.floorplan.geometry.mesh import build_mesh
 from fleet2d.floorplan.rooms.doorways import DoorLine, fit_lines
+from fleet2d.kernels import I64, Bool
 from fleet2d.kernels.mesh import Mesh, locate
 from fleet2d.kernels.region import region_contains, visible_region
 from fleet2d.kernels.sight import line_of_sight
 
-I64 = NDArray[np.int64]
 ROOM = [shapely.box(0, 0, 640, 640)]
 MIDDLE: Segment = ((320, 0), (320, 640))
 
@@ -41,7 +40,7 @@ def with_doors(home: Home, rng: np.random.Generator, count: int) -> tuple[Home, 
     return home_of(polygons), [segment for segment in segments if segment is not None]
 
 
-def verdicts(mesh: Mesh, eye: I64, points: I64) -> NDArray[np.bool_]:
+def verdicts(mesh: Mesh, eye: I64, points: I64) -> Bool:
     """Return whether each point is visible, by the walk through the mesh."""
     x, y = eye.tolist()
     triangle = locate(mesh, x, y)
@@ -50,7 +49,7 @@ def verdicts(mesh: Mesh, eye: I64, points: I64) -> NDArray[np.bool_]:
     )
 
 
-def truth(home: Home, shut: list[Segment], eye: I64, points: I64) -> NDArray[np.bool_]:
+def truth(home: Home, shut: list[Segment], eye: I64, points: I64) -> Bool:
     """Return whether each point is visible, by looking at every wall and every shut door."""
     walls = home.walls
     if shut:

@@ -6,7 +6,6 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 import shapely
 from hypothesis import given
@@ -23,8 +22,7 @@ from fleet2d.floorplan.formats.houseexpo import read_houseexpo
 from fleet2d.floorplan.home.space import ROUNDING, Space
 from fleet2d.floorplan.load import load_floorplan
 from fleet2d.floorplan.plan import FloorPlan
-
-Int64 = npt.NDArray[np.int64]
+from fleet2d.kernels import F64, I64
 
 UNITS_PER_M = 1280
 RADII = (0.15, 0.2, 0.3)
@@ -79,7 +77,7 @@ def region(space: Space) -> shapely.Geometry:
     return region_of(space.mesh.vertices, space.mesh.triangles)
 
 
-def cells_of(space: Space, rng: np.random.Generator, count: int) -> Int64:
+def cells_of(space: Space, rng: np.random.Generator, count: int) -> I64:
     """Return centres of random cells of the space, of any part."""
     rows, columns = np.nonzero(space.part_of_cell >= 0)
     chosen = rng.integers(0, len(rows), count)
@@ -213,7 +211,7 @@ def test_a_doorway_needs_less_than_a_centimetre_to_spare() -> None:
         assert Space(build_plan(two_rooms(2 * radius - 0.001, 1.0)), radius).parts == 2
 
 
-def moves(plan: FloorPlan) -> list[npt.NDArray[np.float64]]:
+def moves(plan: FloorPlan) -> list[F64]:
     """Return matrices that mirror and turn a plan, with a shift by whole cells."""
     width, height = 64.0 * plan.lattice.columns, 64.0 * plan.lattice.rows
     return [
@@ -230,7 +228,7 @@ def check_symmetry(plan: FloorPlan, radius: float, slip: float) -> None:
     original = region(Space(plan, radius))
     for move in moves(plan):
 
-        def transform(shape: shapely.Geometry, move: npt.NDArray[np.float64] = move) -> Polygon:
+        def transform(shape: shapely.Geometry, move: F64 = move) -> Polygon:
             return shapely.transform(shape, lambda xy: xy @ move[:, :2].T + move[:, 2])
 
         walls = shapely.union_all([transform(polygon) for polygon in plan.polygons])

@@ -1,20 +1,18 @@
 """The row of anyone, from the probabilities of each user, taken as independent."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fleet2d.algorithms.presence.counts import Bins
+from fleet2d.kernels import F64, Bool
 
-F64 = NDArray[np.float64]
 
-
-def unknown_seen(bins: Bins) -> NDArray[np.bool_]:
+def unknown_seen(bins: Bins) -> Bool:
     """Return where somebody was seen who was not recognized as a user: bool (bins, rooms)."""
     unknown = bins.sightings.unknown
     return unknown if bins.sightings.shape[1] > 1 else np.zeros_like(unknown)
 
 
-def with_anyone(chains: list[F64], unknown: NDArray[np.bool_]) -> F64:
+def with_anyone(chains: list[F64], unknown: Bool) -> F64:
     """Add the row of anyone to the probabilities of the users' places.
 
     A room is empty if each user, independently of the others, is somewhere else; it certainly has

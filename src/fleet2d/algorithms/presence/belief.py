@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fleet2d.errors import ComponentError
+from fleet2d.kernels import F64, Bool
 from fleet2d.problems import suggest
-
-F64 = NDArray[np.float64]
 
 ANYONE = "anyone"
 AWAY = "away"
@@ -192,7 +191,7 @@ def _labels(names: tuple[str, ...], places: tuple[str, ...]) -> dict[str, NDArra
     return {"user": user, "room": room}
 
 
-def are_distributions(home: F64, away: F64) -> NDArray[np.bool_]:
+def are_distributions(home: F64, away: F64) -> Bool:
     """Return whether shares (..., rooms) sum to one and away (...) is from 0 to 1: bool (...).
 
     NaN is not a distribution.

@@ -6,24 +6,22 @@ from itertools import pairwise
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from fleet2d.algorithms.presence.anyone import unknown_seen, with_anyone
 from fleet2d.algorithms.presence.belief import BeliefSeries, Presence
 from fleet2d.algorithms.presence.counts import Bins
 from fleet2d.algorithms.presence.day_evidence import DayEvidence, by_day
-from fleet2d.algorithms.presence.estimator import F64, normalized
+from fleet2d.algorithms.presence.estimator import normalized
 from fleet2d.algorithms.presence.habits import Habits
 from fleet2d.algorithms.presence.likelihood import Likelihood
 from fleet2d.algorithms.presence.model import Model
 from fleet2d.algorithms.presence.people import StateLayout
 from fleet2d.component import register
+from fleet2d.kernels import F64, I64
 from fleet2d.kernels.presence import advance
 from fleet2d.kernels.stays import StayModel, Stretches, follow
 from fleet2d.units import Share
-
-I64 = NDArray[np.int64]
 
 FARTHEST = 10_080  # bins ahead; later forecasts equal the one at this horizon
 

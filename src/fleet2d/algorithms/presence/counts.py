@@ -11,9 +11,7 @@ from fleet2d.algorithms.evidence import Evidence, Parts, SightingCounts
 from fleet2d.algorithms.learned import array_of
 from fleet2d.algorithms.presence.belief import HOURS
 from fleet2d.clock import midnight_of
-
-F64 = NDArray[np.float64]
-I64 = NDArray[np.int64]
+from fleet2d.kernels import F64, I64
 
 HOUR_US = 3_600_000_000
 DAY_US = 24 * HOUR_US

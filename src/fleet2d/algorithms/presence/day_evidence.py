@@ -5,16 +5,13 @@ from itertools import pairwise
 from typing import NamedTuple, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fleet2d.algorithms.evidence import SightingCounts
 from fleet2d.algorithms.presence.anyone import unknown_seen
 from fleet2d.algorithms.presence.counts import Bins
+from fleet2d.kernels import I64, U8, Bool
 from fleet2d.kernels.people import PeopleEvidence
 from fleet2d.kernels.stays import WHOLE_PATCH, Stretches, merge_bins
-
-I64 = NDArray[np.int64]
-U8 = NDArray[np.uint8]
 
 
 class DayEvidence(NamedTuple):
@@ -32,7 +29,7 @@ class DayEvidence(NamedTuple):
 
     number: int
     minute: I64
-    unknown: NDArray[np.bool_]
+    unknown: Bool
     view: I64
     views: U8
     sightings: SightingCounts

@@ -6,15 +6,13 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fleet2d.algorithms.presence.belief import Presence, WeeklyPresence
 from fleet2d.algorithms.presence.counts import Bins, DayCounts
 from fleet2d.component import Component
 from fleet2d.errors import ComponentError
+from fleet2d.kernels import F64
 from fleet2d.kernels.presence import resampled
-
-F64 = NDArray[np.float64]
 
 REPLICATES = 200  # of the bootstrap
 FEWEST_DAYS = 2  # fewest days that say anything about how much days differ

@@ -5,13 +5,13 @@ from datetime import timedelta
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from fleet2d.algorithms.presence.counts import Bins
-from fleet2d.algorithms.presence.estimator import F64, Estimator, normalized
+from fleet2d.algorithms.presence.estimator import Estimator, normalized
 from fleet2d.component import register
 from fleet2d.errors import ComponentError
+from fleet2d.kernels import F64, I64, Bool
 from fleet2d.problems import problem
 from fleet2d.units import PositiveDuration, Share
 
@@ -62,7 +62,7 @@ class ExposureRatio(Estimator):
             self._divide(room)
         super().observe(bins)
 
-    def _divide(self, room: NDArray[np.int64]) -> None:
+    def _divide(self, room: I64) -> None:
         """Begin anew with the given patches."""
         self.room = room
         super().begin(self.rooms, self.users, self.half_life)
@@ -86,7 +86,7 @@ class ExposureRatio(Estimator):
             bins.parts.seen, bins.parts.watched, self.is_counted(bins), bins.bin_steps
         )
 
-    def is_counted(self, bins: Bins) -> NDArray[np.bool_]:
+    def is_counted(self, bins: Bins) -> Bool:
         """Return whether each bin counts: bool (bins,)."""
         return np.ones(len(bins.day), bool)
 
@@ -121,9 +121,7 @@ def ratios(sums: F64, detection: float) -> tuple[F64, F64]:
     return rate, np.where(is_watched, away, 0.0)
 
 
-def seen_and_watched(
-    seen: NDArray[np.int64], watched: F64, is_counted: NDArray[np.bool_], bin_steps: int
-) -> F64:
+def seen_and_watched(seen: I64, watched: F64, is_counted: Bool, bin_steps: int) -> F64:
     """Return seen and watched of each place, in bins, and 1: (bins, users + 1, 2 places + 1).
 
     Args:
@@ -164,7 +162,7 @@ class AuditOnly(ExposureRatio):
             )
         return self
 
-    def is_counted(self, bins: Bins) -> NDArray[np.bool_]:
+    def is_counted(self, bins: Bins) -> Bool:
         """Return whether each bin begins in an audit: bool (bins,)."""
         every, length = (
             max(1, duration // timedelta(minutes=1)) for duration in (self.every, self.length)

@@ -6,16 +6,16 @@ from datetime import datetime
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from fleet2d.algorithms.learned import array_of
 from fleet2d.algorithms.presence.belief import HOURS, Presence, WeeklyPresence
 from fleet2d.algorithms.presence.counts import Bins
-from fleet2d.algorithms.presence.estimator import F64, Estimator, normalized
+from fleet2d.algorithms.presence.estimator import Estimator, normalized
 from fleet2d.algorithms.presence.exposure_ratio import ratios, seen_and_watched
 from fleet2d.algorithms.presence.logarithm import natural_log
 from fleet2d.component import register
+from fleet2d.kernels import F64, I64
 from fleet2d.units import Share
 
 WEEK = 10_080  # minutes
@@ -83,7 +83,7 @@ class Fremen(Estimator):
         self.fit = np.zeros((*shape, ORDERS))  # log likelihood of each order's forecasts so far
         self.first = 0  # the first day with samples
         self.span = 0  # days from the first to the last finished one
-        self.day: list[tuple[NDArray[np.int64], F64]] = []  # samples of the present day
+        self.day: list[tuple[I64, F64]] = []  # samples of the present day
         self.week: tuple[F64, F64] | None = None  # the forecast for each hour
 
     def observe(self, bins: Bins) -> None:
@@ -113,7 +113,7 @@ class Fremen(Estimator):
         """Return the forecast for each hour of the week; it needs no smoothing."""
         return self.presence(users, time)
 
-    def forecast(self, minutes: NDArray[np.int64]) -> F64:
+    def forecast(self, minutes: I64) -> F64:
         """Return p(t) at minutes of the week, by the best orders: (minutes, users + 1, rooms)."""
         order = self.fit.argmax(axis=2)[np.newaxis, ..., np.newaxis]
         p: F64 = np.take_along_axis(self._by_order(minutes), order, axis=3)
@@ -123,7 +123,7 @@ class Fremen(Estimator):
         away = 1 - np.minimum(p.sum(axis=-1) / self.detection, 1)
         return normalized(p), away if self.span else np.zeros_like(away)
 
-    def _waves(self, minutes: NDArray[np.int64]) -> F64:
+    def _waves(self, minutes: I64) -> F64:
         """Return cos and sin of 2 pi t / T_i: float64 (2, minutes, periods)."""
         angle = minutes[:, np.newaxis] * np.arange(1, PERIODS + 1) % WEEK
         return np.stack([self.cosines[angle], self.cosines[(angle - WEEK // 4) % WEEK]])
@@ -147,7 +147,7 @@ class Fremen(Estimator):
         self.day, self.week = [], None
         self.span = self.counts.today - self.first + 1
 
-    def _by_order(self, minutes: NDArray[np.int64]) -> F64:
+    def _by_order(self, minutes: I64) -> F64:
         """Return p(t) for each order: float64 (minutes, users + 1, rooms, orders)."""
         total = self.counts.finished
         seen, watched = total[:, : self.rooms], total[:, self.rooms : -1]

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fleet2d.algorithms.presence.estimator import F64
+from fleet2d.kernels import F64
 from fleet2d.kernels.stays import StayModel
 
 WEEKEND = 5  # its first day, Monday being 0

@@ -5,20 +5,18 @@ from statistics import NormalDist
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from fleet2d.algorithms.presence.counts import Bins
 from fleet2d.algorithms.presence.day_evidence import DayEvidence, by_day
-from fleet2d.algorithms.presence.estimator import F64, FEWEST_DAYS, Estimator, normalized
+from fleet2d.algorithms.presence.estimator import FEWEST_DAYS, Estimator, normalized
 from fleet2d.algorithms.presence.people import People, Prior, StateLayout
 from fleet2d.component import register
 from fleet2d.errors import ComponentError
+from fleet2d.kernels import F64, I64, Bool
 from fleet2d.kernels.evidence import sum_places
 from fleet2d.kernels.people import PeoplePlaces
 from fleet2d.units import Share
-
-I64 = NDArray[np.int64]
 
 # Number of earlier days that are revisited in turn when a day is over, and of those stored.
 REVISITS = 2
@@ -195,7 +193,7 @@ class Likelihood(Estimator):
             people.confine(np.append(self._possible_rooms, True).astype(np.float64))
 
     @property
-    def _possible_rooms(self) -> NDArray[np.bool_]:
+    def _possible_rooms(self) -> Bool:
         """The rooms that are joined with those that robots have looked into: bool (rooms,)."""
         if self.island is None or not self.is_watched.any():
             return np.ones(self.rooms, bool)

@@ -1,9 +1,9 @@
 """Logarithms that are the same on every machine, unlike those of the system's math library."""
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-F64 = NDArray[np.float64]
+from fleet2d.kernels import F64
 
 LN_2 = 0.6931471805599453
 ROOT_HALF = 0.7071067811865476

@@ -12,9 +12,10 @@ from fleet2d.algorithms.history import History
 from fleet2d.algorithms.learned import check_numbers
 from fleet2d.algorithms.presence.belief import Presence
 from fleet2d.algorithms.presence.counts import in_time
-from fleet2d.algorithms.presence.estimator import F64, Estimator
+from fleet2d.algorithms.presence.estimator import Estimator
 from fleet2d.component import OneOf, register
 from fleet2d.floorplan.home.home import Home
+from fleet2d.kernels import F64
 from fleet2d.problems import problem
 from fleet2d.streams import stream_key
 from fleet2d.units import PositiveDuration, Share

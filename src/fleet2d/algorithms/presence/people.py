@@ -5,15 +5,12 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fleet2d.algorithms.presence.counts import Bins
 from fleet2d.algorithms.presence.day_evidence import DayEvidence
+from fleet2d.kernels import F64, I64
 from fleet2d.kernels.people import PeoplePlaces, follow_people, smooth_people
 from fleet2d.kernels.stays import Moments, StayModel
-
-F64 = NDArray[np.float64]
-I64 = NDArray[np.int64]
 
 # Mean length of a stay before anything was learned, and of the first and last of several stages.
 # All in bins.

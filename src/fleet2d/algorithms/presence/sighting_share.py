@@ -3,8 +3,9 @@
 import numpy as np
 
 from fleet2d.algorithms.presence.counts import Bins
-from fleet2d.algorithms.presence.estimator import F64, Estimator, normalized
+from fleet2d.algorithms.presence.estimator import Estimator, normalized
 from fleet2d.component import register
+from fleet2d.kernels import F64
 
 
 @register("presence_estimator", "sighting_share")

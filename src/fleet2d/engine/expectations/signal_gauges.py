@@ -4,7 +4,6 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fleet2d.algorithms.output import to_columns
 from fleet2d.engine.gauges.block import Block
@@ -32,10 +31,9 @@ from fleet2d.expectations import quantities, states
 from fleet2d.expectations.signals import Measurement
 from fleet2d.floorplan.geometry.lattice import UNITS_PER_CELL
 from fleet2d.floorplan.home.home import Home, lattice_footprint
+from fleet2d.kernels import I64
 from fleet2d.kernels.look import SightMemory
 from fleet2d.problems import suggest
-
-I64 = NDArray[np.int64]
 
 # The chance of a lens that notices all bodies in view.
 CERTAIN = 2**53

@@ -3,13 +3,11 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
 from fleet2d.algorithms.log import SensorRow
 from fleet2d.engine.bodies import Bodies
 from fleet2d.events import Event
 from fleet2d.floorplan.home.home import Home
+from fleet2d.kernels import I64
 
 
 @dataclass
@@ -31,7 +29,7 @@ class Block:
     end: int
     bodies: Bodies
     home: Home
-    observations: NDArray[np.int64]
+    observations: I64
     readings: Sequence[SensorRow]
     sensors: Sequence[str]
     events: Sequence[Event] = ()

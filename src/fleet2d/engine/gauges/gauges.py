@@ -4,7 +4,6 @@ from collections.abc import Callable, Sequence, Set
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fleet2d.algorithms.activities import ROBOT
 from fleet2d.engine.gauges.block import Block
@@ -14,11 +13,10 @@ from fleet2d.events import EventKind
 from fleet2d.expectations import states
 from fleet2d.expectations.trace import Trace, constant, joined, pulses, shortest
 from fleet2d.floorplan.home.home import Home
+from fleet2d.kernels import I64, Bool
 from fleet2d.kernels.look import IDENTITY, STEP
 from fleet2d.kernels.measure import rooms_at
 from fleet2d.kernels.signals import distances_between, distances_to_shape, speeds
-
-I64 = NDArray[np.int64]
 
 # The charge of a battery is rounded down to thousandths; errors of floats must not lower it.
 PARTS = 1000
@@ -298,7 +296,7 @@ class ValueGauge(Gauge):
         return shortest(start[is_before], value[is_before], end)
 
 
-def outline(mask: NDArray[np.bool_], side: int) -> I64:
+def outline(mask: Bool, side: int) -> I64:
     """Return the edges around some cells: int64 (n, 4), from (x, y) to (x, y) [lattice units].
 
     Args:
@@ -312,7 +310,7 @@ def outline(mask: NDArray[np.bool_], side: int) -> I64:
     return edges * side
 
 
-def _borders(differ: NDArray[np.bool_]) -> list[tuple[int, int, int]]:
+def _borders(differ: Bool) -> list[tuple[int, int, int]]:
     """Return the runs of true values of each row: row, first column, one past the last column."""
     padded = np.pad(differ, ((0, 0), (1, 1)))
     row, column = np.nonzero(padded[:, 1:] != padded[:, :-1])

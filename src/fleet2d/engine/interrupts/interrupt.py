@@ -4,12 +4,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
-import numpy as np
-from numpy.typing import NDArray
-
 from fleet2d.component import Component
 from fleet2d.engine.bodies import PoseBlock
 from fleet2d.entities.actor import Actor
+from fleet2d.kernels import Bool
 
 
 @dataclass(frozen=True)
@@ -42,6 +40,6 @@ class Interrupt(Component):
 
     kind: ClassVar[str] = "interrupt"
 
-    def holds(self, span: SpanView) -> NDArray[np.bool_]:
+    def holds(self, span: SpanView) -> Bool:
         """Return at which steps of a span the condition holds, bool (steps,)."""
         raise NotImplementedError

@@ -3,11 +3,11 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fleet2d.engine.basis import Basis
 from fleet2d.engine.tables.ordering import in_order
 from fleet2d.entities.motion import Track
+from fleet2d.kernels import I64
 from fleet2d.kernels.headings import in_radians
 from fleet2d.kernels.motion import Breakpoints
 from fleet2d.runs.key_kinds import PLANNED, TRACK, WALK
@@ -37,7 +37,7 @@ class KeyFrames:
         self._walkers: set[int] = set()  # bodies whose present plan is a random walk
         self._walked = [1] * count  # the step before which it is collected
         self._moved: set[int] = set()  # bodies that were put elsewhere since their last plan
-        self._blocks: list[NDArray[np.int64]] = []
+        self._blocks: list[I64] = []
         self._rows = 0
         self._end = 0  # key frames before this step are collected when they are stored
 
@@ -157,13 +157,11 @@ class KeyFrames:
         )
 
 
-def _key(step: int, row: int, kind: int, time_us: int, state: Sequence[int]) -> NDArray[np.int64]:
+def _key(step: int, row: int, kind: int, time_us: int, state: Sequence[int]) -> I64:
     return np.array([[step, row, kind, time_us, *state]], np.int64)
 
 
-def _keys(
-    track: Breakpoints, begin: int, end: int, row: int, kind: int, step_us: int
-) -> NDArray[np.int64]:
+def _keys(track: Breakpoints, begin: int, end: int, row: int, kind: int, step_us: int) -> I64:
     keys = np.empty((end - begin, 8), np.int64)
     time = track.time[begin:end]
     keys[:, 0] = -(-time // step_us)

@@ -1,10 +1,11 @@
 """The order of rows, which doesn't depend on the spans of a run."""
 
 import numpy as np
-from numpy.typing import NDArray
+
+from fleet2d.kernels import I64
 
 
-def in_order(blocks: list[NDArray[np.int64]]) -> NDArray[np.int64]:
+def in_order(blocks: list[I64]) -> I64:
     """Join blocks of rows (step, entity, …) and sort them; equal rows keep their order.
 
     Example:

@@ -9,7 +9,6 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fleet2d.algorithms.activities import Activities
 from fleet2d.algorithms.log import SensorRow
@@ -21,6 +20,7 @@ from fleet2d.engine.tables.trajectories import Samples
 from fleet2d.engine.watchers.cameras import Cameras
 from fleet2d.engine.watchers.sensors import Sensors
 from fleet2d.events import HOME, RANKS, Event, EventKind
+from fleet2d.kernels import I8, I32, I64
 
 # Events whose detail is a user, who has a column of their own.
 OF_USERS = frozenset({EventKind.USER_LOST, EventKind.USER_SEEN})
@@ -65,7 +65,7 @@ class Recorder:
         entities = [*(actor.name for actor in basis.actors), *basis.scenario.objects]
         self._rows = {name: row for row, name in enumerate(entities)} | {HOME: -1}
         self._events: list[Event] = []
-        self._observations: list[NDArray[np.int64]] = []
+        self._observations: list[I64] = []
         self._sensors, self._readings = sensors, list[SensorRow]()
         self._rooms = NearestRooms(basis.home.plan)
         self._camera_codes = _codes_of(cameras)
@@ -97,9 +97,7 @@ class Recorder:
         for step, entity, _, detail in begun:
             self.activities.begin(self._users[entity], step, detail)
 
-    def take(
-        self, first: int, end: int, observations: NDArray[np.int64], readings: Sequence[SensorRow]
-    ) -> None:
+    def take(self, first: int, end: int, observations: I64, readings: Sequence[SensorRow]) -> None:
         """Collect the rows of the steps from `first` to `end` - 1.
 
         Args:
@@ -170,7 +168,7 @@ class Recorder:
                 columns |= {"activity": o.activity.tolist(), "true_activity": t.activity.tolist()}
         self.store.append("observations", **columns)
 
-    def _cameras(self, robot: NDArray[np.int32], camera: NDArray[np.int8]) -> NDArray[np.int32]:
+    def _cameras(self, robot: I32, camera: I8) -> I32:
         """Return the codes of cameras from their indices among the cameras of their robot."""
         codes = np.zeros(
             (len(self.bodies), 1 + max(map(len, self._camera_codes.values()))), np.int32
@@ -221,7 +219,7 @@ class Recorder:
             activity=list(activity),
         )
 
-    def _times(self, step: NDArray[np.int64]) -> dict[str, Any]:
+    def _times(self, step: I64) -> dict[str, Any]:
         return {"step": step, "time": self.clock.times(step)}
 
 

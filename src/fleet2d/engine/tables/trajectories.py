@@ -1,7 +1,6 @@
 """Samples: the poses of all bodies at regular times, for the table of trajectories."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fleet2d.artifacts.settings import ArtifactSettings
 from fleet2d.artifacts.table import Column, TableSpec
@@ -10,6 +9,7 @@ from fleet2d.engine.basis import Basis
 from fleet2d.engine.bodies import Bodies
 from fleet2d.engine.tables.ordering import in_order
 from fleet2d.engine.tables.shared_columns import HEADING, STEP, TIME, X, Y, away_column
+from fleet2d.kernels import I64
 from fleet2d.kernels.headings import in_radians
 from fleet2d.kernels.mesh import SUB
 from fleet2d.units import whole_steps
@@ -36,7 +36,7 @@ class Samples:
         """
         self._store, self._clock, self._home = basis.store, basis.clock, basis.home
         self._every = _steps_between(basis.scenario.artifacts, basis.clock)
-        self._blocks: list[NDArray[np.int64]] = []
+        self._blocks: list[I64] = []
         self.count = 0
 
     def take(self, bodies: Bodies, first: int, end: int) -> None:

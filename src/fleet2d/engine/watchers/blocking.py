@@ -9,7 +9,6 @@ from datetime import timedelta
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fleet2d.engine.basis import Basis
 from fleet2d.engine.bodies import Bodies
@@ -17,13 +16,11 @@ from fleet2d.engine.watchers.watcher import Watcher
 from fleet2d.entities.behavior import Situation
 from fleet2d.entities.blocking import plan_after_a_step, plan_around
 from fleet2d.entities.plan import Note, Plan
+from fleet2d.kernels import I64, U8, Bool
 from fleet2d.units import micros
 
 # Time for which a body ignores another one that it goes round or squeezes past.
 PASSES = timedelta(seconds=10)
-
-I64 = NDArray[np.int64]
-Bool = NDArray[np.bool_]
 
 
 class Wait(NamedTuple):
@@ -57,7 +54,7 @@ class PoseColumns(NamedTuple):
 
     x: I64
     y: I64
-    away: NDArray[np.uint8]
+    away: U8
 
 
 class BlockedWays(Watcher):

@@ -4,7 +4,6 @@ from collections.abc import Iterator, Sequence, Set
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fleet2d.algorithms.activities import ActivitySense
 from fleet2d.blame import blame
@@ -27,6 +26,7 @@ from fleet2d.entities.behavior import SightEvent
 from fleet2d.entities.localization import Drift, Localization
 from fleet2d.errors import ScenarioError
 from fleet2d.events import Event
+from fleet2d.kernels import I64
 from fleet2d.kernels.look import (
     IDENTITY,
     SIGHTING,
@@ -68,7 +68,6 @@ GHOST_STREAMS = {
     GhostDraw.HEADING: "faces",
 }
 
-I64 = NDArray[np.int64]
 NOTHING: I64 = np.zeros((0, SIGHTING), np.int64)
 
 

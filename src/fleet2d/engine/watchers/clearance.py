@@ -16,11 +16,10 @@ from fleet2d.engine.watchers.watcher import Watcher
 from fleet2d.entities.decisions import DecidingActor
 from fleet2d.entities.entity import Robot
 from fleet2d.entities.giving_way import TOUCHING, Surroundings
+from fleet2d.kernels import I64, U8
 from fleet2d.kernels.mesh import locate
 from fleet2d.kernels.motion import Poses
 from fleet2d.kernels.sight import line_of_sight
-
-I64 = NDArray[np.int64]
 
 
 class Clearance(Watcher):
@@ -57,7 +56,7 @@ class Clearance(Watcher):
         return end
 
     def _next_look(
-        self, robot: DecidingActor, xs: I64, ys: I64, away: NDArray[np.uint8], first: int, end: int
+        self, robot: DecidingActor, xs: I64, ys: I64, away: U8, first: int, end: int
     ) -> int:
         """Return the step at which a waiting robot checks whether its way is clear."""
         waiting = robot.waiting

@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from fractions import Fraction
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fleet2d.kernels import I64
 from fleet2d.kernels.lens import Lenses
 from fleet2d.kernels.look import SIGHTING, SightMemory
 from fleet2d.kernels.perception import FORCED_IDENTITY, FORCED_MISS, About
@@ -13,7 +13,6 @@ from fleet2d.sight.disturbance import Disturbance, of_camera
 from fleet2d.sight.perception import Perception
 from fleet2d.sight.tables import TableContext
 
-I64 = NDArray[np.int64]
 # Squared distance beyond which a dark camera sees nobody.
 NOT_EVEN_AT_0 = -1
 

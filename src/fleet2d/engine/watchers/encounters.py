@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fleet2d.engine.bodies import Bodies, PoseBlock
 from fleet2d.engine.watchers.watcher import Watcher
@@ -17,6 +16,7 @@ from fleet2d.entities.behavior import Attention, SightEvent
 from fleet2d.entities.decisions import DecidingActor
 from fleet2d.events import Event, EventKind
 from fleet2d.floorplan.objects import POSTURES
+from fleet2d.kernels import I64, Bool
 from fleet2d.kernels.mesh import locate
 from fleet2d.kernels.sight import line_of_sight
 
@@ -27,9 +27,6 @@ STANDING = POSTURES.index("stand")
 # A robot is noticed again after it was farther away than these multiples of the distance.
 AGAIN_NEAR = (5, 4)
 AGAIN_COMING = (3, 2)
-
-I64 = NDArray[np.int64]
-Bool = NDArray[np.bool_]
 
 
 class Encounter(NamedTuple):

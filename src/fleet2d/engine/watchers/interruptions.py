@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fleet2d.blame import blame
 from fleet2d.component import lookup
@@ -21,6 +20,7 @@ from fleet2d.entities.behavior import SightEvent
 from fleet2d.entities.entity import Robot, User
 from fleet2d.errors import ComponentError
 from fleet2d.events import Event
+from fleet2d.kernels import Bool
 from fleet2d.user_modules import source_files
 
 # The events of cameras, which are watchers of their own.
@@ -37,7 +37,7 @@ class Interruptions(Watcher):
         self._actors, self._users = basis.actors, basis.bodies.users
         # Whether the condition held at the last step; None: the plan has not begun yet.
         self._held: dict[Wait, bool | None] = {}
-        self._ahead: dict[Wait, NDArray[np.bool_]] = {}  # whether it holds in the present span
+        self._ahead: dict[Wait, Bool] = {}  # whether it holds in the present span
         self._last: list[Wait] = []
         self._interrupts: dict[str, Interrupt] = {}
         self._files: dict[type[Interrupt], list[Path]] = {}  # of each class of the user's own
@@ -104,14 +104,14 @@ class Interruptions(Watcher):
             self._interrupts[name] = cast("Interrupt", lookup("interrupt", name)())
         return self._interrupts[name]
 
-    def _begins(self, wait: Wait) -> NDArray[np.bool_]:
+    def _begins(self, wait: Wait) -> Bool:
         """Return at which steps of the present span a condition becomes true."""
         holds, held = self._ahead[wait], self._held[wait]
         before = np.concatenate([holds[:1] if held is None else [held], holds[:-1]])
         return holds & ~before
 
 
-def _checked(name: str, holds: NDArray[np.bool_], steps: int) -> NDArray[np.bool_]:
+def _checked(name: str, holds: Bool, steps: int) -> Bool:
     """Return the answer of an interrupt.
 
     Raises:

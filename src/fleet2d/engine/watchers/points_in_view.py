@@ -3,10 +3,10 @@
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fleet2d.errors import ComponentError
 from fleet2d.floorplan.home.home import Home
+from fleet2d.kernels import I64, U64
 from fleet2d.kernels.lens import Lenses
 from fleet2d.kernels.look import UserPoses
 from fleet2d.kernels.mesh import SUB
@@ -27,7 +27,7 @@ def points_seen(
     crowd: UserPoses,
     first: int,
     step_us: int,
-) -> NDArray[np.uint64]:
+) -> U64:
     """Return which points of each body are in view of each camera at each step.
 
     Args:
@@ -61,9 +61,7 @@ def points_seen(
     return answers[number]
 
 
-def _answers(
-    method: FieldOfView, home: Home, lenses: Lenses, queries: NDArray[np.int64]
-) -> NDArray[np.uint64]:
+def _answers(method: FieldOfView, home: Home, lenses: Lenses, queries: I64) -> U64:
     """Return which points of each body are in view, for one pose of one camera."""
     camera, _, x, y, heading = queries[0, : EYE_HEADING + 1].tolist()
     reach = Reach(
@@ -80,5 +78,5 @@ def _answers(
             f" ({len(points)},), a value for each point"
         )
     in_view = flags.reshape(len(queries), -1)
-    bits: NDArray[np.uint64] = np.uint64(1) << np.arange(in_view.shape[1], dtype=np.uint64)
+    bits: U64 = np.uint64(1) << np.arange(in_view.shape[1], dtype=np.uint64)
     return in_view @ bits

@@ -3,7 +3,6 @@
 from collections.abc import Collection, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fleet2d.algorithms.patches import Patches
 from fleet2d.engine.bodies import Bodies
@@ -11,6 +10,7 @@ from fleet2d.engine.watchers.watcher import Watcher
 from fleet2d.entities.actor import Actor
 from fleet2d.entities.entity import Robot
 from fleet2d.events import Event
+from fleet2d.kernels import F64, I64, Bool
 from fleet2d.kernels.mesh import Mesh
 from fleet2d.kernels.watch import NEVER, SightRecord, WatchSetup, empty_pose_cache, settle, watch
 from fleet2d.sight.tables import TableContext, stack_lenses
@@ -20,8 +20,6 @@ from fleet2d.sight.tables import TableContext, stack_lenses
 SLOTS = 1 << 14
 # Most steps in one call of the kernel.
 LONGEST = 1 << 16
-
-I64 = NDArray[np.int64]
 
 
 class SeenArea(Watcher):
@@ -166,7 +164,7 @@ class SeenArea(Watcher):
         self._first_bin += count
         return bins
 
-    def explored(self) -> NDArray[np.bool_]:
+    def explored(self) -> Bool:
         """Return which cells were ever in view, bool (rows, columns)."""
         self.catch_up()
         return self._record.first != NEVER
@@ -182,7 +180,7 @@ class SeenArea(Watcher):
         self._settle()
         return self._record.last.copy()
 
-    def time_since_seen(self) -> NDArray[np.float64]:
+    def time_since_seen(self) -> F64:
         """Return the time since each cell was in view [s], float64 (rows, columns), NaN: never."""
         last = self.last_seen()
         steps = np.where(last == NEVER, np.nan, self.next_step - 1 - last)

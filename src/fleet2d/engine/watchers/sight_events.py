@@ -1,11 +1,9 @@
 """Events of seeing and losing, from sightings that were changed after the look."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fleet2d.kernels import I64
 from fleet2d.kernels.look import IDENTITY, STEP, USER_LOST, USER_SEEN, SightMemory
-
-I64 = NDArray[np.int64]
 
 
 def sight_events(

@@ -6,11 +6,11 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fleet2d.blame import blame
 from fleet2d.errors import ComponentError
 from fleet2d.floorplan.geometry.lattice import Lattice
+from fleet2d.kernels import I64
 from fleet2d.kernels.headings import TURN, in_radians
 from fleet2d.kernels.lens import camera_poses
 from fleet2d.kernels.look import (
@@ -37,7 +37,6 @@ from fleet2d.sight.perception_error import PerceptionError
 if TYPE_CHECKING:
     from fleet2d.engine.watchers.cameras import Cameras
 
-I64 = NDArray[np.int64]
 Place = tuple[I64, I64, I64]  # x, y [lattice units] and heading, one element for each look
 
 # The user of a sighting that an error took back, until it would have become known.

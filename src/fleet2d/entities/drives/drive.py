@@ -4,10 +4,8 @@ from abc import abstractmethod
 from collections.abc import Iterable
 from typing import ClassVar, NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from fleet2d.component import Component
+from fleet2d.kernels import F64
 
 
 class Leg(NamedTuple):
@@ -78,7 +76,7 @@ class Drive(Component):
         moments, the later one is as far along the route or farther.
         """
 
-    def seconds(self, metres: NDArray[np.float64], speed: float) -> NDArray[np.float64]:
+    def seconds(self, metres: F64, speed: float) -> F64:
         """Return what the robot thinks that ways to many places take, without turns [s].
 
         Args:

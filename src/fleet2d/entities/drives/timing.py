@@ -5,19 +5,16 @@ from collections.abc import Iterator
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fleet2d.entities.drives.drive import Drive, Leg, Moment, Route
 from fleet2d.errors import ComponentError
+from fleet2d.kernels import F64, I64
 from fleet2d.kernels.headings import TURN, heading_of, turn_between
 
 # The longest time for a route [s]: ten days, so that poses on it can be interpolated in 64 bits.
 LONGEST_S = 864_000
 # A moment this near to a corner of the route is at the corner [m].
 NEAR_M = 1e-6
-
-I64 = NDArray[np.int64]
-F64 = NDArray[np.float64]
 
 
 def breakpoints(

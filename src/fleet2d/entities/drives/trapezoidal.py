@@ -4,11 +4,11 @@ from collections.abc import Iterator
 from math import isqrt, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from fleet2d.component import register
 from fleet2d.entities.drives.differential import Differential
+from fleet2d.kernels import F64
 
 SHORTEST_MM = 2
 """The shortest piece of a change of speed: some lattice units, so that the robot moves in it."""
@@ -44,7 +44,7 @@ class Trapezoidal(Differential):
         for k in range(pieces - 1, -1, -1):
             yield braking + rising * (pieces - k) / pieces, length - ramp * k * k / pieces**2
 
-    def seconds(self, metres: NDArray[np.float64], speed: float) -> NDArray[np.float64]:
+    def seconds(self, metres: F64, speed: float) -> F64:
         """Return what the robot thinks that ways to many places take, each as one leg [s]."""
         changing = speed * speed / self.acceleration  # gathering speed and braking [m]
         at_speed = np.maximum(metres - changing, 0.0) / speed

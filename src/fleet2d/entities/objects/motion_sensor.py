@@ -6,10 +6,11 @@ import numpy as np
 from pydantic import Field
 
 from fleet2d.component import register
-from fleet2d.entities.objects.sensor import I64, Mask, Sensor, SensorView, first_cause
+from fleet2d.entities.objects.sensor import Sensor, SensorView, first_cause
 from fleet2d.entities.place import Point
 from fleet2d.errors import PlacementError
 from fleet2d.floorplan.home.home import Home
+from fleet2d.kernels import I64, Bool
 from fleet2d.kernels.headings import TURN, half_sine
 from fleet2d.kernels.region import region_contains_points, visible_region
 from fleet2d.units import AngleDeg, Duration, PositiveLength, micros
@@ -71,15 +72,15 @@ class MotionSensor(Sensor):
             near[bodies, columns] = self._in_view(points, home)
         return first_cause(near, view.first)
 
-    def _in_view(self, points: I64, home: Home) -> Mask:
+    def _in_view(self, points: I64, home: Home) -> Bool:
         x, y = self.eye
         if self.version != home.version:
             self.version, self.walls = home.version, home.walls
             self.region = visible_region(self.walls, x, y)
-        is_visible: Mask = region_contains_points(self.walls, x, y, *self.region, points)
+        is_visible: Bool = region_contains_points(self.walls, x, y, *self.region, points)
         return is_visible & self._in_wedge(points[:, 0] - x, points[:, 1] - y)
 
-    def _in_wedge(self, dx: I64, dy: I64) -> Mask:
+    def _in_wedge(self, dx: I64, dy: I64) -> Bool:
         half = round(self.angle_deg / 360 * TURN)
         if half >= TURN:
             return np.ones(len(dx), np.bool_)

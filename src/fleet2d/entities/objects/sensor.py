@@ -5,15 +5,11 @@ from dataclasses import dataclass
 from typing import ClassVar, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from fleet2d.entities.objects.home_object import HomeObject
 from fleet2d.floorplan.home.home import Home
-
-I64 = NDArray[np.int64]
-Mask = NDArray[np.bool_]
-
+from fleet2d.kernels import I64, Bool
 
 SensorFault = Literal["on", "off", "silent"]
 """How a sensor fails: it is always triggered, never triggered, or reports nothing."""
@@ -49,7 +45,7 @@ class SensorView:
     first: int
     x: I64
     y: I64
-    present: Mask
+    present: Bool
     users: int
 
     @property
@@ -89,7 +85,7 @@ class Sensor(HomeObject):
         raise NotImplementedError
 
 
-def first_cause(triggered: Mask, first: int) -> tuple[I64, I64]:
+def first_cause(triggered: Bool, first: int) -> tuple[I64, I64]:
     """Return the steps in which a body triggers a sensor, and the lowest row of those that do.
 
     Args:

@@ -7,9 +7,10 @@ from pydantic import Field
 
 from fleet2d.component import register
 from fleet2d.entities.objects.furniture_sensor import FurnitureSensor
-from fleet2d.entities.objects.sensor import I64, SensorView, first_cause
+from fleet2d.entities.objects.sensor import SensorView, first_cause
 from fleet2d.errors import PlacementError
 from fleet2d.floorplan.home.home import Home
+from fleet2d.kernels import I64
 from fleet2d.units import Duration, Length
 
 

@@ -4,13 +4,13 @@ import math
 from datetime import timedelta
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fleet2d.entities.actor import Actor
 from fleet2d.entities.behavior import Situation
 from fleet2d.entities.nearby import points_at_distance
 from fleet2d.entities.plan import Plan
 from fleet2d.errors import ScenarioError
+from fleet2d.kernels import I64
 from fleet2d.kernels.headings import TURN, heading_of, turn_between
 from fleet2d.sums import sum_in_order
 
@@ -114,17 +114,17 @@ def check_has_camera(actor: Actor, behavior: str) -> None:
         )
 
 
-def _is_free(actor: Actor, point: NDArray[np.int64]) -> bool:
+def _is_free(actor: Actor, point: I64) -> bool:
     return actor.space.part_at(int(point[0]), int(point[1])) == actor.part
 
 
-def _first_heading(route: NDArray[np.int64]) -> int:
+def _first_heading(route: I64) -> int:
     """Return the direction of the first leg of a route [1/4096 turn]."""
     (dx, dy), *_ = np.diff(route, axis=0).tolist() or [[0, 0]]
     return heading_of(dx, dy)
 
 
-def _legs(route: NDArray[np.int64]) -> list[float]:
+def _legs(route: I64) -> list[float]:
     """Return the lengths of the legs of a route [lattice]."""
     legs = np.diff(route, axis=0)
     return np.sqrt((legs * legs).sum(axis=1).astype(np.float64)).tolist()

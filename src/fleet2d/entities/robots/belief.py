@@ -3,11 +3,11 @@
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from fleet2d.entities.behavior import Behavior, Situation
 from fleet2d.errors import ComponentError
+from fleet2d.kernels import F64
 
 ANYONE = "anyone"
 
@@ -20,11 +20,11 @@ class RoomBelief(NamedTuple):
         away: Probability that the person is out of the home.
     """
 
-    share: NDArray[np.float64]
+    share: F64
     away: float
 
     @property
-    def joint(self) -> NDArray[np.float64]:
+    def joint(self) -> F64:
         """Probability of each room, float64 (rooms,); sums to 1 - away."""
         return self.share * (1 - self.away)
 

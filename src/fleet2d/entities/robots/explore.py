@@ -4,7 +4,6 @@ from datetime import datetime, timedelta
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from fleet2d.component import register
@@ -13,6 +12,7 @@ from fleet2d.entities.behavior import Behavior, Situation
 from fleet2d.entities.plan import Plan
 from fleet2d.entities.robots.approach import check_has_camera
 from fleet2d.entities.robots.viewpoints import centres, spread, visible_from
+from fleet2d.kernels import Bool
 from fleet2d.kernels.fields import squared_distance
 from fleet2d.kernels.headings import TURN
 from fleet2d.units import Length, Share
@@ -24,8 +24,6 @@ TARGETS_TRIED = 2000
 WORTH = 0.002
 # Time after which it tries again to pass a shut door to floor that isn't seen yet.
 TRIES_AGAIN = timedelta(minutes=1)
-
-Bool = NDArray[np.bool_]
 
 
 @register("behavior", "explore")

@@ -4,7 +4,6 @@ from datetime import datetime, timedelta
 from typing import ClassVar, NamedTuple, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from fleet2d.clock import midnight_of
@@ -17,6 +16,7 @@ from fleet2d.entities.robots.approach import AT_A_DOOR, approach, check_has_came
 from fleet2d.entities.robots.belief import ANYONE, BeliefBehavior
 from fleet2d.entities.robots.sites import Sites
 from fleet2d.errors import PlacementError
+from fleet2d.kernels import F64
 from fleet2d.search.policies import MOST_EXACT, Policy, after_empty_looks, order_by
 from fleet2d.sums import sum_in_order
 from fleet2d.units import Duration, Length, PositiveDuration, Share, TimeOfDay, problem
@@ -231,7 +231,7 @@ class Find(BeliefBehavior):
         self.plan = plan.ask_by(ends)
         return plan
 
-    def _prior(self, now: Situation) -> tuple[NDArray[np.float64], float]:
+    def _prior(self, now: Situation) -> tuple[F64, float]:
         """Return the probability of each site, and that of being out, disregarding all looks."""
         assert self.search is not None
         belief = self.belief(now, self.search.user)
@@ -245,7 +245,7 @@ class Find(BeliefBehavior):
         away = belief.away if has_output else self.out
         return mixed * (1 - away), away
 
-    def _ages(self, search: SearchState, now: Situation) -> NDArray[np.float64]:
+    def _ages(self, search: SearchState, now: Situation) -> F64:
         """Return the time since the last empty look at each site [s], infinite without one."""
         ages = np.full(len(self.sites), np.inf)
         for look in search.empty_looks:

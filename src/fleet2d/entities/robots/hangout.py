@@ -4,7 +4,6 @@ from datetime import datetime, timedelta
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from fleet2d.component import register
@@ -19,6 +18,7 @@ from fleet2d.entities.robots.places import HangoutPlaces, Nearness
 from fleet2d.entities.robots.viewpoints import Viewpoints, viewpoints_of
 from fleet2d.errors import PlacementError
 from fleet2d.floorplan.home.space import Space
+from fleet2d.kernels import F64
 from fleet2d.kernels.mesh import SUB
 from fleet2d.units import Length, PositiveDuration, Share
 
@@ -88,10 +88,10 @@ class Hangout(BeliefBehavior):
             )
         self.nearness = self.places.nearness(self.near, self.tau.total_seconds())
         self.penalty = self.blocking * self.places.block + self.personal_space * self.places.prox
-        self.ways: tuple[Space, dict[tuple[int, int], NDArray[np.float64]]] = actor.space, {}
+        self.ways: tuple[Space, dict[tuple[int, int], F64]] = actor.space, {}
         self.explored = [r.index for r in actor.reachable_rooms() if r.index not in self.avoided]
         self.viewpoints: tuple[int, dict[int, Viewpoints]] = actor.home.version, {}
-        self.rated_by: NDArray[np.float64] | None = None  # the probabilities behind `worth`
+        self.rated_by: F64 | None = None  # the probabilities behind `worth`
         self.worth = -self.penalty
         self.place: int | None = None
         self.decides_at = actor.clock.start
@@ -151,7 +151,7 @@ class Hangout(BeliefBehavior):
             if plan.reaches(*point):
                 plan.go_to_point(*point).turn_by(1.0)
 
-    def _scores(self, now: Situation, joint: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _scores(self, now: Situation, joint: F64) -> F64:
         """Return the rating of each place, float64 (n,), by the probability of each room."""
         if self.rated_by is None or not np.array_equal(joint, self.rated_by):
             gain = np.zeros(len(self.places.points))
@@ -161,7 +161,7 @@ class Hangout(BeliefBehavior):
             self.rated_by, self.worth = joint, gain - self.penalty
         return self.worth - self._ways(now.actor)
 
-    def _ways(self, actor: Actor) -> NDArray[np.float64]:
+    def _ways(self, actor: Actor) -> F64:
         """Return the cost of the way to each place, float64 (n,), infinite without a way.
 
         The robot decides often, but stands at few places: costs are kept by position, until its

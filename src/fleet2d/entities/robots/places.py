@@ -5,12 +5,12 @@ from typing import Literal
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 
 from fleet2d.entities.actor import Actor
 from fleet2d.entities.robots.viewpoints import sight_range
 from fleet2d.floorplan.cache import read_only
 from fleet2d.floorplan.plan import Room
+from fleet2d.kernels import F64, I64
 from fleet2d.kernels.mesh import CELL_CENTRE, SUB
 from fleet2d.kernels.points import points_in_sight
 
@@ -23,8 +23,6 @@ SEATS_TRIED = 60
 # Places to stand are tried on a grid of this pitch [m].
 PITCH = 0.5
 
-I64 = NDArray[np.int64]
-F64 = NDArray[np.float64]
 Seats = tuple[I64, ...]
 Nearness = Literal["room", "view", "path"]
 

@@ -3,7 +3,6 @@
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from fleet2d.component import register
@@ -12,6 +11,7 @@ from fleet2d.entities.nearest import Nearest
 from fleet2d.entities.plan import Plan
 from fleet2d.errors import FloorPlanError, PlacementError
 from fleet2d.floorplan.formats.valetudo import read_valetudo_paths
+from fleet2d.kernels import I64
 from fleet2d.paths import InputPath
 from fleet2d.units import Length
 
@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from fleet2d.entities.actor import Actor
-
-I64 = NDArray[np.int64]
 
 
 @register("behavior", "retrace")

@@ -3,13 +3,13 @@
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fleet2d.entities.actor import Actor
 from fleet2d.entities.behavior import Situation
 from fleet2d.entities.plan import Plan
 from fleet2d.entities.robots.approach import way_seconds
 from fleet2d.entities.robots.viewpoints import viewpoints_of
+from fleet2d.kernels import F64
 from fleet2d.kernels.headings import TURN
 from fleet2d.search.problem import SearchProblem, search_problem
 from fleet2d.sums import sum_in_order
@@ -18,8 +18,6 @@ from fleet2d.sums import sum_in_order
 ENOUGH = 0.9
 # Counted for a route that is blocked at present, as by a shut door [s].
 NO_WAY = 86_400.0
-
-F64 = NDArray[np.float64]
 
 
 class Sites:

@@ -3,18 +3,16 @@
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fleet2d.entities.actor import Actor
 from fleet2d.floorplan.plan import Room
+from fleet2d.kernels import I64, Bool
 from fleet2d.kernels.mesh import CELL_CENTRE, SUB
 from fleet2d.kernels.points import points_in_sight
 
 # The most cells of a room that are tried as viewpoints, and as targets to be seen, evenly spread.
 STANDS_TRIED = 48
 TARGETS_TRIED = 400
-
-I64 = NDArray[np.int64]
 
 
 class Viewpoints(NamedTuple):
@@ -72,7 +70,7 @@ def _choose_viewpoints(actor: Actor, room: Room, enough: float, most: int) -> Vi
     return Viewpoints(tuple(points), 1 - float(unseen.sum()) / len(goals))
 
 
-def visible_from(actor: Actor, place: I64, goals: I64) -> NDArray[np.bool_]:
+def visible_from(actor: Actor, place: I64, goals: I64) -> Bool:
     """Return which goals (n, 2) are in range and in sight of a place, at any heading, bool (n,)."""
     near = ((goals - place) ** 2).sum(axis=1) <= sight_range(actor) ** 2
     visible = np.zeros(len(goals), np.bool_)

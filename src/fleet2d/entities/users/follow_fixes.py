@@ -4,10 +4,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fleet2d.entities.nearest import Nearest
 from fleet2d.floorplan.home.space import straight_way
+from fleet2d.kernels import F64, I64
 from fleet2d.kernels.headings import TURN, heading_of
 from fleet2d.kernels.mesh import locate
 from fleet2d.kernels.motion import time_route
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from fleet2d.entities.actor import Actor
     from fleet2d.entities.plan import Plan
 
-I64 = NDArray[np.int64]
 
 # Coordinates are clipped to this, far outside of any home [m].
 FAR = 1e6
@@ -44,9 +43,7 @@ class Fixes:
     outside: int
 
 
-def place_fixes(
-    actor: "Actor", time_us: I64, xy: NDArray[np.float64], turns: NDArray[np.float64], reach: float
-) -> Fixes:
+def place_fixes(actor: "Actor", time_us: I64, xy: F64, turns: F64, reach: float) -> Fixes:
     """Return fixes moved to the nearest place where the body can be.
 
     Args:

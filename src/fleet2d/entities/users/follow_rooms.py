@@ -5,11 +5,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fleet2d.entities.nearest import Nearest
 from fleet2d.entities.plan import Note
 from fleet2d.floorplan.home.space import straight_way
+from fleet2d.kernels import I64
 from fleet2d.kernels.motion import time_route
 from fleet2d.logs.log import AWAY
 from fleet2d.logs.rooms import DOOR
@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from fleet2d.entities.actor import Actor
     from fleet2d.entities.plan import Plan
 
-I64 = NDArray[np.int64]
 
 # In visits shorter than this, the body stops at the nearest point of the room [us].
 BRIEF_US = 10_000_000

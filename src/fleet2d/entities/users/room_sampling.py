@@ -5,7 +5,6 @@ from datetime import timedelta
 from typing import TYPE_CHECKING, NamedTuple, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from fleet2d.component import register
@@ -15,6 +14,7 @@ from fleet2d.entities.plan import Plan
 from fleet2d.entities.users.spots import Spot, Spots
 from fleet2d.errors import PlacementError
 from fleet2d.floorplan.geometry.lattice import UNITS_PER_CELL
+from fleet2d.kernels import I64
 from fleet2d.problems import problem
 from fleet2d.routines.activity import AnyDurationLaw, DurationLaw
 from fleet2d.routines.laws import draw_weighted
@@ -144,7 +144,7 @@ class RoomSampling(Behavior):
                 self.debt_us[room] += int(walk_us * share)
 
 
-def _rooms_along(actor: "Actor", route: NDArray[np.int64]) -> list[tuple[int, float]]:
+def _rooms_along(actor: "Actor", route: I64) -> list[tuple[int, float]]:
     """Return the index of each room that a route leads through, and its share of the length."""
     plan = actor.home.plan
     legs = np.diff(route, axis=0).astype(np.float64)

@@ -12,7 +12,6 @@ from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.formats.occupancy import (
     RAY_WIDTH_M,
     SPECK_AREA_M2,
-    Mask,
     OccupancyMap,
     OccupancySource,
     free_space,
@@ -21,6 +20,7 @@ from fleet2d.floorplan.formats.raster import GreyPicture, read_grey
 from fleet2d.floorplan.geometry.lattice import MAX_CELL_M, MIN_CELL_M
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.source import in_file
+from fleet2d.kernels import Bool
 from fleet2d.kernels.masks import label_parts
 from fleet2d.paths import InputPath
 from fleet2d.units import PositiveLength, Share
@@ -102,19 +102,19 @@ def read_image(
         )
 
 
-def _light(picture: GreyPicture, threshold: float) -> Mask:
-    light: Mask = picture.values >= threshold * picture.white
+def _light(picture: GreyPicture, threshold: float) -> Bool:
+    light: Bool = picture.values >= threshold * picture.white
     return light if picture.clear is None else light | picture.clear
 
 
-def _inside(light: Mask) -> Mask:
+def _inside(light: Bool) -> Bool:
     """Return the light pixels that are not connected to the edge of the picture.
 
     Raises:
         FloorPlanError: There are none.
     """
     part = label_parts(np.pad(light, 1, constant_values=True), False)[1:-1, 1:-1]
-    inside: Mask = light & (part != 0)  # the first part is the margin
+    inside: Bool = light & (part != 0)  # the first part is the margin
     if inside.any():
         return inside
     if not light.any():

@@ -13,7 +13,6 @@ from typing import Any, Literal
 import numpy as np
 import shapely
 import shapely.geometry
-from numpy.typing import NDArray
 from shapely import Point
 from shapely.geometry.base import BaseGeometry
 
@@ -22,12 +21,13 @@ from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.formats.fields import MAX_COORDINATE_M, clean_coordinate, shown_value
 from fleet2d.floorplan.geometry.repair import repair
 from fleet2d.floorplan.rooms.vocabulary import room_type
+from fleet2d.kernels import F64
 from fleet2d.problems import suggest
 
 COLLECTION = "FeatureCollection"
 
 Units = Literal["auto", "m", "degrees"]
-Move = Callable[[NDArray[np.float64]], NDArray[np.float64]]
+Move = Callable[[F64], F64]
 
 # WGS 84: half the larger axis [m], and the square of the eccentricity.
 SEMI_MAJOR_M, ECCENTRICITY_2 = 6378137.0, 0.00669437999014
@@ -284,7 +284,7 @@ def _shape(geometry: object, kind: str, where: str, notes: list[str]) -> BaseGeo
 # --- Units -------------------------------------------------------------------------------------
 
 
-def _units(content: dict[str, Any], bounds: NDArray[np.float64], units: Units) -> Units:
+def _units(content: dict[str, Any], bounds: F64, units: Units) -> Units:
     """Return the units: of the setting, else those that the file declares, else by its extent."""
     declared = content.get("units", "auto") if units == "auto" else units
     if declared not in ("auto", "m", "degrees"):
@@ -306,7 +306,7 @@ def _units(content: dict[str, Any], bounds: NDArray[np.float64], units: Units) -
     )
 
 
-def _projection(bounds: NDArray[np.float64], notes: list[str]) -> Move:
+def _projection(bounds: F64, notes: list[str]) -> Move:
     """Return the function from longitude and latitude to metres east and north of their centre.
 
     The plane touches the ellipsoid in the centre: over 1 km the error is below 0.1 m.
@@ -325,7 +325,7 @@ def _projection(bounds: NDArray[np.float64], notes: list[str]) -> Move:
     return lambda xy: np.round((xy - centre) * scale, 3)
 
 
-def _shift(bounds: NDArray[np.float64], notes: list[str]) -> Move:
+def _shift(bounds: F64, notes: list[str]) -> Move:
     """Return the function that moves far coordinates, such as UTM's, near the origin."""
     if np.abs(bounds).max() <= MAX_COORDINATE_M / 10:
         return lambda xy: xy

@@ -15,7 +15,6 @@ from typing import Any, ClassVar
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 from shapely import Polygon
 
 from fleet2d.component import register
@@ -26,6 +25,7 @@ from fleet2d.floorplan.geometry.lattice import UNITS_PER_CELL, Lattice
 from fleet2d.floorplan.objects import PlacedObject, UsePlace
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.source import FloorPlanSource, in_file, read_document
+from fleet2d.kernels import Bool
 from fleet2d.paths import InputPath
 
 
@@ -165,7 +165,7 @@ def _part_document(lattice: Lattice, polygon: Polygon) -> dict[str, Any]:
     return part
 
 
-def cell_polygons(mask: NDArray[np.bool_]) -> list[Polygon]:
+def cell_polygons(mask: Bool) -> list[Polygon]:
     """Return the area of cells as polygons [lattice]: the union of their runs along the rows."""
     edges = np.diff(np.pad(mask, ((0, 0), (1, 1))).astype(np.int8), axis=1)
     row, first = np.nonzero(edges == 1)

@@ -5,18 +5,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 from pydantic import Field
 from shapely import Polygon
 
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.source import PixelSource
+from fleet2d.kernels import F64, Bool
 from fleet2d.kernels.fields import squared_distance
 from fleet2d.kernels.masks import count_steps, label_parts, trace_rings
 from fleet2d.units import Length
-
-Mask = NDArray[np.bool_]
-Parts = NDArray[np.int32]
 
 SPECK_AREA_M2 = 0.02
 RAY_WIDTH_M = 0.3
@@ -55,13 +52,13 @@ class OccupancyMap:
         turn: Cosine and sine of the angle from the x axis to the rows, counter-clockwise.
     """
 
-    free: Mask
-    occupied: Mask
+    free: Bool
+    occupied: Bool
     pixel: float
     origin: tuple[float, float] = (0.0, 0.0)
     turn: tuple[float, float] = (1.0, 0.0)
 
-    def to_metres(self, xy: NDArray[np.float64]) -> NDArray[np.float64]:
+    def to_metres(self, xy: F64) -> F64:
         """Return places (column, row) from the lower left corner in metres (…, 2)."""
         cosine, sine = self.turn
         x, y = xy[..., 0] * self.pixel, xy[..., 1] * self.pixel
@@ -116,7 +113,7 @@ def free_space(
     return shapely.transform(outline(home), raw.to_metres), notes
 
 
-def outline(free: Mask) -> Polygon:
+def outline(free: Bool) -> Polygon:
     """Return the exact outline of pixels that are connected across sides.
 
     Args:
@@ -136,7 +133,7 @@ def outline(free: Mask) -> Polygon:
     return Polygon(shell, rings[~outer].tolist())
 
 
-def _specks(raw: OccupancyMap, speck_area_m2: float) -> tuple[Mask, list[str]]:
+def _specks(raw: OccupancyMap, speck_area_m2: float) -> tuple[Bool, list[str]]:
     """Return the pixels of small groups that are surrounded by free ones, and a note."""
     # A margin around the map joins all groups that reach its edge.
     part = label_parts(~np.pad(raw.free, 1), True)[1:-1, 1:-1]
@@ -144,7 +141,7 @@ def _specks(raw: OccupancyMap, speck_area_m2: float) -> tuple[Mask, list[str]]:
     small = (sizes > 0) & (sizes * raw.pixel**2 < speck_area_m2 - TINY)
     small[0] = False  # the part of the margin, which comes first
     area = float(sizes[small].sum()) * raw.pixel**2
-    specks: Mask = ~raw.free & small[part]
+    specks: Bool = ~raw.free & small[part]
     if not small.any():
         return specks, []
     return specks, [
@@ -153,7 +150,7 @@ def _specks(raw: OccupancyMap, speck_area_m2: float) -> tuple[Mask, list[str]]:
     ]
 
 
-def _home(free: Mask, pixel: float, ray_width: float) -> Mask:
+def _home(free: Bool, pixel: float, ray_width: float) -> Bool:
     """Return the pixels of the largest part that a disc reaches, and of what belongs to it."""
     across = math.floor(ray_width / pixel + TINY)
     reach = max((across + 1) // 2, 1)  # the disc covers what is nearer than this to its centre
@@ -174,7 +171,7 @@ def _home(free: Mask, pixel: float, ray_width: float) -> Mask:
     return (steps >= 0) & (~leads_on[part] | (steps < reach))
 
 
-def _left_out(raw: OccupancyMap, free: Mask, home: Mask, ray_width: float) -> list[str]:
+def _left_out(raw: OccupancyMap, free: Bool, home: Bool, ray_width: float) -> list[str]:
     """Return notes on free space outside the home: joined by narrow passages, or not at all."""
     notes = []
     joined = count_steps(home, free) >= 0
@@ -196,7 +193,7 @@ def _left_out(raw: OccupancyMap, free: Mask, home: Mask, ray_width: float) -> li
     return notes
 
 
-def _open_border(raw: OccupancyMap, home: Mask) -> list[str]:
+def _open_border(raw: OccupancyMap, home: Bool) -> list[str]:
     """Return notes on the parts of the outline where the map ends without an obstacle."""
     notes = []
     inside, unknown = np.pad(home, 1), np.pad(~raw.free & ~raw.occupied, 1)

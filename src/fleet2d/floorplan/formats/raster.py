@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from fleet2d.bounds import PICTURE_BYTES, PIXELS, read_bytes
 from fleet2d.errors import FloorPlanError
+from fleet2d.kernels import Bool
 
 _PNG = b"\x89PNG\r\n\x1a\n"
 _CHANNELS = {2: 3, 4: 2, 6: 4}  # by colour type; 1 for the others
@@ -38,7 +39,7 @@ class GreyPicture:
 
     values: NDArray[np.integer[Any]]
     white: int
-    clear: NDArray[np.bool_] | None = None
+    clear: Bool | None = None
 
 
 def read_grey(path: Path) -> GreyPicture:

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 from pydantic import Field
 from shapely import Polygon
 
@@ -26,6 +25,7 @@ from fleet2d.floorplan.formats.raster import GreyPicture, read_grey
 from fleet2d.floorplan.geometry.lattice import MAX_CELL_M, MIN_CELL_M
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.source import in_file, read_yaml
+from fleet2d.kernels import Bool
 from fleet2d.paths import InputPath
 from fleet2d.units import Length
 
@@ -248,9 +248,9 @@ def _occupancy(settings: _MapSettings, picture: GreyPicture, notes: list[str]) -
     return OccupancyMap(free[::-1], occupied[::-1], settings.resolution, (x, y), turn)
 
 
-def _opaque(shades: NDArray[np.bool_], picture: GreyPicture) -> NDArray[np.bool_]:
+def _opaque(shades: Bool, picture: GreyPicture) -> Bool:
     """Return the opaque pixels of some shades, bool (rows, columns)."""
-    pixels: NDArray[np.bool_] = shades[picture.values]
+    pixels: Bool = shades[picture.values]
     return pixels if picture.clear is None else pixels & ~picture.clear
 
 

@@ -12,7 +12,6 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 import shapely
 import shapely.affinity
-from numpy.typing import NDArray
 from shapely import LineString, MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
@@ -21,7 +20,6 @@ from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.formats.occupancy import outline
 from fleet2d.floorplan.formats.valetudo_file import (
     MAP_CLASS,
-    Mask,
     PixelBox,
     PixelLayer,
     check_map,
@@ -39,6 +37,7 @@ from fleet2d.floorplan.objects import PlacedObject, UsePlace
 from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
 from fleet2d.floorplan.rooms.vocabulary import UNKNOWN, usual_type
 from fleet2d.floorplan.source import PixelSource, in_file, read_json
+from fleet2d.kernels import F64, Bool
 from fleet2d.kernels.fields import squared_distance
 from fleet2d.kernels.masks import label_parts
 from fleet2d.paths import InputPath
@@ -122,7 +121,7 @@ def read_valetudo(path: Path, cell: float | None = None, *, no_go: NoGo = "keep_
         )
 
 
-def read_valetudo_paths(path: Path) -> list[NDArray[np.float64]]:
+def read_valetudo_paths(path: Path) -> list[F64]:
     """Read the path that the vacuum drove, in pieces.
 
     Returns:
@@ -140,7 +139,7 @@ def read_valetudo_paths(path: Path) -> list[NDArray[np.float64]]:
     return [piece for piece in pieces if len(piece)]
 
 
-def read_valetudo_path(path: Path) -> NDArray[np.float64]:
+def read_valetudo_path(path: Path) -> F64:
     """Read the path that the vacuum drove, float64 (n, 2) [m], with all pieces joined.
 
     Raises:
@@ -163,7 +162,7 @@ def read_valetudo_charger(path: Path) -> tuple[float, float] | None:
 # --- Free space and rooms ----------------------------------------------------------------------
 
 
-def _free_pixels(layers: list[PixelLayer], box: PixelBox, notes: list[str]) -> Mask:
+def _free_pixels(layers: list[PixelLayer], box: PixelBox, notes: list[str]) -> Bool:
     """Return the pixels that are floor and not wall, bool (rows, columns)."""
     segments_at = np.zeros((box.rows, box.columns), np.uint16)
     floor, wall = (np.zeros(segments_at.shape, np.bool_) for _ in range(2))
@@ -185,7 +184,7 @@ def _free_pixels(layers: list[PixelLayer], box: PixelBox, notes: list[str]) -> M
     return floor & ~wall
 
 
-def _in_metres(mask: Mask, box: PixelBox, pixel_m: float) -> MultiPolygon:
+def _in_metres(mask: Bool, box: PixelBox, pixel_m: float) -> MultiPolygon:
     """Return the exact outlines of pixels [m]."""
     part = label_parts(mask, False)
     if part.max(initial=-1) >= MAX_PARTS:
@@ -224,7 +223,7 @@ def _regions(layers: list[PixelLayer], pixel_m: float, notes: list[str]) -> list
 
 
 def _no_go_areas(
-    content: dict[str, Any], free: Mask, box: PixelBox, no_go: NoGo, notes: list[str]
+    content: dict[str, Any], free: Bool, box: PixelBox, no_go: NoGo, notes: list[str]
 ) -> list[Polygon]:
     """Return the areas that robots keep out of [m]; no-go areas as walls change `free` instead."""
     pixel_m = pixel_side(content)
@@ -252,7 +251,7 @@ def _no_go_areas(
     return areas
 
 
-def _no_go_shape(corners: NDArray[np.float64], kind: str) -> BaseGeometry:
+def _no_go_shape(corners: F64, kind: str) -> BaseGeometry:
     """Return the shape of a no-go area, or a band a pixel wide along a virtual wall [pixels]."""
     if kind == "virtual_wall":
         if len(corners) < 2:
@@ -269,7 +268,7 @@ def _parts_in_metres(shape: BaseGeometry, pixel_m: float) -> list[Polygon]:
     return [part for part in shapely.get_parts(metres).tolist() if part.geom_type == "Polygon"]
 
 
-def _remove_pixels(shape: BaseGeometry, free: Mask, box: PixelBox) -> None:
+def _remove_pixels(shape: BaseGeometry, free: Bool, box: PixelBox) -> None:
     """Remove from the free pixels those that a shape [pixels] overlaps."""
     shape = shape.buffer(-TINY, join_style="mitre")
     x0, y0, x1, y1 = shape.bounds
@@ -283,7 +282,7 @@ def _remove_pixels(shape: BaseGeometry, free: Mask, box: PixelBox) -> None:
         free[row, columns] = ~shapely.intersects(shape, pixels)
 
 
-def _charger(content: dict[str, Any], free: Mask, box: PixelBox) -> list[PlacedObject]:
+def _charger(content: dict[str, Any], free: Bool, box: PixelBox) -> list[PlacedObject]:
     """Return the vacuum's charger, with a place to stand in front of it."""
     at = read_charger(content)
     if at is None:

@@ -10,11 +10,11 @@ from dataclasses import dataclass
 from typing import Annotated, Any
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, TypeAdapter
 
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.formats.fields import MAX_COORDINATE_M, Listed, shown_value, validate
+from fleet2d.kernels import F64, I64, Bool
 
 MAP_CLASS = "ValetudoMap"
 VERSION = 2
@@ -26,7 +26,6 @@ MIN_PIXEL_CM, MAX_PIXEL_CM = 1, 100
 MAX_PIXEL_NUMBER = 2**20
 CM_PER_M = 100
 
-Mask = NDArray[np.bool_]
 
 _LIMIT_CM = MAX_COORDINATE_M * CM_PER_M
 _OBJECTS = TypeAdapter(Listed[dict[str, Any]])
@@ -51,7 +50,7 @@ class PixelLayer:
     kind: str
     name: str
     is_named: bool
-    runs: NDArray[np.int64]
+    runs: I64
 
 
 @dataclass(frozen=True)
@@ -64,7 +63,7 @@ class PixelBox:
     rows: int
 
     @classmethod
-    def around(cls, runs: NDArray[np.int64]) -> "PixelBox":
+    def around(cls, runs: I64) -> "PixelBox":
         """Return the smallest box that holds all runs of pixels.
 
         Raises:
@@ -84,7 +83,7 @@ class PixelBox:
         row, column = part.row - self.row, part.column - self.column
         return slice(row, row + part.rows), slice(column, column + part.columns)
 
-    def paint(self, runs: NDArray[np.int64]) -> Mask:
+    def paint(self, runs: I64) -> Bool:
         """Return the pixels that the runs cover, bool (rows, columns), first row at the bottom."""
         steps = np.zeros((self.rows, self.columns + 1), np.int32)
         row, column = runs[:, 1] - self.row, runs[:, 0] - self.column
@@ -183,7 +182,7 @@ def _segment_name(layer: dict[str, Any], number: int) -> tuple[str, bool]:
     return f"segment_{_meta(layer).get('segmentId', number)}", False
 
 
-def _runs(layer: dict[str, Any], where: str) -> NDArray[np.int64]:
+def _runs(layer: dict[str, Any], where: str) -> I64:
     """Return the runs of pixels of a layer, int64 (n, 3), with rows that count upwards."""
     packed = _whole_numbers(layer, "compressedPixels", 3, "runs x, y, length", where)
     single = _whole_numbers(layer, "pixels", 2, "pixels x, y", where)
@@ -197,9 +196,7 @@ def _runs(layer: dict[str, Any], where: str) -> NDArray[np.int64]:
     return runs[runs[:, 2] > 0]
 
 
-def _whole_numbers(
-    layer: dict[str, Any], key: str, group: int, meaning: str, where: str
-) -> NDArray[np.int64]:
+def _whole_numbers(layer: dict[str, Any], key: str, group: int, meaning: str, where: str) -> I64:
     """Return a flat list of whole numbers in groups, int64 (n, group)."""
     values = validate(_PIXELS, layer.get(key) or [], f"{where}.{key}")
     if len(values) % group:
@@ -218,7 +215,7 @@ def entities_of(content: dict[str, Any], kind: str) -> Iterator[tuple[dict[str, 
     return ((e, where) for e, where in objects_in(content, "entities") if e.get("type") == kind)
 
 
-def read_points(entity: dict[str, Any], where: str) -> NDArray[np.float64]:
+def read_points(entity: dict[str, Any], where: str) -> F64:
     """Return an entity's points, float64 (n, 2) [m]."""
     values = validate(_POINTS, entity.get("points"), f"{where}.points")
     if len(values) % 2:

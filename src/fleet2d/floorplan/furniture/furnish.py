@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.arrangement import number_objects
@@ -13,6 +12,7 @@ from fleet2d.floorplan.furniture.catalogue import FURNITURE
 from fleet2d.floorplan.furniture.interior import Interior
 from fleet2d.floorplan.furniture.room_view import FurnitureGroup, Piece
 from fleet2d.floorplan.plan import FloorPlan, Room
+from fleet2d.kernels import I64
 from fleet2d.streams import Draws, stream_key
 
 # Sizes are drawn in steps of this [m].
@@ -118,7 +118,7 @@ def _place_tv(interior: Interior, room: Room, first: int, draws: Draws) -> None:
     middle = sofa.footprint.centroid
     group = replace(_alone("tv", draws)[0], corner=0, away=0)
 
-    def score(turn: int, shape: tuple[int, int], size: tuple[int, int]) -> NDArray[np.int64] | None:
+    def score(turn: int, shape: tuple[int, int], size: tuple[int, int]) -> I64 | None:
         if turn != (turn_of_sofa + 2) % 4:
             return None
         u, v = view.turn_place(turn, middle.x, middle.y)

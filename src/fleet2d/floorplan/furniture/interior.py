@@ -2,7 +2,6 @@
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 
 from fleet2d.floorplan.furniture.room_view import (
     FurnitureGroup,
@@ -17,13 +16,12 @@ from fleet2d.floorplan.home.space import Space
 from fleet2d.floorplan.home.standing import BODY_RADIUS, Window, grown_cells, with_approaches
 from fleet2d.floorplan.objects import PlacedObject
 from fleet2d.floorplan.plan import FloorPlan, Room, rings
+from fleet2d.kernels import Bool
 from fleet2d.kernels.masks import label_parts
 from fleet2d.streams import Draws
 
 DOOR_CLEARANCE = 0.9
 """Depth of the floor before a doorway that stays empty, on either side [m]."""
-
-Bool = NDArray[np.bool_]
 
 
 class Interior:

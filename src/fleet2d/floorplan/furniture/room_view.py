@@ -5,12 +5,12 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fleet2d.floorplan.furniture.catalogue import stand_furniture
 from fleet2d.floorplan.geometry.lattice import UNITS_PER_CELL
 from fleet2d.floorplan.objects import PlacedObject
 from fleet2d.floorplan.plan import FloorPlan, Room
+from fleet2d.kernels import I64, Bool
 from fleet2d.kernels.fields import squared_distance
 from fleet2d.kernels.headings import QUARTER, TURN
 from fleet2d.kernels.masks import label_parts
@@ -29,9 +29,7 @@ POCKET_M2 = 0.06
 # Distance from a door beyond which more distance earns no points [m].
 FAR_M = 3.0
 
-Bool = NDArray[np.bool_]
-Int = NDArray[np.int64]
-Score = Callable[[int, tuple[int, int], tuple[int, int]], Int | None]
+Score = Callable[[int, tuple[int, int], tuple[int, int]], I64 | None]
 
 
 @dataclass(frozen=True)
@@ -147,7 +145,7 @@ class RoomView:
 
     def _options(
         self, group: FurnitureGroup, turn: int, empty: Bool, score: Score | None
-    ) -> tuple[Int, Int, Int] | None:
+    ) -> tuple[I64, I64, I64] | None:
         """Return the rows and columns of first cells where the group can be, and their points."""
         width, depth = self._size(group)
         front = count_cells(self.lattice.cell, group.front)
@@ -176,7 +174,7 @@ class RoomView:
             rows, columns, points = rows[more >= 0], columns[more >= 0], (points + more)[more >= 0]
         return rows, columns, points
 
-    def _points(self, group: FurnitureGroup, turn: int, rows: Int, columns: Int) -> Int:
+    def _points(self, group: FurnitureGroup, turn: int, rows: I64, columns: I64) -> I64:
         """Return the points of first cells for corners and for the distance from doors."""
         width, depth = self._size(group)
         points = np.zeros(len(rows), np.int64)
@@ -269,20 +267,20 @@ def count_cells(cell: float, metres: float) -> int:
     return math.floor(metres / cell + 0.5 + 1e-6)
 
 
-def _sums(mask: Bool) -> Int:
+def _sums(mask: Bool) -> I64:
     """Count the cells of a mask above and left of each corner, (rows + 1, columns + 1)."""
     sums = np.zeros((mask.shape[0] + 1, mask.shape[1] + 1), np.int32)
     np.cumsum(np.cumsum(mask, axis=0, dtype=np.int32), axis=1, out=sums[1:, 1:])
     return sums
 
 
-def _in_box(sums: Int, rows: Int, columns: Int, high: int, wide: int) -> Int:
+def _in_box(sums: I64, rows: I64, columns: I64, high: int, wide: int) -> I64:
     """Return how many cells of a mask are in the boxes that begin at some cells."""
     right, top = columns + wide, rows + high
     return sums[top, right] - sums[rows, right] - sums[top, columns] + sums[rows, columns]
 
 
-def _count(mask: Bool, high: int, wide: int) -> Int:
+def _count(mask: Bool, high: int, wide: int) -> I64:
     """Return how many cells of the mask are in the rectangle that begins at each cell."""
     sums = _sums(mask)
     return sums[high:, wide:] - sums[:-high, wide:] - sums[high:, :-wide] + sums[:-high, :-wide]

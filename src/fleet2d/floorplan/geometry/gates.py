@@ -3,13 +3,12 @@
 from collections.abc import Collection, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fleet2d.errors import FloorPlanError
+from fleet2d.kernels import I64
 from fleet2d.kernels.mesh import WALL, Mesh
 
 Segment = tuple[tuple[int, int], tuple[int, int]]
-I64 = NDArray[np.int64]
 
 
 class Gates:

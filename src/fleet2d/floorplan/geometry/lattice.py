@@ -7,9 +7,10 @@ from functools import cached_property
 from typing import Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from fleet2d.errors import FloorPlanError
+from fleet2d.kernels import F64, I64
 
 UNITS_PER_CELL = 64
 MARGIN_CELLS = 2
@@ -102,11 +103,11 @@ class Lattice:
         return UNITS_PER_CELL / self.cell
 
     @cached_property
-    def _origin_units(self) -> NDArray[np.int64]:
+    def _origin_units(self) -> I64:
         cells = np.rint(np.asarray(self.origin) / self.cell).astype(np.int64)
         return cells * UNITS_PER_CELL
 
-    def to_lattice(self, xy: ArrayLike) -> NDArray[np.int64]:
+    def to_lattice(self, xy: ArrayLike) -> I64:
         """Return positions (…, 2) [m] as the nearest lattice points, int64 of the same shape."""
         units = np.rint(np.asarray(xy, dtype=np.float64) * self.units_per_m)
         return units.astype(np.int64) - self._origin_units
@@ -136,12 +137,12 @@ class Lattice:
         units, (x0, y0) = self.units_per_m, self._origin_point
         return (x + x0) / units, (y + y0) / units
 
-    def to_walls(self, xy: ArrayLike) -> NDArray[np.int64]:
+    def to_walls(self, xy: ArrayLike) -> I64:
         """Return positions (…, 2) [m] as the nearest even lattice points, where walls may stand."""
         halves = np.rint(np.asarray(xy, dtype=np.float64) * self.units_per_m / 2)
         return 2 * halves.astype(np.int64) - self._origin_units
 
-    def to_metres(self, xy: ArrayLike) -> NDArray[np.float64]:
+    def to_metres(self, xy: ArrayLike) -> F64:
         """Return lattice points (…, 2) in metres, float64 of the same shape."""
         return (np.asarray(xy) + self._origin_units) / self.units_per_m
 
@@ -154,7 +155,7 @@ class Lattice:
         half = UNITS_PER_CELL // 2 + 1
         return UNITS_PER_CELL * column + half, UNITS_PER_CELL * row + half
 
-    def centre_axes(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    def centre_axes(self) -> tuple[I64, I64]:
         """Return the x (columns,) and the y (rows,) of the cell centres, lattice units."""
         half = UNITS_PER_CELL // 2 + 1
         return (

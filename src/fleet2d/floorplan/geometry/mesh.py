@@ -4,19 +4,17 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 import shapely
 from shapely.geometry import MultiPolygon, Polygon
 
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.geometry.lattice import COORDINATE_LIMIT
+from fleet2d.kernels import I32, I64
 from fleet2d.kernels.mesh import SUB, WALL, Mesh
 from fleet2d.sums import sum_in_order
 
 GRID = 2
 """Walls lie on even lattice units; cell centres are odd, so no straight wall hits one."""
-
-Int64 = npt.NDArray[np.int64]
 
 
 class SnappedPolygon(NamedTuple):
@@ -90,7 +88,7 @@ def build_mesh(
     return mesh
 
 
-def _rings(polygons: Sequence[Polygon], width: int, height: int) -> list[list[Int64]]:
+def _rings(polygons: Sequence[Polygon], width: int, height: int) -> list[list[I64]]:
     """Return each polygon as open rings, outer first: int64 (n, 2), free space on the left."""
     if not polygons or any(polygon.area <= 0 for polygon in polygons):
         raise FloorPlanError(
@@ -126,18 +124,18 @@ def _rings(polygons: Sequence[Polygon], width: int, height: int) -> list[list[In
     return _drop_flat_vertices(rings)
 
 
-def _keys(points: Int64) -> Int64:
+def _keys(points: I64) -> I64:
     """Return one number per point that sorts like (x, y)."""
     return points[..., 0] * (2 * COORDINATE_LIMIT) + points[..., 1]
 
 
-def _drop_flat_vertices(polygons: list[list[Int64]]) -> list[list[Int64]]:
+def _drop_flat_vertices(polygons: list[list[I64]]) -> list[list[I64]]:
     """Drop vertices in the middle of a straight wall, except where rings touch."""
     everywhere = np.concatenate([_keys(ring) for rings in polygons for ring in rings])
     keys, counts = np.unique(everywhere, return_counts=True)
     touching = keys[counts > 1]
 
-    def straighten(ring: Int64) -> Int64:
+    def straighten(ring: I64) -> I64:
         before, after = np.roll(ring, 1, axis=0) - ring, np.roll(ring, -1, axis=0) - ring
         bends = before[:, 0] * after[:, 1] != before[:, 1] * after[:, 0]
         return ring[bends | np.isin(_keys(ring), touching)]
@@ -145,18 +143,18 @@ def _drop_flat_vertices(polygons: list[list[Int64]]) -> list[list[Int64]]:
     return [[straighten(ring) for ring in rings] for rings in polygons]
 
 
-def _split_at_touching_vertices(polygons: list[list[Int64]]) -> list[list[Int64]]:
+def _split_at_touching_vertices(polygons: list[list[I64]]) -> list[list[I64]]:
     """Insert every vertex that lies in the middle of a wall into that wall."""
     return _split_at(
         polygons, np.unique(np.concatenate([r for rings in polygons for r in rings]), axis=0)
     )
 
 
-def _split_at(polygons: list[list[Int64]], vertices: Int64) -> list[list[Int64]]:
+def _split_at(polygons: list[list[I64]], vertices: I64) -> list[list[I64]]:
     """Insert each of some points that lies in the middle of a wall into that wall."""
     tree = shapely.STRtree(np.asarray(shapely.points(vertices)))
 
-    def split(ring: Int64) -> Int64:
+    def split(ring: I64) -> I64:
         ends = np.roll(ring, -1, axis=0)
         boxes = shapely.box(*np.minimum(ring, ends).T, *np.maximum(ring, ends).T)
         wall, near = tree.query(np.asarray(boxes))
@@ -171,7 +169,7 @@ def _split_at(polygons: list[list[Int64]], vertices: Int64) -> list[list[Int64]]
     return [[split(ring) for ring in rings] for rings in polygons]
 
 
-def _build(polygons: list[list[Int64]]) -> Mesh | None:
+def _build(polygons: list[list[I64]]) -> Mesh | None:
     """Return the mesh, or None when the triangles don't fill just the space between the rings."""
     rings = [ring for rings in polygons for ring in rings]
     wall_starts = np.concatenate(rings)
@@ -194,28 +192,28 @@ def _build(polygons: list[list[Int64]]) -> Mesh | None:
     return Mesh(vertices, triangles.astype(np.int32), neighbors)
 
 
-def _triangulate(polygons: list[list[Int64]]) -> Int64:
+def _triangulate(polygons: list[list[I64]]) -> I64:
     """Return triangles that fill the polygons: int64 (t, 3, 2), counter-clockwise corners."""
     shapes = [Polygon(rings[0], rings[1:]) for rings in polygons]
     filled = shapely.get_parts(shapely.constrained_delaunay_triangles(shapes))
     exact = shapely.get_coordinates(filled).reshape(len(filled), 4, 2)[:, :3]
-    corners: Int64 = exact.astype(np.int64)
+    corners: I64 = exact.astype(np.int64)
     areas = _doubled_areas(corners)
     corners[areas < 0] = corners[areas < 0][:, ::-1]
     return corners[areas != 0]
 
 
-def _cross_products(starts: Int64, ends: Int64) -> Int64:
+def _cross_products(starts: I64, ends: I64) -> I64:
     """Return the cross products of points; over a closed ring they add up to twice its area."""
     return starts[:, 0] * ends[:, 1] - starts[:, 1] * ends[:, 0]
 
 
-def _doubled_areas(corners: Int64) -> Int64:
+def _doubled_areas(corners: I64) -> I64:
     """Return twice the signed area of each triangle; `corners` is int64 (t, 3, 2)."""
     return _cross_products(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
 
 
-def _neighbors(triangles: Int64, vertex_count: int, walls: Int64) -> npt.NDArray[np.int32] | None:
+def _neighbors(triangles: I64, vertex_count: int, walls: I64) -> I32 | None:
     """Return the triangle across each edge.
 
     Args:

@@ -6,7 +6,6 @@ from typing import Literal
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
 from fleet2d.errors import FloorPlanError
@@ -17,6 +16,7 @@ from fleet2d.floorplan.objects import PlacedObject, Point
 from fleet2d.floorplan.plan import FloorPlan, Room
 from fleet2d.floorplan.rooms.regions import LabelledRegion
 from fleet2d.floorplan.rooms.vocabulary import UNKNOWN
+from fleet2d.kernels import Bool
 from fleet2d.sums import sum_in_order
 
 Severity = Literal["unlivable", "wrong", "odd"]
@@ -310,7 +310,7 @@ def main_part(plan: FloorPlan, space: Space) -> int | None:
 
 
 def _closed_room(
-    room: Room, body: str, empty: Space | None, space: Space, in_room: NDArray[np.bool_]
+    room: Room, body: str, empty: Space | None, space: Space, in_room: Bool
 ) -> Finding:
     severity: Severity = "wrong" if room.area_m2 >= TINY_ROOM_M2 else "odd"
     size = f"{room.name} ({room.area_m2:.1f} m2)"
@@ -323,9 +323,7 @@ def _closed_room(
     return Finding("room", severity, text, room.anchor_xy)
 
 
-def _corner(
-    plan: FloorPlan, room: Room, lost: NDArray[np.bool_], body: str, empty: Space | None
-) -> Finding:
+def _corner(plan: FloorPlan, room: Room, lost: Bool, body: str, empty: Space | None) -> Finding:
     rows, columns = np.nonzero(lost)
     nearest = int(np.argmin((rows - rows.mean()) ** 2 + (columns - columns.mean()) ** 2))
     cell = plan.lattice.cell_centre(int(rows[nearest]), int(columns[nearest]))

@@ -12,14 +12,12 @@ from fleet2d.component import Settings
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.home.space import Space
 from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.kernels import I32, I64, Bool
 from fleet2d.kernels.fields import MOST_COST, cost_distance, descend, squared_distance
 from fleet2d.kernels.masks import label_parts
 from fleet2d.kernels.mesh import CELL_CENTRE, SUB
 from fleet2d.kernels.taut import pull_taut
 from fleet2d.units import Length
-
-I64 = NDArray[np.int64]
-I32 = NDArray[np.int32]
 
 CLOSED = -1
 
@@ -68,7 +66,7 @@ def costs_of(
     return np.minimum(costs, MOST_COST).astype(np.int32)
 
 
-def cells_within(plan: FloorPlan, areas: tuple[shapely.Polygon, ...]) -> NDArray[np.bool_]:
+def cells_within(plan: FloorPlan, areas: tuple[shapely.Polygon, ...]) -> Bool:
     """Return the cells whose centre is in one of the areas [m]: bool (rows, columns)."""
     mask = np.zeros(plan.free.shape, np.bool_)
     if areas:
@@ -214,7 +212,7 @@ def route_by_cost(
 
 def closed_cells_around(
     space: Space, cost: NDArray[np.signedinteger], at: tuple[int, int]
-) -> NDArray[np.bool_] | None:
+) -> Bool | None:
     """Return the closed cells around a place, bool (rows, columns); None for an open place."""
     closed = (space.part_of_cell >= 0) & (cost < 0)
     row, column = at[1] // SUB, at[0] // SUB
@@ -224,9 +222,7 @@ def closed_cells_around(
     return part == part[row, column]
 
 
-def _nearest(
-    space: Space, is_open: NDArray[np.bool_], at: tuple[int, int]
-) -> tuple[int, int] | None:
+def _nearest(space: Space, is_open: Bool, at: tuple[int, int]) -> tuple[int, int] | None:
     """Return the (row, column) of the open cell nearest to a point; ties: lowest row, column."""
     row, column = at[1] // SUB, at[0] // SUB
     if is_open[row, column]:

@@ -7,7 +7,6 @@ from typing import Any, Self, TypeVar
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 from shapely import Polygon
 
 from fleet2d.errors import FloorPlanError, PlacementError
@@ -23,6 +22,7 @@ from fleet2d.floorplan.plan import FloorPlan, Room
 from fleet2d.floorplan.rooms.adjacency import doorway_segments
 from fleet2d.floorplan.rooms.doorways import Doorway
 from fleet2d.floorplan.rooms.vocabulary import room_type
+from fleet2d.kernels import I32
 from fleet2d.kernels.mesh import Mesh
 
 # Types of rooms through which people leave a home without an entrance, the likeliest first.
@@ -72,7 +72,7 @@ class Home:
         self._places: tuple[int, dict[tuple[int, int], tuple[int, int]]] = (-1, {})
         # The layer `costmap` at its last use, the number of its changes, and the spaces of bodies
         # that pay its costs.
-        self._costs: NDArray[np.int32] = np.zeros((0, 0), np.int32)
+        self._costs: I32 = np.zeros((0, 0), np.int32)
         self._costs_version = 0
         self._costed: dict[Space, CostedSpace] = {}
 

@@ -15,6 +15,7 @@ from fleet2d.floorplan.cache import read_only
 from fleet2d.floorplan.geometry.gates import Segment
 from fleet2d.floorplan.geometry.mesh import build_mesh, snap_polygon
 from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.kernels import F64, I32, I64
 from fleet2d.kernels.fields import walking_distance
 from fleet2d.kernels.mesh import (
     SUB,
@@ -33,8 +34,6 @@ ROUNDING = 3
 ESCAPE_ATTEMPTS = 200
 # Number of results that a space caches of each of its searches.
 CACHED_ROUTES = 4096
-
-I64 = NDArray[np.int64]
 
 
 class Space:
@@ -176,7 +175,7 @@ class Space:
         route = None if inside is None else self.routes.find(*inside, *goal)
         return None if route is None else read_only(np.concatenate([[start], route]))
 
-    def distance_field(self, places: I64) -> NDArray[np.float64]:
+    def distance_field(self, places: I64) -> F64:
         """Return the walking distance of each cell from the nearest of some places.
 
         Args:
@@ -188,7 +187,7 @@ class Space:
         """
         return self._metres(self._steps(places))
 
-    def distances(self, place: tuple[int, int], points: I64) -> NDArray[np.float64]:
+    def distances(self, place: tuple[int, int], points: I64) -> F64:
         """Return the walking distances of points from a place, as `distance_field` measures them.
 
         Args:
@@ -201,11 +200,11 @@ class Space:
         steps = self._steps(np.array([place], np.int64))
         return self._metres(steps[points[:, 1] // SUB, points[:, 0] // SUB])
 
-    def _steps(self, places: I64) -> NDArray[np.int32]:
+    def _steps(self, places: I64) -> I32:
         cells = np.asarray(places, np.int64).reshape(-1, 2)[:, ::-1] // SUB
         return walking_distance(self.part_of_cell >= 0, np.ascontiguousarray(cells))
 
-    def _metres(self, steps: NDArray[np.int32]) -> NDArray[np.float64]:
+    def _metres(self, steps: I32) -> F64:
         return np.where(steps >= 0, steps * (self.plan.lattice.cell / 5), np.inf)
 
     def _way_in(self, x: int, y: int) -> tuple[int, int] | None:
@@ -286,7 +285,7 @@ def _octagon(radius: float) -> I64:
     return np.array([(a, b), (b, a), (-b, a), (-a, b), (-a, -b), (-b, -a), (b, -a), (a, -b)])
 
 
-def grow_shape(corners: NDArray[np.float64], radius: float) -> BaseGeometry:
+def grow_shape(corners: F64, radius: float) -> BaseGeometry:
     """Grow a line, or the inside of a ring [lattice], by the octagon of a body.
 
     Args:
@@ -298,7 +297,7 @@ def grow_shape(corners: NDArray[np.float64], radius: float) -> BaseGeometry:
     return shapely.union_all([*walls, *solid])
 
 
-def _grow_walls(ring: NDArray[np.float64], octagon: I64) -> NDArray[np.object_]:
+def _grow_walls(ring: F64, octagon: I64) -> NDArray[np.object_]:
     """Grow every wall of a ring by the octagon; return convex polygons."""
     ends = np.concatenate([ring[:-1, None] + octagon, ring[1:, None] + octagon], axis=1)
     return np.asarray(shapely.convex_hull(shapely.multipoints(ends)))
@@ -309,6 +308,6 @@ def _even_at_least(value: float) -> int:
 
 
 @lru_cache(CACHED_ROUTES)
-def straight_way(begin: tuple[int, int], end: tuple[int, int]) -> NDArray[np.int64]:
+def straight_way(begin: tuple[int, int], end: tuple[int, int]) -> I64:
     """Return the straight route, int64 (2, 2), read-only as those of `Space.route` are."""
     return read_only(np.array([begin, end], np.int64))

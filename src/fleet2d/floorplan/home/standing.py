@@ -5,13 +5,13 @@ from dataclasses import replace
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 from shapely import LineString, Point, Polygon
 
 from fleet2d.floorplan.geometry.lattice import UNITS_PER_CELL, Lattice
 from fleet2d.floorplan.home.space import Space
 from fleet2d.floorplan.objects import PlacedObject, UsePlace
 from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.kernels import I64, Bool
 from fleet2d.kernels.mesh import locate, strictly_inside
 from fleet2d.kernels.sight import line_of_sight
 
@@ -33,7 +33,7 @@ Window = tuple[slice, slice]
 
 def standing_cells(
     plan: FloorPlan, radius: float, objects: Iterable[PlacedObject] | None = None
-) -> NDArray[np.bool_]:
+) -> Bool:
     """Return the cells where the middle of a body can be, bool (rows, columns).
 
     A cell beside furniture counts only if the body can be at every point of it, so that a body can
@@ -55,9 +55,7 @@ def standing_cells(
     return cells
 
 
-def grown_cells(
-    lattice: Lattice, footprint: Polygon, radius: float
-) -> tuple[Window, NDArray[np.bool_]]:
+def grown_cells(lattice: Lattice, footprint: Polygon, radius: float) -> tuple[Window, Bool]:
     """Return the cells on which a body of a radius [m] would touch a footprint [m].
 
     Returns:
@@ -87,7 +85,7 @@ def grown_cells(
 def with_approaches(
     plan: FloorPlan,
     thing: PlacedObject,
-    standing: NDArray[np.bool_],
+    standing: Bool,
     others: Iterable[PlacedObject] = (),
 ) -> PlacedObject:
     """Return an object with only those places of use that a body can get to.
@@ -127,7 +125,7 @@ def with_approaches(
 def nearest_standing(
     plan: FloorPlan,
     use: UsePlace,
-    standing: NDArray[np.bool_],
+    standing: Bool,
     reach: float,
     obstacles: Sequence[Polygon] = (),
 ) -> tuple[int, int] | None:
@@ -163,7 +161,7 @@ def nearest_standing(
     return None
 
 
-def _window(lattice: Lattice, points: NDArray[np.int64]) -> Window:
+def _window(lattice: Lattice, points: I64) -> Window:
     """Return the rows and columns of the cells around lattice points (n, 2)."""
     (x0, y0), (x1, y1) = points.min(axis=0) // UNITS_PER_CELL, points.max(axis=0) // UNITS_PER_CELL
     rows = slice(*np.clip((y0, y1 + 1), 0, lattice.rows).tolist())

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fleet2d.floorplan.geometry.gates import Segment
 from fleet2d.floorplan.geometry.lattice import UNITS_PER_CELL, Lattice
 from fleet2d.floorplan.rooms.doorways import Doorway
+from fleet2d.kernels import I16, I64, Bool
 
 _CENTRE = UNITS_PER_CELL // 2 + 1
 
@@ -35,7 +35,7 @@ class RoomLink:
 
 
 def room_links(
-    lattice: Lattice, room_of_cell: NDArray[np.int16], doorways: Sequence[Doorway]
+    lattice: Lattice, room_of_cell: I16, doorways: Sequence[Doorway]
 ) -> tuple[RoomLink, ...]:
     """Return the links between rooms: doorways by index, then open borders by rooms."""
     doors = [
@@ -57,7 +57,7 @@ def doorway_segments(lattice: Lattice, doorways: Sequence[Doorway]) -> list[Segm
 
 
 def open_borders(
-    lattice: Lattice, room_of_cell: NDArray[np.int16], passages: Sequence[Segment]
+    lattice: Lattice, room_of_cell: I16, passages: Sequence[Segment]
 ) -> tuple[RoomLink, ...]:
     """Return the borders of rooms without a wall, except in passages.
 
@@ -85,7 +85,7 @@ def open_borders(
     )
 
 
-def _border(rooms: NDArray[np.int16], axis: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _border(rooms: I16, axis: int) -> tuple[I64, I64]:
     """Return the (row, column) of cells whose successor has another room, and both rooms."""
     before, after = (rooms[:-1], rooms[1:]) if axis == 0 else (rooms[:, :-1], rooms[:, 1:])
     differ = (before != after) & (before >= 0) & (after >= 0)
@@ -93,16 +93,12 @@ def _border(rooms: NDArray[np.int16], axis: int) -> tuple[NDArray[np.int64], NDA
     return np.argwhere(differ), pairs
 
 
-def _crosses(
-    first: NDArray[np.int64], step: NDArray[np.int64], passage: Segment
-) -> NDArray[np.bool_]:
+def _crosses(first: I64, step: I64, passage: Segment) -> Bool:
     """Return which steps from cell centres meet a passage."""
     start = np.array(passage[0])
     along = np.array(passage[1]) - start
 
-    def side(
-        origin: NDArray[np.int64], direction: NDArray[np.int64], point: NDArray[np.int64]
-    ) -> NDArray[np.int64]:
+    def side(origin: I64, direction: I64, point: I64) -> I64:
         gap = point - origin
         return np.sign(direction[..., 0] * gap[..., 1] - direction[..., 1] * gap[..., 0])
 

@@ -4,19 +4,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from shapely import Polygon
 
 from fleet2d.floorplan.geometry.gates import Gates, Segment
 from fleet2d.floorplan.geometry.lattice import Lattice
 from fleet2d.floorplan.geometry.mesh import build_mesh
+from fleet2d.kernels import F64, I32, I64, Bool
 from fleet2d.kernels.chambers import spread_labels
 from fleet2d.kernels.mesh import WALL, Mesh, label_triangles, rasterize_cells
 
 MIN_CHAMBER_M2 = 0.8
 """Least area of a chamber; smaller ones, such as space in a thick wall, are joined to others."""
-
-I32 = NDArray[np.int32]
 
 
 @dataclass(frozen=True)
@@ -51,7 +49,7 @@ def cut_chambers(
     lattice: Lattice,
     polygons: Sequence[Polygon],
     mesh: Mesh,
-    free: NDArray[np.bool_],
+    free: Bool,
     segments: Sequence[Segment],
     min_area_m2: float = MIN_CHAMBER_M2,
 ) -> Chambers:
@@ -101,7 +99,7 @@ def _sides(
     return [(min(parts), max(parts)) for parts in parts_beside]
 
 
-def _areas(mesh: Mesh, part: I32) -> NDArray[np.float64]:
+def _areas(mesh: Mesh, part: I32) -> F64:
     """Return the area of each part, square lattice units."""
     a, b, c = (mesh.vertices[mesh.triangles[:, k]] for k in range(3))
     doubled = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
@@ -111,11 +109,11 @@ def _areas(mesh: Mesh, part: I32) -> NDArray[np.float64]:
 
 
 def _join_small(
-    areas: NDArray[np.float64],
+    areas: F64,
     sides: Sequence[tuple[int, int]],
     lengths: Sequence[int],
     min_area_m2: float,
-) -> NDArray[np.int64]:
+) -> I64:
     """Join small parts to others; return for each part the lowest part of its chamber."""
     owner = np.arange(len(areas))
     total = areas.copy()
@@ -137,8 +135,8 @@ def _join_small(
 
 def _number_chambers(
     chamber: I32,
-    free: NDArray[np.bool_],
-    joined: NDArray[np.int64],
+    free: Bool,
+    joined: I64,
     sides: Sequence[tuple[int, int]],
 ) -> Chambers:
     """Return the chambers numbered by their first cells, row by row."""

@@ -6,7 +6,6 @@ from typing import Literal
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 from shapely import Polygon
 
 from fleet2d.floorplan.geometry.gates import Segment
@@ -20,6 +19,7 @@ from fleet2d.floorplan.rooms.labelling import label_chambers
 from fleet2d.floorplan.rooms.regions import LabelledRegion, Region, cells_in, snap_regions
 from fleet2d.floorplan.rooms.room import NO_ROOM, Room, assign_rooms, dropped_note, make_rooms
 from fleet2d.floorplan.rooms.segmentation import segment_rooms
+from fleet2d.kernels import I16, I64, Bool
 from fleet2d.kernels.mesh import Mesh
 
 RegionKind = Literal["exact", "boxes", "none"]
@@ -106,11 +106,11 @@ def divide(
     lattice: Lattice,
     polygons: Sequence[Polygon],
     mesh: Mesh,
-    free: NDArray[np.bool_],
+    free: Bool,
     regions: Sequence[LabelledRegion],
     kind: RegionKind,
     passages: Passages | None,
-) -> tuple[NDArray[np.int16], tuple[Room, ...], list[str]]:
+) -> tuple[I16, tuple[Room, ...], list[str]]:
     """Divide the free cells among rooms; see `assign_rooms`, `label_rooms`, `segment_rooms`."""
     if kind == "exact" or passages is None:
         return assign_rooms(lattice, free, regions)
@@ -123,7 +123,7 @@ def divide(
 def select_doorways(
     lattice: Lattice,
     polygons: Sequence[Polygon],
-    room_of_cell: NDArray[np.int16],
+    room_of_cell: I16,
     passages: Passages,
 ) -> list[tuple[DoorLine, Segment]]:
     """Return the passages that are doorways: narrow, and between two different rooms."""
@@ -149,11 +149,11 @@ def _line(lattice: Lattice, segment: Segment) -> DoorLine:
 
 def label_rooms(
     lattice: Lattice,
-    free: NDArray[np.bool_],
+    free: Bool,
     regions: Sequence[LabelledRegion],
     chambers: Chambers,
     passages: Passages,
-) -> tuple[NDArray[np.int16], tuple[Room, ...], list[str]]:
+) -> tuple[I16, tuple[Room, ...], list[str]]:
     """Divide the free cells among rooms that walls bound, and that rough boxes label.
 
     See `label_chambers` for how boxes and chambers are matched. Space that no box claims becomes
@@ -214,9 +214,7 @@ def _merge_labels(regions: list[Region], into: Mapping[int, int]) -> list[str]:
     return notes
 
 
-def number_rooms(
-    lattice: Lattice, room_of_cell: NDArray[np.int64]
-) -> tuple[NDArray[np.int16], tuple[Room, ...], list[str]]:
+def number_rooms(lattice: Lattice, room_of_cell: I64) -> tuple[I16, tuple[Room, ...], list[str]]:
     """Return rooms without labels: `room_0` and so on, or `unknown_0` for a single one.
 
     Args:
@@ -232,9 +230,7 @@ def number_rooms(
     return (*make_rooms(lattice, room_of_cell, regions), [])
 
 
-def _neighbors(
-    lattice: Lattice, painted: NDArray[np.int64], passages: Sequence[Segment]
-) -> dict[int, set[int]]:
+def _neighbors(lattice: Lattice, painted: I64, passages: Sequence[Segment]) -> dict[int, set[int]]:
     """Return for each region the regions that it is linked to."""
     rooms = painted.astype(np.int16)
     pairs = [link.rooms for link in open_borders(lattice, rooms, ())]

@@ -15,11 +15,10 @@ from numpy.typing import NDArray
 from shapely import Polygon
 
 from fleet2d.floorplan.geometry.gates import Segment
+from fleet2d.kernels import F64, I64, Bool
 from fleet2d.kernels.chambers import pairs_in_sight
 from fleet2d.kernels.mesh import Mesh
 
-I64 = NDArray[np.int64]
-F64 = NDArray[np.float64]
 Corners = NDArray[np.intp]
 
 MIN_DOOR_M, MAX_DOOR_M = 0.5, 1.4
@@ -64,7 +63,7 @@ class _Walls:
     start: F64
     end: F64
     before: F64
-    reflex: NDArray[np.bool_]
+    reflex: Bool
 
 
 def find_passages(
@@ -159,7 +158,7 @@ def _around(points: F64, units_per_m: float) -> NDArray[np.object_]:
     return np.asarray(shapely.box(*(points - reach).T, *(points + reach).T))
 
 
-def _ends_well(walls: _Walls, corner: NDArray[np.intp], other: F64) -> NDArray[np.bool_]:
+def _ends_well(walls: _Walls, corner: NDArray[np.intp], other: F64) -> Bool:
     """Return which lines to other points get no shorter if their end moves off the corner."""
     is_shortest = np.ones(len(corner), np.bool_)
     line = other - walls.start[corner]
@@ -195,16 +194,16 @@ def _shortest_first(lines: I64) -> I64:
     return ordered[is_short]
 
 
-def _all_free(mesh: Mesh, lines: I64) -> NDArray[np.bool_]:
+def _all_free(mesh: Mesh, lines: I64) -> Bool:
     """Return which lines cross only free space."""
     middle = (lines[:, :2] + lines[:, 2:]) // 2
     half = np.rint((lines[:, 2:] - lines[:, :2]) * (VISIBLE_SHARE / 2)).astype(np.int64)
-    free: NDArray[np.bool_] = pairs_in_sight(mesh, middle, middle + half)
+    free: Bool = pairs_in_sight(mesh, middle, middle + half)
     free &= pairs_in_sight(mesh, middle, middle - half)
     return free
 
 
-def _opens(mesh: Mesh, lines: I64, side: int, units_per_m: float) -> NDArray[np.bool_]:
+def _opens(mesh: Mesh, lines: I64, side: int, units_per_m: float) -> Bool:
     """Return which lines have wider space behind them on a side (1: left, -1: right)."""
     span = (lines[:, 2:] - lines[:, :2]).astype(np.float64)
     length = np.sqrt((span * span).sum(axis=1))
@@ -233,7 +232,7 @@ def _opens(mesh: Mesh, lines: I64, side: int, units_per_m: float) -> NDArray[np.
     return opens
 
 
-def _in_a_wall(mesh: Mesh, walls: _Walls, lines: I64, units_per_m: float) -> NDArray[np.bool_]:
+def _in_a_wall(mesh: Mesh, walls: _Walls, lines: I64, units_per_m: float) -> Bool:
     """Return which lines are no wider than a door, or continue in a wall at both ends."""
     span = (lines[:, 2:] - lines[:, :2]).astype(np.float64)
     length = np.sqrt((span * span).sum(axis=1))

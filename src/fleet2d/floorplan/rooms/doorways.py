@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 from shapely import LineString, Polygon
 
 from fleet2d.floorplan.geometry.gates import Segment
 from fleet2d.floorplan.geometry.lattice import Lattice
 from fleet2d.floorplan.objects import Point
+from fleet2d.kernels import F64, I16
 
 # How far beyond the end of a door line its wall may be [m].
 REACH_M = 0.3
@@ -110,7 +110,7 @@ def fit_lines(
 
 def name_doorways(
     lattice: Lattice,
-    room_of_place: NDArray[np.int16],
+    room_of_place: I16,
     room_names: Sequence[str],
     fitted: Sequence[tuple[DoorLine, Segment]],
 ) -> tuple[Doorway, ...]:
@@ -137,9 +137,7 @@ def name_doorways(
     return tuple(doorways)
 
 
-def _fit(
-    walls: list[Polygon], ends: NDArray[np.float64], reach: float
-) -> tuple[list[Polygon], LineString] | None:
+def _fit(walls: list[Polygon], ends: F64, reach: float) -> tuple[list[Polygon], LineString] | None:
     """Return the walls and the line from wall to wall, or None where there is no such line."""
     middle, along = ends.mean(axis=0), ends[1] - ends[0]
     length = float(np.sqrt(along @ along))
@@ -163,9 +161,7 @@ def _fit(
     return changed, line
 
 
-def _jamb(
-    polygon: Polygon, start: NDArray[np.float64], end: NDArray[np.float64]
-) -> tuple[int, int] | None:
+def _jamb(polygon: Polygon, start: F64, end: F64) -> tuple[int, int] | None:
     """Return the even lattice point where the way from `start` to `end` first meets a wall."""
     hits = shapely.get_coordinates(shapely.intersection(polygon.boundary, LineString([start, end])))
     if len(hits) == 0:
@@ -180,7 +176,7 @@ def _jamb(
     return int(x), int(y)
 
 
-def _with_corner(polygon: Polygon, point: NDArray[np.float64]) -> Polygon:
+def _with_corner(polygon: Polygon, point: F64) -> Polygon:
     """Return the polygon with a corner at a point on or beside one of its walls.
 
     It is added even if the point is on the wall, since another corner might move that wall.
@@ -198,9 +194,7 @@ def _with_corner(polygon: Polygon, point: NDArray[np.float64]) -> Polygon:
     return Polygon(rings[0], rings[1:])
 
 
-def rooms_beside(
-    lattice: Lattice, room_of_place: NDArray[np.int16], segment: Segment
-) -> tuple[int, int]:
+def rooms_beside(lattice: Lattice, room_of_place: I16, segment: Segment) -> tuple[int, int]:
     """Return the rooms to the left and to the right of a segment, the nearest that differ."""
     (x0, y0), (x1, y1) = segment
     dx, dy = x1 - x0, y1 - y0

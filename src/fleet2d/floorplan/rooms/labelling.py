@@ -9,17 +9,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fleet2d.floorplan.rooms.chambers import Chambers
 from fleet2d.floorplan.rooms.regions import Patch
+from fleet2d.kernels import F64, I32, I64, Bool
 from fleet2d.kernels.chambers import label_frames, spread_labels
 from fleet2d.kernels.fields import squared_distance
 from fleet2d.kernels.masks import label_parts
-
-I32 = NDArray[np.int32]
-I64 = NDArray[np.int64]
-Mask = NDArray[np.bool_]
 
 MIN_OUTLINE_OVERLAP = 0.5
 """A box outlines a chamber if the intersection of box and chamber's frame is at least this share
@@ -147,7 +143,7 @@ def _too_small(box: Patch, cell: float) -> bool:
     return narrow or box.cells * cell**2 < MIN_ROOM_M2
 
 
-def _overlaps(frame: I64, frames: I64) -> NDArray[np.float64]:
+def _overlaps(frame: I64, frames: I64) -> F64:
     """Return the intersection of a frame with each of others, as a share of their union."""
     low, high = np.maximum(frame[:2], frames[:, :2]), np.minimum(frame[2:], frames[:, 2:])
     common = np.clip(high - low, 0, None).prod(axis=1)
@@ -192,7 +188,7 @@ def _window(frames: I64) -> tuple[slice, slice]:
     return slice(int(row), int(end_row)), slice(int(column), int(end_column))
 
 
-def _cells_in(box: Patch, window: tuple[slice, slice], inside: Mask) -> Mask:
+def _cells_in(box: Patch, window: tuple[slice, slice], inside: Bool) -> Bool:
     """Return the cells of a box inside a block, bool (rows, columns) of the block's window."""
     common = [
         (max(a.start, b.start), max(min(a.stop, b.stop), a.start, b.start))
@@ -210,7 +206,7 @@ def _cells_in(box: Patch, window: tuple[slice, slice], inside: Mask) -> Mask:
     return cells & inside
 
 
-def _fill(labels: I32, inside: Mask, cell: float, next_room: int) -> tuple[I32, int]:
+def _fill(labels: I32, inside: Bool, cell: float, next_room: int) -> tuple[I32, int]:
     """Give every cell of a block a room; return also the number of the next room without a box."""
     boxes = np.flatnonzero(np.bincount(labels[labels >= 0]))
     first_room = next_room
@@ -227,7 +223,7 @@ def _fill(labels: I32, inside: Mask, cell: float, next_room: int) -> tuple[I32, 
 
 
 def _keep_one_piece(
-    labels: I32, box: int, whole: Mask, cell: float, merged: dict[int, int], dropped: dict[int, str]
+    labels: I32, box: int, whole: Bool, cell: float, merged: dict[int, int], dropped: dict[int, str]
 ) -> None:
     """Leave a box its largest piece, or nothing if that is too small to be a room."""
     own = labels == box
@@ -247,7 +243,7 @@ def _keep_one_piece(
         dropped[box] = TOO_SMALL
 
 
-def _number_rests(labels: I32, inside: Mask, boxes: int, cell: float, next_room: int) -> int:
+def _number_rests(labels: I32, inside: Bool, boxes: int, cell: float, next_room: int) -> int:
     """Number the parts of a block that no box covers and that are large enough to be rooms."""
     rest = inside & (labels < 0)
     if boxes == 0:

@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 from shapely import LineString, MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
+from fleet2d.kernels import F64
+
 Place = tuple[float, float]
-Vector = NDArray[np.float64]
 
 TOUCH_M = 0.02
 """Outlines no further apart than this touch, as coordinates are rounded (degrees to 1 cm)."""
@@ -149,7 +150,7 @@ def _sides(area: MultiPolygon) -> NDArray[np.object_]:
     return np.asarray(shapely.linestrings(np.stack([starts, ends], axis=1)))
 
 
-def _walls_across(free: MultiPolygon, at: Vector, normal: Vector) -> list[tuple[float, float]]:
+def _walls_across(free: MultiPolygon, at: F64, normal: F64) -> list[tuple[float, float]]:
     """Return the walls on a line across a door, from and to [m]; infinite at the line's ends."""
     across = LineString([at - REACH_M * normal, at + REACH_M * normal])
     walls = []
@@ -165,7 +166,7 @@ def _walls_across(free: MultiPolygon, at: Vector, normal: Vector) -> list[tuple[
     return walls
 
 
-def _middle_lines(corners: Vector, along: Vector) -> list[tuple[Place, Place]]:
+def _middle_lines(corners: F64, along: F64) -> list[tuple[Place, Place]]:
     """Return the middle lines of an area along a direction and across it, the longer first."""
     middle_lines = []
     axes = (along, np.array([-along[1], along[0]]))
@@ -177,11 +178,11 @@ def _middle_lines(corners: Vector, along: Vector) -> list[tuple[Place, Place]]:
     return [line for _, line in sorted(middle_lines, key=lambda pair: -pair[0])]
 
 
-def _normal(start: Vector, end: Vector) -> Vector:
+def _normal(start: F64, end: F64) -> F64:
     along = end - start
     return np.array([-along[1], along[0]]) / np.sqrt(along @ along)
 
 
-def _ends(start: Vector, end: Vector) -> tuple[Place, Place]:
+def _ends(start: F64, end: F64) -> tuple[Place, Place]:
     (x0, y0), (x1, y1) = start.tolist(), end.tolist()
     return (x0, y0), (x1, y1)

@@ -5,16 +5,14 @@ from dataclasses import dataclass
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 from shapely import MultiPolygon, Polygon
 
 from fleet2d.floorplan.geometry.lattice import UNITS_PER_CELL, Lattice
 from fleet2d.floorplan.rooms.vocabulary import leading_type, room_type
+from fleet2d.kernels import I64, Bool
 
 NOT_FREE = -1
 TO_CENTRE = UNITS_PER_CELL // 2 + 1
-
-Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -71,7 +69,7 @@ class Patch:
     """
 
     window: tuple[slice, slice]
-    mask: Mask
+    mask: Bool
 
     @property
     def cells(self) -> int:
@@ -79,7 +77,7 @@ class Patch:
         return int(np.count_nonzero(self.mask))
 
     @property
-    def frame(self) -> NDArray[np.int64]:
+    def frame(self) -> I64:
         """The box around its cells: first row, first column, last row + 1, last column + 1."""
         rows, columns = (np.flatnonzero(self.mask.any(axis=axis)) for axis in (1, 0))
         first = np.array([self.window[0].start, self.window[1].start])
@@ -94,7 +92,7 @@ def snap_regions(lattice: Lattice, regions: Sequence[LabelledRegion]) -> list[Re
     return _merge_equal([_snap(lattice, region) for region in regions])
 
 
-def paint_regions(free: NDArray[np.bool_], regions: list[Region]) -> NDArray[np.int64]:
+def paint_regions(free: Bool, regions: list[Region]) -> I64:
     """Return the index of the region of each cell, int64 (rows, columns).
 
     The smallest region wins. Free cells outside all regions have `len(regions)`, others -1.
@@ -106,7 +104,7 @@ def paint_regions(free: NDArray[np.bool_], regions: list[Region]) -> NDArray[np.
     return painted
 
 
-def _paint_one(painted: NDArray[np.int64], shape: Polygon | MultiPolygon, value: int) -> None:
+def _paint_one(painted: I64, shape: Polygon | MultiPolygon, value: int) -> None:
     """Give `value` to the free cells whose centre lies inside `shape`."""
     if not shape.is_empty:
         window = _window(painted.shape, shape)
@@ -122,9 +120,7 @@ def _window(size: tuple[int, ...], shape: Polygon | MultiPolygon) -> tuple[slice
     return slice(row, end_row), slice(column, end_column)
 
 
-def _inside(
-    free: NDArray[np.bool_], window: tuple[slice, slice], shape: Polygon | MultiPolygon
-) -> NDArray[np.bool_]:
+def _inside(free: Bool, window: tuple[slice, slice], shape: Polygon | MultiPolygon) -> Bool:
     """Return which free cells of a window have their centre inside a shape."""
     inside = free.copy()
     if not shape.equals(shapely.box(*shape.bounds)):
@@ -136,7 +132,7 @@ def _inside(
     return inside
 
 
-def cells_in(free: NDArray[np.bool_], shape: Polygon | MultiPolygon) -> Patch:
+def cells_in(free: Bool, shape: Polygon | MultiPolygon) -> Patch:
     """Return the free cells inside a shape."""
     if shape.is_empty:
         return Patch((slice(0, 0), slice(0, 0)), np.zeros((0, 0), np.bool_))

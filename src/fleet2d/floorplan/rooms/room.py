@@ -5,7 +5,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from shapely import Polygon
 
 from fleet2d.errors import FloorPlanError
@@ -14,6 +13,7 @@ from fleet2d.floorplan.names import number_names
 from fleet2d.floorplan.rooms.adjacency import open_borders
 from fleet2d.floorplan.rooms.regions import LabelledRegion, Region, paint_regions, snap_regions
 from fleet2d.floorplan.rooms.vocabulary import UNKNOWN
+from fleet2d.kernels import I16, I64, Bool
 from fleet2d.kernels.chambers import label_frames
 from fleet2d.kernels.fields import squared_distance
 from fleet2d.kernels.masks import label_parts
@@ -49,8 +49,8 @@ class Room:
 
 
 def assign_rooms(
-    lattice: Lattice, free: NDArray[np.bool_], regions: Sequence[LabelledRegion]
-) -> tuple[NDArray[np.int16], tuple[Room, ...], list[str]]:
+    lattice: Lattice, free: Bool, regions: Sequence[LabelledRegion]
+) -> tuple[I16, tuple[Room, ...], list[str]]:
     """Divide the free cells among rooms.
 
     Where regions overlap the smaller one wins, of equal ones the first. Regions that are equal once
@@ -80,7 +80,7 @@ def assign_rooms(
     return room_of_cell, rooms, notes
 
 
-def _gap_notes(lattice: Lattice, painted: NDArray[np.int64], regions: int) -> list[str]:
+def _gap_notes(lattice: Lattice, painted: I64, regions: int) -> list[str]:
     """Return a sentence about small gaps between regions, such as doorways, if there are any.
 
     Args:
@@ -111,8 +111,8 @@ def _gap_notes(lattice: Lattice, painted: NDArray[np.int64], regions: int) -> li
 
 
 def make_rooms(
-    lattice: Lattice, painted: NDArray[np.int64], merged: Sequence[Region]
-) -> tuple[NDArray[np.int16], tuple[Room, ...]]:
+    lattice: Lattice, painted: I64, merged: Sequence[Region]
+) -> tuple[I16, tuple[Room, ...]]:
     """Return the rooms of the regions that have cells, and the room of each cell.
 
     Args:
@@ -141,8 +141,8 @@ def make_rooms(
 
 def _room(
     lattice: Lattice,
-    room_of_cell: NDArray[np.int16],
-    frame: NDArray[np.int64],
+    room_of_cell: I16,
+    frame: I64,
     index: int,
     name: str,
     region: Region,

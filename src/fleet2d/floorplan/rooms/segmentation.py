@@ -10,9 +10,9 @@ too small to be a room. The lines are those of `find_passages`.
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fleet2d.floorplan.rooms.chambers import Chambers
+from fleet2d.kernels import I64
 
 MIN_ROOM_M2 = 1.2
 """Least area of a room behind a doorway, such as a toilet."""
@@ -20,7 +20,7 @@ MIN_OPEN_ROOM_M2 = 4.0
 """Least area of a room behind an opening; a smaller space is an alcove."""
 
 
-def segment_rooms(chambers: Chambers, is_opening: Sequence[bool], cell: float) -> NDArray[np.int64]:
+def segment_rooms(chambers: Chambers, is_opening: Sequence[bool], cell: float) -> I64:
     """Join chambers into rooms.
 
     Args:

@@ -4,16 +4,13 @@ from datetime import timedelta
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fleet2d.algorithms.algorithm import Present
 from fleet2d.algorithms.history import History
 from fleet2d.algorithms.output import RoomDistribution
 from fleet2d.algorithms.presence.belief import BeliefSeries, Presence
 from fleet2d.errors import ComponentError
-
-F64 = NDArray[np.float64]
-I64 = NDArray[np.int64]
+from fleet2d.kernels import F64, I64
 
 
 def presence_of(name: str, state: Present) -> Presence | None:

@@ -5,12 +5,9 @@ the same on every machine.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fleet2d.algorithms.presence.logarithm import LN_2, natural_log
-from fleet2d.kernels import flows
-
-F64 = NDArray[np.float64]
+from fleet2d.kernels import F64, flows
 
 
 def total_variation(truth: F64, estimate: F64) -> F64:

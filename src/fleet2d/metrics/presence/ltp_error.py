@@ -5,7 +5,6 @@ from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from fleet2d.algorithms.algorithm import Present
@@ -14,6 +13,7 @@ from fleet2d.algorithms.presence.belief import ANYONE, Presence
 from fleet2d.clock import DAY_S
 from fleet2d.component import register
 from fleet2d.floorplan.home.home import Home
+from fleet2d.kernels import F64, I64
 from fleet2d.metrics.metric import Metric
 from fleet2d.metrics.presence.belief_reader import presence_of
 from fleet2d.metrics.presence.distances import (
@@ -31,9 +31,6 @@ from fleet2d.metrics.presence.occupancy import (
     walking_distances,
 )
 from fleet2d.units import PositiveDuration, Share
-
-F64 = NDArray[np.float64]
-I64 = NDArray[np.int64]
 
 MEAN = "mean"
 SHOWN = ("tv", "earth_mover_m", "inside", "burn_in_day")  # in the closing table

@@ -3,7 +3,6 @@
 from datetime import timedelta
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fleet2d.algorithms.algorithm import Present
 from fleet2d.algorithms.history import History
@@ -13,11 +12,9 @@ from fleet2d.clock import HOUR_US, midnight_of
 from fleet2d.floorplan.cache import read_only
 from fleet2d.floorplan.home.home import Home
 from fleet2d.floorplan.home.space import Space
+from fleet2d.kernels import F64, I64, Bool
 from fleet2d.kernels.mesh import SUB
 from fleet2d.units import micros
-
-I64 = NDArray[np.int64]
-F64 = NDArray[np.float64]
 
 # Clearance that a person needs to walk from room to room [m].
 RADIUS = 0.2
@@ -84,14 +81,14 @@ def hours_of_week(history: History, state: Present) -> I64:
     return (start_us + steps * round(history.step_s * 1e6)) // HOUR_US % HOURS
 
 
-def _anybody(history: History, state: Present) -> NDArray[np.bool_]:
+def _anybody(history: History, state: Present) -> Bool:
     """Return whether each room had somebody in it, last nobody at home: bool (steps, rooms + 1)."""
     change = np.zeros((len(history) + 1, len(state.home.rooms) + 1), np.int32)
     for user in state.users:
         begin, end, room = history.poses(user).visits
         np.add.at(change, (begin, room), 1)  # NOWHERE is -1: the last column
         np.add.at(change, (end, room), -1)
-    is_occupied: NDArray[np.bool_] = np.cumsum(change[:-1], axis=0) > 0
+    is_occupied: Bool = np.cumsum(change[:-1], axis=0) > 0
     is_occupied[:, -1] = ~is_occupied[:, :-1].any(axis=1)
     return is_occupied
 

@@ -5,7 +5,6 @@ from datetime import timedelta
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fleet2d.algorithms.algorithm import Present
 from fleet2d.algorithms.evidence import steps_of_bin
@@ -13,6 +12,7 @@ from fleet2d.algorithms.history import History
 from fleet2d.algorithms.observations import NOWHERE
 from fleet2d.component import register
 from fleet2d.floorplan.home.home import Home
+from fleet2d.kernels import F64, I64, Bool
 from fleet2d.metrics.metric import Metric
 from fleet2d.metrics.presence.belief_reader import BeliefReader
 from fleet2d.metrics.presence.scores import (
@@ -26,9 +26,6 @@ from fleet2d.metrics.presence.scores import (
     top_k,
 )
 from fleet2d.units import PositiveDuration
-
-F64 = NDArray[np.float64]
-I64 = NDArray[np.int64]
 
 # Upper ends of the classes of the gap since a user was last seen [min], and their names.
 GAP_ENDS = (1, 5, 15, 60, 240)
@@ -57,7 +54,7 @@ class ScoredBins(NamedTuple):
     belief: F64
     reference: F64
 
-    def of(self, which: NDArray[np.bool_]) -> "ScoredBins":
+    def of(self, which: Bool) -> "ScoredBins":
         """Return the bins of a mask."""
         gap, truth, last = self.gap[which], self.truth[which], self.last[which]
         return ScoredBins(gap, truth, last, self.belief[which], self.reference[which])

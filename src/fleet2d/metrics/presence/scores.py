@@ -6,10 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fleet2d.algorithms.presence.logarithm import natural_log
+from fleet2d.kernels import F64, I64
 from fleet2d.sums import sum_in_order
-
-F64 = NDArray[np.float64]
-I64 = NDArray[np.int64]
 
 LEAST = 1e-6  # smaller probabilities are raised to this before taking logarithms
 MASSES = 15  # number of groups of about equal size, by forecast probability

@@ -14,12 +14,11 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fleet2d.extras import extra
+from fleet2d.kernels import F64, I64
 from fleet2d.sums import sum_in_order
 
-F64 = NDArray[np.float64]
 LEVEL = 0.95
 RESAMPLES = 2000
 POWER_Z = 0.84  # standard normal quantile of a power of 80 %
@@ -140,7 +139,7 @@ def estimate(
     return MeanEstimate(mean, mean + float(low), mean + float(high), error, freedom, spread)
 
 
-def _codes(levels: Mapping[str, Sequence[Any]], count: int) -> dict[str, NDArray[np.int64]]:
+def _codes(levels: Mapping[str, Sequence[Any]], count: int) -> dict[str, I64]:
     """Return the number of the unit of each value, by level: int64 (values,).
 
     Levels with one unit are left out, as are levels with a unit for each value unless there is no
@@ -156,7 +155,7 @@ def _codes(levels: Mapping[str, Sequence[Any]], count: int) -> dict[str, NDArray
     return crossed or dict(list(codes.items())[-1:])
 
 
-def _analyse(data: F64, codes: Mapping[str, NDArray[np.int64]]) -> tuple[Spread, float, float]:
+def _analyse(data: F64, codes: Mapping[str, I64]) -> tuple[Spread, float, float]:
     """Return variance components, the variance of the mean, and its degrees of freedom."""
     count, units = len(data), {name: int(numbers.max()) + 1 for name, numbers in codes.items()}
     if len(codes) == 1:
@@ -183,11 +182,11 @@ def _analyse(data: F64, codes: Mapping[str, NDArray[np.int64]]) -> tuple[Spread,
     return Spread(units, components, residual, count), variance, freedom
 
 
-def _unit_means(data: F64, numbers: NDArray[np.int64]) -> F64:
+def _unit_means(data: F64, numbers: I64) -> F64:
     return np.bincount(numbers, data) / np.bincount(numbers)
 
 
-def _resampled_means(data: F64, codes: list[NDArray[np.int64]], resamples: int) -> F64:
+def _resampled_means(data: F64, codes: list[I64], resamples: int) -> F64:
     """Return the means of resamples: float64 (resamples,)."""
     generator = np.random.Generator(np.random.Philox(key=0))
     blocks: list[F64] = []

@@ -5,11 +5,11 @@ from collections.abc import Mapping
 from typing import Any, Literal, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import model_validator
 
 from fleet2d.component import Settings
 from fleet2d.extras import extra
+from fleet2d.kernels import F64
 from fleet2d.problems import problem
 
 Method = Literal["random", "latin_hypercube"]
@@ -83,7 +83,7 @@ def rounded(value: float, digits: int = DIGITS) -> float:
     return float(f"{value:.{digits}g}")
 
 
-def shares(method: Method, count: int, dimensions: int, seed: int) -> NDArray[np.float64]:
+def shares(method: Method, count: int, dimensions: int, seed: int) -> F64:
     """Return points of the unit cube: float64 (count, dimensions), the same at each call.
 
     Raises:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from fleet2d.floorplan.geometry.lattice import UNITS_PER_CELL
 from fleet2d.floorplan.objects import PlacedObject
 from fleet2d.floorplan.plan import FloorPlan, Room, rings
+from fleet2d.kernels import I16
 from fleet2d.kernels.mesh import Mesh
 from fleet2d.palette import deep_color, room_color
 from fleet2d.viewer.facts.contract import (
@@ -72,7 +73,7 @@ def walls_facts(mesh: Mesh) -> WallsFacts:
     )
 
 
-def runs_of(cells: NDArray[np.int16]) -> list[int]:
+def runs_of(cells: I16) -> list[int]:
     """Return cells as pairs (value, number of cells), row by row.
 
     >>> runs_of(np.array([[1, 1], [1, 2]], np.int16))

@@ -3,13 +3,12 @@
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fleet2d.kernels import I64, Bool
 from fleet2d.runs.categories import categories
 from fleet2d.runs.run import Run
 from fleet2d.viewer.facts.contract import SightingFacts
 
-I64 = NDArray[np.int64]
 JOIN_S = 6.0  # shorter gaps between sightings are no gaps in a lane
 
 
@@ -48,7 +47,7 @@ def sightings_of(run: Run) -> list[SightingFacts]:
     return lanes
 
 
-def _stretches(step: I64, false: NDArray[np.bool_], gap: int) -> tuple[I64, I64, Any]:
+def _stretches(step: I64, false: Bool, gap: int) -> tuple[I64, I64, Any]:
     """Return first and last step of each stretch without a gap, and whether it is of false ones."""
     order = np.argsort(step, kind="stable")
     step, false = step[order], false[order]

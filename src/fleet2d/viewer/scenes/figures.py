@@ -10,11 +10,11 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import PowerNorm
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from fleet2d.clock import midnight_of
 from fleet2d.errors import InputError
 from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.kernels import F64
 from fleet2d.palette import TEXT_COLOR
 from fleet2d.pictures.floorplan import (
     DPI,
@@ -172,7 +172,7 @@ def draw_heat(run: Run, names: list[str], axes: Axes) -> ScalarMappable:
     return colors
 
 
-def _hours_per_m2(run: Run, plan: FloorPlan, names: list[str]) -> NDArray[np.float64]:
+def _hours_per_m2(run: Run, plan: FloorPlan, names: list[str]) -> F64:
     step_us, steps = run.manifest["step_us"], run.manifest["steps"]
     interval = timedelta(microseconds=int(step_us * -(-steps // SAMPLES)))
     lattice = plan.lattice

@@ -15,10 +15,10 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.text import Text
-from numpy.typing import NDArray
 
 from fleet2d.errors import InputError
 from fleet2d.extras import extra
+from fleet2d.kernels import I64, U8
 from fleet2d.pictures.floorplan import drawing_style, figure_size
 from fleet2d.pictures.theme import apply_theme
 from fleet2d.runs.run import Run
@@ -31,8 +31,6 @@ HEIGHT_PX = 720
 HEIGHT_IN = 7.2
 # A GIF or WebP is written from pictures that are all in memory.
 MOST_PICTURES = 3_000
-
-Pixels = NDArray[np.uint8]
 
 
 def write_film(
@@ -77,7 +75,7 @@ def write_film(
     return len(moments)
 
 
-def _store(path: Path, frames: Iterator[tuple[int, Pixels]], total: int, rate: Fraction) -> None:
+def _store(path: Path, frames: Iterator[tuple[int, U8]], total: int, rate: Fraction) -> None:
     """Write a film under another name, and rename it when it is complete."""
     unfinished = path.with_name(f".{path.name}.unfinished{path.suffix}")
     write = _write_mp4 if path.suffix.lower() == ".mp4" else _write_pictures
@@ -118,9 +116,9 @@ def _figure(run: Run, height: int) -> Figure:
 def _frames(
     stage: Stage,
     first: int,
-    moments: NDArray[np.int64],
+    moments: I64,
     on_progress: Callable[[int, int], None] | None,
-) -> Iterator[tuple[int, Pixels]]:
+) -> Iterator[tuple[int, U8]]:
     """Yield the number and the pixels of each frame that differs from the one before."""
     canvas: Any = stage.figure.canvas
     for _, artist in (*stage.body_artists, *stage.clock_artists):
@@ -152,9 +150,7 @@ def _frames(
         yield moment, np.asarray(canvas.buffer_rgba())
 
 
-def _write_mp4(
-    path: Path, frames: Iterator[tuple[int, Pixels]], total: int, rate: Fraction
-) -> None:
+def _write_mp4(path: Path, frames: Iterator[tuple[int, U8]], total: int, rate: Fraction) -> None:
     with extra("film", "an MP4 film needs PyAV"):
         import av
     with av.open(str(path), "w", options={"movflags": "faststart"}) as container:
@@ -178,7 +174,7 @@ def _write_mp4(
 
 
 def _write_pictures(
-    path: Path, frames: Iterator[tuple[int, Pixels]], total: int, rate: Fraction
+    path: Path, frames: Iterator[tuple[int, U8]], total: int, rate: Fraction
 ) -> None:
     """Write a GIF or WebP, whose pictures have durations of their own."""
     from PIL import Image

@@ -13,8 +13,8 @@ from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 from matplotlib.patheffects import withStroke
-from numpy.typing import NDArray
 
+from fleet2d.kernels import F64, Bool
 from fleet2d.palette import ACCENT_COLOR, TEXT_COLOR, VIEW_COLOR, VIEW_EDGE
 from fleet2d.pictures.floorplan import floorplan_axes
 from fleet2d.pictures.life import RIM_COLOR, SightWalls, field_of_view
@@ -138,7 +138,7 @@ class Stage:
         self._away.set_text(f"away: {', '.join(away)}" if away else "")
         return self._scene != last_scene
 
-    def changes(self) -> NDArray[np.bool_]:
+    def changes(self) -> Bool:
         """Return whether each moment differs from the one before: bool (moments,)."""
         if not self.bodies:
             return np.ones(1, np.bool_)
@@ -236,7 +236,7 @@ class Stage:
 
     def _outlines(
         self, facts: BodyFacts, pose: tuple[float, float, float], sight: SightWalls, step: int
-    ) -> Iterator[NDArray[np.float64]]:
+    ) -> Iterator[F64]:
         x, y, heading = pose
         pans = self._pans(facts, step)
         for camera, pan in zip(facts["cameras"], pans, strict=True):
@@ -255,7 +255,7 @@ class Stage:
             for part in shapely.get_parts(region):
                 yield shapely.get_coordinates(part.exterior)
 
-    def _draw_paths(self, index: int) -> list[NDArray[np.float64]]:
+    def _draw_paths(self, index: int) -> list[F64]:
         """Draw the paths of the last minute; return them, each float64 (n, 2) [m]."""
         moments = max(1, TAIL // timedelta(microseconds=self._step_us * self.stride))
         span = slice(max(0, index - moments), index + 1)

@@ -8,6 +8,8 @@ from matplotlib.backends.backend_agg import RendererAgg
 from matplotlib.text import Text
 from numpy.typing import NDArray
 
+from fleet2d.kernels import U8
+
 _NUMBERS = re.compile(r"\d+|\D+")
 EDGE = 2  # pixels around a text for its antialiased rim
 
@@ -30,7 +32,7 @@ class TextStamps:
         self._stamps: dict[tuple[str, object, float], Stamp | None] = {}
         self._advances: dict[tuple[str, float], float] = {}
 
-    def paste(self, text: Text, pixels: NDArray[np.uint8]) -> None:
+    def paste(self, text: Text, pixels: U8) -> None:
         """Paste a text on a picture, at its position.
 
         Args:
@@ -50,7 +52,7 @@ class TextStamps:
             x += self._advance(text) if len(parts) > 1 else 0
         text.set_text(content)
 
-    def _paste_part(self, text: Text, x: float, y: float, pixels: NDArray[np.uint8]) -> None:
+    def _paste_part(self, text: Text, x: float, y: float, pixels: U8) -> None:
         key = (text.get_text(), text.get_color(), float(text.get_fontsize()))
         if key not in self._stamps:
             self._stamps[key] = self._stamp(text)

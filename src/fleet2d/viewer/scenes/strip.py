@@ -12,6 +12,7 @@ from matplotlib.colors import to_rgb
 from numpy.typing import NDArray
 
 from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.kernels import F64, I16
 from fleet2d.palette import TEXT_COLOR, deep_color
 from fleet2d.pictures.overlay import HATCH_COLOR, QUIET_COLOR
 from fleet2d.runs.run import Run
@@ -28,7 +29,7 @@ class StripRow(NamedTuple):
 
     name: str
     color: str
-    room: NDArray[np.int16]
+    room: I16
     time: NDArray[np.datetime64]
 
 
@@ -64,7 +65,7 @@ def draw_strip(
         names: Whether to write the names of rooms into long stretches.
     """
     begin, end = _limits(run)
-    boxes: list[NDArray[np.float64]] = []
+    boxes: list[F64] = []
     faces: list[tuple[float, float, float]] = []
     for number, row in enumerate(rows):
         for start, stop, room in _stretches(row, end):
