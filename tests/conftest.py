@@ -12,16 +12,18 @@ from typing import Any
 import hypothesis
 import pytest
 from tests.scenes import Cli
-from tests.thorough import examples
+from tests.thorough import THOROUGH, examples
 
 from fleet2d import cli
 
 _ROOT = Path(__file__).parents[1]
 
-# No property fails by how long an example takes, or its making on a busy machine.
+# No property fails by how long an example takes, or its making on a busy machine. Ordinary runs try
+# the same examples each time, so that a fresh clone passes; thorough ones search for new examples.
 hypothesis.settings.register_profile(
     "fleet2d",
     max_examples=examples(100),
+    derandomize=not THOROUGH,
     deadline=None,
     suppress_health_check=[hypothesis.HealthCheck.too_slow],
 )
