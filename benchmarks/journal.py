@@ -28,10 +28,10 @@ from unittest.mock import patch
 import fleet2d
 from fleet2d.artifacts import store
 from fleet2d.artifacts.buffer import TableBuffer
-from fleet2d.artifacts.ledger import Ledger
 from fleet2d.artifacts.seal import verify_run
 from fleet2d.artifacts.store import RunStore
 from fleet2d.artifacts.table_writer import TableWriter
+from fleet2d.artifacts.unfinished import UnfinishedRun
 from fleet2d.engine.snapshots.checkpoint import CheckpointWriter
 
 
@@ -42,7 +42,7 @@ def without(*names: str) -> Iterator[None]:
     parts: dict[str, list[Any]] = {
         "journal": [
             patch.object(TableWriter, "log", nothing),
-            patch.object(Ledger, "commit", nothing),
+            patch.object(UnfinishedRun, "commit", nothing),
         ],
         "checkpoints": [patch.object(CheckpointWriter, "after_span", nothing)],
         "seal": [patch.object(store, "make_seal", nothing)],
@@ -85,7 +85,7 @@ def timed_calls() -> Iterator[Counter[str]]:
     parts: dict[str, list[tuple[Any, str]]] = {
         "journal": [
             (TableWriter, "log"),
-            *((Ledger, name) for name in ("begin", "commit", "end")),
+            *((UnfinishedRun, name) for name in ("begin", "commit", "end")),
             (RunStore, "commit"),
         ],
         "checkpoints": [(CheckpointWriter, "checkpoint")],
@@ -144,9 +144,9 @@ def share_of_instructions(days: int) -> float:
 import tempfile
 from pathlib import Path
 import journal, pyarrow.parquet
-from fleet2d.artifacts import ledger
+from fleet2d.artifacts import unfinished
 from fleet2d.engine.snapshots import checkpoint
-checkpoint.COMMIT_S = checkpoint.COMPUTING_S = checkpoint.WAITING_S = ledger.SYNC_S = 1e9
+checkpoint.COMMIT_S = checkpoint.COMPUTING_S = checkpoint.WAITING_S = unfinished.SYNC_S = 1e9
 """
     )
     month = f"tempfile.TemporaryDirectory() as f: journal.month(Path(f) / 'run', {days})"

@@ -106,8 +106,8 @@ def hostile() -> dict[str, bytes]:
     import os
     import subprocess
 
-    from fleet2d.artifacts.lock import RunLock
     from fleet2d.engine.simulation import Simulation
+    from fleet2d.storage.files import FolderLock
     from fleet2d.studies.data.journal import Journal
     from fleet2d.viewer.server.serve import PageServer
 
@@ -121,7 +121,7 @@ def hostile() -> dict[str, bytes]:
         "a simulation": pickle.dumps(Call(Simulation, {})),
         "a journal of a study": pickle.dumps(Call(Journal, Path("x"))),
         "a server": pickle.dumps(Call(PageServer, [])),
-        "a lock": pickle.dumps(Call(RunLock, Path("/tmp"))),
+        "a lock": pickle.dumps(Call(FolderLock, Path("/tmp"), "x")),
         "eval": pickle.dumps(Call(eval, "1")),
         "objects from bytes": pickle.dumps(Call(np.ndarray, (1,), "O", bytes(8))),
         "a type": pickle.dumps(np.dtype("U5")),

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fleet2d.artifacts.encoding import GROWTH, HEADER, LINE, NARROW, RAW, RUNS, ArrayReader
+from fleet2d.artifacts.unfinished import GROWTH, HEADER, LINE, NARROW, RAW, RUNS, ArrayReader
 
 INT64 = np.dtype(np.int64)
 

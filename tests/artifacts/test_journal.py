@@ -3,8 +3,6 @@
 import json
 import os
 import random
-import subprocess
-import sys
 from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
@@ -14,16 +12,20 @@ import numpy as np
 import pytest
 from tests.thorough import examples
 
-from fleet2d.artifacts import journal
-from fleet2d.artifacts.encoding import ArrayReader
-from fleet2d.artifacts.journal import FOLDER, JOURNAL_NAME, last_commit
-from fleet2d.artifacts.ledger import Ledger
-from fleet2d.artifacts.lock import LOCK_NAME, RunLock
 from fleet2d.artifacts.store import RunStore
 from fleet2d.artifacts.table import DTYPES, Column, TableSpec
+from fleet2d.artifacts.unfinished import (
+    FOLDER,
+    JOURNAL,
+    JOURNAL_NAME,
+    ArrayReader,
+    UnfinishedRun,
+    last_commit,
+)
 from fleet2d.errors import ArtifactError, RunDirectoryError
 from fleet2d.kernels.encoding import encode_arrays
 from fleet2d.runs.run import open_run, run_of
+from fleet2d.storage.journal import FrameWriter, read_frames
 
 from .tables import EVERY_KIND, part, rows_of_every_kind, stored
 
@@ -47,9 +49,9 @@ def begin_run(directory: Path, commits: int = 5, **options: Any) -> RunStore:
 
 def kill(store: RunStore) -> Path:
     """End a run as the end of its process would: nothing more is written, the lock goes."""
-    assert store._ledger is not None
-    store._ledger.journal.close()
-    store._ledger.release()
+    assert store._unfinished is not None
+    store._unfinished.journal.frames.close()
+    store._unfinished.release()
     assert store.directory is not None
     return store.directory
 
@@ -107,11 +109,11 @@ def test_a_store_goes_on_behind_a_commit(tmp_path: Path, flush_rows: int, undone
         if k >= 2:
             store.append("late", step=[k], what=[None if k % 2 else f"word {k}"])
         ends.append(store.commit(k))
-    ledger = Ledger(kill(store))
-    ledger.lock()
+    unfinished = UnfinishedRun(kill(store))
+    unfinished.lock()
     commit = ends[4 - undone]
     again = RunStore(tmp_path / "run", [EVERY_KIND], flush_rows=flush_rows)
-    again.reopen(ledger, commit)
+    again.reopen(unfinished, commit)
     for k in range(5 - undone, 5):
         again.append("every_kind", **part(ROWS, 100 * k, 100 * k + 100))
         again.append("late", step=[k], what=[None if k % 2 else f"word {k}"])
@@ -150,14 +152,13 @@ Frame = tuple[str, Any, bytes]
 
 def with_frames(path: Path, change: Callable[[list[Frame]], None]) -> None:
     """Change the frames of a journal; their checksums are right afterwards."""
-    frames: list[Frame] = [frame[:3] for frame in journal._frames(path)]
+    frames: list[Frame] = [frame[:3] for frame in read_frames(path, JOURNAL)]
     change(frames)
-    content = journal.MAGIC
+    writer = FrameWriter(path, JOURNAL)
     for kind, description, arrays in frames:
-        number, text = journal._KINDS.index(kind), json.dumps(description).encode()
-        checksum = journal._checksum(number, text, arrays)
-        content += journal._HEADER.pack(number, len(text), len(arrays), checksum) + text + arrays
-    path.write_bytes(content)
+        writer.add(kind, json.dumps(description), arrays)
+    writer.commit()
+    writer.close()
 
 
 def put_into(value: Any, rng: random.Random) -> Any:
@@ -301,34 +302,9 @@ def test_what_is_no_journal_has_no_commit(tmp_path: Path) -> None:
 def test_one_run_has_one_writer(tmp_path: Path) -> None:
     store = begin_run(tmp_path / "run")
     with pytest.raises(RunDirectoryError, match=f"being written by process {os.getpid()} on"):
-        Ledger(tmp_path / "run").lock()
+        UnfinishedRun(tmp_path / "run").lock()
     store.close()
-    Ledger(tmp_path / "run").lock()
-
-
-def test_a_lock_that_is_left_over_is_no_hindrance(tmp_path: Path) -> None:
-    (tmp_path / LOCK_NAME).write_text("process 1 on another machine")
-    lock = RunLock(tmp_path)
-    lock.release()
-    assert [] == list(tmp_path.iterdir())
-
-
-def test_only_one_of_many_takes_the_lock(tmp_path: Path) -> None:
-    code = (
-        "import sys, time; from pathlib import Path; from fleet2d.artifacts.lock import RunLock\n"
-        f"try: RunLock(Path({str(tmp_path)!r})); print('mine'); time.sleep(2)\n"
-        "except Exception as error: print(type(error).__name__)\n"
-    )
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
-    processes = [
-        subprocess.Popen(
-            [sys.executable, "-c", code], stdout=subprocess.PIPE, text=True, env=environment
-        )
-        for _ in range(5)
-    ]
-    outputs = sorted(process.communicate(timeout=60)[0].strip() for process in processes)
-    assert 1 == outputs.count("mine")
-    assert 4 == outputs.count("RunDirectoryError")
+    UnfinishedRun(tmp_path / "run").lock()
 
 
 def test_a_run_in_memory_commits_nothing() -> None:
@@ -346,12 +322,12 @@ def test_a_full_disk_keeps_what_was_committed(
         raise OSError(28, "No space left on device")
 
     with monkeypatch.context() as patch:
-        patch.setattr("fleet2d.artifacts.files.write_all", refuse)
+        patch.setattr("fleet2d.storage.files.write_all", refuse)
         with pytest.raises(ArtifactError, match=r"the disk is full.*fleet2d resume"):
             store.commit(3)
     run = open_run(tmp_path / "run")
     assert 300 == run.arrow("every_kind").num_rows
-    Ledger(tmp_path / "run").lock()  # nobody holds it any more
+    UnfinishedRun(tmp_path / "run").lock()  # nobody holds it any more
 
 
 @pytest.mark.parametrize("status", ["complete", "interrupted"])
@@ -366,9 +342,9 @@ def test_a_disk_that_fails_when_the_journal_is_closed_ends_no_run(
         close(handle)
         raise OSError(5, "Input/output error")
 
-    assert store._ledger is not None
-    handle = store._ledger.journal._handle
-    monkeypatch.setattr("fleet2d.artifacts.journal.os.close", lambda h: (fail if h == handle else close)(h))  # fmt: skip
+    assert store._unfinished is not None
+    handle = store._unfinished.journal.frames._handle
+    monkeypatch.setattr("fleet2d.storage.journal.os.close", lambda h: (fail if h == handle else close)(h))  # fmt: skip
     store.close(status)
     assert status == open_run(tmp_path / "run").status
-    Ledger(tmp_path / "run").lock()  # nobody holds it any more
+    UnfinishedRun(tmp_path / "run").lock()  # nobody holds it any more

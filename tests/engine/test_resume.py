@@ -20,11 +20,11 @@ from tests.thorough import THOROUGH, some
 
 import fleet2d
 from fleet2d import Algorithm
-from fleet2d.artifacts import arrow, files, lock
-from fleet2d.artifacts.journal import FOLDER, JOURNAL_NAME
-from fleet2d.artifacts.ledger import CHECKPOINT_NAME
+from fleet2d.artifacts import arrow
 from fleet2d.artifacts.seal import verify_run
+from fleet2d.artifacts.unfinished import CHECKPOINT_NAME, FOLDER, JOURNAL_NAME
 from fleet2d.errors import ArtifactError, Fleet2DError, RunDirectoryError
+from fleet2d.storage import files
 
 KILLS = int(os.environ.get("FLEET2D_KILLS", "100" if THOROUGH else "4"))
 """Random moments at which a run is killed, and every other time its resumption; more before a release."""
@@ -45,11 +45,11 @@ def undisturbed(duration: str = "1 h") -> dict[str, Any]:
 
 def cut_off(simulation: fleet2d.Simulation) -> Path:
     """Leave a run as the end of its process would."""
-    ledger = simulation._store._ledger
-    assert ledger is not None
-    ledger.journal.close()
-    assert ledger._lock is not None
-    os.close(ledger._lock._handle)
+    unfinished = simulation._store._unfinished
+    assert unfinished is not None
+    unfinished.journal.frames.close()
+    assert unfinished._lock is not None
+    os.close(unfinished._lock._handle)
     assert simulation.directory is not None
     return simulation.directory
 
@@ -340,10 +340,10 @@ class Disk:
         self.count, self.fails_at, self.dies = 0, fails_at, dies
         self.synced: dict[Path, int] = {}
         self.written: set[Path] = set()
-        self.locks: list[lock.RunLock] = []
+        self.locks: list[files.FolderLock] = []
         self.is_dead = False
         write_all, sync, replace = files.write_all, files.sync, files.replace
-        parquet, take = arrow.ParquetTable.write, lock.RunLock.__init__
+        parquet, take = arrow.ParquetTable.write, files.FolderLock.__init__
 
         def counted_write(handle: int, data: bytes) -> None:
             self.written.add(self.path(handle))
@@ -370,15 +370,15 @@ class Disk:
                 self.fail()
             parquet(table, *rows)
 
-        def kept_lock(taken: lock.RunLock, directory: Path) -> None:
-            take(taken, directory)
+        def kept_lock(taken: files.FolderLock, *where: Any) -> None:
+            take(taken, *where)
             self.locks.append(taken)
 
         patch.setattr(files, "write_all", counted_write)
         patch.setattr(files, "sync", counted_sync)
         patch.setattr(files, "replace", counted_replace)
         patch.setattr(arrow.ParquetTable, "write", counted_parquet)
-        patch.setattr(lock.RunLock, "__init__", kept_lock)
+        patch.setattr(files.FolderLock, "__init__", kept_lock)
 
     @staticmethod
     def path(handle: int) -> Path:

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from tests.reference import encoding as slow
 
-from fleet2d.artifacts.encoding import GROWTH, HEADER, LINE, NARROW, RAW, RUNS, ArrayReader
+from fleet2d.artifacts.unfinished import GROWTH, HEADER, LINE, NARROW, RAW, RUNS, ArrayReader
 from fleet2d.kernels.encoding import encode_arrays
 
 RNG = np.random.default_rng(0)

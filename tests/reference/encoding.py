@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fleet2d.artifacts.encoding import GROWTH, HEADER, LINE, NARROW, RAW, RUNS
+from fleet2d.artifacts.unfinished import GROWTH, HEADER, LINE, NARROW, RAW, RUNS
 from fleet2d.kernels import I64
 
 WHOLE = 2**64

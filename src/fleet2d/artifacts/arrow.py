@@ -13,13 +13,13 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
-from fleet2d.artifacts import files
 from fleet2d.artifacts.chunk import Chunk, ColumnChunk, Dictionary, empty_chunk, encode_strings
-from fleet2d.artifacts.files import PARTIAL
 from fleet2d.artifacts.table import DTYPES, Column, Kind, TableSpec
 from fleet2d.bounds import TABLE_BYTES, unpacked_bytes
 from fleet2d.errors import ArtifactError
 from fleet2d.kernels import Bool
+from fleet2d.storage import files
+from fleet2d.storage.files import PARTIAL
 
 # Bytes of text in one array: Arrow counts them by 32 bits.
 MOST_TEXT = 2**31 - 1

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import errno
 import os
-from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
 
 from fleet2d.errors import ArtifactError, Fleet2DError, RunDirectoryError
-
-_FULL = {errno.ENOSPC, getattr(errno, "EDQUOT", errno.ENOSPC)}
+from fleet2d.storage.files import is_disk_full
 
 
 def check_run_directory(directory: Path) -> None:
@@ -47,26 +44,6 @@ def _check_writable(directory: Path, nearest: Path) -> None:
         )
 
 
-def refuse_links(directory: Path, folders: Iterable[str]) -> None:
-    """Refuse a run directory with links: who goes on writing there would change what they lead to.
-
-    Args:
-        directory: The run directory, which may itself be reached by a link.
-        folders: Names of the folders in it.
-
-    Raises:
-        RunDirectoryError: There is a link in it, or in one of the folders.
-        OSError: A folder can't be read.
-    """
-    for folder in (directory, *(directory / name for name in folders)):
-        for path in sorted(folder.iterdir()) if folder.is_dir() else ():
-            if path.is_symlink():
-                raise RunDirectoryError(
-                    f"{path} is a link, so the run would be written elsewhere: remove it, or"
-                    " replace it by what it leads to"
-                )
-
-
 def make_directories(directory: Path) -> list[Path]:
     """Create a directory and its parents; return those that were missing, outermost first.
 
@@ -88,11 +65,6 @@ def remove_directories(directories: list[Path]) -> None:
     for path in reversed(directories):
         with suppress(OSError):
             path.rmdir()
-
-
-def is_disk_full(error: OSError) -> bool:
-    """Whether an error means that the disk, or the user's quota, is full."""
-    return error.errno in _FULL
 
 
 def cannot_write(directory: Path, error: OSError) -> Fleet2DError:

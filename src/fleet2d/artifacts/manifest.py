@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Protocol
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
-from fleet2d.artifacts.files import write_atomically
 from fleet2d.artifacts.manifest_parts import Count, ManifestParts, time_problem
 from fleet2d.artifacts.plain import canonical, plain
 from fleet2d.artifacts.strict_json import read_json
@@ -21,6 +20,7 @@ from fleet2d.artifacts.versions import versions
 from fleet2d.bounds import FILE_BYTES, read_bytes
 from fleet2d.errors import RunDirectoryError
 from fleet2d.problems import did_you_mean
+from fleet2d.storage.files import write_atomically
 
 if TYPE_CHECKING:
     from fleet2d.clock import Clock

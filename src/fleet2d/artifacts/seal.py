@@ -13,8 +13,6 @@ from pathlib import Path
 from typing import Any
 
 from fleet2d.artifacts.digest import changed_tables, digest_of_file, run_digest, sha256_of
-from fleet2d.artifacts.journal import FOLDER
-from fleet2d.artifacts.lock import LOCK_NAME
 from fleet2d.artifacts.manifest import (
     FILE_NAME,
     FileRecord,
@@ -24,6 +22,7 @@ from fleet2d.artifacts.manifest import (
     json_of,
 )
 from fleet2d.artifacts.plain import canonical
+from fleet2d.artifacts.unfinished import FOLDER, LOCK_NAME
 from fleet2d.bounds import FILE_BYTES, read_bytes
 from fleet2d.errors import ArtifactError, RunDirectoryError
 

@@ -12,19 +12,22 @@ from fleet2d.artifacts.digest import TableDigest, run_digest
 from fleet2d.artifacts.directory import (
     cannot_write,
     check_run_directory,
-    is_disk_full,
     make_directories,
     remove_directories,
 )
-from fleet2d.artifacts.files import PARTIAL, sync_directory, write_atomically
-from fleet2d.artifacts.journal import Commit
-from fleet2d.artifacts.ledger import Ledger, columns_of, remove_leftovers
-from fleet2d.artifacts.lock import LOCK_NAME
 from fleet2d.artifacts.manifest import FILE_NAME, Manifest, Status
 from fleet2d.artifacts.seal import make_seal
 from fleet2d.artifacts.table import TableSpec
 from fleet2d.artifacts.table_writer import TableWriter
+from fleet2d.artifacts.unfinished import (
+    LOCK_NAME,
+    Commit,
+    UnfinishedRun,
+    columns_of,
+    remove_leftovers,
+)
 from fleet2d.errors import ArtifactError, RunDirectoryError
+from fleet2d.storage.files import PARTIAL, is_disk_full, sync_directory, write_atomically
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -70,7 +73,7 @@ class RunStore:
         self._digests: dict[str, str] | None = None
         self._is_open = directory is None
         self._failure: ArtifactError | None = None
-        self._ledger = None if self.root is None else Ledger(self.root)
+        self._unfinished = None if self.root is None else UnfinishedRun(self.root)
         for spec in specs:
             self.add_table(spec)
 
@@ -102,7 +105,7 @@ class RunStore:
             self._new_directories = make_directories(self.root)
             self._lock_directory(self.root)
             self._is_open = True
-            self._ledger_of().begin()
+            self._unfinished_run().begin()
             self.manifest.status = "running"
             self.manifest.write(self.root)
         except OSError as error:
@@ -111,30 +114,30 @@ class RunStore:
 
     def _lock_directory(self, root: Path) -> None:
         """Lock the directory, and check that no other run has begun there in the meantime."""
-        ledger = self._ledger_of()
-        ledger.lock()
+        unfinished = self._unfinished_run()
+        unfinished.lock()
         if any(path.name != LOCK_NAME for path in root.iterdir()):
-            ledger.release()
+            unfinished.release()
             raise RunDirectoryError(f"another run was stored in {self.directory} just now")
 
-    def reopen(self, ledger: Ledger, commit: Commit | None) -> None:
+    def reopen(self, unfinished: UnfinishedRun, commit: Commit | None) -> None:
         """Continue in the directory of an unfinished run, after a commit of its journal.
 
         Args:
-            ledger: The journal and checkpoint of the run, locked for this process.
+            unfinished: The journal and checkpoint of the run, locked for this process.
             commit: The commit to continue after; None: start from the beginning.
 
         Raises:
             ArtifactError: The journal is damaged, or the directory can't be written.
         """
         assert self.root is not None
-        self._ledger, self._is_open = ledger, True
+        self._unfinished, self._is_open = unfinished, True
         with self._writing("the directory"):
             self.manifest.status = "running"
             self.manifest.write(self.root)
             for path in (*self.root.glob("*.parquet"), *self.root.glob(f"*.parquet{PARTIAL}")):
                 path.unlink()  # the journal has all of their rows
-            for entry in ledger.resume(commit):
+            for entry in unfinished.resume(commit):
                 self.add_table(entry.spec)
                 table = self._tables[entry.spec.name]
                 for name, words in entry.words.items():
@@ -152,13 +155,13 @@ class RunStore:
             write_atomically(self.root / name, content.encode())
 
     def keep_checkpoint(self, write: Callable[[int], None]) -> None:
-        """Replace the checkpoint of the run; see `Ledger.keep_checkpoint`.
+        """Replace the checkpoint of the run; see `UnfinishedRun.keep_checkpoint`.
 
         Raises:
             ArtifactError: It can't be written; the run is marked as failed.
         """
         with self._writing("the checkpoint"):
-            self._ledger_of().keep_checkpoint(write)
+            self._unfinished_run().keep_checkpoint(write)
 
     def commit(self, step: int, *, sync: bool = False) -> Commit | None:
         """Write all rows so far to the journal, so that they survive a crash of the process.
@@ -178,8 +181,8 @@ class RunStore:
         self._check_usable()
         with self._writing("the journal"):
             for entry in self._tables.values():
-                entry.log(self._ledger)
-            return self._ledger_of().commit(step, sync=sync)
+                entry.log(self._unfinished)
+            return self._unfinished_run().commit(step, sync=sync)
 
     def add_table(self, spec: TableSpec) -> None:
         """Add a table, at any time before the run is closed; the same table may be added again.
@@ -289,7 +292,7 @@ class RunStore:
                 self.manifest.seal = make_seal(self.manifest, self.root)
                 self.manifest.write(self.root)
                 sync_directory(self.root)
-            self._ledger_of().end(keep=status != "complete")
+            self._unfinished_run().end(keep=status != "complete")
         return digests
 
     def discard(self) -> None:
@@ -298,7 +301,7 @@ class RunStore:
             if entry.file is not None:
                 entry.file.abandon()
         if self.root is not None and self._is_open:
-            self._ledger_of().end()
+            self._unfinished_run().end()
             remove_leftovers(self.root)
             for name in (FILE_NAME, *(f"{table}.parquet" for table in self._tables)):
                 for path in (self.root / name, self.root / f"{name}{PARTIAL}"):
@@ -318,7 +321,7 @@ class RunStore:
         if not rows:
             return
         with self._writing("the journal"):
-            entry.log(self._ledger)
+            entry.log(self._unfinished)
         chunk = entry.buffer.take(reuse=self.root is not None)
         entry.logged = 0
         entry.digest.update(chunk, rows)
@@ -329,9 +332,9 @@ class RunStore:
         with self._writing(f"{name}.parquet", entry):
             entry.file_in(self.root).write(chunk, rows, entry.buffer.words)
 
-    def _ledger_of(self) -> Ledger:
-        assert self._ledger is not None, "a run in memory has no ledger"
-        return self._ledger
+    def _unfinished_run(self) -> UnfinishedRun:
+        assert self._unfinished is not None, "a run in memory has no journal"
+        return self._unfinished
 
     def _finish_files(self, root: Path) -> None:
         """Complete every file before any is renamed."""
@@ -379,7 +382,7 @@ class RunStore:
         for table in self._tables.values():
             if table.file is not None:
                 table.file.abandon()
-        self._ledger_of().end(keep=True, undo=True)
+        self._unfinished_run().end(keep=True, undo=True)
         self.manifest.status = "failed"
         self.manifest.notes.append(reason)
         return _try_write(self.manifest, self.root) or (

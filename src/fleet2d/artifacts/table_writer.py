@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 from fleet2d.artifacts.buffer import TableBuffer
 from fleet2d.artifacts.chunk import Chunk
 from fleet2d.artifacts.digest import TableDigest
-from fleet2d.artifacts.ledger import Ledger
 from fleet2d.artifacts.manifest import ColumnRecord, TableRecord
+from fleet2d.artifacts.unfinished import UnfinishedRun
 
 if TYPE_CHECKING:
     from fleet2d.artifacts.arrow import ParquetTable
@@ -40,16 +40,16 @@ class TableWriter:
         for chunk, rows in self.chunks:
             self.digest.update(chunk, rows)
 
-    def log(self, ledger: Ledger | None) -> None:
+    def log(self, unfinished: UnfinishedRun | None) -> None:
         """Append the rows of the buffer to the journal that are not in it yet.
 
         Raises:
             OSError: They can't be written.
         """
         first, buffer = self.logged, self.buffer
-        if ledger is None or first == buffer.rows:
+        if unfinished is None or first == buffer.rows:
             return
-        ledger.journal.add(buffer.spec, buffer.arrays(first), buffer.rows - first, buffer.words)
+        unfinished.journal.add(buffer.spec, buffer.arrays(first), buffer.rows - first, buffer.words)
         self.logged = buffer.rows
 
     def file_in(self, root: Path) -> ParquetTable:

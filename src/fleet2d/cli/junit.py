@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 from xml.etree import ElementTree as ET
 
-from fleet2d.artifacts.files import write_atomically
 from fleet2d.errors import InputError
+from fleet2d.storage.files import write_atomically
 
 if TYPE_CHECKING:
     from fleet2d.cli.scenario_case import ScenarioCase

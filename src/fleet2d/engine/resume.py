@@ -5,17 +5,23 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
-from fleet2d.artifacts.directory import cannot_write, refuse_links
-from fleet2d.artifacts.journal import FOLDER, JOURNAL_NAME, last_commit
-from fleet2d.artifacts.ledger import Ledger, remove_leftovers
+from fleet2d.artifacts.directory import cannot_write
 from fleet2d.artifacts.manifest import FILE_NAME, Manifest
 from fleet2d.artifacts.store import RunStore
+from fleet2d.artifacts.unfinished import (
+    FOLDER,
+    JOURNAL_NAME,
+    UnfinishedRun,
+    last_commit,
+    remove_leftovers,
+)
 from fleet2d.engine.inputs import changed_inputs
 from fleet2d.engine.simulation import Simulation
 from fleet2d.engine.snapshots.checkpoint import Checkpoint, UnusableCheckpointError
 from fleet2d.errors import RunDirectoryError
 from fleet2d.runs.run import LEARNED_NAME, Run
 from fleet2d.scenario.model import load_scenario
+from fleet2d.storage.files import refuse_links
 from fleet2d.trust import Trust, refuse_untrusted, restrict
 
 
@@ -54,20 +60,20 @@ def reopen(directory: str | Path, trust: Trust) -> tuple[Simulation, str]:
     """
     root = Path(directory)
     Manifest.read(root)  # before anything is written there
-    ledger = Ledger(root)
+    unfinished = UnfinishedRun(root)
     try:
         refuse_links(root, (FOLDER, LEARNED_NAME))
-        ledger.lock()
+        unfinished.lock()
     except OSError as error:
         raise cannot_write(root, error) from error
     try:
-        return _reopen(root, ledger, trust)
+        return _reopen(root, unfinished, trust)
     except BaseException:
-        ledger.release()
+        unfinished.release()
         raise
 
 
-def _reopen(root: Path, ledger: Ledger, trust: Trust) -> tuple[Simulation, str]:
+def _reopen(root: Path, unfinished: UnfinishedRun, trust: Trust) -> tuple[Simulation, str]:
     manifest = Manifest.read(root)
     if manifest.status == "complete":
         remove_leftovers(root)
@@ -83,25 +89,25 @@ def _reopen(root: Path, ledger: Ledger, trust: Trust) -> tuple[Simulation, str]:
     with restrict(trust):
         scenario = load_scenario(manifest.scenario)
         try:
-            checkpoint = _checkpoint(ledger, manifest)
-            run = Simulation.reopened(scenario, RunStore(root), ledger, checkpoint)
+            checkpoint = _checkpoint(unfinished, manifest)
+            run = Simulation.reopened(scenario, RunStore(root), unfinished, checkpoint)
         except UnusableCheckpointError as error:
             remark = f"starting again from the first step: {error}"
-            run = Simulation.reopened(scenario, RunStore(root), ledger, None)
+            run = Simulation.reopened(scenario, RunStore(root), unfinished, None)
         else:
             remark = f"continuing from {run.time:%Y-%m-%d %H:%M:%S}, step {run.step}"
     run.catch_up(manifest.interventions)
     return run, remark
 
 
-def _checkpoint(ledger: Ledger, manifest: Manifest) -> Checkpoint:
+def _checkpoint(unfinished: UnfinishedRun, manifest: Manifest) -> Checkpoint:
     """Return the last checkpoint, after checking that the journal has all of its rows.
 
     Raises:
         UnusableCheckpointError: There is none, or it can't be used.
     """
-    checkpoint = Checkpoint.open(ledger.checkpoint, manifest)
-    last = last_commit(ledger.folder / JOURNAL_NAME)
+    checkpoint = Checkpoint.open(unfinished.checkpoint, manifest)
+    last = last_commit(unfinished.folder / JOURNAL_NAME)
     if last is None or last.end < checkpoint.commit.end:
         raise UnusableCheckpointError("the journal is shorter than the checkpoint says")
     return checkpoint

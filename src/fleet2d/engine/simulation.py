@@ -8,9 +8,9 @@ from contextlib import ExitStack, nullcontext, suppress
 from pathlib import Path
 from typing import Any, BinaryIO, Self
 
-from fleet2d.artifacts.ledger import Ledger
 from fleet2d.artifacts.manifest import Status
 from fleet2d.artifacts.store import RunStore
+from fleet2d.artifacts.unfinished import UnfinishedRun
 from fleet2d.clock import Clock
 from fleet2d.engine.expectations.verdicts import Judging
 from fleet2d.engine.interventions import is_from_outside
@@ -118,14 +118,18 @@ class Simulation(Judging):
 
     @classmethod
     def reopened(
-        cls, scenario: Scenario, store: RunStore, ledger: Ledger, checkpoint: Checkpoint | None
+        cls,
+        scenario: Scenario,
+        store: RunStore,
+        unfinished: UnfinishedRun,
+        checkpoint: Checkpoint | None,
     ) -> Self:
         """Return an unfinished run in its directory, at its checkpoint; see `fleet2d.resume`.
 
         Args:
             scenario: The scenario of the run.
             store: The store of its directory, not opened.
-            ledger: The journal and checkpoint of the run, locked.
+            unfinished: The journal and checkpoint of the run, locked.
             checkpoint: Where to continue; None: start from the first step.
 
         Raises:
@@ -136,14 +140,14 @@ class Simulation(Judging):
         run = cls.__new__(cls)
         run._prepare(scenario, store)
         if checkpoint is None:
-            store.reopen(ledger, None)
+            store.reopen(unfinished, None)
             store_plan(store, run.home)
             run._setup_s = time.perf_counter() - began
             return run
         state = checkpoint.read(run._constants)
         store.manifest = checkpoint.manifest
         store.manifest.resumed.append(checkpoint.commit.step)
-        store.reopen(ledger, checkpoint.commit)
+        store.reopen(unfinished, checkpoint.commit)
         run._take(state)
         run._setup_s, run._simulate_s, run._save_s = checkpoint.wall_s
         assert run._keeper is not None

@@ -19,7 +19,6 @@ from matplotlib.figure import Figure
 from matplotlib.patches import PathPatch, Rectangle
 from matplotlib.path import Path as Outline
 
-from fleet2d.artifacts.files import write_atomically
 from fleet2d.errors import InputError
 from fleet2d.floorplan.geometry.lattice import UNITS_PER_CELL
 from fleet2d.floorplan.home.standing import grown_cells
@@ -37,6 +36,7 @@ from fleet2d.palette import (
 )
 from fleet2d.pictures.objects import draw_objects, label_objects
 from fleet2d.pictures.theme import apply_theme
+from fleet2d.storage.files import write_atomically
 
 # Formats of pictures, each with the metadata that would differ from time to time.
 STAMPS = MappingProxyType({".png": "Software", ".svg": "Date", ".pdf": "CreationDate"})

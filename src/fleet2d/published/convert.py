@@ -9,7 +9,6 @@ from typing import Any
 
 import yaml
 
-from fleet2d.artifacts.directory import is_disk_full
 from fleet2d.document import Document, Keys, read_document
 from fleet2d.errors import ArtifactError, Fleet2DError, InputError, ScenarioError
 from fleet2d.floorplan.formats.houseexpo import read_houseexpo
@@ -24,6 +23,7 @@ from fleet2d.published.sections import (
     read_step,
 )
 from fleet2d.scenario.model import Scenario, load_scenario
+from fleet2d.storage.files import is_disk_full
 
 
 def convert_file(old: Path, new: Path) -> list[str]:

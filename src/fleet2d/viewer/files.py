@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from fleet2d.artifacts.files import write_atomically
 from fleet2d.errors import InputError
+from fleet2d.storage.files import write_atomically
 
 
 def write_file(path: Path, content: bytes) -> None:

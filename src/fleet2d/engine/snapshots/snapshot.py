@@ -71,9 +71,8 @@ _CONSTRUCTORS = frozenset({"object_array", "plain_array", "plain_scalar", "plain
 # Packages without classes of states: their objects could read, write or run something.
 _NO_STATE = (
     "fleet2d.artifacts.arrow",
-    "fleet2d.artifacts.journal",
-    "fleet2d.artifacts.ledger",
-    "fleet2d.artifacts.lock",
+    "fleet2d.artifacts.unfinished",
+    "fleet2d.storage",
     "fleet2d.runs",
     "fleet2d.calibrate",
     "fleet2d.cli",

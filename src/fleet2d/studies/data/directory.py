@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fleet2d.artifacts.files import PARTIAL
 from fleet2d.errors import RunDirectoryError
+from fleet2d.storage.files import PARTIAL
 from fleet2d.studies.data.journal import Journal
 from fleet2d.studies.data.parts import Part, next_number, part_name, read_parts, write_part
 from fleet2d.studies.data.storage import Storage, write_error

@@ -5,9 +5,8 @@ import re
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from fleet2d.artifacts.directory import is_disk_full
-from fleet2d.artifacts.files import PARTIAL
 from fleet2d.errors import ArtifactError, RunDirectoryError
+from fleet2d.storage.files import PARTIAL, is_disk_full
 
 COPY_BYTES = 1 << 22
 

@@ -1,0 +1,1 @@
+"""Folders that survive crashes and strangers: safe names, atomic files, one writer, a journal."""

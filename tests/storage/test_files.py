@@ -1,0 +1,111 @@
+"""Files of a folder that others may have written: names, links, replacement, and the lock."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from fleet2d.errors import RunDirectoryError
+from fleet2d.storage.files import FolderLock, path_in, refuse_links, replacing, write_atomically
+
+LOCK_NAME = "run.lock"
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "", "/", ".", "..", "../x", "a/../../x", "/etc/passwd", "a//b", "a/", "a\\b", "a\n", "a\0b",
+        "\x1b[31mred", "a\udcff", None, 3, ["a"],
+    ],
+)  # fmt: skip
+def test_a_name_that_leads_elsewhere_is_refused(tmp_path: Path, name: object) -> None:
+    with pytest.raises(RunDirectoryError, match="which is not inside of it") as caught:
+        path_in(tmp_path, name)
+    assert str(caught.value).isprintable()
+
+
+@pytest.mark.parametrize("name", ["run", "learned/ltp.npz", "tables/events/000001.parquet", "é b"])
+def test_a_plain_name_is_a_path(tmp_path: Path, name: str) -> None:
+    assert tmp_path / name == path_in(tmp_path, name)
+
+
+def test_links_and_devices_are_refused_wherever_they_are_on_the_way(tmp_path: Path) -> None:
+    folder, elsewhere = tmp_path / "folder", tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    (elsewhere / "file").write_text("theirs")
+    folder.mkdir()
+    (folder / "way").symlink_to(elsewhere)
+    (folder / "file").symlink_to(elsewhere / "file")
+    (folder / "nowhere").symlink_to(elsewhere / "nothing")
+    os.mkfifo(folder / "pipe")
+    for name in ("way", "way/file", "way/new", "file", "nowhere"):
+        with pytest.raises(RunDirectoryError, match="is a link, which may lead anywhere"):
+            path_in(folder, name)
+    with pytest.raises(RunDirectoryError, match="is a device or a pipe"):
+        path_in(folder, "pipe")
+    with pytest.raises(RunDirectoryError):
+        refuse_links(folder)
+    for path in folder.iterdir():
+        path.unlink()
+    refuse_links(folder, ("nothing",))
+
+
+def test_the_folder_itself_may_be_a_link(tmp_path: Path) -> None:
+    (tmp_path / "first").mkdir()
+    (tmp_path / "latest").symlink_to(tmp_path / "first")
+    assert tmp_path / "latest" / "file" == path_in(tmp_path / "latest", "file")
+    refuse_links(tmp_path / "latest")
+
+
+def test_a_link_in_place_of_a_file_is_replaced(tmp_path: Path) -> None:
+    """`study.json.partial` led to a file of the user, which was overwritten."""
+    theirs = tmp_path / "theirs"
+    theirs.write_text("precious")
+    for name in ("plan.json", "plan.json.partial"):
+        (tmp_path / name).symlink_to(theirs)
+        write_atomically(tmp_path / "plan.json", b"{}")
+        assert not (tmp_path / "plan.json").is_symlink()
+    assert "precious" == theirs.read_text()
+    assert {"theirs", "plan.json"} == {path.name for path in tmp_path.iterdir()}
+
+
+def test_a_file_that_was_not_finished_leaves_the_old_one(tmp_path: Path) -> None:
+    file = tmp_path / "plan.json"
+    file.write_text("old")
+
+    def fail() -> None:
+        with replacing(file) as handle:
+            os.write(handle, b"ne")
+            raise ValueError("no more")
+
+    with pytest.raises(ValueError, match="no more"):
+        fail()
+    assert "old" == file.read_text()
+    assert [file] == list(tmp_path.iterdir())
+
+
+def test_a_lock_that_is_left_over_is_no_hindrance(tmp_path: Path) -> None:
+    (tmp_path / LOCK_NAME).write_text("process 1 on another machine")
+    lock = FolderLock(tmp_path, LOCK_NAME)
+    lock.release()
+    assert [] == list(tmp_path.iterdir())
+
+
+def test_only_one_of_many_takes_the_lock(tmp_path: Path) -> None:
+    code = (
+        "import sys, time; from pathlib import Path; from fleet2d.storage.files import FolderLock\n"
+        f"try: FolderLock(Path({str(tmp_path)!r}), 'run.lock'); print('mine'); time.sleep(2)\n"
+        "except Exception as error: print(type(error).__name__)\n"
+    )
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+    processes = [
+        subprocess.Popen(
+            [sys.executable, "-c", code], stdout=subprocess.PIPE, text=True, env=environment
+        )
+        for _ in range(5)
+    ]
+    outputs = sorted(process.communicate(timeout=60)[0].strip() for process in processes)
+    assert 1 == outputs.count("mine")
+    assert 4 == outputs.count("RunDirectoryError")
