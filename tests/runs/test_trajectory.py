@@ -1,5 +1,6 @@
 """The path rebuilt from key frames is the path that was simulated, at every step and exactly."""
 
+from dataclasses import fields
 from datetime import timedelta
 from functools import cache
 from pathlib import Path
@@ -14,6 +15,7 @@ import fleet2d
 from fleet2d import Behavior, Plan, Run, Simulation, Situation
 from fleet2d.entities.entity import Robot
 from fleet2d.errors import ArtifactError
+from fleet2d.runs.trajectory import PathReader, Trajectory
 
 TWO_ROOMS = {"order": "random", "dwell": "20 s", "rooms": ["living_room", "kitchen", "hallway"]}
 COMMUTER: dict[str, Any] = {
@@ -150,6 +152,22 @@ def test_run_that_starts_within_a_day_is_rebuilt(bodies: str, start: str) -> Non
 @pytest.mark.parametrize("stride", [7, 60, 10_000])
 def test_every_so_many_steps_is_rebuilt(bodies: str, stride: int) -> None:
     assert_rebuilt(run_of(bodies), stride)
+
+
+@pytest.mark.parametrize("bodies", BODIES)
+@pytest.mark.parametrize(("stride", "part"), [(1, 1000), (7, 999), (60, 61), (10_000, 500)])
+def test_parts_of_a_path_are_those_of_the_whole(bodies: str, stride: int, part: int) -> None:
+    run = run_of(bodies)
+    every = timedelta(seconds=stride)
+    for name in [*run.manifest["entities"]["users"], *run.manifest["entities"]["robots"]]:
+        reader = PathReader(run, run.plan, name)
+
+        parts = [reader.read(k, k + part, every) for k in range(0, reader.clock.steps, part)]
+
+        whole = run.path(name, every)
+        for field in fields(Trajectory):
+            joined = np.concatenate([getattr(path, field.name) for path in parts])
+            np.testing.assert_array_equal(getattr(whole, field.name), joined, field.name)
 
 
 @pytest.mark.parametrize("bodies", BODIES)

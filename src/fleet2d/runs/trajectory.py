@@ -1,5 +1,8 @@
 """Poses at any step of a stored run, rebuilt exactly from its key frames."""
 
+from bisect import bisect_right
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from typing import TYPE_CHECKING, Any
@@ -22,7 +25,6 @@ from fleet2d.kernels.motion import (
     Breakpoints,
     Poses,
     empty_poses,
-    paste_poses,
     trace_meander,
     trace_track,
 )
@@ -74,48 +76,145 @@ def rebuild_path(run: "Run", plan: FloorPlan, entity: str, every: timedelta) -> 
         ArtifactError: The run stored no key frames or damaged ones, there is no such body, or
             `every` is not a multiple of the step.
     """
-    manifest = run.manifest
-    clock = Clock(datetime.fromisoformat(manifest["start"]), manifest["step_us"], manifest["steps"])
-    if not isinstance(every, timedelta):
-        raise ArtifactError(
-            f"every: expected a timedelta like timedelta(seconds=10), got {every!r}"
-        )
-    stride = whole_steps(every, clock.step_us, "every", ArtifactError)
-    if "key_frames" not in run.tables:
-        raise ArtifactError("the run stored no key frames: run it with artifacts.key_frames=true")
-    try:
-        keys = _keys_of(run, plan, entity, clock)
-        steps = np.arange(0, clock.steps, stride, dtype=np.int64)
+    reader = PathReader(run, plan, entity)
+    return reader.read(0, reader.clock.steps, every)
+
+
+class PathReader:
+    """The path of one body of a stored run, read in parts so that memory stays bounded.
+
+    Attributes:
+        clock: The simulated time of the run.
+    """
+
+    def __init__(self, run: "Run", plan: FloorPlan, entity: str) -> None:
+        """Read the key frames of a body.
+
+        Raises:
+            ArtifactError: The run stored no key frames or damaged ones, or there is no such body.
+        """
+        manifest = run.manifest
+        start = datetime.fromisoformat(manifest["start"])
+        self.clock = Clock(start, manifest["step_us"], manifest["steps"])
+        self._run, self._plan, self._entity = run, plan, entity
+        if "key_frames" not in run.tables:
+            raise ArtifactError(
+                "the run stored no key frames: run it with artifacts.key_frames=true"
+            )
+        with _damage():
+            self._keys = _keys_of(run, plan, entity)
+            step = self._keys["step"].tolist()
+            ends = [*step, self.clock.steps]
+            self._segments = [(i, j, step[i], ends[j]) for i, j in _segments(self._keys["kind"])]
+        self._walker: tuple[Home, Actor, Meander] | None = None
+
+    def read(self, first: int, end: int, every: timedelta) -> Trajectory:
+        """Return the poses at the multiples of a time in the steps from `first` to before `end`.
+
+        Args:
+            first: The first step, at least 0.
+            end: The step after the last one.
+            every: Time between two poses, a multiple of the step.
+
+        Raises:
+            ArtifactError: The key frames are damaged, or `every` is not a multiple of the step.
+        """
+        if not isinstance(every, timedelta):
+            raise ArtifactError(
+                f"every: expected a timedelta like timedelta(seconds=10), got {every!r}"
+            )
+        clock, plan = self.clock, self._plan
+        stride = whole_steps(every, clock.step_us, "every", ArtifactError)
+        end = min(end, clock.steps)
+        before = -(-first // stride)  # the number of poses before the first one
+        steps = np.arange(before * stride, end, stride, dtype=np.int64)
         out = empty_poses(len(steps))
         out.x[:] = -1  # outside of the plan: what damaged key frames leave out
-        _trace(run, plan, entity, clock, keys, stride, out)
-    except (KeyError, ValueError, OverflowError, MemoryError) as error:
+        with _damage():
+            for key, last_key, begin, stop in self._segments:
+                low, high = -(-begin // stride) - before, -(-stop // stride) - before
+                part = slice(max(low, 0), min(high, len(steps)))
+                if part.start < part.stop:
+                    poses = Poses(*(values[part] for values in out))
+                    self._trace(key, last_key, stop, steps[part], poses)
+        rows, columns = plan.room_of_place.shape
+        cells = out.y // SUB, out.x // SUB
+        inside = (0 <= cells[0]) & (cells[0] < rows) & (0 <= cells[1]) & (cells[1] < columns)
+        if not inside.all():
+            raise ArtifactError(
+                f"key_frames.parquet has poses of {self._entity} outside of the floor plan: it is"
+                " damaged; `fleet2d verify` says which files have changed"
+            )
+        xy = plan.lattice.to_metres(np.stack([out.x, out.y], axis=-1))
+        room = np.where(out.away, -1, plan.room_of_place[cells])
+        return Trajectory(
+            steps,
+            clock.times(steps),
+            xy[:, 0],
+            xy[:, 1],
+            in_radians(out.heading),
+            out.away.astype(bool),
+            room,
+        )
+
+    def _trace(self, begin: int, end: int, stop: int, steps: I64, out: Poses) -> None:
+        """Fill in poses of the segment of some key frames, which ends before the step `stop`."""
+        keys, step_us = self._keys, self.clock.step_us
+        if keys["kind"][begin] != WALK:
+            part = Breakpoints(*(keys[name][begin:end] for name in Breakpoints._fields))
+            apart = int(steps[1] - steps[0]) if len(steps) > 1 else 1
+            trace_track(part, int(steps[0]) * step_us, apart * step_us, out)
+            return
+        if self._walker is None:
+            self._walker = _walker(self._run, self._plan, self._entity, self.clock)
+        home, actor, behavior = self._walker
+        step = int(keys["step"][begin])
+        state = Pose(*(int(keys[n][begin]) for n in ("x", "y", "heading", "away")))
+        poses = empty_poses(stop - step + 1)
+        trace_meander(home.walls, actor.space.mesh, behavior.rule, step, state[:3], poses)
+        # The stored end of the walk; a walk without a step ended as the body was put elsewhere.
+        if begin + 1 < len(keys["x"]) and stop > step:
+            last = (poses.x[-1], poses.y[-1], poses.heading[-1])
+            if last != tuple(keys[name][begin + 1] for name in ("x", "y", "heading")):
+                raise ArtifactError(
+                    f"the random walk of {self._entity} from step {step} on can't be rebuilt: it"
+                    " was walked by other rules than those of its behavior 'meander', or by"
+                    " another version"
+                )
+        for values, walked in zip(out, poses, strict=True):
+            values[:] = walked[steps - step]
+
+
+@contextmanager
+def _damage() -> Iterator[None]:
+    """Report what damaged key frames cause."""
+    try:
+        yield
+    except (KeyError, ValueError, OverflowError, IndexError, MemoryError) as error:
         raise ArtifactError(
             f"key_frames.parquet can't be followed ({one_line(error, 100)}): it is damaged;"
             " `fleet2d verify` says which files have changed"
         ) from error
-    rows, columns = plan.room_of_place.shape
-    cells = out.y // SUB, out.x // SUB
-    inside = (0 <= cells[0]) & (cells[0] < rows) & (0 <= cells[1]) & (cells[1] < columns)
-    if not inside.all():
-        raise ArtifactError(
-            f"key_frames.parquet has poses of {entity} outside of the floor plan: it is damaged;"
-            " `fleet2d verify` says which files have changed"
-        )
-    xy = plan.lattice.to_metres(np.stack([out.x, out.y], axis=-1))
-    room = np.where(out.away, -1, plan.room_of_place[cells])
-    return Trajectory(
-        steps,
-        clock.times(steps),
-        xy[:, 0],
-        xy[:, 1],
-        in_radians(out.heading),
-        out.away.astype(bool),
-        room,
-    )
 
 
-def _keys_of(run: "Run", plan: FloorPlan, entity: str, clock: Clock) -> dict[str, Any]:
+def _segments(kind: I64) -> Iterator[tuple[int, int]]:
+    """Yield the first key frame of each walk and track, and the one after its last."""
+    is_end = np.isin(kind, (WALK, PLANNED))
+    ends = np.flatnonzero(is_end).tolist()
+    begin = 0
+    while begin < len(kind):
+        if kind[begin] == WALK:
+            end = begin + 1
+        else:
+            at = bisect_right(ends, begin)
+            end = ends[at] if at < len(ends) else len(kind)
+            if end < len(kind) and kind[end] == PLANNED:  # the body never reached it
+                end += 1
+        yield begin, end
+        begin = end
+
+
+def _keys_of(run: "Run", plan: FloorPlan, entity: str) -> dict[str, Any]:
     """Return the key frames of a body in lattice units, each column (n,)."""
     entities = run.manifest["entities"]
     names = [*entities["users"], *entities["robots"]]
@@ -128,84 +227,16 @@ def _keys_of(run: "Run", plan: FloorPlan, entity: str, clock: Clock) -> dict[str
     column = {n: rows[n].to_numpy() for n in ("step", "time", "x", "y", "heading", "away")}
     kind = compute.index_in(rows["kind"].cast("string"), array(KEY_KINDS)).to_numpy()
     xy = plan.lattice.to_lattice(np.stack([column["x"], column["y"]], axis=-1))
+    start = np.datetime64(run.manifest["start"], "us")
     return {
         "step": column["step"],
-        "time": (column["time"].astype("M8[us]") - np.datetime64(clock.start, "us")).astype(
-            np.int64
-        ),
+        "time": (column["time"].astype("M8[us]") - start).astype(np.int64),
         "kind": kind.astype(np.int64),
         "x": np.ascontiguousarray(xy[:, 0]),
         "y": np.ascontiguousarray(xy[:, 1]),
         "heading": np.rint(column["heading"] * (TURN / (2 * np.pi))).astype(np.int64) % TURN,
         "away": column["away"].astype(np.uint8),
     }
-
-
-def _trace(
-    run: "Run",
-    plan: FloorPlan,
-    entity: str,
-    clock: Clock,
-    keys: dict[str, Any],
-    stride: int,
-    out: Poses,
-) -> None:
-    """Fill `out` from the key frames, segment by segment, each up to the next one's begin."""
-    kind, step = keys["kind"], keys["step"]
-    walker = None
-    begin = 0
-    while begin < len(kind):
-        end = begin + 1
-        if kind[begin] == WALK:
-            stop = step[end] if end < len(kind) else clock.steps
-            walker = walker or _walker(run, plan, entity, clock)
-            _follow_walk(walker, keys, begin, int(stop), stride, out)
-        else:
-            while end < len(kind) and kind[end] not in (WALK, PLANNED):
-                end += 1
-            if end < len(kind) and kind[end] == PLANNED:  # the body never reached it
-                end += 1
-            stop = step[end] if end < len(kind) else clock.steps
-            _follow_track(keys, begin, end, int(stop), clock, stride, out)
-        begin = end
-
-
-def _follow_track(
-    keys: dict[str, Any], begin: int, end: int, stop: int, clock: Clock, stride: int, out: Poses
-) -> None:
-    part = Breakpoints(*(keys[name][begin:end] for name in Breakpoints._fields))
-    first = -(-int(keys["step"][begin]) // stride)
-    last = -(-stop // stride)
-    if last > first:
-        poses = Poses(
-            out.x[first:last], out.y[first:last], out.heading[first:last], out.away[first:last]
-        )
-        trace_track(part, first * stride * clock.step_us, stride * clock.step_us, poses)
-
-
-def _follow_walk(
-    walker: tuple[Home, Actor, Meander],
-    keys: dict[str, Any],
-    begin: int,
-    stop: int,
-    stride: int,
-    out: Poses,
-) -> None:
-    home, actor, behavior = walker
-    step = int(keys["step"][begin])
-    state = Pose(*(int(keys[n][begin]) for n in ("x", "y", "heading", "away")))
-    poses = empty_poses(stop - step + 1)
-    trace_meander(home.walls, actor.space.mesh, behavior.rule, step, state[:3], poses)
-    # The stored end of the walk; a walk without a step ended as the body was put elsewhere.
-    if begin + 1 < len(keys["x"]) and stop > step:
-        last = (poses.x[-1], poses.y[-1], poses.heading[-1])
-        if last != tuple(keys[name][begin + 1] for name in ("x", "y", "heading")):
-            raise ArtifactError(
-                f"the random walk of {actor.name} from step {step} on can't be rebuilt: it was"
-                " walked by other rules than those of its behavior 'meander', or by another version"
-            )
-    first = -(-step // stride)
-    paste_poses(out, first, poses, slice(first * stride - step, stop - step, stride))
 
 
 def _walker(run: "Run", plan: FloorPlan, entity: str, clock: Clock) -> tuple[Home, Actor, Meander]:
