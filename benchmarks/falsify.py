@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from fleet2d.scenario.compose import compose
-from fleet2d.studies.execution.executor import SerialExecutor
+from fleet2d.studies.executors import SerialExecutor
 from fleet2d.testing.search import FailureSearch, Subject, TryJob
 from fleet2d.testing.space import read_space
 

@@ -17,13 +17,18 @@ from collections.abc import Generator
 from pathlib import Path
 from typing import Any
 
-from fleet2d.studies.analysis.reader import open_study
-from fleet2d.studies.data.record import record_of
-from fleet2d.studies.driver import RunOptions, check_study, run_study
-from fleet2d.studies.execution.executor import Event, Executor, Finished, SerialExecutor
-from fleet2d.studies.execution.jobs import StudyJob, WorkerJob
+from fleet2d.studies.driver import RunOptions, StudyJob, check_study, run_study
 from fleet2d.studies.execution.local import LocalExecutor
-from fleet2d.studies.execution.schedule import TaskSchedule
+from fleet2d.studies.executors import (
+    Event,
+    Executor,
+    Finished,
+    SerialExecutor,
+    TaskSchedule,
+    WorkerJob,
+)
+from fleet2d.studies.reader import open_study
+from fleet2d.studies.records import record_of
 from fleet2d.studies.simulator import VariantOutcome
 
 EXAMPLES = Path(__file__).parents[1] / "examples" / "studies"

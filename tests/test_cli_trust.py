@@ -108,7 +108,7 @@ def hostile() -> dict[str, bytes]:
 
     from fleet2d.engine.simulation import Simulation
     from fleet2d.storage.files import FolderLock
-    from fleet2d.studies.data.journal import Journal
+    from fleet2d.studies.records import Journal
     from fleet2d.viewer.server.serve import PageServer
 
     dotted = b"\x80\x04\x8c\x13fleet2d.paper.speed\x8c\x10subprocess.Popen\x93\x8c\x04true\x85R."

@@ -26,7 +26,7 @@ from fleet2d.kernels.headings import TURN
 from fleet2d.kernels.mesh import SUB
 from fleet2d.routines.manners import Manners
 from fleet2d.routines.persona import bundled_names
-from fleet2d.studies.design.specification import StudyFile
+from fleet2d.studies.specification import StudyFile
 from fleet2d.testing.rate import rate_test
 from fleet2d.units import AngleDeg, Duration, Length, Share, Speed, TurnRateDeg
 

@@ -48,10 +48,10 @@ if TYPE_CHECKING:
     from fleet2d.sight.fov import FieldOfView as FieldOfView
     from fleet2d.sight.perception_error import PerceptionError as PerceptionError
     from fleet2d.sight.region import VisibleRegion as VisibleRegion
-    from fleet2d.studies.analysis.reader import Study as Study
-    from fleet2d.studies.analysis.reader import open_study as open_study
     from fleet2d.studies.api import map_runs as map_runs
     from fleet2d.studies.api import study as study
+    from fleet2d.studies.reader import Study as Study
+    from fleet2d.studies.reader import open_study as open_study
     from fleet2d.units import Duration as Duration
     from fleet2d.units import Length as Length
     from fleet2d.units import Share as Share

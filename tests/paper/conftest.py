@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import pytest
 
 from fleet2d.paper import months
-from fleet2d.studies.execution.executor import SerialExecutor
+from fleet2d.studies.executors import SerialExecutor
 
 
 @pytest.fixture(scope="module")

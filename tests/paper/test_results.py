@@ -16,8 +16,8 @@ from fleet2d.paper.result import Result, Table, make_directory
 from fleet2d.paper.results import RESULTS, check_names, reproduce
 from fleet2d.paper.watched import FrameSeries
 from fleet2d.scenario.model import load_scenario
-from fleet2d.studies.design.specification import read_specification
-from fleet2d.studies.design.variants import Design, build_design
+from fleet2d.studies.design import Design, build_design
+from fleet2d.studies.specification import read_specification
 
 PNG = b"\x89PNG\r\n\x1a\n"
 TINY = PaperOptions(quick=True, seeds=1, days=2)

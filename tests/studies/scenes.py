@@ -8,10 +8,10 @@ from typing import Any
 import pytest
 from tests.scenes import scenario
 
-from fleet2d.studies.analysis.reader import Study, open_study
-from fleet2d.studies.data.results import Counts
+from fleet2d.studies.directory import Counts
 from fleet2d.studies.driver import RunOptions, check_study, run_study
-from fleet2d.studies.execution.executor import Executor, SerialExecutor
+from fleet2d.studies.executors import Executor, SerialExecutor
+from fleet2d.studies.reader import Study, open_study
 
 SPEED = "robots.astro.speed"
 

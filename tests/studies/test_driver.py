@@ -12,15 +12,11 @@ from tests.studies.scenes import SPEED, base, digests, run, small
 from tests.thorough import some
 
 from fleet2d.errors import ArtifactError, RunDirectoryError, ScenarioError
-from fleet2d.studies import driver
-from fleet2d.studies.analysis.reader import open_study
-from fleet2d.studies.design import identity
-from fleet2d.studies.execution import jobs
-from fleet2d.studies.execution.executor import Event, SerialExecutor
-from fleet2d.studies.execution.jobs import WorkerJob
+from fleet2d.studies import design, driver
 from fleet2d.studies.execution.local import LocalExecutor
-from fleet2d.studies.execution.schedule import TaskSchedule
-from fleet2d.studies.plan import catalogue
+from fleet2d.studies.executors import Event, SerialExecutor, TaskSchedule, WorkerJob
+from fleet2d.studies.plan import Changed
+from fleet2d.studies.reader import open_study
 
 ROWS = {"keep": {"tables": ["room_share"]}}
 BROKEN = """from fleet2d import Algorithm
@@ -209,9 +205,9 @@ def test_results_of_another_scenario_are_refused_until_told_to_redo(copied: Path
 
 @pytest.mark.parametrize(("changed", "runs"), [("redo", 6), ("keep", 0)])
 def test_results_of_other_code_are_refused_until_told_what_to_do(
-    copied: Path, monkeypatch: pytest.MonkeyPatch, changed: catalogue.Changed, runs: int
+    copied: Path, monkeypatch: pytest.MonkeyPatch, changed: Changed, runs: int
 ) -> None:
-    monkeypatch.setattr(identity, "code_version", lambda: "another")
+    monkeypatch.setattr(design, "code_version", lambda: "another")
     with pytest.raises(RunDirectoryError, match="6 of the same scenarios, by other code"):
         run(small(**ROWS), copied)
     executor = CountingExecutor()
@@ -310,7 +306,7 @@ def test_a_file_that_changes_during_a_study_fails_its_variants(
 
     counts, study = run(failing, tmp_path / "study", Meddling())
     assert 3 == counts.failed
-    assert {jobs.CHANGED} == set(study.failures["error"])
+    assert {driver.CHANGED} == set(study.failures["error"])
 
 
 @pytest.mark.parametrize("workers", some([2, 1, 4], 3))

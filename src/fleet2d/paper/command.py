@@ -47,7 +47,7 @@ def reproduce_paper(
     from fleet2d.paper.months import PaperOptions
     from fleet2d.paper.result import make_directory
     from fleet2d.paper.results import check_names, reproduce
-    from fleet2d.studies.execution.executor import cores
+    from fleet2d.studies.executors import cores
 
     names = check_names(results or [])
     options = PaperOptions(quick, seeds, days, workers or cores(), real_map, out / "studies")

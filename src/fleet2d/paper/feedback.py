@@ -15,7 +15,7 @@ from fleet2d.paper.months import USER, OnProgress, PaperOptions, interval, month
 from fleet2d.paper.result import Result, Table, counted
 
 if TYPE_CHECKING:
-    from fleet2d.studies.analysis.reader import Study
+    from fleet2d.studies.reader import Study
 
 NAME = "feedback"
 TITLE = "The feedback loop: error of long-term presence by what the robot does"

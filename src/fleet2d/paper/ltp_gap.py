@@ -15,7 +15,7 @@ from fleet2d.paper.months import CAMERA, USER, OnProgress, PaperOptions, month, 
 from fleet2d.paper.result import Result, Table, counted
 
 if TYPE_CHECKING:
-    from fleet2d.studies.analysis.reader import Study
+    from fleet2d.studies.reader import Study
 
 NAME = "ltp-gap"
 TITLE = "Fig. 7 left: gap of long-term presence by days"

@@ -8,11 +8,11 @@ from typing import Any
 
 from fleet2d.errors import ComponentError
 from fleet2d.studies import driver
-from fleet2d.studies.analysis.intervals import estimate
-from fleet2d.studies.analysis.reader import Study, open_study
-from fleet2d.studies.data.record import VariantRecord
-from fleet2d.studies.data.results import Counts
+from fleet2d.studies.answers import estimate
+from fleet2d.studies.directory import Counts
 from fleet2d.studies.execution.local import LocalExecutor
+from fleet2d.studies.reader import Study, open_study
+from fleet2d.studies.records import VariantRecord
 
 OnProgress = Callable[[str, int, int], None]
 """A function that receives progress: the name of the phase, the finished steps, and all steps."""

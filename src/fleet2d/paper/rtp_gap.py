@@ -14,7 +14,7 @@ from fleet2d.paper.months import USER, OnProgress, PaperOptions, interval, month
 from fleet2d.paper.result import Result, Table, counted
 
 if TYPE_CHECKING:
-    from fleet2d.studies.analysis.reader import Study
+    from fleet2d.studies.reader import Study
 
 NAME = "rtp-gap"
 TITLE = "Fig. 7 right: accuracy of real-time presence by last-seen gap"

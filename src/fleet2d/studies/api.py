@@ -2,23 +2,29 @@
 
 import pickle
 import sys
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, TypeVar
 
 from fleet2d.errors import ComponentError, InputError
 from fleet2d.runs.run import Run
 from fleet2d.scenario.model import Scenario
-from fleet2d.studies.analysis.reader import Study, open_study
-from fleet2d.studies.data.record import WorkerTask
-from fleet2d.studies.design.specification import read_specification
 from fleet2d.studies.driver import RunOptions, check_study, run_study
-from fleet2d.studies.execution.executor import Executor, LostTask, SerialExecutor, cores
-from fleet2d.studies.execution.jobs import FunctionJob
 from fleet2d.studies.execution.local import LocalExecutor
-from fleet2d.studies.execution.schedule import TaskSchedule
-from fleet2d.studies.plan.catalogue import Changed
+from fleet2d.studies.executors import (
+    Executor,
+    LostTask,
+    SerialExecutor,
+    TaskSchedule,
+    WorkerTask,
+    cores,
+)
+from fleet2d.studies.plan import Changed
 from fleet2d.studies.progress import observing
+from fleet2d.studies.reader import Study, open_study
+from fleet2d.studies.simulator import describe_error, run_scenario
+from fleet2d.studies.specification import read_specification
 
 Result = TypeVar("Result")
 ExecutorName = Literal["local", "ray", "serial"]
@@ -126,7 +132,7 @@ def make_executor(executor: ExecutorName | Executor, workers: int | None = None)
     if executor == "serial":
         return SerialExecutor()
     if executor == "ray":
-        from fleet2d.studies.execution.ray_executor import RayExecutor
+        from fleet2d.studies.ray_executor import RayExecutor
 
         return RayExecutor(workers)
     raise InputError(f"there is no executor {executor!r}: give local, ray or serial")
@@ -165,3 +171,37 @@ def _resolve(scenario: Any) -> Any:
     from fleet2d.scenario.model import load_scenario
 
     return load_scenario(scenario).resolved()
+
+
+@dataclass
+class FunctionJob:
+    """Runs scenarios, and calls a function with each run.
+
+    Attributes:
+        function: The function, pickled.
+        scenarios: The scenarios, in the order of the tasks' indices.
+    """
+
+    function: bytes
+    scenarios: Sequence[Any]
+
+    def __call__(self, task: WorkerTask) -> bytes:
+        """Return what the function returns, or the error, pickled."""
+        try:
+            scenario = self.scenarios[task.index]
+            return pickle.dumps((True, self._call(run_scenario(scenario))))
+        except Exception as error:  # noqa: BLE001 - raised again in the driver
+            return pickle.dumps((False, _portable(error)))
+
+    def _call(self, run: Run) -> Any:
+        function: Callable[[Run], Any] = pickle.loads(self.function)  # noqa: S301 - our own
+        return function(run)
+
+
+def _portable(error: Exception) -> Exception:
+    """Return the error if it can be pickled, else one with the same text."""
+    try:
+        pickle.loads(pickle.dumps(error))  # noqa: S301 - our own
+    except Exception:  # noqa: BLE001 - errors of users may do anything
+        return RuntimeError(describe_error(error))
+    return error

@@ -16,8 +16,8 @@ from fleet2d.errors import InputError
 from fleet2d.trust_options import TrustFiles, TrustFolders, restrict_to
 
 if TYPE_CHECKING:
-    from fleet2d.studies.analysis.reader import Study
     from fleet2d.studies.driver import CheckedStudy
+    from fleet2d.studies.reader import Study
 
 studying = typer.Typer(
     help="Run many scenarios as one experiment, resumable, ending in an answer.",
@@ -90,8 +90,7 @@ def status(
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
     """Print the progress of a study, even while it is being run."""
-    from fleet2d.studies.data.directory import StudyDirectory
-    from fleet2d.studies.data.results import count
+    from fleet2d.studies.directory import StudyDirectory, count
 
     directory = StudyDirectory(location)
     meta = directory.read_meta()
@@ -118,7 +117,7 @@ def rerun(
     trust_dir: TrustFolders = None,
 ) -> None:
     """Run one variant again, and compare its digest with the stored one."""
-    from fleet2d.studies.analysis.reader import open_study
+    from fleet2d.studies.reader import open_study
 
     study = open_study(location)
     number = _number_of(study, variant)
@@ -147,8 +146,8 @@ def report(
     ] = None,
 ) -> None:
     """Write one self-contained HTML page of answers, and its figures as files."""
-    from fleet2d.studies.analysis.reader import open_study
-    from fleet2d.studies.analysis.report import write_report
+    from fleet2d.studies.reader import open_study
+    from fleet2d.studies.report import write_report
 
     if out is None and "://" in location:
         raise InputError(
@@ -159,10 +158,9 @@ def report(
 
 def _print_plan(checked: "CheckedStudy", workers: int | None) -> None:
     """Print the axes, the first variants, and the time that all will take."""
-    from fleet2d.studies.execution.executor import cores
     from fleet2d.studies.execution.local import LocalExecutor
-    from fleet2d.studies.plan.forecast import forecast
-    from fleet2d.studies.plan.study_plan import check_setups
+    from fleet2d.studies.executors import cores
+    from fleet2d.studies.plan import check_setups, forecast
     from fleet2d.studies.progress import in_words
 
     plan = checked.plan
@@ -186,7 +184,7 @@ def _print_plan(checked: "CheckedStudy", workers: int | None) -> None:
 
 
 def _print_failures(location: str) -> None:
-    from fleet2d.studies.analysis.reader import open_study
+    from fleet2d.studies.reader import open_study
 
     table = open_study(location).arrow_variants.select(["variant", "status", "error"])
     failed = [row for row in table.to_pylist() if row["status"] == "failed"]
@@ -243,9 +241,9 @@ def tune(
 ) -> None:
     """Search parameters on training homes, and judge the best on other homes."""
     from fleet2d.studies.api import default_location, make_executor
-    from fleet2d.studies.design.specification import read_specification
     from fleet2d.studies.progress import observing_trials
-    from fleet2d.studies.tune.tuning import tune as search
+    from fleet2d.studies.specification import read_specification
+    from fleet2d.studies.tuning import tune as search
 
     with restrict_to(trust, trust_dir):
         specification = read_specification(source)

@@ -7,30 +7,84 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from fleet2d.errors import ArtifactError
-from fleet2d.studies.data.directory import VARIANTS, Meta, StudyDirectory
-from fleet2d.studies.data.journal import Journal
-from fleet2d.studies.data.parts import Part, drop_part
-from fleet2d.studies.data.record import VariantRecord, WorkerTask, record_of
-from fleet2d.studies.data.results import Counts, statuses, write_variants
-from fleet2d.studies.design.identity import code_version
-from fleet2d.studies.design.specification import Specification, read_specification
-from fleet2d.studies.design.variants import build_design
-from fleet2d.studies.execution.executor import Event, Executor, LostTask
-from fleet2d.studies.execution.jobs import StudyJob
-from fleet2d.studies.execution.schedule import TaskSchedule
-from fleet2d.studies.plan.catalogue import (
+from fleet2d.errors import ArtifactError, Fleet2DError
+from fleet2d.studies.design import (
+    Design,
+    FileHashes,
+    build_design,
+    code_version,
+    identity,
+    input_hash,
+    scenario_content,
+)
+from fleet2d.studies.directory import (
+    VARIANTS,
+    Counts,
+    Meta,
+    StudyDirectory,
+    statuses,
+    write_variants,
+)
+from fleet2d.studies.executors import Event, Executor, LostTask, TaskSchedule, WorkerTask
+from fleet2d.studies.parts import Part, drop_part
+from fleet2d.studies.plan import (
     Changed,
     ReconciledPlan,
     ScenarioFile,
+    StudyPlan,
+    check_setups,
+    make_plan,
     reconcile,
     write_catalogue,
 )
-from fleet2d.studies.plan.study_plan import StudyPlan, check_setups, make_plan
-from fleet2d.studies.simulator import VariantOutcome
+from fleet2d.studies.records import Journal, VariantRecord, record_of
+from fleet2d.studies.simulator import VariantOutcome, describe_error, execute
+from fleet2d.studies.specification import Specification, read_specification
+from fleet2d.trust import Trust, current_trust, restrict
 
 PART_BYTES = 64_000_000  # size at which a journal becomes a part
 PART_S_REMOTE = 60.0  # the longest time that results for a store are on this machine only
+CHANGED = (
+    "a file that the variant reads, or Fleet2D itself, changed after the study began: run the study"
+    " again"
+)
+
+
+@dataclass
+class StudyJob:
+    """Runs variants of a design.
+
+    Attributes:
+        design: The design.
+        metrics: Patterns of the numbers to keep.
+        tables: Names of the tables to keep.
+        trust: The code that workers may run; None: any.
+    """
+
+    design: Design
+    metrics: tuple[str, ...]
+    tables: tuple[str, ...]
+    trust: Trust | None = field(default_factory=current_trust)
+
+    def __call__(self, task: WorkerTask) -> bytes:
+        """Run a variant; return its record, with the error if it fails."""
+        with restrict(self.trust):
+            return record_of(task, self._outcome(task)).encode()
+
+    def _outcome(self, task: WorkerTask) -> VariantOutcome:
+        try:
+            scenario = self.design.scenario(task.index)
+            inputs = input_hash(scenario, self._files)
+        except Fleet2DError as error:  # a file changed after the study was planned
+            return VariantOutcome("failed", error=describe_error(error))
+        current, _ = identity(scenario_content(scenario), inputs)
+        if current != task.identity:
+            return VariantOutcome("failed", error=CHANGED)
+        return execute(scenario, self.metrics, self.tables)
+
+    def __post_init__(self) -> None:
+        """Start with no hashes."""
+        self._files = FileHashes()
 
 
 class Observer:

@@ -11,9 +11,9 @@ from fleet2d.studies.driver import Observer
 if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
 
-    from fleet2d.studies.data.record import VariantRecord
-    from fleet2d.studies.data.results import Counts
-    from fleet2d.studies.tune.tuning import TuneObserver
+    from fleet2d.studies.directory import Counts
+    from fleet2d.studies.records import VariantRecord
+    from fleet2d.studies.tuning import TuneObserver
 
 
 class BarObserver(Observer):

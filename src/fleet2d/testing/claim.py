@@ -116,8 +116,8 @@ class Claim:
         """The variants of the scenario along its axes, checked; without axes only itself."""
         if not self.varies:
             return (Variant(self.scenario),)
-        from fleet2d.studies.design.specification import read_specification
-        from fleet2d.studies.design.variants import build_design
+        from fleet2d.studies.design import build_design
+        from fleet2d.studies.specification import read_specification
 
         base, axes = self.scenario.resolved(), dict(self.axes)
         if self.households:

@@ -15,9 +15,7 @@ from fleet2d.document import Document
 from fleet2d.errors import InputError
 from fleet2d.extras import extra
 from fleet2d.problems import suggest
-from fleet2d.studies.data.record import WorkerTask
-from fleet2d.studies.execution.executor import Executor, LostTask
-from fleet2d.studies.execution.schedule import TaskSchedule
+from fleet2d.studies.executors import Executor, LostTask, TaskSchedule, WorkerTask
 from fleet2d.studies.simulator import describe_error
 from fleet2d.testing.claim import ATTRIBUTE, Claim, Variant
 from fleet2d.testing.running import Body, run_trial

@@ -14,10 +14,8 @@ from fleet2d.errors import Fleet2DError, InputError
 from fleet2d.problems import did_you_mean, refusal
 from fleet2d.scenario.compose import apply_changes, assignment
 from fleet2d.scenario.model import Scenario, scenario_of
-from fleet2d.studies.axes.choice import Choice, key_path
-from fleet2d.studies.axes.kinds import AnyAxis
-from fleet2d.studies.axes.sampling import Parameter
-from fleet2d.studies.tune.trials import suggested
+from fleet2d.studies.axes import AnyAxis, Choice, Parameter, key_path
+from fleet2d.studies.tuning import suggested
 
 if TYPE_CHECKING:
     import optuna

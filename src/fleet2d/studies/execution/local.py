@@ -13,19 +13,19 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from fleet2d.errors import InputError
-from fleet2d.studies.data.record import WorkerTask
-from fleet2d.studies.execution.executor import (
+from fleet2d.studies.execution.pipe import receive, send
+from fleet2d.studies.execution.worker import BROKEN, READY
+from fleet2d.studies.executors import (
     AHEAD,
     MOST_STARTS,
     Event,
     FinishedTask,
     LostTask,
+    TaskSchedule,
+    WorkerJob,
+    WorkerTask,
     retry,
 )
-from fleet2d.studies.execution.jobs import WorkerJob
-from fleet2d.studies.execution.pipe import receive, send
-from fleet2d.studies.execution.schedule import TaskSchedule
-from fleet2d.studies.execution.worker import BROKEN, READY
 
 MEMORY_SHARE = 0.8  # share of the machine's memory that all workers may use together
 

@@ -1,1 +1,0 @@
-"""The analysis of a study: its tables, statistics, figures and report."""

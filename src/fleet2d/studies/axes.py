@@ -1,0 +1,616 @@
+"""The axes of a study: lists, ranges, samples, homes, people, and combinations of them."""
+
+import itertools
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Any, ClassVar, Literal, Self, TypeVar
+
+import numpy as np
+from pydantic import AfterValidator, BeforeValidator, Field, model_validator
+
+from fleet2d.bounds import VARIANTS
+from fleet2d.component import Settings
+from fleet2d.document import Keys
+from fleet2d.errors import ScenarioError
+from fleet2d.extras import extra
+from fleet2d.kernels import F64
+from fleet2d.paths import folder_of
+from fleet2d.problems import did_you_mean, problem
+
+Label = str | int | float | bool | None
+"""The name of a choice in tables and messages; None where the axis does not apply."""
+
+
+@dataclass(frozen=True)
+class Choice:
+    """One value of an axis.
+
+    Attributes:
+        labels: Its label by column; an axis has one column, a group one for each of its axes.
+        changes: (key path, value) pairs that it sets in the scenario.
+    """
+
+    labels: Mapping[str, Label]
+    changes: tuple[tuple[Keys, Any], ...] = field(default=(), compare=False)
+
+    @property
+    def words(self) -> str:
+        """The choice as messages name it.
+
+        >>> Choice({"speed": 0.3, "robot": "slow"}).words
+        'speed = 0.3, robot = slow'
+        """
+        return ", ".join(f"{column} = {label}" for column, label in self.labels.items())
+
+
+def key_path(text: str) -> Keys:
+    """Split 'robots.astro.speed' into its keys.
+
+    Raises:
+        ScenarioError: A part is empty.
+    """
+    keys = tuple(part.strip() for part in text.split("."))
+    if not all(keys):
+        raise ScenarioError(f"expected a key path like robots.astro.speed, got {text!r}")
+    return keys
+
+
+def label_values(values: Sequence[Any]) -> list[Label]:
+    """Return a label for each value: itself, else its `type`, else its number from 1.
+
+    >>> label_values([0.3, "fast"]), label_values([{"type": "patrol"}, {"type": "hangout"}])
+    ([0.3, 'fast'], ['patrol', 'hangout'])
+    """
+    labels = [_own_label(value) for value in values]
+    if None not in labels and len({repr(label) for label in labels}) == len(values):
+        return labels
+    if all(value is None or isinstance(value, str | int | float) for value in values):
+        return ["none" if label is None else label for label in labels]
+    return [f"{number}" for number in range(1, len(values) + 1)]
+
+
+def _own_label(value: Any) -> Label:
+    if isinstance(value, str):
+        return str(value)
+    if isinstance(value, bool | int | float):
+        return value
+    kind = value.get("type") if isinstance(value, Mapping) else None
+    return str(kind) if isinstance(kind, str) else None
+
+
+class Axis(Settings):
+    """Base class of axes.
+
+    Attributes:
+        is_population: Whether its values are a sample of a population (homes, people); the
+            intervals of answers hold over populations.
+        when: The axis applies only where other axes have these values: {robot: hangout}; a list:
+            any of them.
+    """
+
+    is_population: ClassVar[bool] = False
+
+    when: dict[str, Any] = Field(default={})
+
+    def columns(self, name: str) -> tuple[str, ...]:
+        """Return the columns of its labels."""
+        return (name,)
+
+    def populations(self, name: str) -> tuple[str, ...]:
+        """Return its columns whose values are a sample of a population."""
+        return self.columns(name) if self.is_population else ()
+
+    def choices(self, name: str) -> list[Choice]:
+        """Return the label and the scenario changes of each value of the axis, in order.
+
+        Raises:
+            InputError: A file or a package is missing.
+        """
+        raise NotImplementedError
+
+
+Number = TypeVar("Number", int, float)
+
+
+def check_count(count: Number) -> Number:
+    """Return a count, unless so many values are too many for one study.
+
+    Raises:
+        PydanticCustomError: They are.
+    """
+    if count > VARIANTS.most:
+        raise problem(
+            f"more than {VARIANTS.most:,} values are too many for one study; to allow more, set"
+            f" {VARIANTS.variable} in the environment"
+        )
+    return count
+
+
+Count = Annotated[int, AfterValidator(check_count)]
+"""A number of values that fits into one study."""
+
+
+Method = Literal["random", "latin_hypercube"]
+DIGITS = 6  # significant digits of a sampled number, so that tables print the very value
+
+
+class Parameter(Settings):
+    """One sampled or searched parameter: a range, or a list to choose from.
+
+    Attributes:
+        key: The key path that it sets.
+        low: The smallest value.
+        high: The largest value.
+        log: Whether values are uniform in the logarithm.
+        integer: Whether values are whole numbers.
+        unit: The unit to write after the number: d, cm, %.
+        choices: A list to choose from, instead of a range.
+    """
+
+    key: str
+    low: float | None = None
+    high: float | None = None
+    log: bool = False
+    integer: bool = False
+    unit: str = ""
+    choices: tuple[Any, ...] = ()
+
+    @model_validator(mode="after")
+    def _one_way(self) -> Self:
+        if self.choices:
+            if self.low is not None or self.high is not None:
+                raise problem("give low and high, or choices, not both")
+            return self
+        if self.low is None or self.high is None or not self.low < self.high:
+            raise problem("give low and high, low below high; or choices")
+        if self.log and self.low <= 0:
+            raise problem(f"low is {self.low:g}; with log it must be above 0")
+        return self
+
+    def at(self, share: float) -> Any:
+        """Return the value at a share of the range, from 0 to 1.
+
+        >>> Parameter(key="a.b", low=1, high=100, log=True).at(0.5)
+        10.0
+        """
+        if self.choices:
+            return self.choices[min(int(share * len(self.choices)), len(self.choices) - 1)]
+        assert self.low is not None
+        assert self.high is not None
+        if self.integer:
+            return min(int(self.low + share * (self.high - self.low + 1)), int(self.high))
+        if self.log:
+            return rounded(math.exp(math.log(self.low) + share * math.log(self.high / self.low)))
+        return rounded(self.low + share * (self.high - self.low))
+
+    def with_unit(self, value: Any) -> Any:
+        """Return a value as the scenario file spells it, with its unit.
+
+        >>> Parameter(key="a.b", low=1, high=9, unit="d").with_unit(2.5)
+        '2.5 d'
+        """
+        return f"{value!r} {self.unit}" if self.unit and not self.choices else value
+
+
+def rounded(value: float, digits: int = DIGITS) -> float:
+    """Return a number rounded to a number of significant digits.
+
+    >>> rounded(0.123456789)
+    0.123457
+    """
+    return float(f"{value:.{digits}g}")
+
+
+def shares(method: Method, count: int, dimensions: int, seed: int) -> F64:
+    """Return points of the unit cube: float64 (count, dimensions), the same at each call.
+
+    Raises:
+        InputError: scipy is missing, which Latin hypercubes need.
+    """
+    generator = np.random.Generator(np.random.Philox(seed))
+    if method == "random":
+        return generator.random((count, dimensions))
+    with extra("study", "a Latin hypercube needs scipy"):
+        from scipy.stats import qmc
+    return qmc.LatinHypercube(dimensions, rng=generator).random(count)
+
+
+def draw(
+    parameters: Mapping[str, Parameter], method: Method, count: int, seed: int
+) -> list[dict[str, Any]]:
+    """Return `count` samples, each a mapping of parameter name to value."""
+    points = shares(method, count, len(parameters), seed)
+    return [
+        {
+            name: parameter.at(float(share))
+            for (name, parameter), share in zip(parameters.items(), row, strict=True)
+        }
+        for row in points
+    ]
+
+
+def _texts(value: Any) -> tuple[Any, ...]:
+    """Return a text or a list of texts as a tuple; each keeps the folder of its file."""
+    texts = (value,) if isinstance(value, str | Path) else value
+    if not isinstance(texts, list | tuple) or not all(isinstance(t, str | Path) for t in texts):
+        raise problem(f"expected a text or a list of texts, got {value!r}")
+    return tuple(texts)
+
+
+Texts = Annotated[Any, BeforeValidator(_texts)]
+
+
+class FloorplansAxis(Axis):
+    """Floor plans: the files of a folder or a pattern, or a list of files.
+
+    Attributes:
+        floorplans: A folder, a pattern, or files.
+        settings: Further keys of the floor plan, such as furnish.
+    """
+
+    is_population: ClassVar[bool] = True
+
+    floorplans: Texts
+    settings: dict[str, Any] = Field(default={})
+
+    def choices(self, name: str) -> list[Choice]:
+        """Return a choice for each floor plan; its label is the name of its file.
+
+        Raises:
+            ScenarioError: There is no such file, or one is not a floor plan.
+        """
+        files = self._files()
+        labels = [path.stem for path in files]
+        if len(set(labels)) < len(labels):
+            labels = [path.name for path in files]
+        return [
+            Choice({name: label}, ((("floorplan",), self._section(path)),))
+            for label, path in zip(labels, files, strict=True)
+        ]
+
+    def _files(self) -> list[Path]:
+        from fleet2d.floorplan.load import plan_suffixes
+
+        files: list[Path] = []
+        suffixes = plan_suffixes()
+        for pattern in self.floorplans:
+            path = folder_of(pattern) / Path(pattern).expanduser()
+            candidates = path.iterdir() if path.is_dir() else path.parent.glob(path.name)
+            plans = sorted(p for p in candidates if p.suffix.lower() in suffixes)
+            if not plans:
+                raise ScenarioError(
+                    f"no floor plan matches {pattern!r} in {folder_of(pattern)}: name a folder, a"
+                    f" pattern or a file that ends in {', '.join(suffixes)}"
+                )
+            files += plans
+        return files
+
+    def _section(self, path: Path) -> dict[str, Any]:
+        from fleet2d.floorplan.load import format_of_file
+
+        return {"type": format_of_file(path), "path": str(path.absolute()), **self.settings}
+
+
+class SyntheticAxis(Axis):
+    """Synthetic homes by their seeds.
+
+    Attributes:
+        synthetic: The number of homes, from seed 0 on; or a list of seeds.
+        first: The first seed, if `synthetic` is a number.
+        settings: Further keys of the homes, such as area_m2 and furnish.
+    """
+
+    is_population: ClassVar[bool] = True
+
+    synthetic: Count | tuple[int, ...]
+    first: int = Field(default=0, ge=0)
+    settings: dict[str, Any] = Field(default={})
+
+    def choices(self, name: str) -> list[Choice]:
+        """Return a choice for each home; its label is its seed."""
+        seeds = self.synthetic
+        if isinstance(seeds, int):
+            seeds = tuple(range(self.first, self.first + seeds))
+        return [
+            Choice(
+                {name: seed},
+                ((("floorplan",), {"type": "synthetic", "seed": seed, **self.settings}),),
+            )
+            for seed in seeds
+        ]
+
+
+class PersonasAxis(Axis):
+    """Personas of one user: the bundled ones, or files of your own.
+
+    Attributes:
+        personas: `all`, or a list of names and files.
+        user: The name of the user who has the persona.
+    """
+
+    is_population: ClassVar[bool] = True
+
+    personas: Texts
+    user: str
+
+    def choices(self, name: str) -> list[Choice]:
+        """Return a choice for each persona."""
+        from fleet2d.routines.persona import bundled_names
+
+        personas = bundled_names() if self.personas == ("all",) else self.personas
+        user = ("users", self.user)
+        return [
+            Choice(
+                {name: Path(persona).stem},
+                (((*user, "type"), "routine"), ((*user, "persona"), persona)),
+            )
+            for persona in personas
+        ]
+
+
+class ValuesAxis(Axis):
+    """A list of values of one key, or of several keys that have the same value.
+
+    Attributes:
+        key: The key path, or several.
+        values: The values.
+        labels: What the values are called.
+    """
+
+    key: str | tuple[str, ...]
+    values: tuple[Any, ...] = Field(min_length=1)
+    labels: tuple[str, ...] = ()
+
+    @model_validator(mode="after")
+    def _as_many_labels(self) -> Self:
+        if self.labels and len(self.labels) != len(self.values):
+            raise problem(f"there are {len(self.labels)} labels for {len(self.values)} values")
+        return self
+
+    def choices(self, name: str) -> list[Choice]:
+        """Return a choice for each value."""
+        keys = (self.key,) if isinstance(self.key, str) else self.key
+        paths = [key_path(key) for key in keys]
+        labels = self.labels or label_values(self.values)
+        return [
+            Choice({name: label}, tuple((path, value) for path in paths))
+            for label, value in zip(labels, self.values, strict=True)
+        ]
+
+
+class RangeAxis(Axis):
+    """Evenly spaced numbers of a range, by their step or their count.
+
+    Attributes:
+        key: The key path.
+        range: First and last number.
+        step: Difference between consecutive numbers.
+        count: The number of values, instead of a step.
+        log: With `count`: whether consecutive numbers differ by a constant factor.
+        unit: The unit to write after the number: d, cm, %.
+    """
+
+    key: str
+    range: tuple[float, float]
+    step: float | None = Field(default=None, gt=0)
+    count: Count | None = Field(default=None, ge=2)
+    log: bool = False
+    unit: str = ""
+
+    @model_validator(mode="after")
+    def _step_or_count(self) -> Self:
+        first, last = self.range
+        if (self.step is None) == (self.count is None):
+            raise problem("give step, or count")
+        if not first < last:
+            raise problem(f"the first number, {first:g}, must be below the last, {last:g}")
+        if self.step is not None:
+            check_count((last - first) / self.step)
+        if self.log and (first <= 0 or self.count is None):
+            raise problem("log needs a count, and numbers above 0")
+        return self
+
+    def numbers(self) -> list[float]:
+        """Return the numbers, rounded so that 0.1 + 0.2 is 0.3.
+
+        >>> RangeAxis(key="a.b", range=(0.1, 0.5), step=0.2).numbers()
+        [0.1, 0.3, 0.5]
+        """
+        first, last = self.range
+        if self.step is not None:
+            steps = math.floor((last - first) / self.step + 1e-9)
+            return [rounded(first + i * self.step, 12) for i in range(steps + 1)]
+        assert self.count is not None
+        shares = [i / (self.count - 1) for i in range(self.count)]
+        if self.log:
+            return [rounded(first * (last / first) ** share) for share in shares]
+        return [rounded(first + share * (last - first), 12) for share in shares]
+
+    def choices(self, name: str) -> list[Choice]:
+        """Return a choice for each number; whole numbers stay whole."""
+        numbers = self.numbers()
+        are_whole = all(number.is_integer() for number in numbers)
+        values: list[Any] = [int(number) if are_whole else number for number in numbers]
+        path = key_path(self.key)
+        return [
+            Choice({name: value}, ((path, f"{value!r} {self.unit}" if self.unit else value),))
+            for value in values
+        ]
+
+
+class OptionsAxis(Axis):
+    """Named options, each a set of changes.
+
+    Attributes:
+        options: The options by name, each {key path: value, …}.
+        population: Whether the options are a sample of a population, as homes and people are.
+    """
+
+    options: dict[str, dict[str, Any]] = Field(min_length=1)
+    population: bool = False
+
+    def populations(self, name: str) -> tuple[str, ...]:
+        """Return its column if its options are a sample of a population."""
+        return (name,) if self.population else ()
+
+    def choices(self, name: str) -> list[Choice]:
+        """Return a choice for each option."""
+        return [
+            Choice({name: label}, tuple((key_path(k), v) for k, v in changes.items()))
+            for label, changes in self.options.items()
+        ]
+
+
+class SampleAxis(Axis):
+    """Random or Latin-hypercube samples of several parameters at once.
+
+    Attributes:
+        sample: The parameters, by column.
+        count: The number of samples.
+        method: The sampling method, `latin_hypercube` or `random`.
+        seed: The seed of the samples.
+    """
+
+    sample: dict[str, Parameter] = Field(min_length=1)
+    count: Count = Field(ge=1)
+    method: Method = "latin_hypercube"
+    seed: int = Field(default=0, ge=0)
+
+    def columns(self, name: str) -> tuple[str, ...]:
+        """Return a column for each parameter."""
+        return tuple(self.sample)
+
+    def choices(self, name: str) -> list[Choice]:
+        """Return a choice for each sample.
+
+        Raises:
+            InputError: scipy is missing, which Latin hypercubes need.
+        """
+        choices = []
+        labels = {
+            column: dict(zip(map(repr, p.choices), label_values(p.choices), strict=True))
+            for column, p in self.sample.items()
+        }
+        for values in draw(self.sample, self.method, self.count, self.seed):
+            names: dict[str, Label] = {
+                column: labels[column].get(repr(value), value) for column, value in values.items()
+            }
+            changes = tuple(
+                (key_path(self.sample[column].key), self.sample[column].with_unit(value))
+                for column, value in values.items()
+            )
+            choices.append(Choice(names, changes))
+        return choices
+
+
+class _GroupAxis(Axis):
+    """Base class of axes that consist of other axes."""
+
+    def axes(self) -> "dict[str, Axis]":
+        """Return the axes of the group."""
+        raise NotImplementedError
+
+    def columns(self, name: str) -> tuple[str, ...]:
+        """Return the columns of all of its axes."""
+        return tuple(c for axis_name, axis in self.axes().items() for c in axis.columns(axis_name))
+
+    def populations(self, name: str) -> tuple[str, ...]:
+        """Return the columns of its axes whose values are a sample of a population."""
+        return tuple(
+            c for axis_name, axis in self.axes().items() for c in axis.populations(axis_name)
+        )
+
+    def _join(self, rows: Iterator[tuple[Choice, ...]]) -> list[Choice]:
+        """Return a choice for each row: the labels and changes of all its parts."""
+        return [
+            Choice(
+                {column: label for part in row for column, label in part.labels.items()},
+                tuple(change for part in row for change in part.changes),
+            )
+            for row in rows
+        ]
+
+
+class ZipAxis(_GroupAxis):
+    """Axes of equal length in step: the first choices together, the second ones, and so on.
+
+    Attributes:
+        zip: The axes, by name.
+    """
+
+    zip: "dict[str, AnyAxis]" = Field(min_length=1)
+
+    def axes(self) -> dict[str, Axis]:
+        """Return the axes of the group."""
+        return self.zip
+
+    def choices(self, name: str) -> list[Choice]:
+        """Return a choice for each position of the axes.
+
+        Raises:
+            ScenarioError: The axes differ in length.
+        """
+        lists = {axis_name: axis.choices(axis_name) for axis_name, axis in self.zip.items()}
+        if len({len(choices) for choices in lists.values()}) > 1:
+            lengths = ", ".join(
+                f"{axis_name} has {len(choices)}" for axis_name, choices in lists.items()
+            )
+            raise ScenarioError(f"the axes of a zip must have equally many values: {lengths}")
+        return self._join(zip(*lists.values(), strict=True))
+
+
+class GridAxis(_GroupAxis):
+    """All combinations of the values of axes, as of the axes of a study itself.
+
+    Attributes:
+        grid: The axes, by name.
+    """
+
+    grid: "dict[str, AnyAxis]" = Field(min_length=1)
+
+    def axes(self) -> dict[str, Axis]:
+        """Return the axes of the group."""
+        return self.grid
+
+    def choices(self, name: str) -> list[Choice]:
+        """Return a choice for each combination; the last axis changes fastest."""
+        lists = (axis.choices(axis_name) for axis_name, axis in self.grid.items())
+        return self._join(itertools.product(*lists))
+
+
+KINDS: dict[str, type[Axis]] = {
+    "values": ValuesAxis,
+    "range": RangeAxis,
+    "options": OptionsAxis,
+    "floorplans": FloorplansAxis,
+    "synthetic": SyntheticAxis,
+    "personas": PersonasAxis,
+    "sample": SampleAxis,
+    "zip": ZipAxis,
+    "grid": GridAxis,
+}
+"""The kinds of axes by the key that only they have."""
+
+
+def _axis_of(value: Any) -> Any:
+    """Choose the kind of an axis by the key that only it has."""
+    if isinstance(value, Axis):
+        return value
+    if not isinstance(value, Mapping):
+        raise problem(f"expected an axis like {{key: PATH, values: […]}}, got {value!r}")
+    kinds = [kind for kind in KINDS if kind in value]
+    if len(kinds) != 1:
+        unknown = next((key for key in value if key not in ("key", "when")), "")
+        hint = did_you_mean(unknown, KINDS) if not kinds else "."
+        keys = " and ".join(kinds) or ", ".join(map(repr, value)) or "nothing"
+        raise problem(f"expected exactly one of {', '.join(KINDS)}, got {keys}{hint}")
+    return KINDS[kinds[0]].model_validate(value)
+
+
+AnyAxis = Annotated[Axis, BeforeValidator(_axis_of)]
+"""A field that takes an axis of any kind."""
+
+ZipAxis.model_rebuild()
+GridAxis.model_rebuild()

@@ -1,1 +1,0 @@
-"""Axes of a study: lists, ranges, grids, samples, homes and people."""

@@ -1,1 +1,0 @@
-"""The stored data of a study: its folder, journal, parts and results."""

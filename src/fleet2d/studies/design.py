@@ -1,0 +1,379 @@
+"""The design of a study: its variants, the scenario of each, and its identity."""
+
+import hashlib
+import json
+import math
+import platform
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache, cached_property
+from pathlib import Path
+from typing import Any
+
+from fleet2d import version
+from fleet2d.document import Document
+from fleet2d.errors import InputError, ScenarioError
+from fleet2d.problems import suggest
+from fleet2d.scenario.compose import apply_changes, assignment, merge
+from fleet2d.scenario.model import Scenario, scenario_of
+from fleet2d.studies.axes import Choice, Label, key_path
+from fleet2d.studies.simulator import files_of
+from fleet2d.studies.specification import SEED, Specification
+
+DIGITS = 32  # hexadecimal digits of a hash
+# Packages that run, show or evaluate simulations without changing their results.
+_LEAVES = ("studies", "cli", "pictures", "viewer", "paper", "fit", "calibrate", "published")
+_SUFFIXES = (".py", ".so", ".yaml", ".json")
+_NO_EFFECT = ("max_span", "speedup")  # keys of `simulation` that change no result
+
+
+@cache
+def code_version() -> str:
+    """Return the version of Fleet2D with a hash of the files that can change a run.
+
+    It is constant for a release; in a checkout it changes with every edit of such a file.
+    """
+    root = Path(version.__file__).parent
+    digest = hashlib.sha256()
+    for path in sorted(root.rglob("*")):
+        name = path.relative_to(root)
+        if path.suffix in _SUFFIXES and name.parts[0] not in _LEAVES:
+            digest.update(name.as_posix().encode() + b"\0")
+            digest.update(hashlib.sha256(path.read_bytes()).digest())
+    python = ".".join(platform.python_version_tuple()[:2])
+    return f"fleet2d {version.__version__}, python {python}, files {digest.hexdigest()[:DIGITS]}"
+
+
+class FileHashes:
+    """Hashes of input files; a file is read again only after it changed."""
+
+    def __init__(self) -> None:
+        self._hashes: dict[tuple[str, int, int], str] = {}
+
+    def __getitem__(self, path: Path) -> str:
+        """Return the SHA-256 of a file.
+
+        Raises:
+            InputError: The file can't be read.
+        """
+        try:
+            status = path.stat()
+            key = (str(path), status.st_mtime_ns, status.st_size)
+            if key not in self._hashes:
+                self._hashes[key] = hashlib.sha256(path.read_bytes()).hexdigest()
+        except OSError as error:
+            raise InputError(
+                f"{path} can't be read: {error.strerror}; a variant needs it"
+            ) from error
+        return self._hashes[key]
+
+
+def scenario_content(scenario: Scenario) -> dict[str, Any]:
+    """Return the keys of a resolved scenario that have an effect on its results."""
+    content = scenario.resolved()
+    content.pop("name", None)
+    content["simulation"] = {k: v for k, v in content["simulation"].items() if k not in _NO_EFFECT}
+    return content
+
+
+def content_hash(content: Any) -> str:
+    """Return a hash of plain data. The order of keys counts: users decide in theirs.
+
+    >>> content_hash({"a": 1, "b": 2}) == content_hash({"b": 2, "a": 1})
+    False
+    """
+    text = json.dumps(content, separators=(",", ":"))
+    return hashlib.sha256(text.encode()).hexdigest()[:DIGITS]
+
+
+def input_hash(scenario: Scenario, files: FileHashes) -> str:
+    """Return a hash of the files that a scenario names: floor plans, logs, the user's modules.
+
+    Raises:
+        InputError: A file can't be read.
+    """
+    return content_hash({str(path): files[path] for path in files_of(scenario)})
+
+
+def identity(content: Mapping[str, Any], inputs: str) -> tuple[str, str]:
+    """Return the identity of a variant, and the hash of its scenario alone.
+
+    Args:
+        content: Its `scenario_content`, with its seed.
+        inputs: The `input_hash` of its scenario.
+    """
+    scenario = content_hash(content)
+    return content_hash([code_version(), scenario, inputs]), scenario
+
+
+def home_key(content: Mapping[str, Any]) -> str:
+    """Return a hash that is the same for variants that can share a home."""
+    return content_hash([content["floorplan"], content["objects"]])[:8]
+
+
+NOT_APPLICABLE = -1
+MOST_VARIANTS = 10_000_000
+SWITCHES = ("key_frames", "observations", "events")  # of `artifacts`, named after their tables
+
+
+@dataclass(frozen=True)
+class AxisPlan:
+    """An axis with its choices.
+
+    Attributes:
+        name: Its name.
+        columns: The columns that it fills.
+        when: Condition on the columns of earlier axes under which it applies.
+        choices: Its choices, in order.
+        changes: The scenario change of each choice, with the place that messages name.
+    """
+
+    name: str
+    columns: tuple[str, ...]
+    when: Mapping[str, Any]
+    choices: tuple[Choice, ...]
+    changes: tuple[Document, ...]
+
+
+@dataclass(frozen=True)
+class RulePlan:
+    """A change of the scenario for all variants that fulfil a condition on columns."""
+
+    when: Mapping[str, Any]
+    change: Document
+
+
+@dataclass(frozen=True)
+class Design:
+    """All variants of a study. Scenarios are built on request; a design can be pickled.
+
+    A variant is a combination of choices, and a seed. Seeds change fastest: variants of one home
+    with the same seeds stay together, and their users live the same lives.
+
+    Attributes:
+        base: The composed base scenario, with the changes that all variants share.
+        folder: The folder of the study file.
+        axes: The axes.
+        rules: Conditional changes.
+        exclude: Conditions on columns; combinations that fulfil one are left out.
+        seeds: The seeds of each combination.
+    """
+
+    base: Document
+    folder: Path
+    axes: tuple[AxisPlan, ...]
+    rules: tuple[RulePlan, ...]
+    exclude: tuple[Mapping[str, Any], ...]
+    seeds: tuple[int, ...]
+
+    @cached_property
+    def combinations(self) -> list[tuple[int, ...]]:
+        """The index of the choice on each axis, by combination; -1 where an axis doesn't apply."""
+        return list(self._extend((), {}))
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """The columns of all axes, and the seed."""
+        return (*(column for axis in self.axes for column in axis.columns), SEED)
+
+    @property
+    def labels(self) -> dict[str, list[Label]]:
+        """The labels of each column, in order."""
+        labels: dict[str, list[Label]] = {
+            column: list(dict.fromkeys(choice.labels[column] for choice in axis.choices))
+            for axis in self.axes
+            for column in axis.columns
+        }
+        return {**labels, SEED: list(self.seeds)}
+
+    def __len__(self) -> int:
+        """Return the number of variants."""
+        return len(self.combinations) * len(self.seeds)
+
+    def parameters(self, index: int) -> dict[str, Label]:
+        """Return the labels of a variant by column."""
+        combination, seed = self._at(index)
+        return {**self._labels(combination), SEED: seed}
+
+    def scenario(self, index: int) -> Scenario:
+        """Build and check the scenario of a variant.
+
+        Raises:
+            ScenarioError: The scenario is wrong; the message names the axis and the value.
+        """
+        combination, seed = self._at(index)
+        labels = {**self._labels(combination), SEED: seed}
+        changes = [
+            axis.changes[choice]
+            for axis, choice in zip(self.axes, combination, strict=True)
+            if choice != NOT_APPLICABLE
+        ]
+        changes += [rule.change for rule in self.rules if matches(rule.when, labels)]
+        changes.append(assignment(("simulation", "seed"), seed, f"seed {seed}"))
+        try:
+            return scenario_of(apply_changes(self.base, changes), self.folder)
+        except InputError as error:
+            raise type(error)(f"{self.describe(index)}: {error}") from None
+
+    def describe(self, index: int) -> str:
+        """Return a variant as messages call it: 'variant 3 (speed = 0.3, seed = 1)'."""
+        labels = ", ".join(
+            f"{column} = {label}"
+            for column, label in self.parameters(index).items()
+            if label is not None
+        )
+        return f"variant {index} ({labels})"
+
+    def _at(self, index: int) -> tuple[tuple[int, ...], int]:
+        combination, seed = divmod(index, len(self.seeds))
+        return self.combinations[combination], self.seeds[seed]
+
+    def _labels(self, combination: Sequence[int]) -> dict[str, Label]:
+        labels: dict[str, Label] = {}
+        for axis, choice in zip(self.axes, combination, strict=False):
+            if choice == NOT_APPLICABLE:
+                labels |= dict.fromkeys(axis.columns)
+            else:
+                labels |= axis.choices[choice].labels
+        return labels
+
+    def _extend(
+        self, prefix: tuple[int, ...], labels: Mapping[str, Label]
+    ) -> Iterator[tuple[int, ...]]:
+        """Yield the combinations that start with a prefix, the last axis changing fastest."""
+        if len(prefix) == len(self.axes):
+            if not any(matches(condition, labels) for condition in self.exclude):
+                yield prefix
+            return
+        axis = self.axes[len(prefix)]
+        if matches(axis.when, labels):
+            for number, choice in enumerate(axis.choices):
+                yield from self._extend((*prefix, number), {**labels, **choice.labels})
+        else:
+            empty = dict.fromkeys(axis.columns)
+            yield from self._extend((*prefix, NOT_APPLICABLE), {**labels, **empty})
+
+
+def matches(condition: Mapping[str, Any], labels: Mapping[str, Label]) -> bool:
+    """Return whether labels fulfil a condition: each column has the value, or one of a list.
+
+    >>> matches({"robot": ["patrol", "hangout"]}, {"robot": "hangout", "speed": 0.3})
+    True
+    """
+    return all(
+        any(same_label(labels.get(column), value) for value in _values(condition, column))
+        for column in condition
+    )
+
+
+def _values(condition: Mapping[str, Any], column: str) -> Sequence[Any]:
+    """Return the values of a column that a condition allows."""
+    value = condition[column]
+    return value if isinstance(value, list | tuple) else [value]
+
+
+def same_label(label: Label, value: Any) -> bool:
+    """Return whether a label equals a value of the study file: 1 is 1.0, but true is not 1."""
+    return label == value and isinstance(label, bool) == isinstance(value, bool)
+
+
+def build_design(specification: Specification) -> Design:
+    """Turn a study into its variants, without building their scenarios.
+
+    Raises:
+        ScenarioError: An axis has no values, a condition names a value that no axis has, or there
+            are too many variants.
+    """
+    file = specification.file
+    axes = tuple(_axis_plan(specification, name) for name in file.axes)
+    rules = tuple(
+        RulePlan(rule.when, _change(rule.set.items(), _place(specification, "rules", i)))
+        for i, rule in enumerate(file.rules)
+    )
+    count = math.prod(len(axis.choices) for axis in axes)
+    if count > MOST_VARIANTS:
+        raise ScenarioError(
+            f"{specification.name} would have {count:,} combinations: at most {MOST_VARIANTS:,}"
+            " can be run as one study; sample some of them by an axis of the kind `sample`"
+        )
+    base = merge(specification.base, _artifacts(file.keep.tables))
+    seeds = file.replicates or (_base_seed(specification.base),)
+    design = Design(base, specification.folder, axes, rules, file.exclude, seeds)
+    _check_conditions(specification, design)
+    if not design.combinations:
+        raise ScenarioError(f"{specification.name} has no variants: all are excluded")
+    return design
+
+
+def _axis_plan(specification: Specification, name: str) -> AxisPlan:
+    axis = specification.file.axes[name]
+    place = specification.places.place(("axes", name))
+    try:
+        choices = tuple(axis.choices(name))
+        changes = tuple(
+            _change(
+                ((".".join(keys), value) for keys, value in choice.changes),
+                f"axis {name!r}, {choice.words}{', ' * bool(place)}{place}",
+            )
+            for choice in choices
+        )
+    except InputError as error:
+        raise ScenarioError(f"{place}{': ' * bool(place)}axes.{name}: {error}") from None
+    return AxisPlan(name, axis.columns(name), axis.when, choices, changes)
+
+
+def _change(changes: Any, place: str) -> Document:
+    """Merge (key path, value) pairs into one change; messages name the place."""
+    result = Document()
+    for path, value in changes:
+        result = merge(result, assignment(key_path(path), value, place))
+    return result
+
+
+def _place(specification: Specification, *location: str | int) -> str:
+    place = specification.places.place(location)
+    key = ".".join(map(str, location))
+    return f"{key}, {place}" if place else key
+
+
+def _check_conditions(specification: Specification, design: Design) -> None:
+    """Refuse conditions on values that no axis has: they would silently never hold."""
+    file = specification.file
+    conditions: list[tuple[tuple[str | int, ...], Mapping[str, Any]]] = [
+        *(((("axes", axis.name, "when")), axis.when) for axis in design.axes),
+        *((("rules", i, "when"), rule.when) for i, rule in enumerate(file.rules)),
+        *((("exclude", i), condition) for i, condition in enumerate(file.exclude)),
+        *(
+            (("compare", i, "against"), comparison.against)
+            for i, comparison in enumerate(file.compare)
+        ),
+    ]
+    if file.tune is not None:
+        conditions.append((("tune", "held_out"), file.tune.held_out))
+    for location, condition in conditions:
+        for column in condition:
+            labels = design.labels[column]
+            for value in _values(condition, column):
+                if not any(same_label(label, value) for label in labels):
+                    place = specification.places.place((*location, column))
+                    raise ScenarioError(
+                        f"{place}{': ' * bool(place)}{'.'.join(map(str, location))}.{column}: no"
+                        f" variant has {value!r}{suggest(value, labels)}"
+                    )
+
+
+def _artifacts(tables: Sequence[str]) -> Document:
+    """Return the change that turns off the tables that a study doesn't keep."""
+    settings: dict[str, Any] = {name: name in tables for name in SWITCHES}
+    if "trajectories" not in tables:
+        settings["trajectories"] = "off"
+    change = Document()
+    for name, value in {**settings, "outputs": True, "learned": False}.items():
+        change = merge(change, assignment(("artifacts", name), value, "keep.tables"))
+    return change
+
+
+def _base_seed(base: Document) -> int:
+    simulation = base.data.get("simulation")
+    seed = simulation.get(SEED) if isinstance(simulation, Mapping) else None
+    return seed if isinstance(seed, int) else 0

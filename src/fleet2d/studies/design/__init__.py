@@ -1,1 +1,0 @@
-"""The design of a study: its file, its variants, and the identity of each."""

@@ -1,0 +1,198 @@
+"""The figures of a report: comparisons, means by axis, distributions, and metrics over time."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fleet2d.extras import extra
+from fleet2d.studies.answers import estimate
+from fleet2d.studies.parts import VARIANT
+
+if TYPE_CHECKING:
+    import polars as pl
+
+    from fleet2d.studies.reader import Study
+
+
+VALUE, DAY = "value", "day"
+_US_A_DAY = 86_400_000_000
+_CLOCK = (VARIANT, "step", "time")
+
+
+def over_time(study: "Study", metric: str) -> "pl.DataFrame | None":
+    """Return a metric at each moment: columns `variant`, `day`, `value` and the axes.
+
+    The first part of the metric's name is the table, the last part the column, and the parts
+    between select rows: `ltp_error.ana.tv` is column `tv` of the rows of ana in `ltp_error`.
+
+    Returns:
+        The rows by variant and day; None if the study keeps no such table.
+    """
+    import polars as pl
+
+    name, *middle, end = metric.split(".")
+    if name not in study.tables:
+        return None
+    rows = study.polars(name)
+    schema = rows.collect_schema()
+    columns = [c for c in schema if c not in (*_CLOCK, *study.columns)]
+    numbers = [c for c in columns if schema[c].is_float()]
+    texts = [c for c in columns if schema[c] == pl.String]
+    if end in numbers:
+        column, selectors = end, middle
+    elif numbers:
+        column, selectors = numbers[0], [*middle, end]
+    else:
+        return None
+    for selector in selectors:
+        if not texts:
+            return None
+        rows = rows.filter(pl.any_horizontal(pl.col(c) == selector for c in texts))
+    start = pl.col("time").dt.truncate("1d").min().over(VARIANT)
+    day = (pl.col("time") - start).dt.total_microseconds() / _US_A_DAY
+    return (
+        rows.with_columns(day.alias(DAY), pl.col(column).alias(VALUE))
+        .group_by(VARIANT, DAY, *study.columns)
+        .agg(pl.col(VALUE).mean())
+        .sort(VARIANT, DAY)
+        .collect()
+    )
+
+
+with extra("viz", "drawing needs matplotlib"):
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+
+DPI = 120
+COLORS = (
+    "#2c6fb0", "#b5305c", "#3f8a4f", "#c26a12", "#8153b5", "#1f8a8c", "#8a6d3b", "#5b6770",
+)  # fmt: skip
+DARK, PALE = "#2d3138", "#c4c9d0"
+MOST_LINES = 8
+MOST_LABELS = 24
+MOMENTS = 60  # the most points of a line over time
+
+
+def draw_comparison(table: "pl.DataFrame", axis: str, reference: Any, metric: str) -> Figure:
+    """Draw differences to a reference with their intervals, one row for each value of an axis."""
+    rows = table.to_dicts()[::-1]
+    figure, axes = _figure(0.42 * len(rows) + 1.1)
+    for y, row in enumerate(rows):
+        is_clear = row["low"] > 0 or row["high"] < 0
+        color = COLORS[0] if is_clear else PALE
+        axes.plot([row["low"], row["high"]], [y, y], color=color, lw=2.2, solid_capstyle="butt")
+        axes.plot(row["difference"], y, "o", color=color, ms=6)
+    axes.axvline(0, color=DARK, lw=0.8)
+    statistics = {"mean", "reference", "difference", "low", "high", "pairs", "verdict"}
+    inner_axes = [
+        column for column in table.columns
+        if column not in {axis, *statistics} and not column.startswith(("n_", "variance_"))
+    ]  # fmt: skip
+    labels = [", ".join([str(row[axis]), *(f"{c} {row[c]}" for c in inner_axes)]) for row in rows]
+    axes.set_yticks(range(len(rows)), labels)
+    axes.set_ylim(-0.6, len(rows) - 0.4)
+    axes.set_xlabel(f"{metric}: difference to {axis} = {reference}")
+    return figure
+
+
+def draw_means(tables: "dict[str, pl.DataFrame]", metric: str) -> Figure:
+    """Draw the mean of a metric by the values of each axis, one panel for each axis."""
+    figure = Figure(figsize=(8.0, 2.8), dpi=DPI, layout="constrained")
+    panels = np.atleast_1d(figure.subplots(1, max(len(tables), 1), sharey=True))
+    for panel, (axis, table) in zip(panels, tables.items(), strict=False):
+        _tidy(panel)
+        rows = table.to_dicts()
+        x = np.arange(len(rows))
+        means = np.array([row["mean"] for row in rows])
+        ends = np.array([[row["low"], row["high"]] for row in rows])
+        is_numeric = all(isinstance(row[axis], int | float) for row in rows)
+        if is_numeric:
+            x = np.array([row[axis] for row in rows], np.float64)
+        finite = np.isfinite(ends).all(axis=1)
+        errors = np.abs(ends[finite] - means[finite, None]).T
+        panel.errorbar(x[finite], means[finite], yerr=errors, fmt="none", ecolor=PALE, lw=2)
+        panel.plot(x, means, "o-" if is_numeric else "o", color=COLORS[0], ms=5, lw=1)
+        if not is_numeric:
+            _label(panel, [str(row[axis]) for row in rows])
+        panel.set_xlabel(axis)
+    panels[0].set_ylabel(metric)
+    return figure
+
+
+def draw_distribution(frame: "pl.DataFrame", metric: str, axis: str | None) -> Figure:
+    """Draw the metric of every variant with median and quartiles, by the values of an axis."""
+    import polars as pl
+
+    labels = [None] if axis is None else frame[axis].unique(maintain_order=True).to_list()
+    figure, axes = _figure(2.8)
+    generator = np.random.Generator(np.random.Philox(key=1))
+    for x, label in enumerate(labels):
+        group = frame if axis is None else frame.filter(pl.col(axis).eq_missing(label))
+        values = group[metric].to_numpy()
+        shift = generator.uniform(-0.22, 0.22, len(values))
+        axes.plot(x + shift, values, ".", color=PALE, ms=4, zorder=1)
+        low, middle, high = np.quantile(values, [0.25, 0.5, 0.75])
+        axes.plot([x, x], [low, high], color=COLORS[0], lw=5, alpha=0.5, solid_capstyle="butt")
+        axes.plot([x - 0.16, x + 0.16], [middle, middle], color=DARK, lw=1.6)
+    _label(axes, ["all" if label is None else str(label) for label in labels])
+    axes.set_xlabel(axis or "")
+    axes.set_ylabel(metric)
+    return figure
+
+
+def draw_course(
+    frame: "pl.DataFrame", metric: str, axis: str | None, units: Sequence[str]
+) -> Figure:
+    """Draw a metric with its interval over simulated days, one line for each value of an axis."""
+    import polars as pl
+
+    labels = [None] if axis is None else frame[axis].unique(maintain_order=True).to_list()
+    days = frame[DAY].unique().sort().to_numpy()
+    moments = days[np.unique(np.linspace(0, len(days) - 1, MOMENTS).round().astype(int))]
+    figure, axes = _figure(3.0)
+    for number, label in enumerate(labels[:MOST_LINES]):
+        group = frame if axis is None else frame.filter(pl.col(axis).eq_missing(label))
+        points = []
+        for day in moments:
+            rows = group.filter(pl.col(DAY) == day).group_by(list(units) or ["variant"])
+            cells = rows.agg(pl.col(VALUE).mean()).drop_nulls()
+            if len(cells):
+                levels = {unit: cells[unit].to_list() for unit in units}
+                mean = estimate(cells[VALUE].to_numpy(), levels, resamples=300)
+                points.append((day, mean.mean, mean.low, mean.high))
+        x, means, low, high = np.array(points).T
+        color = COLORS[number % len(COLORS)]
+        axes.fill_between(x, low, high, color=color, alpha=0.15, lw=0)
+        axes.plot(x, means, color=color, lw=1.5, label=str(label))
+    axes.set_xlabel("simulated time [days]")
+    axes.set_ylabel(metric)
+    if axis is not None:
+        axes.legend(frameon=False, fontsize=8, title=axis, title_fontsize=8)
+    return figure
+
+
+def _figure(height: float) -> tuple[Figure, Axes]:
+    figure = Figure(figsize=(8.0, height), dpi=DPI, layout="constrained")
+    axes = figure.subplots()
+    _tidy(axes)
+    return figure, axes
+
+
+def _tidy(axes: Axes) -> None:
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.tick_params(labelsize=8)
+
+
+def _label(axes: Axes, labels: Sequence[str]) -> None:
+    """Label the x axis at 0, 1, 2 …; of many labels only every n-th is written."""
+    stride = max(1, -(-len(labels) // MOST_LABELS))
+    ticks = range(0, len(labels), stride)
+    longest = max(map(len, labels), default=0)
+    is_slanted = longest * len(labels) > 90
+    axes.set_xticks(
+        ticks, [labels[i] for i in ticks], rotation=30 if is_slanted else 0,
+        ha="right" if is_slanted else "center",
+    )  # fmt: skip
+    axes.set_xlim(-0.6, len(labels) - 0.4)

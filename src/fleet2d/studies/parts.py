@@ -1,0 +1,275 @@
+"""Parts of a study's data set: many variants in one Parquet file for each table.
+
+A part is written to a scratch folder and moved into the storage file by file. It counts once its
+commit record is written: the names of its files with their sizes and checksums.
+"""
+
+import hashlib
+import json
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from fleet2d.studies.records import VariantRecord
+from fleet2d.studies.storage import Storage, write_error
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+    from fleet2d.studies.records import Journal
+
+
+RECORDS, RESULTS, TABLES = "parts", "results", "tables"
+VARIANT = "variant"
+ROWS_A_GROUP = 250_000
+
+
+@dataclass(frozen=True)
+class PartFile:
+    """A file of a part, as its commit record describes it."""
+
+    name: str
+    size: int
+    sha256: str
+
+
+@dataclass(frozen=True)
+class Part:
+    """A committed part.
+
+    Attributes:
+        number: Its number, from 1.
+        variants: The number of its variants.
+        files: Its files.
+    """
+
+    number: int
+    variants: int
+    files: tuple[PartFile, ...]
+
+    def problem(self, storage: Storage, *, checksums: bool) -> str | None:
+        """Return the first problem of its files in words, None if there is none.
+
+        Args:
+            storage: The storage of the files.
+            checksums: Whether to read the files and compare checksums, beside their sizes.
+        """
+        for file in self.files:
+            size = storage.size(file.name)
+            if size is None:
+                return f"{file.name} is missing"
+            if size != file.size:
+                return f"{file.name} has {size} bytes instead of {file.size}"
+            if checksums and hashlib.sha256(storage.read(file.name)).hexdigest() != file.sha256:
+                return f"{file.name} was changed"
+        return None
+
+
+def part_name(number: int) -> str:
+    """Return the name of the files of a part."""
+    return f"{number:06d}"
+
+
+def next_number(parts: Iterable[Part]) -> int:
+    """Return the number of the part after these."""
+    return max((part.number for part in parts), default=0) + 1
+
+
+def read_parts(storage: Storage) -> list[Part]:
+    """Return the committed parts, in order."""
+    parts = []
+    for name in storage.names(RECORDS):
+        if name.endswith(".json"):
+            content = json.loads(storage.read(name))
+            files = tuple(PartFile(**file) for file in content["files"])
+            parts.append(Part(content["number"], content["variants"], files))
+    return sorted(parts, key=lambda part: part.number)
+
+
+def drop_part(storage: Storage, part: Part) -> None:
+    """Delete a part: its commit record first, so that it never counts without its files."""
+    storage.delete(f"{RECORDS}/{part_name(part.number)}.json")
+    for file in part.files:
+        storage.delete(file.name)
+
+
+def write_part(storage: Storage, scratch: Path, number: int, journal: "Journal") -> Part:
+    """Write the variants of a journal as a part, and commit it.
+
+    Args:
+        storage: The storage of the study.
+        scratch: A local folder for unfinished files, on the same disk as a local storage.
+        number: The number of the part.
+        journal: The records.
+
+    Raises:
+        ArtifactError: It can't be written; the journal still holds everything.
+    """
+    name, files = part_name(number), []
+    try:
+        scratch.mkdir(parents=True, exist_ok=True)
+        for file in scratch.iterdir():  # left by a crash
+            file.unlink()
+        local_files = _write_files(scratch, name, journal)
+    except OSError as error:
+        raise write_error(storage.location, error) from error
+    for target, local in local_files.items():
+        with local.open("rb") as stream:
+            digest = hashlib.file_digest(stream, "sha256").hexdigest()
+        files.append(PartFile(target, local.stat().st_size, digest))
+        storage.publish(local, target)
+    part = Part(number, len(journal), tuple(files))
+    content = {
+        "number": number,
+        "variants": part.variants,
+        "files": [vars(file) for file in part.files],
+    }
+    storage.write(f"{RECORDS}/{name}.json", json.dumps(content, indent=1).encode())
+    return part
+
+
+def _write_files(scratch: Path, name: str, journal: "Journal") -> dict[str, Path]:
+    """Write results and tables; return the local files by their names in the storage."""
+    import pyarrow.parquet as pq
+
+    numbers = sorted(journal.offsets)
+    schemas = _table_schemas(journal.read(number) for number in numbers)
+    results = scratch / f"{name}-results"
+    pq.write_table(
+        results_table(journal.read(number).header for number in numbers),
+        results,
+        compression="zstd",
+    )
+    files = {f"{RESULTS}/{name}.parquet": results}
+    with ExitStack() as stack:
+        writers: dict[str, _PartFileWriter] = {}
+        for i, (table, schema) in enumerate(schemas.items()):
+            local = scratch / f"{name}-table-{i}"
+            files[f"{TABLES}/{table}/{name}.parquet"] = local
+            writers[table] = stack.enter_context(_PartFileWriter(local, schema))
+        for number in numbers:
+            for table, rows in tables_of(journal.read(number)).items():
+                writers[table].write(number, rows)
+    return files
+
+
+class _PartFileWriter:
+    """Writes one Parquet file of a table. A row group holds the rows of one or more variants."""
+
+    def __init__(self, path: Path, schema: "pa.Schema") -> None:
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
+        self._schema = schema.insert(0, pa.field(VARIANT, pa.int32(), nullable=False))
+        self._writer: pq.ParquetWriter = pq.ParquetWriter(path, self._schema, compression="zstd")
+        self._buffer: list[pa.Table] = []
+
+    def write(self, number: int, rows: "pa.Table") -> None:
+        """Add the rows of a variant."""
+        self._buffer.append(with_variant(rows, number, self._schema))
+        if sum(table.num_rows for table in self._buffer) >= ROWS_A_GROUP:
+            self._flush()
+
+    def __enter__(self) -> "_PartFileWriter":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._flush()
+        self._writer.close()
+
+    def _flush(self) -> None:
+        import pyarrow as pa
+
+        if self._buffer:
+            table = pa.concat_tables(self._buffer)
+            self._writer.write_table(table, row_group_size=max(table.num_rows, 1))
+            self._buffer = []
+
+
+def tables_of(record: VariantRecord) -> "dict[str, pa.Table]":
+    """Return the tables of a record."""
+    import pyarrow as pa
+
+    return {
+        name: pa.ipc.open_stream(buffer).read_all() for name, buffer in record.streams().items()
+    }
+
+
+def with_variant(rows: "pa.Table", number: int, schema: "pa.Schema") -> "pa.Table":
+    """Return the rows of a variant in the schema of the data set, with a column of its number."""
+    import pyarrow as pa
+
+    count = rows.num_rows
+    columns = []
+    for field in schema:
+        if field.name == VARIANT:
+            columns.append(pa.repeat(pa.scalar(number, pa.int32()), count))
+        elif field.name in rows.column_names:
+            columns.append(rows.column(field.name).cast(field.type))
+        else:
+            columns.append(pa.nulls(count, field.type))
+    return pa.table(columns, schema=schema)
+
+
+def plain_schema(schema: "pa.Schema") -> "pa.Schema":
+    """Return a schema without dictionary types: their words differ between homes."""
+    import pyarrow as pa
+
+    fields = []
+    for field in schema:
+        kind = field.type.value_type if pa.types.is_dictionary(field.type) else field.type
+        unit = (field.metadata or {}).get(b"unit")
+        fields.append(pa.field(field.name, kind, True, {"unit": unit} if unit else None))
+    return pa.schema(fields)
+
+
+def _table_schemas(records: Iterable[VariantRecord]) -> "dict[str, pa.Schema]":
+    """Return for each table the schema that fits the rows of all variants."""
+    import pyarrow as pa
+
+    schemas: dict[str, pa.Schema] = {}
+    for record in records:
+        for name, buffer in record.streams().items():
+            schema = plain_schema(pa.ipc.open_stream(buffer).schema)
+            common = schemas.setdefault(name, schema)
+            if common != schema:
+                schemas[name] = pa.unify_schemas([common, schema], promote_options="permissive")
+    return schemas
+
+
+_HEADER_FIELDS = ("identity", "status", "digest", "error", "trace")
+_SECONDS = ("setup", "simulate", "total")
+RESULT_COLUMNS = (
+    VARIANT, *_HEADER_FIELDS, "attempts", "setup_s", "simulate_s", "wall_s", "peak_rss_mb",
+)  # fmt: skip
+"""The columns of the results beside the metrics."""
+
+
+def results_table(headers: Iterable[Mapping[str, Any]]) -> "pa.Table":
+    """Return one row for each variant: status, times, memory, and a column for each metric."""
+    import pyarrow as pa
+
+    rows = list(headers)
+    columns: dict[str, pa.Array] = {VARIANT: pa.array([row["number"] for row in rows], pa.int32())}
+    for name in _HEADER_FIELDS:
+        columns[name] = pa.array([row.get(name) for row in rows], pa.string())
+    columns["attempts"] = pa.array([row["attempts"] for row in rows], pa.int32())
+    for phase in _SECONDS:
+        seconds = [row.get("wall_s", {}).get(phase) for row in rows]
+        columns["wall_s" if phase == "total" else f"{phase}_s"] = pa.array(seconds, pa.float64())
+    columns["peak_rss_mb"] = pa.array([row.get("peak_rss_mb") for row in rows], pa.float64())
+    for name in dict.fromkeys(name for row in rows for name in row.get("metrics", ())):
+        values = [row.get("metrics", {}).get(name) for row in rows]
+        columns[name] = pa.array(values, pa.float64())
+    return pa.table(columns)
+
+
+def read_results(storage: Storage, parts: Iterable[Part]) -> "Iterator[pa.Table]":
+    """Yield the results of each part."""
+    import pyarrow.parquet as pq
+
+    for part in parts:
+        name = f"{RESULTS}/{part_name(part.number)}.parquet"
+        yield pq.read_table(storage.path(name), filesystem=storage.filesystem)

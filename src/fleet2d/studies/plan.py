@@ -1,0 +1,476 @@
+"""The plan of a study: its variants, checked and stored, and the time that they will take."""
+
+import json
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from datetime import timedelta
+from typing import TYPE_CHECKING, Any, Literal
+
+from fleet2d.errors import (
+    ComponentError,
+    Fleet2DError,
+    InputError,
+    RunDirectoryError,
+    ScenarioError,
+)
+from fleet2d.problems import suggest
+from fleet2d.scenario.model import Scenario
+from fleet2d.studies.axes import Label
+from fleet2d.studies.design import (
+    SWITCHES,
+    Design,
+    FileHashes,
+    content_hash,
+    home_key,
+    identity,
+    input_hash,
+    scenario_content,
+)
+from fleet2d.studies.directory import PLAN, SCENARIOS, StudyDirectory
+from fleet2d.studies.executors import Executor, LostTask, SerialExecutor, TaskSchedule, WorkerTask
+from fleet2d.studies.parts import VARIANT
+from fleet2d.studies.simulator import check_setup, measure
+from fleet2d.sums import sum_in_order
+from fleet2d.trust import Trust, current_trust, restrict
+from fleet2d.units import parse_duration
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+
+MOST_PROBLEMS = 10  # in one report
+FEW_SETUPS = 8  # up to here starting workers costs more than it saves
+
+
+@dataclass(frozen=True, slots=True)
+class PlannedVariant:
+    """A variant before it is run.
+
+    Attributes:
+        number: Its number in results; it stays when the study is extended.
+        index: Its index in the design.
+        identity: The hash of everything that its results depend on.
+        scenario: The hash of its scenario alone.
+        template: The hash of its scenario without the seed.
+        home_key: The same for variants that can share a home.
+        simulated_s: The simulated time of its run [s].
+    """
+
+    number: int
+    index: int
+    identity: str
+    scenario: str
+    template: str
+    home_key: str
+    simulated_s: float
+
+
+@dataclass(frozen=True)
+class StudyPlan:
+    """A design and its variants, all checked.
+
+    Attributes:
+        design: The design.
+        variants: The variants, in the order of the design.
+    """
+
+    design: Design
+    variants: tuple[PlannedVariant, ...]
+
+    def parameters(self, variant: PlannedVariant) -> dict[str, Label]:
+        """Return the labels of a variant by column."""
+        return self.design.parameters(variant.index)
+
+
+def make_plan(
+    design: Design, tables: Sequence[str] = (), keep: Callable[[str, Any], None] | None = None
+) -> StudyPlan:
+    """Build and check the scenario of every variant of a design.
+
+    Args:
+        design: The design.
+        tables: The tables to keep, each of which some variant must have.
+        keep: Called with the template (a hash) and the content of each combination's scenario.
+
+    Raises:
+        ScenarioError: Variants are wrong; a line per problem, with axis and value.
+    """
+    variants: list[PlannedVariant] = []
+    problems: list[str] = []
+    files, known_tables = FileHashes(), set[str]()
+    for number in range(len(design.combinations)):
+        first = number * len(design.seeds)
+        try:
+            scenario = design.scenario(first)
+            content = scenario_content(scenario)
+            variants += _planned(design, first, content, input_hash(scenario, files))
+        except InputError as error:
+            problems.append(str(error))
+            if len(problems) == MOST_PROBLEMS:
+                break
+            continue
+        if keep is not None:
+            keep(variants[-1].template, scenario.resolved())
+        known_tables |= {*scenario.algorithms, *scenario.metrics, *_sensor_tables(scenario)}
+    _raise_problems(problems)
+    _check_tables(tables, known_tables)
+    _check_identities(design, variants)
+    return StudyPlan(design, tuple(variants))
+
+
+def setups_to_check(plan: StudyPlan) -> list[PlannedVariant]:
+    """Return variants in which each home meets each choice of every other axis, and no more.
+
+    Their set-up shows people and robots that have no room where they start, without setting up
+    every variant.
+    """
+    design = plan.design
+    by_home: dict[str, list[tuple[PlannedVariant, tuple[int, ...]]]] = {}
+    for number, combination in enumerate(design.combinations):
+        variant = plan.variants[number * len(design.seeds)]
+        by_home.setdefault(variant.home_key, []).append((variant, combination))
+    return [variant for variants in by_home.values() for variant in _covering(variants)]
+
+
+def _covering(
+    variants: Sequence[tuple[PlannedVariant, tuple[int, ...]]],
+) -> Iterator[PlannedVariant]:
+    """Yield variants of one home in which each choice of each axis comes at least once."""
+    first = variants[0][1]
+    varying = [i for i in range(len(first)) if any(c[i] != first[i] for _, c in variants)]
+    covered: set[tuple[int, int]] = set()
+    for all_new in (True, False):  # variants of new choices only come first: fewer are needed
+        for variant, combination in variants:
+            choices = {(axis, combination[axis]) for axis in varying}
+            uncovered = choices - covered
+            if uncovered and (uncovered == choices or not all_new):
+                covered |= choices
+                yield variant
+    if not varying:
+        yield variants[0][0]
+
+
+@dataclass
+class SetupJob:
+    """Sets variants up without running them, to find errors.
+
+    Attributes:
+        design: The design.
+        trust: The code that workers may run; None: any.
+    """
+
+    design: Design
+    trust: Trust | None = field(default_factory=current_trust)
+
+    def __call__(self, task: WorkerTask) -> bytes:
+        """Return the error of a variant's set-up as text; empty if there is none."""
+        try:
+            with restrict(self.trust):
+                check_setup(self.design.scenario(task.index))
+        except Fleet2DError as error:
+            return str(error).encode()
+        return b""
+
+
+def check_setups(
+    plan: StudyPlan, executor: Executor, on_progress: Callable[[int, int], None] | None = None
+) -> None:
+    """Set up the variants that `setups_to_check` returns: homes with people and robots in them.
+
+    Raises:
+        ScenarioError: Variants are wrong; a line per problem, with axis and value.
+    """
+    problems: dict[int, str] = {}
+    tasks = [WorkerTask(v.number, v.index, v.identity, v.home_key) for v in setups_to_check(plan)]
+    runner = executor if len(tasks) > FEW_SETUPS else SerialExecutor()
+    events = runner.run(SetupJob(plan.design), TaskSchedule(tasks))
+    try:
+        for done, event in enumerate(events):
+            if on_progress is not None:
+                on_progress(done + 1, len(tasks))
+            text = event.reason if isinstance(event, LostTask) else event.payload.decode()
+            if text:
+                problems[event.task.index] = f"{plan.design.describe(event.task.index)}: {text}"
+            if len(problems) == MOST_PROBLEMS:
+                break
+    finally:
+        events.close()
+    _raise_problems([problems[index] for index in sorted(problems)])
+
+
+def _raise_problems(problems: list[str]) -> None:
+    if len(problems) == MOST_PROBLEMS:
+        problems = [*problems, f"… and perhaps more: these are the first {MOST_PROBLEMS}"]
+    if problems:
+        raise ScenarioError("\n".join(_without_repetition(problems)))
+
+
+def _planned(
+    design: Design, first: int, content: dict[str, Any], inputs: str
+) -> Iterator[PlannedVariant]:
+    """Yield the variants of one combination; they differ by their seeds only."""
+    home, simulation = home_key(content), content["simulation"]
+    step, duration = parse_duration(simulation["step"]), parse_duration(simulation["duration"])
+    template = content_hash({**content, "simulation": {**simulation, "seed": None}})
+    for i, seed in enumerate(design.seeds):
+        simulation["seed"] = seed
+        variant_identity, scenario = identity(content, inputs)
+        simulated_s = (duration // step * step).total_seconds()
+        yield PlannedVariant(
+            first + i, first + i, variant_identity, scenario, template, home, simulated_s
+        )
+
+
+def _sensor_tables(scenario: Scenario) -> list[str]:
+    return ["sensors"] if scenario.objects else []
+
+
+def _check_tables(tables: Sequence[str], known: set[str]) -> None:
+    names = sorted({"trajectories", *SWITCHES, *known})
+    layers = ("explored", "first_seen", "last_seen", "time_since_seen")
+    for name in tables:
+        if name not in names and not name.startswith(layers):
+            raise ScenarioError(
+                f"keep.tables: no variant has a table {name!r}{suggest(name, names)}"
+            )
+
+
+def _check_identities(design: Design, variants: Sequence[PlannedVariant]) -> None:
+    """Refuse two variants with the same scenario, of which one axis has no effect."""
+    by_identity: dict[str, PlannedVariant] = {}
+    for variant in variants:
+        equal = by_identity.setdefault(variant.identity, variant)
+        if equal is not variant:
+            raise ScenarioError(
+                f"{design.describe(equal.index)} and {design.describe(variant.index)} are the same"
+                " scenario: an axis sets what another axis or a rule overrides, or has a value"
+                " twice"
+            )
+
+
+def _without_repetition(problems: list[str]) -> list[str]:
+    """Return the first of all problems that differ by their variant only."""
+    first: dict[str, str] = {}
+    for text in problems:
+        first.setdefault(text.partition("): ")[2] or text, text)
+    return list(first.values())
+
+
+Changed = Literal["redo", "keep"]
+PLAN_COLUMNS = (VARIANT, "identity", "scenario", "template", "home_key", "simulated_s")
+BATCH = 1000
+
+
+class ScenarioFile:
+    """Collects the scenarios of combinations as a compressed Parquet file in memory."""
+
+    def __init__(self) -> None:
+        """Create an empty file."""
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
+        self._schema = pa.schema([("template", pa.string()), ("scenario", pa.string())])
+        self._sink = pa.BufferOutputStream()
+        self._writer = pq.ParquetWriter(self._sink, self._schema, compression="zstd")
+        self._rows: list[dict[str, str]] = []
+
+    def add(self, template: str, content: Mapping[str, Any]) -> None:
+        """Add the scenario of a combination, with any of its seeds."""
+        self._rows.append({"template": template, "scenario": json.dumps(content)})
+        if len(self._rows) == BATCH:
+            self._flush()
+
+    def content(self) -> bytes:
+        """Close the file and return its bytes."""
+        self._flush()
+        self._writer.close()
+        return bytes(self._sink.getvalue())
+
+    def _flush(self) -> None:
+        import pyarrow as pa
+
+        self._writer.write_table(pa.Table.from_pylist(self._rows, self._schema))
+        self._rows = []
+
+
+@dataclass(frozen=True)
+class ReconciledPlan:
+    """A plan matched with the stored variants of a study.
+
+    Attributes:
+        plan: The plan, with the numbers of stored variants.
+        new: The number of variants that the study didn't have.
+        set_aside: The number of stored results that no longer belong to it.
+    """
+
+    plan: StudyPlan
+    new: int
+    set_aside: int
+
+
+def reconcile(
+    plan: StudyPlan, directory: StudyDirectory, finished: Iterable[int], changed: Changed | None
+) -> ReconciledPlan:
+    """Number the variants of a plan as in the stored study; new variants get new numbers.
+
+    Args:
+        plan: The current plan.
+        directory: The study.
+        finished: Numbers of the variants with results.
+        changed: What to do with results of other code, inputs or scenarios.
+
+    Raises:
+        RunDirectoryError: There are such results, and `changed` is None.
+    """
+    try:
+        stored_rows = directory.read_table(PLAN, PLAN_COLUMNS[:3]).to_pylist()
+    except FileNotFoundError:
+        return ReconciledPlan(plan, len(plan.variants), 0)
+    numbers = {row["identity"]: row[VARIANT] for row in stored_rows}
+    present = {variant.identity for variant in plan.variants}
+    with_results = set(finished)
+    stale = {
+        row["scenario"]: row
+        for row in stored_rows
+        if row["identity"] not in present and row[VARIANT] in with_results
+    }
+    recomputed = [v for v in plan.variants if v.identity not in numbers and v.scenario in stale]
+    if stale and changed is None:
+        raise RunDirectoryError(_refusal(directory.location, len(recomputed), len(stale)))
+    next_number = max(numbers.values(), default=-1) + 1
+    variants: list[PlannedVariant] = []
+    reused = 0
+    for variant in plan.variants:
+        if variant.identity in numbers:
+            variants.append(replace(variant, number=numbers[variant.identity]))
+        elif changed == "keep" and variant.scenario in stale:
+            row = stale[variant.scenario]
+            variants.append(replace(variant, number=row[VARIANT], identity=row["identity"]))
+            reused += 1
+        else:
+            variants.append(replace(variant, number=next_number))
+            next_number += 1
+    new_variants = sum(variant.identity not in numbers for variant in variants)
+    return ReconciledPlan(
+        StudyPlan(plan.design, tuple(variants)), new_variants, len(stale) - reused
+    )
+
+
+def _refusal(location: str, recomputed: int, stale: int) -> str:
+    removed = stale - recomputed
+    causes = [
+        f"{recomputed} of the same scenarios, by other code or input files" * bool(recomputed),
+        f"{removed} of scenarios that the study no longer has" * bool(removed),
+    ]
+    keep = ", --changed keep leaves those of other code as they are" if recomputed else ""
+    return (
+        f"{location} holds results that don't belong to this study as it is now:"
+        f" {' and '.join(filter(None, causes))}. --changed redo runs anew what has changed and"
+        f" sets the old results aside{keep}; or choose another --out"
+    )
+
+
+def plan_table(plan: StudyPlan) -> "pa.Table":
+    """Return a plan as a table: a row per variant, in the order of the design."""
+    import pyarrow as pa
+
+    columns: dict[str, pa.Array] = {
+        VARIANT: pa.array([v.number for v in plan.variants], pa.int32())
+    }
+    for name in PLAN_COLUMNS[1:]:
+        columns[name] = pa.array([getattr(v, name) for v in plan.variants])
+    labels = [plan.parameters(v) for v in plan.variants]
+    for column in plan.design.columns:
+        columns[column] = label_array([row[column] for row in labels])
+    return pa.table(columns)
+
+
+def label_array(labels: list[Label]) -> "pa.Array":
+    """Return labels as a column: numbers or booleans if all labels are, else text.
+
+    >>> label_array([1, 2.5]).type, label_array([1, "a"]).to_pylist()
+    (DataType(double), ['1', 'a'])
+    """
+    import pyarrow as pa
+
+    kinds = {type(label) for label in labels if label is not None}
+    if kinds <= {bool} or kinds <= {int}:
+        return pa.array(labels, pa.bool_() if kinds == {bool} else pa.int64())
+    if kinds <= {int, float}:
+        return pa.array(labels, pa.float64())
+    return pa.array([None if label is None else str(label) for label in labels], pa.string())
+
+
+def write_catalogue(
+    directory: StudyDirectory, plan: StudyPlan, scenarios: Callable[[], bytes]
+) -> None:
+    """Write the plan and the scenarios of a study."""
+    directory.storage.write(SCENARIOS, scenarios())
+    directory.write_table(PLAN, plan_table(plan))
+
+
+def stored_scenario(directory: StudyDirectory, number: int) -> dict[str, Any]:
+    """Return the scenario of a variant, with its seed.
+
+    Raises:
+        RunDirectoryError: The study has no such variant.
+    """
+    import pyarrow.parquet as pq
+
+    filesystem, path = directory.storage.filesystem, directory.storage.path
+    rows = pq.read_table(
+        path(PLAN), filesystem=filesystem, filters=[(VARIANT, "=", number)],
+        columns=["template", "seed"],
+    ).to_pylist()  # fmt: skip
+    if not rows:
+        raise RunDirectoryError(f"{directory.location} has no variant {number}")
+    texts = pq.read_table(
+        path(SCENARIOS), filesystem=filesystem, filters=[("template", "=", rows[0]["template"])]
+    ).to_pylist()
+    content: dict[str, Any] = json.loads(texts[0]["scenario"])
+    content["simulation"]["seed"] = rows[0]["seed"]
+    return content
+
+
+SAMPLES = 3
+
+
+@dataclass(frozen=True)
+class Forecast:
+    """The time that a study will take.
+
+    Attributes:
+        simulated: The simulated time of all variants.
+        wall: The wall time of all variants with one worker.
+    """
+
+    simulated: timedelta
+    wall: timedelta
+
+    def by(self, workers: int) -> timedelta:
+        """Return the wall time with a number of workers."""
+        return self.wall / max(workers, 1)
+
+
+def forecast(plan: StudyPlan, samples: int = SAMPLES) -> Forecast:
+    """Measure the speed of some variants, after a warm-up that loads all code.
+
+    Raises:
+        ComponentError: All measured variants fail.
+    """
+    count = len(plan.variants)
+    numbers = sorted({round(i * (count - 1) / max(samples - 1, 1)) for i in range(samples)})
+    measure(plan.design.scenario(0), most_s=0.0)
+    speeds = []
+    for i in numbers:
+        with suppress(ComponentError):  # a variant may fail without ending the study
+            speeds.append(measure(plan.design.scenario(plan.variants[i].index)))
+    if not speeds:
+        raise ComponentError("all measured variants fail: run one of them with `fleet2d run`")
+    wall_s = sum_in_order(
+        sum_in_order(speed.seconds(variant.simulated_s) for speed in speeds) / len(speeds)
+        for variant in plan.variants
+    )
+    simulated_s = sum(variant.simulated_s for variant in plan.variants)
+    return Forecast(timedelta(seconds=simulated_s), timedelta(seconds=wall_s))

@@ -1,0 +1,338 @@
+"""Reading a study: its variants and its tables as one data set that needn't fit into memory."""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, cast
+
+from fleet2d.errors import ArtifactError, InputError
+from fleet2d.extras import extra
+from fleet2d.problems import did_you_mean, suggest
+from fleet2d.studies import answers
+from fleet2d.studies.directory import Counts, StudyDirectory, variants_table
+from fleet2d.studies.parts import (
+    RESULT_COLUMNS,
+    TABLES,
+    VARIANT,
+    part_name,
+    plain_schema,
+    tables_of,
+    with_variant,
+)
+from fleet2d.studies.plan import stored_scenario
+from fleet2d.studies.records import read_journal
+from fleet2d.studies.simulator import run_scenario
+from fleet2d.trust import Trust, restrict_stored
+
+if TYPE_CHECKING:
+    import duckdb
+    import pandas as pd
+    import polars as pl
+    import pyarrow as pa
+    import pyarrow.dataset as pads
+
+    from fleet2d.runs.run import Run
+
+
+class Study:
+    """A study that was run completely or partly.
+
+    Attributes:
+        location: The folder or store, without secrets.
+        meta: Its description: name, columns, populations, comparisons.
+
+    Example:
+        >>> study = open_study("studies/speed")  # doctest: +SKIP
+        >>> study.variants.head(2)  # doctest: +SKIP
+    """
+
+    def __init__(self, directory: StudyDirectory) -> None:
+        """Read the description; results are read when they are used."""
+        self._directory = directory
+        self.location = directory.location
+        self.meta = directory.read_meta()
+
+    def __repr__(self) -> str:
+        """Return its location and its progress."""
+        counts = self.counts
+        return f"<Study {self.location}: {counts.complete} of {counts.total} variants complete>"
+
+    @cached_property
+    def arrow_variants(self) -> "pa.Table":
+        """The variants, a row each: parameters, status, time, digest and metrics."""
+        return variants_table(self._directory)
+
+    @cached_property
+    def variants(self) -> "pl.DataFrame":
+        """The variants as a polars data frame, with the columns of `arrow_variants`.
+
+        Raises:
+            InputError: polars is not installed.
+        """
+        return cast("pl.DataFrame", _polars().from_arrow(self.arrow_variants))
+
+    @property
+    def counts(self) -> Counts:
+        """The numbers of complete, failed and missing variants."""
+        return Counts.of(self.arrow_variants.column("status").to_pylist())
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """The columns of the axes, the seed last."""
+        return self.meta.columns
+
+    @property
+    def metrics(self) -> tuple[str, ...]:
+        """The names of the metrics, such as `ltp_error.ana.tv`."""
+        no_metrics = {*self.columns, *RESULT_COLUMNS, "simulated_s"}
+        return tuple(name for name in self.arrow_variants.column_names if name not in no_metrics)
+
+    @property
+    def failures(self) -> "pl.DataFrame":
+        """The variants that failed, with their errors."""
+        frame = self.variants.filter(_polars().col("status") == "failed")
+        return frame.select(VARIANT, *self.columns, "error", "trace", "attempts")
+
+    @cached_property
+    def tables(self) -> tuple[str, ...]:
+        """The names of the tables that the study keeps and that have rows."""
+        paths = (name.split("/") for name in self._directory.storage.names(TABLES))
+        names = {path[-2] for path in paths if len(path) >= 2}
+        for record in self._journal_records():
+            names |= {name for name, _ in record.header["tables"]}
+        return tuple(sorted(names))
+
+    def arrow(self, table: str) -> "pads.Dataset":
+        """Return a table of all variants as an Arrow data set, its first column `variant`.
+
+        Raises:
+            ArtifactError: The study keeps no such table.
+        """
+        import pyarrow as pa
+        import pyarrow.dataset as pads
+
+        if table not in self.tables:
+            raise ArtifactError(
+                f"the study has no table {table!r}{suggest(table, self.tables, 'It has')};"
+                " keep.tables in the study file names them"
+            )
+        storage = self._directory.storage
+        files = [
+            storage.path(name)
+            for name in (f"{TABLES}/{table}/{part_name(p.number)}.parquet" for p in self._parts)
+            if storage.exists(name)
+        ]
+        schemas = [pads.dataset(file, filesystem=storage.filesystem).schema for file in files]
+        recent = [
+            (record.number, rows)
+            for record in self._journal_records()
+            if record.is_complete and (rows := tables_of(record).get(table)) is not None
+        ]
+        field = pa.field(VARIANT, pa.int32(), nullable=False)
+        schemas += [plain_schema(rows.schema).insert(0, field) for _, rows in recent]
+        schema = pa.unify_schemas(schemas, promote_options="permissive")
+        stored = pads.dataset(files, schema, filesystem=storage.filesystem, format="parquet")
+        if not recent:
+            return stored
+        tables = [with_variant(rows, number, schema) for number, rows in recent]
+        journal = pads.dataset(pa.concat_tables(tables))
+        return pads.dataset([stored, journal]) if files else journal
+
+    def polars(self, table: str) -> "pl.LazyFrame":
+        """Return a table of all variants with their parameters as a lazy frame.
+
+        Raises:
+            ArtifactError: The study keeps no such table.
+            InputError: polars is not installed.
+        """
+        rows = _polars().scan_pyarrow_dataset(self.arrow(table))
+        parameters = self.variants.lazy().select(VARIANT, *self.columns)
+        return cast("pl.LazyFrame", rows.join(parameters, on=VARIANT, how="inner"))
+
+    def pandas(
+        self,
+        table: str | None = None,
+        variants: Sequence[int] | None = None,
+        columns: Sequence[str] | None = None,
+    ) -> "pd.DataFrame":
+        """Return the variants, or a table of some or all of them, as a pandas data frame.
+
+        Args:
+            table: A table; None: the variants.
+            variants: Numbers of the variants; None: all.
+            columns: Columns of the table; None: all.
+
+        Raises:
+            ArtifactError: The study keeps no such table.
+        """
+        if table is None:
+            return self.arrow_variants.to_pandas()
+        frames = [batch.to_pandas() for batch in self.batches(table, variants, columns)]
+        import pandas as pd
+
+        return pd.concat(frames, ignore_index=True)
+
+    def batches(
+        self,
+        table: str,
+        variants: Sequence[int] | None = None,
+        columns: Sequence[str] | None = None,
+    ) -> "Iterator[pa.RecordBatch]":
+        """Yield the rows of a table in Arrow record batches, which fit into memory."""
+        import pyarrow.compute as pc
+
+        condition = None if variants is None else pc.field(VARIANT).isin(list(variants))
+        names = None if columns is None else list(columns)
+        yield from self.arrow(table).to_batches(columns=names, filter=condition)
+
+    def duckdb(self) -> "duckdb.DuckDBPyConnection":
+        """Return a DuckDB connection with a view `variants`, and one for each table.
+
+        Raises:
+            InputError: DuckDB is not installed.
+        """
+        with extra("study", "this needs DuckDB"):
+            import duckdb
+        connection = duckdb.connect()
+        connection.register("variants", self.arrow_variants)
+        for table in self.tables:
+            connection.register(table, self.arrow(table))
+        return connection
+
+    def scenario(self, variant: int) -> dict[str, Any]:
+        """Return the scenario of a variant, with its seed, as `fleet2d.run` takes it.
+
+        Raises:
+            RunDirectoryError: There is no such variant.
+        """
+        return stored_scenario(self._directory, variant)
+
+    def rerun(
+        self,
+        variant: int,
+        out: str | Path | None = None,
+        *,
+        trust: Iterable[str | Path] = (),
+        **settings: Any,
+    ) -> "Run":
+        """Run one variant again.
+
+        Args:
+            variant: Its number.
+            out: Where to store the run; None: in memory.
+            trust: Files and folders of code that may run, for scenarios with components of the
+                user.
+            settings: Changes of the scenario, as of `fleet2d.run`, such as more `artifacts`.
+
+        Raises:
+            RunDirectoryError: There is no such variant, or the directory can't be used.
+            ScenarioError: Its code isn't trusted.
+        """
+        with restrict_stored(Trust.of(trust)):
+            return run_scenario(self.scenario(variant), out, **settings)
+
+    @property
+    def complete(self) -> "pl.DataFrame":
+        """The variants that are complete."""
+        return self.variants.filter(_polars().col("status") == "complete")
+
+    def paired(
+        self,
+        metric: str,
+        against: Mapping[str, Any],
+        by: Sequence[str] | None = None,
+        within: Sequence[str] = (),
+    ) -> "pl.DataFrame":
+        """Compare the values of an axis with one of them, pair by pair.
+
+        A pair is two variants that differ by that axis alone: same home, same people, same seed,
+        and so the same lives of the people.
+
+        Args:
+            metric: A number, such as `ltp_error.ana.tv`.
+            against: The axis and its reference value, as in {"robot": "patrol"}.
+            by: Columns of the units over which intervals hold; None: homes, people and seeds.
+            within: Axes with a comparison for each of their values; over other axes the differences
+                are averaged.
+
+        Returns:
+            A row for each other value: mean, reference, difference, low and high (95 %), pairs,
+            variance_ratio (of unpaired to paired differences), and a verdict in words.
+
+        Raises:
+            InputError: There is no such metric, axis or value.
+        """
+        return answers.paired(
+            self._with_metric(metric), self.columns, metric, against, self._units(by), within
+        )
+
+    def summary(
+        self, metric: str, axes: Sequence[str], by: Sequence[str] | None = None
+    ) -> "pl.DataFrame":
+        """Return the mean of a metric for each combination of values of axes, with intervals.
+
+        Raises:
+            InputError: There is no such metric or axis.
+        """
+        return answers.summary(self._with_metric(metric), metric, axes, self._units(by))
+
+    def effects(self, metric: str, by: Sequence[str] | None = None) -> "pl.DataFrame":
+        """Return the main effect of each value of each axis: its mean minus the mean of all.
+
+        Raises:
+            InputError: There is no such metric.
+        """
+        return answers.effects(
+            self._with_metric(metric), self._fixed_axes(), metric, self._units(by)
+        )
+
+    def shares(self, metric: str) -> "pl.DataFrame":
+        """Return the share of a metric's variance by axis, and by pairs of axes beyond both.
+
+        Raises:
+            InputError: There is no such metric.
+        """
+        return answers.variance_shares(self._with_metric(metric), self.columns, metric)
+
+    def _fixed_axes(self) -> tuple[str, ...]:
+        return tuple(c for c in self.columns if c not in self.meta.populations)
+
+    def _units(self, by: Sequence[str] | None) -> tuple[str, ...]:
+        units = tuple(self.meta.populations if by is None else by)
+        answers.check_axes(units, self.columns)
+        return units
+
+    def _with_metric(self, metric: str) -> "pl.DataFrame":
+        if metric not in self.metrics:
+            hint = did_you_mean(metric, self.metrics)
+            raise InputError(
+                f"no variant has a numeric metric {metric!r}{hint} There are:"
+                f" {', '.join(self.metrics[:20])}{', …' if len(self.metrics) > 20 else ''}"
+            )
+        pl = _polars()
+        return self.complete.filter(pl.col(metric).is_not_null() & pl.col(metric).is_finite())
+
+    @cached_property
+    def _parts(self) -> Any:
+        return self._directory.parts()
+
+    def _journal_records(self) -> Any:
+        return read_journal(self._directory.journal_path(self._parts))
+
+
+def open_study(location: str | Path) -> Study:
+    """Open a study for reading, even while it is being run.
+
+    Args:
+        location: The folder that `fleet2d study run` wrote, or a location like s3://bucket/study.
+
+    Raises:
+        RunDirectoryError: There is no study.
+    """
+    return Study(StudyDirectory(location))
+
+
+def _polars() -> Any:
+    with extra("study", "this needs polars"):
+        import polars as pl
+    return pl

@@ -1,0 +1,305 @@
+"""The study file: its sections as typed settings, and how it is read."""
+
+import os.path
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import BeforeValidator, Field, ValidationError, model_validator
+
+from fleet2d.bounds import one_line
+from fleet2d.component import Settings
+from fleet2d.document import Document, read_document
+from fleet2d.errors import ScenarioError
+from fleet2d.paths import folder_of
+from fleet2d.problems import problem, problem_at, suggest
+from fleet2d.scenario.compose import compose
+from fleet2d.scenario.explain import explain
+from fleet2d.scenario.model import Scenario
+from fleet2d.studies.axes import AnyAxis, Parameter, check_count
+from fleet2d.trust import check_code
+from fleet2d.units import PositiveDuration
+
+
+class TuneSettings(Settings):
+    """The searched parameters, the objectives, and the homes on which the results are judged.
+
+    Attributes:
+        search: The parameters, by name.
+        objectives: Metrics such as ltp_error.ana.tv, each with the better direction.
+        trials: The number of settings to try.
+        held_out: {axis: [values]}: unknown to the search, used only by the report.
+        prune_at: Simulated times at which poor trials end early; with one objective only.
+        seed: The seed of the search.
+    """
+
+    search: dict[str, Parameter] = Field(min_length=1)
+    objectives: dict[str, Literal["minimize", "maximize"]] = Field(min_length=1)
+    trials: int = Field(default=40, ge=1)
+    held_out: dict[str, tuple[Any, ...]] = Field(min_length=1, max_length=1)
+    prune_at: tuple[PositiveDuration, ...] = ()
+    seed: int = Field(default=0, ge=0)
+
+    @model_validator(mode="after")
+    def _prunes_by_one_objective(self) -> Self:
+        if self.prune_at and len(self.objectives) > 1:
+            raise problem(
+                "prune_at needs one objective: with several objectives no trial can end early"
+            )
+        if list(self.prune_at) != sorted(set(self.prune_at)):
+            raise problem("prune_at needs times in ascending order")
+        return self
+
+
+SEED = "seed"
+RESERVED = (
+    "variant", "identity", "status", "digest", "error", "wall_s", "setup_s", "simulate_s",
+    "attempts", "step", "time", "scenario", "template", "home_key", "simulated_s", "trace",
+    "peak_rss_mb",
+)  # fmt: skip
+"""Columns of the results; no axis may have such a name."""
+
+
+class ConditionalChange(Settings):
+    """A change for all variants that fulfil a condition.
+
+    Attributes:
+        when: Values of axes; a list: any of them.
+        set: {key path: value, …}.
+    """
+
+    when: dict[str, Any] = Field(default={})
+    set: dict[str, Any] = Field(min_length=1)
+
+
+class Keep(Settings):
+    """What a study keeps of each run.
+
+    Attributes:
+        metrics: Names or patterns of numbers, such as ltp_error.*.tv.
+        tables: Tables of a run, by name.
+    """
+
+    metrics: tuple[str, ...] = ("*",)
+    tables: tuple[str, ...] = ()
+
+
+class PairedComparison(Settings):
+    """A paired comparison that the report shows.
+
+    Attributes:
+        metric: A number, such as ltp_error.ana.tv.
+        against: The axis and its reference value.
+        by: The columns whose values are the units of intervals; left out: homes, people, seeds.
+        within: Axes with a separate comparison for each of their values.
+    """
+
+    metric: str
+    against: dict[str, Any] = Field(min_length=1, max_length=1)
+    by: tuple[str, ...] | None = None
+    within: tuple[str, ...] = ()
+
+
+def _numbers_or_count(value: Any) -> Any:
+    if isinstance(value, int) and not isinstance(value, bool):
+        if value < 1:
+            raise problem(f"expected 1 or more replicates, got {one_line(value)}")
+        return tuple(range(check_count(value)))
+    return value
+
+
+class StudyFile(Settings):
+    """A study: a base scenario, axes along which it varies, what to keep and to compare.
+
+    Attributes:
+        name: The name of the study in reports.
+        description: The question it answers, for the report.
+        base: The scenario: a file, bundled:NAME, or a mapping; left out: bundled:base.
+        axes: The axes along which scenarios vary, by name.
+        replicates: The number of seeds, from 0 on, or a list; left out: the seed of the base.
+        rules: Changes for some of the variants.
+        exclude: Combinations to leave out: {axis: value, …}.
+        keep: The metrics and tables to keep of each run.
+        compare: The comparisons that the report shows.
+        tune: The search of `fleet2d tune`.
+    """
+
+    name: str | None = None
+    description: str = ""
+    base: Any = None
+    axes: dict[str, AnyAxis] = Field(default={})
+    replicates: Annotated[
+        tuple[Annotated[int, Field(ge=0, lt=2**63)], ...], BeforeValidator(_numbers_or_count)
+    ] = ()
+    rules: tuple[ConditionalChange, ...] = ()
+    exclude: tuple[dict[str, Any], ...] = ()
+    keep: Keep = Keep()
+    compare: tuple[PairedComparison, ...] = ()
+    tune: TuneSettings | None = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _short_axes(cls, data: Any) -> Any:
+        """Expand `robots.astro.speed: [0.3, 0.6]` to an axis with that key."""
+        axes = data.get("axes") if isinstance(data, Mapping) else None
+        if not isinstance(axes, Mapping):
+            return data
+        return {**data, "axes": {name: _long_form(name, axis) for name, axis in axes.items()}}
+
+    @model_validator(mode="after")
+    def _columns_differ(self) -> Self:
+        owners: dict[str, str] = {}
+        for name, axis in self.axes.items():
+            for column in axis.columns(name):
+                if column in (SEED, *RESERVED):
+                    message = (
+                        f"an axis can't be called {column!r}, because results have a column of that"
+                        " name"
+                    )
+                    raise problem_at(("axes", name), message)
+                if column in owners:
+                    message = f"the axis {owners[column]!r} has a column {column!r}, too"
+                    raise problem_at(("axes", name), message)
+                owners[column] = name
+        return self
+
+    @model_validator(mode="after")
+    def _conditions_name_columns(self) -> Self:
+        known: list[str] = []
+        for name, axis in self.axes.items():
+            _check_columns(axis.when, known, ("axes", name, "when"), "axes before it")
+            known += axis.columns(name)
+        for i, rule in enumerate(self.rules):
+            _check_columns(rule.when, [*known, SEED], ("rules", i, "when"), "axes")
+        for i, condition in enumerate(self.exclude):
+            _check_columns(condition, [*known, SEED], ("exclude", i), "axes")
+        for i, comparison in enumerate(self.compare):
+            for key in ("against", "by", "within"):
+                columns = getattr(comparison, key) or ()
+                _check_columns(columns, [*known, SEED], ("compare", i, key), "axes")
+        return self
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """The columns of all axes."""
+        return tuple(c for name, axis in self.axes.items() for c in axis.columns(name))
+
+    @property
+    def populations(self) -> tuple[str, ...]:
+        """The columns whose values are a sample of a population, the seed last."""
+        columns = (c for name, axis in self.axes.items() for c in axis.populations(name))
+        return (*columns, SEED)
+
+
+def _long_form(name: str, axis: Any) -> Any:
+    if isinstance(axis, list | tuple):
+        if "." not in name:
+            raise problem_at(
+                ("axes", name),
+                f"a bare list is for an axis that is called by its key path, like"
+                f" robots.astro.speed: […]; else write {name}: {{key: PATH, values: […]}}",
+            )
+        return {"key": name, "values": list(axis)}
+    needs_key = isinstance(axis, Mapping) and "key" not in axis and "." in name
+    if needs_key and axis.keys() & {"values", "range"}:
+        return {"key": name, **axis}
+    return axis
+
+
+def _check_columns(
+    columns: Mapping[str, Any] | tuple[str, ...],
+    known: list[str],
+    location: tuple[str | int, ...],
+    noun: str,
+) -> None:
+    for column in columns:
+        if column not in known:
+            raise problem_at(
+                (*location, column) if isinstance(columns, Mapping) else location,
+                f"there is no axis {column!r}{suggest(column, known, f'The {noun}')}",
+            )
+
+
+@dataclass(frozen=True)
+class Specification:
+    """The content of a study file.
+
+    Attributes:
+        file: The sections, validated.
+        places: File and line of each key.
+        base: The composed base scenario.
+        folder: The folder of the file, for relative paths.
+        source: The file; None for a mapping.
+    """
+
+    file: StudyFile
+    places: Document
+    base: Document
+    folder: Path
+    source: Path | None = None
+
+    @property
+    def name(self) -> str:
+        """The name of the study: as the file says, else the name of the file."""
+        return self.file.name or (self.source.stem if self.source else "study")
+
+
+def read_specification(source: str | Path | Mapping[str, Any] | Specification) -> Specification:
+    """Read and check a study, without building its variants.
+
+    Args:
+        source: A YAML file, or the same as a mapping.
+
+    Raises:
+        ScenarioError: The study is wrong; the message says where and what to write.
+    """
+    if isinstance(source, Specification):
+        return source
+    path: Path | None = None
+    if isinstance(source, Mapping):
+        document, folder = Document(dict(source)), Path.cwd()
+    else:
+        path = Path(source)
+        document, folder = read_document(path), path.absolute().parent
+    try:
+        file = StudyFile.model_validate(document.data)
+    except ValidationError as error:
+        raise explain(error, document) from None
+    base = _base(file.base, document)
+    check_code(str(path or "the study"), [document.data, base.data])
+    return Specification(file, document, base, folder, path)
+
+
+def _base(base: Any, document: Document) -> Document:
+    """Compose the base scenario; messages name the lines of the study file."""
+    try:
+        if isinstance(base, Scenario):
+            return compose(base.resolved())
+        if isinstance(base, Mapping):
+            return _inline_base(base, document)
+        if base is None or (isinstance(base, str) and base.startswith("bundled:")):
+            return compose(base)
+        if not isinstance(base, str | Path):
+            raise ScenarioError(f"expected the file of a scenario or a mapping, got {base!r}")
+        return compose(os.path.relpath(folder_of(base) / Path(base).expanduser()))
+    except ScenarioError as error:
+        place = document.place(("base",))
+        raise ScenarioError(f"{place}{': ' * bool(place)}base: {error}") from None
+
+
+def _inline_base(base: Mapping[str, Any], document: Document) -> Document:
+    """Compose a base that the study file itself holds, with the lines of its keys."""
+    extends = base.get("extends") or []
+    parents = extends if isinstance(extends, list) else [extends]
+    paths = [
+        str(p) if str(p).startswith("bundled:") else str(folder_of(p) / Path(str(p)).expanduser())
+        for p in parents
+    ]
+    composed = compose({**base, "extends": paths})
+    composed.places.update(
+        (keys[1:], place)
+        for keys, place in document.places.items()
+        if keys[:1] == ("base",) and keys[1:2] != ("extends",)
+    )
+    return composed

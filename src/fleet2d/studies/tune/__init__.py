@@ -1,1 +1,0 @@
-"""Tuning: a search for settings on training homes, evaluated on other homes."""

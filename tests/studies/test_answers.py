@@ -1,0 +1,153 @@
+"""Answers on made-up variants, where the truth is known; and on a robot that hangs out or not."""
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import polars as pl
+import pytest
+
+import fleet2d
+from fleet2d.errors import InputError
+from fleet2d.studies.answers import effects, paired, variance_ratio, variance_shares
+
+COLUMNS = ("method", "robot", "home", "seed")
+
+
+def variants(
+    homes: int = 8, seeds: int = 4, effect: float = 0.5, noise: float = 0.1, chance: int = 0
+) -> pl.DataFrame:
+    """Two methods of a known difference, in homes and lives that differ much more."""
+    generator = np.random.default_rng(chance)
+    home, seed = generator.normal(0, 2, homes), generator.normal(0, 1, seeds)
+    return pl.DataFrame(
+        {
+            "method": method, "robot": robot, "home": h, "seed": s, "variant": 0,
+            "score": home[h] + seed[s] + effect * (method == "new") + generator.normal(0, noise),
+        }
+        for method in ("old", "new")
+        for robot in ("patrol", "hangout")
+        for h in range(homes)
+        for s in range(seeds)
+    )  # fmt: skip
+
+
+def compare(frame: pl.DataFrame, **keys: Any) -> list[dict[str, Any]]:
+    keys = {"by": ("home", "seed"), **keys}
+    return paired(frame, COLUMNS, "score", {"method": "old"}, **keys).to_dicts()
+
+
+def test_a_known_difference_is_found_though_homes_differ_more() -> None:
+    (row,) = compare(variants())
+    assert row["low"] < 0.5 < row["high"]
+    assert row["high"] - row["low"] < 0.2
+    assert "above old" in row["verdict"]
+    assert (64, 8, 4) == (row["pairs"], row["n_home"], row["n_seed"])
+
+
+def test_pairs_take_out_what_homes_and_lives_have_in_common() -> None:
+    (row,) = compare(variants())
+    assert row["variance_ratio"] > 100
+
+
+def test_within_an_axis_each_of_its_values_has_a_row() -> None:
+    rows = compare(variants(), within=("robot",))
+    assert ["patrol", "hangout"] == [row["robot"] for row in rows]
+
+
+def test_missing_variants_leave_out_their_pairs_only() -> None:
+    frame = variants().filter(~((pl.col("home") == 0) & (pl.col("method") == "new")))
+    (row,) = compare(frame)
+    assert (56, 7) == (row["pairs"], row["n_home"])
+
+
+def test_too_few_replicates_are_named_with_how_many_are_needed() -> None:
+    (row,) = compare(variants(homes=3, effect=0.05, noise=0.4))
+    assert "too few replicates to tell" in row["verdict"]
+    assert "values of home (now 3)" in row["verdict"]
+
+
+def test_one_pair_tells_nothing() -> None:
+    (row,) = compare(variants(homes=1, seeds=1), within=("robot",))[:1]
+    assert "one pair only" in row["verdict"]
+
+
+def test_equal_values_are_called_the_same() -> None:
+    (row,) = compare(variants(effect=0, noise=0))
+    assert "the same as old in every pair" == row["verdict"]
+
+
+def test_an_axis_that_applies_on_one_side_only_needs_no_partner() -> None:
+    frame = variants().with_columns(
+        explore=pl.when(pl.col("method") == "new").then(0.2).otherwise(None)
+    )
+    table = paired(frame, (*COLUMNS, "explore"), "score", {"method": "old"}, ("home", "seed"))
+    assert 64 == table["pairs"][0]
+
+
+def test_without_pairs_there_is_no_answer() -> None:
+    frame = variants().filter((pl.col("method") == "new") == (pl.col("home") < 4))
+    with pytest.raises(InputError, match="no two variants differ by method alone"):
+        compare(frame)
+
+
+def test_main_effects_are_those_that_were_put_in() -> None:
+    table = effects(variants(), ("method", "robot"), "score", ("home", "seed"))
+    rows = {(row["axis"], row["value"]): row for row in table.to_dicts()}
+    assert 0.25 == pytest.approx(rows["method", "new"]["effect"], abs=0.05)
+    assert rows["robot", "patrol"]["low"] < 0 < rows["robot", "patrol"]["high"]
+
+
+def test_shares_of_the_variance_name_what_matters() -> None:
+    table = variance_shares(variants(effect=0), COLUMNS, "score")
+    assert "home" == table["source"][0]
+    assert 1 == pytest.approx(table["share"].sum(), abs=0.05)
+
+
+def test_the_ratio_of_variances_is_that_of_unpaired_to_paired() -> None:
+    generator = np.random.default_rng(2)
+    life = generator.normal(0, 1, 4000)
+    method_a, method_b = (life + generator.normal(0, 0.5, 4000) for _ in range(2))
+    assert 5.0 == pytest.approx(
+        variance_ratio(method_b, method_a), rel=0.1
+    )  # 2 × 1.25 / (2 × 0.25)
+
+
+def test_hanging_out_or_not_has_the_variance_in_pairs_that_is_promised(tmp_path: Path) -> None:
+    """The same lives in the same homes; compared with runs whose home and seed are another's."""
+    patrol = {"type": "patrol", "cooldown": "1 h"}
+    hangout = {"type": "hangout", "source": "ltp", "near": "view", "period": "30 min"}
+    study = fleet2d.study(
+        {
+            "base": {
+                "extends": "bundled:base",
+                "simulation": {"start": "2026-01-05T17:00", "duration": "5 h"},
+            },
+            "axes": {
+                "robot": {
+                    "options": {
+                        "off": {"robots.astro.behaviors": [patrol]},
+                        "on": {"robots.astro.behaviors": [hangout, patrol]},
+                    }
+                },
+                "home": {"synthetic": 3, "settings": {"furnish": True}},
+            },
+            "replicates": 6,
+            "keep": {"metrics": ["sightings.*", "distance.*"]},
+        },
+        tmp_path / "hangout",
+        executor="serial",
+    )
+    (walked,) = study.paired("distance.ana", {"robot": "off"}).to_dicts()
+    # Her life is the same, whatever the robot does.
+    assert (0, math.inf) == (walked["difference"], walked["variance_ratio"])
+    frame = study.variants.sort("home", "seed")
+    for metric in ("sightings.ana", "distance.astro"):
+        (row,) = study.paired(metric, {"robot": "off"}).to_dicts()
+        on, off = (
+            frame.filter(frame["robot"] == name)[metric].to_numpy() for name in ("on", "off")
+        )
+        unpaired = np.concatenate([on - np.roll(off, shift) for shift in range(1, len(on))])
+        assert 18 == row["pairs"] == len(on)
+        assert unpaired.var() / (on - off).var() == pytest.approx(row["variance_ratio"], rel=0.15)

@@ -1,0 +1,114 @@
+"""Intervals hold the truth as often as they claim, over homes and seeds."""
+
+import math
+
+import numpy as np
+import pytest
+
+from fleet2d.studies.answers import MeanEstimate, estimate
+
+STUDIES = 400
+
+
+def coverage(homes: int, seeds: int, home: float, seed: float, noise: float, skewed: bool) -> float:
+    """Return how often the interval holds a known effect, in simulated studies."""
+    generator = np.random.default_rng(7)
+    home_of, seed_of = np.repeat(np.arange(homes), seeds), np.tile(np.arange(seeds), homes)
+    hits = 0
+    for _ in range(STUDIES):
+        if skewed:
+            of_home = generator.exponential(home, homes) - home
+        else:
+            of_home = generator.normal(0, home, homes)
+        of_seed = generator.normal(0, seed, seeds)
+        values = 1 + of_home[home_of] + of_seed[seed_of]
+        values = values + generator.normal(0, noise, len(values))
+        mean = estimate(values, {"home": home_of, "seed": seed_of}, resamples=300)
+        hits += mean.low <= 1 <= mean.high
+    return hits / STUDIES
+
+
+@pytest.mark.parametrize(
+    ("homes", "seeds", "home", "seed", "noise", "skewed"),
+    [
+        (5, 5, 1.0, 0.0, 1.0, False),
+        (5, 5, 1.0, 1.0, 1.0, False),
+        (10, 5, 1.0, 0.5, 1.0, False),
+        (10, 10, 1.0, 0.0, 0.1, False),
+        (1, 8, 0.0, 1.0, 1.0, False),
+        (8, 1, 1.0, 0.0, 1.0, False),
+        (20, 5, 1.0, 0.5, 0.5, True),
+    ],
+)
+def test_they_hold_the_truth_as_often_as_they_claim(
+    homes: int, seeds: int, home: float, seed: float, noise: float, skewed: bool
+) -> None:
+    # 95 %, within 3 standard errors of 400 studies; a little less of skewed values.
+    assert (0.90 if skewed else 0.917) < coverage(homes, seeds, home, seed, noise, skewed) <= 0.99
+
+
+def test_over_values_that_have_nothing_in_common_they_are_cautious() -> None:
+    assert coverage(5, 5, 0.0, 0.0, 1.0, False) >= 0.95
+
+
+def test_the_same_values_give_the_same_interval() -> None:
+    values = [0.1, 0.4, 0.2, 0.9]
+    assert estimate(values) == estimate(values)
+
+
+def test_an_interval_holds_its_mean() -> None:
+    mean = estimate([0.1, 0.4, 0.2, 0.9])
+    assert mean.low < mean.mean < mean.high
+    assert 0.4 == pytest.approx(mean.mean)
+
+
+def test_more_homes_make_it_narrower() -> None:
+    generator = np.random.default_rng(1)
+    of_home = generator.normal(1, 1, 40)
+    few, many = (
+        estimate(
+            np.repeat(of_home[:n], 3), {"home": np.repeat(np.arange(n), 3), "seed": [0, 1, 2] * n}
+        )
+        for n in (10, 40)
+    )
+    assert many.high - many.low < few.high - few.low
+
+
+def test_one_value_has_no_interval() -> None:
+    mean = estimate([0.5], {"home": [0], "seed": [0]})
+    assert 0.5 == mean.mean
+    assert math.isnan(mean.low)
+    assert math.isnan(estimate([]).mean)
+
+
+def test_equal_values_have_an_interval_of_no_width() -> None:
+    mean = estimate([0.5, 0.5, 0.5])
+    assert (0.5, 0.5) == (mean.low, mean.high)
+
+
+def test_levels_with_a_single_unit_do_not_count() -> None:
+    one_level = estimate([1.0, 2.0, 4.0], {"seed": [0, 1, 2]})
+    assert one_level == estimate([1.0, 2.0, 4.0], {"home": ["a"] * 3, "seed": [0, 1, 2]})
+
+
+def study_of(homes: int, effect: float) -> MeanEstimate:
+    generator = np.random.default_rng(3)
+    of_home, seeds = generator.normal(effect, 1, homes), 4
+    values = np.repeat(of_home, seeds) + generator.normal(0, 0.5, homes * seeds)
+    levels = {"home": np.repeat(np.arange(homes), seeds), "seed": list(range(seeds)) * homes}
+    return estimate(values, levels)
+
+
+def test_how_many_homes_would_do_is_what_shows_it_four_times_in_five() -> None:
+    mean = study_of(6, 0.7)
+    needed = mean.needed()
+    assert "home" in needed
+    assert "seed" not in needed  # homes differ: more seeds in the same ones show nothing
+    generator = np.random.default_rng(9)
+    spread, count = mean.spread, needed["home"]
+    clear = 0
+    for _ in range(300):
+        of_home = generator.normal(abs(mean.mean), math.sqrt(spread.components["home"]), count)
+        noise = generator.normal(0, math.sqrt(spread.residual), (count, 4))
+        clear += estimate((of_home[:, None] + noise).mean(axis=1), resamples=200).is_clear
+    assert 0.7 < clear / 300 < 0.97  # known spread, so rather more than less

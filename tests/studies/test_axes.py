@@ -1,0 +1,168 @@
+"""Axes: what they offer, how it is labelled, and how they refuse."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from pydantic import TypeAdapter, ValidationError
+from tests.scenes import flat_document
+
+from fleet2d.errors import ScenarioError
+from fleet2d.studies.axes import KINDS, AnyAxis, Axis, Parameter
+
+SPEED = "robots.astro.speed"
+
+
+def axis(**keys: Any) -> Axis:
+    return TypeAdapter(AnyAxis).validate_python(keys)
+
+
+def labels(x_axis: Axis, name: str = "x") -> list[Any]:
+    return [tuple(choice.labels.values()) for choice in x_axis.choices(name)]
+
+
+def values(x_axis: Axis, name: str = "x") -> list[Any]:
+    return [choice.changes[0][1] for choice in x_axis.choices(name)]
+
+
+def test_values_are_their_own_labels() -> None:
+    assert [(0.3,), ("fast",)] == labels(axis(key=SPEED, values=[0.3, "fast"]))
+
+
+def test_values_with_a_type_are_called_by_it() -> None:
+    behaviors = [{"type": "patrol"}, {"type": "hangout", "source": "ltp"}]
+    assert [("patrol",), ("hangout",)] == labels(axis(key="robots.astro", values=behaviors))
+
+
+def test_values_that_can_not_be_told_apart_are_numbered() -> None:
+    lists = [[{"type": "patrol"}], [{"type": "find"}]]
+    assert [("1",), ("2",)] == labels(axis(key="robots.astro.behaviors", values=lists))
+
+
+def test_a_value_can_be_set_for_several_keys() -> None:
+    (choice,) = axis(key=[SPEED, "robots.bolt.speed"], values=[0.3]).choices("speed")
+    assert [("robots", "astro", "speed"), ("robots", "bolt", "speed")] == [
+        keys for keys, _ in choice.changes
+    ]
+
+
+@pytest.mark.parametrize(
+    ("keys", "expected"),
+    [
+        ({"range": [0.1, 0.5], "step": 0.2}, [0.1, 0.3, 0.5]),
+        ({"range": [1, 3], "step": 1}, [1, 2, 3]),
+        ({"range": [0, 1], "count": 3}, [0.0, 0.5, 1.0]),
+        ({"range": [1, 100], "count": 3, "log": True}, [1, 10, 100]),
+        ({"range": [7, 28], "count": 2, "unit": "d"}, ["7 d", "28 d"]),
+    ],
+)
+def test_range(keys: dict[str, Any], expected: list[Any]) -> None:
+    assert expected == values(axis(key="a.b", **keys))
+
+
+def test_options_change_several_keys_each() -> None:
+    x_axis = axis(options={"slow": {SPEED: 0.2}, "fast": {SPEED: 0.9, "robots.astro.radius": 0.1}})
+    assert [("slow",), ("fast",)] == labels(x_axis)
+    assert [1, 2] == [len(choice.changes) for choice in x_axis.choices("x")]
+
+
+def test_floor_plans_of_a_folder_are_called_by_their_files(tmp_path: Path) -> None:
+    for name in ("b", "a"):
+        (tmp_path / f"{name}.json").write_text(json.dumps(flat_document()))
+    (tmp_path / "notes.txt").write_text("not a plan")
+    x_axis = axis(floorplans=str(tmp_path), settings={"furnish": True})
+    assert [("a",), ("b",)] == labels(x_axis)
+    section = values(x_axis)[0]
+    assert ("native", str(tmp_path / "a.json"), True) == tuple(
+        section[k] for k in ("type", "path", "furnish")
+    )
+    assert [("b",)] == labels(axis(floorplans=str(tmp_path / "b*.json")))
+
+
+def test_a_folder_without_floor_plans_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ScenarioError, match="no floor plan matches"):
+        axis(floorplans=str(tmp_path)).choices("home")
+
+
+def test_synthetic_homes_are_called_by_their_seeds() -> None:
+    assert [(5,), (6,)] == labels(axis(synthetic=2, first=5))
+    assert [(9,), (3,)] == labels(axis(synthetic=[9, 3]))
+
+
+def test_all_personas_are_those_that_come_with_fleet2d() -> None:
+    axis_labels = labels(axis(personas="all", user="ana"))
+    assert ("retired",) in axis_labels
+    assert 6 == len(axis_labels)
+
+
+@pytest.mark.parametrize("method", ["random", "latin_hypercube"])
+def test_samples_are_the_same_at_each_call_and_within_range(method: str) -> None:
+    parameters = {
+        "speed": {"key": SPEED, "low": 0.2, "high": 1.0},
+        "dwell": {"key": "robots.astro.dwell", "low": 1, "high": 60, "log": True, "unit": "min"},
+        "order": {"key": "robots.astro.order", "choices": ["fixed", "random"]},
+    }
+    x_axis = axis(sample=parameters, count=8, method=method, seed=3)
+    assert ("speed", "dwell", "order") == x_axis.columns("x")
+    axis_labels = labels(x_axis)
+    assert axis_labels == labels(x_axis)
+    assert all(0.2 <= speed <= 1.0 and 1 <= dwell <= 60 for speed, dwell, _ in axis_labels)
+    assert {"fixed", "random"} == {order for *_, order in axis_labels}
+    assert x_axis.choices("x")[0].changes[1][1].endswith(" min")
+
+
+def test_a_latin_hypercube_fills_every_eighth_of_a_range_once() -> None:
+    x_axis = axis(sample={"speed": {"key": SPEED, "low": 0, "high": 8}}, count=8)
+    assert list(range(8)) == sorted(int(speed) for (speed,) in labels(x_axis))
+
+
+def test_whole_numbers_reach_both_ends() -> None:
+    parameter = Parameter(key="a.b", low=1, high=3, integer=True)
+    assert [1, 2, 3, 3] == [parameter.at(share) for share in (0.0, 0.5, 0.9, 1.0)]
+
+
+def test_a_zip_pairs_values() -> None:
+    x_axis = axis(zip={"speed": {"key": SPEED, "values": [0.3, 0.6]}, "home": {"synthetic": 2}})
+    assert [(0.3, 0), (0.6, 1)] == labels(x_axis)
+    assert ("home",) == x_axis.populations("x")
+
+
+def test_a_zip_of_unequal_lengths_is_refused() -> None:
+    x_axis = axis(zip={"speed": {"key": SPEED, "values": [0.3]}, "home": {"synthetic": 2}})
+    with pytest.raises(ScenarioError, match="speed has 1, home has 2"):
+        x_axis.choices("x")
+
+
+def test_a_grid_within_an_axis_combines_all() -> None:
+    x_axis = axis(
+        grid={"a": {"key": "a.b", "values": [1, 2]}, "c": {"key": "c.d", "values": [3, 4]}}
+    )
+    assert [(1, 3), (1, 4), (2, 3), (2, 4)] == labels(x_axis)
+
+
+@pytest.mark.parametrize(
+    ("keys", "message"),
+    [
+        ({"key": SPEED}, "exactly one of values"),
+        ({"key": SPEED, "vals": [1]}, "did you mean 'values'"),
+        ({"key": SPEED, "values": [1], "range": [0, 1]}, "got values and range"),
+        ({"key": SPEED, "values": []}, "at least 1"),
+        ({"key": SPEED, "values": [1], "labels": ["a", "b"]}, "2 labels for 1 values"),
+        ({"key": SPEED, "range": [0, 1]}, "give step, or count"),
+        ({"key": SPEED, "range": [1, 0], "count": 3}, "below the last"),
+        ({"key": SPEED, "range": [0, 1], "count": 3, "log": True}, "above 0"),
+        ({"sample": {"a": {"key": SPEED, "low": 2, "high": 1}}, "count": 3}, "low below high"),
+        (
+            {"sample": {"a": {"key": SPEED, "low": 0, "high": 1, "log": True}}, "count": 3},
+            "above 0",
+        ),
+    ],
+)
+def test_wrong_axes_are_refused(keys: dict[str, Any], message: str) -> None:
+    with pytest.raises(ValidationError, match=message):
+        axis(**keys)
+
+
+def test_every_kind_is_known_by_a_key_of_its_own() -> None:
+    assert all(kind in cls.model_fields for kind, cls in KINDS.items())

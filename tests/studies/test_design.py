@@ -1,0 +1,117 @@
+"""Designs: which variants there are, what their scenarios are, and what errors name."""
+
+import pickle
+from pathlib import Path
+from typing import Any
+
+import pytest
+from tests.studies.scenes import SPEED, base, small
+
+from fleet2d.errors import ScenarioError
+from fleet2d.studies.design import Design, build_design
+from fleet2d.studies.specification import read_specification
+
+RADIUS = "robots.astro.radius"
+
+
+def design(**keys: Any) -> Design:
+    return build_design(read_specification(small(**keys)))
+
+
+def labels(study_design: Design, *columns: str) -> list[tuple[Any, ...]]:
+    return [tuple(study_design.parameters(i)[c] for c in columns) for i in range(len(study_design))]
+
+
+def test_every_value_meets_every_other_and_every_seed() -> None:
+    study_design = design(axes={SPEED: [0.3, 0.6], RADIUS: [0.1, 0.2]}, replicates=2)
+    assert (8, (SPEED, RADIUS, "seed")) == (len(study_design), study_design.columns)
+    assert [(0.3, 0.1, 0), (0.3, 0.1, 1), (0.3, 0.2, 0)] == labels(
+        study_design, SPEED, RADIUS, "seed"
+    )[:3]
+
+
+def test_scenarios_have_their_values_and_their_seed() -> None:
+    scenario = design().scenario(4)
+    assert (0.6, 1) == (scenario.robots["astro"].speed, scenario.simulation.seed)
+
+
+def test_without_replicates_the_seed_is_that_of_the_base() -> None:
+    study_design = build_design(read_specification({"base": base()}))
+    assert ([(4,)], 1) == (labels(study_design, "seed"), len(study_design))
+
+
+def test_tables_that_are_not_kept_are_not_made() -> None:
+    artifacts = design().scenario(0).artifacts
+    assert ("off", False, False) == (
+        artifacts.trajectories, artifacts.observations, artifacts.key_frames,
+    )  # fmt: skip
+    kept_artifacts = design(keep={"tables": ["observations", "trajectories"]}).scenario(0).artifacts
+    assert (60.0, True) == (
+        kept_artifacts.trajectories.total_seconds(),
+        kept_artifacts.observations,
+    )  # type: ignore[union-attr]
+
+
+def test_an_axis_with_a_condition_applies_there_only() -> None:
+    axes = {
+        "robot": {"key": "robots.astro.order", "values": ["fixed", "random"]},
+        "dwell": {"key": "robots.astro.dwell", "values": [60, 90], "when": {"robot": "random"}},
+    }
+    study_design = design(axes=axes, replicates=1)
+    expected = [("fixed", None), ("random", 60), ("random", 90)]
+    assert expected == labels(study_design, "robot", "dwell")
+
+
+def test_rules_change_the_variants_that_they_name() -> None:
+    rules = [{"when": {SPEED: [0.6]}, "set": {RADIUS: 0.11}}]
+    study_design = design(rules=rules, replicates=1)
+    assert [0.15, 0.11] == [study_design.scenario(i).robots["astro"].radius for i in range(2)]
+
+
+def test_excluded_combinations_are_left_out() -> None:
+    axes = {SPEED: [0.3, 0.6], RADIUS: [0.1, 0.2]}
+    study_design = design(axes=axes, replicates=1, exclude=[{SPEED: 0.3, RADIUS: 0.2}])
+    assert [(0.3, 0.1), (0.6, 0.1), (0.6, 0.2)] == labels(study_design, SPEED, RADIUS)
+
+
+def test_a_design_without_variants_is_refused() -> None:
+    with pytest.raises(ScenarioError, match="has no variants"):
+        design(exclude=[{SPEED: [0.3, 0.6]}])
+
+
+def test_a_design_too_large_to_list_is_refused() -> None:
+    many = {f"robots.astro.x{i}": list(range(60)) for i in range(5)}
+    with pytest.raises(ScenarioError, match="777,600,000 combinations"):
+        design(axes=many)
+
+
+@pytest.mark.parametrize(
+    ("keys", "message"),
+    [
+        ({"exclude": [{SPEED: 0.5}]}, r"exclude.0.robots.astro.speed: no variant has 0.5"),
+        ({"rules": [{"when": {"seed": 7}, "set": {RADIUS: 1}}]}, r"no variant has 7.*0, 1, 2"),
+        ({"compare": [{"metric": "x", "against": {SPEED: 1}}]}, r"compare.0.against"),
+    ],
+)
+def test_conditions_that_never_hold_are_refused(keys: dict[str, Any], message: str) -> None:
+    with pytest.raises(ScenarioError, match=message):
+        design(**keys)
+
+
+def test_an_error_in_a_scenario_names_axis_and_value() -> None:
+    study_design = design(axes={"pace": {"key": SPEED, "values": [0.3, "quick"]}})
+    with pytest.raises(ScenarioError, match=r"variant 3 \(pace = quick, seed = 0\).*axis 'pace'"):
+        study_design.scenario(3)
+
+
+def test_an_error_in_a_study_file_names_its_line(tmp_path: Path) -> None:
+    file = tmp_path / "study.yaml"
+    file.write_text("axes:\n  pace: {key: robots.astro.sped, values: [0.3]}\n")
+    with pytest.raises(ScenarioError, match=r"axis 'pace', pace = 0.3, .*study.yaml:2.*'speed'"):
+        build_design(read_specification(file)).scenario(0)
+
+
+def test_a_design_can_be_sent_to_another_process() -> None:
+    study_design = design()
+    again = pickle.loads(pickle.dumps(study_design))
+    assert study_design.scenario(5).resolved() == again.scenario(5).resolved()

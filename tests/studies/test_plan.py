@@ -1,0 +1,126 @@
+"""Plans: all variants built and checked, with identities that change with what matters only."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from tests.scenes import OWN
+from tests.studies.scenes import SPEED, base, small
+
+from fleet2d.errors import ScenarioError
+from fleet2d.scenario.model import load_scenario
+from fleet2d.studies.design import FileHashes, build_design, code_version, input_hash
+from fleet2d.studies.executors import SerialExecutor
+from fleet2d.studies.plan import StudyPlan, check_setups, make_plan, setups_to_check
+from fleet2d.studies.specification import read_specification
+
+ATTIC = {"key": "users.ana.start", "values": ["kitchen", "attic", "kitchn"]}
+
+
+def plan(**keys: Any) -> StudyPlan:
+    specification = read_specification(small(**keys))
+    return make_plan(build_design(specification), specification.file.keep.tables)
+
+
+def identities(**keys: Any) -> list[str]:
+    return [variant.identity for variant in plan(**keys).variants]
+
+
+def test_identities_are_the_same_at_each_call_and_differ_among_variants() -> None:
+    assert identities() == identities()
+    assert 6 == len(set(identities()))
+
+
+def test_identities_stay_when_other_values_come() -> None:
+    assert set(identities()) < set(identities(axes={SPEED: [0.1, 0.3, 0.6]}, replicates=5))
+
+
+@pytest.mark.parametrize("change", [{"max_span": 60}, {"speedup": 1000}])
+def test_what_changes_no_result_changes_no_identity(change: dict[str, Any]) -> None:
+    assert identities() == identities(base=base(simulation=change))
+
+
+def test_what_changes_results_changes_identities() -> None:
+    assert not set(identities()) & set(identities(base=base("3 min")))
+
+
+def test_another_order_of_robots_is_another_scenario() -> None:
+    robots = {name: {"type": "patrol", "camera": {"range": [0, 4]}} for name in ("astro", "bolt")}
+    other = dict(reversed(robots.items()))
+
+    assert not set(identities(base=base(robots=robots))) & set(identities(base=base(robots=other)))
+
+
+def test_a_module_of_ones_own_is_part_of_the_identity(tmp_path: Path) -> None:
+    module = tmp_path / "mine.py"
+    text = "from fleet2d import Algorithm\nclass Nothing(Algorithm):\n    pass\n"
+    module.write_text(text)
+    scenario = load_scenario(
+        base(algorithms={"own": {"type": f"{tmp_path.as_posix()}/mine:Nothing"}})
+    )
+    first_hash = input_hash(scenario, FileHashes())
+    module.write_text(text + "# another\n")
+    assert first_hash != input_hash(scenario, FileHashes())
+
+
+def test_the_code_has_a_version() -> None:
+    assert code_version().startswith("fleet2d ")
+    assert code_version() == code_version()
+
+
+def test_all_wrong_variants_are_told_at_once_without_repetition() -> None:
+    axes = {"pace": {"key": SPEED, "values": [0.3, "quick", -1]}}
+    with pytest.raises(ScenarioError) as caught:
+        plan(axes=axes)
+    lines = str(caught.value).splitlines()
+    assert 2 == len(lines)
+    assert "pace = quick" in lines[0]
+    assert "pace = -1" in lines[1]
+
+
+def test_who_can_not_stand_in_a_home_is_found_before_the_first_run() -> None:
+    with pytest.raises(ScenarioError, match=r"variant 3 \(start = attic"):
+        check_setups(plan(axes={"start": ATTIC}), SerialExecutor())
+
+
+def test_each_home_meets_each_choice_in_as_few_set_ups_as_that_takes() -> None:
+    axes = {
+        "home": {"synthetic": 2},
+        SPEED: [0.1, 0.2, 0.3, 0.4],
+        "robots.astro.radius": [0.1, 0.12, 0.14, 0.16],
+    }
+    study_plan = plan(axes=axes, replicates=2)
+    setups = [study_plan.parameters(variant) for variant in setups_to_check(study_plan)]
+    assert 8 == len(setups)  # of 32 combinations
+    for column in (SPEED, "robots.astro.radius"):
+        assert 8 == len({(row["home"], row[column]) for row in setups})
+
+
+def test_two_variants_with_the_same_scenario_are_refused() -> None:
+    axes = {SPEED: [0.3], "again": {"key": SPEED, "values": [0.4, 0.5], "when": {}}}
+    rules = [{"set": {SPEED: 0.2}}]
+    with pytest.raises(ScenarioError, match="are the same scenario"):
+        plan(axes=axes, rules=rules)
+
+
+@pytest.mark.parametrize("table", ["room_share", "observations", "explored.astro"])
+def test_tables_that_variants_have_can_be_kept(table: str) -> None:
+    assert plan(keep={"tables": [table]})
+
+
+def test_a_table_that_no_variant_has_is_refused() -> None:
+    with pytest.raises(ScenarioError, match="did you mean 'room_share'"):
+        plan(keep={"tables": ["rom_share"]})
+
+
+def test_variants_that_share_a_home_have_its_key() -> None:
+    homes = {"home": {"synthetic": 2}}
+    users = {"users": {"ana": {"type": "meander"}}}
+    study_plan = plan(axes=homes, base=base() | users, replicates=2)
+    keys = [variant.home_key for variant in study_plan.variants]
+    assert keys[0] == keys[1] != keys[2] == keys[3]
+
+
+def test_own_components_run_in_a_study() -> None:
+    own = {"share": {"type": f"{OWN}:Share", "period": "1 min"}}
+    assert plan(base=base(algorithms=own), keep={"tables": ["share"]})

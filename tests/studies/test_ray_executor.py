@@ -1,0 +1,61 @@
+"""Ray: the same results on a cluster of several nodes, one of which is killed in the middle."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from tests.studies.scenes import base, digests, optional, run, small
+
+from fleet2d.studies import api
+from fleet2d.studies.driver import Observer
+from fleet2d.studies.records import VariantRecord
+
+ray = optional("ray")
+pytestmark = [
+    pytest.mark.filterwarnings("ignore"),  # Ray's own
+]
+
+
+@pytest.fixture
+def cluster() -> Iterator[Any]:
+    """A cluster of a head without cores and two nodes with one each."""
+    from ray.cluster_utils import Cluster
+
+    cluster = Cluster(initialize_head=True, head_node_args={"num_cpus": 0})
+    try:
+        cluster.nodes_to_kill = [cluster.add_node(num_cpus=1) for _ in range(2)]
+        cluster.wait_for_nodes()
+        yield cluster
+    finally:
+        ray.shutdown()
+        cluster.shutdown()
+
+
+class KillsANode(Observer):
+    """Kills a node of a cluster as soon as workers on both nodes are at work."""
+
+    def __init__(self, cluster: Any, executor: Any) -> None:
+        self.cluster, self.executor, self.has_killed = cluster, executor, False
+
+    def on_result(self, record: VariantRecord) -> None:
+        at_work = sum(bool(actor.tasks) for actor in self.executor._crew)
+        if at_work == 2 and not self.has_killed:
+            self.has_killed = True
+            self.cluster.remove_node(self.cluster.nodes_to_kill[0], allow_graceful=False)
+
+
+def test_a_node_that_dies_loses_only_what_it_ran(
+    cluster: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    study = small(base=base("30 min"), replicates=20)
+    monkeypatch.setenv("RAY_ADDRESS", cluster.address)
+    executor = api.make_executor("ray")
+    assert 2 == executor.workers
+    observer = KillsANode(cluster, executor)
+    counts, killed = run(study, tmp_path / "killed", executor, observer=observer)
+    assert (40, 0) == (counts.complete, counts.failed)
+    assert observer.has_killed
+    _, undisturbed = run(study, tmp_path / "undisturbed")
+    assert digests(undisturbed) == digests(killed)
+    assert killed.variants["attempts"].max() >= 2  # what the node ran was run again

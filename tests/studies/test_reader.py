@@ -1,0 +1,146 @@
+"""Reading studies with polars, pandas, DuckDB and Arrow, and answers from them."""
+
+from pathlib import Path
+
+import polars as pl
+import pyarrow.parquet as pq
+import pytest
+from tests.studies.scenes import SPEED, run, small
+
+from fleet2d.errors import ArtifactError, InputError, RunDirectoryError
+from fleet2d.studies.reader import Study, open_study
+
+SIGHTINGS = "sightings.ana"
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory: pytest.TempPathFactory) -> Study:
+    keys = {
+        "keep": {"tables": ["room_share", "observations"]},
+        "compare": [{"metric": SIGHTINGS, "against": {SPEED: 0.3}}],
+        "description": "Does a fast robot see more?",
+    }
+    return run(small(**keys), tmp_path_factory.mktemp("study") / "speeds")[1]
+
+
+def test_variants_have_parameters_status_time_digest_and_metrics(study: Study) -> None:
+    frame = study.variants
+    assert [SPEED, "seed", "status", "digest", "wall_s"] == [
+        c for c in frame.columns if c in (SPEED, "seed", "status", "digest", "wall_s")
+    ]
+    assert SIGHTINGS in study.metrics
+    assert (pl.Float64, pl.Int64) == (frame.schema[SPEED], frame.schema["seed"])
+    assert frame[SIGHTINGS].is_between(0, 1).all()
+
+
+def test_a_table_of_all_variants_comes_with_their_parameters(study: Study) -> None:
+    rows = study.polars("room_share").collect()
+    assert {"variant", "step", "time", "user", "room", SPEED, "seed"} <= set(rows.columns)
+    assert set(range(6)) == set(rows["variant"])
+
+
+def test_rows_are_those_of_the_run_itself(study: Study) -> None:
+    run = study.rerun(2)
+    expected = run.polars("room_share").with_columns(pl.col(pl.Categorical).cast(pl.String))
+    rows = pl.from_arrow(pa_rows(study, 2)).drop("variant")  # type: ignore[union-attr]
+    assert expected.rows() == rows.rows()
+
+
+def pa_rows(study: Study, variant: int):  # type: ignore[no-untyped-def]
+    import pyarrow.compute as pc
+
+    return study.arrow("room_share").to_table(filter=pc.field("variant") == variant)
+
+
+def test_pandas_reads_some_variants_and_columns(study: Study) -> None:
+    frame = study.pandas("room_share", variants=[1, 4], columns=["variant", "room"])
+    assert ({1, 4}, ["variant", "room"]) == (set(frame["variant"]), list(frame.columns))
+    assert 6 == len(study.pandas())
+
+
+def test_duckdb_joins_tables_and_variants(study: Study) -> None:
+    rows = study.duckdb().sql(
+        f'select "{SPEED}", count(*) from room_share join variants using (variant) group by 1'
+    )
+    assert {0.3, 0.6} == {speed for speed, _ in rows.fetchall()}
+
+
+def test_any_parquet_reader_reads_it(study: Study) -> None:
+    assert 6 == pq.read_table(Path(study.location) / "variants.parquet").num_rows
+    files = str(Path(study.location) / "tables/room_share")
+    assert study.polars("room_share").collect().height == pq.read_table(files).num_rows
+
+
+def test_a_table_that_is_not_kept_is_named(study: Study) -> None:
+    with pytest.raises(ArtifactError, match="did you mean 'room_share'"):
+        study.arrow("roomshare")
+
+
+def test_a_metric_or_axis_that_is_not_there_is_named(study: Study) -> None:
+    with pytest.raises(InputError, match=f"did you mean '{SIGHTINGS}'"):
+        study.paired("sighting.ana", {SPEED: 0.3})
+    with pytest.raises(InputError, match="did you mean 'seed'"):
+        study.paired(SIGHTINGS, {SPEED: 0.3}, by=["seeds"])
+    with pytest.raises(InputError, match=r"has robots.astro.speed = 0.4"):
+        study.paired(SIGHTINGS, {SPEED: 0.4})
+    with pytest.raises(InputError, match="no axis 'sped'"):
+        study.paired(SIGHTINGS, {"sped": 0.4})
+
+
+def test_a_scenario_of_a_study_runs_as_any_other(study: Study) -> None:
+    assert 0.6 == study.scenario(5)["robots"]["astro"]["speed"]
+    with pytest.raises(RunDirectoryError, match="no variant 99"):
+        study.scenario(99)
+
+
+def test_a_variant_can_be_stored_with_more_artifacts(study: Study, tmp_path: Path) -> None:
+    run = study.rerun(0, tmp_path / "run", artifacts={"events": True})
+    assert "events" in run.tables
+    assert (tmp_path / "run/manifest.json").exists()
+
+
+def test_a_folder_without_a_study_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(RunDirectoryError, match="holds no study"):
+        open_study(tmp_path)
+
+
+def test_paired_compares_the_same_seeds(study: Study) -> None:
+    (row,) = study.paired(SIGHTINGS, {SPEED: 0.3}).to_dicts()
+    values = study.variants.pivot(SPEED, index="seed", values=SIGHTINGS)
+    differences = values["0.6"] - values["0.3"]
+    assert differences.mean() == pytest.approx(row["difference"])
+    assert (0.6, 3, 3) == (row[SPEED], row["pairs"], row["n_seed"])
+    assert row["low"] < row["difference"] < row["high"]
+
+
+def test_a_summary_has_a_row_for_each_value(study: Study) -> None:
+    table = study.summary(SIGHTINGS, [SPEED])
+    assert [0.3, 0.6] == table[SPEED].to_list()
+    assert (table["low"] <= table["mean"]).all()
+
+
+def test_effects_of_an_axis_add_up_to_nothing(study: Study) -> None:
+    table = study.effects(SIGHTINGS)
+    assert 0 == pytest.approx(table["effect"].sum())
+    assert ["0.3", "0.6"] == table["value"].to_list()
+
+
+def test_shares_of_the_variance_are_shares(study: Study) -> None:
+    table = study.shares(SIGHTINGS)
+    assert table["share"].is_between(0, 1).all()
+    assert {SPEED, "seed"} == set(table["source"])
+
+
+def test_a_report_is_one_page_with_its_figures(study: Study, tmp_path: Path) -> None:
+    from fleet2d.studies.report import write_report
+
+    page = write_report(study, tmp_path / "report")
+    text = page.read_text()
+    assert "Does a fast robot see more?" in text
+    assert "against 0.3" in text
+    assert "There are only 3 values of seed" in text
+    assert "http" not in text.replace("http://www.w3.org", "")
+    figures = {path.name for path in (tmp_path / "report/figures").iterdir()}
+    assert {"compare-1.svg", "sightings_ana-means.svg", "sightings_ana-distribution.svg"} <= figures
+    assert "room_share_ana_kitchen_0-time.svg" in figures
+    assert text == write_report(study, tmp_path / "again").read_text()

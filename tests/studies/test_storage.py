@@ -1,0 +1,123 @@
+"""Where studies lie: folders, and an S3 server on this machine."""
+
+import shutil
+from collections.abc import Generator, Iterator
+from pathlib import Path
+from typing import Any
+
+import pyarrow.fs as pafs
+import pytest
+from tests.studies.scenes import digests, optional, run, small
+
+from fleet2d.errors import ArtifactError, RunDirectoryError
+from fleet2d.studies import driver
+from fleet2d.studies.directory import StudyDirectory
+from fleet2d.studies.executors import Event, SerialExecutor, TaskSchedule, WorkerJob
+from fleet2d.studies.reader import open_study
+from fleet2d.studies.storage import Storage
+
+ROWS = small(keep={"tables": ["room_share"]})
+
+
+class Interrupted(SerialExecutor):
+    """Ends after two tasks."""
+
+    def run(self, job: WorkerJob, tasks: TaskSchedule) -> Generator[Event]:
+        for number, event in enumerate(super().run(job, tasks)):
+            if number == 2:
+                raise KeyboardInterrupt
+            yield event
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[str]:
+    """An S3 server on this machine: its address."""
+    moto = optional("moto.server")
+    running = moto.ThreadedMotoServer(port=0, verbose=False)
+    running.start()
+    _, port = running.get_host_and_port()
+    yield f"127.0.0.1:{port}"
+    running.stop()
+
+
+@pytest.fixture
+def location(server: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+    """Where a study lies on that server; the cache of this machine is empty."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    bucket = f"bucket-{abs(hash(tmp_path)) % 10**9}"
+    pafs.S3FileSystem(
+        access_key="key", secret_key="secret", endpoint_override=server, scheme="http",
+        region="us-east-1", allow_bucket_creation=True,
+    ).create_dir(bucket)  # fmt: skip
+    options = f"endpoint_override={server}&scheme=http&region=us-east-1"
+    return f"s3://key:secret@{bucket}/studies/speed?{options}"
+
+
+def test_a_study_on_s3_is_the_same_as_in_a_folder(location: str, tmp_path: Path) -> None:
+    _, local = run(ROWS, tmp_path / "study")
+    counts, remote = run(ROWS, location)  # type: ignore[arg-type]
+    assert 6 == counts.complete
+    assert digests(local) == digests(remote)
+    assert local.arrow("room_share").to_table() == remote.arrow("room_share").to_table()
+    table = remote.polars("room_share").collect()
+    assert 6 == table["variant"].n_unique()
+    assert digests(local)[3] == remote.rerun(3).digest
+
+
+def test_a_study_on_s3_goes_on_where_it_was_interrupted(location: str, tmp_path: Path) -> None:
+    with pytest.raises(KeyboardInterrupt):
+        run(ROWS, location, Interrupted())  # type: ignore[arg-type]
+    assert 2 == open_study(location).counts.complete
+    _, remote = run(ROWS, location)  # type: ignore[arg-type]
+    _, local = run(ROWS, tmp_path / "study")
+    assert digests(local) == digests(remote)
+
+
+def test_what_is_on_s3_is_there_for_another_machine(
+    location: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(driver, "PART_S_REMOTE", 0.0)  # each result becomes a part at once
+    with pytest.raises(KeyboardInterrupt):
+        run(ROWS, location, Interrupted())  # type: ignore[arg-type]
+    shutil.rmtree(tmp_path / "cache")
+    assert 2 == open_study(location).counts.complete
+
+
+def test_a_part_that_is_cut_on_s3_is_run_again(location: str) -> None:
+    run(ROWS, location)  # type: ignore[arg-type]
+    Storage(location).write("results/000001.parquet", b"PAR1")
+    counts, _ = run(ROWS, location)  # type: ignore[arg-type]
+    assert 6 == counts.complete
+
+
+def test_a_location_that_is_none_is_refused() -> None:
+    with pytest.raises(RunDirectoryError, match="can't be used as a store"):
+        Storage("nowhere://bucket/study")
+
+
+def test_secrets_in_a_location_are_not_printed() -> None:
+    storage = Storage("s3://key:secret@bucket/study?region=us-east-1")
+    assert "s3://bucket/study?region=us-east-1" == storage.location
+
+
+def test_a_server_that_does_not_answer_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("AWS_MAX_ATTEMPTS", "1")
+    gone = "s3://key:secret@bucket/study?endpoint_override=127.0.0.1:9&scheme=http&region=a"
+    options: Any = "&request_timeout=1&connect_timeout=1"
+    try:
+        directory = StudyDirectory(gone + options)
+    except RunDirectoryError:  # some versions know no such options
+        directory = StudyDirectory(gone)
+    with pytest.raises((ArtifactError, RunDirectoryError), match=r"127.0.0.1|can't be reached"):
+        directory.exists()
+
+
+def test_files_are_whole_or_not_there(tmp_path: Path) -> None:
+    storage = Storage(tmp_path)
+    storage.write("a/b.txt", b"whole")
+    assert (["a/b.txt"], 5, b"whole") == (
+        storage.names(), storage.size("a/b.txt"), storage.read("a/b.txt"),
+    )  # fmt: skip
+    storage.delete("a/b.txt")
+    storage.delete("a/b.txt")
+    assert (None, []) == (storage.size("a/b.txt"), storage.names("a"))
