@@ -4,7 +4,7 @@ import numpy as np
 from tests.sight.watching import agree
 
 from fleet2d.algorithms.activities import ROBOT, Activities, ActivitySense
-from fleet2d.kernels.look import CAMERA, STEP, USER
+from fleet2d.kernels.look import SightingColumn as Column
 
 KEYS = np.array([3, 4], np.uint64)
 CONFUSION = {"cook": {"bake": 0.5, "read": 0.2}, "sleep": {"rest": 1.0}}
@@ -13,10 +13,10 @@ CONFUSION = {"cook": {"bake": 0.5, "read": 0.2}, "sleep": {"rest": 1.0}}
 def rows(steps: list[int], user: int = 0, robot: int = 0, camera: int = 0) -> np.ndarray:
     observations = np.zeros((len(steps), ROBOT + 1), np.int64)
     (
-        observations[:, STEP],
-        observations[:, USER],
+        observations[:, Column.STEP],
+        observations[:, Column.USER],
         observations[:, ROBOT],
-        observations[:, CAMERA],
+        observations[:, Column.CAMERA],
     ) = steps, user, robot, camera
     return observations
 

@@ -13,7 +13,7 @@ from fleet2d.calibrate.command import calibrate_perception, fragment, report
 from fleet2d.calibrate.log import DetectionLog, read_log
 from fleet2d.calibrate.perception import calibrate
 from fleet2d.errors import InputError
-from fleet2d.kernels.look import STEP, USER
+from fleet2d.kernels.look import SightingColumn as Column
 from fleet2d.scenario.model import load_scenario
 from fleet2d.sight.camera import Camera
 from fleet2d.sight.curve import Curve
@@ -118,7 +118,7 @@ def test_the_log_of_a_run_calibrates_to_the_settings_of_the_run() -> None:
     }  # fmt: skip
     rows = Watch(around(distance, bearing, facing), perception={"detection": detection}).look()
     detected = np.zeros(n, bool)
-    detected[rows[rows[:, USER] == 0, STEP]] = True
+    detected[rows[rows[:, Column.USER] == 0, Column.STEP]] = True
     away = np.abs((facing - (bearing + 180) + 180) % 360 - 180)
     calibration = calibrate(DetectionLog(Path("x.csv"), distance, detected, np.abs(bearing), away))
     for name, estimate in calibration.detection.estimates.items():
@@ -127,7 +127,7 @@ def test_the_log_of_a_run_calibrates_to_the_settings_of_the_run() -> None:
         around(distance, bearing, facing), perception=calibration.section(), seed=2
     ).look()
     hits = np.zeros(n, bool)
-    hits[rerun[rerun[:, USER] == 0, STEP]] = True
+    hits[rerun[rerun[:, Column.USER] == 0, Column.STEP]] = True
     assert agree(hits, detected.mean())
 
 

@@ -12,7 +12,7 @@ import shapely
 from tests.sight.watching import PILLAR, SIDE_M, UNITS_PER_M, Watch, agree, around, changed, hall
 
 from fleet2d.kernels import F64, I64, Bool
-from fleet2d.kernels.look import HEADING, IDENTITY, POSTURE, STEP, TRUE_X, TRUE_Y, USER, X, Y
+from fleet2d.kernels.look import SightingColumn as Column
 
 N = 60_000
 RNG = np.random.default_rng(0)
@@ -25,7 +25,7 @@ def noticed(watch: Watch, user: int = 0) -> Bool:
     """Return for each step whether a user is noticed."""
     rows = watch.look()
     result = np.zeros(watch.users.shape[1], bool)
-    result[rows[rows[:, USER] == user, STEP] - watch.first] = True
+    result[rows[rows[:, Column.USER] == user, Column.STEP] - watch.first] = True
     return result
 
 
@@ -219,7 +219,9 @@ def test_misses_of_two_users_are_independent() -> None:
     users = np.concatenate([around(still, 0 * still), around(still, 90 + 0 * still)])
     watch = Watch(users, camera={"detection": 0.5}, perception={"detection": {"memory": 1}})
     rows = watch.look()
-    ana, ben = (np.bincount(rows[rows[:, USER] == u, STEP], minlength=N) for u in (0, 1))
+    ana, ben = (
+        np.bincount(rows[rows[:, Column.USER] == u, Column.STEP], minlength=N) for u in (0, 1)
+    )
     apart = slice(None, None, 12)
     assert agree(ana[apart] * ben[apart], 0.25)
 
@@ -233,14 +235,14 @@ def ghosts(**more: Any) -> I64:
     """Return the false positives of a camera that sees up to 3 m, in a hall with nobody near."""
     camera = {"range": [1, 3], "angle_deg": 120, **more.pop("camera", {})}
     rows = Watch(NOBODY_THERE, camera=camera, **more).look()
-    assert (rows[:, USER] == -1).all()
+    assert (rows[:, Column.USER] == -1).all()
     return rows
 
 
 def test_false_positives_come_at_their_rate() -> None:
     rows = ghosts(perception={"false_positives": {"per_hour": 900}})
     assert abs(len(rows) - N * 0.25) < 4.5 * np.sqrt(N * 0.25)
-    per_step = np.bincount(rows[:, STEP], minlength=N)
+    per_step = np.bincount(rows[:, Column.STEP], minlength=N)
     for count, share in enumerate((0.7788, 0.1947, 0.02434, 0.002028)):
         assert agree(per_step == count, share)
 
@@ -251,12 +253,12 @@ def test_false_positives_come_at_their_rate_whatever_the_period_and_the_step() -
     )
     expected = N * 0.5 / 3600 * 900
     assert abs(len(rows) - expected) < 4.5 * np.sqrt(expected)
-    assert (rows[:, STEP] % 4 == 0).all()
+    assert (rows[:, Column.STEP] % 4 == 0).all()
 
 
 def test_false_positives_are_uniform_over_the_view() -> None:
     rows = ghosts(perception={"false_positives": {"per_hour": 1800}}, walls=hall(PILLAR))
-    xy = rows[:, [X, Y]] / UNITS_PER_M
+    xy = rows[:, [Column.X, Column.Y]] / UNITS_PER_M
     eye = np.array([SIDE_M / 2] * 2)
     offset = xy - eye
     distance, angle = np.hypot(*offset.T), np.rad2deg(np.arctan2(offset[:, 1], offset[:, 0]))
@@ -291,8 +293,8 @@ def test_false_positives_at_a_spot_occur_only_while_it_is_in_view() -> None:
     rows = ghosts(perception={"false_positives": {"spots": spots}}, robot=robot)
     expected = N / 2 * 0.1
     assert abs(len(rows) - expected) < 4.5 * np.sqrt(expected)
-    assert (rows[:, STEP] < N // 2).all()
-    offset = rows[:, [X, Y]] / UNITS_PER_M - [12, 10]
+    assert (rows[:, Column.STEP] < N // 2).all()
+    offset = rows[:, [Column.X, Column.Y]] / UNITS_PER_M - [12, 10]
     for axis in (0, 1):
         assert abs(offset[:, axis].mean()) < 5 * 0.1 / np.sqrt(len(rows))
         assert abs(offset[:, axis].std() / 0.1 - 1) < 5 / np.sqrt(2 * len(rows))
@@ -303,7 +305,7 @@ def test_false_positives_have_the_configured_identities() -> None:
     perception = {"false_positives": {"per_hour": 900, "looks_like": {"cleo": 0.5, "ana": 0.2}}}
     rows = Watch(users, camera={"range": [1, 3]}, perception=perception).look()
     for identity, share in ((0, 0.2), (1, 0.0), (2, 0.5), (-1, 0.3)):
-        assert agree(rows[:, IDENTITY] == identity, share)
+        assert agree(rows[:, Column.IDENTITY] == identity, share)
 
 
 # --- Who it is taken for --------------------------------------------------------------------------
@@ -313,12 +315,12 @@ def test_users_are_recognized_mistaken_or_unknown_by_distance() -> None:
     identity = {"right": [[0, 0.9], [8, 0.3]], "mistaken": [[0, 0.05], [8, 0.4]]}
     users = np.concatenate([around(DISTANCE, BEARING)] * 2)
     rows = Watch(users, perception={"identity": identity}).look()
-    rows = rows[rows[:, USER] == 0]
-    distance = DISTANCE[rows[:, STEP]]
+    rows = rows[rows[:, Column.USER] == 0]
+    distance = DISTANCE[rows[:, Column.STEP]]
     right, mistaken = 0.9 - 0.6 * distance / 8, 0.05 + 0.35 * distance / 8
     edges = [2, 4, 6, 8]
     for who, share in ((0, right), (1, mistaken), (-1, 1 - right - mistaken)):
-        check_by(distance, edges, rows[:, IDENTITY] == who, share)
+        check_by(distance, edges, rows[:, Column.IDENTITY] == who, share)
 
 
 def test_users_are_mistaken_like_the_confusion_matrix() -> None:
@@ -334,7 +336,7 @@ def test_users_are_mistaken_like_the_confusion_matrix() -> None:
     names = ("ana", "ben", "cleo", "dora")
     shares["dora"] = dict.fromkeys(("ana", "ben", "cleo"), 1 / 3)
     for u, true in enumerate(names):
-        identities = rows[rows[:, USER] == u, IDENTITY]
+        identities = rows[rows[:, Column.USER] == u, Column.IDENTITY]
         assert (identities >= 0).all()
         for v, perceived in enumerate(names):
             share = 0.4 if u == v else 0.6 * shares[true].get(perceived, 0.0)
@@ -343,7 +345,7 @@ def test_users_are_mistaken_like_the_confusion_matrix() -> None:
 
 def test_the_only_user_is_mistaken_for_nobody_known() -> None:
     rows = Watch(around(DISTANCE, BEARING), perception={"identity": {"mistaken": 0.3}}).look()
-    assert agree(rows[:, IDENTITY] == -1, 0.3)
+    assert agree(rows[:, Column.IDENTITY] == -1, 0.3)
 
 
 def test_an_identity_lasts_as_long_as_its_track() -> None:
@@ -352,8 +354,8 @@ def test_an_identity_lasts_as_long_as_its_track() -> None:
     users = np.concatenate([around(distance, 0 * distance)] * 2)
     perception = {"identity": {"mistaken": 0.4, "per_track": True}}
     rows = Watch(users, perception=perception).look()
-    rows = rows[rows[:, USER] == 0]
-    identities = rows[:, IDENTITY].reshape(-1, 20)
+    rows = rows[rows[:, Column.USER] == 0]
+    identities = rows[:, Column.IDENTITY].reshape(-1, 20)
     assert (identities == identities[:, :1]).all()
     assert agree(identities[:, 0] == 1, 0.4)
 
@@ -365,7 +367,11 @@ def polar(rows: I64) -> tuple[F64, F64, F64]:
     """Return true distance [m], and the errors in distance [m] and bearing [deg]."""
     eye = SIDE_M / 2
     true, perceived = (
-        rows[:, columns] / UNITS_PER_M - eye for columns in ([TRUE_X, TRUE_Y], [X, Y])
+        rows[:, columns] / UNITS_PER_M - eye
+        for columns in (
+            [Column.TRUE_X, Column.TRUE_Y],
+            [Column.X, Column.Y],
+        )
     )
     bearings = [np.arctan2(xy[:, 1], xy[:, 0]) for xy in (true, perceived)]
     turn = np.rad2deg((bearings[1] - bearings[0] + np.pi) % (2 * np.pi) - np.pi)
@@ -414,7 +420,7 @@ def test_heading_noise_is_that_configured() -> None:
         around(DISTANCE, BEARING, FACING), perception={"attributes": {"heading_noise_deg": 10}}
     )
     rows = watch.look()
-    turn = (rows[:, HEADING] * 360 / 4096 - FACING[rows[:, STEP]] + 180) % 360 - 180
+    turn = (rows[:, Column.HEADING] * 360 / 4096 - FACING[rows[:, Column.STEP]] + 180) % 360 - 180
     check_noise(turn, 10.0)
 
 
@@ -429,7 +435,7 @@ def test_postures_are_confused_as_configured() -> None:
     rows = watch.look()
     expected = [[0.9, 0.1, 0], [0.2, 0.75, 0.05], [0, 0, 1]]
     for true in range(3):
-        perceived = rows[posture[0, rows[:, STEP]] == true, POSTURE]
+        perceived = rows[posture[0, rows[:, Column.STEP]] == true, Column.POSTURE]
         for code in range(3):
             assert agree(perceived == code, expected[true][code])
 
@@ -455,8 +461,8 @@ def test_a_perception_that_never_errs_perceives_the_truth() -> None:
     users = np.concatenate([around(DISTANCE, BEARING, FACING)] * 2)
     rows = Watch(users, perception=perception).look()
     assert 2 * N == len(rows)
-    assert (rows[:, USER] == rows[:, IDENTITY]).all()
-    assert (rows[:, X : POSTURE + 1] == rows[:, TRUE_X:]).all()
+    assert (rows[:, Column.USER] == rows[:, Column.IDENTITY]).all()
+    assert (rows[:, Column.X : Column.POSTURE + 1] == rows[:, Column.TRUE_X :]).all()
 
 
 def test_spans_do_not_change_perception() -> None:
@@ -478,4 +484,7 @@ def test_a_user_more_changes_nothing_of_the_others() -> None:
     rows = Watch(three, perception=perception).look()
     fewer = Watch(three[:2], perception=perception).look()
     for user in (0, -1):
-        assert rows[rows[:, USER] == user].tolist() == fewer[fewer[:, USER] == user].tolist()
+        assert (
+            rows[rows[:, Column.USER] == user].tolist()
+            == fewer[fewer[:, Column.USER] == user].tolist()
+        )

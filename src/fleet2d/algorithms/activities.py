@@ -11,13 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fleet2d.kernels import I64, U64
-from fleet2d.kernels.look import CAMERA, SIGHTING, STEP, USER
+from fleet2d.kernels.look import SightingColumn as Column
 from fleet2d.kernels.perception import ONE, random_shares
 
 Names = NDArray[np.object_]  # str, or None where no activity is known
 
 # A row of observations is a row of the sight kernel, followed by the robot's index.
-ROBOT = SIGHTING
+ROBOT = len(Column)
 NOTHING = 0  # the code for no known activity
 
 
@@ -98,10 +98,10 @@ class Activities:
         if not self.are_perceived:
             return true, perceived
         for (robot, camera), sense in self._senses.items():
-            is_camera = (rows[:, ROBOT] == robot) & (rows[:, CAMERA] == camera)
+            is_camera = (rows[:, ROBOT] == robot) & (rows[:, Column.CAMERA] == camera)
             for user, (steps, codes) in enumerate(self._begun):
-                index = np.flatnonzero(is_camera & (rows[:, USER] == user))
-                looks = rows[index, STEP] - sense.latency
+                index = np.flatnonzero(is_camera & (rows[:, Column.USER] == user))
+                looks = rows[index, Column.STEP] - sense.latency
                 position = np.searchsorted(np.array(steps, np.int64), looks, side="right")
                 true[index] = np.array(codes, np.int64)[position]
                 if sense.confusion is not None:

@@ -15,7 +15,7 @@ from fleet2d.errors import ComponentError
 from fleet2d.events import HOME, Event, EventKind
 from fleet2d.floorplan.home.home import Home
 from fleet2d.kernels import I64
-from fleet2d.kernels.look import IDENTITY, STEP, X, Y
+from fleet2d.kernels.look import SightingColumn as Column
 from fleet2d.kernels.timelines import Window
 
 
@@ -126,13 +126,18 @@ class Log:
     def observe(self, rows: I64) -> None:
         """Store the observations of a span: int64 (n, OBSERVATION), in order of step."""
         if len(rows):
-            self._observations.append(int(rows[0, STEP]), int(rows[-1, STEP]) + 1, rows)
+            self._observations.append(
+                int(rows[0, Column.STEP]), int(rows[-1, Column.STEP]) + 1, rows
+            )
 
     def seen(self, first: int, end: int) -> Rows:
         """Return the rows of the observations of the steps from `first` to `end` - 1."""
         blocks = self._observations.each_touching(first, end)
         return Rows(
-            [rows[slice(*np.searchsorted(rows[:, STEP], (first, end)).tolist())] for rows in blocks]
+            [
+                rows[slice(*np.searchsorted(rows[:, Column.STEP], (first, end)).tolist())]
+                for rows in blocks
+            ]
         )
 
     def perceived(self, first: int, end: int) -> Observations:
@@ -188,8 +193,8 @@ class Log:
         if self._nearest_patches is None:
             self._nearest_patches = NearestRooms(self.home.plan, self.patches.of_cell)
         rows = self.seen(first, end)
-        patch = self._nearest_patches.of(rows.column(X), rows.column(Y))
-        sightings = SightingRows(rows.column(STEP), rows.column(IDENTITY), patch)
+        patch = self._nearest_patches.of(rows.column(Column.X), rows.column(Column.Y))
+        sightings = SightingRows(rows.column(Column.STEP), rows.column(Column.IDENTITY), patch)
         return gather(first, self.bin_steps, self.patches, bins, sightings, users)
 
     def exposure(self, first: int, end: int) -> I64:

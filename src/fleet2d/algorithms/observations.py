@@ -12,20 +12,7 @@ from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.kernels import F64, I8, I16, I32, I64
 from fleet2d.kernels.chambers import fill_from_neighbors
 from fleet2d.kernels.headings import in_radians
-from fleet2d.kernels.look import (
-    CAMERA,
-    HEADING,
-    IDENTITY,
-    POSTURE,
-    STEP,
-    TRUE_HEADING,
-    TRUE_POSTURE,
-    TRUE_X,
-    TRUE_Y,
-    USER,
-    X,
-    Y,
-)
+from fleet2d.kernels.look import SightingColumn as Column
 from fleet2d.kernels.measure import rooms_at
 
 NOWHERE = -1  # the room of a body that is away
@@ -74,7 +61,7 @@ class Observations:
     @cached_property
     def step(self) -> I64:
         """Step at which the observation became known: int64 (n,)."""
-        return read_only(self._rows.column(STEP))
+        return read_only(self._rows.column(Column.STEP))
 
     @cached_property
     def robot(self) -> I32:
@@ -84,12 +71,14 @@ class Observations:
     @cached_property
     def user(self) -> I32:
         """Index of the recognized user, NOBODY if not recognized: int32 (n,)."""
-        return read_only(self._rows.column(IDENTITY).astype(np.int32))
+        return read_only(self._rows.column(Column.IDENTITY).astype(np.int32))
 
     @cached_property
     def _xy(self) -> F64:
         return read_only(
-            self._plan.lattice.to_metres(np.stack([self._rows.column(X), self._rows.column(Y)], 1))
+            self._plan.lattice.to_metres(
+                np.stack([self._rows.column(Column.X), self._rows.column(Column.Y)], 1)
+            )
         )
 
     @property
@@ -105,22 +94,22 @@ class Observations:
     @cached_property
     def room(self) -> I16:
         """Room of the perceived position, or the nearest room: int16 (n,)."""
-        return read_only(self._rooms.of(self._rows.column(X), self._rows.column(Y)))
+        return read_only(self._rooms.of(self._rows.column(Column.X), self._rows.column(Column.Y)))
 
     @cached_property
     def heading(self) -> F64:
         """Perceived heading [rad]: float64 (n,)."""
-        return read_only(in_radians(self._rows.column(HEADING)))
+        return read_only(in_radians(self._rows.column(Column.HEADING)))
 
     @cached_property
     def posture(self) -> I8:
         """Perceived posture, 0 stands, 1 sits, 2 lies: int8 (n,)."""
-        return read_only(self._rows.column(POSTURE).astype(np.int8))
+        return read_only(self._rows.column(Column.POSTURE).astype(np.int8))
 
     @cached_property
     def camera(self) -> I8:
         """Index among the robot's cameras: int8 (n,)."""
-        return read_only(self._rows.column(CAMERA).astype(np.int8))
+        return read_only(self._rows.column(Column.CAMERA).astype(np.int8))
 
     @cached_property
     def activity(self) -> Names:
@@ -186,12 +175,12 @@ def _shared(rooms: I16) -> I16:
 
 def truth(plan: FloorPlan, rows: I64, activities: Activities) -> Truth:
     """Return the truth behind rows of observations."""
-    xy = plan.lattice.to_metres(rows[:, [TRUE_X, TRUE_Y]])
+    xy = plan.lattice.to_metres(rows[:, [Column.TRUE_X, Column.TRUE_Y]])
     return Truth(
-        rows[:, USER].astype(np.int32),
+        rows[:, Column.USER].astype(np.int32),
         xy[:, 0],
         xy[:, 1],
-        in_radians(rows[:, TRUE_HEADING]),
-        rows[:, TRUE_POSTURE].astype(np.int8),
+        in_radians(rows[:, Column.TRUE_HEADING]),
+        rows[:, Column.TRUE_POSTURE].astype(np.int8),
         activities.true(rows),
     )

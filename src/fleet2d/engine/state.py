@@ -30,8 +30,7 @@ from fleet2d.entities.decisions import DecidingActor
 from fleet2d.events import Event, EventKind, EventStream, new_event
 from fleet2d.floorplan.home.home import Home
 from fleet2d.kernels import I64
-from fleet2d.kernels.look import SIGHTING
-from fleet2d.kernels.look import STEP as STEP_COLUMN
+from fleet2d.kernels.look import SightingColumn as Column
 
 if TYPE_CHECKING:
     from fleet2d.engine.gauges.run_expectations import RunExpectations
@@ -234,12 +233,12 @@ class State:
         rows = np.empty((OBSERVATION, ends[-1]), np.int64).T  # columns are read as a whole
         index: Any = slice(None)  # of each sighting among the rows
         if len(blocks) > 1:
-            steps = np.concatenate([block[:, STEP_COLUMN] for block in blocks])
+            steps = np.concatenate([block[:, Column.STEP] for block in blocks])
             index = np.empty(len(rows), np.int64)
             index[np.argsort(steps, kind="stable")] = np.arange(len(rows))
         for cameras, block, (begin, end) in zip(self.cameras, blocks, pairwise(ends), strict=True):
             part = index[begin:end] if len(blocks) > 1 else index
-            rows[part, :SIGHTING], rows[part, ROBOT] = block, cameras.index
+            rows[part, : len(Column)], rows[part, ROBOT] = block, cameras.index
         return rows
 
 

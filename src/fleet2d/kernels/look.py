@@ -8,45 +8,16 @@ from fleet2d._core import USER_LOST, USER_SEEN, About, SightingColumn, look
 from fleet2d.kernels import I8, I32, I64, U8
 
 __all__ = [
-    "CAMERA",
-    "HEADING",
-    "IDENTITY",
-    "POSTURE",
-    "SIGHTING",
-    "STEP",
-    "TRUE_HEADING",
-    "TRUE_POSTURE",
-    "TRUE_X",
-    "TRUE_Y",
-    "USER",
     "USER_LOST",
     "USER_SEEN",
     "LookRule",
     "SightEvents",
     "SightMemory",
+    "SightingColumn",
     "UserPoses",
-    "X",
-    "Y",
     "look",
     "new_memory",
 ]
-
-
-# The columns of a sighting. Where a camera was wrong about a person, USER is NOBODY; where it
-# didn't recognize one, IDENTITY is. X to POSTURE are as perceived.
-STEP = SightingColumn.STEP
-CAMERA = SightingColumn.CAMERA
-USER = SightingColumn.USER
-IDENTITY = SightingColumn.IDENTITY
-X = SightingColumn.X
-Y = SightingColumn.Y
-HEADING = SightingColumn.HEADING
-POSTURE = SightingColumn.POSTURE
-TRUE_X = SightingColumn.TRUE_X
-TRUE_Y = SightingColumn.TRUE_Y
-TRUE_HEADING = SightingColumn.TRUE_HEADING
-TRUE_POSTURE = SightingColumn.TRUE_POSTURE
-SIGHTING = len(SightingColumn)
 
 
 class UserPoses(NamedTuple):
@@ -68,7 +39,9 @@ class SightMemory(NamedTuple):
     noticed: I64  # (identities,): last step at which the identity was noticed; -1: never
     seen: I64  # (identities,): 1 while the identity counts as seen
     about: I64  # (cameras, users, len(About)): see fleet2d.kernels.perception.About
-    backlog: I64  # (cameras, rows, SIGHTING): a ring buffer of sightings that aren't known yet
+    backlog: (
+        I64  # (cameras, rows, SightingColumn): a ring buffer of sightings that aren't known yet
+    )
     waiting: I64  # (cameras, 2): first row and length of the backlog
 
 
@@ -100,6 +73,6 @@ def new_memory(cameras: int, users: int, backlog: int) -> SightMemory:
         noticed=np.full(users + 1, never, np.int64),
         seen=np.zeros(users + 1, np.int64),
         about=about,
-        backlog=np.zeros((cameras, backlog, SIGHTING), np.int64),
+        backlog=np.zeros((cameras, backlog, len(SightingColumn)), np.int64),
         waiting=np.zeros((cameras, 2), np.int64),
     )

@@ -14,7 +14,7 @@ from fleet2d.expectations import states
 from fleet2d.expectations.trace import Trace, constant, joined, pulses, shortest
 from fleet2d.floorplan.home.home import Home
 from fleet2d.kernels import I64, Bool
-from fleet2d.kernels.look import IDENTITY, STEP
+from fleet2d.kernels.look import SightingColumn as Column
 from fleet2d.kernels.measure import rooms_at
 from fleet2d.kernels.signals import distances_between, distances_to_shape, speeds
 
@@ -266,8 +266,8 @@ class PerceivedGauge(Gauge):
 
     def _measure(self, block: Block) -> Trace:
         rows = block.observations
-        rows = rows[(rows[:, ROBOT] == self._robot) & (rows[:, IDENTITY] == self._user)]
-        return pulses(np.unique(rows[:, STEP]), block.first, block.end)
+        rows = rows[(rows[:, ROBOT] == self._robot) & (rows[:, Column.IDENTITY] == self._user)]
+        return pulses(np.unique(rows[:, Column.STEP]), block.first, block.end)
 
 
 class ValueGauge(Gauge):

@@ -28,17 +28,16 @@ from fleet2d.errors import ScenarioError
 from fleet2d.events import Event
 from fleet2d.kernels import I64
 from fleet2d.kernels.look import (
-    IDENTITY,
-    SIGHTING,
     USER_LOST,
     USER_SEEN,
     LookRule,
     SightMemory,
     UserPoses,
-    X,
-    Y,
     look,
     new_memory,
+)
+from fleet2d.kernels.look import (
+    SightingColumn as Column,
 )
 from fleet2d.kernels.perception import MOST_GHOSTS, About, GhostDraw, UserDraw
 from fleet2d.sight.disturbance import Disturbance
@@ -68,7 +67,7 @@ GHOST_STREAMS = {
     GhostDraw.HEADING: "faces",
 }
 
-NOTHING: I64 = np.zeros((0, SIGHTING), np.int64)
+NOTHING: I64 = np.zeros((0, len(Column)), np.int64)
 
 
 class Cameras(Watcher):
@@ -284,9 +283,9 @@ class Cameras(Watcher):
         self.next_step = end
         if len(rows):
             self._sightings.append(rows)
-        identity = rows[:, IDENTITY]  # -1, somebody unknown, is the last row
-        self.perceived[identity, 0] = rows[:, X]
-        self.perceived[identity, 1] = rows[:, Y]
+        identity = rows[:, Column.IDENTITY]  # -1, somebody unknown, is the last row
+        self.perceived[identity, 0] = rows[:, Column.X]
+        self.perceived[identity, 1] = rows[:, Column.Y]
         names, entity = self.event_names, self.owner.name
         return [
             Event(step, entity, names[kind], self.name_of(identity))
@@ -305,7 +304,7 @@ class Cameras(Watcher):
                 yield self.row, SightEvent(event.event, event.detail, x, y)
 
     def collect(self) -> I64:
-        """Return the sightings since the last call, int64 (n, SIGHTING), stored by column."""
+        """Return the sightings since the last call, int64 (n, columns), stored by column."""
         blocks, self._sightings = self._sightings, []
         if len(blocks) == 1:
             return blocks[0]

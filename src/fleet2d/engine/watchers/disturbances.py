@@ -7,7 +7,7 @@ import numpy as np
 
 from fleet2d.kernels import I64
 from fleet2d.kernels.lens import Lenses
-from fleet2d.kernels.look import SIGHTING, SightMemory
+from fleet2d.kernels.look import SightingColumn, SightMemory
 from fleet2d.kernels.perception import FORCED_IDENTITY, FORCED_MISS, About
 from fleet2d.sight.disturbance import Disturbance, of_camera
 from fleet2d.sight.perception import Perception
@@ -92,7 +92,7 @@ def carry_over(memory: SightMemory, old: SightMemory, forced: I64) -> SightMemor
     about = old.about.copy()
     about[..., About.FORCED.value] = forced
     rows = max(memory.backlog.shape[1], int(old.waiting[:, 1].max(initial=0)))
-    backlog = np.zeros((len(about), rows, SIGHTING), np.int64)
+    backlog = np.zeros((len(about), rows, len(SightingColumn)), np.int64)
     waiting = np.zeros_like(old.waiting)
     for c, (begin, length) in enumerate(old.waiting.tolist()):
         places = (begin + np.arange(length)) % max(1, old.backlog.shape[1])

@@ -11,7 +11,8 @@ from fleet2d.kernels.lens import Lenses
 from fleet2d.kernels.look import UserPoses
 from fleet2d.kernels.mesh import SUB
 from fleet2d.kernels.motion import Poses
-from fleet2d.kernels.points import BODY, BODY_X, BODY_Y, EYE_HEADING, view_queries
+from fleet2d.kernels.points import ViewQueryColumn as Column
+from fleet2d.kernels.points import view_queries
 from fleet2d.kernels.seen import Reach
 from fleet2d.sight.fov import FieldOfView
 
@@ -53,8 +54,8 @@ def points_seen(
         lenses, widest, SLACK, robot, crowd.x, crowd.y, crowd.away, first, step_us
     )
     answers = np.zeros(len(queries) + 1, np.uint64)
-    has_moved = queries[1:, : EYE_HEADING + 1] != queries[:-1, : EYE_HEADING + 1]
-    has_moved[:, BODY] = False
+    has_moved = queries[1:, : Column.EYE_HEADING + 1] != queries[:-1, : Column.EYE_HEADING + 1]
+    has_moved[:, Column.BODY] = False
     begins = [0, *(np.flatnonzero(has_moved.any(axis=1)) + 1).tolist()] if len(queries) else []
     for begin, end in zip(begins, [*begins[1:], len(queries)], strict=False):
         answers[begin + 1 : end + 1] = _answers(method, home, lenses, queries[begin:end])
@@ -63,14 +64,14 @@ def points_seen(
 
 def _answers(method: FieldOfView, home: Home, lenses: Lenses, queries: I64) -> U64:
     """Return which points of each body are in view, for one pose of one camera."""
-    camera, _, x, y, heading = queries[0, : EYE_HEADING + 1].tolist()
+    camera, _, x, y, heading = queries[0, : Column.EYE_HEADING + 1].tolist()
     reach = Reach(
         int(lenses.near_squared[camera]),
         int(lenses.far_squared[camera]),
         int(lenses.half_angle[camera]),
     )
-    bodies = lenses.bodies[camera, queries[:, BODY], : int(lenses.points[camera]) + 1]
-    points = (bodies + queries[:, None, [BODY_X, BODY_Y]]).reshape(-1, 2)
+    bodies = lenses.bodies[camera, queries[:, Column.BODY], : int(lenses.points[camera]) + 1]
+    points = (bodies + queries[:, None, [Column.BODY_X, Column.BODY_Y]]).reshape(-1, 2)
     flags: object = method.sees(home, x, y, heading, reach, points)  # a user's own may be wrong
     if not isinstance(flags, np.ndarray) or flags.dtype != bool or flags.shape != (len(points),):
         raise ComponentError(

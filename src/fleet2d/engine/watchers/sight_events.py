@@ -3,7 +3,8 @@
 import numpy as np
 
 from fleet2d.kernels import I64
-from fleet2d.kernels.look import IDENTITY, STEP, USER_LOST, USER_SEEN, SightMemory
+from fleet2d.kernels.look import USER_LOST, USER_SEEN, SightMemory
+from fleet2d.kernels.look import SightingColumn as Column
 
 
 def sight_events(
@@ -12,7 +13,7 @@ def sight_events(
     """Return the events (step, identity, kind) of some steps, as `look` notes them, in its order.
 
     Args:
-        rows: The sightings that become known in the steps, (n, SIGHTING).
+        rows: The sightings that become known in the steps, (n, columns).
         memory: The memory at the first step; what it holds of identities becomes that at the end.
         patience: Steps without a sighting after which an identity counts as lost.
         first: The first step.
@@ -22,7 +23,7 @@ def sight_events(
     events: list[tuple[int, int, int]] = []
     for identity in range(len(memory.seen)):
         number = identity if identity < len(memory.seen) - 1 else -1
-        steps = np.unique(rows[rows[:, IDENTITY] == number, STEP])
+        steps = np.unique(rows[rows[:, Column.IDENTITY] == number, Column.STEP])
         if memory.seen[identity]:
             steps = np.concatenate([memory.noticed[[identity]], steps])
         elif not len(steps):

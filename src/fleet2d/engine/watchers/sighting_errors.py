@@ -13,21 +13,8 @@ from fleet2d.floorplan.geometry.lattice import Lattice
 from fleet2d.kernels import I64
 from fleet2d.kernels.headings import TURN, in_radians
 from fleet2d.kernels.lens import camera_poses
-from fleet2d.kernels.look import (
-    CAMERA,
-    HEADING,
-    IDENTITY,
-    POSTURE,
-    STEP,
-    TRUE_HEADING,
-    TRUE_POSTURE,
-    TRUE_X,
-    TRUE_Y,
-    USER,
-    SightMemory,
-    X,
-    Y,
-)
+from fleet2d.kernels.look import SightingColumn as Column
+from fleet2d.kernels.look import SightMemory
 from fleet2d.kernels.perception import NOBODY, About
 from fleet2d.kernels.timelines import Window
 from fleet2d.sight.camera_sightings import CameraSightings, ErrorStream
@@ -84,20 +71,20 @@ class SightingErrors:
         If so, `memory` holds of the identities what it held before the span.
 
         Args:
-            rows: The sightings as the look returns them, (n, SIGHTING).
+            rows: The sightings as the look returns them, (n, columns).
             memory: The memory after the look; sightings that wait in it are changed, too.
             before: The memory before the look.
             window: The poses of all bodies, from the first step of the span on.
             end: The step after the last one of the span.
         """
-        rows, identities = rows.copy("K"), rows[:, IDENTITY]
+        rows, identities = rows.copy("K"), rows[:, Column.IDENTITY]
         poses: tuple[I64, ...] = ()
         for c in range(len(self._cameras)):
-            here = np.flatnonzero(rows[:, CAMERA] == c)
+            here = np.flatnonzero(rows[:, Column.CAMERA] == c)
             begin, length = memory.waiting[c].tolist()
             places = (begin + np.arange(length)) % max(1, memory.backlog.shape[1])
             part = np.concatenate([rows[here], memory.backlog[c, places]])
-            looks = part[:, STEP] - self._lenses.latency[c]
+            looks = part[:, Column.STEP] - self._lenses.latency[c]
             is_new = looks >= window.first
             if not is_new.any():
                 continue
@@ -106,8 +93,8 @@ class SightingErrors:
             body = poses[0][at], poses[1][at], poses[2][at]
             part[is_new] = self._change(c, part[is_new], looks[is_new], body, memory)
             rows[here], memory.backlog[c, places] = part[: len(here)], part[len(here) :]
-        is_kept = rows[:, USER] != TAKEN_BACK
-        differs = not is_kept.all() or bool((rows[:, IDENTITY] != identities).any())
+        is_kept = rows[:, Column.USER] != TAKEN_BACK
+        differs = not is_kept.all() or bool((rows[:, Column.IDENTITY] != identities).any())
         if differs:
             memory.noticed[:], memory.seen[:] = before.noticed, before.seen
         return rows[is_kept], differs
@@ -120,13 +107,15 @@ class SightingErrors:
             old = self._sightings(camera.name, rows, looks, eye)
             new = self._with_errors(camera, old)
             _write(rows, old, new, self._owner.home.plan.lattice)
-            missed = rows[~new.noticed & (rows[:, USER] != NOBODY), USER]
+            missed = rows[~new.noticed & (rows[:, Column.USER] != NOBODY), Column.USER]
             np.subtract.at(memory.about, (c, missed, About.NOTICED.value), 1)
-            rows[~new.noticed, USER] = TAKEN_BACK
+            rows[~new.noticed, Column.USER] = TAKEN_BACK
         if self._drift is not None:
             x, y, _ = body
-            rows[:, X], rows[:, Y] = self._drift.misplace(rows[:, X], rows[:, Y], x, y, looks)
-            rows[:, HEADING] = (rows[:, HEADING] + self._drift.at(looks).turn) % TURN
+            rows[:, Column.X], rows[:, Column.Y] = self._drift.misplace(
+                rows[:, Column.X], rows[:, Column.Y], x, y, looks
+            )
+            rows[:, Column.HEADING] = (rows[:, Column.HEADING] + self._drift.at(looks).turn) % TURN
         return rows
 
     def _with_errors(self, camera: CameraErrors, sightings: CameraSightings) -> CameraSightings:
@@ -150,7 +139,11 @@ class SightingErrors:
         lattice = owner.home.plan.lattice
         seen, true, at = (
             lattice.to_metres(np.stack(xy, axis=1))
-            for xy in ((rows[:, X], rows[:, Y]), (rows[:, TRUE_X], rows[:, TRUE_Y]), eye[:2])
+            for xy in (
+                (rows[:, Column.X], rows[:, Column.Y]),
+                (rows[:, Column.TRUE_X], rows[:, Column.TRUE_Y]),
+                eye[:2],
+            )
         )
         return CameraSightings(
             camera=camera,
@@ -159,17 +152,17 @@ class SightingErrors:
             start=owner.clock.start,
             step_s=owner.clock.step_us / 1e6,
             step=looks.copy(),
-            user=rows[:, IDENTITY].copy(),
+            user=rows[:, Column.IDENTITY].copy(),
             x=seen[:, 0],
             y=seen[:, 1],
-            heading=in_radians(rows[:, HEADING]),
-            posture=rows[:, POSTURE].copy(),
+            heading=in_radians(rows[:, Column.HEADING]),
+            posture=rows[:, Column.POSTURE].copy(),
             noticed=np.ones(len(rows), np.bool_),
-            true_user=rows[:, USER].copy(),
+            true_user=rows[:, Column.USER].copy(),
             true_x=true[:, 0],
             true_y=true[:, 1],
-            true_heading=in_radians(rows[:, TRUE_HEADING]),
-            true_posture=rows[:, TRUE_POSTURE].copy(),
+            true_heading=in_radians(rows[:, Column.TRUE_HEADING]),
+            true_posture=rows[:, Column.TRUE_POSTURE].copy(),
             camera_x=at[:, 0],
             camera_y=at[:, 1],
             camera_heading=in_radians(eye[2]),
@@ -179,7 +172,9 @@ class SightingErrors:
 def _write(rows: I64, old: CameraSightings, new: CameraSightings, lattice: Lattice) -> None:
     """Write the values that errors changed to sightings, in place and rounded."""
     if new.x is not old.x or new.y is not old.y:
-        rows[:, [X, Y]] = lattice.to_lattice(np.stack([new.x, new.y], axis=1))
+        rows[:, [Column.X, Column.Y]] = lattice.to_lattice(np.stack([new.x, new.y], axis=1))
     if new.heading is not old.heading:
-        rows[:, HEADING] = np.rint(new.heading * (TURN / (2 * math.pi))).astype(np.int64) % TURN
-    rows[:, POSTURE], rows[:, IDENTITY] = new.posture, new.user
+        rows[:, Column.HEADING] = (
+            np.rint(new.heading * (TURN / (2 * math.pi))).astype(np.int64) % TURN
+        )
+    rows[:, Column.POSTURE], rows[:, Column.IDENTITY] = new.posture, new.user
