@@ -26,11 +26,15 @@ from fleet2d.floorplan.geometry.mesh import build_mesh
 from fleet2d.floorplan.load import load_floorplan
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.kernels import I64, Bool
-from fleet2d.kernels.chambers import pairs_in_sight
-from fleet2d.kernels.mesh import CELL_CENTRE, SUB, Mesh
-from fleet2d.kernels.points import points_in_sight
-from fleet2d.kernels.region import region_contains_points, visible_region
-from fleet2d.kernels.seen import Reach, cells_in_view, mark_spans
+from fleet2d.kernels.sight import (
+    Reach,
+    cells_in_view,
+    mark_spans,
+    points_in_sight,
+    region_contains_points,
+    visible_region,
+)
+from fleet2d.kernels.space import CELL_CENTRE, SUB, Mesh, pairs_in_sight
 
 Turn = Callable[[Any], Any]
 

@@ -13,7 +13,7 @@ from tests.thorough import some
 
 from fleet2d.floorplan.geometry.mesh import build_mesh, snap_polygon
 from fleet2d.kernels import F64, I64
-from fleet2d.kernels.mesh import Mesh, rasterize_cells
+from fleet2d.kernels.space import Mesh, rasterize_cells
 
 Turn = Callable[[F64], F64]
 

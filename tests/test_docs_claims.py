@@ -22,8 +22,8 @@ from fleet2d.floorplan.home.costmap import CostmapSettings
 from fleet2d.floorplan.home.layers import LayerSettings
 from fleet2d.floorplan.synthetic.source import Synthetic
 from fleet2d.interventions.intervention import verbs
-from fleet2d.kernels.headings import TURN
-from fleet2d.kernels.mesh import SUB
+from fleet2d.kernels.numbers import TURN
+from fleet2d.kernels.space import SUB
 from fleet2d.routines.manners import Manners
 from fleet2d.routines.persona import bundled_names
 from fleet2d.studies.specification import StudyFile

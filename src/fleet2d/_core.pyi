@@ -1149,7 +1149,7 @@ class Legs:
 WHOLE_PATCH: int = 255
 
 def merge_bins(minute: numpy.typing.NDArray[numpy.int64], view: numpy.typing.NDArray[numpy.int64], bin: numpy.typing.NDArray[numpy.int64], patch: numpy.typing.NDArray[numpy.int64], steps: numpy.typing.NDArray[numpy.int64], longest: int) -> tuple[numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.float64]]:
-    """Merge bins with equal evidence; see `fleet2d.kernels.stays`."""
+    """Merge bins with equal evidence; see `fleet2d.kernels.presence`."""
 
 def follow(model: tuple[Any, ...], stretches: tuple[Any, ...], now: numpy.typing.NDArray[numpy.float64], shown: numpy.typing.NDArray[numpy.int64]) -> numpy.typing.NDArray[numpy.float64]:
     """
@@ -1176,7 +1176,7 @@ def follow_people(model: tuple[Any, ...], day: tuple[Any, ...], longest: int, no
 
     Args:
         model: The transition probabilities: as of one person, with people as the first dimension.
-        day: The evidence, see `fleet2d.kernels.people`.
+        day: The evidence, see `fleet2d.kernels.presence`.
         longest: Largest number of bins in a stretch.
         now: float64 (people, stages, patches), probability before the first bin; becomes that after the last.
 
@@ -1194,7 +1194,7 @@ def smooth_people(model: tuple[Any, ...], day: tuple[Any, ...], longest: int, pr
 
     Args:
         model: The transition probabilities: as of one person, with people as the first dimension.
-        day: The evidence, see `fleet2d.kernels.people`.
+        day: The evidence, see `fleet2d.kernels.presence`.
         longest: Largest number of bins in a stretch.
         prior: float64 (people, stages, patches), probability before the first bin.
         future: float64 (people, stages, patches), likelihood of the evidence after the last one.

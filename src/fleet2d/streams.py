@@ -10,7 +10,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from fleet2d.kernels.random import StepDraws
+from fleet2d.kernels.numbers import StepDraws
 
 T = TypeVar("T")
 

@@ -13,7 +13,7 @@ from fleet2d.calibrate.command import calibrate_perception, fragment, report
 from fleet2d.calibrate.log import DetectionLog, read_log
 from fleet2d.calibrate.perception import calibrate
 from fleet2d.errors import InputError
-from fleet2d.kernels.look import SightingColumn as Column
+from fleet2d.kernels.sight import SightingColumn as Column
 from fleet2d.scenario.model import load_scenario
 from fleet2d.sight.camera import Camera
 from fleet2d.sight.curve import Curve

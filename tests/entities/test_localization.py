@@ -10,8 +10,15 @@ import fleet2d
 from fleet2d import Algorithm
 from fleet2d.entities.localization import Drift, Localization
 from fleet2d.errors import InputError
-from fleet2d.kernels.headings import TURN, UNIT, cosine, sine
-from fleet2d.kernels.random import random_bell, random_below, random_uniform
+from fleet2d.kernels.numbers import (
+    TURN,
+    UNIT,
+    cosine,
+    random_bell,
+    random_below,
+    random_uniform,
+    sine,
+)
 from fleet2d.streams import stream_key
 
 WRONG = {

@@ -19,15 +19,20 @@ from tests.homes import home_of
 import fleet2d
 from fleet2d import _core
 from fleet2d.floorplan.geometry.lattice import Lattice
-from fleet2d.kernels.lens import Lenses
-from fleet2d.kernels.look import LookRule, new_memory
 from fleet2d.kernels.motion import Breakpoints, WalkRule, empty_poses
-from fleet2d.kernels.people import PeopleEvidence
-from fleet2d.kernels.perception import ErrorTables
-from fleet2d.kernels.routes import Corners
-from fleet2d.kernels.seen import Reach
-from fleet2d.kernels.stays import Moments, StayModel, Stretches
-from fleet2d.kernels.watch import NEVER, SightRecord, WatchSetup, empty_pose_cache
+from fleet2d.kernels.presence import Moments, PeopleEvidence, StayModel, Stretches
+from fleet2d.kernels.sight import (
+    NEVER,
+    ErrorTables,
+    Lenses,
+    LookRule,
+    Reach,
+    SightRecord,
+    WatchSetup,
+    empty_pose_cache,
+    new_memory,
+)
+from fleet2d.kernels.space import Corners
 from fleet2d.sight.camera import Camera
 from fleet2d.sight.perception import Perception
 from fleet2d.sight.tables import TableContext, error_tables, stack_lenses

@@ -1,4 +1,4 @@
-"""Slow, obvious twins of `fleet2d.kernels.chambers`."""
+"""Slow, obvious twins of `fleet2d.kernels.space`."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Slow, obvious twins of the kernels in `fleet2d.kernels.fields`."""
+"""Slow, obvious twins of the kernels in `fleet2d.kernels.space`."""
 
 from itertools import product
 

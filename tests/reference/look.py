@@ -13,7 +13,8 @@ from tests.reference.motion import half_up
 from tests.reference.random import random_bell, random_below, random_bits
 from tests.reference.sight import visible
 
-from fleet2d.kernels import I64, perception
+import fleet2d.kernels.sight as k
+from fleet2d.kernels import I64
 
 Point = tuple[int, int]
 LOST, SEEN = 0, 1
@@ -124,7 +125,7 @@ class Errors:
     when, and what is remembered of it, is told here.
     """
 
-    tables: perception.ErrorTables
+    tables: k.ErrorTables
     camera: int
     start_us: int = 0
 
@@ -147,7 +148,6 @@ class Errors:
         shown: int, chance: int,
     ) -> bool:  # fmt: skip
         """Return whether a user who is `away` from the camera is noticed."""
-        k = perception
         last, value = self.draws[u], 0
         lasts = False
         if last is not None and self.row[k.AT_STAY] != 0:
@@ -166,7 +166,7 @@ class Errors:
 
     def taken_for(self, u: int, now: int, away: tuple[int, int], patience: int) -> int:
         """Return for whom a noticed user is taken; -1 for nobody known."""
-        k, before = perception, self.tracks[u]
+        before = self.tracks[u]
         if before is not None and self.row[k.KEEPS] == 1 and now - before[0] < patience:
             identity = before[1]
         else:
@@ -184,7 +184,7 @@ class Errors:
 
     def perceived(self, u: int, now: int, away: tuple[int, int], user: Body) -> tuple[int, ...]:
         """Return x and y beside where the user is, heading and posture, as perceived."""
-        k, table, c = perception, self.tables.table, self.camera
+        table, c = self.tables.table, self.camera
         dx, dy = k.perceived_offset(table, self.tables.keys, c, u, now, *away)
         turn = self._noise(self.keys[u][k.UserDraw.HEADING], now, self.row[k.HEADING_NOISE])
         posture = k.perceived_posture(
@@ -196,20 +196,20 @@ class Errors:
         """Return the false positives of a look."""
         if not self.tables.has_ghosts[self.camera]:
             return []
-        of = dict(zip(perception.GhostDraw, self.ghost_keys, strict=True))
+        of = dict(zip(k.GhostDraw, self.ghost_keys, strict=True))
         keys = {purpose: random_bits(key, now) for purpose, key in of.items()}
-        draw = random_bits(of[perception.GhostDraw.COUNT], now) // 2**33
+        draw = random_bits(of[k.GhostDraw.COUNT], now) // 2**33
         found = []
         for number in range(_outcome(self.tables.ghosts[self.camera].tolist(), draw)):
-            share = random_bits(keys[perception.GhostDraw.SOURCE], number) // 2**33
+            share = random_bits(keys[k.GhostDraw.SOURCE], number) // 2**33
             source = _outcome(self.tables.source[self.camera].tolist(), share)
-            key = random_bits(keys[perception.GhostDraw.PLACE], number)
+            key = random_bits(keys[k.GhostDraw.PLACE], number)
             place = self._place(walls, eye, at, heading, source, key)
             if place is None:
                 continue
-            share = random_bits(keys[perception.GhostDraw.IDENTITY], number) // 2**33
+            share = random_bits(keys[k.GhostDraw.IDENTITY], number) // 2**33
             who = _outcome(self.tables.looks_like[self.camera].tolist(), share)
-            faces = random_below(keys[perception.GhostDraw.HEADING], number, 4096)
+            faces = random_below(keys[k.GhostDraw.HEADING], number, 4096)
             found.append(Ghost(*place, faces, who if who < len(self.keys) else -1))
         return found
 

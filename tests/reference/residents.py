@@ -8,8 +8,7 @@ from fleet2d.entities.plan import Plan
 from fleet2d.entities.users.known_home import KnownHome
 from fleet2d.entities.users.setting import Setting
 from fleet2d.entities.users.spots import Seat, Spot
-from fleet2d.kernels.headings import TURN, turn_between
-from fleet2d.kernels.random import Bits
+from fleet2d.kernels.numbers import TURN, Bits, turn_between
 from fleet2d.routines.laws import exponential
 from fleet2d.routines.planner import PLANNED, RESUMES
 from fleet2d.streams import Draws

@@ -17,8 +17,8 @@ from fleet2d.floorplan.home.home import Home
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.rooms.doorways import DoorLine
 from fleet2d.kernels import Bool
-from fleet2d.kernels.mesh import SUB
-from fleet2d.kernels.seen import Reach
+from fleet2d.kernels.sight import Reach
+from fleet2d.kernels.space import SUB
 from fleet2d.sight.flashlight import Flashlight
 from fleet2d.sight.fov import FieldOfView
 from fleet2d.sight.line_of_sight import LineOfSight

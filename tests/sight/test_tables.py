@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from tests.sight.watching import LATTICE, UNITS_PER_M, scene
 
+import fleet2d.kernels.sight as k
 from fleet2d.errors import ScenarioError
-from fleet2d.kernels import perception as k
 from fleet2d.sight.camera import Camera
 from fleet2d.sight.perception import Perception
 from fleet2d.sight.tables import error_tables, is_perfect, stack_lenses

@@ -15,9 +15,8 @@ from shapely.geometry import Polygon
 from tests.homes import SUB, Home, home_of
 
 from fleet2d.floorplan.geometry.mesh import snap_polygon
-from fleet2d.kernels.mesh import locate
-from fleet2d.kernels.region import region_outline, visible_region
-from fleet2d.kernels.sight import line_of_sight
+from fleet2d.kernels.sight import line_of_sight, region_outline, visible_region
+from fleet2d.kernels.space import locate
 
 # A user's position is rounded by at most half a lattice unit on each axis.
 MARGIN_PX = 1

@@ -12,10 +12,9 @@ from tests.homes import home_of
 
 from fleet2d.floorplan.geometry.lattice import Lattice
 from fleet2d.kernels import F64, I8, I64
-from fleet2d.kernels.look import LookRule, SightMemory, look, new_memory
-from fleet2d.kernels.mesh import Mesh
-from fleet2d.kernels.perception import MOST_GHOSTS
-from fleet2d.kernels.timelines import Window
+from fleet2d.kernels.motion import Window
+from fleet2d.kernels.sight import MOST_GHOSTS, LookRule, SightMemory, look, new_memory
+from fleet2d.kernels.space import Mesh
 from fleet2d.sight.camera import Camera
 from fleet2d.sight.perception import Perception
 from fleet2d.sight.tables import TableContext, error_tables, stack_lenses

@@ -1,4 +1,4 @@
-// What a camera sees, as Python holds it: the named tuple `fleet2d.kernels.seen.Reach`.
+// What a camera sees, as Python holds it: the named tuple `fleet2d.kernels.sight.Reach`.
 #pragma once
 
 #include "../seen.hpp"

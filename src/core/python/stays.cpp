@@ -21,7 +21,7 @@ void bind_stays(nb::module_& m) {
                               std::move(result.patch), std::move(result.share));
         },
         "minute"_a, "view"_a, "bin"_a, "patch"_a, "steps"_a, "longest"_a, Unlocked(),
-        "Merge bins with equal evidence; see `fleet2d.kernels.stays`.");
+        "Merge bins with equal evidence; see `fleet2d.kernels.presence`.");
     m.def(
         "follow",
         [](const StayModel& model, const Stretches& stretches, View<f64, 3> now, View<i64> shown) {

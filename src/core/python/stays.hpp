@@ -1,4 +1,4 @@
-// Stays as Python holds them: the named tuples of `fleet2d.kernels.stays`.
+// Stays as Python holds them: the named tuples of `fleet2d.kernels.presence`.
 #pragma once
 
 #include "../stays.hpp"

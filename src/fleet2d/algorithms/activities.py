@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fleet2d.kernels import I64, U64
-from fleet2d.kernels.look import SightingColumn as Column
-from fleet2d.kernels.perception import ONE, random_shares
+from fleet2d.kernels.sight import ONE, random_shares
+from fleet2d.kernels.sight import SightingColumn as Column
 
 Names = NDArray[np.object_]  # str, or None where no activity is known
 

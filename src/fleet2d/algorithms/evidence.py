@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 from fleet2d.algorithms.patches import Patches
 from fleet2d.floorplan.cache import read_only
 from fleet2d.kernels import F64, I64, U8, Bool
-from fleet2d.kernels.evidence import gather_views
-from fleet2d.kernels.presence import list_sightings
+from fleet2d.kernels.presence import gather_views, list_sightings
 
 # Length of a bin [us]; one step where a step is longer.
 BIN_US = 60_000_000

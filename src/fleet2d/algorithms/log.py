@@ -15,8 +15,8 @@ from fleet2d.errors import ComponentError
 from fleet2d.events import HOME, Event, EventKind
 from fleet2d.floorplan.home.home import Home
 from fleet2d.kernels import I64
-from fleet2d.kernels.look import SightingColumn as Column
-from fleet2d.kernels.timelines import Window
+from fleet2d.kernels.motion import Window
+from fleet2d.kernels.sight import SightingColumn as Column
 
 
 class SensorRow(NamedTuple):

@@ -10,10 +10,10 @@ from fleet2d.algorithms.activities import ROBOT, Activities, Names
 from fleet2d.floorplan.cache import read_only
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.kernels import F64, I8, I16, I32, I64
-from fleet2d.kernels.chambers import fill_from_neighbors
-from fleet2d.kernels.headings import in_radians
-from fleet2d.kernels.look import SightingColumn as Column
-from fleet2d.kernels.measure import rooms_at
+from fleet2d.kernels.motion import rooms_at
+from fleet2d.kernels.numbers import in_radians
+from fleet2d.kernels.sight import SightingColumn as Column
+from fleet2d.kernels.space import fill_from_neighbors
 
 NOWHERE = -1  # the room of a body that is away
 NO_NAMES: Names = np.empty(0, object)

@@ -9,7 +9,7 @@ from fleet2d.algorithms.observations import NOWHERE
 from fleet2d.floorplan.cache import read_only
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.kernels import F64, I16, I64
-from fleet2d.kernels.mesh import label_triangles, rasterize_cells
+from fleet2d.kernels.space import label_triangles, rasterize_cells
 
 # Side of a patch [m], approximately; larger where a room would have more than about MOST_PATCHES.
 SIDE_M = 1.0

@@ -10,15 +10,14 @@ from fleet2d.algorithms.frozen import frozen
 from fleet2d.algorithms.observations import NOWHERE
 from fleet2d.floorplan.home.home import Home
 from fleet2d.kernels import F64, I16, I64, U8, Bool
-from fleet2d.kernels.headings import in_radians
-from fleet2d.kernels.measure import count_together, rooms_at, sum_moves
-from fleet2d.kernels.motion import Poses
+from fleet2d.kernels.motion import Poses, count_together, rooms_at, sum_moves
+from fleet2d.kernels.numbers import in_radians
 
 Array = TypeVar("Array", bound=NDArray[Any])
 
 
 class Path(Protocol):
-    """Protocol of runs of equal pose of one body, such as `fleet2d.kernels.timelines.Window`."""
+    """Protocol of runs of equal pose of one body, such as `fleet2d.kernels.motion.Window`."""
 
     @property
     def first(self) -> int:

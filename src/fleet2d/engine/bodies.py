@@ -10,8 +10,7 @@ from fleet2d.entities.body import NEVER
 from fleet2d.entities.motion import Pose, RandomWalk
 from fleet2d.entities.plan import Plan
 from fleet2d.kernels import I8, I64, U8
-from fleet2d.kernels.motion import Breakpoints, Poses
-from fleet2d.kernels.timelines import Timelines, Window
+from fleet2d.kernels.motion import Breakpoints, Poses, Timelines, Window
 
 STANDING = np.zeros(1, np.int8), np.zeros(0, np.int64)
 

@@ -30,7 +30,7 @@ from fleet2d.entities.decisions import DecidingActor
 from fleet2d.events import Event, EventKind, EventStream, new_event
 from fleet2d.floorplan.home.home import Home
 from fleet2d.kernels import I64
-from fleet2d.kernels.look import SightingColumn as Column
+from fleet2d.kernels.sight import SightingColumn as Column
 
 if TYPE_CHECKING:
     from fleet2d.engine.gauges.run_expectations import RunExpectations

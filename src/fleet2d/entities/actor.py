@@ -12,7 +12,7 @@ from fleet2d.entities.motion import Motion, Pose
 from fleet2d.entities.place import ANY, Point, is_point
 from fleet2d.entities.plan import Plan
 from fleet2d.floorplan.objects import PlacedObject
-from fleet2d.kernels.headings import TURN
+from fleet2d.kernels.numbers import TURN
 from fleet2d.streams import Draws
 
 

@@ -12,9 +12,9 @@ from fleet2d.entities.plan import Note, Plan
 from fleet2d.entities.resume import heading_at, next_stop
 from fleet2d.floorplan.home.costmap import CLOSED
 from fleet2d.kernels import I64
-from fleet2d.kernels.headings import TURN, turn_between
-from fleet2d.kernels.mesh import SUB
 from fleet2d.kernels.motion import Breakpoints
+from fleet2d.kernels.numbers import TURN, turn_between
+from fleet2d.kernels.space import SUB
 
 
 def plan_after_a_step(now: Situation, interrupted: Plan, notes: Sequence[Note] = ()) -> Plan:

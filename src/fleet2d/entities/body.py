@@ -22,7 +22,7 @@ from fleet2d.floorplan.home.space import Space
 from fleet2d.floorplan.objects import PlacedObject, Posture
 from fleet2d.floorplan.plan import Room
 from fleet2d.kernels import F64, I64
-from fleet2d.kernels.headings import TURN
+from fleet2d.kernels.numbers import TURN
 from fleet2d.streams import Draws, stream_key
 
 NEVER = 1 << 62

@@ -8,9 +8,15 @@ from pydantic import Field, model_validator
 
 from fleet2d.component import Settings
 from fleet2d.kernels import I64, U8
-from fleet2d.kernels.headings import TURN, turned
-from fleet2d.kernels.random import BELL_STD, random_bell, random_below, random_uniform
-from fleet2d.kernels.timelines import Window
+from fleet2d.kernels.motion import Window
+from fleet2d.kernels.numbers import (
+    BELL_STD,
+    TURN,
+    random_bell,
+    random_below,
+    random_uniform,
+    turned,
+)
 from fleet2d.problems import problem_at
 from fleet2d.streams import stream_key
 from fleet2d.units import AngleDeg, Length, PositiveDuration, micros

@@ -9,9 +9,8 @@ from fleet2d.component import register
 from fleet2d.entities.actor import Actor
 from fleet2d.entities.behavior import Behavior, Situation
 from fleet2d.entities.plan import Plan
-from fleet2d.kernels.headings import TURN
 from fleet2d.kernels.motion import WalkRule
-from fleet2d.kernels.random import BELL_STD
+from fleet2d.kernels.numbers import BELL_STD, TURN
 from fleet2d.units import AngleDeg
 
 # A step longer than any home is never possible; this limit keeps products within 64 bits.

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from fleet2d.kernels.mesh import Mesh
 from fleet2d.kernels.motion import Breakpoints, WalkRule
+from fleet2d.kernels.space import Mesh
 
 
 class Pose(NamedTuple):

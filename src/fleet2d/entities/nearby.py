@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from fleet2d.entities.body import Body
-from fleet2d.kernels.headings import TURN, UNIT, cosine, sine
+from fleet2d.kernels.numbers import TURN, UNIT, cosine, sine
 
 
 def points_at_distance(

@@ -10,7 +10,7 @@ from typing import Protocol
 from fleet2d.entities.behavior import Situation
 from fleet2d.entities.place import Point, RoomChoice
 from fleet2d.entities.plan import Plan
-from fleet2d.kernels.headings import TURN, turn_between
+from fleet2d.kernels.numbers import TURN, turn_between
 from fleet2d.units import micros
 
 

@@ -14,8 +14,8 @@ from fleet2d.events import KINDS
 from fleet2d.floorplan.home.space import Space, straight_way
 from fleet2d.floorplan.objects import POSTURES, PlacedObject, Posture
 from fleet2d.kernels import I8, I64
-from fleet2d.kernels.headings import TURN, turn_between
 from fleet2d.kernels.motion import Breakpoints, Legs, WalkRule
+from fleet2d.kernels.numbers import TURN, turn_between
 from fleet2d.problems import did_you_mean
 from fleet2d.units import LONGEST_DURATION, micros
 

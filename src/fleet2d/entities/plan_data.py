@@ -11,8 +11,8 @@ from fleet2d.entities.plan import Note, Plan
 from fleet2d.errors import ComponentError
 from fleet2d.floorplan.objects import POSTURES
 from fleet2d.kernels import I64
-from fleet2d.kernels.mesh import SUB
 from fleet2d.kernels.motion import Legs, WalkRule
+from fleet2d.kernels.space import SUB
 from fleet2d.problems import problem, refusal
 
 if TYPE_CHECKING:

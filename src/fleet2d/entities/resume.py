@@ -9,8 +9,8 @@ from fleet2d.entities.motion import Track
 from fleet2d.entities.plan import Note, Plan
 from fleet2d.errors import NoWayError
 from fleet2d.kernels import I64
-from fleet2d.kernels.headings import TURN, turn_between
 from fleet2d.kernels.motion import Breakpoints
+from fleet2d.kernels.numbers import TURN, turn_between
 
 Detour = Callable[[tuple[int, int], tuple[int, int]], I64 | None]
 

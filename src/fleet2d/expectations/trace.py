@@ -5,7 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fleet2d.kernels import F64, I64, signals
+from fleet2d.kernels import F64, I64
+from fleet2d.kernels.motion import sliding_max, until
 
 
 class Trace(NamedTuple):
@@ -59,7 +60,7 @@ class Trace(NamedTuple):
             before: Value that is assumed before the first step.
             after: Value that is assumed from the end on.
         """
-        maxima = signals.sliding_max(self.start, self.value, self.end, low, high, before, after)
+        maxima = sliding_max(self.start, self.value, self.end, low, high, before, after)
         return Trace(*maxima, self.end)
 
     def sliding_min(self, low: int, high: int, before: float, after: float) -> "Trace":
@@ -78,7 +79,7 @@ class Trace(NamedTuple):
         hold, reached = (
             t.value[np.searchsorted(t.start, start, side="right") - 1] for t in (self, goal)
         )
-        return Trace(*signals.until(start, hold, reached, after), self.end)
+        return Trace(*until(start, hold, reached, after), self.end)
 
 
 def constant(value: float, first: int, end: int) -> Trace:

@@ -12,7 +12,7 @@ from fleet2d.floorplan.geometry.lattice import Lattice
 from fleet2d.floorplan.names import number_names
 from fleet2d.floorplan.objects import PlacedObject, Point
 from fleet2d.kernels import F64
-from fleet2d.kernels.headings import TURN, UNIT, cosine, in_radians, sine
+from fleet2d.kernels.numbers import TURN, UNIT, cosine, in_radians, sine
 
 
 def number_objects(objects: Sequence[PlacedObject]) -> tuple[PlacedObject, ...]:

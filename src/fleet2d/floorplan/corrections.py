@@ -18,7 +18,7 @@ from fleet2d.floorplan.rooms.regions import LabelledRegion, Region, cells_in, sn
 from fleet2d.floorplan.rooms.room import Room, make_rooms
 from fleet2d.floorplan.rooms.vocabulary import usual_type
 from fleet2d.kernels import I64
-from fleet2d.kernels.chambers import fill_from_neighbors
+from fleet2d.kernels.space import fill_from_neighbors
 from fleet2d.problems import problem
 from fleet2d.units import Length
 

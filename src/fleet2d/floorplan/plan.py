@@ -32,8 +32,7 @@ from fleet2d.floorplan.rooms.regions import LabelledRegion
 from fleet2d.floorplan.rooms.room import NO_ROOM, Room
 from fleet2d.floorplan.rooms.vocabulary import room_type
 from fleet2d.kernels import I16, Bool
-from fleet2d.kernels.chambers import fill_from_neighbors
-from fleet2d.kernels.mesh import Mesh, rasterize_cells, strictly_inside
+from fleet2d.kernels.space import Mesh, fill_from_neighbors, rasterize_cells, strictly_inside
 from fleet2d.leaves import views
 from fleet2d.sums import sum_in_order
 

@@ -14,7 +14,7 @@ from fleet2d.entities.plan_data import check_data, plan_of
 from fleet2d.errors import PlacementError
 from fleet2d.interventions.intervention import Intervention, body
 from fleet2d.interventions.world import World
-from fleet2d.kernels.headings import TURN
+from fleet2d.kernels.numbers import TURN
 from fleet2d.units import AngleDeg, PositiveDuration
 
 

@@ -1,27 +1,66 @@
-"""Poses over time: tracks between breakpoints, and the random walk of a meandering body.
+"""Bodies over time: tracks and timelines of poses, measurements of them, and the days of people.
 
 A *track* is five arrays over its breakpoints i: time [us], x, y [lattice], heading [1/4096 turn],
 and away (1 = not at home). Between two breakpoints the pose moves in a straight line and turns the
-shorter way, both at constant rate; before the first and after the last one it stays.
+shorter way, both at constant rate; before the first and after the last one it stays. `Timelines`
+holds the tracks of all bodies. `DayPlanner`, `Interruptions` and `Resident` make those of people
+who follow a routine.
 """
 
 from typing import NamedTuple
 
 import numpy as np
 
-from fleet2d._core import Legs, time_route, trace_meander, trace_track
+from fleet2d._core import (
+    DayPlanner,
+    Interruptions,
+    LastStint,
+    Legs,
+    Resident,
+    Scene,
+    Timelines,
+    Waits,
+    Window,
+    count_together,
+    distances_between,
+    distances_to_shape,
+    rooms_at,
+    sliding_max,
+    speeds,
+    sum_moves,
+    time_route,
+    trace_meander,
+    trace_track,
+    until,
+)
 from fleet2d.kernels import I64, U8
 
 __all__ = [
     "Breakpoints",
+    "DayPlanner",
+    "Interruptions",
+    "LastStint",
     "Legs",
     "Poses",
+    "Resident",
+    "Scene",
+    "Timelines",
+    "Waits",
     "WalkRule",
+    "Window",
+    "count_together",
+    "distances_between",
+    "distances_to_shape",
     "empty_poses",
     "paste_poses",
+    "rooms_at",
+    "sliding_max",
+    "speeds",
+    "sum_moves",
     "time_route",
     "trace_meander",
     "trace_track",
+    "until",
 ]
 
 

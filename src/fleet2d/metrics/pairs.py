@@ -10,7 +10,7 @@ from fleet2d.algorithms.history import History
 from fleet2d.algorithms.poses import BodyPoses
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.kernels import F64, I64, Bool
-from fleet2d.kernels.points import points_in_sight
+from fleet2d.kernels.sight import points_in_sight
 
 
 class RobotUserPair(NamedTuple):

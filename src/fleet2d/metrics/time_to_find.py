@@ -13,7 +13,7 @@ from fleet2d.component import register
 from fleet2d.events import Event
 from fleet2d.floorplan.home.home import Home
 from fleet2d.kernels import F64
-from fleet2d.kernels.points import points_in_sight
+from fleet2d.kernels.sight import points_in_sight
 from fleet2d.metrics.metric import Metric
 from fleet2d.metrics.survival import kaplan_meier, quantile, restricted_mean
 from fleet2d.sums import sum_in_order

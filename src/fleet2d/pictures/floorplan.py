@@ -25,7 +25,7 @@ from fleet2d.floorplan.home.standing import grown_cells
 from fleet2d.floorplan.plan import FloorPlan, Room, rings
 from fleet2d.floorplan.rooms.room import NO_ROOM
 from fleet2d.kernels import I16, Bool
-from fleet2d.kernels.fields import squared_distance
+from fleet2d.kernels.space import squared_distance
 from fleet2d.palette import (
     ACCENT_COLOR,
     BORDER_COLOR,

@@ -11,8 +11,8 @@ from matplotlib.patches import Circle, Polygon, Wedge
 from fleet2d.errors import InputError
 from fleet2d.floorplan.home.home import Home
 from fleet2d.floorplan.plan import FloorPlan
-from fleet2d.kernels.headings import TURN
-from fleet2d.kernels.seen import Reach
+from fleet2d.kernels.numbers import TURN
+from fleet2d.kernels.sight import Reach
 from fleet2d.palette import TEXT_COLOR, VIEW_COLOR, VIEW_EDGE
 from fleet2d.pictures.floorplan import check_picture, figure_size, floorplan_axes, picture
 from fleet2d.pictures.layers import layer_on_axes

@@ -18,7 +18,7 @@ from fleet2d.floorplan.geometry.lattice import Lattice
 from fleet2d.floorplan.home.home import Home
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.kernels import F64, Bool
-from fleet2d.kernels.mesh import Mesh
+from fleet2d.kernels.space import Mesh
 from fleet2d.palette import VIEW_COLOR, VIEW_EDGE
 from fleet2d.pictures.traces import BodyTrace
 from fleet2d.sight.region import VisibleRegion, WallPlan

@@ -18,7 +18,7 @@ from fleet2d.published.reader import ConfigReader, tidy
 from fleet2d.sight.camera import Camera
 from fleet2d.units import micros
 
-# Random turns are cut at 4.88 standard deviations (kernels.random), so this limit has no effect.
+# Random turns are cut at 4.88 standard deviations (kernels.numbers), so this limit has no effect.
 _TURN_LIMIT_STD = 5
 _FASTEST_TURN_DEG_S = 36_000
 _WIDEST_TURN_DEG = 3600

@@ -3,7 +3,7 @@
 from collections.abc import Collection, Mapping, Sequence
 from typing import NamedTuple
 
-from fleet2d.kernels.interruptions import Interruptions
+from fleet2d.kernels.motion import Interruptions
 from fleet2d.routines.activity import Activity, seconds
 from fleet2d.routines.laws import Law
 from fleet2d.routines.needs import Errand, Need

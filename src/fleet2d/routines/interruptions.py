@@ -6,7 +6,7 @@ begin and end as planned. A day's interruptions are a function of its date and i
 
 from collections.abc import Sequence
 
-from fleet2d.kernels.random import Bits
+from fleet2d.kernels.numbers import Bits
 from fleet2d.routines.interruption_rules import (
     CERTAIN,
     CHANCE_BITS,

@@ -15,7 +15,7 @@ from collections.abc import Callable, Collection, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
-from fleet2d.kernels.planner import DayPlanner
+from fleet2d.kernels.motion import DayPlanner
 from fleet2d.routines.laws import Law, draw_weighted
 from fleet2d.routines.occupancy import ANY_ROOM, Occupancy
 from fleet2d.streams import Draws

@@ -19,8 +19,6 @@ from fleet2d.errors import ArtifactError
 from fleet2d.floorplan.home.home import Home
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.kernels import F64, I16, I64, Bool
-from fleet2d.kernels.headings import TURN, in_radians
-from fleet2d.kernels.mesh import SUB
 from fleet2d.kernels.motion import (
     Breakpoints,
     Poses,
@@ -28,6 +26,8 @@ from fleet2d.kernels.motion import (
     trace_meander,
     trace_track,
 )
+from fleet2d.kernels.numbers import TURN, in_radians
+from fleet2d.kernels.space import SUB
 from fleet2d.runs.key_kinds import KEY_KINDS, PLANNED, WALK
 from fleet2d.scenario.model import load_scenario
 from fleet2d.trust import restrict_stored

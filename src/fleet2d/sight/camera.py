@@ -7,7 +7,7 @@ from typing import NamedTuple, Self
 from pydantic import Field, model_validator
 
 from fleet2d.component import Settings
-from fleet2d.kernels.headings import TURN, UNIT, cosine, sine
+from fleet2d.kernels.numbers import TURN, UNIT, cosine, sine
 from fleet2d.problems import problem, problem_at
 from fleet2d.sight.perception import Perception
 from fleet2d.units import (
@@ -41,7 +41,7 @@ class Pan(Settings):
 
 
 class Lens(NamedTuple):
-    """A camera in integer units for the sight kernel; see `fleet2d.kernels.look.Lenses`."""
+    """A camera in integer units for the sight kernel; see `fleet2d.kernels.sight.Lenses`."""
 
     near: int  # lattice units
     far: int

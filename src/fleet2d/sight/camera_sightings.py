@@ -13,10 +13,9 @@ from fleet2d.clock import DAY_US, HOUR_US, midnight_of
 from fleet2d.errors import ComponentError
 from fleet2d.floorplan.home.home import Home
 from fleet2d.kernels import F64, I16, I64, Bool
-from fleet2d.kernels.headings import QUARTER, TURN, UNIT, half_sines
-from fleet2d.kernels.measure import rooms_at
-from fleet2d.kernels.perception import NOBODY, ONE, POSTURES, random_shares
-from fleet2d.kernels.random import BELL_STD, random_bells
+from fleet2d.kernels.motion import rooms_at
+from fleet2d.kernels.numbers import BELL_STD, QUARTER, TURN, UNIT, half_sines, random_bells
+from fleet2d.kernels.sight import NOBODY, ONE, POSTURES, random_shares
 from fleet2d.streams import stream_key
 from fleet2d.units import micros
 

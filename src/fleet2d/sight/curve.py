@@ -11,7 +11,7 @@ from pydantic_core import CoreSchema
 
 from fleet2d.component import Settings
 from fleet2d.kernels import F64, I64
-from fleet2d.kernels.perception import ONE
+from fleet2d.kernels.sight import ONE
 from fleet2d.problems import problem, problem_at
 from fleet2d.units import Share
 

@@ -9,8 +9,8 @@ from pydantic import Field
 from fleet2d.component import register
 from fleet2d.floorplan.home.home import Home
 from fleet2d.kernels import I64, U8, Bool
-from fleet2d.kernels.headings import TURN
-from fleet2d.kernels.mesh import SUB, Mesh
+from fleet2d.kernels.numbers import TURN
+from fleet2d.kernels.space import SUB, Mesh
 from fleet2d.sight.fov import FieldOfView, Reach
 from fleet2d.sight.visibility_polygon import filled_cells
 

@@ -8,9 +8,8 @@ import numpy as np
 from fleet2d.component import Component
 from fleet2d.floorplan.home.home import Home
 from fleet2d.kernels import I64, Bool
-from fleet2d.kernels.mesh import CELL_CENTRE, SUB
-from fleet2d.kernels.points import points_in_reach
-from fleet2d.kernels.seen import Reach
+from fleet2d.kernels.sight import Reach, points_in_reach
+from fleet2d.kernels.space import CELL_CENTRE, SUB
 
 __all__ = ["Bool", "FieldOfView", "Reach"]
 

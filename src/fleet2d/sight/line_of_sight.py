@@ -3,7 +3,7 @@
 from fleet2d.component import register
 from fleet2d.floorplan.home.home import Home
 from fleet2d.kernels import I64, Bool
-from fleet2d.kernels.points import points_in_sight
+from fleet2d.kernels.sight import points_in_sight
 from fleet2d.sight.fov import FieldOfView
 
 

@@ -9,9 +9,9 @@ import numpy.typing as npt
 from fleet2d.errors import PlacementError
 from fleet2d.floorplan.geometry.lattice import Lattice
 from fleet2d.kernels import F64, Bool
-from fleet2d.kernels.mesh import Mesh
-from fleet2d.kernels.region import region_contains_points, region_outline
-from fleet2d.kernels.region import visible_region as visible_region_fast
+from fleet2d.kernels.sight import region_contains_points, region_outline
+from fleet2d.kernels.sight import visible_region as visible_region_fast
+from fleet2d.kernels.space import Mesh
 
 
 class WallPlan(Protocol):

@@ -9,9 +9,8 @@ import numpy as np
 from fleet2d.errors import ScenarioError
 from fleet2d.floorplan.geometry.lattice import Lattice
 from fleet2d.kernels import I64
-from fleet2d.kernels.headings import HALF_TURN, TURN
-from fleet2d.kernels.lens import Lenses
-from fleet2d.kernels.perception import (
+from fleet2d.kernels.numbers import BELL_STD, HALF_TURN, TURN
+from fleet2d.kernels.sight import (
     AT_BEARING,
     AT_DISTANCE,
     AT_FACING,
@@ -37,9 +36,9 @@ from fleet2d.kernels.perception import (
     TABLE,
     ErrorTables,
     GhostDraw,
+    Lenses,
     UserDraw,
 )
-from fleet2d.kernels.random import BELL_STD
 from fleet2d.problems import suggest
 from fleet2d.sight.camera import Lens
 from fleet2d.sight.curve import chance, cumulative, decay

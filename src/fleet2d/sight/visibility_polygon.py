@@ -14,9 +14,14 @@ from fleet2d.component import register
 from fleet2d.errors import ScenarioError
 from fleet2d.floorplan.home.home import Home
 from fleet2d.kernels import I32, I64, Bool
-from fleet2d.kernels.mesh import SUB, Mesh, rasterize_cells
-from fleet2d.kernels.region import region_contains_points, regions_of_cells, visible_region
-from fleet2d.kernels.seen import cells_in_view, mark_spans
+from fleet2d.kernels.sight import (
+    cells_in_view,
+    mark_spans,
+    region_contains_points,
+    regions_of_cells,
+    visible_region,
+)
+from fleet2d.kernels.space import SUB, Mesh, rasterize_cells
 from fleet2d.problems import problem_at
 from fleet2d.sight.fov import FieldOfView, Reach
 

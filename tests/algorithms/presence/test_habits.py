@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from fleet2d.algorithms.presence.chain_model import steps_of
 from fleet2d.algorithms.presence.habits import Habits
-from fleet2d.kernels.stays import StayModel
+from fleet2d.kernels.presence import StayModel
 
 PLACES = 4
 

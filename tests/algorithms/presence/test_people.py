@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 from tests.algorithms.presence.worlds import MONDAY
-from tests.kernels.test_stays import PATCHES, PLACES, ROOM, by_state, case, twin
+from tests.kernels.test_presence_stays import PATCHES, PLACES, ROOM, by_state, case, twin
 
 from fleet2d.algorithms.evidence import Evidence, Parts, SightingCounts
 from fleet2d.algorithms.presence.counts import Bins, in_time
@@ -17,8 +17,7 @@ from fleet2d.algorithms.presence.people import (
     StateLayout,
     model_of,
 )
-from fleet2d.kernels.smoothing import smooth
-from fleet2d.kernels.stays import Moments, Stretches, merge_bins
+from fleet2d.kernels.presence import Moments, Stretches, merge_bins, smooth
 
 PRIOR = Prior(0.9, 0.05)
 

@@ -11,7 +11,7 @@ import fleet2d
 from fleet2d.engine import phases
 from fleet2d.engine.phases import PHASES, Span
 from fleet2d.engine.watchers.cameras import Cameras
-from fleet2d.kernels.look import new_memory
+from fleet2d.kernels.sight import new_memory
 
 
 def test_a_robot_that_has_seen_nobody_remembers_nothing() -> None:

@@ -12,10 +12,8 @@ from fleet2d.engine.watchers.points_in_view import points_seen
 from fleet2d.errors import ComponentError, Fleet2DError, InputError
 from fleet2d.floorplan.home.home import Home
 from fleet2d.kernels import U64, Bool
-from fleet2d.kernels.lens import Lenses, camera_pose
-from fleet2d.kernels.look import UserPoses
 from fleet2d.kernels.motion import Poses
-from fleet2d.kernels.seen import Reach
+from fleet2d.kernels.sight import Lenses, Reach, UserPoses, camera_pose
 from fleet2d.sight.camera import Camera
 from fleet2d.sight.flashlight import Flashlight
 from fleet2d.sight.fov import FieldOfView

@@ -12,7 +12,7 @@ from fleet2d.floorplan.furniture.catalogue import (
     furniture_type,
     stand_furniture,
 )
-from fleet2d.kernels.headings import QUARTER, TURN
+from fleet2d.kernels.numbers import QUARTER, TURN
 
 PAGE = Path(__file__).parents[3] / "docs" / "objects.md"
 TALL = {"wardrobe", "fridge", "bookshelf", "shelf"}

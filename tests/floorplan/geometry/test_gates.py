@@ -17,9 +17,8 @@ from fleet2d.floorplan.geometry.lattice import Lattice
 from fleet2d.floorplan.geometry.mesh import build_mesh
 from fleet2d.floorplan.rooms.doorways import DoorLine, fit_lines
 from fleet2d.kernels import I64, Bool
-from fleet2d.kernels.mesh import Mesh, locate
-from fleet2d.kernels.region import region_contains, visible_region
-from fleet2d.kernels.sight import line_of_sight
+from fleet2d.kernels.sight import line_of_sight, region_contains, visible_region
+from fleet2d.kernels.space import Mesh, locate
 
 ROOM = [shapely.box(0, 0, 640, 640)]
 MIDDLE: Segment = ((320, 0), (320, 640))

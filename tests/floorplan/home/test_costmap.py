@@ -20,9 +20,8 @@ from fleet2d.floorplan.home.home import Home
 from fleet2d.floorplan.home.layers import LayerSettings
 from fleet2d.floorplan.home.space import Space
 from fleet2d.floorplan.plan import FloorPlan
-from fleet2d.kernels.mesh import locate
 from fleet2d.kernels.sight import line_of_sight
-from fleet2d.kernels.taut import leg_cost
+from fleet2d.kernels.space import leg_cost, locate
 
 HALL = FloorPlan.build(
     "hall", shapely.box(0, 0, 6, 4), no_go=[shapely.box(2, 1, 4, 3), shapely.box(5, 3.5, 5.5, 4)]

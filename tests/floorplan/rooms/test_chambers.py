@@ -6,7 +6,7 @@ import shapely
 from fleet2d.floorplan.geometry.lattice import Lattice
 from fleet2d.floorplan.geometry.mesh import build_mesh
 from fleet2d.floorplan.rooms.chambers import Chambers, cut_chambers
-from fleet2d.kernels.mesh import rasterize_cells
+from fleet2d.kernels.space import rasterize_cells
 
 LATTICE = Lattice(0.05, (0.0, 0.0), 120, 60)
 M = int(LATTICE.units_per_m)

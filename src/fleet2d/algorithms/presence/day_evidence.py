@@ -10,8 +10,7 @@ from fleet2d.algorithms.evidence import SightingCounts
 from fleet2d.algorithms.presence.anyone import unknown_seen
 from fleet2d.algorithms.presence.counts import Bins
 from fleet2d.kernels import I64, U8, Bool
-from fleet2d.kernels.people import PeopleEvidence
-from fleet2d.kernels.stays import WHOLE_PATCH, Stretches, merge_bins
+from fleet2d.kernels.presence import WHOLE_PATCH, PeopleEvidence, Stretches, merge_bins
 
 
 class DayEvidence(NamedTuple):

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fleet2d.kernels import F64
-from fleet2d.kernels.stays import StayModel
+from fleet2d.kernels.presence import StayModel
 
 WEEKEND = 5  # its first day, Monday being 0
 FEWEST_BINS = 1440  # with fewer bins of evidence, hours aren't distinguished

@@ -14,8 +14,7 @@ from fleet2d.algorithms.presence.people import People, Prior, StateLayout
 from fleet2d.component import register
 from fleet2d.errors import ComponentError
 from fleet2d.kernels import F64, I64, Bool
-from fleet2d.kernels.evidence import sum_places
-from fleet2d.kernels.people import PeoplePlaces
+from fleet2d.kernels.presence import PeoplePlaces, sum_places
 from fleet2d.units import Share
 
 # Number of earlier days that are revisited in turn when a day is over, and of those stored.

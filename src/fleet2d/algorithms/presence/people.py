@@ -9,8 +9,7 @@ import numpy as np
 from fleet2d.algorithms.presence.counts import Bins
 from fleet2d.algorithms.presence.day_evidence import DayEvidence
 from fleet2d.kernels import F64, I64
-from fleet2d.kernels.people import PeoplePlaces, follow_people, smooth_people
-from fleet2d.kernels.stays import Moments, StayModel
+from fleet2d.kernels.presence import Moments, PeoplePlaces, StayModel, follow_people, smooth_people
 
 # Mean length of a stay before anything was learned, and of the first and last of several stages.
 # All in bins.

@@ -23,7 +23,7 @@ from fleet2d.floorplan.home.home import Home
 from fleet2d.interventions.intervention import Intervention, parse_intervention
 from fleet2d.interventions.script import WHEN, parse_entry
 from fleet2d.interventions.verbs import Verbs
-from fleet2d.kernels.headings import in_radians
+from fleet2d.kernels.numbers import in_radians
 from fleet2d.problems import refusal, suggest
 from fleet2d.runs.run import Run
 from fleet2d.scenario.model import Scenario

@@ -32,7 +32,7 @@ from fleet2d.expectations.signals import Measurement
 from fleet2d.floorplan.geometry.lattice import UNITS_PER_CELL
 from fleet2d.floorplan.home.home import Home, lattice_footprint
 from fleet2d.kernels import I64
-from fleet2d.kernels.look import SightMemory
+from fleet2d.kernels.sight import SightMemory
 from fleet2d.problems import suggest
 
 # The chance of a lens that notices all bodies in view.

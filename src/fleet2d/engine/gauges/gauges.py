@@ -14,9 +14,8 @@ from fleet2d.expectations import states
 from fleet2d.expectations.trace import Trace, constant, joined, pulses, shortest
 from fleet2d.floorplan.home.home import Home
 from fleet2d.kernels import I64, Bool
-from fleet2d.kernels.look import SightingColumn as Column
-from fleet2d.kernels.measure import rooms_at
-from fleet2d.kernels.signals import distances_between, distances_to_shape, speeds
+from fleet2d.kernels.motion import distances_between, distances_to_shape, rooms_at, speeds
+from fleet2d.kernels.sight import SightingColumn as Column
 
 # The charge of a battery is rounded down to thousandths; errors of floats must not lower it.
 PARTS = 1000

@@ -25,7 +25,7 @@ from fleet2d.errors import ArtifactError
 from fleet2d.floorplan.home.costmap import CostedSpace
 from fleet2d.floorplan.home.space import Space
 from fleet2d.floorplan.plan import FloorPlan
-from fleet2d.kernels.mesh import Mesh
+from fleet2d.kernels.space import Mesh
 from fleet2d.routines.persona import Persona
 from fleet2d.scenario.model import Scenario
 from fleet2d.user_modules import is_scenario_module, public_name

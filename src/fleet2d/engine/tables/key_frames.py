@@ -8,8 +8,8 @@ from fleet2d.engine.basis import Basis
 from fleet2d.engine.tables.ordering import in_order
 from fleet2d.entities.motion import Track
 from fleet2d.kernels import I64
-from fleet2d.kernels.headings import in_radians
 from fleet2d.kernels.motion import Breakpoints
+from fleet2d.kernels.numbers import in_radians
 from fleet2d.runs.key_kinds import PLANNED, TRACK, WALK
 
 # Time between the key frames of a random walk [us].

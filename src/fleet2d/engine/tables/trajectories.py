@@ -10,8 +10,8 @@ from fleet2d.engine.bodies import Bodies
 from fleet2d.engine.tables.ordering import in_order
 from fleet2d.engine.tables.shared_columns import HEADING, STEP, TIME, X, Y, away_column
 from fleet2d.kernels import I64
-from fleet2d.kernels.headings import in_radians
-from fleet2d.kernels.mesh import SUB
+from fleet2d.kernels.numbers import in_radians
+from fleet2d.kernels.space import SUB
 from fleet2d.units import whole_steps
 
 

@@ -27,19 +27,22 @@ from fleet2d.entities.localization import Drift, Localization
 from fleet2d.errors import ScenarioError
 from fleet2d.events import Event
 from fleet2d.kernels import I64
-from fleet2d.kernels.look import (
+from fleet2d.kernels.sight import (
+    MOST_GHOSTS,
     USER_LOST,
     USER_SEEN,
+    About,
+    GhostDraw,
     LookRule,
     SightMemory,
+    UserDraw,
     UserPoses,
     look,
     new_memory,
 )
-from fleet2d.kernels.look import (
+from fleet2d.kernels.sight import (
     SightingColumn as Column,
 )
-from fleet2d.kernels.perception import MOST_GHOSTS, About, GhostDraw, UserDraw
 from fleet2d.sight.disturbance import Disturbance
 from fleet2d.sight.fov import FieldOfView
 from fleet2d.sight.line_of_sight import LineOfSight

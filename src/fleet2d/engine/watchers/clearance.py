@@ -17,9 +17,9 @@ from fleet2d.entities.decisions import DecidingActor
 from fleet2d.entities.entity import Robot
 from fleet2d.entities.giving_way import TOUCHING, Surroundings
 from fleet2d.kernels import I64, U8
-from fleet2d.kernels.mesh import locate
 from fleet2d.kernels.motion import Poses
 from fleet2d.kernels.sight import line_of_sight
+from fleet2d.kernels.space import locate
 
 
 class Clearance(Watcher):

@@ -6,9 +6,14 @@ from fractions import Fraction
 import numpy as np
 
 from fleet2d.kernels import I64
-from fleet2d.kernels.lens import Lenses
-from fleet2d.kernels.look import SightingColumn, SightMemory
-from fleet2d.kernels.perception import FORCED_IDENTITY, FORCED_MISS, About
+from fleet2d.kernels.sight import (
+    FORCED_IDENTITY,
+    FORCED_MISS,
+    About,
+    Lenses,
+    SightingColumn,
+    SightMemory,
+)
 from fleet2d.sight.disturbance import Disturbance, of_camera
 from fleet2d.sight.perception import Perception
 from fleet2d.sight.tables import TableContext

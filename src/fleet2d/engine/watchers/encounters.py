@@ -17,8 +17,8 @@ from fleet2d.entities.decisions import DecidingActor
 from fleet2d.events import Event, EventKind
 from fleet2d.floorplan.objects import POSTURES
 from fleet2d.kernels import I64, Bool
-from fleet2d.kernels.mesh import locate
 from fleet2d.kernels.sight import line_of_sight
+from fleet2d.kernels.space import locate
 
 # The squared distance of a person who can't be met: larger than any home [lattice units²].
 FAR = 1 << 50

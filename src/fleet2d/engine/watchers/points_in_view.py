@@ -7,13 +7,10 @@ import numpy as np
 from fleet2d.errors import ComponentError
 from fleet2d.floorplan.home.home import Home
 from fleet2d.kernels import I64, U64
-from fleet2d.kernels.lens import Lenses
-from fleet2d.kernels.look import UserPoses
-from fleet2d.kernels.mesh import SUB
 from fleet2d.kernels.motion import Poses
-from fleet2d.kernels.points import ViewQueryColumn as Column
-from fleet2d.kernels.points import view_queries
-from fleet2d.kernels.seen import Reach
+from fleet2d.kernels.sight import Lenses, Reach, UserPoses, view_queries
+from fleet2d.kernels.sight import ViewQueryColumn as Column
+from fleet2d.kernels.space import SUB
 from fleet2d.sight.fov import FieldOfView
 
 # Methods may round points to cells, so points this far outside the field of view are checked, too.

@@ -3,8 +3,8 @@
 import numpy as np
 
 from fleet2d.kernels import I64
-from fleet2d.kernels.look import USER_LOST, USER_SEEN, SightMemory
-from fleet2d.kernels.look import SightingColumn as Column
+from fleet2d.kernels.sight import USER_LOST, USER_SEEN, SightMemory
+from fleet2d.kernels.sight import SightingColumn as Column
 
 
 def sight_events(

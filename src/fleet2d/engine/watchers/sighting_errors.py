@@ -11,12 +11,10 @@ from fleet2d.blame import blame
 from fleet2d.errors import ComponentError
 from fleet2d.floorplan.geometry.lattice import Lattice
 from fleet2d.kernels import I64
-from fleet2d.kernels.headings import TURN, in_radians
-from fleet2d.kernels.lens import camera_poses
-from fleet2d.kernels.look import SightingColumn as Column
-from fleet2d.kernels.look import SightMemory
-from fleet2d.kernels.perception import NOBODY, About
-from fleet2d.kernels.timelines import Window
+from fleet2d.kernels.motion import Window
+from fleet2d.kernels.numbers import TURN, in_radians
+from fleet2d.kernels.sight import NOBODY, About, SightMemory, camera_poses
+from fleet2d.kernels.sight import SightingColumn as Column
 from fleet2d.sight.camera_sightings import CameraSightings, ErrorStream
 from fleet2d.sight.perception import Perception
 from fleet2d.sight.perception_error import PerceptionError

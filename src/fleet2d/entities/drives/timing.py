@@ -9,7 +9,7 @@ import numpy as np
 from fleet2d.entities.drives.drive import Drive, Leg, Moment, Route
 from fleet2d.errors import ComponentError
 from fleet2d.kernels import F64, I64
-from fleet2d.kernels.headings import TURN, heading_of, turn_between
+from fleet2d.kernels.numbers import TURN, heading_of, turn_between
 
 # The longest time for a route [s]: ten days, so that poses on it can be interpolated in 64 bits.
 LONGEST_S = 864_000

@@ -11,8 +11,8 @@ from fleet2d.entities.place import Point
 from fleet2d.errors import PlacementError
 from fleet2d.floorplan.home.home import Home
 from fleet2d.kernels import I64, Bool
-from fleet2d.kernels.headings import TURN, half_sine
-from fleet2d.kernels.region import region_contains_points, visible_region
+from fleet2d.kernels.numbers import TURN, half_sine
+from fleet2d.kernels.sight import region_contains_points, visible_region
 from fleet2d.units import AngleDeg, Duration, PositiveLength, micros
 
 

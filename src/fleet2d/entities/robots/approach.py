@@ -11,7 +11,7 @@ from fleet2d.entities.nearby import points_at_distance
 from fleet2d.entities.plan import Plan
 from fleet2d.errors import ScenarioError
 from fleet2d.kernels import I64
-from fleet2d.kernels.headings import TURN, heading_of, turn_between
+from fleet2d.kernels.numbers import TURN, heading_of, turn_between
 from fleet2d.sums import sum_in_order
 
 # Time after which a robot tries again to pass a shut door.

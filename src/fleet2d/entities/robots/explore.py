@@ -13,8 +13,8 @@ from fleet2d.entities.plan import Plan
 from fleet2d.entities.robots.approach import check_has_camera
 from fleet2d.entities.robots.viewpoints import centres, spread, visible_from
 from fleet2d.kernels import Bool
-from fleet2d.kernels.fields import squared_distance
-from fleet2d.kernels.headings import TURN
+from fleet2d.kernels.numbers import TURN
+from fleet2d.kernels.space import squared_distance
 from fleet2d.units import Length, Share
 
 # The most cells of the home that are tried as viewpoints, and as targets to be seen.

@@ -19,7 +19,7 @@ from fleet2d.entities.robots.viewpoints import Viewpoints, viewpoints_of
 from fleet2d.errors import PlacementError
 from fleet2d.floorplan.home.space import Space
 from fleet2d.kernels import F64
-from fleet2d.kernels.mesh import SUB
+from fleet2d.kernels.space import SUB
 from fleet2d.units import Length, PositiveDuration, Share
 
 # When exploring a room: the part of it to be shown, by at most this many viewpoints.

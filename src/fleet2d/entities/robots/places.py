@@ -11,8 +11,8 @@ from fleet2d.entities.robots.viewpoints import sight_range
 from fleet2d.floorplan.cache import read_only
 from fleet2d.floorplan.plan import Room
 from fleet2d.kernels import F64, I64
-from fleet2d.kernels.mesh import CELL_CENTRE, SUB
-from fleet2d.kernels.points import points_in_sight
+from fleet2d.kernels.sight import points_in_sight
+from fleet2d.kernels.space import CELL_CENTRE, SUB
 
 # Radius of the bodies whose ways count as the ways of people [m].
 PERSON = 0.2

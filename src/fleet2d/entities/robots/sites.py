@@ -10,7 +10,7 @@ from fleet2d.entities.plan import Plan
 from fleet2d.entities.robots.approach import way_seconds
 from fleet2d.entities.robots.viewpoints import viewpoints_of
 from fleet2d.kernels import F64
-from fleet2d.kernels.headings import TURN
+from fleet2d.kernels.numbers import TURN
 from fleet2d.search.problem import SearchProblem, search_problem
 from fleet2d.sums import sum_in_order
 

@@ -7,8 +7,8 @@ import numpy as np
 from fleet2d.entities.actor import Actor
 from fleet2d.floorplan.plan import Room
 from fleet2d.kernels import I64, Bool
-from fleet2d.kernels.mesh import CELL_CENTRE, SUB
-from fleet2d.kernels.points import points_in_sight
+from fleet2d.kernels.sight import points_in_sight
+from fleet2d.kernels.space import CELL_CENTRE, SUB
 
 # The most cells of a room that are tried as viewpoints, and as targets to be seen, evenly spread.
 STANDS_TRIED = 48

@@ -8,10 +8,10 @@ import numpy as np
 from fleet2d.entities.nearest import Nearest
 from fleet2d.floorplan.home.space import straight_way
 from fleet2d.kernels import F64, I64
-from fleet2d.kernels.headings import TURN, heading_of
-from fleet2d.kernels.mesh import locate
 from fleet2d.kernels.motion import time_route
+from fleet2d.kernels.numbers import TURN, heading_of
 from fleet2d.kernels.sight import line_of_sight
+from fleet2d.kernels.space import locate
 
 if TYPE_CHECKING:
     from fleet2d.entities.actor import Actor

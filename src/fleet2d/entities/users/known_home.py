@@ -8,7 +8,7 @@ from fleet2d.entities.plan import Plan, new_note
 from fleet2d.entities.users.setting import MOVE_KINDS, Setting
 from fleet2d.entities.users.spots import Seat, Spot
 from fleet2d.floorplan.objects import POSTURES
-from fleet2d.kernels.residents import LastStint, Resident, Scene
+from fleet2d.kernels.motion import LastStint, Resident, Scene
 from fleet2d.streams import Draws
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ from fleet2d.component import register
 from fleet2d.entities.behavior import Attention, Behavior, SightEvent, Situation
 from fleet2d.entities.nearby import points_at_distance
 from fleet2d.entities.plan import Plan
-from fleet2d.kernels.headings import TURN, heading_of, turn_between
+from fleet2d.kernels.numbers import TURN, heading_of, turn_between
 from fleet2d.routines.laws import Law
 from fleet2d.routines.manners import Manners
 from fleet2d.streams import Draws

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from fleet2d.entities.users.spots import Seat
-from fleet2d.kernels.residents import Waits
+from fleet2d.kernels.motion import Waits
 from fleet2d.routines.activity import Activity
 from fleet2d.routines.laws import Law, exponential
 

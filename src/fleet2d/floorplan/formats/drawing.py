@@ -21,7 +21,7 @@ from fleet2d.floorplan.geometry.lattice import MAX_CELL_M, MIN_CELL_M
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.source import in_file
 from fleet2d.kernels import Bool
-from fleet2d.kernels.masks import label_parts
+from fleet2d.kernels.space import label_parts
 from fleet2d.paths import InputPath
 from fleet2d.units import PositiveLength, Share
 

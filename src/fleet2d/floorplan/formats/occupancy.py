@@ -11,8 +11,7 @@ from shapely import Polygon
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.source import PixelSource
 from fleet2d.kernels import F64, Bool
-from fleet2d.kernels.fields import squared_distance
-from fleet2d.kernels.masks import count_steps, label_parts, trace_rings
+from fleet2d.kernels.space import count_steps, label_parts, squared_distance, trace_rings
 from fleet2d.units import Length
 
 SPECK_AREA_M2 = 0.02

@@ -38,8 +38,7 @@ from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
 from fleet2d.floorplan.rooms.vocabulary import UNKNOWN, usual_type
 from fleet2d.floorplan.source import PixelSource, in_file, read_json
 from fleet2d.kernels import F64, Bool
-from fleet2d.kernels.fields import squared_distance
-from fleet2d.kernels.masks import label_parts
+from fleet2d.kernels.space import label_parts, squared_distance
 from fleet2d.paths import InputPath
 
 NoGo = Literal["keep_out", "wall", "ignore"]

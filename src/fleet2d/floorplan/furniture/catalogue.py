@@ -8,7 +8,7 @@ from shapely import Polygon
 
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.objects import Blocks, PlacedObject, Point, Posture, UsePlace
-from fleet2d.kernels.headings import QUARTER, TURN, UNIT, cosine, in_radians, sine
+from fleet2d.kernels.numbers import QUARTER, TURN, UNIT, cosine, in_radians, sine
 from fleet2d.problems import suggest
 
 Range = tuple[float, float]

@@ -13,7 +13,7 @@ from fleet2d.floorplan.furniture.catalogue import FURNITURE, stand_furniture
 from fleet2d.floorplan.home.standing import BODY_RADIUS, standing_cells, with_approaches
 from fleet2d.floorplan.objects import Blocks, PlacedObject
 from fleet2d.floorplan.plan import FloorPlan
-from fleet2d.kernels.headings import TURN
+from fleet2d.kernels.numbers import TURN
 from fleet2d.problems import problem_at, suggest
 from fleet2d.units import AngleDeg, Length, PositiveLength
 

@@ -17,7 +17,7 @@ from fleet2d.floorplan.home.standing import BODY_RADIUS, Window, grown_cells, wi
 from fleet2d.floorplan.objects import PlacedObject
 from fleet2d.floorplan.plan import FloorPlan, Room, rings
 from fleet2d.kernels import Bool
-from fleet2d.kernels.masks import label_parts
+from fleet2d.kernels.space import label_parts
 from fleet2d.streams import Draws
 
 DOOR_CLEARANCE = 0.9

@@ -11,9 +11,8 @@ from fleet2d.floorplan.geometry.lattice import UNITS_PER_CELL
 from fleet2d.floorplan.objects import PlacedObject
 from fleet2d.floorplan.plan import FloorPlan, Room
 from fleet2d.kernels import I64, Bool
-from fleet2d.kernels.fields import squared_distance
-from fleet2d.kernels.headings import QUARTER, TURN
-from fleet2d.kernels.masks import label_parts
+from fleet2d.kernels.numbers import QUARTER, TURN
+from fleet2d.kernels.space import label_parts, squared_distance
 from fleet2d.streams import Draws
 
 # Largest distance of a wall behind a piece, to allow for the steps of jagged walls [m].

@@ -6,7 +6,7 @@ import numpy as np
 
 from fleet2d.errors import FloorPlanError
 from fleet2d.kernels import I64
-from fleet2d.kernels.mesh import WALL, Mesh
+from fleet2d.kernels.space import WALL, Mesh
 
 Segment = tuple[tuple[int, int], tuple[int, int]]
 
@@ -26,7 +26,7 @@ class Gates:
         >>> gate = ((320, 0), (320, 640))
         >>> mesh = build_mesh([shapely.box(0, 0, 640, 640)], 10, 10, corners=gate)
         >>> gates = Gates(mesh, [gate])
-        >>> from fleet2d.kernels.mesh import locate
+        >>> from fleet2d.kernels.space import locate
         >>> from fleet2d.kernels.sight import line_of_sight
         >>> for walls in (gates.mesh, gates.shut({0})):
         ...     line_of_sight(walls, 11, 11, locate(walls, 11, 11), 631, 11)

@@ -10,7 +10,7 @@ from shapely.geometry import MultiPolygon, Polygon
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.geometry.lattice import COORDINATE_LIMIT
 from fleet2d.kernels import I32, I64
-from fleet2d.kernels.mesh import SUB, WALL, Mesh
+from fleet2d.kernels.space import SUB, WALL, Mesh
 from fleet2d.sums import sum_in_order
 
 GRID = 2

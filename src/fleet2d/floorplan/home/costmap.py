@@ -13,10 +13,16 @@ from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.home.space import Space
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.kernels import I32, I64, Bool
-from fleet2d.kernels.fields import MOST_COST, cost_distance, descend, squared_distance
-from fleet2d.kernels.masks import label_parts
-from fleet2d.kernels.mesh import CELL_CENTRE, SUB
-from fleet2d.kernels.taut import pull_taut
+from fleet2d.kernels.space import (
+    CELL_CENTRE,
+    MOST_COST,
+    SUB,
+    cost_distance,
+    descend,
+    label_parts,
+    pull_taut,
+    squared_distance,
+)
 from fleet2d.units import Length
 
 CLOSED = -1

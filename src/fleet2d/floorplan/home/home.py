@@ -23,7 +23,7 @@ from fleet2d.floorplan.rooms.adjacency import doorway_segments
 from fleet2d.floorplan.rooms.doorways import Doorway
 from fleet2d.floorplan.rooms.vocabulary import room_type
 from fleet2d.kernels import I32
-from fleet2d.kernels.mesh import Mesh
+from fleet2d.kernels.space import Mesh
 
 # Types of rooms through which people leave a home without an entrance, the likeliest first.
 EXIT_ROOMS = ("entryway", "lobby", "hallway", "hall", "living_room", "kitchen")

@@ -16,17 +16,18 @@ from fleet2d.floorplan.geometry.gates import Segment
 from fleet2d.floorplan.geometry.mesh import build_mesh, snap_polygon
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.kernels import F64, I32, I64
-from fleet2d.kernels.fields import walking_distance
-from fleet2d.kernels.mesh import (
+from fleet2d.kernels.sight import line_of_sight
+from fleet2d.kernels.space import (
     SUB,
+    Corners,
     Mesh,
+    Routes,
     label_triangles,
     locate,
     rasterize_cells,
     strictly_inside,
+    walking_distance,
 )
-from fleet2d.kernels.routes import Corners, Routes
-from fleet2d.kernels.sight import line_of_sight
 
 # Snapping of the shrunk walls and rounding of a pose add up to less than this [lattice].
 ROUNDING = 3

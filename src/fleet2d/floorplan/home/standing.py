@@ -12,8 +12,8 @@ from fleet2d.floorplan.home.space import Space
 from fleet2d.floorplan.objects import PlacedObject, UsePlace
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.kernels import I64, Bool
-from fleet2d.kernels.mesh import locate, strictly_inside
 from fleet2d.kernels.sight import line_of_sight
+from fleet2d.kernels.space import locate, strictly_inside
 
 BODY_RADIUS = 0.25
 """The radius of the body that furniture leaves space for [m]: that of a large person."""

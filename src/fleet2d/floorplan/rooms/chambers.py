@@ -10,8 +10,7 @@ from fleet2d.floorplan.geometry.gates import Gates, Segment
 from fleet2d.floorplan.geometry.lattice import Lattice
 from fleet2d.floorplan.geometry.mesh import build_mesh
 from fleet2d.kernels import F64, I32, I64, Bool
-from fleet2d.kernels.chambers import spread_labels
-from fleet2d.kernels.mesh import WALL, Mesh, label_triangles, rasterize_cells
+from fleet2d.kernels.space import WALL, Mesh, label_triangles, rasterize_cells, spread_labels
 
 MIN_CHAMBER_M2 = 0.8
 """Least area of a chamber; smaller ones, such as space in a thick wall, are joined to others."""

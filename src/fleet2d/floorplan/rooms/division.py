@@ -20,7 +20,7 @@ from fleet2d.floorplan.rooms.regions import LabelledRegion, Region, cells_in, sn
 from fleet2d.floorplan.rooms.room import NO_ROOM, Room, assign_rooms, dropped_note, make_rooms
 from fleet2d.floorplan.rooms.segmentation import segment_rooms
 from fleet2d.kernels import I16, I64, Bool
-from fleet2d.kernels.mesh import Mesh
+from fleet2d.kernels.space import Mesh
 
 RegionKind = Literal["exact", "boxes", "none"]
 """The regions of a source are the rooms themselves (`exact`), boxes that label what walls bound

@@ -16,8 +16,7 @@ from shapely import Polygon
 
 from fleet2d.floorplan.geometry.gates import Segment
 from fleet2d.kernels import F64, I64, Bool
-from fleet2d.kernels.chambers import pairs_in_sight
-from fleet2d.kernels.mesh import Mesh
+from fleet2d.kernels.space import Mesh, pairs_in_sight
 
 Corners = NDArray[np.intp]
 

@@ -13,9 +13,7 @@ import numpy as np
 from fleet2d.floorplan.rooms.chambers import Chambers
 from fleet2d.floorplan.rooms.regions import Patch
 from fleet2d.kernels import F64, I32, I64, Bool
-from fleet2d.kernels.chambers import label_frames, spread_labels
-from fleet2d.kernels.fields import squared_distance
-from fleet2d.kernels.masks import label_parts
+from fleet2d.kernels.space import label_frames, label_parts, spread_labels, squared_distance
 
 MIN_OUTLINE_OVERLAP = 0.5
 """A box outlines a chamber if the intersection of box and chamber's frame is at least this share

@@ -14,9 +14,7 @@ from fleet2d.floorplan.rooms.adjacency import open_borders
 from fleet2d.floorplan.rooms.regions import LabelledRegion, Region, paint_regions, snap_regions
 from fleet2d.floorplan.rooms.vocabulary import UNKNOWN
 from fleet2d.kernels import I16, I64, Bool
-from fleet2d.kernels.chambers import label_frames
-from fleet2d.kernels.fields import squared_distance
-from fleet2d.kernels.masks import label_parts
+from fleet2d.kernels.space import label_frames, label_parts, squared_distance
 
 NO_ROOM = -1
 MAX_GAP_M2 = 0.8

@@ -6,7 +6,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from fleet2d.kernels.random import random_below
+from fleet2d.kernels.numbers import random_below
 
 T = TypeVar("T")
 

@@ -7,7 +7,8 @@ the same on every machine.
 import numpy as np
 
 from fleet2d.algorithms.presence.logarithm import LN_2, natural_log
-from fleet2d.kernels import F64, flows
+from fleet2d.kernels import F64
+from fleet2d.kernels.presence import earth_mover as minimal_cost
 
 
 def total_variation(truth: F64, estimate: F64) -> F64:
@@ -78,7 +79,7 @@ def earth_mover(truth: F64, estimate: F64, cost: F64) -> F64:
         2.5
     """
     rooms = len(cost)
-    moved = flows.earth_mover(estimate.reshape(-1, rooms), truth.reshape(-1, rooms), cost)
+    moved = minimal_cost(estimate.reshape(-1, rooms), truth.reshape(-1, rooms), cost)
     return moved.reshape(truth.shape[:-1])
 
 

@@ -13,7 +13,7 @@ from fleet2d.floorplan.cache import read_only
 from fleet2d.floorplan.home.home import Home
 from fleet2d.floorplan.home.space import Space
 from fleet2d.kernels import F64, I64, Bool
-from fleet2d.kernels.mesh import SUB
+from fleet2d.kernels.space import SUB
 from fleet2d.units import micros
 
 # Clearance that a person needs to walk from room to room [m].

@@ -11,7 +11,7 @@ from fleet2d.floorplan.geometry.lattice import UNITS_PER_CELL
 from fleet2d.floorplan.objects import PlacedObject
 from fleet2d.floorplan.plan import FloorPlan, Room, rings
 from fleet2d.kernels import I16
-from fleet2d.kernels.mesh import Mesh
+from fleet2d.kernels.space import Mesh
 from fleet2d.palette import deep_color, room_color
 from fleet2d.viewer.facts.contract import (
     DoorFacts,

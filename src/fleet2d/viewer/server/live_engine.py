@@ -12,8 +12,8 @@ from fleet2d.engine.simulation import Simulation
 from fleet2d.entities.motion import Track
 from fleet2d.errors import InputError, PlacementError
 from fleet2d.floorplan.home.change import HomeChange
-from fleet2d.kernels.headings import TURN
-from fleet2d.kernels.mesh import Mesh
+from fleet2d.kernels.numbers import TURN
+from fleet2d.kernels.space import Mesh
 from fleet2d.runs.run import Run
 from fleet2d.viewer.facts.contract import LiveBody, LiveEvent, LiveOrder, MarkFacts
 from fleet2d.viewer.facts.marks import intervention_marks

@@ -1,0 +1,96 @@
+"""The space between walls: its mesh, shortest paths, and grids and masks of its cells.
+
+A mesh is a triangulation of the free space whose vertices are all wall vertices. Everything that
+sight and paths need follows from it by integer arithmetic. Which of the many possible
+triangulations it is never shows in a result.
+
+A shortest path in a polygonal space bends only at its reflex corners (Lozano-Pérez and Wesley,
+Communications of the ACM 22, 1979): `Routes` is A* over the corners that a taut string can touch.
+The space is the free space shrunk by a body's radius, so a path may touch its border. Which corners
+see each other is decided in integers; lengths are the only floats (sums of correctly rounded square
+roots, the same on every machine).
+
+Pixels outside a mask count as not in the mask.
+
+Constants:
+    SUB: Lattice units per cell.
+    CELL_CENTRE: Offset of a cell's centre from its corner: odd, so that no axis-parallel wall runs
+        through it.
+    BUCKET: Side of the square buckets that find the triangle of a point, in lattice units.
+    WALL: The neighbor across an edge that is a wall.
+"""
+
+from typing import NamedTuple
+
+from fleet2d._core import (
+    BUCKET,
+    CELL_CENTRE,
+    MOST_COST,
+    SUB,
+    WALL,
+    Mesh,
+    Routes,
+    contains_triangle,
+    cost_distance,
+    count_steps,
+    descend,
+    distance,
+    fill_from_neighbors,
+    label_frames,
+    label_parts,
+    label_triangles,
+    leg_cost,
+    locate,
+    orient,
+    pairs_in_sight,
+    pull_taut,
+    rasterize_cells,
+    spread_labels,
+    squared_distance,
+    step_cost,
+    strictly_inside,
+    trace_rings,
+    walking_distance,
+)
+from fleet2d.kernels import I64, Bool
+
+__all__ = [
+    "BUCKET",
+    "CELL_CENTRE",
+    "MOST_COST",
+    "SUB",
+    "WALL",
+    "Corners",
+    "Mesh",
+    "Routes",
+    "contains_triangle",
+    "cost_distance",
+    "count_steps",
+    "descend",
+    "distance",
+    "fill_from_neighbors",
+    "label_frames",
+    "label_parts",
+    "label_triangles",
+    "leg_cost",
+    "locate",
+    "orient",
+    "pairs_in_sight",
+    "pull_taut",
+    "rasterize_cells",
+    "spread_labels",
+    "squared_distance",
+    "step_cost",
+    "strictly_inside",
+    "trace_rings",
+    "walking_distance",
+]
+
+
+class Corners(NamedTuple):
+    """The reflex corners of a space: the nodes of its route graph."""
+
+    vertex: I64  # (nodes,) the vertex of the mesh at each, ascending
+    before: I64  # (nodes, 2) the vertex of the border before the corner [lattice]
+    after: I64  # (nodes, 2) and the one after it
+    simple: Bool  # (nodes,) False where several walls meet: no one before and after

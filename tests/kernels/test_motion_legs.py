@@ -1,0 +1,127 @@
+"""Plans built leg by leg, against the same in lists."""
+
+import copy
+import pickle
+from math import ceil
+
+import numpy as np
+import pytest
+import shapely
+from tests.homes import home_of
+from tests.kernels.test_space_routes import routes_of
+
+from fleet2d.kernels.motion import Legs, time_route
+from fleet2d.kernels.numbers import TURN, turn_between
+
+SPEED, TURN_RATE = 768.0, 1023.7
+# With a pillar, and less than the places that the tests go to.
+ROOM = shapely.box(0, 0, 3600, 3600) - shapely.box(1600, 1600, 2200, 2200)
+
+
+class InLists:
+    """The slow, obvious twin of Legs: the state is the last row."""
+
+    def __init__(self) -> None:
+        self.rows = [[5_000_000, 100, 200, 7, 0]]
+
+    @property
+    def now(self) -> list[int]:
+        return self.rows[-1]
+
+    def turn(self, headings: int) -> None:
+        left = abs(headings)
+        while left > 0:
+            part = min(left, TURN // 3)
+            left -= part
+            time, x, y, heading, away = self.now
+            heading = (heading + (part if headings > 0 else -part)) % TURN
+            self.rows.append([time + ceil(part * 1e6 / TURN_RATE), x, y, heading, away])
+
+    def settle(self, x: int, y: int, heading: int) -> None:
+        if [x, y] != self.now[1:3]:
+            self.walk(np.array([self.now[1:3], [x, y]]))
+        self.turn(turn_between(self.now[3], heading))
+
+    def walk(self, route: np.ndarray) -> None:
+        timed = time_route(route, self.now[0], self.now[3], SPEED, TURN_RATE)
+        self.rows += [[*row, 0] for row in timed[1:].tolist()]
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_legs_equal_lists(seed: int) -> None:
+    random, legs, twin = np.random.default_rng(seed), Legs(), InLists()
+    routes = routes_of(home_of([ROOM]))
+    legs.mark(*twin.now)
+    for what in random.integers(0, 6, 80).tolist():
+        time, x, y, heading, away = now = twin.now
+        if what == 0:
+            twin.rows.append([time + int(random.integers(0, 10**9)), x, y, heading, away])
+            legs.mark(*twin.now)
+        elif what == 1:
+            headings = int(random.integers(-2 * TURN, 2 * TURN))
+            twin.turn(headings)
+            assert twin.now == list(legs.turn(*now, headings, TURN_RATE))
+        elif what == 2:
+            route = np.concatenate([[[x, y]], random.integers(0, 4000, (3, 2))])
+            twin.walk(route)
+            assert twin.now == list(legs.walk(time, heading, route, SPEED, TURN_RATE))
+        elif what == 3:
+            place = random.choice([x, *random.integers(0, 4000, 2)], 2).tolist()
+            twin.settle(*place, towards := int(random.integers(TURN)))
+            after = legs.settle(time, x, y, heading, *place, towards, SPEED, TURN_RATE)
+            assert twin.now == list(after)
+        elif what == 4:
+            goal = random.integers(1, 4000, 2).tolist()
+            off = None if random.random() < 0.5 else tuple(random.integers(1, 4000, 2).tolist())
+            after = legs.go(time, x, y, heading, routes, *goal, SPEED, TURN_RATE, off)
+            begin = off or (x, y)
+            inside = all(ROOM.contains(shapely.Point(point)) for point in (begin, goal))
+            assert inside == (after is not None)
+            if inside:
+                twin.walk(np.array([(x, y), begin]))
+                twin.walk(routes.find(*begin, *goal))
+                assert twin.now == list(after)
+        else:
+            block = np.array([[time + 10, 3, 4, 5, 1], [time + 20, 6, 7, 8, 0]])
+            legs.add(block)
+            twin.rows += block.tolist()
+
+    columns = legs.track()
+
+    assert len(twin.rows) == len(legs)
+    assert twin.rows == legs.rows().tolist()
+    assert [list(row) for row in zip(*(c.tolist() for c in columns), strict=True)] == twin.rows
+    assert [np.dtype(t) for t in ("i8", "i8", "i8", "i8", "u1")] == [c.dtype for c in columns]
+
+
+def test_copies_go_on_by_themselves() -> None:
+    legs = Legs()
+    legs.mark(1, 2, 3, 4, 0)
+    twins = [copy.deepcopy(legs), pickle.loads(pickle.dumps(legs))]
+    legs.mark(2, 2, 3, 4, 0)
+
+    assert [1, 1, 2] == [len(each) for each in (*twins, legs)]
+    assert [[1, 2, 3, 4, 0]] == twins[1].rows().tolist()
+
+
+def test_wrong_numbers_are_refused() -> None:
+    legs = Legs()
+    for row in ((2**62, 0, 0, 0, 0), (0, 2**30, 0, 0, 0), (0, 0, 0, 0, 2)):
+        with pytest.raises(ValueError, match="must be"):
+            legs.mark(*row)
+        with pytest.raises(ValueError, match="must be"):
+            legs.add(np.array([row]))
+    with pytest.raises(ValueError, match="turn_rate"):
+        legs.turn(0, 0, 0, 0, 0, 5, 0.0)
+    with pytest.raises(ValueError, match="route"):
+        legs.walk(0, 0, np.zeros((0, 2), np.int64), 1.0, 1.0)
+    with pytest.raises(ValueError, match="speed"):
+        legs.settle(0, 0, 0, 0, 9, 9, 0, 0.0, 1.0)
+    with pytest.raises(ValueError, match="pose"):
+        legs.settle(0, 0, 0, 0, 2**40, 9, 0, 1.0, 1.0)
+    routes = routes_of(home_of([ROOM]))
+    with pytest.raises(ValueError, match="speed"):
+        legs.go(0, 33, 33, 0, routes, 99, 99, -1.0, 1.0)
+    assert legs.go(0, 33, 33, 0, routes, 2**40, 9, 1.0, 1.0) is None
+
+    assert len(legs) == 0

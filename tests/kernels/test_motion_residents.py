@@ -1,0 +1,246 @@
+"""What people do in a home, against the same leg by leg, and what is refused."""
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from tests.reference.residents import SlowHome
+from tests.scenes import scenario
+from tests.thorough import examples
+
+import fleet2d
+from fleet2d.entities.plan import Plan
+from fleet2d.entities.users.known_home import KnownHome
+from fleet2d.entities.users.setting import MOVE_KINDS, SECOND_US, Setting, SmallMove
+from fleet2d.floorplan.objects import POSTURES
+from fleet2d.kernels.motion import LastStint, Legs, Resident, Scene, Waits
+from fleet2d.routines.activity import Activity
+from fleet2d.routines.laws import uniform
+
+HOMES = {
+    "furnished": {"floorplan": {"type": "bundled", "furnish": True}},
+    "empty": {},
+}
+
+
+@cache
+def person(home: str, body: str) -> tuple[Any, Any]:
+    """A person in a home, or a robot that moves as a person does not, and its routine."""
+    users: dict[str, Any] = {"ana": {"type": "routine", "persona": "retired"}}
+    robot = {"type": "routine", "persona": "retired", "drive": {"type": "trapezoidal"}}
+    content = scenario("1 d", users=users, robots={"astro": robot}, **HOMES[home])
+    actor = fleet2d.Simulation(content).actors[body]
+    return actor.behaviors[0], actor
+
+
+@st.composite
+def setting_of(draw: st.DrawFn, spots: Any, rooms: list[Any], kinds: list[str]) -> Setting:
+    """A setting with any rooms, furniture, moves and stores."""
+    own = draw(st.lists(st.sampled_from(rooms), max_size=3, unique=True))
+    activity = Activity(
+        away=draw(st.booleans()) and draw(st.booleans()),
+        choose=draw(st.sampled_from(["own", "nearest", "each_time", "here"])),
+        posture=draw(st.sampled_from(POSTURES)),
+        objects=tuple(draw(st.lists(st.sampled_from(kinds), max_size=3)) if kinds else ()),
+    )
+    moves = [
+        SmallMove(kind, draw(st.sampled_from([1, 60, 900, 7200])))
+        for kind in MOVE_KINDS
+        if draw(st.booleans()) and not activity.away
+    ]
+    seats = spots.at_furniture(activity.objects, own, activity.posture)
+    stores = draw(st.lists(st.sampled_from(rooms), max_size=2))
+    takes = draw(st.sampled_from([(0, 0), (1, 90), (600, 600), (9, 50_000)]))
+    return Setting(activity, own, list(seats), stores, tuple(moves), uniform(*takes))
+
+
+@settings(max_examples=examples(400), deadline=None)
+@given(
+    st.data(),
+    st.sampled_from([("furnished", "ana"), ("empty", "ana"), ("furnished", "astro")]),
+)
+def test_activities_equal_those_done_leg_by_leg(data: st.DataObject, who: tuple[str, str]) -> None:
+    behavior, actor = person(*who)
+    kinds = sorted({thing.type for thing in actor.home.objects if thing.uses})
+    any_setting = setting_of(behavior.spots, list(behavior.reachable_rooms), kinds)
+    homes = KnownHome(behavior, actor), SlowHome(behavior, actor)
+    plans = [Plan(actor, 0) for _ in homes]
+    for _ in range(data.draw(st.integers(1, 3))):
+        stints, end_us = [], plans[0].time_us
+        for _ in range(data.draw(st.integers(1, 4))):
+            end_us += data.draw(st.sampled_from([0, 1, 7, 100, 1800, 9000])) * SECOND_US
+            number = data.draw(st.integers(0, 1))
+            role, stays = data.draw(st.integers(0, 3)), data.draw(st.booleans())
+            scene = f"a{number}", data.draw(any_setting)
+            stints.append((scene, number, end_us, role, stays))
+        until_us = end_us - data.draw(st.sampled_from([0, 0, 3600])) * SECOND_US
+        continues = data.draw(st.booleans())
+        for plan, home in zip(plans, homes, strict=True):
+            home.update()
+            rows = [(home.scene(*scene), *numbers) for scene, *numbers in stints]
+            home.live(plan, rows, until_us, continues=continues)
+        one, other = ((vars(plan), plan.legs.rows().tolist()) for plan in plans)
+        assert other[1] == one[1]
+        for name in ("time_us", "x", "y", "heading", "away", "notes", "posture", "postures"):
+            assert other[0][name] == one[0][name], name
+
+
+WAITS = Waits(np.array([5, 9]))
+LAW = ([1, 5], 1, 5, 0, 1 << 24)
+SCENE = (None, 0, False, 0, 0, [0], [], [1], [(1, WAITS)], LAW)
+
+
+class Room:
+    """A home of one room, and a seat."""
+
+    def __init__(self, **answers: Any) -> None:
+        self.answers: dict[str, Any] = {
+            "spots": [(5, 5)], "seats": [0], "seat": (9, 9, 0, 1, 8, 8), "nearest": 0,
+            "room_at": 0, "wait": 0, "way_out": (1, 1),
+        } | answers  # fmt: skip
+
+    def __getattr__(self, name: str) -> Any:
+        return lambda *_: self.answers[name]
+
+
+def live(home: Any = None, scene: Scene | None = None, **changes: Any) -> Any:
+    """Do an activity where no route is known."""
+    stint = {"number": 0, "end": 1000, "role": 0, "stays": False} | changes
+    now = changes.get("now", (0, 0, 0, 0, 0))
+    walk = changes.get("walk", lambda course, place: ((course[0][0] + 7, *place[1:], 0, 0), 0))
+    resident = Resident(1, 100.0, 100.0, None, [])
+    row = (scene or Scene(*SCENE), *(stint[n] for n in ("number", "end", "role", "stays")))
+    last = changes.get("last", LastStint())
+    return resident.live(
+        home or Room(), walk, Legs(), now, changes.get("posture", 0), [row], 1000, False, last
+    )
+
+
+def test_what_is_asked_for_is_used() -> None:
+    end, posture, postures, notes = live()
+    assert ((1000, 5, 5, 0, 0), 0, [], [(7, 0, 0)]) == (end, posture, postures, notes)
+
+
+class Rooms(Room):
+    """A home of rooms with a spot each."""
+
+    def spots(self, room: int) -> list[tuple[int, int]]:
+        return [(5 + room, 5)]
+
+
+def walks_of(
+    stints: list[tuple[Scene, int, int, int, bool]], **answers: Any
+) -> list[tuple[int, int]]:
+    """Return the spots to which somebody walks, 7 us each, who does activities from 0 on."""
+    spots = []
+
+    def walk(course: Any, place: tuple[int, int, int]) -> Any:
+        spots.append(place[1:])
+        return (course[0][0] + 7, *place[1:], 0, 0), 0
+
+    resident, until = Resident(1, 100.0, 100.0, None, []), stints[-1][2]
+    now = (0, 0, 0, 0, 0)
+    resident.live(Rooms(**answers), walk, Legs(), now, 0, stints, until, False, LastStint())
+    return spots
+
+
+def test_who_was_interrupted_returns_to_where_the_planned_activity_was_done() -> None:
+    scenes = [Scene(None, 0, False, 0, 0, [room], [], [], [], None) for room in range(3)]
+    planned, interrupts, resumes = 0, 1, 2
+    rows = [(scenes[0], 0, 100, planned), (scenes[1], 1, 200, interrupts)]
+    rows += [(scenes[2], 2, 300, resumes)]
+    assert [(5, 5), (6, 5), (5, 5)] == walks_of([(*row, False) for row in rows])
+
+
+EVERY_10_S = Waits(np.array([10 * SECOND_US] * 2))
+DUE_US = 7 + 10 * SECOND_US
+
+
+def test_no_move_begins_in_the_last_ninety_seconds() -> None:
+    walks = {}
+    for more_us in (0, 1):
+        moves = Scene(None, 0, False, 0, 0, [0, 1], [], [], [(1, EVERY_10_S)], None)
+        end_us = DUE_US + 90 * SECOND_US + more_us
+        walks[more_us] = [len(walks_of([(moves, number, end_us, 0, False)])) for number in range(9)]
+    assert {1} == set(walks[0])
+    assert {1, 2} == set(walks[1])  # some stay in their room
+
+
+@pytest.mark.parametrize(("more_us", "walks"), [(0, 1), (1, 3)])
+@pytest.mark.parametrize("wait_us", [0, 20 * SECOND_US])
+def test_nothing_is_fetched_without_time_to_wait_and_return(
+    wait_us: int, more_us: int, walks: int
+) -> None:
+    takes_5_s = ([5, 5], 5, 5, 0, 1 << 24)
+    fetches = Scene(None, 0, False, 0, 0, [0], [], [1], [(2, EVERY_10_S)], takes_5_s)
+    end_us = DUE_US + wait_us + 5 * SECOND_US + 90 * SECOND_US + more_us
+    assert walks == len(walks_of([(fetches, 0, end_us, 0, False)], wait=wait_us))
+
+
+@pytest.mark.parametrize(
+    ("place", "value", "message"),
+    [
+        (3, 4, "choose must be 0 to 3"),
+        (4, -1, "postures must be 0 to 127"),
+        (8, [(3, WAITS)], "kinds of moves must be 0 to 2"),
+        (8, [(1, WAITS), (0, WAITS)], "turns come before other moves"),
+        (8, [(1, WAITS)] * 4, "three kinds of small moves"),
+        (2, True, "makes no small moves"),
+        (9, ([9, 8], 0, 0, 0, 0), "quantiles must ascend"),
+        (9, ([-5, 8], -5, 8, 0, 1), "must take 0 s or more"),
+    ],
+)
+def test_wrong_scenes_are_refused(place: int, value: Any, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        Scene(*SCENE[:place], value, *SCENE[place + 1 :])
+
+
+@pytest.mark.parametrize("waits", [[], [0], [0, 0], [1, 2, 3], [-1, 5], [2**61]])
+def test_wrong_waits_are_refused(waits: list[int]) -> None:
+    with pytest.raises(ValueError, match="waits must be a power of two"):
+        Waits(np.array(waits, np.int64))
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"number": -1}, "numbers of stints"),
+        ({"end": 2**38}, "stints must end within"),
+        ({"role": 4}, "roles must be 0 to 3"),
+        ({"now": (0, 2**30, 0, 0, 0)}, "a pose must be within"),
+        ({"posture": 128}, "postures must be 0 to 127"),
+        ({"home": Room(spots=[])}, "a room must have a spot"),
+        ({"home": Room(spots=[(2**30, 0)])}, "a pose must be within"),
+        ({"walk": lambda *_: ((0, 0, 0, 0, 2), 0)}, "away must be 0 or 1"),
+        ({"walk": lambda *_: ((0, 0, 0, 0, 0), -1)}, "postures must be 0 to 127"),
+    ],
+)
+def test_wrong_stints_and_answers_are_refused(changes: dict[str, Any], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        live(**changes)
+
+
+def test_an_error_of_the_home_is_passed_on_and_the_last_stint_stays_known() -> None:
+    last = LastStint()
+    live(last=last)
+    before = last.__getstate__()
+
+    def no_way(*_: Any) -> Any:
+        raise KeyError("no way")
+
+    with pytest.raises(KeyError, match="no way"):
+        live(last=last, walk=no_way, number=1)
+
+    assert (0, (-1, 5, 5), (-1, 5, 5)) == before
+    assert (0, None, None) == last.__getstate__()
+    assert live(last=last)[0] == (1000, 5, 5, 0, 0)
+
+
+def test_wrong_rates_and_steps_are_refused() -> None:
+    with pytest.raises(ValueError, match="speed and turn_rate"):
+        Resident(1, 0.0, 1.0, None, [])
+    with pytest.raises(ValueError, match="a pose must be within"):
+        Resident(1, 1.0, 1.0, None, [(0, 0, 2**30, 0)])

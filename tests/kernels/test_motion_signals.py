@@ -1,0 +1,125 @@
+"""Signals as stretches of equal value, against twins that go step by step."""
+
+from math import inf
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from tests.reference import signals as slow
+
+from fleet2d.kernels.motion import (
+    Breakpoints,
+    Timelines,
+    Window,
+    distances_between,
+    distances_to_shape,
+    sliding_max,
+    speeds,
+    until,
+)
+
+STEP_US = 1000
+STEPS = 24
+spot = st.integers(0, 40)
+track = st.lists(st.tuples(st.integers(1, 6), spot, spot, st.booleans()), min_size=1, max_size=5)
+bodies = st.lists(track, min_size=2, max_size=2)
+value = st.sampled_from([-inf, -2.0, -1.0, 0.0, 1.0, 2.0, inf])
+values = st.lists(value, min_size=1, max_size=14)
+Track = list[tuple[int, int, int, bool]]
+
+
+def timelines_of(tracks: list[Track]) -> Timelines:
+    result = Timelines(len(tracks), STEP_US)
+    for body, legs in enumerate(tracks):
+        time = np.cumsum([0, *(leg[0] for leg in legs[1:])]) * STEP_US
+        x, y, away = (np.array(column) for column in list(zip(*legs, strict=True))[1:])
+        points = Breakpoints(
+            time, x.astype(np.int64), y.astype(np.int64), np.zeros_like(time), away.astype(np.uint8)
+        )
+        result.follow(body, 0, points, np.zeros(0, np.int64), np.zeros(1, np.int8))
+    return result
+
+
+def poses_of(window: Window, body: int) -> list[slow.Pose]:
+    x, y, _, away, _ = window.dense(body, window.first, window.end)
+    rows = zip(x.tolist(), y.tolist(), away.tolist(), strict=True)
+    return [(x, y, bool(away)) for x, y, away in rows]
+
+
+def dense(stretches: tuple[np.ndarray, np.ndarray], end: int = STEPS) -> list[float]:
+    start, numbers = stretches
+    assert (numbers[1:] != numbers[:-1]).all(), "neighbours differ"
+    return np.repeat(numbers, np.diff(np.append(start, end))).tolist()
+
+
+def stretches(numbers: list[float]) -> tuple[np.ndarray, np.ndarray]:
+    array = np.array(numbers)
+    is_first = np.append(True, array[1:] != array[:-1])
+    return np.flatnonzero(is_first), array[is_first]
+
+
+@given(bodies)
+def test_distances_between_bodies_equal_each_step(tracks: list[Track]) -> None:
+    window = timelines_of(tracks).window(0, STEPS)
+    pairs = zip(poses_of(window, 0), poses_of(window, 1), strict=True)
+    assert [slow.distance(*pair) for pair in pairs] == dense(distances_between(window, 0, 1))
+
+
+@given(bodies, st.lists(st.tuples(spot, spot, spot, spot), max_size=4))
+def test_distances_to_a_shape_equal_each_step(tracks: list[Track], boxes: list[slow.Edge]) -> None:
+    edges = [
+        edge
+        for x0, y0, x1, y1 in boxes
+        for edge in ((x0, y0, x1, y0), (x1, y0, x1, y1), (x1, y1, x0, y1), (x0, y1, x0, y0))
+    ]
+    window = timelines_of(tracks).window(0, STEPS)
+    expected = [slow.distance_to_shape(pose, edges) for pose in poses_of(window, 0)]
+    rows = np.array(edges, np.int64).reshape(-1, 4)
+    assert dense(distances_to_shape(window, 0, rows)) == pytest.approx(expected)
+
+
+@given(bodies, st.integers(1, STEPS - 1))
+def test_speeds_go_on_from_window_to_window(tracks: list[Track], cut: int) -> None:
+    timelines = timelines_of(tracks)
+    poses = poses_of(timelines.window(0, STEPS), 0)
+    x, y, away = poses[cut - 1]
+    nothing = np.zeros(0, np.int64)
+    first = speeds(timelines.window(0, cut), 0, nothing)
+    second = speeds(timelines.window(cut, STEPS), 0, np.array([x, y, away], np.int64))
+    together = dense(first, cut) + dense((second[0] - cut, second[1]), STEPS - cut)
+    assert [slow.speed(poses, step) for step in range(STEPS)] == together
+
+
+@given(values, st.integers(-6, 6), st.integers(0, 9), value, value)
+def test_the_greatest_value_of_a_window_equals_its_steps(
+    numbers: list[float], low: int, length: int, before: float, after: float
+) -> None:
+    expected = slow.sliding_max(numbers, low, low + length, before, after)
+    result = sliding_max(*stretches(numbers), len(numbers), low, low + length, before, after)
+    assert expected == dense(result, len(numbers))
+
+
+@given(st.lists(st.tuples(value, value), min_size=1, max_size=12), value)
+def test_until_is_the_best_of_all_steps_to_wait_for(
+    pairs: list[tuple[float, float]], after: float
+) -> None:
+    hold, goal = ([pair[i] for pair in pairs] for i in (0, 1))
+    steps = np.arange(len(pairs))
+    result = until(steps, np.array(hold), np.array(goal), after)
+    assert slow.until(hold, goal, after) == dense(result, len(pairs))
+
+
+def test_wrong_stretches_are_refused() -> None:
+    start, numbers = np.array([0, 2], np.int64), np.array([1.0, 2.0])
+    with pytest.raises(ValueError, match="ascend"):
+        sliding_max(start[::-1].copy(), numbers, 5, 0, 1, 0.0, 0.0)
+    with pytest.raises(ValueError, match="before end"):
+        sliding_max(start, numbers, 2, 0, 1, 0.0, 0.0)
+    with pytest.raises(ValueError, match="numbers"):
+        until(start, numbers, np.array([1.0, np.nan]), 0.0)
+    with pytest.raises(ValueError, match="low"):
+        sliding_max(start, numbers, 5, 2, 1, 0.0, 0.0)
+    window = timelines_of([[(1, 0, 0, False)]]).window(0, 4)
+    with pytest.raises(ValueError, match="no such body"):
+        distances_between(window, 0, 1)

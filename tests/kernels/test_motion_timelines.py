@@ -1,0 +1,506 @@
+"""How bodies move, piece after piece, against a twin that holds a pose for every step."""
+
+import copy
+import gc
+import pickle
+import sys
+from bisect import bisect_right
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from itertools import islice
+from typing import Any
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule
+from tests.homes import Home, home_of
+from tests.reference import motion as slow
+from tests.strategies import quick
+
+from fleet2d.kernels.motion import Breakpoints, Timelines, WalkRule, Window
+
+Pose = tuple[int, int, int, int, int]
+"""x, y, heading, away, posture."""
+
+STEP_US = 1000
+HORIZON = 60
+POSE_TYPES = (np.int64, np.int64, np.int64, np.uint8, np.int8)
+ROOM = home_of([shapely.box(0, 0, 1280, 960).difference(shapely.box(500, 300, 640, 700))])
+INSIDE = home_of([shapely.box(100, 100, 1180, 860).difference(shapely.box(400, 200, 740, 800))])
+
+
+class Twin:
+    """Poses of one body at every step, up to the horizon."""
+
+    def __init__(self) -> None:
+        self.poses: dict[int, Pose] = {}
+
+    def follow(
+        self, step: int, track: list[slow.Row], posture_us: list[int], postures: list[int]
+    ) -> None:
+        self._go_on(
+            step,
+            lambda s: (
+                *slow.pose_at(track, s * STEP_US),
+                postures[bisect_right(posture_us, s * STEP_US)],
+            ),
+        )
+
+    def walk(self, step: int, walls: Home, space: Home, rule: WalkRule, start: Any) -> None:
+        key, stride, sway, limit = (int(part) for part in rule[:4])
+        steps = slow.walk(walls.walls, space.walls, key, stride, sway, limit, start, step)
+        poses = dict(enumerate(islice(steps, HORIZON - step), step))
+        self._go_on(step, lambda s: (*poses[s], 0, 0))
+
+    def _go_on(self, step: int, pose_at: Callable[[int], Pose]) -> None:
+        for s in range(step, HORIZON):
+            self.poses[s] = pose_at(s)
+
+
+def breakpoints(track: list[slow.Row]) -> Breakpoints:
+    """Return a track as the kernel has it."""
+    *columns, away = (np.array(column, np.int64) for column in zip(*track, strict=True))
+    return Breakpoints(*columns, away.astype(np.uint8))
+
+
+def runs_of(window: Window, body: int) -> list[tuple[int, Pose]]:
+    """Return the runs of a body: the step at which each begins, and its pose."""
+    part = slice(*window.start[body : body + 2].tolist())
+    columns = (window.step, window.x, window.y, window.heading, window.away, window.posture)
+    rows = zip(*(column[part].tolist() for column in columns), strict=True)
+    return [(step, (x, y, heading, away, posture)) for step, x, y, heading, away, posture in rows]
+
+
+def dense(window: Window, body: int, first: int, end: int) -> list[Pose]:
+    """Return the poses of a body at some steps."""
+    columns = (column.tolist() for column in window.dense(body, first, end))
+    return list(zip(*columns, strict=True))
+
+
+def joined(poses: list[Pose], first: int) -> list[tuple[int, Pose]]:
+    """Return the steps at which another pose is taken, and the poses."""
+    return [(first + j, pose) for j, pose in enumerate(poses) if j == 0 or pose != poses[j - 1]]
+
+
+def check_window(window: Window, expected: list[list[Pose]], first: int, end: int) -> None:
+    """Check that a window tells the poses of all bodies, in as few runs as there can be."""
+    assert (first, end) == (window.first, window.end)
+    assert len(expected) + 1 == len(window.start)
+    for body, poses in enumerate(expected):
+        assert joined(poses, first) == runs_of(window, body)
+        assert poses == dense(window, body, first, end)
+    assert sum(len(runs_of(window, body)) for body in range(len(expected))) == window.start[-1]
+
+
+# Steps and half steps, nothing at all, and times within a step.
+pauses = st.one_of(st.sampled_from([0, 0, 500, 1000, 5000, 20_000]), st.integers(1, 9000))
+
+
+@st.composite
+def tracks(draw: st.DrawFn, around: int) -> list[slow.Row]:
+    """Tracks that begin near a moment: jumps, halts, legs, turns, and being away."""
+    time = around + draw(st.sampled_from([0, 0, -7000, -333, 500, 12_000]))
+    x, y, heading, away = draw(st.integers(0, 900)), 400, draw(st.integers(0, 4095)), 0
+    track = [(time, x, y, heading, away)]
+    for _ in range(draw(st.integers(0, 5))):
+        time += draw(pauses)
+        x += draw(st.sampled_from([0, 0, 0, 1, -40, 7000]))
+        y += draw(st.sampled_from([0, 0, 3, -2000]))
+        heading = (heading + draw(st.sampled_from([0, 0, 0, 1, 2047, 2048, 3000]))) % 4096
+        away = draw(st.sampled_from([0, 0, 1]))
+        track.append((time, x, y, heading, away))
+    return track
+
+
+@st.composite
+def postures_from(draw: st.DrawFn, around: int) -> tuple[list[int], list[int]]:
+    """When another posture is taken, at or within steps, and which."""
+    times = sorted(around + pause for pause in draw(st.lists(pauses, max_size=4)))
+    codes = draw(st.lists(st.integers(0, 2), min_size=len(times) + 1, max_size=len(times) + 1))
+    return times, codes
+
+
+class Moving(RuleBasedStateMachine):
+    """Bodies that get plans at ever later steps, or others at the same; looked at anywhere."""
+
+    @initialize(bodies=st.integers(1, 3), data=st.data())
+    def begin(self, bodies: int, data: st.DataObject) -> None:
+        self.now = self.known_from = 0
+        self.timelines = Timelines(bodies, STEP_US)
+        self.twins = [Twin() for _ in range(bodies)]
+        for body in range(bodies):
+            if data.draw(st.booleans()):
+                self._follow(body, data)
+            else:
+                self._walk(body, data)
+
+    def _follow(self, body: int, data: st.DataObject) -> None:
+        track = data.draw(tracks(self.now * STEP_US))
+        times, codes = data.draw(postures_from(self.now * STEP_US))
+        moments, postures = np.array(times, np.int64), np.array(codes, np.int8)
+        self.timelines.follow(body, self.now, breakpoints(track), moments, postures)
+        self.twins[body].follow(self.now, track, times, codes)
+
+    def _walk(self, body: int, data: st.DataObject) -> None:
+        key, stride = (
+            data.draw(st.integers(0, 2**64 - 1)),
+            data.draw(st.sampled_from([700, 20_000])),
+        )
+        of, start = WalkRule(np.uint64(key), stride, 40_000, 500), (221, 333, 77)
+        space = data.draw(st.sampled_from([ROOM, INSIDE]))
+        self.timelines.walk(body, self.now, ROOM.mesh, space.mesh, of, start)
+        self.twins[body].walk(self.now, ROOM, space, of, start)
+
+    @rule(steps=st.integers(0, 9), at=st.integers(0, 2), data=st.data())
+    def follow(self, steps: int, at: int, data: st.DataObject) -> None:
+        """Another plan, some steps later or at the same step."""
+        self.now = min(self.now + steps, HORIZON - 2)
+        self._follow(at % len(self.twins), data)
+
+    @rule(steps=st.integers(0, 9), at=st.integers(0, 2), data=st.data())
+    def walk(self, steps: int, at: int, data: st.DataObject) -> None:
+        self.now = min(self.now + steps, HORIZON - 2)
+        self._walk(at % len(self.twins), data)
+
+    @rule(back=st.integers(0, 5), at=st.integers(0, 2), data=st.data())
+    def follow_from_an_earlier_step_on(self, back: int, at: int, data: st.DataObject) -> None:
+        """As a script may, that lets a body do something else than was planned."""
+        now, self.now = self.now, max(self.known_from, self.now - back)
+        self._follow(at % len(self.twins), data)
+        self.now = now
+
+    @rule(data=st.data())
+    def look_at_a_window(self, data: st.DataObject) -> None:
+        first = data.draw(st.integers(self.known_from, HORIZON - 1))
+        end = data.draw(st.integers(first, HORIZON))
+        expected = [[twin.poses[s] for s in range(first, end)] for twin in self.twins]
+        check_window(self.timelines.window(first, end), expected, first, end)
+        body = data.draw(st.integers(0, len(self.twins) - 1))
+        check_window(self.timelines.runs(body, first, end), [expected[body]], first, end)
+
+    @rule(data=st.data())
+    def look_at_a_step(self, data: st.DataObject) -> None:
+        step = data.draw(st.integers(self.known_from, HORIZON - 1))
+        expected = [twin.poses[step][:4] for twin in self.twins]
+        assert expected == [self.timelines.pose(b, step) for b in range(len(self.twins))]
+        columns = (column.tolist() for column in self.timelines.poses(step))
+        assert expected == list(zip(*columns, strict=True))
+
+    @rule(steps=st.integers(0, 20))
+    def forget(self, steps: int) -> None:
+        """All before a step, not beyond the present one; what is left is as before."""
+        before = min(self.known_from + steps, self.now)
+        self.timelines.forget(before)
+        self.known_from = before
+
+    @rule(how=st.sampled_from(["pickle", "deepcopy", "copy of a copy"]))
+    def go_on_with_a_copy(self, how: str) -> None:
+        if how == "pickle":
+            self.timelines = pickle.loads(pickle.dumps(self.timelines))
+        elif how == "deepcopy":
+            self.timelines = copy.deepcopy(self.timelines)
+        else:
+            state = pickle.dumps(self.timelines)
+            self.timelines = pickle.loads(pickle.dumps(pickle.loads(state)))
+
+    @invariant()
+    def the_present_pose_is_known(self) -> None:
+        if hasattr(self, "twins"):
+            for body, twin in enumerate(self.twins):
+                assert twin.poses[self.now][:4] == self.timelines.pose(body, self.now)
+
+
+TestMoving = Moving.TestCase
+TestMoving.settings = quick
+
+
+# --- Windows of given poses --------------------------------------------------------------------
+
+
+@quick
+@given(st.data(), st.integers(0, 3), st.integers(0, 12), st.integers(0, 10**9))
+def test_a_window_of_given_poses_joins_equal_ones(
+    data: st.DataObject, bodies: int, steps: int, first: int
+) -> None:
+    pose = st.tuples(*[st.integers(0, 1)] * 5)
+    rows = st.lists(pose, min_size=steps, max_size=steps)
+    poses = data.draw(st.lists(rows, min_size=bodies, max_size=bodies))
+    columns = np.array(poses, np.int64).reshape(bodies, steps, 5).transpose(2, 0, 1)
+    given_poses = (column.astype(t) for column, t in zip(columns, POSE_TYPES, strict=True))
+    window = Window(first, *given_poses)
+
+    check_window(window, poses, first, first + steps)
+    if bodies and steps:
+        begin = data.draw(st.integers(0, steps - 1))
+        end = data.draw(st.integers(begin, steps))
+        assert poses[0][begin:end] == dense(window, 0, first + begin, first + end)
+
+
+def resting(bodies: int = 1) -> Timelines:
+    """Return bodies that rest at (5, 6)."""
+    timelines = Timelines(bodies, STEP_US)
+    for body in range(bodies):
+        track = breakpoints([(0, 5, 6, 7, 0)])
+        timelines.follow(body, 0, track, np.zeros(0, np.int64), np.zeros(1, np.int8))
+    return timelines
+
+
+def test_resting_for_ten_years_is_one_run() -> None:
+    window = resting(3).window(0, 10 * 365 * 86_400_000)
+    assert [0, 1, 2, 3] == window.start.tolist()
+    assert [5, 5, 5] == window.x.tolist()
+
+
+def test_a_window_of_no_steps_has_no_runs() -> None:
+    window = resting(2).window(7, 7)
+    assert [0, 0, 0] == window.start.tolist()
+    assert [] == dense(window, 1, 7, 7)
+
+
+def test_a_window_of_nobody_has_no_runs() -> None:
+    window = Timelines(0, STEP_US).window(3, 9)
+    assert (3, 9, [0]) == (window.first, window.end, window.start.tolist())
+
+
+@pytest.mark.parametrize("name", ["start", "step", "x", "y", "heading", "away", "posture"])
+def test_arrays_of_a_window_are_read_only_and_outlive_it(name: str) -> None:
+    array = getattr(resting(500).window(3, 9), name)
+    before = array.tolist()
+    gc.collect()
+    assert before == array.tolist()
+    with pytest.raises(ValueError, match="read-only"):
+        array[0] = 1
+
+
+def test_a_walk_is_drawn_once_and_the_same_in_any_order() -> None:
+    rule_ = WalkRule(np.uint64(5), 9000, 40_000, 500)
+    ways = []
+    for order in ([50, 0, 20], [0, 20, 50]):
+        timelines = Timelines(1, STEP_US)
+        timelines.walk(0, 0, ROOM.mesh, INSIDE.mesh, rule_, (221, 333, 77))
+        for step in order:
+            timelines.pose(0, step)
+        ways.append(dense(timelines.window(0, 60), 0, 0, 60))
+    assert ways[0] == ways[1]
+    assert len(set(ways[0])) > 20
+
+
+def test_threads_may_ask_for_the_same_walk_at_once() -> None:
+    """It is drawn on as it is asked for: two threads that did that at once crashed."""
+    walker = WalkRule(np.uint64(5), 9000, 40_000, 500)
+
+    def ask(timelines: Timelines) -> list[int]:
+        return [len(timelines.window(s, s + 3000).step) for s in range(0, 60_000, 977)]
+
+    def walking() -> Timelines:
+        timelines = Timelines(1, STEP_US)
+        timelines.walk(0, 0, ROOM.mesh, INSIDE.mesh, walker, (221, 333, 77))
+        return timelines
+
+    expected = ask(walking())
+    for _ in range(10):
+        with ThreadPoolExecutor(4) as pool:
+            assert [expected] * 4 == list(pool.map(ask, [walking()] * 4))
+
+
+def test_timelines_keep_the_meshes_of_walks_alive() -> None:
+    timelines = Timelines(1, STEP_US)
+    mesh = home_of([shapely.box(0, 0, 1280, 960)]).mesh
+    rule_ = WalkRule(np.uint64(5), 9000, 40_000, 500)
+    timelines.walk(0, 0, mesh, mesh, rule_, (221, 333, 77))
+    expected = timelines.pose(0, 40)
+    again = copy.deepcopy(timelines)
+    del mesh, timelines
+    gc.collect()
+    assert expected == again.pose(0, 40)
+    assert 200 == len(dense(again.window(0, 200), 0, 0, 200))
+
+
+def test_meshes_are_freed_with_their_walks() -> None:
+    """Doors that open and shut make many of them in a month."""
+    timelines, rule_ = resting(2), WalkRule(np.uint64(5), 9000, 40_000, 500)
+    meshes = [home_of([shapely.box(0, 0, 1280, 900 + 2 * i)]).mesh for i in range(4)]
+
+    def reference_counts() -> list[int]:
+        return [sys.getrefcount(mesh) for mesh in meshes]
+
+    free = reference_counts()
+    timelines.walk(0, 0, meshes[0], meshes[1], rule_, (221, 333, 77))
+    timelines.walk(1, 5, meshes[0], meshes[0], rule_, (221, 333, 77))
+    timelines.walk(0, 10, meshes[2], meshes[3], rule_, (221, 333, 77))
+    timelines.pose(0, 30)
+    for before, used in ((9, [1, 1, 1, 1]), (10, [1, 0, 1, 1]), (50, [1, 0, 1, 1])):
+        timelines.forget(before)
+        assert used == [now - then for now, then in zip(reference_counts(), free, strict=True)]
+    expected = timelines.window(50, 90)
+    again = pickle.loads(pickle.dumps(timelines)).window(50, 90)
+    assert runs_of(expected, 0) == runs_of(again, 0)
+    del timelines
+    assert free == reference_counts()
+
+
+def test_copies_are_independent() -> None:
+    timelines = resting()
+    twin = copy.deepcopy(timelines)
+    track = breakpoints([(0, 50, 60, 70, 1)])
+    twin.follow(0, 4, track, np.zeros(0, np.int64), np.zeros(1, np.int8))
+    assert [(5, 6, 7, 0), (50, 60, 70, 1)] == [timelines.pose(0, 4), twin.pose(0, 4)]
+
+
+def follow(**changes: Any) -> Callable[[Timelines], None]:
+    arguments = {
+        "body": 0,
+        "step": 0,
+        "track": breakpoints([(0, 5, 6, 7, 0), (10, 6, 6, 7, 0)]),
+        "posture_us": np.zeros(1, np.int64),
+        "postures": np.zeros(2, np.int8),
+    } | changes
+    return lambda timelines: timelines.follow(**arguments)
+
+
+def walk(**changes: Any) -> Callable[[Timelines], None]:
+    arguments = {
+        "body": 0,
+        "step": 0,
+        "walls": ROOM.mesh,
+        "space": INSIDE.mesh,
+        "rule": WalkRule(np.uint64(5), 9000, 40_000, 500),
+        "start": (221, 333, 77),
+    } | changes
+    return lambda timelines: timelines.walk(**arguments)
+
+
+TRACK = breakpoints([(0, 5, 6, 7, 0), (10, 6, 6, 7, 0)])
+
+
+@pytest.mark.parametrize(
+    ("do", "message"),
+    [
+        (follow(body=1), "no such body"),
+        (follow(body=-1), "no such body"),
+        (follow(step=-1), "step"),
+        (follow(step=2**60), "step"),
+        (follow(track=TRACK._replace(x=np.zeros(1, np.int64))), "one length"),
+        (follow(track=breakpoints([(9, 0, 0, 0, 0), (3, 0, 0, 0, 0)])), "ascend"),
+        (follow(track=TRACK._replace(x=np.array([0, 2**41]))), "small"),
+        (follow(postures=np.zeros(1, np.int8)), "one more"),
+        (follow(posture_us=np.array([5, 4]), postures=np.zeros(3, np.int8)), "ascend"),
+        (walk(body=1), "no such body"),
+        (walk(step=-1), "step"),
+        (walk(start=(2**30, 0, 0)), "start"),
+        (walk(rule=WalkRule(np.uint64(5), -1, 0, 0)), "stride"),
+        (walk(rule=WalkRule(np.uint64(5), 1, 1 << 60, 0)), "sway"),
+        (walk(rule=WalkRule(np.uint64(5), 1, 1, 1 << 40)), "turn_limit"),
+        (lambda timelines: timelines.pose(1, 0), "no such body"),
+        (lambda timelines: timelines.pose(0, -1), "step"),
+        (lambda timelines: timelines.window(5, 4), "before"),
+        (lambda timelines: timelines.window(-1, 4), "step"),
+        (lambda timelines: timelines.window(0, 2**60), "step"),
+        (lambda timelines: timelines.runs(3, 0, 4), "no such body"),
+        (lambda timelines: timelines.window(2, 4).dense(0, 1, 4), "within the window"),
+        (lambda timelines: timelines.window(2, 4).dense(0, 2, 5), "within the window"),
+        (lambda timelines: timelines.window(2, 4).dense(1, 2, 4), "no such body"),
+        (lambda timelines: Timelines(-1, 1), "0 or more"),
+        (lambda timelines: Timelines(1, 0), "1 or more"),
+    ],
+)
+def test_invalid_calls_are_refused_and_change_nothing(
+    do: Callable[[Timelines], None], message: str
+) -> None:
+    timelines = resting()
+    with pytest.raises(ValueError, match=message):
+        do(timelines)
+    assert (5, 6, 7, 0) == timelines.pose(0, 9)
+
+
+def test_a_body_without_a_motion_yet_is_nowhere() -> None:
+    timelines = Timelines(2, STEP_US)
+    for ask in (lambda: timelines.pose(1, 0), lambda: timelines.window(0, 3)):
+        with pytest.raises(ValueError, match="no motion yet"):
+            ask()
+
+
+@pytest.mark.parametrize("walks", [False, True])
+def test_forgotten_steps_are_refused(walks: bool) -> None:
+    timelines = resting()
+    (walk() if walks else follow(step=4))(timelines)
+    timelines.pose(0, 30)
+    follow(step=20)(timelines)
+    timelines.forget(12)
+    assert timelines.pose(0, 12)
+    for step in (0, 3 if not walks else 11):
+        with pytest.raises(ValueError, match="forgotten"):
+            timelines.pose(0, step)
+        with pytest.raises(ValueError, match="forgotten"):
+            timelines.window(step, 15)
+
+
+@pytest.mark.parametrize("bodies", [0, 1, 3])
+@pytest.mark.parametrize("steps", [0, 1, 9])
+def test_a_pickled_window_is_restored(bodies: int, steps: int) -> None:
+    rng = np.random.default_rng(steps)
+    columns = (rng.integers(0, 2, (bodies, steps)).astype(t) for t in POSE_TYPES)
+    window = Window(7, *columns)
+    for again in (copy.deepcopy(window), pickle.loads(pickle.dumps(window))):
+        assert (7, 7 + steps) == (again.first, again.end)
+        for body in range(bodies):
+            assert runs_of(window, body) == runs_of(again, body)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"end": 6}, "no state of a window"),
+        ({"first": 8}, "no state of a window"),
+        ({"start": [0, 2, 3]}, "no state of a window"),
+        ({"start": [0, 3, 2]}, "no state of a window"),
+        ({"start": [0, 9, 4]}, "no state of a window"),
+        ({"start": [1, 2, 4]}, "no state of a window"),
+        ({"start": [0, 0, 4]}, "no state of a window"),
+        ({"start": []}, "no state of a window"),
+        ({"step": [7, 8, 7, 11]}, "no state of a window"),
+        ({"step": [7, 7, 7, 8]}, "no state of a window"),
+        ({"step": [8, 9, 7, 8]}, "no state of a window"),
+        ({"x": [0, 1, 2]}, "no state of a window"),
+    ],
+)
+def test_states_that_no_window_has_are_refused(changes: dict[str, Any], message: str) -> None:
+    state = {
+        "first": 7, "end": 11, "start": [0, 2, 4], "step": [7, 8, 7, 8],
+        **{name: [0, 1, 2, 3] for name in ("x", "y", "heading", "away", "posture")},
+    }  # fmt: skip
+    types = [int, int, np.int64, np.int64, *POSE_TYPES]
+
+    def read(parts: dict[str, Any]) -> Window:
+        window = Window.__new__(Window)
+        values = (
+            v if t is int else np.array(v, t) for v, t in zip(parts.values(), types, strict=True)
+        )
+        window.__setstate__(tuple(values))
+        return window
+
+    assert [(7, (2, 2, 2, 2, 2)), (8, (3, 3, 3, 3, 3))] == runs_of(read(state), 1)
+    with pytest.raises(ValueError, match=message):
+        read({**state, **changes})
+
+
+def test_states_that_no_timelines_have_are_refused() -> None:
+    timelines = resting()
+    bodies, step_us, pieces = timelines.__getstate__()
+    for wrong in (
+        (bodies, 0, pieces),
+        (-1, step_us, pieces),
+        (bodies, step_us, []),
+        (bodies, step_us, [[(0, TRACK, np.zeros(3, np.int64), np.zeros(1, np.int8))]]),
+        (bodies, step_us, [[(0, TRACK)]]),
+        (bodies, step_us, [[(0,) * 8]]),
+        (bodies, step_us, "pieces"),
+        (bodies,),
+        (),
+    ):
+        empty = Timelines.__new__(Timelines)
+        with pytest.raises((ValueError, TypeError, RuntimeError, IndexError)):
+            empty.__setstate__(wrong)

@@ -1,0 +1,429 @@
+"""Poses over time against fractions, and the random walk against a look at every wall."""
+
+import math
+from fractions import Fraction
+from itertools import islice, pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given
+from hypothesis import strategies as st
+from shapely.geometry import Polygon
+from tests.homes import Home, home_of, houseexpo
+from tests.reference import motion as slow
+from tests.reference.sight import is_inside, touches_any_wall
+from tests.strategies import homes, quick, seeds
+
+from fleet2d.kernels import I64
+from fleet2d.kernels.motion import (
+    Breakpoints,
+    Poses,
+    WalkRule,
+    time_route,
+    trace_meander,
+    trace_track,
+)
+from fleet2d.kernels.numbers import TURN
+
+DAY_US = 86_400_000_000
+
+
+def poses(count: int) -> Poses:
+    """Return room for poses, filled with what no pose is."""
+    x, y, heading = (np.full(count, -7, np.int64) for _ in range(3))
+    return Poses(x, y, heading, np.full(count, 9, np.uint8))
+
+
+def rows_of(out: Poses) -> list[slow.Pose]:
+    """Return the poses as tuples."""
+    return list(zip(*(array.tolist() for array in out), strict=True))
+
+
+def traced(track: list[slow.Row], begin: int, step: int, count: int) -> list[slow.Pose]:
+    """Return the poses that the kernel finds."""
+    time, x, y, heading, away = (np.array(column, np.int64) for column in zip(*track, strict=True))
+    out = poses(count)
+    trace_track(Breakpoints(time, x, y, heading, away.astype(np.uint8)), begin, step, out)
+    return rows_of(out)
+
+
+def twin(track: list[slow.Row], begin: int, step: int, count: int) -> list[slow.Pose]:
+    """Return the poses that the twin finds."""
+    return [slow.pose_at(track, begin + i * step) for i in range(count)]
+
+
+@st.composite
+def tracks(draw: st.DrawFn) -> list[slow.Row]:
+    """Tracks with breakpoints at equal times, halts, turns across 0 and half turns."""
+    time, x, y, heading, away = draw(st.integers(0, 50)), 500, 700, draw(st.integers(0, 4095)), 0
+    track = [(time, x, y, heading, away)]
+    pause = st.one_of(st.sampled_from([0, 1, 20, 1_000_000]), st.integers(0, 200))
+    hop = st.one_of(st.just(0), st.integers(-40, 40), st.integers(-(2**20), 2**20))
+    turn = st.one_of(st.sampled_from([0, 2047, 2048, 2049, -1, 1]), st.integers(0, 4095))
+    for _ in range(draw(st.integers(0, 6))):
+        time += draw(pause)
+        x, y = x + draw(hop), y + draw(hop)
+        heading, away = (heading + draw(turn)) % TURN, draw(st.integers(0, 1))
+        track.append((time, x, y, heading, away))
+    return track
+
+
+@quick
+@given(tracks(), st.integers(-60, 400), st.sampled_from([1, 3, 20, 333_333]))
+def test_trace_track_equals_fractions(track: list[slow.Row], begin: int, step: int) -> None:
+    assert twin(track, begin, step, 40) == traced(track, begin, step, 40)
+
+
+@quick
+@given(tracks(), st.integers(0, 200), st.integers(1, 40), st.integers(0, 30), st.integers(0, 30))
+def test_trace_track_of_two_spans_equals_one(
+    track: list[slow.Row], begin: int, step: int, first: int, second: int
+) -> None:
+    whole = traced(track, begin, step, first + second)
+
+    split = traced(track, begin, step, first) + traced(track, begin + first * step, step, second)
+
+    assert whole == split
+
+
+@pytest.mark.parametrize(
+    ("track", "begin", "step", "expected"),
+    [
+        pytest.param(
+            [(0, 0, 0, 0, 0), (4, 2, -2, 0, 0)],
+            0,
+            1,
+            [(0, 0, 0, 0), (1, 0, 0, 0), (1, -1, 0, 0), (2, -1, 0, 0), (2, -2, 0, 0)],
+            id="halves-round-up-on-both-sides",
+        ),
+        pytest.param(
+            [(0, 0, 0, 4090, 0), (6, 0, 0, 6, 0)],
+            0,
+            1,
+            [(0, 0, h, 0) for h in (4090, 4092, 4094, 0, 2, 4, 6)],
+            id="turn-across-zero",
+        ),
+        pytest.param(
+            [(0, 0, 0, 100, 0), (4, 0, 0, 2148, 0)],
+            0,
+            1,
+            [(0, 0, h, 0) for h in (100, 3684, 3172, 2660, 2148)],
+            id="half-turn-goes-clockwise",
+        ),
+        pytest.param(
+            [(0, 0, 0, 0, 0), (10, 5, 0, 0, 1), (10, 9, 9, 7, 0), (20, 9, 9, 7, 1)],
+            0,
+            10,
+            [(0, 0, 0, 0), (9, 9, 7, 0), (9, 9, 7, 1), (9, 9, 7, 1)],
+            id="on-breakpoints-the-later-of-two-at-once",
+        ),
+        pytest.param(
+            [(100, 1, 2, 3, 1)], 0, 60, [(1, 2, 3, 1)] * 4, id="one-breakpoint-before-and-after"
+        ),
+        pytest.param(
+            [(100, 0, 0, 0, 0), (200, 50, 0, 0, 0)],
+            0,
+            50,
+            [(x, 0, 0, 0) for x in (0, 0, 0, 25, 50, 50)],
+            id="stands-still-before-it-begins",
+        ),
+    ],
+)
+def test_trace_track_of_a_known_case(
+    track: list[slow.Row], begin: int, step: int, expected: list[slow.Pose]
+) -> None:
+    assert expected == twin(track, begin, step, len(expected))
+    assert expected == traced(track, begin, step, len(expected))
+
+
+def test_trace_track_of_a_ten_year_halt_and_a_day_long_leg_does_not_overflow() -> None:
+    years = 3650 * DAY_US
+    track = [(0, 5, 5, 0, 0), (years, 5, 5, 0, 0), (years + DAY_US, 2**20, 5, 2047, 0)]
+
+    for begin, step in ((0, 300 * DAY_US), (years, 7_000_000_001)):
+        assert twin(track, begin, step, 14) == traced(track, begin, step, 14)
+
+
+@quick
+@given(
+    st.integers(-(2**20), 2**20),
+    st.integers(-(2**20), 2**20),
+    st.integers(1, 10**9),
+    st.integers(1, 10**8),
+)
+def test_trace_track_rounds_halves_up(start: int, change: int, whole: int, step: int) -> None:
+    """However many steps a leg has: quotients are carried along from step to step."""
+    track = [(0, start, -start, 0, 0), (whole, start + change, -start - change, 1, 0)]
+
+    for begin in (0, whole // 2):
+        assert twin(track, begin, step, 60) == traced(track, begin, step, 60)
+
+
+KNOWN = Breakpoints(*(np.array([0, 5, 9]) for _ in range(4)), np.zeros(3, np.uint8))
+
+
+@pytest.mark.parametrize(
+    ("track", "step", "message"),
+    [
+        pytest.param(KNOWN._replace(x=np.zeros(2, np.int64)), 1, "one length", id="lengths"),
+        pytest.param(Breakpoints(*(a[:0] for a in KNOWN)), 1, "1 or more", id="empty"),
+        pytest.param(KNOWN._replace(time=np.array([0, 9, 5])), 3, "ascend", id="backwards"),
+        pytest.param(KNOWN._replace(x=np.array([0, 2**41, 0])), 3, "small", id="far"),
+        pytest.param(KNOWN._replace(time=KNOWN.time << 57), 3, "short", id="long"),
+        pytest.param(KNOWN, 0, "step", id="no-step"),
+        pytest.param(KNOWN, 1 << 60, "step", id="beyond-all-time"),
+    ],
+)
+def test_trace_track_refuses_invalid_input(track: Breakpoints, step: int, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        trace_track(track, 0, step, poses(4))
+
+
+def timed(route: list[tuple[int, int]], speed: float, rate: float, heading: int = 0) -> I64:
+    """Return the breakpoints of a route that begins at 1 s."""
+    return time_route(np.array(route, np.int64), 1_000_000, heading, speed, rate)
+
+
+corners = st.one_of(
+    st.tuples(st.integers(0, 3), st.integers(0, 3)),
+    st.tuples(st.integers(0, 2**20 - 1), st.integers(0, 2**20 - 1)),
+)
+
+
+@quick
+@given(
+    st.lists(corners, min_size=1, max_size=8),
+    st.floats(50.0, 5000.0),
+    st.floats(100.0, 8000.0),
+    st.integers(0, 4095),
+)
+def test_time_route_turns_then_walks_at_most_at_top_speed(
+    route: list[tuple[int, int]], speed: float, rate: float, heading: int
+) -> None:
+    """Each leg takes the least whole microseconds; a rounded float may add or take one."""
+    rows = iter(timed(route, speed, rate, heading).tolist())
+    state = [1_000_000, *route[0], heading]
+    assert state == next(rows)
+
+    for (ax, ay), (bx, by) in pairwise(route):
+        squared = (bx - ax) ** 2 + (by - ay) ** 2
+        if squared == 0:
+            continue
+        leg = next(rows)
+        if leg[1:3] == [ax, ay]:
+            turn = abs(slow.shorter_turn(state[3], leg[3]))
+            assert turn > 0
+            assert abs(leg[0] - state[0] - -(turn * 10**6 // -Fraction(rate))) <= 1
+            assert (leg[0] - state[0] + 1e-3) * rate >= turn * 1e6
+            state, leg = leg, next(rows)
+        assert [bx, by, state[3]] == leg[1:]
+        assert abs(leg[0] - state[0] - slow.least_walk_us(squared, Fraction(speed))) <= 1
+        assert (leg[0] - state[0] + 1e-3) * speed >= squared**0.5 * 1e6
+        state = leg
+    assert next(rows, None) is None
+
+
+def test_time_route_of_a_known_route() -> None:
+    """Two points twice, a leg in the heading that it has already, a turn back."""
+    route = [(0, 0), (0, 0), (1000, 0), (1000, 0), (3000, 0), (3000, 1500), (3000, 0)]
+
+    expected = [
+        [1_000_000, 0, 0, 0],
+        [2_000_000, 1000, 0, 0],
+        [4_000_000, 3000, 0, 0],
+        [5_000_000, 3000, 0, 1024],
+        [6_500_000, 3000, 1500, 1024],
+        [8_500_000, 3000, 1500, 3072],
+        [10_000_000, 3000, 0, 3072],
+    ]
+
+    assert expected == timed(route, 1000.0, 1024.0).tolist()
+
+
+@pytest.mark.parametrize("route", [[(5, 5)], [(5, 5), (5, 5)], [(5, 5)] * 4])
+def test_time_route_of_length_0_is_its_start(route: list[tuple[int, int]]) -> None:
+    assert [[1_000_000, 5, 5, 77]] == timed(route, 1000.0, 1024.0, heading=77).tolist()
+
+
+def test_time_route_rounds_every_time_up() -> None:
+    rows = timed([(0, 0), (0, 1)], 3.0, 3000.0)
+
+    assert [1_000_000, 1_341_334, 1_674_668] == rows[:, 0].tolist()
+
+
+@pytest.mark.parametrize(("speed", "rate"), [(0.0, 1.0), (1.0, 0.0), (-1.0, 1.0), (math.nan, 1.0)])
+def test_time_route_refuses_speeds_that_lead_nowhere(speed: float, rate: float) -> None:
+    with pytest.raises(ValueError, match="above 0"):
+        timed([(0, 0), (5, 5)], speed, rate)
+
+
+def test_endless_time_route_ends_at_the_last_possible_time() -> None:
+    assert 2**61 == timed([(0, 0), (5, 5), (0, 9)], 1e-300, 1e-300)[-1, 0]
+
+
+# --- The random walk ---
+
+
+def walked(walls: Home, space: Home, rule: WalkRule, first: int, start: I64, count: int) -> I64:
+    """Return the poses of a walk: int64 (count, 3)."""
+    out = poses(count)
+    trace_meander(walls.mesh, space.mesh, rule, first, tuple(start.tolist()), out)
+    assert not out.away.any()
+    return np.stack(out[:3], axis=1)
+
+
+def shrunk(home: Home, reach: int) -> Home | None:
+    """Return the home as a body that reaches so far on all sides has it; None if it has none."""
+    outside = shapely.box(-500, -500, 20_000, 20_000).difference(shapely.union_all(home.polygons))
+    grown = [
+        shapely.affinity.translate(outside, x, y)
+        for x, y in ((reach, 0), (-reach, 0), (0, reach), (0, -reach))
+    ]
+    rest = shapely.union_all(home.polygons).difference(shapely.union_all(grown), grid_size=2)
+    parts = [p for p in shapely.get_parts(rest) if p.geom_type == "Polygon" and p.area > 0]
+    return home_of(parts) if parts else None
+
+
+def inner_points(home: Home, rng: np.random.Generator, count: int) -> I64:
+    """Return points strictly inside: int64 (n, 2)."""
+    tried = rng.integers(0, [64 * home.columns, 64 * home.rows], (40 * count, 2))
+    inside = tried[is_inside(home.walls, tried)]
+    off_wall = [not touches_any_wall(home.walls, p, p[None])[0] for p in inside[:count]]
+    return np.asarray(inside[:count][off_wall], np.int64)
+
+
+def check_walk(space: Home, steps: I64, rule: WalkRule) -> int:
+    """Check that no step leaves the space, crosses a wall, turns or strides too far."""
+    moves = np.diff(steps[:, :2], axis=0)
+    moved = np.flatnonzero(moves.any(axis=1))
+    turns = (np.diff(steps[:, 2]) + 2048) % TURN - 2048
+    assert np.abs(turns).max() <= rule.turn_limit
+    assert is_inside(space.walls, steps[:, :2]).all()
+    for j in moved:
+        assert not touches_any_wall(space.walls, steps[j, :2], steps[j + 1, None, :2])[0]
+        assert abs(np.hypot(*moves[j]) - rule.stride / 256) < 1
+    return len(moved)
+
+
+@quick
+@given(homes(), seeds(), st.sampled_from([700, 20_000, 90_000]), st.integers(0, 200))
+def test_trace_meander_equals_a_check_of_every_wall(
+    polygons: list[Polygon], seed: int, stride: int, limit: int
+) -> None:
+    home, rng = home_of(polygons), np.random.default_rng(seed)
+    rule = WalkRule(np.uint64(seed), stride, 40_000, limit)
+    for x, y in inner_points(home, rng, 2):
+        start = np.array([x, y, rng.integers(TURN)])
+        steps = slow.walk(home.walls, home.walls, seed, stride, 40_000, limit, start.tolist())
+
+        expected = np.array(list(islice(steps, 40)))
+
+        assert np.array_equal(expected, walked(home, home, rule, 0, start, 40))
+
+
+@quick
+@given(homes(), seeds(), st.sampled_from([40, 100]))
+def test_trace_meander_from_the_border_of_the_space_equals_the_reference(
+    polygons: list[Polygon], seed: int, reach: int
+) -> None:
+    home, rng = home_of(polygons), np.random.default_rng(seed)
+    space = shrunk(home, reach)
+    if space is None:
+        return
+    wall = space.walls[rng.integers(len(space.walls))]
+    for x, y in (wall[:2], (wall[:2] + wall[2:]) // 2):
+        start = np.array([x, y, rng.integers(TURN)])
+        rule = WalkRule(np.uint64(seed), 9_000, 60_000, 2048)
+        steps = slow.walk(home.walls, space.walls, seed, 9_000, 60_000, 2048, start.tolist())
+
+        expected = np.array(list(islice(steps, 25)))
+
+        assert np.array_equal(expected, walked(home, space, rule, 0, start, 25))
+
+
+def test_trace_meander_from_the_border_gets_inside_and_stays() -> None:
+    home = home_of([shapely.box(0, 0, 2000, 2000)])
+    space = home_of([shapely.box(300, 300, 1700, 1700)])
+    rule = WalkRule(np.uint64(3), 20_000, 60_000, 1024)
+
+    for start in ((300, 900), (300, 300), (1700, 1700), (1000, 1700)):
+        steps = walked(home, space, rule, 0, np.array([*start, 2048]), 300)
+        away = np.flatnonzero((steps[:, :2] != start).any(axis=1))
+        inside = steps[away[0] :]
+
+        assert away[0] < 150
+        assert len(away) == len(inside)
+        assert check_walk(space, inside, rule) > 50
+
+
+def test_trace_meander_from_the_border_does_not_step_through_a_wall() -> None:
+    """Beyond the wall is space too, one stride away, and it would be strictly inside."""
+    home = home_of([shapely.box(0, 0, 2000, 1000), shapely.box(2010, 0, 4000, 1000)])
+    space = home_of([shapely.box(300, 300, 1700, 700), shapely.box(2310, 300, 3700, 700)])
+    rule = WalkRule(np.uint64(3), 900 * 256, 0, 1)
+
+    steps = walked(home, space, rule, 0, np.array([1700, 500, 0]), 5)
+
+    assert [[1700, 500]] * 5 == steps[:, :2].tolist()
+
+
+@pytest.mark.parametrize("stride", [256, 0.1 * 1280 * 256, 1280 * 256])
+def test_trace_meander_never_leaves_a_real_home(shared_data: Path, stride: float) -> None:
+    """Known failure 8: with 1 m a step, one move in five crossed a wall."""
+    path = shared_data / "houseexpo" / "658e5214673c7a4e25b458e56bdb6144.json"
+    home, rng = houseexpo(path), np.random.default_rng(8)
+    rule = WalkRule(np.uint64(12), int(stride), 30_000, 300)
+    count = 4000
+
+    moved = 0
+    for x, y in inner_points(home, rng, 2):
+        steps = walked(home, home, rule, 0, np.array([x, y, 0]), count)
+        moved += check_walk(home, steps, rule)
+    assert moved > count / 50
+
+
+@quick
+@given(homes(), seeds(), st.integers(1, 39))
+def test_trace_meander_of_two_spans_equals_one(
+    polygons: list[Polygon], seed: int, cut: int
+) -> None:
+    home, rng = home_of(polygons), np.random.default_rng(seed)
+    rule = WalkRule(np.uint64(seed), 15_000, 40_000, 500)
+    for x, y in [*inner_points(home, rng, 1), home.walls[0, :2]]:
+        whole = walked(home, home, rule, 70, np.array([x, y, 9]), 40)
+
+        assert np.array_equal(whole[cut:], walked(home, home, rule, 70 + cut, whole[cut], 40 - cut))
+
+
+def test_trace_meander_with_a_stride_beyond_the_home_stays_and_turns() -> None:
+    home = home_of([shapely.box(0, 0, 640, 640)])
+    rule = WalkRule(np.uint64(1), 1000 * 256, 60_000, 4096)
+
+    steps = walked(home, home, rule, 0, np.array([333, 333, 0]), 500)
+
+    assert {(333, 333)} == {(x, y) for x, y, _ in steps.tolist()}
+    assert len(set(steps[:, 2].tolist())) > 200
+
+
+@pytest.mark.parametrize("limit", [0, 1, 37])
+def test_trace_meander_turns_no_faster_than_the_limit(limit: int) -> None:
+    home = home_of([shapely.box(0, 0, 6400, 6400)])
+    rule = WalkRule(np.uint64(1), 2000, 20_000_000, limit)
+
+    steps = walked(home, home, rule, 0, np.array([3000, 3000, 4090]), 300)
+    turns = (np.diff(steps[:, 2]) + 2048) % TURN - 2048
+
+    assert {limit} == set(np.abs(turns).tolist()) - {0}.difference({limit})
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"stride": -1}, {"stride": 2**31}, {"sway": -1}, {"turn_limit": -1}]
+)
+def test_trace_meander_refuses_a_rule_that_is_none(wrong: dict[str, int]) -> None:
+    home = home_of([shapely.box(0, 0, 640, 640)])
+    rule = WalkRule(np.uint64(1), 5, 5, 5)._replace(**wrong)
+
+    with pytest.raises(ValueError, match=next(iter(wrong))):
+        walked(home, home, rule, 0, np.array([33, 33, 0]), 3)

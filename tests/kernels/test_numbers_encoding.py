@@ -1,0 +1,126 @@
+"""Arrays as bytes: equal to those of the slow twin, and read back to the last bit."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+from tests.reference import encoding as slow
+
+from fleet2d.artifacts.unfinished import GROWTH, HEADER, LINE, NARROW, RAW, RUNS, ArrayReader
+from fleet2d.kernels.numbers import encode_arrays
+
+RNG = np.random.default_rng(0)
+INT64 = [-(2**63), -1, 0, 1, 254, 255, 256, 2**16, 2**32, 2**63 - 1]
+STEPS = RNG.integers(0, 5, 1000).cumsum()
+
+
+def read_back(arrays: list[NDArray[Any]]) -> list[NDArray[Any]]:
+    reader = ArrayReader(encode_arrays(arrays))
+    return [reader.read(values.dtype, len(values)) for values in arrays]
+
+
+def is_same(one: NDArray[Any], other: NDArray[Any]) -> bool:
+    return one.dtype == other.dtype and one.tobytes() == other.tobytes()
+
+
+@st.composite
+def columns(draw: st.DrawFn) -> list[NDArray[Any]]:
+    """Arrays of any type and of any behaviour: few values, many, rising, at the limits."""
+    arrays: list[NDArray[Any]] = []
+    for _ in range(draw(st.integers(0, 4))):
+        count = draw(st.sampled_from([0, 1, 2, 3, 7, 63, 64, 65, 66, 129, 300]))
+        rng = np.random.default_rng(draw(st.integers(0, 2**32)))
+        kind = draw(st.sampled_from(["bool", "text", "int32", "int64", "steps", "line", "float64"]))
+        most = draw(st.sampled_from([0, 1, 2, 254, 255, 256, 2**16, 2**31 - 1]))
+        repeat = draw(st.sampled_from([1, 3, 40]))
+        numbers = np.repeat(rng.integers(-(most // 8), most, count, endpoint=True), repeat)[:count]
+        if kind == "int64":
+            numbers = np.where(rng.random(count) < 0.1, rng.choice(INT64, count), numbers)
+        if kind == "steps":
+            numbers = np.abs(numbers).cumsum()
+        if kind == "line" and arrays and arrays[-1].dtype == np.int64:
+            numbers = arrays[-1] * int(rng.choice(INT64)) + int(rng.choice(INT64[1:-1]))
+        if kind == "float64":
+            numbers = np.where(numbers % 5 == 0, rng.choice([np.nan, -0.0, 0.0]), numbers / 7)
+        types = {"bool": bool, "text": np.uint8, "int32": np.int32, "float64": np.float64}
+        arrays.append(numbers.astype(types.get(kind, np.int64)))
+    return arrays
+
+
+@given(columns())
+def test_bytes_are_those_of_the_twin_and_read_back(arrays: list[NDArray[Any]]) -> None:
+    assert slow.encode_arrays(arrays) == encode_arrays(arrays)
+    for values, back in zip(arrays, read_back(arrays), strict=True):
+        assert is_same(values, back)
+
+
+@pytest.mark.parametrize(
+    ("values", "encoding"),
+    [
+        (np.zeros(1000), RUNS),
+        (np.repeat([1.0, np.nan, -0.0], 400), RUNS),
+        (np.arange(1000) * 7, GROWTH),
+        (np.r_[np.arange(500), np.arange(9000, 9500)], GROWTH),
+        (np.arange(1000) * 300, NARROW),
+        (np.arange(1000) * 2**40, RAW),
+        (np.full(1000, -1), RUNS),
+        (np.arange(1000)[::-1].copy(), NARROW),
+        (RNG.normal(size=1000), RAW),
+        (np.arange(3), NARROW),
+        (np.zeros(0, np.int32), RAW),
+        (np.zeros(0, np.int64), RAW),
+        (np.ones(1000, bool), RUNS),
+        (np.arange(1000, dtype=np.int32) % 3, NARROW),
+        (np.arange(1000, dtype=np.int32) % 3 - 1, RAW),
+        (np.zeros(1000, np.uint8), RAW),
+        (np.array([-(2**63), 2**63 - 1, 5] * 500), RAW),
+    ],
+)
+def test_each_encoding_is_used_where_it_is_short(values: Any, encoding: int) -> None:
+    content = encode_arrays([values])
+    assert encoding == content[0]
+    assert slow.encode_arrays([values]) == content
+    assert is_same(values, *read_back([values]))
+
+
+@pytest.mark.parametrize(
+    ("times", "steps", "fits"),
+    [
+        (STEPS * 1_000_000 + 5, STEPS, True),
+        (STEPS * -3, STEPS, True),
+        (np.r_[STEPS[:-1] * 7, STEPS[-1] * 7 + 1], STEPS, False),
+        (np.r_[STEPS[:500] * 7, STEPS[500] * 7 + 1, STEPS[501:] * 7], STEPS, False),
+        (STEPS[:2] * 7, STEPS[:2], False),  # two are always on a line
+        (STEPS, np.zeros(1000, np.int64), False),
+        (STEPS[:-1], STEPS, False),
+        (STEPS * 7, STEPS[::-1].copy(), False),
+        (np.r_[-(2**63), np.arange(998), 2**63 - 1], np.r_[np.zeros(999, np.int64), 1], False),
+    ],
+)
+def test_times_that_are_multiples_of_steps_are_a_line(times: Any, steps: Any, fits: bool) -> None:
+    content = encode_arrays([steps, times])
+    alone = encode_arrays([steps])
+    assert fits == (content[len(alone)] == LINE)
+    if fits:
+        assert len(alone) + HEADER.size + 16 == len(content)
+    assert slow.encode_arrays([steps, times]) == content
+    assert all(map(is_same, [steps, times], read_back([steps, times])))
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        np.zeros(3, np.float32),
+        np.zeros(3, np.int16),
+        np.zeros((2, 3)),
+        np.zeros(3).astype(">f8"),
+        [1, 2],
+        None,
+    ],
+)
+def test_what_no_column_holds_is_refused(wrong: Any) -> None:
+    with pytest.raises(TypeError, match="incompatible function arguments"):
+        encode_arrays([np.zeros(3), wrong])

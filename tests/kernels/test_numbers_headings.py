@@ -1,0 +1,198 @@
+"""Headings against sines to sixty digits: neither libm nor rounding may show."""
+
+import hashlib
+from decimal import ROUND_HALF_EVEN, Decimal
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from tests.reference import headings as slow
+from tests.strategies import quick
+
+from fleet2d.kernels.numbers import (
+    HALF_TURN,
+    QUARTER,
+    SINES,
+    TURN,
+    UNIT,
+    cosine,
+    half_sine,
+    half_sines,
+    heading_of,
+    sine,
+    turn_between,
+    turned,
+)
+
+# Two libms differ by an ulp of the sine, times UNIT: 2**-53 * 2**30.
+LIBM_ERROR = 2.0**-22
+
+
+def test_sines_are_pinned() -> None:
+    expected = "4c0e1da65ba03734026be97f8d3655689f8a33259be2b868f3f7511f9c5e3b28"
+
+    assert (np.int64, (2 * QUARTER + 1,)) == (SINES.dtype, SINES.shape)
+    assert expected == hashlib.sha256(SINES.astype("<i8").tobytes()).hexdigest()
+
+
+def test_sines_are_rounded_to_nearest_and_no_libm_can_disagree() -> None:
+    """No sine comes so near to the middle between two integers that an ulp would matter."""
+    nearest_to_tie = 1.0
+    for part in range(2 * QUARTER + 1):
+        scaled = slow.sine(part) * UNIT
+        rounded = scaled.to_integral_value(ROUND_HALF_EVEN)
+        nearest_to_tie = min(nearest_to_tie, 0.5 - abs(float(scaled - rounded)))
+
+        assert int(rounded) == SINES[part]
+
+    assert nearest_to_tie > 100 * LIBM_ERROR
+
+
+@pytest.mark.parametrize("shift", [0, 2 * TURN, -2 * TURN, 10 * TURN])
+def test_half_sine_goes_round_the_whole_turn(shift: int) -> None:
+    for part in range(0, 2 * TURN, 1 if shift == 0 else 37):
+        exact = slow.sine(part) * UNIT
+
+        assert abs(int(half_sine(part + shift)) - exact) <= Decimal("0.5")
+
+
+@pytest.mark.parametrize("heading", [0, 1, 1023, 1024, 1025, 2048, 3071, 3072, 4095, -1, 5000])
+def test_sine_and_cosine_equal_the_heading(heading: int) -> None:
+    exact = slow.sine(2 * heading) * UNIT, slow.cosine(2 * heading) * UNIT
+
+    assert abs(int(sine(heading)) - exact[0]) <= Decimal("0.5")
+    assert abs(int(cosine(heading)) - exact[1]) <= Decimal("0.5")
+
+
+def test_sine_and_cosine_keep_the_symmetries_of_the_circle() -> None:
+    for heading in range(TURN):
+        s, c = sine(heading), cosine(heading)
+
+        assert (-s, -c) == (sine(heading + HALF_TURN), cosine(heading + HALF_TURN))
+        assert (-s, c) == (sine(-heading), cosine(-heading))
+        assert (c, -s) == (sine(heading + QUARTER), cosine(heading + QUARTER))
+
+
+@pytest.mark.parametrize(
+    ("dx", "dy", "expected"),
+    [
+        (0, 0, 0),
+        (1, 0, 0),
+        (0, 1, 1024),
+        (-1, 0, 2048),
+        (0, -1, 3072),
+        (7, 7, 512),
+        (-7, 7, 1536),
+        (-7, -7, 2560),
+        (7, -7, 3584),
+        (2**20, 0, 0),
+        (2**20, -1, 0),
+        (2**20, 1, 0),
+        (1, 2**20, 1024),
+        (-(2**20), 2**20, 1536),
+        (3, 4, 605),
+        (-(2**20), -1, 2048),
+    ],
+)
+def test_heading_of_known_directions(dx: int, dy: int, expected: int) -> None:
+    assert expected == heading_of(dx, dy)
+
+
+def test_heading_of_small_vectors_is_the_nearest() -> None:
+    reach = 12
+    for dx in range(-reach, reach + 1):
+        for dy in range(-reach, reach + 1):
+            if dx or dy:
+                assert {int(heading_of(dx, dy))} == slow.nearest_headings(dx, dy)
+
+
+@quick
+@given(st.integers(-(2**20), 2**20), st.integers(-(2**20), 2**20))
+def test_heading_of_large_vectors_is_the_nearest(dx: int, dy: int) -> None:
+    if dx == 0 and dy == 0:
+        return
+    assert {int(heading_of(dx, dy))} == slow.nearest_headings(dx, dy)
+
+
+def test_heading_of_vectors_near_a_boundary_is_the_nearest() -> None:
+    """The hardest vectors: up to 700 units long, all but in the middle between two headings."""
+    rng = np.random.default_rng(5)
+    for part in 2 * rng.integers(0, TURN, 60) + 1:
+        c, s = float(slow.cosine(int(part))), float(slow.sine(int(part)))
+        length = float(rng.integers(100, 700))
+        x, y = round(length * c), round(length * s)
+        around = [(x + i, y + j) for i in (-1, 0, 1) for j in (-1, 0, 1)]
+        dx, dy = min(around, key=lambda v: abs(v[0] * s - v[1] * c))
+
+        assert {int(heading_of(dx, dy))} == slow.nearest_headings(dx, dy)
+
+
+@quick
+@given(st.integers(-(2**20), 2**20), st.integers(-(2**20), 2**20))
+def test_heading_of_turns_with_the_vector(dx: int, dy: int) -> None:
+    if dx == 0 and dy == 0:
+        return
+    heading = heading_of(dx, dy)
+
+    assert (heading + QUARTER) % TURN == heading_of(-dy, dx)
+    assert (heading + HALF_TURN) % TURN == heading_of(-dx, -dy)
+
+
+def test_no_lattice_vector_lies_right_between_two_headings() -> None:
+    """So no tie is ever broken: the smallest such vector would be longer than any plan."""
+    for part in range(1, 2 * TURN, 2):
+        c, s = int(half_sine(part + 2 * QUARTER)), int(half_sine(part))
+
+        assert max(abs(c), abs(s)) // np.gcd(c, s) > 2**15
+
+
+@pytest.mark.parametrize(
+    ("start", "end", "expected"),
+    [
+        (0, 0, 0),
+        (0, 1, 1),
+        (1, 0, -1),
+        (4095, 0, 1),
+        (0, 4095, -1),
+        (0, 2047, 2047),
+        (0, 2048, -2048),
+        (2048, 0, -2048),
+        (0, 2049, -2047),
+        (3000, 100, 1196),
+        (100, 3000, -1196),
+        (-1, 4097, 2),
+    ],
+)
+def test_turn_between_is_the_shorter_way(start: int, end: int, expected: int) -> None:
+    assert expected == turn_between(start, end)
+
+
+@given(st.integers(-(10**6), 10**6), st.integers(-(10**6), 10**6))
+def test_turn_between_leads_from_start_to_end(start: int, end: int) -> None:
+    turn = int(turn_between(start, end))
+
+    assert -HALF_TURN <= turn < HALF_TURN
+    assert (start + turn - end) % TURN == 0
+
+
+def test_vectors_whose_products_would_leave_64_bits_are_refused() -> None:
+    """That to (-2**63, -2**63) was turned for ever."""
+    for dx, dy in ((-(2**63), -(2**63)), (2**31 + 1, 0), (0, -(2**31) - 1)):
+        with pytest.raises(ValueError, match=r"within 2\*\*31"):
+            heading_of(dx, dy)
+    assert [512, 3584] == [heading_of(2**31, 2**31), heading_of(2**31, -(2**31))]
+
+
+def test_the_table_of_a_whole_turn_has_the_sine_of_each_angle() -> None:
+    assert [int(half_sine(i)) for i in range(2 * TURN)] == half_sines().tolist()
+
+
+@quick
+@given(st.integers(-(2**31), 2**31), st.integers(-(2**31), 2**31), st.integers(-9000, 9000))
+def test_turned_points_are_the_nearest_to_the_exact_ones(x: int, y: int, angle: int) -> None:
+    columns = (np.array([value], np.int64) for value in (x, y, angle))
+    new_x, new_y = (int(column[0]) for column in turned(*columns))
+    along, up = int(half_sine(angle + 2 * QUARTER)), int(half_sine(angle))
+    assert abs(2 * (x * along - y * up - new_x * UNIT)) <= UNIT
+    assert abs(2 * (x * up + y * along - new_y * UNIT)) <= UNIT

@@ -1,0 +1,192 @@
+import copy
+import pickle
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from tests.reference import random as slow
+from tests.strategies import quick
+
+from fleet2d.kernels.numbers import (
+    BELL_MEAN,
+    BELL_STD,
+    Bits,
+    StepDraws,
+    random_bell,
+    random_bells,
+    random_below,
+    random_bits,
+    random_uniform,
+)
+
+keys = st.integers(0, 2**64 - 1)
+counters = st.integers(0, 2**63 - 1)
+
+# Outputs of the reference implementation (Vigna's splitmix64.c) for two seeds.
+KNOWN = {
+    1234567: [
+        6457827717110365317,
+        3203168211198807973,
+        9817491932198370423,
+        4593380528125082431,
+        16408922859458223821,
+    ],
+    0: [0xE220A8397B1DCDAF, 0x6E789E6AA1B965F4, 0x06C45D188009454F],
+}
+
+
+@pytest.mark.parametrize("seed", KNOWN)
+def test_random_bits_are_the_published_outputs_of_splitmix64(seed: int) -> None:
+    expected = KNOWN[seed]
+
+    assert expected == [int(random_bits(np.uint64(seed), i)) for i in range(len(expected))]
+    assert expected == slow.splitmix(seed, len(expected))
+
+
+@quick
+@given(keys, counters)
+def test_random_bits_of_any_key_and_counter_equal_the_reference(key: int, counter: int) -> None:
+    assert slow.random_bits(key, counter) == int(random_bits(np.uint64(key), counter))
+
+
+def test_random_bits_are_addressed_not_drawn() -> None:
+    key = np.uint64(2**64 - 1)
+
+    forwards = [int(random_bits(key, i)) for i in range(50)]
+    backwards = [int(random_bits(key, i)) for i in reversed(range(50))]
+
+    assert forwards == backwards[::-1] == slow.splitmix(2**64 - 1, 50)
+
+
+@quick
+@given(keys, counters, st.one_of(st.sampled_from([1, 2, 2**31 - 1]), st.integers(1, 2**31 - 1)))
+def test_random_below_is_in_range_and_that_of_the_twin(key: int, counter: int, bound: int) -> None:
+    drawn = int(random_below(np.uint64(key), counter, bound))
+
+    assert 0 <= drawn < bound
+    assert slow.random_below(key, counter, bound) == drawn
+
+
+def test_random_below_reaches_both_ends() -> None:
+    key = np.uint64(7)
+
+    assert set(range(6)) == {int(random_below(key, i, 6)) for i in range(200)}
+    assert {0} == {int(random_below(key, i, 1)) for i in range(200)}
+
+
+def test_random_below_the_largest_bound_does_not_overflow() -> None:
+    """The product of 32 random bits and the bound needs 63 bits."""
+    bound = 2**31 - 1
+    of_ones, of_zeros = np.uint64(slow.key_of_word(2**64 - 1)), np.uint64(slow.key_of_word(0))
+
+    assert bound - 1 == random_below(of_ones, 0, bound)
+    assert random_below(of_zeros, 0, bound) == 0
+
+
+@quick
+@given(keys, counters)
+def test_random_uniform_is_the_upper_53_bits(key: int, counter: int) -> None:
+    drawn = float(random_uniform(np.uint64(key), counter))
+
+    assert 0.0 <= drawn < 1.0
+    assert slow.random_bits(key, counter) >> 11 == drawn * 2**53
+
+
+@quick
+@given(keys, counters)
+def test_random_bell_is_the_sum_of_the_bytes(key: int, counter: int) -> None:
+    assert slow.random_bell(key, counter) == int(random_bell(np.uint64(key), counter))
+
+
+@pytest.mark.parametrize(("word", "expected"), [(0, -1020), (2**64 - 1, 1020), (255 << 56, -765)])
+def test_random_bell_of_extreme_words(word: int, expected: int) -> None:
+    """A word of ones has the largest sum: 2040, in lanes of sixteen bits."""
+    key = np.uint64(slow.key_of_word(word))
+    assert word == int(random_bits(key, 0))
+
+    assert expected == int(random_bell(key, 0))
+
+
+def test_random_bell_has_the_stated_moments() -> None:
+    chances = slow.distribution_of_bell()
+    mean = sum(value * chance for value, chance in chances.items())
+    variance = sum(value**2 * chance for value, chance in chances.items())
+    kurtosis = sum(value**4 * chance for value, chance in chances.items()) / variance**2 - 3
+
+    assert 1 == sum(chances.values())
+    assert (-1020, 1020) == (min(chances), max(chances))
+    assert mean == 0
+    assert BELL_MEAN == 1020
+    assert variance == 43690
+    assert abs(BELL_STD - 43690**0.5) < 1e-9
+    assert round(float(kurtosis), 2) == -0.15
+    assert round(1020 / BELL_STD, 2) == 4.88
+
+
+def test_random_bell_draws_follow_their_distribution() -> None:
+    """Ten thousand fixed draws: mean and standard deviation within three standard errors."""
+    drawn = np.array([int(random_bell(np.uint64(11), i)) for i in range(10_000)])
+
+    assert abs(drawn.mean()) < 3 * BELL_STD / 100
+    assert abs(drawn.std() / BELL_STD - 1) < 3 / 200**0.5 / 10
+
+
+@quick
+@given(keys, counters, st.lists(st.integers(1, 2**31 - 1)))
+def test_draws_of_a_step_equal_the_reference(key: int, step: int, bounds: list[int]) -> None:
+    draws = StepDraws(np.uint64(key), step)
+    own_key = slow.random_bits(key, step)
+
+    expected = [slow.random_below(own_key, i, bound) for i, bound in enumerate(bounds)]
+    assert expected == [draws.below(bound) for bound in bounds]
+    assert (slow.random_bits(own_key, len(bounds)) >> 11) / 2**53 == draws.uniform()
+
+
+@quick
+@given(keys, st.lists(st.integers(0, 30)))
+def test_bits_of_a_draw_of_30_are_used_from_the_lowest(key: int, counts: list[int]) -> None:
+    bits, draws = Bits(StepDraws(np.uint64(key), 5)), StepDraws(np.uint64(key), 5)
+
+    left = value = 0
+    for count in counts:
+        if left < count:
+            value, left = draws.below(1 << 30), 30
+        assert value % 2**count == bits.take(count)
+        value, left = value >> count, left - count
+
+
+def test_bits_and_others_share_the_draws_of_a_step() -> None:
+    draws, all_of_them = StepDraws(np.uint64(3), 5), StepDraws(np.uint64(3), 5)
+    bits = Bits(draws)
+
+    values = [bits.take(30), draws.below(1 << 30), bits.take(30)]
+
+    assert [all_of_them.below(1 << 30) for _ in range(3)] == values
+
+
+@pytest.mark.parametrize("bound", [0, -1, 2**31, 2**62])
+def test_a_bound_out_of_range_is_refused(bound: int) -> None:
+    with pytest.raises(ValueError, match=f"bound is {bound}: it must be from 1 to"):
+        StepDraws(np.uint64(3), 5).below(bound)
+
+
+def test_more_than_30_bits_are_refused() -> None:
+    with pytest.raises(ValueError, match="count must be 0 to 30"):
+        Bits(StepDraws(np.uint64(3), 5)).take(31)
+
+
+@pytest.mark.parametrize("way", [copy.copy, lambda draws: pickle.loads(pickle.dumps(draws))])
+def test_a_copy_of_draws_is_independent(way: Callable[[StepDraws], StepDraws]) -> None:
+    draws = StepDraws(np.uint64(3), 5)
+    draws.below(7)
+    twin = way(draws)
+    assert [draws.below(10**9) for _ in range(3)] == [twin.below(10**9) for _ in range(3)]
+
+
+@quick
+@given(keys, st.lists(counters))
+def test_bell_shaped_draws_of_many_counters_are_those_of_each(key: int, many: list[int]) -> None:
+    draws = random_bells(np.uint64(key), np.array(many, np.int64))
+    assert [random_bell(key, counter) for counter in many] == draws.tolist()

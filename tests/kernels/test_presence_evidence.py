@@ -1,0 +1,129 @@
+"""Evidence in bins against the same with NumPy, to the last bit."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from fleet2d.algorithms.presence.anyone import with_anyone
+from fleet2d.kernels import F64, I64, Bool
+from fleet2d.kernels.presence import PeoplePlaces, gather_views, sum_places
+
+
+def views(seed: int, robots: int) -> tuple[I64, ...]:
+    """Return cells in view of some robots, many bins alike, and the patches that they are of."""
+    random = np.random.default_rng(seed)
+    room = np.repeat(np.arange(5), random.integers(1, 4, 5))
+    cells = random.integers(0, 40, len(room))
+    room_cells = np.maximum(np.bincount(room, cells, minlength=5).astype(np.int64), 1)
+    most = random.integers(0, 2 + cells, (30, robots, len(room)))
+    summed = random.integers(0, 61, most.shape) * most
+    seen = np.stack([summed, most], axis=2)
+    return seen[random.integers(0, 30, 200).repeat(3)], room, cells, room_cells
+
+
+@pytest.mark.parametrize("robots", [0, 1, 3])
+@pytest.mark.parametrize("seed", range(4))
+def test_views_equal_numpy(seed: int, robots: int) -> None:
+    cells, room, size, room_cells = views(seed, robots)
+    first, of_patch = np.flatnonzero(np.diff(room, prepend=-1)), np.maximum(size, 1)
+    summed, most = cells[:, :, 0], cells[:, :, 1].max(axis=1, initial=0)
+    by_room = np.add.reduceat(summed, first, axis=2).max(axis=1, initial=0) / (room_cells * 60)
+    shown = most / of_patch
+    expected = (
+        by_room,
+        summed.max(axis=1, initial=0) / (of_patch * 60),
+        shown,
+        np.rint(np.minimum(shown, 1) * 255).astype(np.uint8),
+    )
+
+    result = gather_views(cells, room, size, room_cells, 60)
+
+    for one, other in zip(expected, result, strict=True):
+        assert one.dtype == other.dtype
+        assert np.array_equal(one, other)
+
+
+def test_half_a_part_is_rounded_to_the_even_one() -> None:
+    room, size = np.zeros(1, np.int64), np.array([510])
+    cells = np.array([1, 3, 5, 509])[:, None, None, None].repeat(2, axis=2)
+
+    *_, parts = gather_views(cells, room, size, size, 1)
+
+    assert [0, 2, 2, 254] == parts[:, 0].tolist()
+
+
+def values(chains: F64, unknown: Bool, users: int) -> F64:
+    """Return what adds up of each bin, as an estimator in NumPy has it."""
+    rows = with_anyone(list(chains), unknown) if users else chains[0][:, None]
+    return np.concatenate([rows, rows * (1 - rows), np.ones((*rows.shape[:2], 1))], axis=2)
+
+
+def together(stretches: list[tuple[F64, I64]]) -> PeoplePlaces:
+    """Return the stretches of people one after the other."""
+    places, bins = (np.concatenate(parts) for parts in zip(*stretches, strict=True))
+    begin = np.cumsum([0, *(len(lengths) for _, lengths in stretches)])
+    return PeoplePlaces(places, bins, begin)
+
+
+def chain_of(random: np.random.Generator, bins: int) -> tuple[F64, I64]:
+    """Return probabilities of places in stretches of up to five bins, and their lengths."""
+    cuts = np.cumsum(random.integers(1, 6, bins))
+    lengths = np.diff([0, *cuts[cuts < bins], bins])
+    places = random.dirichlet(np.full(6, 0.1), len(lengths))
+    places[::3] *= 1 + 1e-15  # sums are one up to rounding
+    return places, lengths
+
+
+@pytest.mark.parametrize("users", [0, 1, 2, 5])
+@pytest.mark.parametrize("longest", [1, 7, 9, 60, 700])
+def test_sums_by_hour_equal_numpy(users: int, longest: int) -> None:
+    random = np.random.default_rng(users)
+    ends = np.cumsum(random.integers(1, longest + 1, 9))
+    stretches = [chain_of(random, int(ends[-1])) for _ in range(max(users, 1))]
+    chains = np.stack([np.repeat(places, bins, axis=0) for places, bins in stretches])
+    unknown = random.random((ends[-1], 5)) < 0.05
+    first = np.array([0, *ends[:-1]])
+    expected = np.add.reduceat(values(chains, unknown, users), first, axis=0)
+
+    result = sum_places(together(stretches), unknown, users, first)
+
+    assert np.array_equal(expected, result)
+    for sums, (a, b) in zip(result, pairwise([0, *ends.tolist()]), strict=True):
+        assert (sums[:, -1] == b - a).all()
+
+
+def test_wrong_sizes_are_refused() -> None:
+    chain, unknown = (np.full((2, 3), 1 / 3), np.array([3, 1])), np.zeros((4, 2), bool)
+    chains = together([chain, chain])
+    with pytest.raises(ValueError, match="no users"):
+        sum_places(chains, unknown, 3, np.array([0]))
+    wrong = (
+        chains._replace(probability=chains.probability[:, :2]),
+        chains._replace(bins=np.array([3, 1, 4, 0])),
+        chains._replace(begin=np.array([0, 1, 4])),
+    )
+    for other in wrong:
+        with pytest.raises(ValueError, match="a chain must be"):
+            sum_places(other, unknown, 2, np.array([0]))
+    for other in (
+        chains._replace(probability=chains.probability[:3]),
+        chains._replace(begin=np.array([0, 3, 2])),
+        chains._replace(begin=np.array([0, 2, 5])),
+    ):
+        with pytest.raises(ValueError, match="chains must be"):
+            sum_places(other, unknown, 2, np.array([0]))
+    with pytest.raises(ValueError, match="a chain must be"):
+        sum_places(chains, unknown[:3], 2, np.array([0]))
+    for first in ([1], [0, 0], [0, 4]):
+        with pytest.raises(ValueError, match="ascend"):
+            sum_places(chains, unknown, 2, np.array(first))
+    cells, room, size = np.zeros((2, 1, 2, 3), np.int64), np.array([0, 0, 1]), np.array([1, 1, 1])
+    with pytest.raises(ValueError, match="rooms of patches"):
+        gather_views(cells, room[::-1].copy(), size, size[:2], 60)
+    with pytest.raises(ValueError, match="rooms of patches"):
+        gather_views(cells, room, size, size, 60)
+    with pytest.raises(ValueError, match="cells must be"):
+        gather_views(cells, room[:2], size, size[:2], 60)
+    with pytest.raises(ValueError, match="not be empty"):
+        gather_views(cells, room, size, size[:2] * 0, 60)

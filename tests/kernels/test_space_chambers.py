@@ -1,0 +1,78 @@
+import numpy as np
+import shapely
+from hypothesis import given
+from hypothesis import strategies as st
+from tests.reference.chambers import nearest_labels
+
+from fleet2d.floorplan.geometry.mesh import build_mesh
+from fleet2d.kernels import I32, Bool
+from fleet2d.kernels.sight import line_of_sight
+from fleet2d.kernels.space import (
+    fill_from_neighbors,
+    label_frames,
+    locate,
+    pairs_in_sight,
+    spread_labels,
+)
+
+
+@st.composite
+def labelled(draw: st.DrawFn) -> tuple[I32, Bool]:
+    rows, columns = draw(st.integers(1, 9)), draw(st.integers(1, 9))
+    cells = st.lists(st.integers(-6, 3), min_size=rows * columns, max_size=rows * columns)
+    drawn = np.array(draw(cells)).reshape(rows, columns)
+    return np.maximum(drawn, -1).astype(np.int32), drawn > -5
+
+
+@given(labelled())
+def test_labels_spread_as_growing_them_step_by_step_does(
+    drawn: tuple[I32, Bool],
+) -> None:
+    labels, mask = drawn
+
+    assert np.array_equal(nearest_labels(labels, mask), spread_labels(labels, mask))
+
+
+def test_pairs_see_each_other_as_one_by_one() -> None:
+    mesh = build_mesh([shapely.box(0, 0, 640, 640) - shapely.box(256, 0, 320, 512)], 10, 10)
+    rng = np.random.default_rng(3)
+    eyes, places = rng.integers(-20, 660, (2, 300, 2))
+
+    expected = [
+        line_of_sight(mesh, *eye, locate(mesh, *eye), *place)
+        for eye, place in zip(eyes.tolist(), places.tolist(), strict=True)
+    ]
+
+    assert expected == pairs_in_sight(mesh, eyes, places).tolist()
+
+
+@given(labelled())
+def test_frames_are_the_boxes_of_the_cells_of_each_label(
+    drawn: tuple[I32, Bool],
+) -> None:
+    labels, _ = drawn
+    frames = label_frames(labels, 4)
+
+    for label in range(4):
+        cells = np.argwhere(labels == label)
+        if len(cells):
+            expected = [*cells.min(axis=0), *(cells.max(axis=0) + 1)]
+            assert expected == frames[label].tolist()
+        else:
+            assert (frames[label, :2] > frames[label, 2:]).all()
+
+
+@given(labelled())
+def test_cells_without_a_label_take_the_first_that_touches_them(
+    drawn: tuple[I32, Bool],
+) -> None:
+    labels = np.pad(drawn[0], 1, constant_values=-1).astype(np.int16)
+    around = ((0, -1), (0, 1), (-1, 0), (1, 0), (-1, -1), (-1, 1), (1, -1), (1, 1))
+
+    expected = labels.copy()
+    for row, column in np.argwhere(labels[1:-1, 1:-1] < 0) + 1:
+        near = (int(labels[row + up, column + east]) for up, east in around)
+        expected[row, column] = next((label for label in near if label >= 0), -1)
+    expected[[0, -1]] = expected[:, [0, -1]] = -1
+
+    assert np.array_equal(expected[1:-1, 1:-1], fill_from_neighbors(labels)[1:-1, 1:-1])

@@ -1,0 +1,155 @@
+from itertools import pairwise
+
+import numpy as np
+import pytest
+import shapely
+
+from fleet2d.kernels import I32, Bool
+from fleet2d.kernels.space import count_steps, label_parts, trace_rings
+
+SHAPES = [(1, 1), (1, 9), (9, 1), (2, 2), (6, 7), (14, 11)]
+SHARES = [0.0, 0.2, 0.5, 0.6, 0.9, 1.0]
+
+
+def masks(shape: tuple[int, int], share: float, count: int = 10) -> list[Bool]:
+    rng = np.random.default_rng([*shape, int(100 * share)])
+    return [rng.random(shape) < share for _ in range(count)]
+
+
+# --- Slow, obvious twins ------------------------------------------------------------------------
+
+
+def near(row: int, column: int, diagonal: bool) -> list[tuple[int, int]]:
+    sides = [(row + 1, column), (row - 1, column), (row, column + 1), (row, column - 1)]
+    corners = [(row + a, column + b) for a in (-1, 1) for b in (-1, 1)]
+    return sides + corners if diagonal else sides
+
+
+def slow_label_parts(mask: Bool, diagonal: bool) -> I32:
+    """Let every pixel take the lowest number around it until nothing changes."""
+    pixels = [(int(r), int(c)) for r, c in np.argwhere(mask)]
+    number = {pixel: k for k, pixel in enumerate(pixels)}
+    changed = True
+    while changed:
+        before = dict(number)
+        for pixel in pixels:
+            around = [number[p] for p in near(*pixel, diagonal) if p in number]
+            number[pixel] = min([number[pixel], *around])
+        changed = before != number
+    order = {lowest: k for k, lowest in enumerate(sorted(set(number.values())))}
+    out = np.full(mask.shape, -1, np.int32)
+    for pixel, lowest in number.items():
+        out[pixel] = order[lowest]
+    return out
+
+
+def slow_count_steps(start: Bool, mask: Bool) -> I32:
+    """Walk one step further from all that is reached, again and again."""
+    out = np.where(start & mask, 0, -1).astype(np.int32)
+    for step in range(1, mask.size + 1):
+        reached = np.pad(out == step - 1, 1)
+        around = reached[2:, 1:-1] | reached[:-2, 1:-1] | reached[1:-1, 2:] | reached[1:-1, :-2]
+        out[around & mask & (out < 0)] = step
+    return out
+
+
+def rings_of(mask: Bool) -> list[I32]:
+    corners, starts = trace_rings(mask)
+    return [corners[a:b] for a, b in pairwise(starts.tolist())]
+
+
+def unit_sides(rings: list[I32]) -> list[tuple[int, ...]]:
+    """Cut rings into directed sides of one pixel."""
+    sides: list[tuple[int, ...]] = []
+    for ring in rings:
+        for (x0, y0), (x1, y1) in zip(ring.tolist(), np.roll(ring, -1, 0).tolist(), strict=True):
+            dx, dy = np.sign(x1 - x0), np.sign(y1 - y0)
+            assert (dx == 0) != (dy == 0)
+            length = abs(x1 - x0) + abs(y1 - y0)
+            sides += [
+                (x0 + k * dx, y0 + k * dy, x0 + (k + 1) * dx, y0 + (k + 1) * dy)
+                for k in range(length)
+            ]
+    return sides
+
+
+def slow_sides(mask: Bool) -> set[tuple[int, ...]]:
+    """Go round every pixel, and drop what two pixels share."""
+    sides = set()
+    for y, x in np.argwhere(mask).tolist():
+        sides |= {(x, y, x + 1, y), (x + 1, y, x + 1, y + 1)}
+        sides |= {(x + 1, y + 1, x, y + 1), (x, y + 1, x, y)}
+    return {side for side in sides if (*side[2:], *side[:2]) not in sides}
+
+
+# --- Parts and steps ----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize("share", SHARES)
+@pytest.mark.parametrize("diagonal", [False, True])
+def test_parts_of_random_masks_equal_the_reference(
+    shape: tuple[int, int], share: float, diagonal: bool
+) -> None:
+    for mask in masks(shape, share, 4):
+        assert np.array_equal(slow_label_parts(mask, diagonal), label_parts(mask, diagonal))
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize("share", SHARES)
+def test_steps_in_random_masks_equal_the_reference(shape: tuple[int, int], share: float) -> None:
+    for mask, start in zip(masks(shape, share), masks(shape, 0.1), strict=True):
+        assert np.array_equal(slow_count_steps(start, mask), count_steps(start, mask))
+
+
+# --- Rings --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize("share", SHARES)
+def test_rings_of_random_masks_run_along_every_side_once_with_the_mask_on_the_left(
+    shape: tuple[int, int], share: float
+) -> None:
+    for mask in masks(shape, share):
+        sides = unit_sides(rings_of(mask))
+
+        assert len(sides) == len(set(sides))
+        assert slow_sides(mask) == set(sides)
+
+
+@pytest.mark.parametrize("share", [0.5, 0.6, 0.7, 0.9])
+def test_rings_of_one_part_are_one_sound_polygon_that_covers_its_pixels(share: float) -> None:
+    for mask in masks((14, 11), share, 40):
+        part = label_parts(mask, False)
+        largest = part == np.argmax(np.bincount(part[mask]))
+
+        rings = [shapely.LinearRing(ring) for ring in rings_of(largest)]
+        outer = [ring for ring in rings if ring.is_ccw]
+        shape = shapely.Polygon(outer[0], [ring for ring in rings if not ring.is_ccw])
+
+        y, x = np.nonzero(largest)
+        assert 1 == len(outer)
+        assert all(ring.is_simple for ring in rings)
+        assert shape.is_valid, shapely.is_valid_reason(shape)
+        assert shape.equals(shapely.union_all(shapely.box(x, y, x + 1, y + 1)))
+
+
+def test_rings_bend_at_every_corner_and_nowhere_else() -> None:
+    rings = rings_of(np.ones((3, 5), np.bool_))
+
+    assert [[0, 0], [5, 0], [5, 3], [0, 3]] == rings[0].tolist()
+
+
+def test_two_holes_that_share_a_corner_are_two_rings() -> None:
+    """A ring that went on into the other hole would cross itself."""
+    mask = np.ones((4, 4), np.bool_)
+    mask[1, 2] = mask[2, 1] = False
+
+    assert [4, 4, 4] == [len(ring) for ring in rings_of(mask)]
+
+
+def test_an_empty_mask_has_no_ring() -> None:
+    corners, starts = trace_rings(np.zeros((3, 4), np.bool_))
+
+    assert (0, 2) == corners.shape
+    assert [0] == starts.tolist()

@@ -1,0 +1,264 @@
+"""Shortest paths against Dijkstra over all corners, in free space with holes and pinches."""
+
+import math
+import pickle
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given
+from shapely.geometry import Polygon
+from tests.homes import Home, home_of, shuffled
+from tests.reference.routes import graph_of, length_of, region_of, shortest, straight_ways
+from tests.strategies import homes, quick, seeds
+
+from fleet2d.kernels import I64
+from fleet2d.kernels.space import Corners, Routes, distance
+
+
+def corners_of(home: Home) -> Corners:
+    """Return the nodes of a route graph: reflex corners, and vertices where several walls meet."""
+    into = {tuple(v): [] for v in home.mesh.vertices.tolist()}
+    out_of = {tuple(v): [] for v in home.mesh.vertices.tolist()}
+    for ax, ay, bx, by in home.walls.tolist():
+        out_of[ax, ay].append((bx, by))
+        into[bx, by].append((ax, ay))
+    vertex, before, after, simple = [], [], [], []
+    for i, v in enumerate(home.mesh.vertices.tolist()):
+        a, b = into[tuple(v)], out_of[tuple(v)]
+        if not a:  # another ring's corner in the middle of a wall
+            continue
+        alone = len(a) == 1
+        turn = (v[0] - a[0][0]) * (b[0][1] - v[1]) - (v[1] - a[0][1]) * (b[0][0] - v[0])
+        if not alone or turn < 0:
+            vertex.append(i)
+            before.append(a[0])
+            after.append(b[0])
+            simple.append(alone)
+    return Corners(
+        np.array(vertex, np.int64),
+        np.array(before, np.int64).reshape(-1, 2),
+        np.array(after, np.int64).reshape(-1, 2),
+        np.array(simple, np.bool_),
+    )
+
+
+def routes_of(home: Home) -> Routes:
+    """Return the corners of a home and the legs between them."""
+    return Routes(home.mesh, corners_of(home))
+
+
+def legs_of(routes: Routes) -> list[I64]:
+    """Return all legs, as arrays that can be compared."""
+    return [routes.leg_start, routes.leg_end, routes.leg_length]
+
+
+def some_points(home: Home, rng: np.random.Generator, count: int) -> I64:
+    """Return points inside: centres of cells, and points in line with corners."""
+    region = region_of(home.mesh.vertices, home.mesh.triangles)
+    anywhere = rng.integers(0, [64 * home.columns, 64 * home.rows], (20 * count, 2))
+    first, second = rng.choice(home.mesh.vertices, (2, 20 * count))
+    tried = np.concatenate([anywhere, (first + second) // 2, 2 * second - first])
+    rng.shuffle(tried)
+    inside = shapely.contains_properly(region, shapely.points(tried))
+    return np.asarray(tried[inside][:count], np.int64)
+
+
+def check_routes(home: Home, rng: np.random.Generator, count: int) -> tuple[int, int]:
+    """Compare paths between random points with the twin; return how many bend and how many fail."""
+    vertices = home.mesh.vertices
+    region, routes = region_of(vertices, home.mesh.triangles), routes_of(home)
+    slow_graph = graph_of(region, vertices)
+    points = some_points(home, rng, 2 * count)
+    bent = failed = 0
+    for start, goal in zip(points[::2], points[1::2], strict=False):
+        expected = shortest(region, vertices, slow_graph, start, goal)
+        path, back = routes.find(*start, *goal), routes.find(*goal, *start)
+        if path is None:
+            assert math.isinf(expected)
+            assert back is None
+            failed += 1
+            continue
+        assert back is not None
+        assert [start.tolist(), goal.tolist()] == path[[0, -1]].tolist()
+        assert straight_ways(region, path[:-1], path[1:]).all()
+        assert math.isclose(expected, length_of(path), rel_tol=1e-9)
+        assert math.isclose(expected, length_of(back), rel_tol=1e-9)
+        bent += len(path) > 2
+    return bent, failed
+
+
+@quick
+@given(homes(), seeds())
+def test_find_route_is_as_short_as_dijkstra_over_all_corners(
+    polygons: list[Polygon], seed: int
+) -> None:
+    check_routes(home_of(polygons), np.random.default_rng(seed), 6)
+
+
+@quick
+@given(homes(), seeds())
+def test_find_route_does_not_depend_on_the_mesh(polygons: list[Polygon], seed: int) -> None:
+    home, rng = home_of(polygons), np.random.default_rng(seed)
+    other = home._replace(mesh=shuffled(home.mesh, rng))
+    routes, other_routes = routes_of(home), routes_of(other)
+    points = some_points(home, rng, 8)
+
+    assert all(map(np.array_equal, legs_of(routes), legs_of(other_routes)))
+    for start, goal in zip(points[::2], points[1::2], strict=False):
+        path, same = routes.find(*start, *goal), other_routes.find(*start, *goal)
+        assert (path is None) == (same is None)
+        assert path is None or np.array_equal(path, same)
+
+
+def crowded(seed: int) -> Home:
+    """Return a hall full of slanted pillars."""
+    rng = np.random.default_rng(seed)
+    pillars = []
+    for _ in range(22):
+        centre, spread = rng.integers(300, 3800, 2), rng.integers(60, 500)
+        outline = centre + rng.integers(-spread, spread, (6, 2))
+        pillars.append(shapely.convex_hull(shapely.multipoints(outline)))
+    hall = shapely.difference(
+        shapely.box(0, 0, 4096, 4096), shapely.union_all(pillars), grid_size=2
+    )
+    return home_of([part for part in shapely.get_parts(hall) if part.area > 0])
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_find_route_among_many_pillars_is_as_short_as_dijkstra(seed: int) -> None:
+    bent, _ = check_routes(crowded(seed), np.random.default_rng(seed), 40)
+
+    assert bent > 15
+
+
+def test_find_route_between_two_parts_is_none() -> None:
+    home = home_of([shapely.box(0, 0, 640, 640), shapely.box(704, 0, 1344, 640)])
+    routes = routes_of(home)
+
+    assert routes.find(33, 33, 737, 33) is None
+    assert routes.find(33, 33, 670, 33) is None
+    assert routes.find(670, 33, 33, 33) is None
+
+
+def test_find_route_without_corners_is_straight() -> None:
+    home = home_of([shapely.box(0, 0, 640, 640)])
+
+    path = routes_of(home).find(33, 33, 601, 97)
+
+    assert path is not None
+    assert [[33, 33], [601, 97]] == path.tolist()
+
+
+def test_find_route_again_returns_an_array_of_its_own() -> None:
+    routes = routes_of(home_of([shapely.box(0, 0, 640, 640)]))
+
+    first = routes.find(33, 33, 601, 97)
+    assert first is not None
+    first[:] = 0
+
+    assert [[33, 33], [601, 97]] == np.asarray(routes.find(33, 33, 601, 97)).tolist()
+    assert [[33, 33], [601, 99]] == np.asarray(routes.find(33, 33, 601, 99)).tolist()
+
+
+def test_find_route_to_its_start_has_length_0() -> None:
+    home = home_of([shapely.box(0, 0, 640, 640)])
+
+    path = routes_of(home).find(33, 33, 33, 33)
+
+    assert path is not None
+    assert [[33, 33], [33, 33]] == path.tolist()
+
+
+def test_find_route_round_a_pillar_takes_the_shorter_side() -> None:
+    home = home_of([shapely.box(0, 0, 640, 640).difference(shapely.box(200, 100, 400, 600))])
+
+    path = routes_of(home).find(101, 301, 501, 301)
+
+    assert path is not None
+    assert [[101, 301], [200, 100], [400, 100], [501, 301]] == path.tolist()
+
+
+def test_find_route_along_a_row_of_corners_touches_each() -> None:
+    """The straight line touches four corners: strictly no line of sight, but the shortest way."""
+    pillars = [shapely.box(128, 64, 192, 320), shapely.box(384, 128, 448, 320)]
+    home = home_of([shapely.box(0, 0, 640, 640).difference(shapely.union_all(pillars))])
+
+    path = routes_of(home).find(64, 320, 512, 320)
+
+    assert path is not None
+    assert length_of(path) == 448
+
+
+def test_find_route_through_a_point_where_two_pillars_meet_bends_at_it() -> None:
+    """The string bends round one pillar there, though it runs into the walls of the other."""
+    pillars = [shapely.box(128, 320, 320, 512), shapely.box(320, 128, 512, 320)]
+    home = home_of([shapely.box(0, 0, 640, 640).difference(shapely.union_all(pillars))])
+
+    path = routes_of(home).find(319, 129, 321, 511)
+
+    assert path is not None
+    assert [[319, 129], [320, 320], [321, 511]] == path.tolist()
+
+
+def test_find_route_among_equal_routes_is_deterministic() -> None:
+    """The tie goes to corners with lower ids: the lower way, as ids are sorted by x, then y."""
+    home = home_of([shapely.box(0, 0, 640, 640).difference(shapely.box(220, 220, 420, 420))])
+
+    path = routes_of(home).find(100, 320, 540, 320)
+
+    assert path is not None
+    assert [[100, 320], [220, 220], [420, 220], [540, 320]] == path.tolist()
+
+
+def test_routes_keep_their_mesh_and_can_be_pickled() -> None:
+    home = home_of([shapely.box(0, 0, 640, 640).difference(shapely.box(200, 100, 400, 600))])
+    routes = routes_of(home)
+
+    other = pickle.loads(pickle.dumps(routes))
+
+    assert all(map(np.array_equal, legs_of(routes), legs_of(other)))
+    ends = other.leg_end
+    path = other.find(101, 301, 501, 301)
+    del other
+    assert path is not None
+    assert [[101, 301], [200, 100], [400, 100], [501, 301]] == path.tolist()
+    assert not ends.flags.writeable
+    assert len(ends) == len(routes.leg_end)
+
+
+@pytest.mark.parametrize(
+    ("field", "change"),
+    [
+        ("vertex", lambda a: a[::-1]),
+        ("vertex", lambda a: a + 10**6),
+        ("before", lambda a: a[:-1]),
+        ("after", lambda a: a - 10**7),
+        ("simple", lambda a: a[:-1]),
+    ],
+)
+def test_routes_refuse_corners_that_are_none(field: str, change: Callable[[I64], I64]) -> None:
+    home = crowded(1)
+    corners = corners_of(home)
+
+    with pytest.raises(ValueError, match="must"):
+        Routes(home.mesh, corners._replace(**{field: change(getattr(corners, field))}))
+
+
+def test_route_graph_has_each_leg_in_both_directions() -> None:
+    routes = routes_of(crowded(1))
+    begins = np.repeat(np.arange(len(routes.leg_start) - 1), np.diff(routes.leg_start))
+    ends = zip(begins.tolist(), routes.leg_end.tolist(), strict=True)
+    legs = dict(zip(ends, routes.leg_length.tolist(), strict=True))
+
+    assert len(legs) == len(routes.leg_end)
+    assert len(legs) > 20
+    assert all(legs[b, a] == length for (a, b), length in legs.items())
+
+
+@pytest.mark.parametrize(
+    ("b", "expected"), [((0, 0), 0.0), ((3, 4), 5.0), ((2**20, 2**20), math.sqrt(2**41))]
+)
+def test_distance_is_the_correctly_rounded_root(b: tuple[int, int], expected: float) -> None:
+    assert expected == distance(0, 0, *b) == distance(*b, 0, 0)
