@@ -12,7 +12,7 @@ import pytest
 from tests.scenes import scenario
 
 import fleet2d
-from fleet2d.entities.actor import Actor
+from fleet2d.entities.behavior import Actor
 from fleet2d.entities.plan import Plan
 from fleet2d.garbage import OBJECTS, library_imports, rare_collections, release_memory
 

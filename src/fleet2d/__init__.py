@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from fleet2d.engine.resume import resume as resume
     from fleet2d.engine.run import run as run
     from fleet2d.engine.simulation import Simulation as Simulation
-    from fleet2d.entities.actor import Actor as Actor
+    from fleet2d.entities.behavior import Actor as Actor
     from fleet2d.entities.behavior import Behavior as Behavior
     from fleet2d.entities.behavior import Situation as Situation
     from fleet2d.entities.drives.drive import Drive as Drive

@@ -10,8 +10,7 @@ from tests.scenes import everything
 import fleet2d
 from fleet2d.engine import state
 from fleet2d.engine.bodies import Bodies, poses_of
-from fleet2d.entities.body import NEVER
-from fleet2d.entities.motion import Pose, Track
+from fleet2d.entities.body import NEVER, Pose, Track
 from fleet2d.kernels.motion import Breakpoints
 
 SECOND = 1_000_000

@@ -10,7 +10,7 @@ from tests.scenes import digests, run
 
 import fleet2d
 from fleet2d import Behavior, Plan, Situation
-from fleet2d.entities.hours import holds, parse_span
+from fleet2d.entities.behavior import holds, parse_span
 from fleet2d.errors import InputError
 
 OWN = __name__

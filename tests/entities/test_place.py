@@ -6,7 +6,7 @@ import pytest
 from tests.scenes import scenario
 
 import fleet2d
-from fleet2d.entities.actor import Actor
+from fleet2d.entities.behavior import Actor
 from fleet2d.errors import InputError, PlacementError
 
 

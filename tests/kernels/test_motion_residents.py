@@ -13,8 +13,7 @@ from tests.thorough import examples
 
 import fleet2d
 from fleet2d.entities.plan import Plan
-from fleet2d.entities.users.known_home import KnownHome
-from fleet2d.entities.users.setting import MOVE_KINDS, SECOND_US, Setting, SmallMove
+from fleet2d.entities.users.resident import MOVE_KINDS, SECOND_US, KnownHome, Setting, SmallMove
 from fleet2d.floorplan.objects import POSTURES
 from fleet2d.kernels.motion import LastStint, Legs, Resident, Scene, Waits
 from fleet2d.routines.activity import Activity

@@ -6,8 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fleet2d.entities.body import NEVER
-from fleet2d.entities.motion import Pose, RandomWalk
+from fleet2d.entities.body import NEVER, Pose, RandomWalk
 from fleet2d.entities.plan import Plan
 from fleet2d.kernels import I8, I64, U8
 from fleet2d.kernels.motion import Breakpoints, Poses, Timelines, Window

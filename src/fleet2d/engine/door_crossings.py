@@ -3,8 +3,8 @@
 import numpy as np
 from shapely import LineString
 
-from fleet2d.entities.actor import Actor
-from fleet2d.entities.motion import Track
+from fleet2d.entities.behavior import Actor
+from fleet2d.entities.body import Track
 from fleet2d.floorplan.geometry.gates import Segment
 from fleet2d.kernels.motion import Breakpoints
 

@@ -16,8 +16,8 @@ import shapely
 from fleet2d.clock import midnight_of
 from fleet2d.engine.basis import Basis
 from fleet2d.engine.door_crossings import crossings, way_ahead
-from fleet2d.entities.actor import Actor
-from fleet2d.entities.motion import Track
+from fleet2d.entities.behavior import Actor
+from fleet2d.entities.body import Track
 from fleet2d.entities.objects.door import Door, how_to_hang_a_door
 from fleet2d.errors import ComponentError, PlacementError, ScenarioError
 from fleet2d.events import HOME, Event, EventKind

@@ -5,10 +5,8 @@ from typing import NamedTuple
 import numpy as np
 
 from fleet2d.component import Settings
-from fleet2d.entities.body import Body
-from fleet2d.entities.furniture import stop_at
-from fleet2d.entities.motion import Motion, Track
-from fleet2d.entities.place import Place
+from fleet2d.entities.body import Body, Motion, Track
+from fleet2d.entities.place import Place, stop_at
 from fleet2d.entities.plan import Note, Plan
 from fleet2d.kernels import F64, I64
 from fleet2d.units import PositiveDuration, Share, micros

@@ -1,21 +1,118 @@
-"""Behaviors: their base class, and the situation in which they decide where a body goes next."""
+"""Hours of the week in which something holds: ``weekdays 08:00-18:00``."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime, timedelta
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple
 
+from pydantic import BeforeValidator, PlainSerializer, WithJsonSchema
+
+from fleet2d.blame import blame
+from fleet2d.clock import midnight_of
 from fleet2d.component import Component
-from fleet2d.entities.hours import Hours
+from fleet2d.entities.battery import Charge
+from fleet2d.entities.body import NEVER, Body, Motion, Pose
+from fleet2d.entities.place import ANY, Point, is_kind, is_point
 from fleet2d.entities.plan import Plan
+from fleet2d.floorplan.objects import PlacedObject
+from fleet2d.kernels.numbers import TURN
+from fleet2d.problems import problem, shown
 from fleet2d.streams import Draws
-from fleet2d.units import Duration
+from fleet2d.units import Duration, format_time_of_day, parse_time_of_day
+from fleet2d.weekdays import weekdays_of
 
 if TYPE_CHECKING:
-    from fleet2d.entities.actor import Actor
-    from fleet2d.entities.place import Point, RoomChoice
+    from fleet2d.entities.place import RoomChoice
     from fleet2d.floorplan.home.home import Home
     from fleet2d.floorplan.plan import Room
+
+
+DAY = timedelta(days=1)
+
+
+class HoursSpan(NamedTuple):
+    """Hours of some days of the week; those that end before they begin last past midnight.
+
+    Attributes:
+        days: The days on which the hours begin, 0 is Monday.
+        begin: Their begin, since midnight.
+        end: Their end, since the same midnight, up to a day after `begin`.
+        text: The hours in a scenario.
+    """
+
+    days: tuple[int, ...]
+    begin: timedelta
+    end: timedelta
+    text: str
+
+    def holds_at(self, time: datetime) -> datetime | None:
+        """Return the end of the hours that a moment lies in; None if it lies outside."""
+        midnight = midnight_of(time)
+        for day in (midnight - DAY, midnight):
+            if day.weekday() in self.days and day + self.begin <= time < day + self.end:
+                return day + self.end
+        return None
+
+    def next_begin(self, time: datetime) -> datetime:
+        """Return when the hours begin next after a moment."""
+        midnight = midnight_of(time)
+        days = (midnight + i * DAY for i in range(8))
+        begins = (day + self.begin for day in days if day.weekday() in self.days)
+        return next(begin for begin in begins if begin > time)
+
+
+def parse_span(value: object) -> HoursSpan:
+    """Read hours: ``08:00-18:00``, ``weekdays 22:00-06:00`` or ``monday,friday 9:00-12:00``.
+
+    Example:
+        >>> span = parse_span("weekend 22:00-06:00")
+        >>> span.holds_at(datetime(2026, 1, 12, 5)), span.holds_at(datetime(2026, 1, 10, 5))
+        (datetime.datetime(2026, 1, 12, 6, 0), None)
+    """
+    if isinstance(value, HoursSpan):
+        return value
+    words = value.split() if isinstance(value, str) else []
+    if not 1 <= len(words) <= 2 or words[-1].count("-") != 1:
+        raise problem(
+            f"expected hours, got {shown(value)}: write them like '08:00-22:00',"
+            " 'weekdays 9:00-17:00' or 'monday,friday 22:00-06:00'"
+        )
+    begin, end = (parse_time_of_day(text) for text in words[-1].split("-"))
+    if begin == end:
+        raise problem(f"hours must begin and end at different times, got {shown(value)}")
+    days = sorted(weekdays_of((words[0] if words[1:] else "daily").split(",")))
+    names = "" if len(words) == 1 else f"{words[0]} "
+    text = f"{names}{format_time_of_day(begin)}-{format_time_of_day(end)}"
+    return HoursSpan(tuple(days), begin, end if end > begin else end + DAY, text)
+
+
+def _parse_hours(value: object) -> tuple[HoursSpan, ...]:
+    if isinstance(value, Sequence) and not isinstance(value, str | HoursSpan):
+        return tuple(parse_span(item) for item in value)
+    return (parse_span(value),)
+
+
+Hours = Annotated[
+    tuple[HoursSpan, ...],
+    BeforeValidator(_parse_hours),
+    PlainSerializer(lambda spans: [span.text for span in spans]),
+    WithJsonSchema(
+        {
+            "description": "hours of the week, like '08:00-22:00' or 'weekdays 9:00-17:00', or a"
+            " list of them",
+            "x-quantity": "hours",
+            "anyOf": [{"type": "string"}, {"type": "array", "items": {"type": "string"}}],
+            "examples": ["08:00-22:00", ["weekdays 9:00-17:00", "weekend 10:00-20:00"]],
+        }
+    ),
+]
+"""Hours of the week, in one or several spans; what an empty list means is up to the field."""
+
+
+def holds(hours: Sequence[HoursSpan], time: datetime) -> datetime | None:
+    """Return the end of the hours that a moment lies in; None if it lies outside."""
+    ends = [end for span in hours if (end := span.holds_at(time))]
+    return max(ends, default=None)
 
 
 class Attention(NamedTuple):
@@ -248,3 +345,88 @@ class Behavior(Component):
     def decide(self, now: Situation) -> Plan | None:
         """Return the plan from now on; None leaves the decision to the next behavior."""
         raise NotImplementedError
+
+
+@dataclass(eq=False)
+class Actor(Body):
+    """A body with behaviors, and the plan that it follows.
+
+    Attributes:
+        behaviors: Its own copies of the behaviors of its configuration, the first one first.
+        charge: The charge of its battery; None without a battery.
+        command: What it was called to do, until a behavior takes it up.
+        in_view: Returns the people that its cameras have in view, and the last place of each [m].
+        plan: The plan that it follows.
+        motion: The motion of that plan.
+        planned_at: The step at which it began the plan.
+    """
+
+    behaviors: list[Behavior] = field(init=False)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self.in_view: Callable[[], Mapping[str, Point]] = dict  # set if it has cameras
+        behaviors = getattr(self.entity, "behaviors", ())
+        self.behaviors = [behavior.model_copy(deep=True) for behavior in behaviors]
+        with blame(self.path, None):
+            self._state = self._first_pose()
+            battery = getattr(self.entity, "battery", None)
+            self.charge = None if battery is None else Charge(battery, self)
+            for behavior in self.behaviors:
+                behavior.start(self)
+            claims = ((behavior, behavior.attention(self)) for behavior in self.behaviors)
+            self._attentive = next((pair for pair in claims if pair[1] is not None), None)
+        self.command: Command | None = None
+        self.plan: Plan = Plan(self, 0).stay()
+        self.motion: Motion = self.plan.finish()
+        self.planned_at = 0
+
+    def ask(self, step: int | None) -> None:
+        """Set the step at which it decides next; None: never."""
+        if self._bodies is not None:
+            self._bodies.ask_at[self.row] = NEVER if step is None else step
+
+    @property
+    def attention(self) -> Attention | None:
+        """Which actions of robots interrupt its plans: those of the first attentive behavior."""
+        return self._attentive[1] if self._attentive else None
+
+    @property
+    def event_kinds(self) -> frozenset[str]:
+        """The kinds of events that its behaviors declare in `records`."""
+        return frozenset().union(*(behavior.records for behavior in self.behaviors))
+
+    def own_furniture(self, kind: str) -> PlacedObject | None:
+        """Return the piece of furniture of a kind that is its own, if its behaviors say so."""
+        names = (behavior.furniture(self, kind) for behavior in self.behaviors)
+        return next((self.home.object(name) for name in names if name is not None), None)
+
+    def posture_code(self, time_us: int) -> int:
+        """Return the posture at a moment, by its number in POSTURES."""
+        plan: Plan | None = getattr(self, "plan", None)  # none yet while the first one is made
+        if plan is None or not (plan.postures or plan.posture != "stand"):
+            return 0
+        return plan.posture_at(time_us)
+
+    def _first_pose(self) -> Pose:
+        """Return the pose at step 0."""
+        place = self.entity.start
+        if place is None:
+            begins = (behavior.begins_at(self.clock.start) for behavior in self.behaviors)
+            place = next((begin for begin in begins if begin is not None), (ANY,))
+            if place and is_kind(self, place) and not self._has_any(place):
+                place = (ANY,)
+        away = int(len(place) == 0)
+        if away:
+            x, y = self.way_out
+        elif is_point(place):
+            x, y = self.home.plan.lattice.point_at(place)  # type: ignore[arg-type]
+            self.part = max(self.space.part_at(x, y), 0)
+            x, y = self.point(place)  # type: ignore[arg-type]
+        else:
+            self.part = self._start_part(place)  # type: ignore[arg-type]
+            x, y = self.find(place, 0, "start")
+        heading = self.entity.start_heading_deg
+        if heading is None:
+            return Pose(x, y, Draws(self.stream("start heading"), 0).below(TURN), away)
+        return Pose(x, y, round(heading / 360 * TURN) % TURN, away)

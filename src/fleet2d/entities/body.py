@@ -1,29 +1,130 @@
-"""A body in its home: where it is, where it can be, and the places that it knows."""
+"""Bodies: how a scenario declares them, how they move, and where in a home they can be."""
 
 import copy
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple, Protocol
+from typing import Any, ClassVar, NamedTuple, Protocol
 
 import numpy as np
+from pydantic import Field
 
 from fleet2d.blame import blame
 from fleet2d.clock import Clock
-from fleet2d.entities.body_settings import BodySettings
+from fleet2d.component import Settings, components, lookup
 from fleet2d.entities.drives.differential import Differential
-from fleet2d.entities.drives.drive import Drive
-from fleet2d.entities.drives.timing import breakpoints, estimate
-from fleet2d.entities.furniture import furniture_of, room_of_furniture
-from fleet2d.entities.motion import Pose
-from fleet2d.entities.place import ANY, Point, RoomChoice, is_point, matching_rooms, parse_place
-from fleet2d.errors import PlacementError
+from fleet2d.entities.drives.drive import Drive, breakpoints, estimate
+from fleet2d.entities.place import (
+    ANY,
+    Place,
+    Point,
+    RoomChoice,
+    furniture_of,
+    is_point,
+    matching_rooms,
+    parse_place,
+    room_of_furniture,
+)
+from fleet2d.errors import ComponentError, PlacementError, ScenarioError
 from fleet2d.floorplan.home.home import Home
 from fleet2d.floorplan.home.space import Space
 from fleet2d.floorplan.objects import PlacedObject, Posture
 from fleet2d.floorplan.plan import Room
 from fleet2d.kernels import F64, I64
+from fleet2d.kernels.motion import Breakpoints, WalkRule
 from fleet2d.kernels.numbers import TURN
+from fleet2d.kernels.space import Mesh
+from fleet2d.problems import suggest
+from fleet2d.sight.camera import Camera
 from fleet2d.streams import Draws, stream_key
+from fleet2d.units import AngleDeg, Length, Speed, TurnRateDeg
+
+
+class Pose(NamedTuple):
+    """The pose of a body at one step.
+
+    Attributes:
+        x: Position [lattice].
+        y: Position [lattice].
+        heading: Counter-clockwise from +x [1/4096 turn].
+        away: 1 if the body is out of the home, else 0.
+    """
+
+    x: int
+    y: int
+    heading: int
+    away: int
+
+
+@dataclass(frozen=True)
+class Track:
+    """A motion along breakpoints that are known beforehand."""
+
+    breakpoints: Breakpoints
+    step_us: int
+
+
+@dataclass(frozen=True)
+class RandomWalk:
+    """A random walk, drawn step by step."""
+
+    walls: Mesh
+    space: Mesh
+    rule: WalkRule
+
+
+Motion = Track | RandomWalk
+
+
+class BodySettings(Settings):
+    """A body in the home: its size, how fast it moves, and where it is at first.
+
+    Attributes:
+        radius: Radius of the body [m].
+        speed: Walking speed [m/s].
+        turn_rate_deg: How fast it turns on the spot [deg/s].
+        start: Where it is at first; left out: where its behavior would be, else drawn.
+        start_heading_deg: Heading at first, counter-clockwise from +x; left out: drawn.
+        color: Color in pictures.
+        opens_doors: Opens doors in its way; else a shut door is a wall to it.
+    """
+
+    radius: Length = Field(default=0.2, gt=0, le=2)
+    speed: Speed = Field(default=1.0, ge=0.01, le=20)
+    turn_rate_deg: TurnRateDeg = Field(default=180.0, ge=0.01, le=36000)
+    start: Place | None = None
+    start_heading_deg: AngleDeg | None = None
+    color: str | None = Field(default=None, min_length=1)
+    opens_doors: bool = False
+    # Whether its routes are the cheapest by the costmap, if there is one, and not the shortest.
+    minds_costs: ClassVar[bool] = False
+    # Whether it sits or lies on furniture that a place names, instead of stopping before it.
+    uses_furniture: ClassVar[bool] = False
+    # What happens when its cameras lose somebody, and when they see somebody.
+    sight_events: ClassVar[tuple[str, str]]
+
+    @property
+    def eyes(self) -> dict[str, Camera]:
+        """Its cameras by name; none, unless a subclass has some."""
+        return {}
+
+    def check_interrupt(self, name: str) -> None:
+        """Check that an event may end its plans: one of its cameras, or a registered interrupt.
+
+        Raises:
+            ComponentError: There is none of that name, or it needs a camera.
+        """
+        own = self.sight_events if self.eyes else ()
+        if name in own:
+            return
+        try:
+            lookup("interrupt", name)
+        except ScenarioError as error:
+            if ":" in name:
+                raise ComponentError(str(error)) from error
+            known = suggest(name, sorted({*own, *components("interrupt")}), "These do")
+            hint = "" if own else f" ({' and '.join(self.sight_events)} need a camera)"
+            raise ComponentError(f"no event {name!r} interrupts its plans{known}{hint}") from error
+
 
 NEVER = 1 << 62
 """The step of what never happens."""

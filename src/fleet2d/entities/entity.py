@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 from fleet2d.component import OneOf
 from fleet2d.entities.battery import Battery
 from fleet2d.entities.behavior import Behavior
-from fleet2d.entities.body_settings import BodySettings
+from fleet2d.entities.body import BodySettings
 from fleet2d.entities.drives.differential import Differential
 from fleet2d.entities.drives.drive import Drive
 from fleet2d.entities.giving_way import GivesWay

@@ -6,8 +6,7 @@ from typing import Literal
 from pydantic import Field
 
 from fleet2d.component import register
-from fleet2d.entities.actor import Actor
-from fleet2d.entities.behavior import Behavior, Situation
+from fleet2d.entities.behavior import Actor, Behavior, Situation
 from fleet2d.entities.plan import Plan
 from fleet2d.kernels.motion import WalkRule
 from fleet2d.kernels.numbers import BELL_STD, TURN

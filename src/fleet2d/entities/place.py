@@ -1,16 +1,33 @@
-"""Places as a scenario names them: rooms, kinds of rooms, furniture, lists of those, points."""
+"""Places: rooms, furniture and points as a scenario names them, and where a body stops for one.
+
+A scenario names a kind ("bathroom", "sofa") or a single place ("bathroom_0", a point). A kind that
+this home lacks, or that the body can't reach, is left out as long as another place remains; the
+body's `notes` say so. A single place that is missing is an error that names the key.
+"""
 
 import difflib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import cached_property
 from numbers import Real
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
+import numpy as np
+import shapely
 from pydantic import BeforeValidator, PlainSerializer, WithJsonSchema
 
 from fleet2d.errors import PlacementError
+from fleet2d.floorplan.furniture.catalogue import FURNITURE
 from fleet2d.floorplan.objects import PlacedObject
 from fleet2d.floorplan.plan import Room
+from fleet2d.floorplan.rooms.vocabulary import PRIORITY, usual_type
+from fleet2d.kernels import I64
+from fleet2d.kernels.numbers import TURN, UNIT, cosine, sine
+from fleet2d.problems import did_you_mean
+from fleet2d.streams import Draws
 from fleet2d.units import problem
+
+if TYPE_CHECKING:
+    from fleet2d.entities.body import Body
 
 ANY = "any"
 # Separates a piece of furniture from its owner: "bed of ana".
@@ -18,6 +35,7 @@ OF = " of "
 
 RoomChoice = tuple[str, ...]
 Point = tuple[float, float]
+P = TypeVar("P", bound=RoomChoice | Point)
 
 
 def parse_place(value: object) -> RoomChoice | Point:
@@ -141,3 +159,200 @@ def _furniture(objects: Sequence[PlacedObject]) -> str:
     """Return a sentence that lists the kinds of furniture that are places, for messages."""
     kinds = sorted({thing.type for thing in objects if thing.uses})
     return f" The furniture is: {', '.join(kinds)}." if kinds else ""
+
+
+def furniture_of(body: "Body", place: RoomChoice | Point) -> PlacedObject | None:
+    """Return the piece of furniture that a place names, if it names one and no room before it.
+
+    Of several of a kind that it can get to, a body uses one for the whole run.
+    """
+    if is_point(place):
+        return None
+    rooms = {name for room in body.reachable_rooms() for name in (room.name, room.type)}
+    for name in place:
+        if name == ANY or name in rooms:
+            return None
+        pieces = [
+            thing
+            for thing in body.home.objects
+            if name in (thing.name, thing.type) and _gets_to(body, thing)
+        ]
+        if pieces:
+            return Draws(body.stream(f"object of {name}"), 0).choice(pieces)
+        if OF in str(name):
+            owned = _owned(body, *str(name).split(OF, 1))
+            if owned is not None and _gets_to(body, owned):
+                return owned
+    return None
+
+
+def _owned(body: "Body", kind: str, person: str) -> PlacedObject | None:
+    """Return the piece of furniture of a kind that a person uses for the whole run.
+
+    Raises:
+        PlacementError: There is no such person.
+    """
+    if person not in body.people:
+        raise PlacementError(
+            f"there is no user {person!r} who could have a {kind}"
+            f"{did_you_mean(person, body.people)}"
+        )
+    owner = body.people[person]
+    if owner is None:  # not built yet; asked again when somebody goes there
+        owner = body
+    return owner.own_furniture(kind) or furniture_of(owner, (kind,))
+
+
+def room_of_furniture(body: "Body", place: RoomChoice | Point) -> list[Room]:
+    """Return the room from which the furniture of a place is used; empty if it names none."""
+    thing = furniture_of(body, place)
+    if thing is None:
+        return []
+    plan = body.home.plan
+    room = plan.room_at(*plan.lattice.to_metres(body.place_at(thing, 0).approach).tolist())
+    return [] if room is None else [body.home.rooms[room.index]]
+
+
+def seat_at(body: "Body", place: object) -> PlacedObject | None:
+    """Return the furniture that a place names, if the body uses furniture; else None."""
+    return furniture_of(body, parse_place(place)) if body.entity.uses_furniture else None
+
+
+def stop_at(body: "Body", place: RoomChoice | Point) -> tuple[int, int]:
+    """Return the lattice point at which a body stops for a place.
+
+    For a point, that point; for a room, its middle; for furniture, the point in front of it.
+
+    Raises:
+        PlacementError: There is no such place, or it can't be reached.
+    """
+    if is_point(place):
+        return body.point(place)  # type: ignore[arg-type]
+    thing = furniture_of(body, place)
+    if thing is not None:
+        return body.place_at(thing, 0).approach
+    return body.middle(body.rooms(place)[0])  # type: ignore[arg-type]
+
+
+def stops_at(body: "Body", place: RoomChoice | Point) -> list[tuple[int, int]]:
+    """Return the lattice points at which a body stops for a place: one per room of its kind."""
+    if is_point(place) or furniture_of(body, place) is not None:
+        return [stop_at(body, place)]
+    return [body.middle(room) for room in body.rooms(place)]  # type: ignore[arg-type]
+
+
+def _gets_to(body: "Body", thing: PlacedObject) -> bool:
+    """Return whether a body can get to the first place at which a piece of furniture is used."""
+    if not thing.uses:
+        return False
+    x, y = body.place_at(thing, 0).approach
+    use = thing.uses[0]
+    at = body.home.plan.lattice.point_at(use.approach or (use.x, use.y))
+    # Within a metre, if the place itself is too tight: not from another room behind a wall.
+    metre = body.home.plan.lattice.units_per_m
+    return bool((x - at[0]) ** 2 + (y - at[1]) ** 2 <= metre * metre)
+
+
+def available_places(
+    body: "Body", key: str, places: Iterable[P], *, needed: bool = True
+) -> list[P]:
+    """Return the places that the home has, and note which kinds of places it lacks.
+
+    Args:
+        body: The body that goes there.
+        key: The key of the scenario, below the body, for messages: "patrol.rooms".
+        places: Rooms, furniture, kinds of them, lists of those, or points.
+        needed: Whether at least one place has to remain.
+
+    Raises:
+        PlacementError: The home lacks a single place, or no place remains.
+    """
+    available, missing, last_error = [], [], None
+    for place in places:
+        try:
+            if not is_point(place):
+                body.rooms(place)  # type: ignore[arg-type]
+            available.append(place)
+        except PlacementError as error:
+            if not is_kind(body, place):
+                raise PlacementError(f"{key}: {error}") from None
+            missing.append(" or ".join(map(str, place)))
+            last_error = error
+    if last_error is not None and not available and needed:
+        raise PlacementError(f"{key}: this home has none of these places: {last_error}") from None
+    if missing:
+        names = ", ".join(missing)
+        body.notes.append(
+            f"{key}: left out, because this home has none that can be reached: {names}"
+        )
+    return available
+
+
+def available_rooms(
+    body: "Body", key: str, names: Iterable[str], *, needed: bool = True
+) -> list[Room]:
+    """Return the rooms of some names and kinds, as `available_places` does."""
+    places = available_places(body, key, [(name,) for name in names], needed=needed)
+    return list(dict.fromkeys(room for place in places for room in body.rooms(place)))
+
+
+def is_kind(body: "Body", place: RoomChoice | Point) -> bool:
+    """Whether a place gives a type ('bathroom'), not a particular room or object ('bathroom_0')."""
+    if is_point(place):
+        return False
+    names = {room.name for room in body.home.rooms} | {t.name for t in body.home.objects}
+    types = {room.type for room in body.home.rooms} | {t.type for t in body.home.objects}
+    return all(
+        name not in names
+        and not str(name)[-1:].isdigit()  # bathroom_7 is a single bathroom
+        and (name in types or name in FURNITURE or usual_type(str(name)) in PRIORITY)
+        for name in place
+        if name != ANY
+    )
+
+
+def points_at_distance(
+    body: "Body", center: tuple[int, int], distance: int, directions: int
+) -> Iterator[tuple[int, int]]:
+    """Yield the points at a distance from a point where a body can stand, in the point's room.
+
+    Args:
+        body: The body.
+        center: The point [lattice].
+        distance: The distance [lattice].
+        directions: How many directions are tried, evenly spaced.
+    """
+    plan, space = body.home.plan, body.space
+    room = plan.room_at(*plan.lattice.to_metres(center).tolist())
+    for i in range(directions):
+        heading = i * TURN // directions
+        x = center[0] + distance * cosine(heading) // UNIT
+        y = center[1] + distance * sine(heading) // UNIT
+        is_in_room = plan.room_at(*plan.lattice.to_metres((x, y)).tolist()) == room
+        if is_in_room and space.part_at(x, y) == body.part:
+            yield x, y
+
+
+class Nearest:
+    """Centres [lattice] of the free cells that a body can get to, in one room or in all."""
+
+    def __init__(self, body: "Body", room: int | None = None) -> None:
+        cells = body.space.cells(room, body.part)
+        xs, ys = body.home.plan.lattice.centre_axes()
+        self.centres: I64 = np.stack([xs[cells[:, 1]], ys[cells[:, 0]]], 1)
+
+    @cached_property
+    def _tree(self) -> shapely.STRtree:
+        return shapely.STRtree([shapely.Point(x, y) for x, y in self.centres.tolist()])
+
+    def of(self, points: I64) -> I64:
+        """Return the centre nearest to each point, int64 (n, 2).
+
+        Of several at the same distance, the one of the lowest row, then of the lowest column.
+        """
+        if not len(points) or not len(self.centres):
+            return np.empty((0, 2), np.int64)
+        of_point, centre = self._tree.query_nearest(shapely.points(points), all_matches=True)
+        best = np.full(len(points), len(self.centres), np.int64)
+        np.minimum.at(best, of_point, centre)
+        return self.centres[best]

@@ -5,12 +5,11 @@ from typing import Annotated, Any
 from pydantic import AfterValidator
 
 from fleet2d.component import register
-from fleet2d.entities import orders
-from fleet2d.entities.actor import Actor
-from fleet2d.entities.furniture import furniture_of
-from fleet2d.entities.motion import Pose
-from fleet2d.entities.place import Place, Point, RoomChoice, is_point, matching_rooms
-from fleet2d.entities.plan_data import check_data, plan_of
+from fleet2d.entities.behavior import Actor
+from fleet2d.entities.body import Pose
+from fleet2d.entities.decisions import GoTo, StandStill
+from fleet2d.entities.place import Place, Point, RoomChoice, furniture_of, is_point, matching_rooms
+from fleet2d.entities.plan import check_data, plan_of
 from fleet2d.errors import PlacementError
 from fleet2d.interventions.intervention import Intervention, body
 from fleet2d.interventions.world import World
@@ -98,7 +97,7 @@ class Send(BodyIntervention):
 
     def begin(self, world: World) -> None:
         """Give the order."""
-        order = orders.GoTo(self.to, heading_of(self.heading_deg), self.duration)
+        order = GoTo(self.to, heading_of(self.heading_deg), self.duration)
         body(world, self.entity).obey(order, world.step)
 
 
@@ -114,7 +113,7 @@ class HoldStill(BodyIntervention):
 
     def begin(self, world: World) -> None:
         """Give the order."""
-        body(world, self.entity).obey(orders.StandStill(self.duration), world.step)
+        body(world, self.entity).obey(StandStill(self.duration), world.step)
 
 
 @register("intervention", "release")

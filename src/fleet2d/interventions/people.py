@@ -5,7 +5,7 @@ from datetime import timedelta
 from pydantic import Field
 
 from fleet2d.component import register
-from fleet2d.entities.orders import DoActivity, GoOut, GoTo
+from fleet2d.entities.decisions import DoActivity, GoOut, GoTo
 from fleet2d.entities.place import Place
 from fleet2d.entities.users.guest import Guest
 from fleet2d.errors import ScenarioError

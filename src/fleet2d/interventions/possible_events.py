@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable
 
-from fleet2d.entities.actor import Actor
+from fleet2d.entities.behavior import Actor
 from fleet2d.errors import ScenarioError
 from fleet2d.events import KINDS, EventKind
 from fleet2d.interventions.when import Trigger

@@ -5,8 +5,7 @@ from typing import Self
 from pydantic import Field, model_validator
 
 from fleet2d.component import register
-from fleet2d.entities.actor import Actor
-from fleet2d.entities.behavior import Command
+from fleet2d.entities.behavior import Actor, Command
 from fleet2d.entities.place import Place
 from fleet2d.errors import ScenarioError
 from fleet2d.events import EventKind

@@ -3,7 +3,7 @@
 from typing import ClassVar
 
 from fleet2d.component import register
-from fleet2d.entities.objects.sensor import SensorFault
+from fleet2d.entities.objects.home_object import SensorFault
 from fleet2d.errors import ScenarioError
 from fleet2d.interventions.intervention import Intervention, Lasting
 from fleet2d.interventions.world import World

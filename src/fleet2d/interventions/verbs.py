@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-from fleet2d.entities.objects.sensor import SensorFault
+from fleet2d.entities.objects.home_object import SensorFault
 from fleet2d.interventions.body_verbs import BodyVerbs, Time
 
 

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from fleet2d.bounds import one_line
 from fleet2d.clock import Clock
-from fleet2d.entities.actor import Actor
+from fleet2d.entities.behavior import Actor
+from fleet2d.entities.body import Pose
 from fleet2d.entities.meander import Meander
-from fleet2d.entities.motion import Pose
 from fleet2d.errors import ArtifactError
 from fleet2d.floorplan.home.home import Home
 from fleet2d.floorplan.plan import FloorPlan

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from fleet2d import Drive
-from fleet2d.entities.drives.timing import breakpoints
+from fleet2d.entities.drives.drive import breakpoints
 from fleet2d.kernels.numbers import TURN
 
 CORNER = [(0, 0), (3, 0), (3, 2)]

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from tests.entities.drives.drives import driven
 
 from fleet2d.entities.drives.differential import Differential
-from fleet2d.entities.drives.timing import breakpoints
+from fleet2d.entities.drives.drive import breakpoints
 from fleet2d.kernels.motion import time_route
 from fleet2d.kernels.numbers import TURN
 

@@ -14,7 +14,7 @@ from tests.scenes import digests, path, run, table
 import fleet2d
 from fleet2d import Behavior, Drive, Moment, Plan, Route, Situation
 from fleet2d.component import components
-from fleet2d.entities.drives import timing
+from fleet2d.entities.drives.drive import estimate
 from fleet2d.entities.robots.approach import way_seconds
 from fleet2d.errors import ComponentError, ScenarioError
 from fleet2d.scenario.compose import compose
@@ -165,11 +165,11 @@ class Hopes(Returned):
         return np.array(self.estimate)
 
 
-@pytest.mark.parametrize("estimate", [2.0, [1.0], [-1.0, 1.0], [float("nan"), 0.0]])
-def test_estimates_that_are_no_times_are_refused(estimate: Any) -> None:
-    drive = Hopes.model_construct(estimate=estimate)
+@pytest.mark.parametrize("seconds", [2.0, [1.0], [-1.0, 1.0], [float("nan"), 0.0]])
+def test_estimates_that_are_no_times_are_refused(seconds: Any) -> None:
+    drive = Hopes.model_construct(estimate=seconds)
     with pytest.raises(ComponentError, match=r"Hopes estimated .* of shape \(2,\)"):
-        timing.estimate(drive, np.array([1.0, 2.0]), 0.6)
+        estimate(drive, np.array([1.0, 2.0]), 0.6)
 
 
 @pytest.mark.parametrize(

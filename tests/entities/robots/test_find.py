@@ -17,7 +17,7 @@ from tests.scenes import path, run
 
 import fleet2d
 from fleet2d import Algorithm
-from fleet2d.entities.robots.sites import Sites
+from fleet2d.entities.robots.find import Sites
 from fleet2d.errors import InputError
 from fleet2d.search.policies import exact, order_by
 from fleet2d.search.problem import SearchProblem, play

@@ -19,7 +19,7 @@ from tests.scenes import path, run
 
 import fleet2d
 from fleet2d.engine.simulation import Simulation
-from fleet2d.entities.robots.places import HangoutPlaces, decay
+from fleet2d.entities.robots.hangout import HangoutPlaces, decay
 from fleet2d.errors import InputError
 
 

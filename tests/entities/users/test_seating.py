@@ -11,7 +11,7 @@ import pytest
 from tests.scenes import digests, run, scenario, table
 
 from fleet2d.engine.simulation import Simulation
-from fleet2d.entities.users.seating import _stays
+from fleet2d.entities.users.routine import _stays
 from fleet2d.routines.planner import FINISHES, INTERRUPTS, PLANNED, REST, RESUMES, Doing
 from fleet2d.runs.run import Run
 

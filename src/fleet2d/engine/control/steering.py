@@ -14,8 +14,7 @@ from fleet2d.engine.control.script import schedule
 from fleet2d.engine.control.world import EngineWorld
 from fleet2d.engine.state import State
 from fleet2d.entities.decisions import DecidingActor
-from fleet2d.entities.plan import Plan
-from fleet2d.entities.plan_data import data_of
+from fleet2d.entities.plan import Plan, data_of
 from fleet2d.errors import InputError, ScenarioError
 from fleet2d.events import Event, EventKind, Listener
 from fleet2d.floorplan.home.change import HomeChange

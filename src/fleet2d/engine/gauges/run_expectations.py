@@ -13,7 +13,7 @@ from fleet2d.engine.gauges.block import Block
 from fleet2d.engine.gauges.gauges import BatteryGauge, Gauge, ValueGauge
 from fleet2d.engine.learners import Learners
 from fleet2d.engine.tables.shared_columns import STEP, TIME
-from fleet2d.entities.actor import Actor
+from fleet2d.entities.behavior import Actor
 from fleet2d.events import Event
 from fleet2d.expectations.expectation import Expectation, RunSignals
 from fleet2d.expectations.signals import Measurement

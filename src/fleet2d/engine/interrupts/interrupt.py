@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from fleet2d.component import Component
 from fleet2d.engine.bodies import PoseBlock
-from fleet2d.entities.actor import Actor
+from fleet2d.entities.behavior import Actor
 from fleet2d.kernels import Bool
 
 

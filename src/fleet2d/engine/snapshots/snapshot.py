@@ -20,7 +20,7 @@ from fleet2d.artifacts.plain import plain
 from fleet2d.engine.inputs import components_of
 from fleet2d.engine.snapshots import arrays
 from fleet2d.engine.state import State
-from fleet2d.entities.motion import RandomWalk, Track
+from fleet2d.entities.body import RandomWalk, Track
 from fleet2d.errors import ArtifactError
 from fleet2d.floorplan.home.costmap import CostedSpace
 from fleet2d.floorplan.home.space import Space

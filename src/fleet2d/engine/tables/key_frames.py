@@ -6,7 +6,7 @@ import numpy as np
 
 from fleet2d.engine.basis import Basis
 from fleet2d.engine.tables.ordering import in_order
-from fleet2d.entities.motion import Track
+from fleet2d.entities.body import Track
 from fleet2d.kernels import I64
 from fleet2d.kernels.motion import Breakpoints
 from fleet2d.kernels.numbers import in_radians

@@ -14,7 +14,7 @@ from fleet2d.engine.basis import Basis
 from fleet2d.engine.bodies import Bodies
 from fleet2d.engine.watchers.watcher import Watcher
 from fleet2d.entities.behavior import Situation
-from fleet2d.entities.blocking import plan_after_a_step, plan_around
+from fleet2d.entities.giving_way import plan_after_a_step, plan_around
 from fleet2d.entities.plan import Note, Plan
 from fleet2d.kernels import I64, U8, Bool
 from fleet2d.units import micros

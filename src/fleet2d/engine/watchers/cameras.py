@@ -21,8 +21,7 @@ from fleet2d.engine.watchers.disturbances import (
 from fleet2d.engine.watchers.points_in_view import points_seen
 from fleet2d.engine.watchers.sight_events import sight_events
 from fleet2d.engine.watchers.watcher import Watcher
-from fleet2d.entities.actor import Actor
-from fleet2d.entities.behavior import SightEvent
+from fleet2d.entities.behavior import Actor, SightEvent
 from fleet2d.entities.localization import Drift, Localization
 from fleet2d.errors import ScenarioError
 from fleet2d.events import Event

@@ -7,7 +7,7 @@ import numpy as np
 from fleet2d.algorithms.patches import Patches
 from fleet2d.engine.bodies import Bodies
 from fleet2d.engine.watchers.watcher import Watcher
-from fleet2d.entities.actor import Actor
+from fleet2d.entities.behavior import Actor
 from fleet2d.entities.entity import Robot
 from fleet2d.events import Event
 from fleet2d.kernels import F64, I64, Bool

@@ -13,7 +13,7 @@ from fleet2d.blame import blame
 from fleet2d.engine.basis import Basis
 from fleet2d.engine.bodies import Bodies, PoseBlock
 from fleet2d.engine.watchers.watcher import Watcher
-from fleet2d.entities.objects.sensor import (
+from fleet2d.entities.objects.home_object import (
     Sensor,
     SensorFault,
     SensorReading,

@@ -1,11 +1,17 @@
 """The base of drives: when a robot is where on its route, and which way it faces."""
 
+import math
 from abc import abstractmethod
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from itertools import pairwise
 from typing import ClassVar, NamedTuple
 
+import numpy as np
+
 from fleet2d.component import Component
-from fleet2d.kernels import F64
+from fleet2d.errors import ComponentError
+from fleet2d.kernels import F64, I64
+from fleet2d.kernels.numbers import TURN, heading_of, turn_between
 
 
 class Leg(NamedTuple):
@@ -87,3 +93,110 @@ class Drive(Component):
             float64, of the same shape.
         """
         return metres / speed
+
+
+# The longest time for a route [s]: ten days, so that poses on it can be interpolated in 64 bits.
+LONGEST_S = 864_000
+# A moment this near to a corner of the route is at the corner [m].
+NEAR_M = 1e-6
+
+
+def breakpoints(
+    drive: Drive, points: I64, heading: int, rates: tuple[float, float], units_per_m: float
+) -> I64:
+    """Return the breakpoints of a robot on a route, without the state at its beginning.
+
+    Args:
+        drive: The drive of the robot.
+        points: The route, int64 (n, 2) [lattice].
+        heading: The heading at its beginning [1/4096 turn].
+        rates: Its speed [lattice units per second] and its turn rate [1/4096 turn per second].
+        units_per_m: Lattice units to a metre.
+
+    Returns:
+        Time since the beginning [us], x, y [lattice], heading, away (0); int64 (m, 5).
+
+    Raises:
+        ComponentError: The moments of the drive are not in order, or don't lead to the end.
+    """
+    corners, ends, legs = points[:1].tolist(), [0.0], []
+    for (ax, ay), (bx, by) in pairwise(points.tolist()):
+        dx, dy = bx - ax, by - ay
+        if dx or dy:
+            legs.append(Leg(math.sqrt(dx * dx + dy * dy) / units_per_m, heading_of(dx, dy)))
+            corners.append([bx, by])
+            ends.append(ends[-1] + legs[-1].length)
+
+    def row(moment: Moment, leg: int) -> tuple[int, ...]:
+        (ax, ay), (bx, by) = corners[leg], corners[leg + 1]
+        is_at_end = abs(moment.metres - ends[leg + 1]) <= NEAR_M
+        share = 1.0 if is_at_end else (moment.metres - ends[leg]) / legs[leg].length
+        x, y = ax + round((bx - ax) * share), ay + round((by - ay) * share)
+        return round(moment.seconds * 1e6), x, y, moment.heading % TURN, 0
+
+    rows, leg, last = [], 0, Moment(0.0, 0.0, heading)
+    route = Route(tuple(legs), heading, rates[0] / units_per_m, rates[1])
+    for moment in _checked(drive, route, ends[-1]) if legs else ():
+        while moment.metres > ends[leg + 1] + NEAR_M:
+            if last.metres < ends[leg + 1] - NEAR_M:  # it passes a corner without a moment there
+                rows.append(row(_between(last, moment, ends[leg + 1]), leg))
+            leg += 1
+        rows.append(row(moment, leg))
+        last = moment
+    return np.array(rows, np.int64).reshape(-1, 5)
+
+
+def estimate(drive: Drive, metres: F64, speed: float) -> F64:
+    """Return the times [s] that a drive estimates for ways of some lengths.
+
+    Args:
+        drive: The drive of the robot.
+        metres: The lengths, inf where there is no way.
+        speed: The speed of the robot [m/s].
+
+    Raises:
+        ComponentError: They are not as many times of 0 or more.
+    """
+    seconds = np.asarray(drive.seconds(metres, speed), np.float64)
+    if seconds.shape != metres.shape or not (seconds >= 0).all():
+        raise ComponentError(
+            f"the drive {drive.type_name} estimated {seconds} s for ways of {metres} m: expected"
+            f" times of 0 or more, of shape {metres.shape}"
+        )
+    return seconds
+
+
+def _checked(drive: Drive, route: Route, length: float) -> Iterator[Moment]:
+    """Yield the moments of a drive on a route of a length [m].
+
+    Raises:
+        ComponentError: They are not in order, or don't lead to the end.
+    """
+    last = Moment(0.0, 0.0, route.heading)
+    for seconds, metres, heading in drive.moments(route):
+        moment = Moment(seconds, metres, heading)
+        if not (
+            last.seconds <= seconds <= LONGEST_S
+            and last.metres - NEAR_M <= metres <= length + NEAR_M
+            and isinstance(heading, int | np.integer)
+        ):
+            raise ComponentError(
+                f"the drive {drive.type_name} returned {moment} after {last}, on a route of"
+                f" {length:.6g} m: neither seconds (10 days at most) nor metres may fall, no moment"
+                " may be past the end, and headings are whole numbers"
+            )
+        last = moment
+        yield moment
+    if last.metres < length - NEAR_M:
+        raise ComponentError(
+            f"the drive {drive.type_name} ended after {last.metres:.6g} m of a route of"
+            f" {length:.6g} m: its last moment has to be at the end of the route"
+        )
+
+
+def _between(last: Moment, moment: Moment, metres: float) -> Moment:
+    """Return the moment at which a robot passes a corner, between two others."""
+    share = (metres - last.metres) / (moment.metres - last.metres)
+    turn = turn_between(last.heading % TURN, moment.heading % TURN)
+    seconds = last.seconds + (moment.seconds - last.seconds) * share
+    return Moment(seconds, metres, last.heading + round(turn * share))

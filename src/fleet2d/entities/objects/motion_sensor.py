@@ -6,7 +6,7 @@ import numpy as np
 from pydantic import Field
 
 from fleet2d.component import register
-from fleet2d.entities.objects.sensor import Sensor, SensorView, first_cause
+from fleet2d.entities.objects.home_object import Sensor, SensorView, first_cause
 from fleet2d.entities.place import Point
 from fleet2d.errors import PlacementError
 from fleet2d.floorplan.home.home import Home

@@ -6,8 +6,7 @@ import numpy as np
 from pydantic import Field
 
 from fleet2d.component import register
-from fleet2d.entities.objects.furniture_sensor import FurnitureSensor
-from fleet2d.entities.objects.sensor import SensorView, first_cause
+from fleet2d.entities.objects.home_object import FurnitureSensor, SensorView, first_cause
 from fleet2d.errors import PlacementError
 from fleet2d.floorplan.home.home import Home
 from fleet2d.kernels import I64

@@ -1,18 +1,186 @@
-"""Approaching people: how long a robot drives, where it stops, and how it keeps a distance."""
+"""Beliefs of robots about where a person is, from the output of an algorithm."""
 
 import math
 from datetime import timedelta
+from typing import Any, NamedTuple
 
 import numpy as np
+from pydantic import Field
 
-from fleet2d.entities.actor import Actor
-from fleet2d.entities.behavior import Situation
-from fleet2d.entities.nearby import points_at_distance
+from fleet2d.entities.behavior import Actor, Behavior, Situation
+from fleet2d.entities.place import points_at_distance
 from fleet2d.entities.plan import Plan
-from fleet2d.errors import ScenarioError
-from fleet2d.kernels import I64
+from fleet2d.errors import ComponentError, ScenarioError
+from fleet2d.floorplan.plan import Room
+from fleet2d.kernels import F64, I64, Bool
 from fleet2d.kernels.numbers import TURN, heading_of, turn_between
+from fleet2d.kernels.sight import points_in_sight
+from fleet2d.kernels.space import CELL_CENTRE, SUB
 from fleet2d.sums import sum_in_order
+
+ANYONE = "anyone"
+
+
+class RoomBelief(NamedTuple):
+    """Probabilities of where a person is.
+
+    Attributes:
+        share: Probability of each room, given that the person is at home, float64 (rooms,).
+        away: Probability that the person is out of the home.
+    """
+
+    share: F64
+    away: float
+
+    @property
+    def joint(self) -> F64:
+        """Probability of each room, float64 (rooms,); sums to 1 - away."""
+        return self.share * (1 - self.away)
+
+
+def room_belief(now: Situation, source: str | None, user: str) -> RoomBelief:
+    """Return the probabilities of where a person is now.
+
+    The output of a presence algorithm is evaluated at the present time, for the user; any other
+    output with a `share` per room holds for everybody. Without a source, and before its first
+    output, the probability of a room is proportional to its area.
+
+    Args:
+        now: The situation.
+        source: The algorithm, by its name in the scenario.
+        user: The person, or ANYONE.
+
+    Raises:
+        ComponentError: The output has no probabilities of rooms.
+    """
+    output = now.outputs.get(source) if source else None
+    if output is None:
+        cells = np.array([room.cells for room in now.home.rooms], np.float64)
+        return RoomBelief(cells / cells.sum(), 0.0)
+    if callable(getattr(output, "at", None)):
+        output = output.at(now.time)
+    share: Any = getattr(output, "share", None)
+    away: Any = getattr(output, "away", 0.0)
+    if callable(share):
+        share = share(user)
+        away = away(user) if callable(away) else away
+    rooms = len(now.home.rooms)
+    if share is None or np.shape(share) != (rooms,):
+        raise ComponentError(
+            f"the output of {source!r} has no room probabilities: name a presence algorithm, or"
+            f" one whose output is a RoomDistribution over the {rooms} rooms"
+        )
+    return RoomBelief(np.asarray(share, np.float64), float(away))
+
+
+class BeliefBehavior(Behavior):
+    """Base of behaviors that depend on where a person is believed to be.
+
+    Attributes:
+        user: The user to look for or to be near, or anyone.
+        source: The algorithm with probabilities of where people are; left out: the probability of a
+            room is proportional to its area.
+    """
+
+    user: str = Field(default=ANYONE, min_length=1)
+    source: str | None = None
+
+    def about(self) -> tuple[str, ...]:
+        """Return the user that it depends on, if it is one by name."""
+        return () if self.user == ANYONE else (self.user,)
+
+    def reads(self) -> tuple[str, ...]:
+        """Return the algorithm that it reads."""
+        return () if self.source is None else (self.source,)
+
+    def belief(self, now: Situation, user: str) -> RoomBelief:
+        """Return the probabilities of where a user is now, by its source."""
+        return room_belief(now, self.source, user)
+
+
+# The most cells of a room that are tried as viewpoints, and as targets to be seen, evenly spread.
+STANDS_TRIED = 48
+TARGETS_TRIED = 400
+
+
+class Viewpoints(NamedTuple):
+    """Points to look round from in a room.
+
+    Attributes:
+        points: Lattice points, the one that shows most first.
+        share: The part of the room that they show together.
+    """
+
+    points: tuple[tuple[int, int], ...]
+    share: float
+
+
+def sight_range(actor: Actor) -> float:
+    """Return how far the cameras of a body see [lattice]; 0 without a camera."""
+    ranges = [camera.range[1] for camera in actor.entity.eyes.values()]
+    return max(ranges, default=0.0) * actor.home.plan.lattice.units_per_m
+
+
+def viewpoints_of(actor: Actor, room: Room, enough: float, most: int) -> Viewpoints:
+    """Return the viewpoints of a room, chosen greedily: each adds as much to the view as possible.
+
+    Walls and tall furniture count as they are at present.
+
+    Args:
+        actor: The robot.
+        room: A room that it can enter.
+        enough: The part of the room after which no more points are added.
+        most: The most points.
+    """
+    home, space = actor.home, actor.space
+    key = "views", home.walls, space, actor.part, sight_range(actor), room.index, enough, most
+    return home.cached(key, lambda: _choose_viewpoints(actor, room, enough, most))
+
+
+def _choose_viewpoints(actor: Actor, room: Room, enough: float, most: int) -> Viewpoints:
+    plan = actor.home.plan
+    stands = spread(actor.space.cells(room.index, actor.part), STANDS_TRIED)
+    targets = spread(np.argwhere(plan.room_of_cell == room.index), TARGETS_TRIED)
+    places = np.concatenate([[actor.middle(room)], centres(stands)])
+    goals = centres(targets)
+    visible = np.array([visible_from(actor, place, goals) for place in places])
+    points: list[tuple[int, int]] = []
+    unseen = np.ones(len(goals), np.bool_)
+    while len(points) < most and unseen.sum() > (1 - enough) * len(goals):
+        gains = (visible & unseen).sum(axis=1)
+        best = int(np.argmax(gains))
+        if not gains[best]:
+            break
+        points.append((int(places[best, 0]), int(places[best, 1])))
+        unseen &= ~visible[best]
+    if not points:
+        return Viewpoints((actor.middle(room),), 0.0)
+    return Viewpoints(tuple(points), 1 - float(unseen.sum()) / len(goals))
+
+
+def visible_from(actor: Actor, place: I64, goals: I64) -> Bool:
+    """Return which goals (n, 2) are in range and in sight of a place, at any heading, bool (n,)."""
+    near = ((goals - place) ** 2).sum(axis=1) <= sight_range(actor) ** 2
+    visible = np.zeros(len(goals), np.bool_)
+    x, y = int(place[0]), int(place[1])
+    visible[near] = points_in_sight(actor.home.walls, x, y, goals[near])
+    return visible
+
+
+def spread(cells: I64, most: int) -> I64:
+    """Return the cells (row, column) on the finest square grid that has no more than `most`."""
+    pitch = 1
+    on_grid = cells
+    while len(on_grid) > most:
+        pitch += 1
+        on_grid = cells[(cells[:, 0] % pitch == pitch // 2) & (cells[:, 1] % pitch == pitch // 2)]
+    return on_grid if len(on_grid) else cells[:: max(1, len(cells) // most)]
+
+
+def centres(cells: I64) -> I64:
+    """Return the centres [lattice] of cells (row, column), int64 (n, 2)."""
+    return np.ascontiguousarray(cells[:, ::-1] * SUB + CELL_CENTRE)
+
 
 # Time after which a robot tries again to pass a shut door.
 AT_A_DOOR = timedelta(seconds=10)

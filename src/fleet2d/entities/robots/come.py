@@ -4,9 +4,8 @@ from datetime import timedelta
 from typing import ClassVar
 
 from fleet2d.component import register
-from fleet2d.entities.actor import Actor
-from fleet2d.entities.behavior import Behavior, Command, Situation
-from fleet2d.entities.furniture import stop_at
+from fleet2d.entities.behavior import Actor, Behavior, Command, Situation
+from fleet2d.entities.place import stop_at
 from fleet2d.entities.plan import Plan
 from fleet2d.units import Duration
 

@@ -6,8 +6,7 @@ from typing import ClassVar, Self
 from pydantic import model_validator
 
 from fleet2d.component import register
-from fleet2d.entities.actor import Actor
-from fleet2d.entities.behavior import Behavior, Situation
+from fleet2d.entities.behavior import Actor, Behavior, Situation
 from fleet2d.entities.plan import Plan
 from fleet2d.errors import ScenarioError
 from fleet2d.units import Share, problem

@@ -7,11 +7,9 @@ import numpy as np
 from pydantic import Field
 
 from fleet2d.component import register
-from fleet2d.entities.actor import Actor
-from fleet2d.entities.behavior import Behavior, Situation
+from fleet2d.entities.behavior import Actor, Behavior, Situation
 from fleet2d.entities.plan import Plan
-from fleet2d.entities.robots.approach import check_has_camera
-from fleet2d.entities.robots.viewpoints import centres, spread, visible_from
+from fleet2d.entities.robots.approach import centres, check_has_camera, spread, visible_from
 from fleet2d.kernels import Bool
 from fleet2d.kernels.numbers import TURN
 from fleet2d.kernels.space import squared_distance

@@ -6,8 +6,7 @@ from typing import ClassVar
 from pydantic import Field
 
 from fleet2d.component import register
-from fleet2d.entities.actor import Actor
-from fleet2d.entities.behavior import Behavior, Situation
+from fleet2d.entities.behavior import Actor, Behavior, Situation
 from fleet2d.entities.plan import Plan
 from fleet2d.entities.robots.approach import approach, check_has_camera, face
 from fleet2d.units import Duration, Length, PositiveDuration

@@ -1,26 +1,206 @@
-"""Hangout: stand near people without blocking their way, and move rarely."""
+"""Places to hang out at, rated by all that doesn't depend on where people are at present."""
 
 from datetime import datetime, timedelta
-from typing import ClassVar
+from itertools import combinations
+from typing import ClassVar, Literal
 
 import numpy as np
+import shapely
 from pydantic import Field
 
 from fleet2d.component import register
-from fleet2d.entities.actor import Actor
-from fleet2d.entities.behavior import Situation
-from fleet2d.entities.hours import Hours, holds
-from fleet2d.entities.kinds import available_rooms
+from fleet2d.entities.behavior import Actor, Hours, Situation, holds
+from fleet2d.entities.place import available_rooms
 from fleet2d.entities.plan import Plan
-from fleet2d.entities.robots.approach import face
-from fleet2d.entities.robots.belief import BeliefBehavior
-from fleet2d.entities.robots.places import HangoutPlaces, Nearness
-from fleet2d.entities.robots.viewpoints import Viewpoints, viewpoints_of
+from fleet2d.entities.robots.approach import (
+    BeliefBehavior,
+    Viewpoints,
+    face,
+    sight_range,
+    viewpoints_of,
+)
 from fleet2d.errors import PlacementError
+from fleet2d.floorplan.cache import read_only
 from fleet2d.floorplan.home.space import Space
-from fleet2d.kernels import F64
-from fleet2d.kernels.space import SUB
+from fleet2d.floorplan.plan import Room
+from fleet2d.kernels import F64, I64
+from fleet2d.kernels.sight import points_in_sight
+from fleet2d.kernels.space import CELL_CENTRE, SUB
 from fleet2d.units import Length, PositiveDuration, Share
+
+# Radius of the bodies whose ways count as the ways of people [m].
+PERSON = 0.2
+# Personal space ends at 1.2 m (Hall): within it, a place is the worse the nearer to a seat [m].
+PERSONAL = 1.2
+# The most cells of a room that count as seats, if it has no furniture to sit or lie on.
+SEATS_TRIED = 60
+# Places to stand are tried on a grid of this pitch [m].
+PITCH = 0.5
+
+Seats = tuple[I64, ...]
+Nearness = Literal["room", "view", "path"]
+
+
+class HangoutPlaces:
+    """Candidate places of a robot: lattice points that its body can get to.
+
+    Attributes:
+        points: The places [lattice], int64 (n, 2).
+        room: Index of each place's room, int64 (n,).
+        block: Share of the ways between any two rooms that lead through the robot's body there,
+            float64 (n,).
+        prox: How deep it is in personal space, from 1 on a seat to 0 outside, float64 (n,).
+    """
+
+    def __init__(self, actor: Actor, avoid: frozenset[int], off_doors: float) -> None:
+        """Lay out the places, by walls and furniture as they are at present.
+
+        Args:
+            actor: The robot.
+            avoid: Indices of the rooms without places.
+            off_doors: The least distance of a place from every doorway [m].
+        """
+        self._actor = actor
+        home, people = actor.home, actor.home.space(PERSON, opens_doors=True)
+        # The key has all that the places depend on: robots of other runs in this home share them.
+        body = actor.space, actor.part, actor.entity.radius
+        self._key = (*body, people, home.objects, avoid, off_doors)
+        self.points, self.room, seats, self.block, self.prox = home.cached(
+            ("places", *self._key), lambda: self._lay_out(avoid, off_doors)
+        )
+        self._seats = dict(enumerate(seats))
+
+    def _lay_out(self, avoid: frozenset[int], off_doors: float) -> tuple[I64, I64, Seats, F64, F64]:
+        """Return the points, their rooms, the seats of each room, and two costs of each point.
+
+        The costs are `block`, how much it blocks ways, and `prox`, how near it is to a seat.
+        """
+        self.points, self.room = self._candidates(avoid, off_doors)
+        seats = tuple(read_only(self._seats_of(room)) for room in self._actor.home.rooms)
+        block, prox = read_only(self._blocking()), read_only(self._proximity())
+        return read_only(self.points), read_only(self.room), seats, block, prox
+
+    def nearness(self, by: Nearness, tau: float) -> F64:
+        """Return how near each place is to people in each room, float64 (n, rooms), 0 to 1.
+
+        `room`: 1 in the same room, else 0. `view`: the share of the room's seats in range and in
+        sight. `path`: exp(-t / tau), with t the travel time to the nearest point of the room [s].
+        """
+        actor = self._actor
+        reach = actor.speed, type(actor.drive), repr(actor.drive)
+        key = ("nearness", *self._key, by, tau, actor.home.walls, sight_range(actor), *reach)
+        # In column order: it is read room by room.
+        return actor.home.cached(
+            key, lambda: read_only(np.asfortranarray(self._compute_nearness(by, tau)))
+        )
+
+    def _compute_nearness(self, by: Nearness, tau: float) -> F64:
+        rooms = self._actor.home.rooms
+        if by == "path":
+            return np.stack([self._path(room, tau) for room in rooms], axis=1)
+        column = self._same_room if by == "room" else self._view
+        return np.stack([column(room) for room in rooms], axis=1)
+
+    def _candidates(self, avoid: frozenset[int], off_doors: float) -> tuple[I64, I64]:
+        actor, plan = self._actor, self._actor.home.plan
+        cells = actor.space.cells(None, actor.part)
+        pitch = max(1, round(PITCH / plan.lattice.cell))
+        on_grid = (cells[:, 0] % pitch == 0) & (cells[:, 1] % pitch == 0)
+        rooms = plan.room_of_cell[cells[:, 0], cells[:, 1]].astype(np.int64)
+        is_candidate = on_grid & (rooms >= 0) & ~np.isin(rooms, sorted(avoid))
+        cells, rooms = cells[is_candidate], rooms[is_candidate]
+        points = cells[:, ::-1] * SUB + CELL_CENTRE
+        if plan.doorways and off_doors > 0:
+            lines = [plan.lattice.to_lattice((door.start, door.end)) for door in plan.doorways]
+            gaps = shapely.distance(
+                shapely.points(points)[:, None],
+                np.array([shapely.LineString(line) for line in lines]),
+            )
+            clear = gaps.min(axis=1, initial=np.inf) >= off_doors * plan.lattice.units_per_m
+            points, rooms = points[clear], rooms[clear]
+        return np.ascontiguousarray(points), rooms
+
+    def _seats_of(self, room: Room) -> I64:
+        """Return where people usually are in a room [lattice]: at its furniture, else all over."""
+        plan = self._actor.home.plan
+        uses = [
+            (use.x, use.y)
+            for thing in self._actor.home.objects
+            for use in thing.uses
+            if plan.room_at(use.x, use.y) == plan.rooms[room.index]
+        ]
+        if uses:
+            return np.ascontiguousarray(plan.lattice.to_lattice(uses))
+        cells = np.argwhere(plan.room_of_cell == room.index)
+        cells = cells[:: max(1, len(cells) // SEATS_TRIED)]
+        return np.ascontiguousarray(cells[:, ::-1] * SUB + CELL_CENTRE)
+
+    def _same_room(self, room: Room) -> F64:
+        return (self.room == room.index).astype(np.float64)
+
+    def _view(self, room: Room) -> F64:
+        walls, reach = self._actor.home.walls, sight_range(self._actor)
+        seats = self._seats[room.index]
+        share = np.zeros(len(self.points))
+        for i, (x, y) in enumerate(self.points.tolist()):
+            near = ((seats - (x, y)) ** 2).sum(axis=1) <= reach * reach
+            if near.any():
+                share[i] = np.count_nonzero(points_in_sight(walls, x, y, seats[near])) / len(seats)
+        return share
+
+    def _path(self, room: Room, tau: float) -> F64:
+        actor = self._actor
+        cells = actor.space.cells(room.index, actor.part)
+        if not len(cells):
+            return np.zeros(len(self.points))
+        field = actor.space.distance_field(cells[:, ::-1] * SUB + CELL_CENTRE)
+        metres = field[self.points[:, 1] // SUB, self.points[:, 0] // SUB]
+        return decay(actor.seconds(metres) / tau)
+
+    def _blocking(self) -> F64:
+        """Return the share of people's ways from room to room that a robot at each place blocks."""
+        actor, home = self._actor, self._actor.home
+        space = home.space(PERSON, opens_doors=True)
+        anchors = home.plan.lattice.to_lattice([room.anchor_xy for room in home.rooms]).tolist()
+        stops = [space.nearest(x, y, 0, r) for r, (x, y) in enumerate(anchors)]
+        pairs = list(combinations([stop for stop in stops if stop is not None], 2))
+        reach = (PERSON + actor.entity.radius) * home.plan.lattice.units_per_m
+        points, blocked, ways = shapely.points(self.points), np.zeros(len(self.points)), 0
+        for start, goal in pairs:
+            route = space.route(start, goal)
+            if route is not None and len(route) > 1:
+                ways += 1
+                blocked += shapely.distance(points, shapely.LineString(route)) < reach
+        return blocked / max(ways, 1)
+
+    def _proximity(self) -> F64:
+        """Return how deep each place is in the personal space of the nearest seat, 0 to 1."""
+        plan = self._actor.home.plan
+        uses = [(use.x, use.y) for thing in self._actor.home.objects for use in thing.uses]
+        if not uses or not len(self.points):
+            return np.zeros(len(self.points))
+        seats = plan.lattice.to_lattice(uses)
+        gaps = ((self.points[:, None] - seats[None]) ** 2).sum(axis=2).min(axis=1)
+        metres = np.sqrt(gaps.astype(np.float64)) / plan.lattice.units_per_m
+        return np.maximum(0.0, 1 - metres / PERSONAL)
+
+
+def decay(x: F64) -> F64:
+    """Return exp(-x) for x >= 0 by sums and products only, the same on every machine.
+
+    Computed as (1 + y + y**2/2 + y**3/6 + y**4/24)**-1024 with y = x / 1024: the relative error is
+    below 1e-5 up to x = 60, beyond which the value is negligible.
+
+    Example:
+        >>> decay(np.array([0.0, 1.0, np.inf])).round(6).tolist()
+        [1.0, 0.367879, 0.0]
+    """
+    y = np.minimum(x, 600.0) / 1024
+    growth = 1 + y * (1 + y / 2 * (1 + y / 3 * (1 + y / 4)))
+    for _ in range(10):
+        growth = growth * growth
+    return np.where(np.isfinite(x), 1 / growth, 0.0)
+
 
 # When exploring a room: the part of it to be shown, by at most this many viewpoints.
 ENOUGH = 0.95

@@ -6,11 +6,8 @@ from typing import ClassVar, Literal, Self
 from pydantic import model_validator
 
 from fleet2d.component import register
-from fleet2d.entities.actor import Actor
-from fleet2d.entities.behavior import Behavior, Situation
-from fleet2d.entities.furniture import stops_at
-from fleet2d.entities.kinds import available_places
-from fleet2d.entities.place import Place, Point
+from fleet2d.entities.behavior import Actor, Behavior, Situation
+from fleet2d.entities.place import Place, Point, available_places, stops_at
 from fleet2d.entities.plan import Plan
 from fleet2d.units import Duration, problem
 

@@ -7,7 +7,7 @@ from pydantic import Field
 
 from fleet2d.component import register
 from fleet2d.entities.behavior import Behavior, Situation
-from fleet2d.entities.nearest import Nearest
+from fleet2d.entities.place import Nearest
 from fleet2d.entities.plan import Plan
 from fleet2d.errors import FloorPlanError, PlacementError
 from fleet2d.floorplan.formats.valetudo import read_valetudo_paths
@@ -18,7 +18,7 @@ from fleet2d.units import Length
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from fleet2d.entities.actor import Actor
+    from fleet2d.entities.behavior import Actor
 
 
 @register("behavior", "retrace")

@@ -8,11 +8,8 @@ from pydantic import Field
 
 from fleet2d.clock import midnight_of
 from fleet2d.component import Settings, register
-from fleet2d.entities.actor import Actor
-from fleet2d.entities.behavior import Behavior, Situation
-from fleet2d.entities.furniture import stop_at
-from fleet2d.entities.hours import DAY
-from fleet2d.entities.place import Place
+from fleet2d.entities.behavior import DAY, Actor, Behavior, Situation
+from fleet2d.entities.place import Place, stop_at
 from fleet2d.entities.plan import Plan
 from fleet2d.entities.robots.approach import AT_A_DOOR
 from fleet2d.units import Duration, TimeOfDay

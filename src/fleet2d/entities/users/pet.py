@@ -7,7 +7,7 @@ from pydantic import Field, model_validator
 
 from fleet2d.component import register
 from fleet2d.entities.behavior import Behavior, Situation
-from fleet2d.entities.kinds import available_rooms
+from fleet2d.entities.place import available_rooms
 from fleet2d.entities.plan import Plan
 from fleet2d.entities.users.spots import Spots
 from fleet2d.problems import problem
@@ -15,7 +15,7 @@ from fleet2d.routines.activity import AnyDurationLaw, DurationLaw
 from fleet2d.streams import Draws
 
 if TYPE_CHECKING:
-    from fleet2d.entities.actor import Actor
+    from fleet2d.entities.behavior import Actor
 
 # How many naps are planned at once.
 NAPS = 10

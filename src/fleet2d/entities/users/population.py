@@ -5,7 +5,7 @@ from datetime import datetime, timedelta
 from typing import TYPE_CHECKING, Literal
 
 from fleet2d.component import register
-from fleet2d.entities.users.inhabitant import Inhabitant, rooms_at
+from fleet2d.entities.users.resident import Inhabitant, rooms_at
 from fleet2d.entities.users.spots import Spots
 from fleet2d.routines import survey
 from fleet2d.routines.activity import catalogue
@@ -18,7 +18,7 @@ from fleet2d.routines.timeuse import activities, draw_works_at_home, to_doings
 from fleet2d.streams import Draws, stream_key
 
 if TYPE_CHECKING:
-    from fleet2d.entities.actor import Actor
+    from fleet2d.entities.behavior import Actor
     from fleet2d.entities.place import Point, RoomChoice
 
 

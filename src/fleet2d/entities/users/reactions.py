@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 from fleet2d.component import register
 from fleet2d.entities.behavior import Attention, Behavior, SightEvent, Situation
-from fleet2d.entities.nearby import points_at_distance
+from fleet2d.entities.place import points_at_distance
 from fleet2d.entities.plan import Plan
 from fleet2d.kernels.numbers import TURN, heading_of, turn_between
 from fleet2d.routines.laws import Law
@@ -14,7 +14,7 @@ from fleet2d.streams import Draws
 from fleet2d.units import micros
 
 if TYPE_CHECKING:
-    from fleet2d.entities.actor import Actor
+    from fleet2d.entities.behavior import Actor
 
 # The events, the most important first, and the manner that is the probability of a reaction.
 PROBABILITIES = {

@@ -1,5 +1,7 @@
-"""Replay: be where a person was according to a log, in its rooms or at its positions."""
+"""Reports of replays: how a log was interpreted, as lines of text."""
 
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from datetime import timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
@@ -10,20 +12,453 @@ from pydantic import BeforeValidator, Field, WithJsonSchema
 from fleet2d.clock import DAY_US, midnight_of
 from fleet2d.component import register
 from fleet2d.entities.behavior import Behavior, Situation
-from fleet2d.entities.plan import Plan
-from fleet2d.entities.users.follow_fixes import FixFollower, place_fixes
-from fleet2d.entities.users.follow_rooms import RoomFollower
-from fleet2d.entities.users.replay_report import report_fixes, report_rooms
+from fleet2d.entities.place import Nearest
+from fleet2d.entities.plan import Note, Plan
+from fleet2d.floorplan.home.space import straight_way
+from fleet2d.kernels import F64, I64
+from fleet2d.kernels.motion import time_route
+from fleet2d.kernels.numbers import TURN, heading_of
+from fleet2d.kernels.sight import line_of_sight
+from fleet2d.kernels.space import locate
 from fleet2d.logs.frame import Frame
-from fleet2d.logs.log import ActivityLog, LogError, PositionLog
+from fleet2d.logs.log import AWAY, ActivityLog, LogError, PositionLog
 from fleet2d.logs.read import Layout, read_log
-from fleet2d.logs.rooms import map_rooms
-from fleet2d.logs.visits import LoggedVisit, VisitRule, visits_of
+from fleet2d.logs.rooms import DOOR, RoomChoice, map_rooms
+from fleet2d.logs.visits import UNKNOWN, LoggedVisit, LoggedVisits, VisitRule, visits_of
 from fleet2d.paths import InputFileOrFolder
+from fleet2d.sums import sum_in_order
 from fleet2d.units import Duration, Length, PositiveDuration, Speed, micros
 
 if TYPE_CHECKING:
-    from fleet2d.entities.actor import Actor
+    from fleet2d.entities.behavior import Actor
+
+
+def report_rooms(
+    log: ActivityLog,
+    mapped: Mapping[str, RoomChoice | None],
+    logged: LoggedVisits,
+    rule: VisitRule,
+    paces: "Paces",
+    fastest: float,
+) -> tuple[str, ...]:
+    """Return lines about a log of rooms: which room each label means, omissions, gaps, haste."""
+    lines = [_head(log, len(log.readings), "readings"), *log.notes]
+    for label, count in sorted(log.rooms.items()):
+        choice = mapped[label]
+        meaning = "left out" if choice is None else f"taken for {choice[0]}"
+        lines.append(f"{label}: {meaning}, {count} readings")
+    if logged.overruled:
+        lines.append(
+            f"{logged.overruled} readings yield to later ones of another room in their step"
+        )
+    gaps = [visit for visit in logged.visits if visit.place == UNKNOWN]
+    hours = sum_in_order(
+        (min(v.last + 1, rule.steps) - max(v.first, 0)) * rule.step_us / 3.6e9 for v in gaps
+    )
+    if gaps:
+        lines.append(f"nobody knows where it is in {len(gaps)} gaps, {hours:.1f} h in all")
+    if paces.hurried:
+        lines.append(
+            f"{paces.hurried} of {paces.walks} walks are faster than the body walks, since the log"
+            f" leaves no more time; {paces.over} of them faster than {fastest:g} m/s, the fastest"
+            f" at {paces.fastest:.1f} m/s"
+        )
+    return tuple(lines)
+
+
+def report_fixes(
+    log: PositionLog, fixes: "Fixes", follower: "FixFollower", thinned: int, frame: Frame
+) -> tuple[str, ...]:
+    """Return lines about a log of positions: omitted and moved fixes, gaps, implausible legs."""
+    lines = [_head(log, len(log.time_us), "fixes"), *log.notes]
+    if frame.matches:
+        off = frame.errors()
+        lines.append(f"the frame fits its {len(off)} matches to {float(off.max()):.2f} m")
+    if thinned:
+        lines.append(f"{thinned} fixes are left out: one in a step is enough")
+    if fixes.outside:
+        lines.append(f"{fixes.outside} fixes are outside the home and left out")
+    if fixes.snapped:
+        lines.append(f"{fixes.snapped} fixes are moved to the nearest place where the body fits")
+    if follower.around:
+        lines.append(f"{follower.around} legs go around a wall that a straight line would cross")
+    if follower.gap_count:
+        hours = follower.unknown_us / 3.6e9
+        lines.append(f"nobody knows where it is in {follower.gap_count} gaps, {hours:.2f} h in all")
+    if follower.implausible:
+        metres = follower.top_speed / follower.actor.home.plan.lattice.units_per_m
+        lines.append(
+            f"{follower.implausible} legs are too fast to be true, up to {metres:.1f} m/s: check"
+            " the frame and the times"
+        )
+    return tuple(lines)
+
+
+def _head(log: ActivityLog | PositionLog, count: int, noun: str) -> str:
+    since = f" from {log.first_day}" if log.first_day else ""
+    days = f"{log.days} day{'' if log.days == 1 else 's'}"
+    return f"{log.path.name}, layout {log.layout}: {count} {noun} of {days}{since}"
+
+
+# Coordinates are clipped to this, far outside of any home [m].
+FAR = 1e6
+# A move shorter than this is ignored for the heading [m].
+STIR = 0.1
+
+
+@dataclass(frozen=True)
+class Fixes:
+    """Fixes that the body can follow.
+
+    Attributes:
+        time_us: Times [us since the start of the run], ascending, int64 (n,).
+        xy: Positions, all free and reachable [lattice], int64 (n, 2).
+        heading: Headings [1/4096 turn], -1 where the log has none, int64 (n,).
+        snapped: The number of fixes that were moved to the nearest free place.
+        outside: The number of fixes that were left out, too far from any free place.
+    """
+
+    time_us: I64
+    xy: I64
+    heading: I64
+    snapped: int
+    outside: int
+
+
+def place_fixes(actor: "Actor", time_us: I64, xy: F64, turns: F64, reach: float) -> Fixes:
+    """Return fixes moved to the nearest place where the body can be.
+
+    Args:
+        actor: The body.
+        time_us: Times [us since the start of the run], ascending, int64 (n,).
+        xy: Positions in the plan [m], float64 (n, 2).
+        turns: Headings in the plan [turns], NaN where there is none.
+        reach: A fix farther than this from any such place is left out [m].
+    """
+    lattice, space = actor.home.plan.lattice, actor.space
+    size = 1 << 20  # beyond any home, within 64 bits when squared
+    points: I64 = np.clip(lattice.to_lattice(np.clip(xy, -FAR, FAR)), -size, size)
+    fits = [
+        0 <= x < size and 0 <= y < size and space.part_at(x, y) == actor.part
+        for x, y in points.tolist()
+    ]
+    off = np.flatnonzero(~np.array(fits, bool))
+    near = Nearest(actor).of(points[off])
+    away: I64 = near - points[off]
+    far = (away * away).sum(axis=1) > (reach * lattice.units_per_m) ** 2
+    points[off] = near
+    is_inside = np.ones(len(points), bool)
+    is_inside[off[far]] = False
+    known = np.isfinite(turns)
+    heading = np.full(len(turns), -1, np.int64)
+    heading[known] = np.floor(turns[known] * TURN + 0.5).astype(np.int64) % TURN
+    outside = int(np.count_nonzero(~is_inside))
+    return Fixes(
+        time_us[is_inside],
+        points[is_inside],
+        heading[is_inside],
+        snapped=len(off) - outside,
+        outside=outside,
+    )
+
+
+class FixFollower:
+    """Plans the way through fixes: straight from each to the next if that is free, else around.
+
+    Args:
+        actor: The body.
+        fixes: Its positions.
+        gap_us: Two fixes farther apart in time than this have a gap between them.
+        gaps: What happens in a gap: "unknown": the body is away; "hold": it stays, and leaves in
+            time for the next fix; "walk": it takes all that time for the way.
+        fastest: A leg faster than this is counted as implausible [m/s].
+    """
+
+    def __init__(
+        self, actor: "Actor", fixes: Fixes, gap_us: int, gaps: str, fastest: float
+    ) -> None:
+        self.actor = actor
+        self.fixes = fixes
+        self.gap_us, self.gaps = gap_us, gaps
+        self.fastest = fastest * actor.home.plan.lattice.units_per_m
+        self.unknown_us = self.gap_count = self.implausible = self.around = 0
+        self.top_speed = 0.0
+        self.heading = self._headings()
+
+    def follow(self, plan: "Plan") -> "Plan":
+        """Fill a plan from its beginning, with a jump to the present fix, to the last fix."""
+        time = self.fixes.time_us
+        end_us = self.actor.clock.steps * self.actor.clock.step_us
+        i = int(np.searchsorted(time, plan.time_us, side="right")) - 1
+        if i < 0 or plan.time_us - time[i] > self.gap_us:
+            self._vanish(plan, plan.time_us)
+        else:
+            plan.follow(self._row(i, plan.time_us))
+        for j in range(i + 1, len(time)):
+            if time[j] >= end_us:
+                break
+            if plan.away:
+                self._appear(plan, j)
+            elif time[j] - time[j - 1] <= self.gap_us:
+                self._leg(plan, j - 1, j, plan.time_us)
+            elif self.gaps == "unknown":
+                self._vanish(plan, plan.time_us + 1)  # at the fix itself it is known
+                self.gap_count += 1
+                self.unknown_us += int(time[j] - time[j - 1])
+                self._appear(plan, j)
+            else:
+                leave = plan.time_us
+                if self.gaps == "hold":
+                    leave = max(leave, int(time[j]) - self._takes(j - 1, j))
+                self._leg(plan, j - 1, j, leave)
+        if len(time) and not plan.away and end_us - plan.time_us > self.gap_us:
+            self._vanish(plan, plan.time_us + 1)
+        return plan.stay()
+
+    def _headings(self) -> I64:
+        """Return the heading at each fix: the log's, else the direction to the next fix."""
+        xy, heading = self.fixes.xy, self.fixes.heading.copy()
+        stir = STIR * self.actor.home.plan.lattice.units_per_m
+        last = 0
+        moves = np.diff(xy, axis=0, append=xy[-1:])
+        for i, (dx, dy) in enumerate(moves.tolist()):
+            if heading[i] < 0:
+                has_moved = dx * dx + dy * dy >= stir * stir
+                heading[i] = heading_of(dx, dy) if has_moved else last
+            last = int(heading[i])
+        return heading
+
+    def _row(self, i: int, at_us: int) -> I64:
+        """Return a breakpoint at a fix, int64 (1, 5)."""
+        x, y = self.fixes.xy[i].tolist()
+        return np.array([[at_us, x, y, self.heading[i], 0]], np.int64)
+
+    def _vanish(self, plan: "Plan", at_us: int) -> None:
+        """Make the body's position unknown: it is away, without having walked out."""
+        plan.jump(at_us, away=1).note("unknown")
+
+    def _appear(self, plan: "Plan", i: int) -> None:
+        x, y = self.fixes.xy[i].tolist()
+        at_us, heading = int(self.fixes.time_us[i]), int(self.heading[i])
+        plan.jump(at_us, x=x, y=y, heading=heading, away=0).note("known")
+
+    def _route(self, i: int, j: int) -> I64:
+        """Return the route from a fix to another, straight if that is free; int64 (n, 2)."""
+        (ax, ay), (bx, by) = self.fixes.xy[i].tolist(), self.fixes.xy[j].tolist()
+        space = self.actor.space
+        straight = straight_way((ax, ay), (bx, by))
+        if (ax, ay) == (bx, by):
+            return straight
+        if line_of_sight(space.mesh, ax, ay, locate(space.mesh, ax, ay), bx, by):
+            return straight
+        route = space.route((ax, ay), (bx, by))
+        return straight if route is None else route
+
+    def _takes(self, i: int, j: int) -> int:
+        """Return how long the body takes from one fix to another [us]."""
+        route, heading = self._route(i, j), int(self.heading[i])
+        rows = time_route(route, 0, heading, self.actor.speed, self.actor.turn_rate)
+        return int(rows[-1, 0])
+
+    def _leg(self, plan: "Plan", i: int, j: int, leave_us: int) -> None:
+        """Go from fix i, from a moment on, to fix j, at a constant speed."""
+        route = self._route(i, j)
+        arrive_us = int(self.fixes.time_us[j])
+        moves = np.diff(route, axis=0)
+        lengths = np.sqrt((moves * moves).sum(axis=1).astype(np.float64))
+        total = float(lengths.sum())
+        speed = total * 1e6 / max(arrive_us - leave_us, 1)
+        self.top_speed = max(self.top_speed, speed)
+        self.implausible += speed > self.fastest
+        self.around += len(route) > 2
+        rows = []
+        if leave_us > plan.time_us:
+            rows.append([leave_us, plan.x, plan.y, plan.heading, 0])
+        done = 0.0
+        for (x, y), length, (dx, dy) in zip(
+            route[1:-1].tolist(), lengths[:-1].tolist(), moves[1:].tolist(), strict=True
+        ):
+            done += length
+            at_us = leave_us + int((arrive_us - leave_us) * (done / total))
+            rows.append([at_us, x, y, int(heading_of(dx, dy)), 0])
+        last = self._row(j, arrive_us)
+        plan.follow(np.concatenate([np.array(rows, np.int64).reshape(-1, 5), last]))
+
+
+# In visits shorter than this, the body stops at the nearest point of the room [us].
+BRIEF_US = 10_000_000
+
+
+@dataclass
+class Paces:
+    """Counts of the walks in a replay.
+
+    Attributes:
+        walks: The number of walks.
+        hurried: Those faster than the body walks, because the log leaves no more time.
+        over: Those of the hurried ones that are implausibly fast.
+        fastest: The speed of the fastest walk [m/s].
+    """
+
+    walks: int = 0
+    hurried: int = 0
+    over: int = 0
+    fastest: float = 0.0
+
+
+class RoomFollower:
+    """Plans the way through visits: the body leaves each room in time for the next visit.
+
+    Args:
+        actor: The body.
+        visits: Its visits, in order; the first begins at step 0 or before.
+        at_once: Whether it goes to the next room as soon as it may, and waits there.
+        limit: A walk faster than this is counted as implausible [m/s].
+    """
+
+    def __init__(
+        self,
+        actor: "Actor",
+        visits: Sequence[LoggedVisit],
+        at_once: bool = False,
+        limit: float = float("inf"),
+    ) -> None:
+        self.actor = actor
+        self.limit = limit
+        self.visits = visits
+        self.at_once = at_once
+        self.step_us = actor.clock.step_us
+        self.paces = Paces()
+        self._nearest: dict[int, Nearest] = {}
+
+    def follow(self, plan: "Plan", current: int, *, rejoin: bool) -> "Plan":
+        """Fill a plan from its beginning, in visit `current`, to the end of the log.
+
+        Args:
+            plan: An empty plan.
+            current: The number of the visit at the beginning of the plan.
+            rejoin: Whether the body may be somewhere else, and walks to the visit's room first;
+                else it is put there.
+        """
+        if rejoin:
+            self._catch_up(plan, self.visits[current])
+        elif self.visits[current].place == UNKNOWN:
+            self._vanish(plan, plan.time_us)
+        else:
+            self._appear(plan, self.visits[current], plan.time_us, known=False)
+        for i in range(current + 1, len(self.visits)):
+            before, visit = self.visits[i - 1], self.visits[i]
+            arrive_us = visit.first * self.step_us
+            self._note_activities(plan, before)
+            if arrive_us <= plan.time_us:  # still catching up
+                self._catch_up(plan, visit)
+            elif visit.place == UNKNOWN:
+                self._vanish(plan, arrive_us)
+            elif before.place == UNKNOWN:
+                self._appear(plan, visit, arrive_us)
+            else:
+                self._walk(plan, before, visit)
+        self._note_activities(plan, self.visits[-1])
+        return plan.stay()
+
+    def _catch_up(self, plan: "Plan", visit: LoggedVisit) -> None:
+        """Walk to a visit that has already begun."""
+        if visit.place == UNKNOWN:
+            self._vanish(plan, plan.time_us)
+        elif visit.place == AWAY:
+            plan.leave_home()
+        else:
+            plan.go_to_point(*self._spot(visit, plan))
+
+    def _spot(self, visit: LoggedVisit, plan: "Plan") -> tuple[int, int]:
+        if visit.place in (DOOR, AWAY):
+            return self.actor.way_out
+        return self.actor.find((visit.place,), max(visit.first, 0) * self.step_us, "spot")
+
+    def _vanish(self, plan: "Plan", at_us: int) -> None:
+        """Make the body's position unknown: it is away, without having walked out."""
+        plan.jump(at_us, away=1).note("unknown")
+
+    def _appear(self, plan: "Plan", visit: LoggedVisit, at_us: int, *, known: bool = True) -> None:
+        """Put the body where the log has it."""
+        x, y = self._spot(visit, plan)
+        plan.jump(at_us, x=x, y=y, away=int(visit.place == AWAY))
+        if known:
+            plan.note("known", visit.place)
+
+    def _walk(self, plan: "Plan", before: LoggedVisit, visit: LoggedVisit) -> None:
+        """Walk from one visit to the next, so as to arrive in time."""
+        arrive_us = visit.first * self.step_us
+        may_leave = max(plan.time_us, before.keep * self.step_us)
+        if before.place == AWAY:
+            self._come_home(plan, before, arrive_us)
+            may_leave = max(plan.time_us, may_leave)
+        spot = self._spot(visit, plan)
+        rows = self._way(plan, spot)
+        lasts_us = (visit.keep - visit.first) * self.step_us
+        if visit.place not in (DOOR, AWAY) and (
+            rows[-1, 0] > arrive_us - may_leave or lasts_us < BRIEF_US
+        ):
+            rows = self._way(plan, self._near(plan, spot))
+        self._set_out(plan, rows, may_leave, arrive_us, before)
+        if visit.place == AWAY:
+            plan.jump(arrive_us, away=1).note("left_home")
+
+    def _come_home(self, plan: "Plan", out: LoggedVisit, arrive_us: int) -> None:
+        back_us = max(plan.time_us, min((out.last + 1) * self.step_us, arrive_us - 1))
+        plan.jump(back_us, away=0).note("came_home")
+
+    def _near(self, plan: "Plan", spot: tuple[int, int]) -> tuple[int, int]:
+        """Return the place in the room of a spot that is nearest to the body."""
+        plan_of_home = self.actor.home.plan
+        room = plan_of_home.room_at(*plan_of_home.lattice.to_metres(spot).tolist())
+        if room is None:
+            return spot
+        if room.index not in self._nearest:
+            self._nearest[room.index] = Nearest(self.actor, room.index)
+        x, y = self._nearest[room.index].of(np.array([[plan.x, plan.y]], np.int64))[0].tolist()
+        return x, y
+
+    def _way(self, plan: "Plan", spot: tuple[int, int]) -> I64:
+        """Return the breakpoints of the way to a spot: time since its beginning, x, y, heading."""
+        route = self.actor.space.route((plan.x, plan.y), spot)
+        if route is None:  # a door is shut at present, but the log says that somebody went there
+            route = straight_way((plan.x, plan.y), spot)
+        return time_route(route, 0, plan.heading, self.actor.speed, self.actor.turn_rate)
+
+    def _set_out(
+        self, plan: "Plan", rows: I64, may_leave: int, arrive_us: int, before: LoggedVisit
+    ) -> None:
+        """Follow the breakpoints of a way, at a time and speed that let the body arrive in time."""
+        takes = int(rows[-1, 0])
+        if not takes:
+            plan.follow(np.array([[arrive_us, *rows[-1, 1:], 0]], np.int64))
+            return
+        leave = max(may_leave, arrive_us - takes)
+        if self.at_once:
+            leave = min(leave, max(may_leave, (before.last + 1) * self.step_us))
+        window = arrive_us - leave
+        self.paces.walks += 1
+        times = rows[:, 0]
+        if takes > window:
+            times = times * window // takes
+            self.paces.hurried += 1
+            speed = self.actor.entity.speed * takes / max(window, 1)
+            self.paces.over += speed > self.limit
+            self.paces.fastest = max(self.paces.fastest, speed)
+        block = np.zeros((len(rows) + 1, 5), np.int64)
+        block[:-1, 0], block[:-1, 1:4] = leave + times, rows[:, 1:]
+        block[-1] = block[-2]
+        block[-1, 0] = arrive_us
+        plan.follow(block)
+
+    def _note_activities(self, plan: "Plan", visit: LoggedVisit) -> None:
+        """Add rows for the activities of a visit, except those before the plan begins."""
+        for step, activity in visit.activities:
+            at_us = max(step, 0) * self.step_us
+            if activity and at_us >= plan.began[0] * self.step_us:
+                plan.notes.append(Note(at_us, "activity", activity))
+
 
 GAP_OF_ROOMS = timedelta(minutes=10)
 GAP_OF_FIXES = timedelta(minutes=1)

@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 
 from fleet2d.component import register
 from fleet2d.entities.behavior import Behavior, Situation
-from fleet2d.entities.kinds import available_places
+from fleet2d.entities.place import available_places
 from fleet2d.entities.plan import Plan
 from fleet2d.entities.users.spots import Spot, Spots
 from fleet2d.errors import PlacementError
@@ -22,7 +22,7 @@ from fleet2d.streams import Draws
 from fleet2d.sums import sum_in_order
 
 if TYPE_CHECKING:
-    from fleet2d.entities.actor import Actor
+    from fleet2d.entities.behavior import Actor
     from fleet2d.floorplan.plan import Room
 
 AWAY = "away"

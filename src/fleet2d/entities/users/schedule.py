@@ -9,16 +9,14 @@ from pydantic import Field, model_validator
 from fleet2d.clock import midnight_of
 from fleet2d.component import Settings, register
 from fleet2d.entities.behavior import Behavior, Situation
-from fleet2d.entities.furniture import seat_at
-from fleet2d.entities.kinds import available_places
-from fleet2d.entities.place import Place, Point, RoomChoice, is_point
+from fleet2d.entities.place import Place, Point, RoomChoice, available_places, is_point, seat_at
 from fleet2d.entities.plan import Plan
 from fleet2d.problems import problem, problem_at
 from fleet2d.units import Duration, TimeOfDay, format_time_of_day
 from fleet2d.weekdays import OnDays, weekdays_of
 
 if TYPE_CHECKING:
-    from fleet2d.entities.actor import Actor
+    from fleet2d.entities.behavior import Actor
 
 DAY = timedelta(days=1)
 AWAY: tuple[()] = ()

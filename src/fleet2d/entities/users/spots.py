@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple, TypeVar
 from fleet2d.streams import Draws
 
 if TYPE_CHECKING:
-    from fleet2d.entities.actor import Actor
+    from fleet2d.entities.behavior import Actor
     from fleet2d.entities.place import Point
     from fleet2d.entities.plan import Plan
     from fleet2d.floorplan.home.home import Home

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from fleet2d.engine.simulation import Simulation
-from fleet2d.entities.motion import Track
+from fleet2d.entities.body import Track
 from fleet2d.errors import InputError, PlacementError
 from fleet2d.floorplan.home.change import HomeChange
 from fleet2d.kernels.numbers import TURN
