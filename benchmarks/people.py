@@ -49,7 +49,7 @@ import fleet2d.routines.survey as survey
 from fleet2d.routines.interruptions import without_interruptions
 from fleet2d.routines.life import Life
 from fleet2d.routines.persona import bundled_names, bundled_persona
-from fleet2d.streams import Draws, stream_key
+from fleet2d.runtime.determinism import Draws, stream_key
 
 LOGS = {
     "CASAS AL": "casas_al/events_10_days.txt",

@@ -21,12 +21,11 @@ from fleet2d.artifacts.arrow import read_parquet
 from fleet2d.artifacts.manifest import Manifest
 from fleet2d.bounds import BOUNDS, FILE_BYTES, Bound, one_line, read_bytes
 from fleet2d.calibrate.log import read_log as read_detections
-from fleet2d.document import read_document
+from fleet2d.configuration.documents import parse, read_document
 from fleet2d.errors import Fleet2DError, InputError
 from fleet2d.floorplan.load import load_floorplan
 from fleet2d.logs.read import read_log
 from fleet2d.scenario.model import load_scenario
-from fleet2d.yaml_tree import parse
 
 SMALL = {
     "VALUES": 20_000, "FILE_BYTES": 1_000_000, "LEARNED_BYTES": 1 << 20, "TABLE_BYTES": 1 << 20,

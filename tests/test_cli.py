@@ -18,8 +18,8 @@ import yaml
 from tests.scenes import Cli, every_step, everything, flat_path, fleet2d_process, scenario
 
 import fleet2d as package
-from fleet2d import component
-from fleet2d.document import read_document
+from fleet2d.configuration import components
+from fleet2d.configuration.documents import read_document
 from fleet2d.scenario.compose import bundled_path
 
 PNG = b"\x89PNG\r\n\x1a\n"
@@ -233,8 +233,8 @@ def test_what_is_wrong_does_not_fit_the_schema(
 def test_components_lists_every_type_with_its_fields(fleet2d: Cli) -> None:
     code, out, _ = fleet2d("components")
     assert 0 == code
-    for kind in component.PACKAGES:
-        result = component.components(kind)
+    for kind in components.PACKAGES:
+        result = components.components(kind)
         for name, cls in result.items():
             assert f"{kind}: {name}" in out
             for field in cls.model_fields:
@@ -247,8 +247,8 @@ def test_components_as_json_are_a_list(fleet2d: Cli) -> None:
     code, out, _ = fleet2d("components", "--json")
     assert 0 == code
     listed = {(entry["kind"], entry["type"]) for entry in json.loads(out)}
-    types = {(kind, name) for kind in component.PACKAGES for name in component.components(kind)}
-    assert types == {entry for entry in listed if entry[0] in component.PACKAGES}
+    types = {(kind, name) for kind in components.PACKAGES for name in components.components(kind)}
+    assert types == {entry for entry in listed if entry[0] in components.PACKAGES}
     assert {("behavior", "schedule"), ("floorplan", "bundled"), ("metric", "distance")} <= listed
     assert {("presence_estimator", "fremen"), ("presence_model", "hmm")} <= listed
 

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from tests.scenes import run, scenario, table
 
 import fleet2d
-from fleet2d.clock import Clock
+from fleet2d.runtime.clock import Clock
 
 START = datetime(2026, 3, 28, 23, 59, 59, 500_000)
 

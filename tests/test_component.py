@@ -11,8 +11,8 @@ from typing import Annotated, Any, ClassVar
 import pytest
 from pydantic import Field, TypeAdapter, ValidationError
 
-from fleet2d import component
-from fleet2d.component import (
+from fleet2d.configuration import components as module
+from fleet2d.configuration.components import (
     Component,
     OneOf,
     Settings,
@@ -21,8 +21,8 @@ from fleet2d.component import (
     lookup,
     register,
 )
+from fleet2d.configuration.units import Duration, Length, Text
 from fleet2d.errors import ScenarioError
-from fleet2d.units import Duration, Length, Text
 
 
 class Gadget(Component):
@@ -54,8 +54,8 @@ class Shelf(Settings):
 
 @pytest.fixture(autouse=True)
 def gadgets(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    monkeypatch.setattr(component, "_REGISTRY", {})
-    monkeypatch.setattr(component, "_ALIASES", {})
+    monkeypatch.setattr(module, "_REGISTRY", {})
+    monkeypatch.setattr(module, "_ALIASES", {})
     register("gadget", "lamp", aliases=("light",))(Lamp)
     register("gadget", "fan")(Fan)
     yield
@@ -150,7 +150,7 @@ def test_base_is_the_class_that_declares_the_kind() -> None:
 
 @pytest.mark.parametrize("name", ["meander", "schedule", "patrol"])
 def test_builtin_component_is_found_without_an_import(name: str) -> None:
-    code = f"from fleet2d.component import lookup; print(lookup('behavior', {name!r}).type_name)"
+    code = f"from fleet2d.configuration.components import lookup; print(lookup('behavior', {name!r}).type_name)"
     result = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True
     )
@@ -160,7 +160,7 @@ def test_builtin_component_is_found_without_an_import(name: str) -> None:
 
 OWN = """
 from typing import ClassVar
-from fleet2d.component import Component
+from fleet2d.configuration.components import Component
 from {dots}helpers import SIZE
 
 class Own(Component):
@@ -235,7 +235,7 @@ def test_module_that_is_imported_already_is_not_loaded_twice(
         ("later:Own", "'later:Own' has a field whose type can't be found"),
         ("own.py:Own:x", "write module:Class"),
         ("pathlib:Path", "'pathlib:Path' is not a gadget"),
-        ("fleet2d.component:Component", "is not a gadget"),
+        ("fleet2d.configuration.components:Component", "is not a gadget"),
         ("fleet2d.floorplan.source:FloorPlanSource", "is not a gadget"),
         (":", "can't import ':'"),
     ],
@@ -247,7 +247,7 @@ def test_own_component_that_cannot_be_had_is_explained(
     (folders[0] / "unparsable.py").write_text("class Own(")
     (folders[0] / "needs.py").write_text("import sys\nimport nowhere")
     (folders[0] / "wrong.py").write_text("from .helpers import X")
-    head = "from fleet2d.component import Component\nclass Own(Component):\n    "
+    head = "from fleet2d.configuration.components import Component\nclass Own(Component):\n    "
     (folders[0] / "untyped.py").write_text(f"{head}user = 'mia'")
     (folders[0] / "later.py").write_text(
         f"from __future__ import annotations\n{head}kind: ClassVar[str] = 'gadget'\n    user: Nowhere".replace(

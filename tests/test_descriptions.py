@@ -4,8 +4,7 @@ from typing import Any
 
 from pydantic import Field
 
-from fleet2d.component import Settings, components
-from fleet2d.descriptions import descriptions, summary
+from fleet2d.configuration.components import Settings, components, descriptions, summary
 
 
 class Lamp(Settings):

@@ -15,7 +15,8 @@ from tests.test_docs_tables import is_default
 import fleet2d
 from fleet2d import History, Plan, Present, Situation
 from fleet2d.bounds import BOUNDS
-from fleet2d.component import lookup
+from fleet2d.configuration.components import lookup
+from fleet2d.configuration.units import AngleDeg, Duration, Length, Share, Speed, TurnRateDeg
 from fleet2d.errors import InputError
 from fleet2d.expectations.parse import parse_expectation
 from fleet2d.floorplan.home.costmap import CostmapSettings
@@ -28,7 +29,6 @@ from fleet2d.routines.manners import Manners
 from fleet2d.routines.persona import bundled_names
 from fleet2d.studies.specification import StudyFile
 from fleet2d.testing.rate import rate_test
-from fleet2d.units import AngleDeg, Duration, Length, Share, Speed, TurnRateDeg
 
 ROOT = Path(__file__).parent.parent
 

@@ -11,7 +11,7 @@ import yaml
 from pydantic import BaseModel, TypeAdapter, ValidationError
 
 from fleet2d.cli.app import app
-from fleet2d.component import lookup
+from fleet2d.configuration.components import lookup
 from fleet2d.entities.behavior import Behavior
 from fleet2d.entities.localization import Localization
 from fleet2d.sight.camera import Camera

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from fleet2d.document import Document, parse_yaml, read_document
+from fleet2d.configuration.documents import Document, parse_yaml, read_document
+from fleet2d.configuration.units import Text
 from fleet2d.errors import ScenarioError
-from fleet2d.units import Text
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ from tests.scenes import everything, run, scenario, table
 
 import fleet2d
 from fleet2d.errors import InputError
-from fleet2d.events import CHANGES, HOME, SIGHTS, Event, EventKind, EventStream, Listener
+from fleet2d.runtime.events import CHANGES, HOME, SIGHTS, Event, EventKind, EventStream, Listener
 
 
 class Sink:

@@ -32,7 +32,7 @@ REST = """
 import sys
 import fleet2d
 from fleet2d.cli.app import app
-from fleet2d.component import PACKAGES, components
+from fleet2d.configuration.components import PACKAGES, components
 
 for kind in PACKAGES:
     components(kind)

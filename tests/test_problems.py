@@ -9,7 +9,7 @@ import pytest
 from pydantic import AfterValidator, BaseModel, Field, ValidationError
 from pydantic_core import PydanticCustomError
 
-from fleet2d.problems import did_you_mean, problem_at, rewrite, suggest, unknown_key
+from fleet2d.configuration.problems import did_you_mean, problem_at, rewrite, suggest, unknown_key
 
 
 class Side(Enum):

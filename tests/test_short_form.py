@@ -6,9 +6,8 @@ import pytest
 from pydantic import TypeAdapter
 from tests.test_component import errors, gadgets
 
-from fleet2d.component import Component, OneOf, Settings
-from fleet2d.short_form import ShortForm, split_short_form
-from fleet2d.units import Length
+from fleet2d.configuration.components import Component, OneOf, Settings, ShortForm, split_short_form
+from fleet2d.configuration.units import Length
 
 __all__ = ["gadgets"]  # a fixture
 

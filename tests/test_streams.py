@@ -5,7 +5,7 @@ from itertools import product
 import numpy as np
 import pytest
 
-from fleet2d.streams import Draws, stream_key
+from fleet2d.runtime.determinism import Draws, stream_key
 
 
 def test_every_seed_path_and_purpose_has_a_stream_of_its_own() -> None:

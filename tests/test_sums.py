@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 import fleet2d
-from fleet2d.sums import sum_in_order
+from fleet2d.runtime.determinism import sum_in_order
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 

@@ -13,9 +13,9 @@ from tests.studies.scenes import base
 
 import fleet2d as package
 from fleet2d import cli
+from fleet2d.configuration.trust import Trust, check_code, code_of, restrict
 from fleet2d.errors import ComponentError, ScenarioError
 from fleet2d.studies.reader import open_study
-from fleet2d.trust import Trust, check_code, code_of, restrict
 
 Result = tuple[int, str, str]
 Cli = Callable[..., Result]

@@ -12,8 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import BaseModel, TypeAdapter, ValidationError
 
-from fleet2d.errors import ScenarioError
-from fleet2d.units import (
+from fleet2d.configuration.units import (
     LONGEST_DURATION,
     AngleDeg,
     Duration,
@@ -31,6 +30,7 @@ from fleet2d.units import (
     parse_duration,
     whole_steps,
 )
+from fleet2d.errors import ScenarioError
 
 
 def read(type_: Any, value: object) -> Any:

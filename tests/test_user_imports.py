@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from fleet2d.user_imports import with_imports
+from fleet2d.configuration.trust import with_imports
 
 
 def names(folder: Path, *files: str) -> list[str]:

@@ -5,7 +5,7 @@ from typing import get_args
 import pytest
 from pydantic_core import PydanticCustomError
 
-from fleet2d.weekdays import GROUPS, WEEKDAYS, Days, weekdays_of
+from fleet2d.configuration.units import GROUPS, WEEKDAYS, Days, weekdays_of
 
 
 def test_every_name_that_a_scenario_may_give_stands_for_days() -> None:

@@ -1,7 +1,7 @@
 // Counter-based random bits: a pure function of (key, counter), so no draw depends on another.
 //
 // The generator is SplitMix64 (Steele, Lea, Flood: "Fast splittable pseudorandom number generators",
-// OOPSLA 2014), addressed by counter instead of by state. Keys come from fleet2d.streams.
+// OOPSLA 2014), addressed by counter instead of by state. Keys come from fleet2d.runtime.determinism.
 #pragma once
 
 #include "array.hpp"

@@ -6,8 +6,8 @@ Heavy parts load when they are first used.
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from fleet2d.garbage import library_imports
 from fleet2d.leaves import Judges, Views, register_judges, register_views
+from fleet2d.memory import library_imports
 from fleet2d.version import __version__ as __version__
 
 if TYPE_CHECKING:
@@ -15,7 +15,10 @@ if TYPE_CHECKING:
     from fleet2d.algorithms.algorithm import Present as Present
     from fleet2d.algorithms.history import History as History
     from fleet2d.algorithms.output import RoomDistribution as RoomDistribution
-    from fleet2d.component import register as register
+    from fleet2d.configuration.components import register as register
+    from fleet2d.configuration.units import Duration as Duration
+    from fleet2d.configuration.units import Length as Length
+    from fleet2d.configuration.units import Share as Share
     from fleet2d.engine.interrupts.interrupt import Interrupt as Interrupt
     from fleet2d.engine.interrupts.interrupt import SpanView as SpanView
     from fleet2d.engine.reproduce import reproduce as reproduce
@@ -52,9 +55,6 @@ if TYPE_CHECKING:
     from fleet2d.studies.api import study as study
     from fleet2d.studies.reader import Study as Study
     from fleet2d.studies.reader import open_study as open_study
-    from fleet2d.units import Duration as Duration
-    from fleet2d.units import Length as Length
-    from fleet2d.units import Share as Share
 
 _HOME_OF = {
     "Actor": "entities.actor",
@@ -63,7 +63,7 @@ _HOME_OF = {
     "CameraSightings": "sight.camera_sightings",
     "ComponentError": "errors",
     "Drive": "entities.drives.drive",
-    "Duration": "units",
+    "Duration": "configuration.units",
     "FieldOfView": "sight.fov",
     "Fleet2DError": "errors",
     "FloorPlan": "floorplan.plan",
@@ -75,7 +75,7 @@ _HOME_OF = {
     "Interrupt": "engine.interrupts.interrupt",
     "LabelledRegion": "floorplan.plan",
     "Leg": "entities.drives.drive",
-    "Length": "units",
+    "Length": "configuration.units",
     "Metric": "metrics.metric",
     "Moment": "entities.drives.drive",
     "PerceptionError": "sight.perception_error",
@@ -85,7 +85,7 @@ _HOME_OF = {
     "Route": "entities.drives.drive",
     "Run": "runs.run",
     "Scenario": "scenario.model",
-    "Share": "units",
+    "Share": "configuration.units",
     "Simulation": "engine.simulation",
     "Situation": "entities.behavior",
     "SpanView": "engine.interrupts.interrupt",
@@ -96,7 +96,7 @@ _HOME_OF = {
     "map_runs": "studies.api",
     "open_run": "runs.run",
     "open_study": "studies.reader",
-    "register": "component",
+    "register": "configuration.components",
     "reproduce": "engine.reproduce",
     "resume": "engine.resume",
     "run": "engine.run",

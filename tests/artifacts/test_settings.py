@@ -7,7 +7,7 @@ import pytest
 from pydantic import ValidationError
 
 from fleet2d.artifacts.settings import ArtifactSettings
-from fleet2d.descriptions import descriptions
+from fleet2d.configuration.components import descriptions
 
 
 @pytest.mark.parametrize(

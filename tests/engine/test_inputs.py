@@ -14,7 +14,7 @@ from fleet2d.engine.inputs import input_files
 NET = """
 import numpy as np
 from fleet2d.algorithms.presence.model import Model
-from fleet2d.units import InputPath
+from fleet2d.configuration.units import InputPath
 
 class Net(Model):
     '''Learned elsewhere.'''

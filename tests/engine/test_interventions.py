@@ -11,7 +11,7 @@ from tests.scenes import everything, scenario
 import fleet2d
 from fleet2d.engine.interventions import OUTSIDE, DueIntervention, read_intervention
 from fleet2d.errors import InputError, PlacementError, ScenarioError
-from fleet2d.events import Event
+from fleet2d.runtime.events import Event
 
 
 def home(duration: str = "20 min", **more: Any) -> dict[str, Any]:

@@ -14,11 +14,10 @@ from tests.scenes import fleet2d_process, process, scenario
 
 import fleet2d
 from fleet2d import Algorithm, Behavior, Metric
-from fleet2d.blame import blame
 from fleet2d.cli.watchdog import watched
-from fleet2d.errors import ComponentError, Fleet2DError, ScenarioError
+from fleet2d.configuration.trust import import_class
+from fleet2d.errors import ComponentError, Fleet2DError, ScenarioError, blame
 from fleet2d.runs.run import open_run
-from fleet2d.user_modules import import_class
 
 
 class Text(Exception):

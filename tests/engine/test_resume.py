@@ -71,8 +71,8 @@ def test_a_run_may_be_cut_off_many_times(tmp_path: Path) -> None:
     for minute in (12, 25, 31, 44, 58):
         simulation.run_until(60 * minute)
         directory = cut_off(simulation)
+        from fleet2d.configuration.trust import Trust
         from fleet2d.engine.resume import reopen
-        from fleet2d.trust import Trust
 
         simulation, remark = reopen(directory, Trust())
         assert f"step {600 * (minute // 10)}" in remark

@@ -19,7 +19,7 @@ from fleet2d.kernels.numbers import (
     random_uniform,
     sine,
 )
-from fleet2d.streams import stream_key
+from fleet2d.runtime.determinism import stream_key
 
 WRONG = {
     "drift": "5 cm", "drift_deg": 1, "jump": "50 cm", "jumps_per_hour": 10,

@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 from tests.reference.expectations import Formula, robustness
 from tests.thorough import examples
 
-from fleet2d.clock import Clock
 from fleet2d.expectations import (
     after,
     always,
@@ -26,6 +25,7 @@ from fleet2d.expectations import (
 from fleet2d.expectations.expectation import Expectation, RunSignals
 from fleet2d.expectations.trace import Trace
 from fleet2d.expectations.verdict import verdict_of
+from fleet2d.runtime.clock import Clock
 
 CLOCK = Clock(datetime(2026, 1, 5), 1_000_000, 1000)
 BUILD = {

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from tests.thorough import some
 
 from fleet2d import cli
-from fleet2d.document import read_document
+from fleet2d.configuration.documents import read_document
 from fleet2d.fit.command import fit_routine
 from fleet2d.fit.compare import (
     Distances,
@@ -29,7 +29,7 @@ from fleet2d.fit.validate import Validation, validate
 from fleet2d.logs.log import ActivityLog, LogError
 from fleet2d.logs.read import read_log
 from fleet2d.routines.persona import Persona, read_persona
-from fleet2d.streams import Draws, stream_key
+from fleet2d.runtime.determinism import Draws, stream_key
 
 FIRST = datetime(2020, 3, 2)  # a Monday
 LOGS = ["homer_plus_a", "uci_adl_a", "casas_al/events_10_days.txt"]

@@ -17,7 +17,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from tests.thorough import examples
 
-from fleet2d.component import components, lookup
+from fleet2d.configuration.components import components, lookup
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.formats.drawing import read_image
 from fleet2d.floorplan.formats.ros import read_ros

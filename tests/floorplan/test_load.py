@@ -8,13 +8,13 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-from fleet2d import component
+from fleet2d.configuration import components
+from fleet2d.configuration.units import Text
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.load import advise_type, format_of_file, is_floorplan, load_floorplan
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.source import FloorPlanSource
 from fleet2d.floorplan.synthetic.source import Synthetic
-from fleet2d.paths import Text
 
 # How many rooms the file has (None: it names none), and its free space without specks [m2].
 MAPS = {
@@ -106,9 +106,9 @@ def test_format_is_recognized_by_the_ending_that_it_declares(
         def load(self) -> FloorPlan:
             return load_floorplan(self.path.read_text(), self.cell)
 
-    component.components("floorplan")
-    kinds = component._REGISTRY["floorplan"]
-    monkeypatch.setitem(component._REGISTRY, "floorplan", {**kinds, "drawn": Drawn})
+    components.components("floorplan")
+    kinds = components._REGISTRY["floorplan"]
+    monkeypatch.setitem(components._REGISTRY, "floorplan", {**kinds, "drawn": Drawn})
     file = tmp_path / "mine.HOME"
     file.write_text("synthetic:7")
 

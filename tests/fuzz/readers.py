@@ -24,12 +24,12 @@ import fleet2d
 from fleet2d.algorithms.learned import load_learned
 from fleet2d.artifacts.seal import verify_run
 from fleet2d.calibrate.log import read_log as read_detections
+from fleet2d.configuration.trust import Trust, restrict
 from fleet2d.floorplan.load import load_floorplan
 from fleet2d.logs import read_log
 from fleet2d.routines.persona import BUNDLED as PERSONAS
 from fleet2d.scenario.model import load_scenario
 from fleet2d.studies.specification import read_specification
-from fleet2d.trust import Trust, restrict
 
 RUN = Path(__file__).parents[1] / "fixtures" / "runs" / "v2"
 

@@ -6,9 +6,9 @@ from typing import Any
 import pytest
 from pydantic import TypeAdapter, ValidationError
 
-from fleet2d.clock import Clock
-from fleet2d.events import Event
 from fleet2d.interventions.when import ClockTime, On, Trigger, When, parse_when
+from fleet2d.runtime.clock import Clock
+from fleet2d.runtime.events import Event
 
 WHEN: TypeAdapter[Any] = TypeAdapter(When)
 ON: TypeAdapter[Any] = TypeAdapter(On)

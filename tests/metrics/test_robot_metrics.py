@@ -13,7 +13,7 @@ from tests.entities.robots.test_find import belief
 from tests.scenes import flat_document, run, scenario, table
 
 from fleet2d import Algorithm, Metric
-from fleet2d.component import lookup
+from fleet2d.configuration.components import lookup
 from fleet2d.metrics.survival import kaplan_meier, quantile, restricted_mean
 from fleet2d.runs.run import Run
 

@@ -11,7 +11,7 @@ import pytest
 
 import fleet2d
 from fleet2d.cli.app import app
-from fleet2d.document import read_document
+from fleet2d.configuration.documents import read_document
 from fleet2d.entities.entity import Robot, User
 from fleet2d.entities.meander import Meander
 from fleet2d.errors import ArtifactError, FloorPlanError, InputError, ScenarioError

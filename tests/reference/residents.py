@@ -10,7 +10,7 @@ from fleet2d.entities.users.spots import Seat, Spot
 from fleet2d.kernels.numbers import TURN, Bits, turn_between
 from fleet2d.routines.laws import exponential
 from fleet2d.routines.planner import PLANNED, RESUMES
-from fleet2d.streams import Draws
+from fleet2d.runtime.determinism import Draws
 
 SECOND_US = 1_000_000
 AnyPlace = Spot | Seat

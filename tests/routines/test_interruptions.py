@@ -29,7 +29,7 @@ from fleet2d.routines.interruptions import (
 from fleet2d.routines.life import Life
 from fleet2d.routines.persona import Persona, bundled_names, bundled_persona
 from fleet2d.routines.planner import INTERRUPTS, RESUMES, SLEEP, Doing
-from fleet2d.streams import Draws
+from fleet2d.runtime.determinism import Draws
 
 HOUR = 3600
 IDLE = {"days": {"any_day": {"on": "daily", "wake": "07:00", "sleep": "23:00"}}}

@@ -22,7 +22,7 @@ from fleet2d.routines.laws import (
     normal,
     uniform,
 )
-from fleet2d.streams import Draws, stream_key
+from fleet2d.runtime.determinism import Draws, stream_key
 
 KEY = stream_key(4, "users.ana", "law")
 

@@ -5,12 +5,12 @@ from typing import Annotated, ClassVar
 
 import pytest
 
-from fleet2d import component
-from fleet2d.component import Component, OneOf, register
+from fleet2d.configuration import components
+from fleet2d.configuration.components import Component, OneOf, register
+from fleet2d.configuration.units import Duration, InputPath, Length, Share
 from fleet2d.entities.behavior import Behavior
 from fleet2d.entities.drives.differential import Differential
 from fleet2d.sight.line_of_sight import LineOfSight
-from fleet2d.units import Duration, InputPath, Length, Share
 
 
 class Plan(Component):
@@ -75,11 +75,11 @@ class Tally(Component):
 @pytest.fixture
 def stand_ins(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let the stand-ins be all the components that there are."""
-    for kind in component.PACKAGES:
-        component.components(kind)  # a built-in imported later would register among the stand-ins
-    monkeypatch.setattr(component, "_REGISTRY", {})
-    monkeypatch.setattr(component, "_ALIASES", {})
-    monkeypatch.setattr(component, "_COMPLETE", set(component.PACKAGES))
+    for kind in components.PACKAGES:
+        components.components(kind)  # a built-in imported later would register among the stand-ins
+    monkeypatch.setattr(components, "_REGISTRY", {})
+    monkeypatch.setattr(components, "_ALIASES", {})
+    monkeypatch.setattr(components, "_COMPLETE", set(components.PACKAGES))
     register("sight", "line_of_sight")(LineOfSight)  # defaults that every scenario has
     register("drive", "differential")(Differential)
     register("floorplan", "houseexpo", aliases=("he",))(File)

@@ -7,8 +7,8 @@ from typing import Any, Literal
 import pytest
 from pydantic import Field, ValidationError, model_validator
 
-from fleet2d.component import Settings
-from fleet2d.document import Document
+from fleet2d.configuration.components import Settings
+from fleet2d.configuration.documents import Document
 from fleet2d.engine.simulation import Simulation
 from fleet2d.errors import InputError
 from fleet2d.scenario.explain import describe, explain

@@ -29,7 +29,7 @@ metrics:
 """
 OWN = """
 from typing import ClassVar
-from fleet2d.component import Component
+from fleet2d.configuration.components import Component
 
 class Own(Component):
     kind: ClassVar[str] = "algorithm"

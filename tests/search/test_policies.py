@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.thorough import examples
 
+from fleet2d.runtime.determinism import Draws, stream_key
 from fleet2d.search.policies import (
     MOST_EXACT,
     after_empty_looks,
@@ -21,7 +22,6 @@ from fleet2d.search.policies import (
     receding,
 )
 from fleet2d.search.problem import SearchProblem, clairvoyant_time, play, search_problem
-from fleet2d.streams import Draws, stream_key
 
 DRAWS = Draws(stream_key(4, "robots.astro", "order"), 0)
 HEURISTICS = (nearest_first, likeliest_first, greedy, receding)

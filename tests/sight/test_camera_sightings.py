@@ -6,8 +6,8 @@ from tests.sight.sightings import sightings
 
 import fleet2d
 from fleet2d.kernels.numbers import random_bell
+from fleet2d.runtime.determinism import stream_key
 from fleet2d.sight.perception_error import PerceptionError
-from fleet2d.streams import stream_key
 
 AT = np.linspace(0, 5, 7)
 

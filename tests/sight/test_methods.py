@@ -11,7 +11,7 @@ import shapely
 from tests.scenes import flat_path
 
 import fleet2d
-from fleet2d.component import components
+from fleet2d.configuration.components import components
 from fleet2d.errors import InputError
 from fleet2d.floorplan.home.home import Home
 from fleet2d.floorplan.plan import FloorPlan

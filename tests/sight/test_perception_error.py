@@ -9,7 +9,7 @@ from tests.own_errors import Missed
 from tests.scenes import OWN, scenario
 
 import fleet2d
-from fleet2d import component
+from fleet2d.configuration import components
 from fleet2d.scenario.schema import schema
 from fleet2d.sight.errors.outliers import Outliers
 
@@ -74,10 +74,10 @@ def test_what_is_wrong_is_named(errors: Any, message: str) -> None:
 def test_a_plugin_is_found_by_the_name_of_its_entry_point(monkeypatch: pytest.MonkeyPatch) -> None:
     entry = EntryPoint("missing", "tests.own_errors:Missed", "fleet2d.perception_error")
     kinds = {"perception_error": [entry]}
-    monkeypatch.setattr(component, "_plugins", lambda kind: kinds.get(kind, []))
+    monkeypatch.setattr(components, "_plugins", lambda kind: kinds.get(kind, []))
     monkeypatch.setattr(Missed, "type_name", Missed.type_name)
     assert {"missing": Missed(person="ana")} == errors_of(content({"missing": {"person": "ana"}}))
-    assert "missing" in component.components("perception_error")
+    assert "missing" in components.components("perception_error")
 
 
 def test_the_schema_knows_errors_with_and_without_a_type() -> None:

@@ -4,8 +4,8 @@ from datetime import datetime
 
 import pytest
 
-from fleet2d.clock import Clock
 from fleet2d.errors import InputError
+from fleet2d.runtime.clock import Clock
 from fleet2d.viewer.moments import step_of
 
 CLOCK = Clock(datetime(2026, 1, 5, 6), 1_000_000, 10 * 86_400)

@@ -10,10 +10,10 @@ import numpy as np
 
 from fleet2d.algorithms.history import History
 from fleet2d.algorithms.learned import check_shapes, run_state
-from fleet2d.component import Component
+from fleet2d.configuration.components import Component
+from fleet2d.configuration.units import InputPath, PositiveDuration
 from fleet2d.floorplan.home.home import Home
-from fleet2d.streams import Draws, stream_key
-from fleet2d.units import InputPath, PositiveDuration
+from fleet2d.runtime.determinism import Draws, stream_key
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,8 @@ from fleet2d.algorithms.log import Log as Log
 from fleet2d.algorithms.observations import Looks, Observations, Truth, truth
 from fleet2d.algorithms.poses import BodyPoses
 from fleet2d.errors import ComponentError
-from fleet2d.events import Event
 from fleet2d.kernels import I32, I64, Bool
+from fleet2d.runtime.events import Event
 
 
 @dataclass(frozen=True)

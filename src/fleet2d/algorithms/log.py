@@ -12,11 +12,11 @@ from fleet2d.algorithms.observations import Looks, NearestRooms, Observations, R
 from fleet2d.algorithms.patches import Patches
 from fleet2d.algorithms.poses import BodyPoses, Path
 from fleet2d.errors import ComponentError
-from fleet2d.events import HOME, Event, EventKind
 from fleet2d.floorplan.home.home import Home
 from fleet2d.kernels import I64
 from fleet2d.kernels.motion import Window
 from fleet2d.kernels.sight import SightingColumn as Column
+from fleet2d.runtime.events import HOME, Event, EventKind
 
 
 class SensorRow(NamedTuple):

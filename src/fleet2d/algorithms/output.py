@@ -6,10 +6,10 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fleet2d.configuration.problems import suggest
 from fleet2d.errors import ComponentError
 from fleet2d.floorplan.home.change import HomeChanges
 from fleet2d.kernels import F64
-from fleet2d.problems import suggest
 
 WITHHELD = "withheld"
 """Stands for an output that nobody may read."""

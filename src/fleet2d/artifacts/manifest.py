@@ -18,12 +18,12 @@ from fleet2d.artifacts.strict_json import read_json
 from fleet2d.artifacts.table import Kind
 from fleet2d.artifacts.versions import versions
 from fleet2d.bounds import FILE_BYTES, read_bytes
+from fleet2d.configuration.problems import did_you_mean
 from fleet2d.errors import RunDirectoryError
-from fleet2d.problems import did_you_mean
 from fleet2d.storage.files import write_atomically
 
 if TYPE_CHECKING:
-    from fleet2d.clock import Clock
+    from fleet2d.runtime.clock import Clock
 
 FORMAT = 2
 """Version of the layout of run directories; a reader refuses a later one."""

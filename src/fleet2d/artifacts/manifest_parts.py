@@ -11,7 +11,7 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
-from fleet2d.units import parse_duration
+from fleet2d.configuration.units import parse_duration
 
 # The farthest that a camera sees [m]: far beyond any home.
 _FARTHEST_M = 1000.0

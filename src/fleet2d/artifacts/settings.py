@@ -7,8 +7,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator
 
-from fleet2d.component import Settings
-from fleet2d.units import PositiveDuration
+from fleet2d.configuration.components import Settings
+from fleet2d.configuration.units import PositiveDuration
 
 
 def _off_as_text(value: Any) -> Any:

@@ -13,7 +13,7 @@ from typing import Protocol
 
 import numpy as np
 
-from fleet2d.extras import extra
+from fleet2d.errors import extra
 from fleet2d.kernels import F64, Bool
 
 with extra("calibrate", "calibration needs scipy"):

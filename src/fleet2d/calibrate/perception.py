@@ -11,7 +11,7 @@ from fleet2d.calibrate.factors import Constant, Falling, Orientation
 from fleet2d.calibrate.likelihood import Factor, Fit, ParameterEstimate, ProductLikelihood, wilson
 from fleet2d.calibrate.log import DetectionLog, recognized
 from fleet2d.kernels import F64, I64, Bool
-from fleet2d.sums import sum_in_order
+from fleet2d.runtime.determinism import sum_in_order
 
 GROUPS = 10
 SIGNIFICANCE = 0.05  # the largest p value of a likelihood ratio test with which a factor is used

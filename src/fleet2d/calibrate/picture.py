@@ -7,7 +7,7 @@ import numpy as np
 from fleet2d.calibrate.likelihood import wilson
 from fleet2d.calibrate.log import recognized
 from fleet2d.calibrate.perception import Calibration, ProbabilityGroup
-from fleet2d.extras import extra
+from fleet2d.errors import extra
 from fleet2d.kernels import F64, Bool
 from fleet2d.pictures.floorplan import check_picture, drawing_style, save_figure
 

@@ -5,9 +5,8 @@ import os
 import sys
 from typing import NoReturn
 
-from fleet2d.blame import ctrl_c_watch, exit_guard
-from fleet2d.errors import Fleet2DError, InputError
-from fleet2d.garbage import keep_free_memory, rare_collections
+from fleet2d.errors import Fleet2DError, InputError, ctrl_c_watch, exit_guard
+from fleet2d.memory import keep_free_memory, rare_collections
 
 
 def main() -> NoReturn:

@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
+from fleet2d.configuration.problems import refusal, suggest
 from fleet2d.errors import InputError
-from fleet2d.problems import refusal, suggest
 
 
 def show_diary(name: str | None, out: Path | None, days: int, seed: int) -> list[str]:

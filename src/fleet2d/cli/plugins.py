@@ -15,7 +15,7 @@ from typer.core import TyperGroup
 from typer.main import get_group
 
 from fleet2d.cli import commands
-from fleet2d.garbage import rare_collections
+from fleet2d.memory import rare_collections
 
 GROUP = "fleet2d.command"
 

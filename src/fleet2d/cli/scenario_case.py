@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from fleet2d.arguments import file_name
+from fleet2d.options import file_name
 
 if TYPE_CHECKING:
     from fleet2d.expectations.verdict import Verdict

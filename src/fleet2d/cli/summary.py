@@ -53,7 +53,7 @@ def print_summary(summary: dict[str, Any], run: "Run") -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from fleet2d.units import format_duration
+    from fleet2d.configuration.units import format_duration
 
     console = Console()
     wall = summary["wall_s"]
@@ -99,7 +99,7 @@ def _text(value: Any, unit: str) -> str:
 
 def _class_of(run: "Run", metric: str) -> "type[Metric]":
     """Return the class of a metric, which has its units and its summary."""
-    from fleet2d.component import lookup
+    from fleet2d.configuration.components import lookup
 
     configured = run.manifest["scenario"]["metrics"][metric]
     return cast("type[Metric]", lookup("metric", configured["type"]))

@@ -11,7 +11,7 @@ from types import FrameType
 
 import typer
 
-from fleet2d.blame import blame
+from fleet2d.errors import blame
 
 FIRST_S = 30.0
 """Time after which a running component is named [s]; the next message comes after twice as long."""

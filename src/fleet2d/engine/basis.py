@@ -3,10 +3,10 @@
 from dataclasses import dataclass
 
 from fleet2d.artifacts.store import RunStore
-from fleet2d.clock import Clock
 from fleet2d.engine.bodies import Bodies
 from fleet2d.entities.decisions import DecidingActor
 from fleet2d.floorplan.home.home import Home
+from fleet2d.runtime.clock import Clock
 from fleet2d.scenario.model import Scenario
 
 

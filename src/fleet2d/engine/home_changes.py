@@ -13,22 +13,22 @@ from typing import NamedTuple
 import numpy as np
 import shapely
 
-from fleet2d.clock import midnight_of
+from fleet2d.configuration.problems import suggest
+from fleet2d.configuration.units import micros
 from fleet2d.engine.basis import Basis
 from fleet2d.engine.door_crossings import crossings, way_ahead
 from fleet2d.entities.behavior import Actor
 from fleet2d.entities.body import Track
 from fleet2d.entities.objects.door import Door, how_to_hang_a_door
 from fleet2d.errors import ComponentError, PlacementError, ScenarioError
-from fleet2d.events import HOME, Event, EventKind
 from fleet2d.floorplan.arrangement import move_object
 from fleet2d.floorplan.home.change import HomeChange
 from fleet2d.floorplan.home.home import lattice_footprint
 from fleet2d.floorplan.home.space import grow_shape
 from fleet2d.floorplan.rooms.vocabulary import PRIORITY, usual_type
 from fleet2d.kernels import F64
-from fleet2d.problems import suggest
-from fleet2d.units import micros
+from fleet2d.runtime.clock import midnight_of
+from fleet2d.runtime.events import HOME, Event, EventKind
 
 # Time from the opening of a door to the moment when a body reaches its line [us].
 OPENS_AHEAD_US = 1_000_000

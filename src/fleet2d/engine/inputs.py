@@ -6,12 +6,11 @@ from pathlib import Path
 from pydantic import BaseModel
 
 from fleet2d.artifacts.manifest import Manifest, input_record, is_regular
-from fleet2d.blame import blame
-from fleet2d.component import Component
-from fleet2d.errors import RunDirectoryError
+from fleet2d.configuration.components import Component
+from fleet2d.configuration.trust import source_files
+from fleet2d.errors import RunDirectoryError, blame
 from fleet2d.scenario.model import Scenario
 from fleet2d.sight.perception import Perception
-from fleet2d.user_modules import source_files
 
 
 def input_files(scenario: Scenario) -> list[Path]:

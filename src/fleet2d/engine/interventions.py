@@ -10,8 +10,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from fleet2d.clock import Clock
-from fleet2d.events import Event
+from fleet2d.configuration.units import micros
 from fleet2d.interventions.intervention import (
     Intervention,
     Lasting,
@@ -19,7 +18,8 @@ from fleet2d.interventions.intervention import (
     parse_intervention,
 )
 from fleet2d.interventions.when import Trigger
-from fleet2d.units import micros
+from fleet2d.runtime.clock import Clock
+from fleet2d.runtime.events import Event
 
 # The order at one step: first the ends of interventions, then those of the script and from outside.
 ENDS, SCRIPT, OUTSIDE = range(3)

@@ -16,13 +16,12 @@ from fleet2d.algorithms.history import History, Log
 from fleet2d.algorithms.learned import load_learned, save_learned
 from fleet2d.algorithms.output import FROZEN, WITHHELD, Outputs, to_columns
 from fleet2d.artifacts.table import Column, Kind, TableSpec
-from fleet2d.blame import blame
+from fleet2d.configuration.problems import suggest
+from fleet2d.configuration.units import micros, whole_steps
 from fleet2d.engine.basis import Basis
-from fleet2d.errors import ComponentError, Fleet2DError, ScenarioError
-from fleet2d.events import HOME, Event
+from fleet2d.errors import ComponentError, Fleet2DError, ScenarioError, blame
 from fleet2d.metrics.metric import Metric
-from fleet2d.problems import suggest
-from fleet2d.units import micros, whole_steps
+from fleet2d.runtime.events import HOME, Event
 
 KINDS: dict[str, Kind] = {"b": "bool", "i": "int64", "u": "int64", "f": "float64", "O": "category"}
 

@@ -12,15 +12,14 @@ from typing import Any
 
 from fleet2d.artifacts.directory import cannot_write
 from fleet2d.artifacts.store import RunStore
-from fleet2d.blame import blame
-from fleet2d.clock import Clock
 from fleet2d.engine.inputs import input_files
 from fleet2d.engine.pace import Pace
 from fleet2d.engine.state import State
-from fleet2d.errors import ArtifactError
+from fleet2d.errors import ArtifactError, blame
 from fleet2d.floorplan.formats.native import native_document
 from fleet2d.floorplan.home.home import Home
 from fleet2d.runs.run import FLOORPLAN_NAME
+from fleet2d.runtime.clock import Clock
 from fleet2d.scenario.model import Scenario
 
 # The messages of Ctrl-C, and of the signal that systemd, Docker and Slurm send before they kill.

@@ -9,10 +9,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from fleet2d.algorithms.log import Log
-from fleet2d.blame import blame
 from fleet2d.engine.control.world import EngineWorld
 from fleet2d.engine.state import State
 from fleet2d.entities.behavior import Situation
+from fleet2d.errors import blame
 from fleet2d.floorplan.home.change import HomeChanges
 
 

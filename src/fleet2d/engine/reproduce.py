@@ -9,6 +9,7 @@ from typing import Any
 
 from fleet2d.artifacts.manifest import FILE_NAME, SLOW, Manifest
 from fleet2d.artifacts.seal import verify_run
+from fleet2d.configuration.trust import Trust, refuse_untrusted, restrict
 from fleet2d.engine.gauges.run_expectations import TABLE
 from fleet2d.engine.inputs import changed_inputs
 from fleet2d.engine.simulation import Simulation
@@ -17,7 +18,6 @@ from fleet2d.expectations.expectation import Expectation
 from fleet2d.expectations.verdict import Verdict
 from fleet2d.runs.run import FLOORPLAN_NAME, LEARNED_NAME, Run, open_run
 from fleet2d.scenario.model import load_scenario
-from fleet2d.trust import Trust, refuse_untrusted, restrict
 
 # Fields that are compared in another way, or are the same for all runs.
 _COMPARED_APART = frozenset({"digest", "format", "scenario", "seal", "status", "tables", "notes"})

@@ -15,6 +15,7 @@ from fleet2d.artifacts.unfinished import (
     last_commit,
     remove_leftovers,
 )
+from fleet2d.configuration.trust import Trust, refuse_untrusted, restrict
 from fleet2d.engine.inputs import changed_inputs
 from fleet2d.engine.simulation import Simulation
 from fleet2d.engine.snapshots.checkpoint import Checkpoint, UnusableCheckpointError
@@ -22,7 +23,6 @@ from fleet2d.errors import RunDirectoryError
 from fleet2d.runs.run import LEARNED_NAME, Run
 from fleet2d.scenario.model import load_scenario
 from fleet2d.storage.files import refuse_links
-from fleet2d.trust import Trust, refuse_untrusted, restrict
 
 
 def resume(directory: str | Path, trust: Iterable[str | Path] = ()) -> Run:

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from fleet2d.engine.simulation import Simulation
-from fleet2d.garbage import free_bodies
+from fleet2d.memory import free_bodies
 from fleet2d.runs.run import Run
 from fleet2d.scenario.model import Scenario
 

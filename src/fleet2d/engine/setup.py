@@ -5,7 +5,7 @@ from contextlib import contextmanager
 
 from fleet2d.algorithms.log import Log
 from fleet2d.artifacts.store import RunStore
-from fleet2d.clock import Clock
+from fleet2d.configuration.problems import suggest
 from fleet2d.engine.basis import Basis
 from fleet2d.engine.bodies import Bodies
 from fleet2d.engine.control.script import schedule
@@ -25,10 +25,10 @@ from fleet2d.engine.watchers.sensors import Sensors
 from fleet2d.entities.decisions import DecidingActor
 from fleet2d.entities.objects.door import Door
 from fleet2d.errors import ComponentError, PlacementError, ScenarioError
-from fleet2d.events import EventKind, EventStream
 from fleet2d.floorplan.home.home import Home
 from fleet2d.interventions.script import causes_errors
-from fleet2d.problems import suggest
+from fleet2d.runtime.clock import Clock
+from fleet2d.runtime.events import EventKind, EventStream
 from fleet2d.scenario.model import Scenario
 
 

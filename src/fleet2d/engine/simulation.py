@@ -11,7 +11,7 @@ from typing import Any, BinaryIO, Self
 from fleet2d.artifacts.manifest import Status
 from fleet2d.artifacts.store import RunStore
 from fleet2d.artifacts.unfinished import UnfinishedRun
-from fleet2d.clock import Clock
+from fleet2d.configuration.trust import current_trust, restrict
 from fleet2d.engine.expectations.verdicts import Judging
 from fleet2d.engine.interventions import is_from_outside
 from fleet2d.engine.lifecycle import (
@@ -33,10 +33,10 @@ from fleet2d.engine.snapshots.snapshot import (
 )
 from fleet2d.engine.state import State
 from fleet2d.errors import ArtifactError, InputError
-from fleet2d.garbage import rare_collections
+from fleet2d.memory import rare_collections
 from fleet2d.runs.run import LEARNED_NAME, Run, run_of
+from fleet2d.runtime.clock import Clock
 from fleet2d.scenario.model import Scenario, load_scenario
-from fleet2d.trust import current_trust, restrict
 
 # Fewer steps are simulated without a handler for Ctrl-C.
 SHORT = 100

@@ -27,10 +27,10 @@ from fleet2d.engine.watchers.sensors import Sensors
 from fleet2d.engine.watchers.watcher import Watcher
 from fleet2d.entities.behavior import SightEvent
 from fleet2d.entities.decisions import DecidingActor
-from fleet2d.events import Event, EventKind, EventStream, new_event
 from fleet2d.floorplan.home.home import Home
 from fleet2d.kernels import I64
 from fleet2d.kernels.sight import SightingColumn as Column
+from fleet2d.runtime.events import Event, EventKind, EventStream, new_event
 
 if TYPE_CHECKING:
     from fleet2d.engine.gauges.run_expectations import RunExpectations

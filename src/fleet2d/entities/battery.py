@@ -4,12 +4,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fleet2d.component import Settings
+from fleet2d.configuration.components import Settings
+from fleet2d.configuration.units import PositiveDuration, Share, micros
 from fleet2d.entities.body import Body, Motion, Track
 from fleet2d.entities.place import Place, stop_at
 from fleet2d.entities.plan import Note, Plan
 from fleet2d.kernels import F64, I64
-from fleet2d.units import PositiveDuration, Share, micros
 
 # The table of events gets a row `battery` when the charge has changed by this much.
 RECORDED_CHANGE = 0.05

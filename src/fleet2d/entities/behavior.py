@@ -7,19 +7,18 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple
 
 from pydantic import BeforeValidator, PlainSerializer, WithJsonSchema
 
-from fleet2d.blame import blame
-from fleet2d.clock import midnight_of
-from fleet2d.component import Component
+from fleet2d.configuration.components import Component
+from fleet2d.configuration.problems import problem, shown
+from fleet2d.configuration.units import Duration, format_time_of_day, parse_time_of_day, weekdays_of
 from fleet2d.entities.battery import Charge
 from fleet2d.entities.body import NEVER, Body, Motion, Pose
 from fleet2d.entities.place import ANY, Point, is_kind, is_point
 from fleet2d.entities.plan import Plan
+from fleet2d.errors import blame
 from fleet2d.floorplan.objects import PlacedObject
 from fleet2d.kernels.numbers import TURN
-from fleet2d.problems import problem, shown
-from fleet2d.streams import Draws
-from fleet2d.units import Duration, format_time_of_day, parse_time_of_day
-from fleet2d.weekdays import weekdays_of
+from fleet2d.runtime.clock import midnight_of
+from fleet2d.runtime.determinism import Draws
 
 if TYPE_CHECKING:
     from fleet2d.entities.place import RoomChoice

@@ -8,9 +8,9 @@ from typing import Any, ClassVar, NamedTuple, Protocol
 import numpy as np
 from pydantic import Field
 
-from fleet2d.blame import blame
-from fleet2d.clock import Clock
-from fleet2d.component import Settings, components, lookup
+from fleet2d.configuration.components import Settings, components, lookup
+from fleet2d.configuration.problems import suggest
+from fleet2d.configuration.units import AngleDeg, Length, Speed, TurnRateDeg
 from fleet2d.entities.drives.differential import Differential
 from fleet2d.entities.drives.drive import Drive, breakpoints, estimate
 from fleet2d.entities.place import (
@@ -24,7 +24,7 @@ from fleet2d.entities.place import (
     parse_place,
     room_of_furniture,
 )
-from fleet2d.errors import ComponentError, PlacementError, ScenarioError
+from fleet2d.errors import ComponentError, PlacementError, ScenarioError, blame
 from fleet2d.floorplan.home.home import Home
 from fleet2d.floorplan.home.space import Space
 from fleet2d.floorplan.objects import PlacedObject, Posture
@@ -33,10 +33,9 @@ from fleet2d.kernels import F64, I64
 from fleet2d.kernels.motion import Breakpoints, WalkRule
 from fleet2d.kernels.numbers import TURN
 from fleet2d.kernels.space import Mesh
-from fleet2d.problems import suggest
+from fleet2d.runtime.clock import Clock
+from fleet2d.runtime.determinism import Draws, stream_key
 from fleet2d.sight.camera import Camera
-from fleet2d.streams import Draws, stream_key
-from fleet2d.units import AngleDeg, Length, Speed, TurnRateDeg
 
 
 class Pose(NamedTuple):

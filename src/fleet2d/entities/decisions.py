@@ -12,14 +12,13 @@ from dataclasses import dataclass
 from datetime import datetime, timedelta
 from typing import Protocol
 
-from fleet2d.blame import blame
+from fleet2d.configuration.units import micros
 from fleet2d.entities.behavior import Actor, Behavior, Command, SightEvent, Situation, holds
 from fleet2d.entities.giving_way import JUST_WAITED, GivesWay, Surroundings, WaitForPeople, resumed
 from fleet2d.entities.place import Point, RoomChoice
 from fleet2d.entities.plan import Plan
-from fleet2d.errors import ComponentError, NoWayError, PlacementError
+from fleet2d.errors import ComponentError, NoWayError, PlacementError, blame
 from fleet2d.kernels.numbers import TURN, turn_between
-from fleet2d.units import micros
 
 Ask = Callable[[Behavior, Situation], Plan | None]
 

@@ -7,7 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from pydantic import Field
 
-from fleet2d.component import Settings
+from fleet2d.configuration.components import Settings
+from fleet2d.configuration.units import Length, PositiveDuration, micros
 from fleet2d.entities.behavior import Actor, Situation
 from fleet2d.entities.body import Body, Track
 from fleet2d.entities.plan import Note, Plan
@@ -17,7 +18,6 @@ from fleet2d.kernels import I64
 from fleet2d.kernels.motion import Breakpoints
 from fleet2d.kernels.numbers import TURN, turn_between
 from fleet2d.kernels.space import SUB
-from fleet2d.units import Length, PositiveDuration, micros
 
 Detour = Callable[[tuple[int, int], tuple[int, int]], I64 | None]
 

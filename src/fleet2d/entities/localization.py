@@ -6,7 +6,9 @@ from typing import NamedTuple, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from fleet2d.component import Settings
+from fleet2d.configuration.components import Settings
+from fleet2d.configuration.problems import problem_at
+from fleet2d.configuration.units import AngleDeg, Length, PositiveDuration, micros
 from fleet2d.kernels import I64, U8
 from fleet2d.kernels.motion import Window
 from fleet2d.kernels.numbers import (
@@ -17,9 +19,7 @@ from fleet2d.kernels.numbers import (
     random_uniform,
     turned,
 )
-from fleet2d.problems import problem_at
-from fleet2d.streams import stream_key
-from fleet2d.units import AngleDeg, Length, PositiveDuration, micros
+from fleet2d.runtime.determinism import stream_key
 
 LONGEST = timedelta(days=1)
 MINUTE_US = 60_000_000

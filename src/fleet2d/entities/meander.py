@@ -5,12 +5,12 @@ from typing import Literal
 
 from pydantic import Field
 
-from fleet2d.component import register
+from fleet2d.configuration.components import register
+from fleet2d.configuration.units import AngleDeg
 from fleet2d.entities.behavior import Actor, Behavior, Situation
 from fleet2d.entities.plan import Plan
 from fleet2d.kernels.motion import WalkRule
 from fleet2d.kernels.numbers import BELL_STD, TURN
-from fleet2d.units import AngleDeg
 
 # A step longer than any home is never possible; this limit keeps products within 64 bits.
 LONGEST_STRIDE = 256 << 21

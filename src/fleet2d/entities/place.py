@@ -15,6 +15,8 @@ import numpy as np
 import shapely
 from pydantic import BeforeValidator, PlainSerializer, WithJsonSchema
 
+from fleet2d.configuration.problems import did_you_mean
+from fleet2d.configuration.units import problem
 from fleet2d.errors import PlacementError
 from fleet2d.floorplan.furniture.catalogue import FURNITURE
 from fleet2d.floorplan.objects import PlacedObject
@@ -22,9 +24,7 @@ from fleet2d.floorplan.plan import Room
 from fleet2d.floorplan.rooms.vocabulary import PRIORITY, usual_type
 from fleet2d.kernels import I64
 from fleet2d.kernels.numbers import TURN, UNIT, cosine, sine
-from fleet2d.problems import did_you_mean
-from fleet2d.streams import Draws
-from fleet2d.units import problem
+from fleet2d.runtime.determinism import Draws
 
 if TYPE_CHECKING:
     from fleet2d.entities.body import Body

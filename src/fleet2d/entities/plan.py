@@ -8,21 +8,21 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, Self
 import numpy as np
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
+from fleet2d.configuration.problems import did_you_mean, problem, refusal
+from fleet2d.configuration.units import LONGEST_DURATION, micros
 from fleet2d.entities.body import Motion, RandomWalk, Track
 from fleet2d.entities.place import seat_at
 from fleet2d.errors import ComponentError, NoWayError
-from fleet2d.events import KINDS
 from fleet2d.floorplan.home.space import Space, straight_way
 from fleet2d.floorplan.objects import POSTURES, PlacedObject, Posture
 from fleet2d.kernels import I8, I64
 from fleet2d.kernels.motion import Breakpoints, Legs, WalkRule
 from fleet2d.kernels.numbers import TURN, turn_between
 from fleet2d.kernels.space import SUB
-from fleet2d.problems import did_you_mean, problem, refusal
-from fleet2d.units import LONGEST_DURATION, micros
+from fleet2d.runtime.events import KINDS
 
 if TYPE_CHECKING:
-    from fleet2d.component import Component
+    from fleet2d.configuration.components import Component
     from fleet2d.entities.body import Body
     from fleet2d.entities.place import Point, RoomChoice
 

@@ -7,7 +7,6 @@ from itertools import pairwise
 
 import numpy as np
 
-from fleet2d.clock import Clock
 from fleet2d.expectations.expectation import INFINITE, Expectation, RunSignals, UnaryExpectation
 from fleet2d.expectations.formatting import call_text
 from fleet2d.expectations.scene import Scene
@@ -15,6 +14,7 @@ from fleet2d.expectations.signals import Measurement, Signal, SignalComparison
 from fleet2d.expectations.temporal import Always
 from fleet2d.expectations.trace import Trace, joined
 from fleet2d.kernels import I64
+from fleet2d.runtime.clock import Clock
 
 
 @dataclass(frozen=True, eq=False)

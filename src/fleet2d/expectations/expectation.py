@@ -14,12 +14,12 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from fleet2d.clock import Clock
+from fleet2d.configuration.units import micros
 from fleet2d.errors import InputError
 from fleet2d.expectations.scene import Scene
 from fleet2d.expectations.trace import Trace, combine, spells
 from fleet2d.kernels import F64, I64
-from fleet2d.units import micros
+from fleet2d.runtime.clock import Clock
 
 INFINITE = float("inf")
 TINY = float(np.finfo(np.float64).tiny)

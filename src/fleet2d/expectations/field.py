@@ -3,12 +3,12 @@
 from collections.abc import Mapping
 from typing import Any
 
+from fleet2d.configuration.problems import did_you_mean, problem, problem_at
 from fleet2d.errors import InputError
 from fleet2d.expectations import vocabulary
 from fleet2d.expectations.expectation import Expectation
 from fleet2d.expectations.parse import parse_expectation
 from fleet2d.expectations.verdict import check_judged
-from fleet2d.problems import did_you_mean, problem, problem_at
 
 OPERATORS = ("always", "never", "eventually", "at_end", "at_most")
 KEYS = (*OPERATORS, "until", "after", "within", "holds_for", "during", "of", "per")

@@ -3,7 +3,7 @@
 from datetime import timedelta
 from typing import Any
 
-from fleet2d.units import format_duration
+from fleet2d.configuration.units import format_duration
 
 
 def argument_text(value: Any) -> str:

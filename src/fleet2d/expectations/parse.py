@@ -7,11 +7,11 @@ from collections.abc import Callable, Mapping
 from functools import reduce
 from typing import Any
 
+from fleet2d.configuration.problems import did_you_mean
 from fleet2d.errors import InputError
 from fleet2d.expectations import vocabulary
 from fleet2d.expectations.expectation import Expectation
 from fleet2d.expectations.signals import Signal, WordSignal
-from fleet2d.problems import did_you_mean
 
 WORDS: Mapping[str, Callable[..., Any]] = {
     name: word

@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass
 
+from fleet2d.configuration.units import LENGTH, SHARE, SPEED
 from fleet2d.expectations.scene import Scene
 from fleet2d.expectations.signals import BODY, Signal
-from fleet2d.units import LENGTH, SHARE, SPEED
 
 Place = str | tuple[float, float]
 """A body, a room, an object, or a point (x, y) [m]."""

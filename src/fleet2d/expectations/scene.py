@@ -4,10 +4,10 @@ from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 from datetime import timedelta
 
+from fleet2d.configuration.problems import suggest
+from fleet2d.configuration.units import format_duration
 from fleet2d.errors import ScenarioError
-from fleet2d.events import KINDS, SIGHTS, EventKind
-from fleet2d.problems import suggest
-from fleet2d.units import format_duration
+from fleet2d.runtime.events import KINDS, SIGHTS, EventKind
 
 # Kinds of events that only one type of behavior records.
 _OF_BEHAVIORS = {

@@ -7,13 +7,13 @@ from typing import Any, ClassVar
 import numpy as np
 from pydantic_core import PydanticCustomError
 
+from fleet2d.configuration.units import Quantity
 from fleet2d.errors import InputError
 from fleet2d.expectations.expectation import INFINITE, TINY, Expectation, RunSignals, truth
 from fleet2d.expectations.formatting import argument_text, call_text, number_text
 from fleet2d.expectations.scene import Scene
 from fleet2d.expectations.trace import Trace
 from fleet2d.kernels import F64
-from fleet2d.units import Quantity
 
 BODY = ("user or robot", "bodies")
 

@@ -6,14 +6,14 @@ from datetime import timedelta
 
 import numpy as np
 
-from fleet2d.clock import midnight_of
+from fleet2d.configuration.problems import did_you_mean
 from fleet2d.expectations.expectation import RunSignals
 from fleet2d.expectations.formatting import call_text
 from fleet2d.expectations.scene import Scene
 from fleet2d.expectations.signals import BODY, Condition, Measurement, WordSignal
 from fleet2d.expectations.trace import Trace
 from fleet2d.kernels import I64
-from fleet2d.problems import did_you_mean
+from fleet2d.runtime.clock import midnight_of
 
 
 @dataclass(frozen=True, eq=False)

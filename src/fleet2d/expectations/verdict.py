@@ -5,13 +5,13 @@ from dataclasses import dataclass
 from datetime import datetime, timedelta
 from typing import Any, Protocol
 
-from fleet2d.clock import Clock
+from fleet2d.configuration.units import format_duration
 from fleet2d.errors import InputError
 from fleet2d.expectations.expectation import TINY, And, Expectation, RunSignals
 from fleet2d.expectations.formatting import number_text
 from fleet2d.expectations.temporal import After, Temporal
 from fleet2d.expectations.violation import Violation
-from fleet2d.units import format_duration
+from fleet2d.runtime.clock import Clock
 
 
 @dataclass(frozen=True)

@@ -4,13 +4,12 @@ from datetime import timedelta
 
 from pydantic_core import PydanticCustomError
 
+from fleet2d.configuration.problems import did_you_mean
+from fleet2d.configuration.units import parse_duration, parse_time_of_day, weekdays_of
 from fleet2d.errors import InputError
 from fleet2d.expectations import counting, quantities, signals, states, temporal
 from fleet2d.expectations.expectation import Expectation
 from fleet2d.expectations.quantities import Place
-from fleet2d.problems import did_you_mean
-from fleet2d.units import parse_duration, parse_time_of_day
-from fleet2d.weekdays import weekdays_of
 
 Time = str | float | timedelta
 """How long: text such as "2 min", seconds, or a timedelta."""

@@ -6,7 +6,7 @@ import numpy as np
 
 from fleet2d.fit.timeline import MINUTES, runs
 from fleet2d.kernels import F64, I16
-from fleet2d.sums import sum_in_order
+from fleet2d.runtime.determinism import sum_in_order
 
 HOURS = 24
 FEWEST_STAYS = 5  # the fewest stays at a place whose durations are compared

@@ -5,7 +5,6 @@ from datetime import date
 
 import numpy as np
 
-from fleet2d.clock import DAY_S
 from fleet2d.fit.persona import FittedPersona
 from fleet2d.fit.timeline import MINUTES, Timeline
 from fleet2d.kernels import I16
@@ -13,7 +12,8 @@ from fleet2d.routines.activity import Activity, seconds
 from fleet2d.routines.laws import KNOTS, exponential
 from fleet2d.routines.life import Life
 from fleet2d.routines.planner import Doing
-from fleet2d.streams import Draws, stream_key
+from fleet2d.runtime.clock import DAY_S
+from fleet2d.runtime.determinism import Draws, stream_key
 
 # The date of the first sampled day, a Monday.
 MONDAY = date(2017, 1, 2).toordinal()

@@ -7,13 +7,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fleet2d.clock import DAY_S
+from fleet2d.configuration.units import micros
 from fleet2d.floorplan.rooms.vocabulary import room_type
 from fleet2d.kernels import I16
 from fleet2d.logs.log import AWAY, ActivityLog, LogError
 from fleet2d.logs.rooms import DOOR, USUAL
 from fleet2d.logs.visits import UNKNOWN, LoggedVisit, VisitRule, visits_of
-from fleet2d.units import micros
+from fleet2d.runtime.clock import DAY_S
 
 MINUTES = 1440
 UNKNOWN_STATE = -1

@@ -9,7 +9,9 @@ import shapely
 from pydantic import Field, model_validator
 from shapely import MultiPolygon, Polygon
 
-from fleet2d.component import Settings
+from fleet2d.configuration.components import Settings
+from fleet2d.configuration.problems import problem
+from fleet2d.configuration.units import Length
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.rooms.adjacency import doorway_segments
@@ -19,8 +21,6 @@ from fleet2d.floorplan.rooms.room import Room, make_rooms
 from fleet2d.floorplan.rooms.vocabulary import usual_type
 from fleet2d.kernels import I64
 from fleet2d.kernels.space import fill_from_neighbors
-from fleet2d.problems import problem
-from fleet2d.units import Length
 
 
 class RoomCorrection(Settings):

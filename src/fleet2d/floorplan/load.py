@@ -8,15 +8,15 @@ import re
 from pathlib import Path
 from typing import Any
 
-from fleet2d.component import components, lookup
+from fleet2d.configuration.components import components, lookup
+from fleet2d.configuration.problems import suggest
+from fleet2d.configuration.units import folder_of
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.formats.bundled import bundled_names, read_bundled
 from fleet2d.floorplan.formats.native import native_plan
 from fleet2d.floorplan.formats.native_file import FORMAT
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.source import YAML, FloorPlanSource, read_document, read_yaml
-from fleet2d.paths import folder_of
-from fleet2d.problems import suggest
 
 USUAL_CELL_M = 0.05
 IMAGES = (".pgm", ".png")

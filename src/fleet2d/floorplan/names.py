@@ -5,8 +5,8 @@ from collections.abc import Sequence
 from itertools import count
 from typing import Protocol, TypeVar
 
+from fleet2d.configuration.problems import suggest
 from fleet2d.errors import FloorPlanError, InputError
-from fleet2d.problems import suggest
 
 
 class Named(Protocol):

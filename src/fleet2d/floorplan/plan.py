@@ -34,7 +34,7 @@ from fleet2d.floorplan.rooms.vocabulary import room_type
 from fleet2d.kernels import I16, Bool
 from fleet2d.kernels.space import Mesh, fill_from_neighbors, rasterize_cells, strictly_inside
 from fleet2d.leaves import views
-from fleet2d.sums import sum_in_order
+from fleet2d.runtime.determinism import sum_in_order
 
 __all__ = ["FloorPlan", "LabelledRegion", "Room"]
 

@@ -11,7 +11,8 @@ from typing import Annotated, Any, ClassVar
 from pydantic import AfterValidator, Field, TypeAdapter, ValidationError, model_validator
 
 from fleet2d.bounds import FILE_BYTES, JSON_VALUES, one_line, read_bytes
-from fleet2d.component import Component
+from fleet2d.configuration.components import Component
+from fleet2d.configuration.units import InputPath, Length
 from fleet2d.errors import FloorPlanError, InputError
 from fleet2d.floorplan.cache import Cache
 from fleet2d.floorplan.corrections import RoomCorrection, correct_rooms
@@ -19,8 +20,6 @@ from fleet2d.floorplan.furniture.furnishing import Furnishing, FurniturePiece, p
 from fleet2d.floorplan.home.costmap import CostmapSettings
 from fleet2d.floorplan.home.layers import LayerSettings, check_layers
 from fleet2d.floorplan.plan import FloorPlan
-from fleet2d.paths import InputPath
-from fleet2d.units import Length
 
 YAML = (".yaml", ".yml")
 # Homes that a process caches, read and furnished.
@@ -198,14 +197,14 @@ def read_yaml(path: Path) -> dict[str, Any]:
     # A home in a JSON file is set up without them.
     import yaml
 
-    from fleet2d import yaml_tree
+    from fleet2d.configuration.documents import NodeError, parse
 
     text = _read_text(path, "YAML")
     try:
-        content = yaml_tree.parse(text)
+        content = parse(text)
     except (yaml.YAMLError, RecursionError) as error:
         raise FloorPlanError(f"{path} is not YAML: {one_line(error, 200)}") from None
-    except yaml_tree.NodeError as error:
+    except NodeError as error:
         line = error.node.start_mark.line + 1
         raise FloorPlanError(f"{path}, line {line}: {error}") from None
     except InputError as error:

@@ -5,12 +5,12 @@ from typing import Any, ClassVar, Self
 from pydantic import Field, model_validator
 
 from fleet2d.algorithms.output import FROZEN, WITHHELD, RoomDistribution
-from fleet2d.component import register
+from fleet2d.configuration.components import register
+from fleet2d.configuration.problems import problem, suggest
+from fleet2d.configuration.units import InputPath
 from fleet2d.errors import ScenarioError
 from fleet2d.interventions.intervention import Intervention, Lasting
 from fleet2d.interventions.world import World
-from fleet2d.problems import problem, suggest
-from fleet2d.units import InputPath
 
 
 @register("intervention", "reset")

@@ -4,7 +4,8 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator
 
-from fleet2d.component import register
+from fleet2d.configuration.components import register
+from fleet2d.configuration.units import AngleDeg, PositiveDuration
 from fleet2d.entities.behavior import Actor
 from fleet2d.entities.body import Pose
 from fleet2d.entities.decisions import GoTo, StandStill
@@ -14,7 +15,6 @@ from fleet2d.errors import PlacementError
 from fleet2d.interventions.intervention import Intervention, body
 from fleet2d.interventions.world import World
 from fleet2d.kernels.numbers import TURN
-from fleet2d.units import AngleDeg, PositiveDuration
 
 
 class BodyIntervention(Intervention):

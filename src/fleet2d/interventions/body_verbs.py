@@ -7,9 +7,9 @@ from typing import Any, cast
 
 from pydantic import ValidationError
 
-from fleet2d.component import lookup
+from fleet2d.configuration.components import lookup
+from fleet2d.configuration.problems import refusal
 from fleet2d.interventions.intervention import Intervention
-from fleet2d.problems import refusal
 
 Time = str | timedelta
 """A duration: '90 s', '1 h', or a timedelta."""

@@ -4,7 +4,7 @@ from typing import ClassVar
 
 from pydantic import Field
 
-from fleet2d.component import register
+from fleet2d.configuration.components import register
 from fleet2d.entities.place import Point
 from fleet2d.floorplan.home.change import HomeChange
 from fleet2d.interventions.intervention import Intervention

@@ -13,12 +13,19 @@ from pydantic import (
 )
 from pydantic_core import CoreSchema, InitErrorDetails
 
-from fleet2d.component import Codec, Component, components
+from fleet2d.configuration.components import Codec, Component, components
+from fleet2d.configuration.problems import (
+    did_you_mean,
+    problem,
+    problem_at,
+    refusal,
+    rewrite,
+    suggest,
+)
+from fleet2d.configuration.units import PositiveDuration
 from fleet2d.entities.decisions import DecidingActor
 from fleet2d.errors import ScenarioError
 from fleet2d.interventions.world import World
-from fleet2d.problems import did_you_mean, problem, problem_at, refusal, rewrite, suggest
-from fleet2d.units import PositiveDuration
 
 
 class Intervention(Component):

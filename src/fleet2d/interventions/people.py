@@ -4,7 +4,9 @@ from datetime import timedelta
 
 from pydantic import Field
 
-from fleet2d.component import register
+from fleet2d.configuration.components import register
+from fleet2d.configuration.problems import suggest
+from fleet2d.configuration.units import PositiveDuration
 from fleet2d.entities.decisions import DoActivity, GoOut, GoTo
 from fleet2d.entities.place import Place
 from fleet2d.entities.users.guest import Guest
@@ -12,8 +14,6 @@ from fleet2d.errors import ScenarioError
 from fleet2d.interventions.bodies import check_reach
 from fleet2d.interventions.intervention import Intervention, user
 from fleet2d.interventions.world import World
-from fleet2d.problems import suggest
-from fleet2d.units import PositiveDuration
 
 
 class PersonIntervention(Intervention):

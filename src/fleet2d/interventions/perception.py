@@ -1,13 +1,13 @@
 """Interventions on what a robot perceives: suppress, mistake, inject."""
 
-from fleet2d.component import register
+from fleet2d.configuration.components import register
+from fleet2d.configuration.units import AngleDeg
 from fleet2d.errors import PlacementError
 from fleet2d.interventions.bodies import heading_of
 from fleet2d.interventions.intervention import Lasting, robot, user
 from fleet2d.interventions.robots import check_camera, check_truth, disturb
 from fleet2d.interventions.world import World
 from fleet2d.sight.disturbance import Disturbance, FalseSighting
-from fleet2d.units import AngleDeg
 
 UNKNOWN = "unknown"
 

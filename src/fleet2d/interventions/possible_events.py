@@ -2,12 +2,12 @@
 
 from collections.abc import Iterable
 
+from fleet2d.configuration.problems import did_you_mean, suggest
 from fleet2d.entities.behavior import Actor
 from fleet2d.errors import ScenarioError
-from fleet2d.events import KINDS, EventKind
 from fleet2d.interventions.when import Trigger
 from fleet2d.interventions.world import World
-from fleet2d.problems import did_you_mean, suggest
+from fleet2d.runtime.events import KINDS, EventKind
 
 # Events of every person: an order can cause them if no behavior does.
 OF_PEOPLE = frozenset(

@@ -4,18 +4,18 @@ from typing import Self
 
 from pydantic import Field, model_validator
 
-from fleet2d.component import register
+from fleet2d.configuration.components import register
+from fleet2d.configuration.problems import problem, suggest
+from fleet2d.configuration.units import Share
 from fleet2d.entities.behavior import Actor, Command
 from fleet2d.entities.place import Place
 from fleet2d.errors import ScenarioError
-from fleet2d.events import EventKind
 from fleet2d.interventions.bodies import check_reach
 from fleet2d.interventions.intervention import Intervention, Lasting, body, robot
 from fleet2d.interventions.world import World
-from fleet2d.problems import problem, suggest
+from fleet2d.runtime.events import EventKind
 from fleet2d.sight.disturbance import Disturbance
 from fleet2d.sight.perception import Perception
-from fleet2d.units import Share
 
 # The behavior of Fleet2D that responds to each command.
 RESPONDERS = {"come": "come", "find": "find", "dock": "dock"}

@@ -12,11 +12,11 @@ from pydantic import (
 )
 from pydantic_core import InitErrorDetails
 
-from fleet2d.component import Settings
+from fleet2d.configuration.components import Settings
+from fleet2d.configuration.problems import problem, refusal
+from fleet2d.configuration.units import Duration
 from fleet2d.interventions.intervention import Intervention, Verb
 from fleet2d.interventions.when import ClockTime, On, When
-from fleet2d.problems import problem, refusal
-from fleet2d.units import Duration
 
 # The keys that stand beside those of an intervention.
 WHEN = ("at", "on", "each", "delay")

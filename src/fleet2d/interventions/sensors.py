@@ -2,12 +2,12 @@
 
 from typing import ClassVar
 
-from fleet2d.component import register
+from fleet2d.configuration.components import register
+from fleet2d.configuration.problems import suggest
 from fleet2d.entities.objects.home_object import SensorFault
 from fleet2d.errors import ScenarioError
 from fleet2d.interventions.intervention import Intervention, Lasting
 from fleet2d.interventions.world import World
-from fleet2d.problems import suggest
 
 
 @register("intervention", "stick")

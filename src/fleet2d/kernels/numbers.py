@@ -2,7 +2,7 @@
 
 Random bits are a pure function of (key, counter), so no draw depends on another. The generator is
 SplitMix64 (Steele, Lea, Flood: "Fast splittable pseudorandom number generators", OOPSLA 2014)
-addressed by counter instead of by state. Keys come from :mod:`fleet2d.streams`.
+addressed by counter instead of by state. Keys come from :mod:`fleet2d.runtime.determinism`.
 
 Headings are integers: 4096 to a turn, counter-clockwise from +x, with one table of sines. No sine
 or arc tangent is computed at run time: they differ in the last bit between machines. The table is

@@ -5,11 +5,11 @@ from typing import Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from fleet2d.component import Settings
+from fleet2d.configuration.components import Settings
+from fleet2d.configuration.problems import problem
+from fleet2d.configuration.units import AngleDeg, Length
 from fleet2d.kernels import F64
-from fleet2d.problems import problem
-from fleet2d.sums import sum_in_order
-from fleet2d.units import AngleDeg, Length
+from fleet2d.runtime.determinism import sum_in_order
 
 Pair = tuple[float, float]
 

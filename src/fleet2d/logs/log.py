@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 from fleet2d.bounds import LOG_BYTES, LOG_DAYS, LOG_ROWS, check_file
-from fleet2d.clock import DAY_US
 from fleet2d.errors import InputError
 from fleet2d.kernels import F64, I64
+from fleet2d.runtime.clock import DAY_US
 
 # The most lines that a note lists.
 _MOST_NAMED = 20

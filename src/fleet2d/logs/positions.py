@@ -22,12 +22,12 @@ from fleet2d.bounds import (
     one_line,
     unpacked_bytes,
 )
-from fleet2d.clock import DAY_US
+from fleet2d.configuration.problems import did_you_mean
+from fleet2d.configuration.units import micros
 from fleet2d.kernels import F64, I64, Bool
 from fleet2d.logs.log import LogError, PositionLog
 from fleet2d.logs.times import parse_time
-from fleet2d.problems import did_you_mean
-from fleet2d.units import micros
+from fleet2d.runtime.clock import DAY_US
 
 NAMES = {
     "time": ("time", "timestamp", "t", "datetime", "time_s"),

@@ -2,10 +2,10 @@
 
 from collections.abc import Collection, Mapping, Sequence
 
+from fleet2d.configuration.problems import suggest
 from fleet2d.floorplan.plan import Room
 from fleet2d.floorplan.rooms.vocabulary import room_type
 from fleet2d.logs.log import AWAY, LogError
-from fleet2d.problems import suggest
 
 RoomChoice = tuple[str, ...]
 

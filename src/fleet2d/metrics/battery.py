@@ -5,10 +5,10 @@ from typing import Any, ClassVar
 
 from fleet2d.algorithms.algorithm import Present
 from fleet2d.algorithms.history import History
-from fleet2d.clock import DAY_S
-from fleet2d.component import register
+from fleet2d.configuration.components import register
 from fleet2d.floorplan.home.home import Home
 from fleet2d.metrics.metric import Metric
+from fleet2d.runtime.clock import DAY_S
 
 
 @register("metric", "battery")

@@ -9,12 +9,12 @@ from pydantic import Field
 
 from fleet2d.algorithms.algorithm import Present
 from fleet2d.algorithms.history import History
-from fleet2d.clock import DAY_S
-from fleet2d.component import register
+from fleet2d.configuration.components import register
+from fleet2d.configuration.units import Length
 from fleet2d.floorplan.home.home import Home
 from fleet2d.metrics.metric import Metric
 from fleet2d.metrics.pairs import pairs_of
-from fleet2d.units import Length
+from fleet2d.runtime.clock import DAY_S
 
 
 @register("metric", "blocking")

@@ -8,11 +8,11 @@ import numpy as np
 
 from fleet2d.algorithms.algorithm import Present
 from fleet2d.algorithms.history import History
-from fleet2d.clock import DAY_S
-from fleet2d.component import register
+from fleet2d.configuration.components import register
 from fleet2d.floorplan.home.home import Home
 from fleet2d.metrics.metric import Metric
 from fleet2d.metrics.pairs import in_sight, pairs_of
+from fleet2d.runtime.clock import DAY_S
 
 # Hall's zones, by the distance at which they end [m].
 ZONES = {"intimate": 0.45, "personal": 1.2, "social": 3.6}

@@ -6,9 +6,9 @@ from typing import Any, ClassVar
 
 from fleet2d.algorithms.algorithm import Present
 from fleet2d.algorithms.history import History
-from fleet2d.component import Component
+from fleet2d.configuration.components import Component
+from fleet2d.configuration.units import PositiveDuration
 from fleet2d.floorplan.home.home import Home
-from fleet2d.units import PositiveDuration
 
 
 class Metric(Component):

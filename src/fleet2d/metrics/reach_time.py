@@ -9,12 +9,12 @@ from pydantic import Field
 
 from fleet2d.algorithms.algorithm import Present
 from fleet2d.algorithms.history import History
-from fleet2d.component import register
+from fleet2d.configuration.components import register
+from fleet2d.configuration.units import Length, PositiveDuration, Speed, micros
 from fleet2d.floorplan.home.home import Home
 from fleet2d.metrics.metric import Metric
 from fleet2d.metrics.pairs import pairs_of
-from fleet2d.sums import sum_in_order
-from fleet2d.units import Length, PositiveDuration, Speed, micros
+from fleet2d.runtime.determinism import sum_in_order
 
 
 @register("metric", "reach_time")

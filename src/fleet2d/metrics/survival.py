@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fleet2d.sums import sum_in_order
+from fleet2d.runtime.determinism import sum_in_order
 
 
 def kaplan_meier(times: Sequence[float], happened: Sequence[bool]) -> list[tuple[float, float]]:

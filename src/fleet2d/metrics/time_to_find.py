@@ -9,15 +9,15 @@ from pydantic import Field
 
 from fleet2d.algorithms.algorithm import Present
 from fleet2d.algorithms.history import History
-from fleet2d.component import register
-from fleet2d.events import Event
+from fleet2d.configuration.components import register
+from fleet2d.configuration.units import Length, PositiveDuration
 from fleet2d.floorplan.home.home import Home
 from fleet2d.kernels import F64
 from fleet2d.kernels.sight import points_in_sight
 from fleet2d.metrics.metric import Metric
 from fleet2d.metrics.survival import kaplan_meier, quantile, restricted_mean
-from fleet2d.sums import sum_in_order
-from fleet2d.units import Length, PositiveDuration
+from fleet2d.runtime.determinism import sum_in_order
+from fleet2d.runtime.events import Event
 
 ENDS = ("found", "not_at_home", "gave_up")
 

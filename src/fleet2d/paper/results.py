@@ -2,11 +2,11 @@
 
 from collections.abc import Callable, Sequence
 
+from fleet2d.configuration.problems import suggest
 from fleet2d.errors import InputError
 from fleet2d.paper import feedback, ltp_gap, rtp_gap, speed
 from fleet2d.paper.months import OnProgress, PaperOptions
 from fleet2d.paper.result import Result
-from fleet2d.problems import suggest
 
 RESULTS: dict[str, Callable[[PaperOptions, OnProgress], Result]] = {
     speed.NAME: speed.reproduce,

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fleet2d.extras import extra
+from fleet2d.errors import extra
 
 if TYPE_CHECKING:
     from fleet2d.engine.simulation import Simulation

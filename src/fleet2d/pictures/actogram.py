@@ -8,13 +8,13 @@ from matplotlib.collections import PolyCollection
 from matplotlib.colors import to_rgb
 from matplotlib.patches import Rectangle
 
-from fleet2d.clock import midnight_of
+from fleet2d.configuration.units import micros
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.kernels import F64, I16, I64
 from fleet2d.palette import OTHER_COLOR, ROOM_COLORS, TEXT_COLOR
 from fleet2d.pictures.overlay import HATCH_COLOR, QUIET_COLOR
 from fleet2d.pictures.traces import BodyTrace
-from fleet2d.units import micros
+from fleet2d.runtime.clock import midnight_of
 
 DAY_US = 86_400_000_000
 BINS = 1440  # coloured intervals of a day

@@ -9,12 +9,12 @@ import matplotlib as mpl
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
+from fleet2d.configuration.units import WEEKDAYS
 from fleet2d.pictures.theme import apply_theme
 from fleet2d.routines.interruptions import without_interruptions
 from fleet2d.routines.life import Life
 from fleet2d.routines.persona import Persona
 from fleet2d.routines.planner import FINISHES, INTERRUPTS, RESUMES, Doing
-from fleet2d.weekdays import WEEKDAYS
 
 MONDAY = date(2026, 1, 5)
 DAY_S, HOUR_S = 86_400, 3_600

@@ -9,7 +9,7 @@ from typing import Any
 
 import yaml
 
-from fleet2d.document import Document, Keys, read_document
+from fleet2d.configuration.documents import Document, Keys, read_document
 from fleet2d.errors import ArtifactError, Fleet2DError, InputError, ScenarioError
 from fleet2d.floorplan.formats.houseexpo import read_houseexpo
 from fleet2d.floorplan.home.home import Home

@@ -12,11 +12,11 @@ from fractions import Fraction
 from itertools import chain, count
 from typing import Any
 
-from fleet2d.document import Keys
-from fleet2d.problems import shown
+from fleet2d.configuration.documents import Keys
+from fleet2d.configuration.problems import shown
+from fleet2d.configuration.units import micros
 from fleet2d.published.reader import ConfigReader, tidy
 from fleet2d.sight.camera import Camera
-from fleet2d.units import micros
 
 # Random turns are cut at 4.88 standard deviations (kernels.numbers), so this limit has no effect.
 _TURN_LIMIT_STD = 5

@@ -7,10 +7,10 @@ from typing import Any
 
 from pydantic_core import PydanticCustomError
 
-from fleet2d.document import Document, Keys
+from fleet2d.configuration.documents import Document, Keys
+from fleet2d.configuration.problems import shown
+from fleet2d.configuration.units import parse_duration
 from fleet2d.errors import ScenarioError
-from fleet2d.problems import shown
-from fleet2d.units import parse_duration
 
 _HUGE = 1e300
 _UNITS = {"weeks", "days", "hours", "minutes", "seconds", "milliseconds", "microseconds"}

@@ -7,12 +7,12 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import model_validator
 
-from fleet2d.component import Settings
-from fleet2d.document import read_document
-from fleet2d.problems import problem, suggest
+from fleet2d.configuration.components import Settings
+from fleet2d.configuration.documents import read_document
+from fleet2d.configuration.problems import problem, suggest
+from fleet2d.configuration.units import Duration, PositiveDuration, format_duration
 from fleet2d.routines import laws
 from fleet2d.routines.schema_forms import SchemaForms
-from fleet2d.units import Duration, PositiveDuration, format_duration
 
 FOLDER = Path(__file__).parent
 SECOND = timedelta(seconds=1)

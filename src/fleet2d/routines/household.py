@@ -15,11 +15,11 @@ from typing import Annotated, Any, Self
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from fleet2d.component import Settings
-from fleet2d.document import read_document
+from fleet2d.configuration.components import Settings
+from fleet2d.configuration.documents import read_document
+from fleet2d.configuration.problems import Location, did_you_mean, problem, problem_at, shown
+from fleet2d.configuration.units import OnDays, Share, folder_of, weekdays_of
 from fleet2d.errors import ScenarioError
-from fleet2d.paths import folder_of
-from fleet2d.problems import Location, did_you_mean, problem, problem_at, shown
 from fleet2d.routines.activity import AnyDurationLaw, find_activity
 from fleet2d.routines.laws import uniform
 from fleet2d.routines.life import Life
@@ -41,9 +41,7 @@ from fleet2d.routines.planner import (
 )
 from fleet2d.routines.schema_forms import SchemaForms
 from fleet2d.routines.templates import starts
-from fleet2d.streams import Draws, stream_key
-from fleet2d.units import Share
-from fleet2d.weekdays import OnDays, weekdays_of
+from fleet2d.runtime.determinism import Draws, stream_key
 
 MemberRooms = Mapping[str, Mapping[str, Sequence[int]]]
 # The number of days that are kept after they were drawn.

@@ -26,7 +26,7 @@ from fleet2d.routines.planner import (
     Doing,
     new_doing,
 )
-from fleet2d.streams import Draws
+from fleet2d.runtime.determinism import Draws
 
 # The least duration of the rest of an activity after an interruption [s].
 SHORTEST_REST_S = 60

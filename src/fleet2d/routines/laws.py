@@ -12,8 +12,7 @@ from functools import lru_cache
 from itertools import accumulate, pairwise
 from typing import NamedTuple
 
-from fleet2d.streams import Draws
-from fleet2d.sums import sum_in_order
+from fleet2d.runtime.determinism import Draws, sum_in_order
 
 KNOTS = 128
 _BITS = 24
@@ -44,7 +43,7 @@ class Law(NamedTuple):
         last: The position of `longest` among them.
 
     Example:
-        >>> from fleet2d.streams import Draws, stream_key
+        >>> from fleet2d.runtime.determinism import Draws, stream_key
         >>> law = lognormal(1800, 600)
         >>> draws = Draws(stream_key(4, "users.ana", "doc"), 0)
         >>> [law.draw(draws) for _ in range(4)], law.draw(draws, 0, 900)
@@ -185,7 +184,7 @@ def draw_weighted(draws: Draws, weights: Sequence[int]) -> int:
         draws: The random draws.
         weights: Whole numbers from 0 on, not all 0.
 
-    >>> from fleet2d.streams import Draws, stream_key
+    >>> from fleet2d.runtime.determinism import Draws, stream_key
     >>> draws = Draws(stream_key(4, "users.ana", "doc"), 0)
     >>> [draw_weighted(draws, [0, 8, 0]) for _ in range(8)]
     [1, 1, 1, 1, 1, 1, 1, 1]

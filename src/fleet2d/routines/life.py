@@ -8,7 +8,7 @@ from fleet2d.routines.occupancy import Occupancy
 from fleet2d.routines.persona import Persona
 from fleet2d.routines.planner import DAY_S, DayPlan, Doing, plan_day
 from fleet2d.routines.recorded import draw_recorded, draw_source, in_free_rooms, with_jobs
-from fleet2d.streams import Draws, stream_key
+from fleet2d.runtime.determinism import Draws, stream_key
 
 # The number of days that are kept after they were drawn.
 CACHED_DAYS = 3

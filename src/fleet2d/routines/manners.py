@@ -4,9 +4,9 @@ from datetime import timedelta
 
 from pydantic import Field
 
-from fleet2d.component import Settings
+from fleet2d.configuration.components import Settings
+from fleet2d.configuration.units import Duration, Length, Share
 from fleet2d.routines.activity import AnyDurationLaw, DurationLaw
-from fleet2d.units import Duration, Length, Share
 
 
 class Manners(Settings):

@@ -8,12 +8,12 @@ from typing import Annotated, Any, Self
 
 from pydantic import Field, model_validator
 
-from fleet2d.component import Settings
-from fleet2d.document import read_document
-from fleet2d.problems import problem
+from fleet2d.configuration.components import Settings
+from fleet2d.configuration.documents import read_document
+from fleet2d.configuration.problems import problem
+from fleet2d.configuration.units import Duration, Share, TimeOfDay
 from fleet2d.routines.activity import AnyDurationLaw, seconds
 from fleet2d.routines.schema_forms import SchemaForms
-from fleet2d.units import Duration, Share, TimeOfDay
 
 FOLDER = Path(__file__).parent
 # The least mean time between two occurrences of a need.

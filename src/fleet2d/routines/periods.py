@@ -6,8 +6,8 @@ from typing import Annotated, Any
 
 from pydantic import BeforeValidator, model_validator
 
-from fleet2d.component import Settings
-from fleet2d.problems import problem
+from fleet2d.configuration.components import Settings
+from fleet2d.configuration.problems import problem
 from fleet2d.routines.planner import Doing
 from fleet2d.routines.schema_forms import SchemaForms
 

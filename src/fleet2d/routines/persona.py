@@ -14,11 +14,20 @@ from pydantic import (
     model_validator,
 )
 
-from fleet2d.component import Settings
-from fleet2d.document import read_document
+from fleet2d.configuration.components import Settings
+from fleet2d.configuration.documents import read_document
+from fleet2d.configuration.problems import did_you_mean, problem, problem_at, shown, suggest
+from fleet2d.configuration.units import (
+    WEEKDAYS,
+    Duration,
+    OnDays,
+    Share,
+    TimeOfDay,
+    folder_of,
+    format_time_of_day,
+    weekdays_of,
+)
 from fleet2d.errors import ScenarioError
-from fleet2d.paths import folder_of
-from fleet2d.problems import did_you_mean, problem, problem_at, shown, suggest
 from fleet2d.routines.activity import Activity, AnyDurationLaw, catalogue, find_activity
 from fleet2d.routines.interruption_rules import InterruptionRules, interruption_rules
 from fleet2d.routines.manners import Manners
@@ -34,8 +43,6 @@ from fleet2d.routines.planner import REST, SLEEP, DayPlan
 from fleet2d.routines.recorded import AnyRecordedDay
 from fleet2d.routines.schema_forms import SchemaForms
 from fleet2d.routines.templates import check, day_plans
-from fleet2d.units import Duration, Share, TimeOfDay, format_time_of_day
-from fleet2d.weekdays import WEEKDAYS, OnDays, weekdays_of
 
 BUNDLED = Path(__file__).parent / "personas"
 DAY = timedelta(days=1)

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from fleet2d.kernels.motion import DayPlanner
 from fleet2d.routines.laws import Law, draw_weighted
 from fleet2d.routines.occupancy import ANY_ROOM, Occupancy
-from fleet2d.streams import Draws
+from fleet2d.runtime.determinism import Draws
 
 if TYPE_CHECKING:
     from fleet2d.routines.recorded import Recording

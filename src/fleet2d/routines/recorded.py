@@ -13,10 +13,10 @@ from typing import Annotated, Any, NamedTuple
 
 from pydantic import BeforeValidator, PlainSerializer, WithJsonSchema
 
-from fleet2d.problems import problem
+from fleet2d.configuration.problems import problem
 from fleet2d.routines.occupancy import ANY_ROOM, Occupancy
 from fleet2d.routines.planner import DAY_S, SLEEP, Doing, Job
-from fleet2d.streams import Draws
+from fleet2d.runtime.determinism import Draws
 
 # Probability of a switch to another day where one is possible [in 16ths], and the largest distance
 # between the times of both days [s].

@@ -28,7 +28,7 @@ import numpy as np
 
 from fleet2d.kernels import F64, I32
 from fleet2d.routines.laws import KNOTS, Law, lognormal, position
-from fleet2d.streams import Draws
+from fleet2d.runtime.determinism import Draws
 
 TABLE = Path(__file__).parent / "survey.json"
 CATEGORIES = (

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fleet2d.problems import problem_at
+from fleet2d.configuration.problems import problem_at
 from fleet2d.routines.activity import seconds
 from fleet2d.routines.laws import Law, normal, uniform
 from fleet2d.routines.planner import (
@@ -20,7 +20,7 @@ from fleet2d.routines.planner import (
     fits,
 )
 from fleet2d.routines.recorded import to_recording
-from fleet2d.streams import Draws
+from fleet2d.runtime.determinism import Draws
 
 if TYPE_CHECKING:
     from datetime import timedelta

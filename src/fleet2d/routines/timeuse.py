@@ -5,7 +5,7 @@ from collections.abc import Iterable, Sequence
 from fleet2d.routines.laws import draw_weighted, lognormal
 from fleet2d.routines.planner import NO_GAP_S, Doing
 from fleet2d.routines.survey import SPREAD, Episode, SurveyGroup, table
-from fleet2d.streams import Draws
+from fleet2d.runtime.determinism import Draws
 
 WHOLE = 10_000  # the survey's shares are in parts of this
 PLAIN = {

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fleet2d.artifacts.layers import EVERYWHERE, PREFIX
+from fleet2d.configuration.problems import suggest
 from fleet2d.errors import ArtifactError
-from fleet2d.problems import suggest
 from fleet2d.runs.run import Run
 
 

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 from fleet2d.artifacts.digest import changed_tables, digest_of_file, digest_table, run_digest
 from fleet2d.artifacts.manifest import FILE_NAME, Manifest
 from fleet2d.artifacts.unfinished import Prefix
+from fleet2d.configuration.problems import suggest
 from fleet2d.errors import ArtifactError, RunDirectoryError
 from fleet2d.leaves import judges, views
-from fleet2d.problems import suggest
 from fleet2d.storage.files import PARTIAL
 
 if TYPE_CHECKING:

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fleet2d.bounds import one_line
-from fleet2d.clock import Clock
+from fleet2d.configuration.trust import restrict_stored
+from fleet2d.configuration.units import whole_steps
 from fleet2d.entities.behavior import Actor
 from fleet2d.entities.body import Pose
 from fleet2d.entities.meander import Meander
@@ -29,9 +30,8 @@ from fleet2d.kernels.motion import (
 from fleet2d.kernels.numbers import TURN, in_radians
 from fleet2d.kernels.space import SUB
 from fleet2d.runs.key_kinds import KEY_KINDS, PLANNED, WALK
+from fleet2d.runtime.clock import Clock
 from fleet2d.scenario.model import load_scenario
-from fleet2d.trust import restrict_stored
-from fleet2d.units import whole_steps
 
 if TYPE_CHECKING:
     from fleet2d.runs.run import Run

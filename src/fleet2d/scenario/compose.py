@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from fleet2d.bounds import one_line
-from fleet2d.component import base_of, lookup
-from fleet2d.document import Document, Keys, parse_yaml, read_document
+from fleet2d.configuration.components import base_of, lookup
+from fleet2d.configuration.documents import Document, Keys, parse_yaml, read_document
+from fleet2d.configuration.problems import suggest
 from fleet2d.errors import ScenarioError
-from fleet2d.problems import suggest
 
 BUNDLED = Path(__file__).parent / "bundled"
 ENTRIES = ("users", "robots", "objects", "algorithms", "metrics", "expect")

@@ -8,10 +8,10 @@ from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from fleet2d.bounds import one_line
-from fleet2d.component import components
-from fleet2d.document import Document
+from fleet2d.configuration.components import components
+from fleet2d.configuration.documents import Document
+from fleet2d.configuration.problems import Location, did_you_mean, shown
 from fleet2d.errors import ScenarioError
-from fleet2d.problems import Location, did_you_mean, shown
 from fleet2d.scenario.compose import slot_kind
 
 _EXPECTED = {

@@ -9,25 +9,23 @@ from pydantic import BeforeValidator, Field, PrivateAttr, ValidationError, model
 
 from fleet2d.algorithms.algorithm import Algorithm
 from fleet2d.artifacts.settings import ArtifactSettings
-from fleet2d.component import OneOf, Settings
-from fleet2d.document import Document
+from fleet2d.configuration.components import CheckNames, NameAsType, OneOf, Settings, ShortForm
+from fleet2d.configuration.documents import Document
+from fleet2d.configuration.problems import problem, problem_at, suggest
+from fleet2d.configuration.trust import check_code
+from fleet2d.configuration.units import Duration, PositiveDuration, format_duration, micros
 from fleet2d.entities.entity import Robot, User
 from fleet2d.entities.objects.home_object import HomeObject
-from fleet2d.entry_names import CheckNames, NameAsType
 from fleet2d.errors import ScenarioError
 from fleet2d.floorplan.home.change import HomeChange
 from fleet2d.floorplan.load import advise_type
 from fleet2d.floorplan.source import FloorPlanSource
 from fleet2d.interventions.script import Entry
 from fleet2d.metrics.metric import Metric
-from fleet2d.problems import problem, problem_at, suggest
 from fleet2d.scenario.compose import compose
 from fleet2d.scenario.expectation_field import ExpectationField
 from fleet2d.scenario.explain import explain
-from fleet2d.short_form import ShortForm
 from fleet2d.sight.settings import SightSettings
-from fleet2d.trust import check_code
-from fleet2d.units import Duration, PositiveDuration, format_duration, micros
 
 
 def _parse_local_time(value: Any) -> Any:

@@ -9,7 +9,7 @@ from pydantic import BaseModel
 from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue, models_json_schema
 from pydantic_core import PydanticSerializationError, SchemaError, SchemaSerializer, core_schema
 
-from fleet2d.component import PACKAGES, Component, Settings, aliases, components
+from fleet2d.configuration.components import PACKAGES, Component, Settings, aliases, components
 from fleet2d.interventions.intervention import verbs
 from fleet2d.scenario.compose import ENTRIES
 from fleet2d.scenario.model import Scenario

@@ -10,8 +10,8 @@ from typing import Literal
 import numpy as np
 
 from fleet2d.kernels import F64, I8
+from fleet2d.runtime.determinism import Draws
 from fleet2d.search.problem import SearchProblem
-from fleet2d.streams import Draws
 
 Policy = Literal["random", "nearest", "likeliest", "greedy", "exact", "receding"]
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fleet2d.kernels import F64
-from fleet2d.sums import sum_in_order
+from fleet2d.runtime.determinism import sum_in_order
 
 
 class SearchProblem(NamedTuple):

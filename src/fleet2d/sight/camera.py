@@ -6,11 +6,9 @@ from typing import NamedTuple, Self
 
 from pydantic import Field, model_validator
 
-from fleet2d.component import Settings
-from fleet2d.kernels.numbers import TURN, UNIT, cosine, sine
-from fleet2d.problems import problem, problem_at
-from fleet2d.sight.perception import Perception
-from fleet2d.units import (
+from fleet2d.configuration.components import Settings
+from fleet2d.configuration.problems import problem, problem_at
+from fleet2d.configuration.units import (
     AngleDeg,
     Duration,
     Length,
@@ -20,6 +18,8 @@ from fleet2d.units import (
     micros,
     whole_steps,
 )
+from fleet2d.kernels.numbers import TURN, UNIT, cosine, sine
+from fleet2d.sight.perception import Perception
 
 # Squares of distances in lattice units stay far inside 64 bits.
 FARTHEST_M = 10_000

@@ -9,15 +9,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fleet2d.clock import DAY_US, HOUR_US, midnight_of
+from fleet2d.configuration.units import micros
 from fleet2d.errors import ComponentError
 from fleet2d.floorplan.home.home import Home
 from fleet2d.kernels import F64, I16, I64, Bool
 from fleet2d.kernels.motion import rooms_at
 from fleet2d.kernels.numbers import BELL_STD, QUARTER, TURN, UNIT, half_sines, random_bells
 from fleet2d.kernels.sight import NOBODY, ONE, POSTURES, random_shares
-from fleet2d.streams import stream_key
-from fleet2d.units import micros
+from fleet2d.runtime.clock import DAY_US, HOUR_US, midnight_of
+from fleet2d.runtime.determinism import stream_key
 
 FARTHEST_M = 10_000.0
 """Largest coordinate of a perceived position [m]."""

@@ -9,11 +9,11 @@ import numpy as np
 from pydantic import Field, GetJsonSchemaHandler, model_serializer, model_validator
 from pydantic_core import CoreSchema
 
-from fleet2d.component import Settings
+from fleet2d.configuration.components import Settings
+from fleet2d.configuration.problems import problem, problem_at
+from fleet2d.configuration.units import Share
 from fleet2d.kernels import F64, I64
 from fleet2d.kernels.sight import ONE
-from fleet2d.problems import problem, problem_at
-from fleet2d.units import Share
 
 EXACT = 20  # digits: far more than a probability in units of 2**-31 needs
 LIMIT = 200  # beyond exp(-200) or exp(200) a probability is 0 or 1

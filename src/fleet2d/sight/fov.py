@@ -5,7 +5,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from fleet2d.component import Component
+from fleet2d.configuration.components import Component
 from fleet2d.floorplan.home.home import Home
 from fleet2d.kernels import I64, Bool
 from fleet2d.kernels.sight import Reach, points_in_reach

@@ -9,13 +9,12 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from fleet2d.component import OneOf, Settings
-from fleet2d.entry_names import CheckNames, NameAsType
-from fleet2d.problems import problem_at
+from fleet2d.configuration.components import CheckNames, NameAsType, OneOf, Settings
+from fleet2d.configuration.problems import problem_at
+from fleet2d.configuration.units import AngleDeg, Duration, Length, Share
+from fleet2d.runtime.determinism import sum_in_order
 from fleet2d.sight.curve import Curve
 from fleet2d.sight.perception_error import PerceptionError
-from fleet2d.sums import sum_in_order
-from fleet2d.units import AngleDeg, Duration, Length, Share
 
 Posture = Literal["stand", "sit", "lie"]
 POSTURES: tuple[Posture, ...] = ("stand", "sit", "lie")

@@ -3,7 +3,7 @@
 from abc import abstractmethod
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from fleet2d.component import Component
+from fleet2d.configuration.components import Component
 
 if TYPE_CHECKING:
     from fleet2d.sight.camera_sightings import CameraSightings

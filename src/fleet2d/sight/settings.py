@@ -2,10 +2,10 @@
 
 from typing import Annotated
 
-from fleet2d.component import OneOf, Settings
+from fleet2d.configuration.components import OneOf, Settings
+from fleet2d.configuration.units import PositiveDuration
 from fleet2d.sight.fov import FieldOfView
 from fleet2d.sight.line_of_sight import LineOfSight
-from fleet2d.units import PositiveDuration
 
 
 class SightSettings(Settings):

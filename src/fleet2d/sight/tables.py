@@ -6,6 +6,8 @@ from decimal import Decimal
 
 import numpy as np
 
+from fleet2d.configuration.problems import suggest
+from fleet2d.configuration.units import micros
 from fleet2d.errors import ScenarioError
 from fleet2d.floorplan.geometry.lattice import Lattice
 from fleet2d.kernels import I64
@@ -39,13 +41,11 @@ from fleet2d.kernels.sight import (
     Lenses,
     UserDraw,
 )
-from fleet2d.problems import suggest
+from fleet2d.runtime.determinism import sum_in_order
 from fleet2d.sight.camera import Lens
 from fleet2d.sight.curve import chance, cumulative, decay
 from fleet2d.sight.perception import POSTURES as POSTURE_NAMES
 from fleet2d.sight.perception import Attributes, Detection, FalsePositives, Identity, Perception
-from fleet2d.sums import sum_in_order
-from fleet2d.units import micros
 
 SUM_ERROR = 1e-6  # largest excess over 1 of a sum of probabilities
 

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from fleet2d.component import register
+from fleet2d.configuration.components import register
+from fleet2d.configuration.problems import problem_at
 from fleet2d.errors import ScenarioError
 from fleet2d.floorplan.home.home import Home
 from fleet2d.kernels import I32, I64, Bool
@@ -22,7 +23,6 @@ from fleet2d.kernels.sight import (
     visible_region,
 )
 from fleet2d.kernels.space import SUB, Mesh, rasterize_cells
-from fleet2d.problems import problem_at
 from fleet2d.sight.fov import FieldOfView, Reach
 
 Pieces = tuple[I32, I32]

@@ -9,12 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fleet2d.errors import InputError
-from fleet2d.extras import extra
+from fleet2d.configuration.problems import suggest
+from fleet2d.errors import InputError, extra
 from fleet2d.kernels import F64, I64
-from fleet2d.problems import suggest
+from fleet2d.runtime.determinism import sum_in_order
 from fleet2d.studies.parts import VARIANT
-from fleet2d.sums import sum_in_order
 
 if TYPE_CHECKING:
     import polars as pl

@@ -11,13 +11,12 @@ import numpy as np
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from fleet2d.bounds import VARIANTS
-from fleet2d.component import Settings
-from fleet2d.document import Keys
-from fleet2d.errors import ScenarioError
-from fleet2d.extras import extra
+from fleet2d.configuration.components import Settings
+from fleet2d.configuration.documents import Keys
+from fleet2d.configuration.problems import did_you_mean, problem
+from fleet2d.configuration.units import folder_of
+from fleet2d.errors import ScenarioError, extra
 from fleet2d.kernels import F64
-from fleet2d.paths import folder_of
-from fleet2d.problems import did_you_mean, problem
 
 Label = str | int | float | bool | None
 """The name of a choice in tables and messages; None where the axis does not apply."""

@@ -11,9 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from fleet2d.blame import end_by_signal
-from fleet2d.errors import InputError
-from fleet2d.trust_options import TrustFiles, TrustFolders, restrict_to
+from fleet2d.errors import InputError, end_by_signal
+from fleet2d.options import TrustFiles, TrustFolders, restrict_to
 
 if TYPE_CHECKING:
     from fleet2d.studies.driver import CheckedStudy

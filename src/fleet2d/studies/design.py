@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import Any
 
 from fleet2d import version
-from fleet2d.document import Document
+from fleet2d.configuration.documents import Document
+from fleet2d.configuration.problems import suggest
 from fleet2d.errors import InputError, ScenarioError
-from fleet2d.problems import suggest
 from fleet2d.scenario.compose import apply_changes, assignment, merge
 from fleet2d.scenario.model import Scenario, scenario_of
 from fleet2d.studies.axes import Choice, Label, key_path

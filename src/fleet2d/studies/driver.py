@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from fleet2d.configuration.trust import Trust, current_trust, restrict
 from fleet2d.errors import ArtifactError, Fleet2DError
 from fleet2d.studies.design import (
     Design,
@@ -40,7 +41,6 @@ from fleet2d.studies.plan import (
 from fleet2d.studies.records import Journal, VariantRecord, record_of
 from fleet2d.studies.simulator import VariantOutcome, describe_error, execute
 from fleet2d.studies.specification import Specification, read_specification
-from fleet2d.trust import Trust, current_trust, restrict
 
 PART_BYTES = 64_000_000  # size at which a journal becomes a part
 PART_S_REMOTE = 60.0  # the longest time that results for a store are on this machine only

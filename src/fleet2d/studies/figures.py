@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fleet2d.extras import extra
+from fleet2d.errors import extra
 from fleet2d.studies.answers import estimate
 from fleet2d.studies.parts import VARIANT
 

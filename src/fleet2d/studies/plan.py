@@ -7,6 +7,9 @@ from dataclasses import dataclass, field, replace
 from datetime import timedelta
 from typing import TYPE_CHECKING, Any, Literal
 
+from fleet2d.configuration.problems import suggest
+from fleet2d.configuration.trust import Trust, current_trust, restrict
+from fleet2d.configuration.units import parse_duration
 from fleet2d.errors import (
     ComponentError,
     Fleet2DError,
@@ -14,7 +17,7 @@ from fleet2d.errors import (
     RunDirectoryError,
     ScenarioError,
 )
-from fleet2d.problems import suggest
+from fleet2d.runtime.determinism import sum_in_order
 from fleet2d.scenario.model import Scenario
 from fleet2d.studies.axes import Label
 from fleet2d.studies.design import (
@@ -31,9 +34,6 @@ from fleet2d.studies.directory import PLAN, SCENARIOS, StudyDirectory
 from fleet2d.studies.executors import Executor, LostTask, SerialExecutor, TaskSchedule, WorkerTask
 from fleet2d.studies.parts import VARIANT
 from fleet2d.studies.simulator import check_setup, measure
-from fleet2d.sums import sum_in_order
-from fleet2d.trust import Trust, current_trust, restrict
-from fleet2d.units import parse_duration
 
 if TYPE_CHECKING:
     import pyarrow as pa

@@ -9,8 +9,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
 
-from fleet2d.errors import InputError
-from fleet2d.extras import extra
+from fleet2d.errors import InputError, extra
 from fleet2d.studies.executors import (
     AHEAD,
     MOST_STARTS,

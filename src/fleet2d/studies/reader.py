@@ -5,9 +5,9 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
-from fleet2d.errors import ArtifactError, InputError
-from fleet2d.extras import extra
-from fleet2d.problems import did_you_mean, suggest
+from fleet2d.configuration.problems import did_you_mean, suggest
+from fleet2d.configuration.trust import Trust, restrict_stored
+from fleet2d.errors import ArtifactError, InputError, extra
 from fleet2d.studies import answers
 from fleet2d.studies.directory import Counts, StudyDirectory, variants_table
 from fleet2d.studies.parts import (
@@ -22,7 +22,6 @@ from fleet2d.studies.parts import (
 from fleet2d.studies.plan import stored_scenario
 from fleet2d.studies.records import read_journal
 from fleet2d.studies.simulator import run_scenario
-from fleet2d.trust import Trust, restrict_stored
 
 if TYPE_CHECKING:
     import duckdb

@@ -9,17 +9,16 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import BeforeValidator, Field, ValidationError, model_validator
 
 from fleet2d.bounds import one_line
-from fleet2d.component import Settings
-from fleet2d.document import Document, read_document
+from fleet2d.configuration.components import Settings
+from fleet2d.configuration.documents import Document, read_document
+from fleet2d.configuration.problems import problem, problem_at, suggest
+from fleet2d.configuration.trust import check_code
+from fleet2d.configuration.units import PositiveDuration, folder_of
 from fleet2d.errors import ScenarioError
-from fleet2d.paths import folder_of
-from fleet2d.problems import problem, problem_at, suggest
 from fleet2d.scenario.compose import compose
 from fleet2d.scenario.explain import explain
 from fleet2d.scenario.model import Scenario
 from fleet2d.studies.axes import AnyAxis, Parameter, check_count
-from fleet2d.trust import check_code
-from fleet2d.units import PositiveDuration
 
 
 class TuneSettings(Settings):

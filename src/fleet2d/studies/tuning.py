@@ -7,8 +7,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
-from fleet2d.errors import ComponentError, Fleet2DError, InputError, ScenarioError
-from fleet2d.extras import extra
+from fleet2d.configuration.trust import Trust, current_trust, restrict
+from fleet2d.errors import ComponentError, Fleet2DError, InputError, ScenarioError, extra
+from fleet2d.runtime.determinism import sum_in_order
 from fleet2d.scenario.compose import apply_changes, assignment
 from fleet2d.scenario.model import Scenario, scenario_of
 from fleet2d.studies.axes import OptionsAxis, Parameter, key_path, rounded
@@ -25,8 +26,6 @@ from fleet2d.studies.specification import (
     read_specification,
 )
 from fleet2d.studies.storage import write_error
-from fleet2d.sums import sum_in_order
-from fleet2d.trust import Trust, current_trust, restrict
 
 if TYPE_CHECKING:
     import optuna

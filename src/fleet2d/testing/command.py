@@ -85,7 +85,7 @@ def parse_budget(text: str) -> tuple[int, float | None]:
     """
     from pydantic_core import PydanticCustomError
 
-    from fleet2d.units import parse_duration
+    from fleet2d.configuration.units import parse_duration
 
     if re.fullmatch(r"[1-9]\d{0,6}", text.strip()):
         return int(text), None
@@ -146,7 +146,7 @@ def _scenario_text(
     failure: "FailingPoint", job: "TryJob", target: str, out: Path, reason: str
 ) -> str:
     """Return the YAML of a failing scenario: the file that it extends, and the changes."""
-    from fleet2d.document import Document
+    from fleet2d.configuration.documents import Document
     from fleet2d.scenario.compose import assignment, merge
 
     content = Document()

@@ -7,8 +7,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from fleet2d.clock import Clock
 from fleet2d.errors import Fleet2DError
+from fleet2d.runtime.clock import Clock
 from fleet2d.testing.claim import Variant
 from fleet2d.testing.running import Body, ClaimResult, run_trial
 from fleet2d.testing.shrink import Shrinker

@@ -15,7 +15,7 @@ import numpy as np
 
 from fleet2d.errors import InputError
 from fleet2d.kernels import F64, I64
-from fleet2d.sums import sum_in_order
+from fleet2d.runtime.determinism import sum_in_order
 
 MOST_SEEDS = 10_000
 BISECTIONS = 14

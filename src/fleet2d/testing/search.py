@@ -11,10 +11,9 @@ from inspect import signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fleet2d.document import Document
-from fleet2d.errors import InputError
-from fleet2d.extras import extra
-from fleet2d.problems import suggest
+from fleet2d.configuration.documents import Document
+from fleet2d.configuration.problems import suggest
+from fleet2d.errors import InputError, extra
 from fleet2d.studies.executors import Executor, LostTask, TaskSchedule, WorkerTask
 from fleet2d.studies.simulator import describe_error
 from fleet2d.testing.claim import ATTRIBUTE, Claim, Variant

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 from pydantic import TypeAdapter, ValidationError
 
 from fleet2d.bounds import one_line
-from fleet2d.document import Document, Keys, parse_yaml, read_document
+from fleet2d.configuration.documents import Document, Keys, parse_yaml, read_document
+from fleet2d.configuration.problems import did_you_mean, refusal
 from fleet2d.errors import Fleet2DError, InputError
-from fleet2d.problems import did_you_mean, refusal
 from fleet2d.scenario.compose import apply_changes, assignment
 from fleet2d.scenario.model import Scenario, scenario_of
 from fleet2d.studies.axes import AnyAxis, Choice, Parameter, key_path

@@ -5,9 +5,8 @@ from typing import Annotated
 
 import typer
 
-from fleet2d.arguments import ThemeChoice, split
 from fleet2d.errors import InputError, RunDirectoryError
-from fleet2d.trust_options import TrustFiles, TrustFolders, restrict_to
+from fleet2d.options import ThemeChoice, TrustFiles, TrustFolders, restrict_to, split
 
 
 def view(

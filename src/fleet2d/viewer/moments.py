@@ -5,10 +5,10 @@ from datetime import datetime, timedelta
 
 from pydantic_core import PydanticCustomError
 
-from fleet2d.clock import Clock, midnight_of
+from fleet2d.configuration.units import micros, parse_duration
 from fleet2d.errors import InputError
 from fleet2d.runs.run import Run
-from fleet2d.units import micros, parse_duration
+from fleet2d.runtime.clock import Clock, midnight_of
 
 _DAY = re.compile(r"day (\d+)(?:[ ,]+(\d{1,2}):(\d{2})(?::(\d{2}))?)?", re.IGNORECASE)
 _STEP = re.compile(r"step (\d+)", re.IGNORECASE)

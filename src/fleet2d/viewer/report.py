@@ -11,9 +11,9 @@ from typing import Any
 
 import yaml
 
+from fleet2d.configuration.units import format_duration
 from fleet2d.errors import ArtifactError, InputError
 from fleet2d.runs.run import Run
-from fleet2d.units import format_duration
 from fleet2d.viewer.export import POLICY, embedded_run, html_of
 from fleet2d.viewer.facts.page_data import PageData
 from fleet2d.viewer.facts.run_facts import run_title

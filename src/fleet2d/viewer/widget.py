@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from fleet2d.extras import extra
+from fleet2d.errors import extra
 from fleet2d.runs.run import Run
 from fleet2d.viewer.export import embedded_run, html_of
 from fleet2d.viewer.facts.page_data import PageData

@@ -8,7 +8,7 @@ import pytest
 from tests.scenes import digests, run, scenario, table
 
 import fleet2d
-from fleet2d.component import components, lookup
+from fleet2d.configuration.components import components, lookup
 from fleet2d.errors import Fleet2DError
 
 ESTIMATORS, MODELS = (

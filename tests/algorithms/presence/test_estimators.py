@@ -14,7 +14,7 @@ from fleet2d.algorithms.presence.exposure_ratio import AuditOnly, ExposureRatio
 from fleet2d.algorithms.presence.fremen import Fremen
 from fleet2d.algorithms.presence.likelihood import Likelihood
 from fleet2d.algorithms.presence.sighting_share import SightingShare
-from fleet2d.component import components
+from fleet2d.configuration.components import components
 from fleet2d.errors import ComponentError
 from fleet2d.kernels import F64
 

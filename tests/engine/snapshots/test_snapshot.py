@@ -23,7 +23,7 @@ import fleet2d
 from fleet2d import Algorithm, Behavior, Plan, Simulation, Situation
 from fleet2d.engine.snapshots.snapshot import MAGIC, may_refer, open_snapshot
 from fleet2d.errors import ArtifactError, ComponentError, InputError
-from fleet2d.events import Event
+from fleet2d.runtime.events import Event
 
 HOUSE = {
     "hall": {"type": "door", "doorway": "living_room_0-bedroom_0", "closes_after": "20 s"},
@@ -462,7 +462,7 @@ def named(module: str, name: str) -> bytes:
         ("numpy", "ndarray.tofile"),
         ("numpy", "f2py.subprocess.Popen"),
         ("numpy", "load"),
-        ("fleet2d.clock", "np.f2py.subprocess.Popen"),
+        ("fleet2d.runtime.clock", "np.f2py.subprocess.Popen"),
         ("fleet2d.engine.snapshots.snapshot", "pickle.loads"),
         ("fleet2d.engine.snapshots.snapshot", "Path"),
         ("fleet2d.engine.snapshots.snapshot", "json.loads"),
@@ -470,8 +470,8 @@ def named(module: str, name: str) -> bytes:
         ("fleet2d.engine.run", "run"),
         ("fleet2d.engine.simulation", "Simulation"),
         ("fleet2d.artifacts.arrow", "ParquetTable"),
-        ("fleet2d.user_modules", "import_class"),
-        ("fleet2d.user_modules", "importlib.import_module"),
+        ("fleet2d.configuration.trust", "import_class"),
+        ("fleet2d.configuration.trust", "importlib.import_module"),
         ("fleet2d", "run"),
         ("antigravity", "webbrowser"),
         ("nowhere", "nothing"),

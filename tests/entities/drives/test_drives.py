@@ -13,7 +13,7 @@ from tests.scenes import digests, path, run, table
 
 import fleet2d
 from fleet2d import Behavior, Drive, Moment, Plan, Route, Situation
-from fleet2d.component import components
+from fleet2d.configuration.components import components
 from fleet2d.entities.drives.drive import estimate
 from fleet2d.entities.robots.approach import way_seconds
 from fleet2d.errors import ComponentError, ScenarioError

@@ -16,7 +16,7 @@ from fleet2d.engine.simulation import Simulation
 from fleet2d.errors import InputError
 from fleet2d.routines import survey
 from fleet2d.routines.interruptions import without_interruptions
-from fleet2d.streams import Draws, stream_key
+from fleet2d.runtime.determinism import Draws, stream_key
 
 HOUR = 3600
 

@@ -6,7 +6,7 @@ import pytest
 import shapely
 from pydantic import ValidationError
 
-from fleet2d.component import lookup
+from fleet2d.configuration.components import lookup
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.formats.drawing import Image, read_image
 from fleet2d.floorplan.load import load_floorplan

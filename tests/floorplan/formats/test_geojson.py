@@ -7,7 +7,7 @@ import pytest
 import shapely
 from pydantic import ValidationError
 
-from fleet2d.component import lookup
+from fleet2d.configuration.components import lookup
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.formats.geojson import GeoJson, read_geojson
 from fleet2d.floorplan.load import load_floorplan

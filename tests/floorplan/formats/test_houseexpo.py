@@ -8,7 +8,7 @@ import shapely
 from pydantic import ValidationError
 from tests.homes import plan_files
 
-from fleet2d.component import lookup
+from fleet2d.configuration.components import lookup
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.formats.houseexpo import HouseExpo, read_houseexpo
 from fleet2d.floorplan.plan import FloorPlan

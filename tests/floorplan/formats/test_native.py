@@ -7,7 +7,7 @@ import shapely
 import yaml
 from tests.homes import plan_files
 
-from fleet2d.component import lookup
+from fleet2d.configuration.components import lookup
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.formats.bundled import Bundled, bundled_names
 from fleet2d.floorplan.formats.houseexpo import read_houseexpo

@@ -8,7 +8,7 @@ import shapely
 from pydantic import ValidationError
 
 import fleet2d
-from fleet2d.component import lookup
+from fleet2d.configuration.components import lookup
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.formats.ros import Ros, read_ros
 from fleet2d.floorplan.home.space import Space

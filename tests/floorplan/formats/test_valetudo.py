@@ -10,7 +10,7 @@ import pytest
 import shapely
 from pydantic import ValidationError
 
-from fleet2d.component import lookup
+from fleet2d.configuration.components import lookup
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.formats.native import native_document, read_native
 from fleet2d.floorplan.formats.valetudo import (

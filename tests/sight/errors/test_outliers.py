@@ -3,7 +3,7 @@
 import numpy as np
 from tests.sight.sightings import sightings
 
-from fleet2d.component import lookup
+from fleet2d.configuration.components import lookup
 from fleet2d.sight.errors.outliers import Outliers
 
 MANY = 20_000

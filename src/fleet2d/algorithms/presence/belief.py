@@ -8,9 +8,9 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from fleet2d.configuration.problems import suggest
 from fleet2d.errors import ComponentError
 from fleet2d.kernels import F64, Bool
-from fleet2d.problems import suggest
 
 ANYONE = "anyone"
 AWAY = "away"

@@ -17,10 +17,10 @@ from fleet2d.algorithms.presence.habits import Habits
 from fleet2d.algorithms.presence.likelihood import Likelihood
 from fleet2d.algorithms.presence.model import Model
 from fleet2d.algorithms.presence.people import StateLayout
-from fleet2d.component import register
+from fleet2d.configuration.components import register
+from fleet2d.configuration.units import Share
 from fleet2d.kernels import F64, I64
 from fleet2d.kernels.presence import StayModel, Stretches, advance, follow
-from fleet2d.units import Share
 
 FARTHEST = 10_080  # bins ahead; later forecasts equal the one at this horizon
 

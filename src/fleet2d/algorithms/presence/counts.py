@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from fleet2d.algorithms.evidence import Evidence, Parts, SightingCounts
 from fleet2d.algorithms.learned import array_of
 from fleet2d.algorithms.presence.belief import HOURS
-from fleet2d.clock import midnight_of
 from fleet2d.kernels import F64, I64
+from fleet2d.runtime.clock import midnight_of
 
 HOUR_US = 3_600_000_000
 DAY_US = 24 * HOUR_US

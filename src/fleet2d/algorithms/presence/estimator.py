@@ -9,7 +9,7 @@ import numpy as np
 
 from fleet2d.algorithms.presence.belief import Presence, WeeklyPresence
 from fleet2d.algorithms.presence.counts import Bins, DayCounts
-from fleet2d.component import Component
+from fleet2d.configuration.components import Component
 from fleet2d.errors import ComponentError
 from fleet2d.kernels import F64
 from fleet2d.kernels.presence import resampled

@@ -9,11 +9,11 @@ from pydantic import Field, model_validator
 
 from fleet2d.algorithms.presence.counts import Bins
 from fleet2d.algorithms.presence.estimator import Estimator, normalized
-from fleet2d.component import register
+from fleet2d.configuration.components import register
+from fleet2d.configuration.problems import problem
+from fleet2d.configuration.units import PositiveDuration, Share
 from fleet2d.errors import ComponentError
 from fleet2d.kernels import F64, I64, Bool
-from fleet2d.problems import problem
-from fleet2d.units import PositiveDuration, Share
 
 PRIOR = 1.0  # bins of average sightings that are added to each place
 

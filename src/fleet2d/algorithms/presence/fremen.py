@@ -14,9 +14,9 @@ from fleet2d.algorithms.presence.counts import Bins
 from fleet2d.algorithms.presence.estimator import Estimator, normalized
 from fleet2d.algorithms.presence.exposure_ratio import ratios, seen_and_watched
 from fleet2d.algorithms.presence.logarithm import natural_log
-from fleet2d.component import register
+from fleet2d.configuration.components import register
+from fleet2d.configuration.units import Share
 from fleet2d.kernels import F64, I64
-from fleet2d.units import Share
 
 WEEK = 10_080  # minutes
 PERIODS = 100  # candidate periods: a week divided by 1, 2 … 100

@@ -11,11 +11,11 @@ from fleet2d.algorithms.presence.counts import Bins
 from fleet2d.algorithms.presence.day_evidence import DayEvidence, by_day
 from fleet2d.algorithms.presence.estimator import FEWEST_DAYS, Estimator, normalized
 from fleet2d.algorithms.presence.people import People, Prior, StateLayout
-from fleet2d.component import register
+from fleet2d.configuration.components import register
+from fleet2d.configuration.units import Share
 from fleet2d.errors import ComponentError
 from fleet2d.kernels import F64, I64, Bool
 from fleet2d.kernels.presence import PeoplePlaces, sum_places
-from fleet2d.units import Share
 
 # Number of earlier days that are revisited in turn when a day is over, and of those stored.
 REVISITS = 2

@@ -13,12 +13,12 @@ from fleet2d.algorithms.learned import check_numbers
 from fleet2d.algorithms.presence.belief import Presence
 from fleet2d.algorithms.presence.counts import in_time
 from fleet2d.algorithms.presence.estimator import Estimator
-from fleet2d.component import OneOf, register
+from fleet2d.configuration.components import OneOf, register
+from fleet2d.configuration.problems import problem
+from fleet2d.configuration.units import PositiveDuration, Share
 from fleet2d.floorplan.home.home import Home
 from fleet2d.kernels import F64
-from fleet2d.problems import problem
-from fleet2d.streams import stream_key
-from fleet2d.units import PositiveDuration, Share
+from fleet2d.runtime.determinism import stream_key
 
 MINUTE = timedelta(minutes=1)
 DAY = timedelta(days=1)

@@ -10,7 +10,7 @@ from pydantic import Field
 from fleet2d.algorithms.presence.belief import HOURS, BeliefSeries, Presence, WeeklyPresence
 from fleet2d.algorithms.presence.counts import Bins
 from fleet2d.algorithms.presence.estimator import Estimator
-from fleet2d.component import Component, OneOf, register
+from fleet2d.configuration.components import Component, OneOf, register
 from fleet2d.kernels import F64
 
 NEVER = -1

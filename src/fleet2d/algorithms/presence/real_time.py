@@ -12,10 +12,10 @@ from fleet2d.algorithms.learned import check_numbers
 from fleet2d.algorithms.presence.belief import ANYONE, BeliefSeries, Presence, are_distributions
 from fleet2d.algorithms.presence.counts import in_time
 from fleet2d.algorithms.presence.model import Model
-from fleet2d.component import OneOf, register
+from fleet2d.configuration.components import OneOf, register
+from fleet2d.configuration.units import PositiveDuration
 from fleet2d.errors import ComponentError
 from fleet2d.floorplan.home.home import Home
-from fleet2d.units import PositiveDuration
 
 SECOND_US = 1_000_000
 

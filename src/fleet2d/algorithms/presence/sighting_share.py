@@ -4,7 +4,7 @@ import numpy as np
 
 from fleet2d.algorithms.presence.counts import Bins
 from fleet2d.algorithms.presence.estimator import Estimator, normalized
-from fleet2d.component import register
+from fleet2d.configuration.components import register
 from fleet2d.kernels import F64
 
 

@@ -7,9 +7,9 @@ from typing import Annotated
 
 import typer
 
-from fleet2d.arguments import Resolution
 from fleet2d.cli.plugins import entries
 from fleet2d.errors import InputError
+from fleet2d.options import Resolution
 
 
 def convert(

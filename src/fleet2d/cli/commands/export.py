@@ -6,8 +6,8 @@ from typing import Annotated
 import typer
 
 from fleet2d.errors import InputError
+from fleet2d.options import TrustFiles, TrustFolders, restrict_to
 from fleet2d.runs.exporters import exporter, formats
-from fleet2d.trust_options import TrustFiles, TrustFolders, restrict_to
 
 
 def _format_help() -> str:

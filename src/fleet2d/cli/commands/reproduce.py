@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from fleet2d.trust_options import TrustFiles, TrustFolders, trust_of
+from fleet2d.options import TrustFiles, TrustFolders, trust_of
 
 
 def reproduce(

@@ -9,7 +9,7 @@ import typer
 
 from fleet2d.cli.progress import run_with_progress
 from fleet2d.cli.summary import print_results
-from fleet2d.trust_options import TrustFiles, TrustFolders, trust_of
+from fleet2d.options import TrustFiles, TrustFolders, trust_of
 
 
 def resume(

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from fleet2d.arguments import file_name, split
 from fleet2d.cli.progress import run_with_progress
 from fleet2d.cli.summary import print_results
 from fleet2d.cli.watchdog import watched
 from fleet2d.errors import RunDirectoryError
-from fleet2d.garbage import rare_collections
+from fleet2d.memory import rare_collections
+from fleet2d.options import file_name, split
 
 if TYPE_CHECKING:
     from fleet2d.engine.simulation import Simulation

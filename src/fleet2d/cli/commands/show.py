@@ -5,9 +5,15 @@ from typing import Annotated, Literal, NamedTuple
 
 import typer
 
-from fleet2d.arguments import Resolution, ThemeChoice, file_name
 from fleet2d.errors import InputError, RunDirectoryError
-from fleet2d.trust_options import TrustFiles, TrustFolders, restrict_to
+from fleet2d.options import (
+    Resolution,
+    ThemeChoice,
+    TrustFiles,
+    TrustFolders,
+    file_name,
+    restrict_to,
+)
 
 Figure = Annotated[
     Literal["life", "heat", "strip"],

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from fleet2d.arguments import file_name
 from fleet2d.cli.scenario_case import ScenarioCase
 from fleet2d.errors import Fleet2DError, InputError
+from fleet2d.options import file_name
 
 if TYPE_CHECKING:
     from fleet2d.engine.simulation import Simulation

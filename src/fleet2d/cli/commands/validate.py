@@ -6,8 +6,8 @@ from typing import Annotated, Any
 
 import typer
 
-from fleet2d.arguments import Resolution, file_name, split
 from fleet2d.errors import InputError
+from fleet2d.options import Resolution, file_name, split
 
 
 def validate(

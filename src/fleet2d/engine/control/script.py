@@ -2,7 +2,7 @@
 
 from datetime import datetime
 
-from fleet2d.clock import Clock
+from fleet2d.configuration.units import format_duration, micros
 from fleet2d.engine.control.world import EngineWorld
 from fleet2d.engine.interventions import OUTSIDE, SCRIPT, PendingIntervention
 from fleet2d.engine.state import State
@@ -10,7 +10,7 @@ from fleet2d.errors import ScenarioError
 from fleet2d.interventions.possible_events import check_trigger
 from fleet2d.interventions.script import Entry
 from fleet2d.interventions.when import ClockTime
-from fleet2d.units import format_duration, micros
+from fleet2d.runtime.clock import Clock
 
 
 def schedule(state: State, entry: Entry, first: int, index: int | None = None) -> None:

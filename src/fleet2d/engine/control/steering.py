@@ -9,24 +9,24 @@ from typing import Any
 from pydantic import ValidationError
 
 from fleet2d.algorithms.algorithm import Algorithm
-from fleet2d.clock import Clock, next_time
+from fleet2d.configuration.problems import refusal, suggest
+from fleet2d.configuration.units import micros, parse_duration
 from fleet2d.engine.control.script import schedule
 from fleet2d.engine.control.world import EngineWorld
 from fleet2d.engine.state import State
 from fleet2d.entities.decisions import DecidingActor
 from fleet2d.entities.plan import Plan, data_of
 from fleet2d.errors import InputError, ScenarioError
-from fleet2d.events import Event, EventKind, Listener
 from fleet2d.floorplan.home.change import HomeChange
 from fleet2d.floorplan.home.home import Home
 from fleet2d.interventions.intervention import Intervention, parse_intervention
 from fleet2d.interventions.script import WHEN, parse_entry
 from fleet2d.interventions.verbs import Verbs
 from fleet2d.kernels.numbers import in_radians
-from fleet2d.problems import refusal, suggest
 from fleet2d.runs.run import Run
+from fleet2d.runtime.clock import Clock, next_time
+from fleet2d.runtime.events import Event, EventKind, Listener
 from fleet2d.scenario.model import Scenario
-from fleet2d.units import micros, parse_duration
 
 
 class Steering(Verbs):

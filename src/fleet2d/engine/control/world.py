@@ -4,14 +4,14 @@ from collections.abc import Callable, Sequence
 from functools import cached_property
 from pathlib import Path
 
-from fleet2d.clock import Clock
 from fleet2d.engine.state import State
 from fleet2d.entities.body import Pose
 from fleet2d.entities.decisions import Arbiter, DecidingActor
 from fleet2d.entities.objects.home_object import SensorFault
-from fleet2d.events import Event, EventKind
 from fleet2d.floorplan.home.change import HomeChange
 from fleet2d.floorplan.home.home import Home
+from fleet2d.runtime.clock import Clock
+from fleet2d.runtime.events import Event, EventKind
 from fleet2d.sight.disturbance import Disturbance
 
 

@@ -3,7 +3,7 @@
 from datetime import timedelta
 from typing import Any
 
-from fleet2d.clock import Clock
+from fleet2d.configuration.units import MICROSECOND
 from fleet2d.engine.expectations.signal_gauges import gauge_of
 from fleet2d.engine.gauges.gauges import Gauge
 from fleet2d.engine.gauges.run_expectations import RunExpectations
@@ -13,8 +13,8 @@ from fleet2d.expectations.expectation import Expectation
 from fleet2d.expectations.scene import Scene
 from fleet2d.expectations.signals import Measurement
 from fleet2d.expectations.verdict import check_judged
+from fleet2d.runtime.clock import Clock
 from fleet2d.scenario.model import Scenario
-from fleet2d.units import MICROSECOND
 
 
 def expect(

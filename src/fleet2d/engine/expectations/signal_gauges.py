@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from fleet2d.algorithms.output import to_columns
+from fleet2d.configuration.problems import suggest
 from fleet2d.engine.gauges.block import Block
 from fleet2d.engine.gauges.gauges import (
     ActivityGauge,
@@ -33,7 +34,6 @@ from fleet2d.floorplan.geometry.lattice import UNITS_PER_CELL
 from fleet2d.floorplan.home.home import Home, lattice_footprint
 from fleet2d.kernels import I64
 from fleet2d.kernels.sight import SightMemory
-from fleet2d.problems import suggest
 
 # The chance of a lens that notices all bodies in view.
 CERTAIN = 2**53

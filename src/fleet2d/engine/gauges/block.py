@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 from fleet2d.algorithms.log import SensorRow
 from fleet2d.engine.bodies import Bodies
-from fleet2d.events import Event
 from fleet2d.floorplan.home.home import Home
 from fleet2d.kernels import I64
+from fleet2d.runtime.events import Event
 
 
 @dataclass

@@ -9,13 +9,13 @@ from fleet2d.algorithms.activities import ROBOT
 from fleet2d.engine.gauges.block import Block
 from fleet2d.entities.battery import Course
 from fleet2d.entities.behavior import Actor
-from fleet2d.events import EventKind
 from fleet2d.expectations import states
 from fleet2d.expectations.trace import Trace, constant, joined, pulses, shortest
 from fleet2d.floorplan.home.home import Home
 from fleet2d.kernels import I64, Bool
 from fleet2d.kernels.motion import distances_between, distances_to_shape, rooms_at, speeds
 from fleet2d.kernels.sight import SightingColumn as Column
+from fleet2d.runtime.events import EventKind
 
 # The charge of a battery is rounded down to thousandths; errors of floats must not lower it.
 PARTS = 1000

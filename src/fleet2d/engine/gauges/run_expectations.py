@@ -8,17 +8,17 @@ import numpy as np
 
 from fleet2d.artifacts.store import RunStore
 from fleet2d.artifacts.table import Column, TableSpec
-from fleet2d.clock import Clock
 from fleet2d.engine.gauges.block import Block
 from fleet2d.engine.gauges.gauges import BatteryGauge, Gauge, ValueGauge
 from fleet2d.engine.learners import Learners
 from fleet2d.engine.tables.shared_columns import STEP, TIME
 from fleet2d.entities.behavior import Actor
-from fleet2d.events import Event
 from fleet2d.expectations.expectation import Expectation, RunSignals
 from fleet2d.expectations.signals import Measurement
 from fleet2d.expectations.verdict import Verdict, verdict_of
 from fleet2d.metrics.metric import Metric
+from fleet2d.runtime.clock import Clock
+from fleet2d.runtime.events import Event
 
 TABLE = "violations"
 

@@ -1,6 +1,6 @@
 """The last person leaves the home."""
 
-from fleet2d.component import register
+from fleet2d.configuration.components import register
 from fleet2d.engine.interrupts.interrupt import Interrupt, SpanView
 from fleet2d.kernels import Bool
 

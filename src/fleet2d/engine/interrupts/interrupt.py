@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
-from fleet2d.component import Component
+from fleet2d.configuration.components import Component
 from fleet2d.engine.bodies import PoseBlock
 from fleet2d.entities.behavior import Actor
 from fleet2d.kernels import Bool

@@ -12,7 +12,7 @@ from fleet2d.artifacts.manifest import Manifest
 from fleet2d.artifacts.settings import ArtifactSettings
 from fleet2d.artifacts.store import RunStore
 from fleet2d.artifacts.unfinished import Commit
-from fleet2d.clock import DAY_US, Clock
+from fleet2d.configuration.units import micros
 from fleet2d.engine.snapshots.snapshot import (
     Constants,
     UnstorableStateError,
@@ -22,9 +22,9 @@ from fleet2d.engine.snapshots.snapshot import (
 )
 from fleet2d.engine.state import State
 from fleet2d.errors import ArtifactError, RunDirectoryError
-from fleet2d.garbage import release_memory
+from fleet2d.memory import release_memory
+from fleet2d.runtime.clock import DAY_US, Clock
 from fleet2d.storage import files
-from fleet2d.units import micros
 
 # Longest wall time between commits of rows [s]; they are also committed every simulated day.
 COMMIT_S = 2.0

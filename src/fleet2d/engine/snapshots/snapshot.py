@@ -17,6 +17,7 @@ from typing import Any, BinaryIO
 
 from fleet2d.artifacts.chunk import ColumnChunk
 from fleet2d.artifacts.plain import plain
+from fleet2d.configuration.trust import is_scenario_module, public_name
 from fleet2d.engine.inputs import components_of
 from fleet2d.engine.snapshots import arrays
 from fleet2d.engine.state import State
@@ -28,7 +29,6 @@ from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.kernels.space import Mesh
 from fleet2d.routines.persona import Persona
 from fleet2d.scenario.model import Scenario
-from fleet2d.user_modules import is_scenario_module, public_name
 from fleet2d.version import __version__
 
 _HASH = type(hashlib.sha256())
@@ -76,8 +76,8 @@ _NO_STATE = (
     "fleet2d.runs",
     "fleet2d.calibrate",
     "fleet2d.cli",
-    "fleet2d.component",
-    "fleet2d.document",
+    "fleet2d.configuration.components",
+    "fleet2d.configuration.documents",
     "fleet2d.engine.snapshots.checkpoint",
     "fleet2d.engine.resume",
     "fleet2d.engine.run",
@@ -85,14 +85,14 @@ _NO_STATE = (
     "fleet2d.engine.snapshots.snapshot",
     "fleet2d.fit",
     "fleet2d.leaves",
-    "fleet2d.user_modules",
+    "fleet2d.configuration.trust",
     "fleet2d.paper",
     "fleet2d.published",
     "fleet2d.scenario",
     "fleet2d.studies",
     "fleet2d.testing",
-    "fleet2d.trust",
-    "fleet2d.trust_options",
+    "fleet2d.configuration.trust",
+    "fleet2d.options",
     "fleet2d.pictures",
     "fleet2d.viewer",
 )

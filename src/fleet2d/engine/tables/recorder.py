@@ -19,8 +19,8 @@ from fleet2d.engine.tables.key_frames import KeyFrames
 from fleet2d.engine.tables.trajectories import Samples
 from fleet2d.engine.watchers.cameras import Cameras
 from fleet2d.engine.watchers.sensors import Sensors
-from fleet2d.events import HOME, RANKS, Event, EventKind
 from fleet2d.kernels import I8, I32, I64
+from fleet2d.runtime.events import HOME, RANKS, Event, EventKind
 
 # Events whose detail is a user, who has a column of their own.
 OF_USERS = frozenset({EventKind.USER_LOST, EventKind.USER_SEEN})

@@ -4,7 +4,7 @@ import numpy as np
 
 from fleet2d.artifacts.settings import ArtifactSettings
 from fleet2d.artifacts.table import Column, TableSpec
-from fleet2d.clock import Clock
+from fleet2d.configuration.units import whole_steps
 from fleet2d.engine.basis import Basis
 from fleet2d.engine.bodies import Bodies
 from fleet2d.engine.tables.ordering import in_order
@@ -12,7 +12,7 @@ from fleet2d.engine.tables.shared_columns import HEADING, STEP, TIME, X, Y, away
 from fleet2d.kernels import I64
 from fleet2d.kernels.numbers import in_radians
 from fleet2d.kernels.space import SUB
-from fleet2d.units import whole_steps
+from fleet2d.runtime.clock import Clock
 
 
 def trajectory_table(entity: Column, room: Column) -> TableSpec:

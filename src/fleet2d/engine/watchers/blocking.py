@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fleet2d.configuration.units import micros
 from fleet2d.engine.basis import Basis
 from fleet2d.engine.bodies import Bodies
 from fleet2d.engine.watchers.watcher import Watcher
@@ -17,7 +18,6 @@ from fleet2d.entities.behavior import Situation
 from fleet2d.entities.giving_way import plan_after_a_step, plan_around
 from fleet2d.entities.plan import Note, Plan
 from fleet2d.kernels import I64, U8, Bool
-from fleet2d.units import micros
 
 # Time for which a body ignores another one that it goes round or squeezes past.
 PASSES = timedelta(seconds=10)

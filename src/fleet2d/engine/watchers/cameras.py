@@ -6,8 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fleet2d.algorithms.activities import ActivitySense
-from fleet2d.blame import blame
-from fleet2d.clock import midnight_of
+from fleet2d.configuration.units import micros
 from fleet2d.engine.basis import Basis
 from fleet2d.engine.bodies import Bodies, poses_of
 from fleet2d.engine.watchers.disturbances import (
@@ -23,8 +22,7 @@ from fleet2d.engine.watchers.sight_events import sight_events
 from fleet2d.engine.watchers.watcher import Watcher
 from fleet2d.entities.behavior import Actor, SightEvent
 from fleet2d.entities.localization import Drift, Localization
-from fleet2d.errors import ScenarioError
-from fleet2d.events import Event
+from fleet2d.errors import ScenarioError, blame
 from fleet2d.kernels import I64
 from fleet2d.kernels.sight import (
     MOST_GHOSTS,
@@ -42,13 +40,14 @@ from fleet2d.kernels.sight import (
 from fleet2d.kernels.sight import (
     SightingColumn as Column,
 )
+from fleet2d.runtime.clock import midnight_of
+from fleet2d.runtime.determinism import stream_key
+from fleet2d.runtime.events import Event
 from fleet2d.sight.disturbance import Disturbance
 from fleet2d.sight.fov import FieldOfView
 from fleet2d.sight.line_of_sight import LineOfSight
 from fleet2d.sight.perception import Perception
 from fleet2d.sight.tables import TableContext, error_tables, is_perfect, stack_lenses
-from fleet2d.streams import stream_key
-from fleet2d.units import micros
 
 # The name of the random stream of each draw.
 USER_STREAMS = {

@@ -14,11 +14,11 @@ from fleet2d.engine.bodies import Bodies, PoseBlock
 from fleet2d.engine.watchers.watcher import Watcher
 from fleet2d.entities.behavior import Attention, SightEvent
 from fleet2d.entities.decisions import DecidingActor
-from fleet2d.events import Event, EventKind
 from fleet2d.floorplan.objects import POSTURES
 from fleet2d.kernels import I64, Bool
 from fleet2d.kernels.sight import line_of_sight
 from fleet2d.kernels.space import locate
+from fleet2d.runtime.events import Event, EventKind
 
 # The squared distance of a person who can't be met: larger than any home [lattice units²].
 FAR = 1 << 50

@@ -10,18 +10,17 @@ from typing import cast
 
 import numpy as np
 
-from fleet2d.blame import blame
-from fleet2d.component import lookup
+from fleet2d.configuration.components import lookup
+from fleet2d.configuration.trust import source_files
 from fleet2d.engine.basis import Basis
 from fleet2d.engine.bodies import Bodies
 from fleet2d.engine.interrupts.interrupt import Interrupt, SpanView
 from fleet2d.engine.watchers.watcher import Watcher
 from fleet2d.entities.behavior import SightEvent
 from fleet2d.entities.entity import Robot, User
-from fleet2d.errors import ComponentError
-from fleet2d.events import Event
+from fleet2d.errors import ComponentError, blame
 from fleet2d.kernels import Bool
-from fleet2d.user_modules import source_files
+from fleet2d.runtime.events import Event
 
 # The events of cameras, which are watchers of their own.
 SIGHT_EVENTS = frozenset({*User.sight_events, *Robot.sight_events})

@@ -13,7 +13,9 @@ from fleet2d.algorithms.evidence import steps_of_bin
 from fleet2d.algorithms.log import Log
 from fleet2d.algorithms.patches import Patches, patches_of, whole_rooms
 from fleet2d.artifacts.layers import layer_rows, layer_table
-from fleet2d.component import Component
+from fleet2d.configuration.components import Component
+from fleet2d.configuration.problems import suggest
+from fleet2d.configuration.units import whole_steps
 from fleet2d.engine.basis import Basis
 from fleet2d.engine.watchers.seen_area import SeenArea
 from fleet2d.entities.entity import Robot
@@ -23,9 +25,7 @@ from fleet2d.floorplan.home.home import Home
 from fleet2d.floorplan.home.layers import COSTMAP, SEEN_LAYERS, Layer, LayerSettings, LayerType
 from fleet2d.floorplan.source import FloorPlanSource
 from fleet2d.metrics.metric import Metric
-from fleet2d.problems import suggest
 from fleet2d.scenario.model import Scenario
-from fleet2d.units import whole_steps
 
 NEEDS = ("evidence", "exposure", *SEEN_LAYERS)
 

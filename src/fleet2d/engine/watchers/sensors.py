@@ -9,7 +9,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 
 from fleet2d.algorithms.log import SensorRow
-from fleet2d.blame import blame
+from fleet2d.configuration.problems import suggest
 from fleet2d.engine.basis import Basis
 from fleet2d.engine.bodies import Bodies, PoseBlock
 from fleet2d.engine.watchers.watcher import Watcher
@@ -21,9 +21,8 @@ from fleet2d.entities.objects.home_object import (
     SensorView,
     in_order,
 )
-from fleet2d.errors import ScenarioError
-from fleet2d.events import Event, EventKind
-from fleet2d.problems import suggest
+from fleet2d.errors import ScenarioError, blame
+from fleet2d.runtime.events import Event, EventKind
 
 
 @runtime_checkable

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from fleet2d.blame import blame
-from fleet2d.errors import ComponentError
+from fleet2d.errors import ComponentError, blame
 from fleet2d.floorplan.geometry.lattice import Lattice
 from fleet2d.kernels import I64
 from fleet2d.kernels.motion import Window

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Sequence
 
 from fleet2d.engine.bodies import Bodies
 from fleet2d.entities.behavior import SightEvent
-from fleet2d.events import Event
+from fleet2d.runtime.events import Event
 
 
 class Watcher:

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Iterator
 
-from fleet2d.component import register
+from fleet2d.configuration.components import register
 from fleet2d.entities.drives.drive import Drive, Moment, Route
 from fleet2d.kernels.numbers import turn_between
 

@@ -8,7 +8,7 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from fleet2d.component import Component
+from fleet2d.configuration.components import Component
 from fleet2d.errors import ComponentError
 from fleet2d.kernels import F64, I64
 from fleet2d.kernels.numbers import TURN, heading_of, turn_between

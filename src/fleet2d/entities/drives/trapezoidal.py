@@ -6,7 +6,7 @@ from math import isqrt, sqrt
 import numpy as np
 from pydantic import Field
 
-from fleet2d.component import register
+from fleet2d.configuration.components import register
 from fleet2d.entities.drives.differential import Differential
 from fleet2d.kernels import F64
 

@@ -4,7 +4,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from fleet2d.component import register
+from fleet2d.configuration.components import register
 from fleet2d.entities.objects.home_object import Sensor, SensorView
 from fleet2d.floorplan.home.home import Home
 from fleet2d.kernels import I64

@@ -5,14 +5,14 @@ from typing import Self
 
 from pydantic import Field, model_validator
 
-from fleet2d.component import Settings, register
+from fleet2d.configuration.components import Settings, register
+from fleet2d.configuration.problems import did_you_mean, problem
+from fleet2d.configuration.units import PositiveDuration, TimeOfDay
 from fleet2d.entities.objects.home_object import HomeObject
 from fleet2d.entities.place import Point
 from fleet2d.errors import PlacementError
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.rooms.doorways import Doorway
-from fleet2d.problems import did_you_mean, problem
-from fleet2d.units import PositiveDuration, TimeOfDay
 
 
 class Turn(Settings):

@@ -8,10 +8,10 @@ from typing import ClassVar, Literal, NamedTuple
 import numpy as np
 from pydantic import Field
 
-from fleet2d.component import Component
+from fleet2d.configuration.components import Component
+from fleet2d.configuration.units import Duration, micros
 from fleet2d.floorplan.home.home import Home
 from fleet2d.kernels import I64, Bool
-from fleet2d.units import Duration, micros
 
 
 class HomeObject(Component):

@@ -5,7 +5,8 @@ from datetime import timedelta
 import numpy as np
 from pydantic import Field
 
-from fleet2d.component import register
+from fleet2d.configuration.components import register
+from fleet2d.configuration.units import AngleDeg, Duration, PositiveLength, micros
 from fleet2d.entities.objects.home_object import Sensor, SensorView, first_cause
 from fleet2d.entities.place import Point
 from fleet2d.errors import PlacementError
@@ -13,7 +14,6 @@ from fleet2d.floorplan.home.home import Home
 from fleet2d.kernels import I64, Bool
 from fleet2d.kernels.numbers import TURN, half_sine
 from fleet2d.kernels.sight import region_contains_points, visible_region
-from fleet2d.units import AngleDeg, Duration, PositiveLength, micros
 
 
 @register("object", "motion_sensor")

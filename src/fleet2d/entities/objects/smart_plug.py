@@ -5,12 +5,12 @@ from datetime import timedelta
 import numpy as np
 from pydantic import Field
 
-from fleet2d.component import register
+from fleet2d.configuration.components import register
+from fleet2d.configuration.units import Duration, Length
 from fleet2d.entities.objects.home_object import FurnitureSensor, SensorView, first_cause
 from fleet2d.errors import PlacementError
 from fleet2d.floorplan.home.home import Home
 from fleet2d.kernels import I64
-from fleet2d.units import Duration, Length
 
 
 @register("object", "smart_plug")

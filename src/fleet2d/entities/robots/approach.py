@@ -16,7 +16,7 @@ from fleet2d.kernels import F64, I64, Bool
 from fleet2d.kernels.numbers import TURN, heading_of, turn_between
 from fleet2d.kernels.sight import points_in_sight
 from fleet2d.kernels.space import CELL_CENTRE, SUB
-from fleet2d.sums import sum_in_order
+from fleet2d.runtime.determinism import sum_in_order
 
 ANYONE = "anyone"
 

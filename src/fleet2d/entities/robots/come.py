@@ -3,11 +3,11 @@
 from datetime import timedelta
 from typing import ClassVar
 
-from fleet2d.component import register
+from fleet2d.configuration.components import register
+from fleet2d.configuration.units import Duration
 from fleet2d.entities.behavior import Actor, Behavior, Command, Situation
 from fleet2d.entities.place import stop_at
 from fleet2d.entities.plan import Plan
-from fleet2d.units import Duration
 
 
 @register("behavior", "come")

@@ -5,11 +5,11 @@ from typing import ClassVar, Self
 
 from pydantic import model_validator
 
-from fleet2d.component import register
+from fleet2d.configuration.components import register
+from fleet2d.configuration.units import Share, problem
 from fleet2d.entities.behavior import Actor, Behavior, Situation
 from fleet2d.entities.plan import Plan
 from fleet2d.errors import ScenarioError
-from fleet2d.units import Share, problem
 
 # How long it rests at the charger before all behaviors are asked again.
 REST = timedelta(hours=1)

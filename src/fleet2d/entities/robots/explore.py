@@ -6,14 +6,14 @@ from typing import ClassVar
 import numpy as np
 from pydantic import Field
 
-from fleet2d.component import register
+from fleet2d.configuration.components import register
+from fleet2d.configuration.units import Length, Share
 from fleet2d.entities.behavior import Actor, Behavior, Situation
 from fleet2d.entities.plan import Plan
 from fleet2d.entities.robots.approach import centres, check_has_camera, spread, visible_from
 from fleet2d.kernels import Bool
 from fleet2d.kernels.numbers import TURN
 from fleet2d.kernels.space import squared_distance
-from fleet2d.units import Length, Share
 
 # The most cells of the home that are tried as viewpoints, and as targets to be seen.
 STANDS_TRIED = 800

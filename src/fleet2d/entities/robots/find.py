@@ -7,8 +7,15 @@ from typing import ClassVar, NamedTuple, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from fleet2d.clock import midnight_of
-from fleet2d.component import register
+from fleet2d.configuration.components import register
+from fleet2d.configuration.units import (
+    Duration,
+    Length,
+    PositiveDuration,
+    Share,
+    TimeOfDay,
+    problem,
+)
 from fleet2d.entities.behavior import Actor, Command, Situation
 from fleet2d.entities.giving_way import resumed
 from fleet2d.entities.plan import Plan
@@ -26,10 +33,10 @@ from fleet2d.entities.robots.approach import (
 from fleet2d.errors import PlacementError
 from fleet2d.kernels import F64
 from fleet2d.kernels.numbers import TURN
+from fleet2d.runtime.clock import midnight_of
+from fleet2d.runtime.determinism import sum_in_order
 from fleet2d.search.policies import MOST_EXACT, Policy, after_empty_looks, order_by
 from fleet2d.search.problem import SearchProblem, search_problem
-from fleet2d.sums import sum_in_order
-from fleet2d.units import Duration, Length, PositiveDuration, Share, TimeOfDay, problem
 
 # The part of a room to be shown by its viewpoints, if there are few enough of them.
 ENOUGH = 0.9

@@ -8,7 +8,8 @@ import numpy as np
 import shapely
 from pydantic import Field
 
-from fleet2d.component import register
+from fleet2d.configuration.components import register
+from fleet2d.configuration.units import Length, PositiveDuration, Share
 from fleet2d.entities.behavior import Actor, Hours, Situation, holds
 from fleet2d.entities.place import available_rooms
 from fleet2d.entities.plan import Plan
@@ -26,7 +27,6 @@ from fleet2d.floorplan.plan import Room
 from fleet2d.kernels import F64, I64
 from fleet2d.kernels.sight import points_in_sight
 from fleet2d.kernels.space import CELL_CENTRE, SUB
-from fleet2d.units import Length, PositiveDuration, Share
 
 # Radius of the bodies whose ways count as the ways of people [m].
 PERSON = 0.2

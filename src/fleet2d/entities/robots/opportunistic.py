@@ -5,11 +5,11 @@ from typing import ClassVar
 
 from pydantic import Field
 
-from fleet2d.component import register
+from fleet2d.configuration.components import register
+from fleet2d.configuration.units import Duration, Length, Share
 from fleet2d.entities.behavior import Actor, Behavior, Situation
 from fleet2d.entities.plan import Plan
 from fleet2d.entities.robots.approach import approach, check_has_camera, face
-from fleet2d.units import Duration, Length, Share
 
 
 @register("behavior", "opportunistic")

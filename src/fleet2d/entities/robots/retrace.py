@@ -5,15 +5,14 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 from pydantic import Field
 
-from fleet2d.component import register
+from fleet2d.configuration.components import register
+from fleet2d.configuration.units import InputPath, Length
 from fleet2d.entities.behavior import Behavior, Situation
 from fleet2d.entities.place import Nearest
 from fleet2d.entities.plan import Plan
 from fleet2d.errors import FloorPlanError, PlacementError
 from fleet2d.floorplan.formats.valetudo import read_valetudo_paths
 from fleet2d.kernels import I64
-from fleet2d.paths import InputPath
-from fleet2d.units import Length
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -6,14 +6,13 @@ from typing import Annotated, ClassVar
 
 from pydantic import Field
 
-from fleet2d.clock import midnight_of
-from fleet2d.component import Settings, register
+from fleet2d.configuration.components import Settings, register
+from fleet2d.configuration.units import Days, Duration, TimeOfDay, weekdays_of
 from fleet2d.entities.behavior import DAY, Actor, Behavior, Situation
 from fleet2d.entities.place import Place, stop_at
 from fleet2d.entities.plan import Plan
 from fleet2d.entities.robots.approach import AT_A_DOOR
-from fleet2d.units import Duration, TimeOfDay
-from fleet2d.weekdays import Days, weekdays_of
+from fleet2d.runtime.clock import midnight_of
 
 
 class ScheduledVisit(Settings):

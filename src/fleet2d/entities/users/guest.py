@@ -2,7 +2,7 @@
 
 from datetime import datetime
 
-from fleet2d.component import register
+from fleet2d.configuration.components import register
 from fleet2d.entities.behavior import Behavior, Situation
 from fleet2d.entities.plan import Plan
 

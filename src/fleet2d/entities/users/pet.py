@@ -5,14 +5,14 @@ from typing import TYPE_CHECKING, Self
 
 from pydantic import Field, model_validator
 
-from fleet2d.component import register
+from fleet2d.configuration.components import register
+from fleet2d.configuration.problems import problem
 from fleet2d.entities.behavior import Behavior, Situation
 from fleet2d.entities.place import available_rooms
 from fleet2d.entities.plan import Plan
 from fleet2d.entities.users.spots import Spots
-from fleet2d.problems import problem
 from fleet2d.routines.activity import AnyDurationLaw, DurationLaw
-from fleet2d.streams import Draws
+from fleet2d.runtime.determinism import Draws
 
 if TYPE_CHECKING:
     from fleet2d.entities.behavior import Actor

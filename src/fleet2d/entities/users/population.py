@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from datetime import datetime, timedelta
 from typing import TYPE_CHECKING, Literal
 
-from fleet2d.component import register
+from fleet2d.configuration.components import register
 from fleet2d.entities.users.resident import Inhabitant, rooms_at
 from fleet2d.entities.users.spots import Spots
 from fleet2d.routines import survey
@@ -15,7 +15,7 @@ from fleet2d.routines.laws import draw_weighted
 from fleet2d.routines.needs import activities_of, usual_errands, usual_needs
 from fleet2d.routines.planner import REST, Doing
 from fleet2d.routines.timeuse import activities, draw_works_at_home, to_doings
-from fleet2d.streams import Draws, stream_key
+from fleet2d.runtime.determinism import Draws, stream_key
 
 if TYPE_CHECKING:
     from fleet2d.entities.behavior import Actor

@@ -3,15 +3,15 @@
 from datetime import timedelta
 from typing import TYPE_CHECKING, ClassVar
 
-from fleet2d.component import register
+from fleet2d.configuration.components import register
+from fleet2d.configuration.units import micros
 from fleet2d.entities.behavior import Attention, Behavior, SightEvent, Situation
 from fleet2d.entities.place import points_at_distance
 from fleet2d.entities.plan import Plan
 from fleet2d.kernels.numbers import TURN, heading_of, turn_between
 from fleet2d.routines.laws import Law
 from fleet2d.routines.manners import Manners
-from fleet2d.streams import Draws
-from fleet2d.units import micros
+from fleet2d.runtime.determinism import Draws
 
 if TYPE_CHECKING:
     from fleet2d.entities.behavior import Actor

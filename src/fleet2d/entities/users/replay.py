@@ -9,8 +9,15 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import BeforeValidator, Field, WithJsonSchema
 
-from fleet2d.clock import DAY_US, midnight_of
-from fleet2d.component import register
+from fleet2d.configuration.components import register
+from fleet2d.configuration.units import (
+    Duration,
+    InputFileOrFolder,
+    Length,
+    PositiveDuration,
+    Speed,
+    micros,
+)
 from fleet2d.entities.behavior import Behavior, Situation
 from fleet2d.entities.place import Nearest
 from fleet2d.entities.plan import Note, Plan
@@ -25,9 +32,8 @@ from fleet2d.logs.log import AWAY, ActivityLog, LogError, PositionLog
 from fleet2d.logs.read import Layout, read_log
 from fleet2d.logs.rooms import DOOR, RoomChoice, map_rooms
 from fleet2d.logs.visits import UNKNOWN, LoggedVisit, LoggedVisits, VisitRule, visits_of
-from fleet2d.paths import InputFileOrFolder
-from fleet2d.sums import sum_in_order
-from fleet2d.units import Duration, Length, PositiveDuration, Speed, micros
+from fleet2d.runtime.clock import DAY_US, midnight_of
+from fleet2d.runtime.determinism import sum_in_order
 
 if TYPE_CHECKING:
     from fleet2d.entities.behavior import Actor

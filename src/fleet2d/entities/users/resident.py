@@ -20,13 +20,13 @@ from fleet2d.routines.activity import Activity, seconds
 from fleet2d.routines.laws import Law, exponential
 from fleet2d.routines.occupancy import ANY_ROOM
 from fleet2d.routines.planner import NO_GAP_S, REST, SLEEP, Doing
-from fleet2d.streams import Draws
+from fleet2d.runtime.determinism import Draws
 
 if TYPE_CHECKING:
-    from fleet2d.clock import Clock
     from fleet2d.entities.behavior import Actor
     from fleet2d.entities.place import RoomChoice
     from fleet2d.floorplan.plan import Room
+    from fleet2d.runtime.clock import Clock
 
 
 SECOND_US = 1_000_000

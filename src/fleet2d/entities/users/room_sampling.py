@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, NamedTuple, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from fleet2d.component import register
+from fleet2d.configuration.components import register
+from fleet2d.configuration.problems import problem
 from fleet2d.entities.behavior import Behavior, Situation
 from fleet2d.entities.place import available_places
 from fleet2d.entities.plan import Plan
@@ -15,11 +16,9 @@ from fleet2d.entities.users.spots import Spot, Spots
 from fleet2d.errors import PlacementError
 from fleet2d.floorplan.geometry.lattice import UNITS_PER_CELL
 from fleet2d.kernels import I64
-from fleet2d.problems import problem
 from fleet2d.routines.activity import AnyDurationLaw, DurationLaw
 from fleet2d.routines.laws import draw_weighted
-from fleet2d.streams import Draws
-from fleet2d.sums import sum_in_order
+from fleet2d.runtime.determinism import Draws, sum_in_order
 
 if TYPE_CHECKING:
     from fleet2d.entities.behavior import Actor

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, NamedTuple, Self
 
 from pydantic import model_validator
 
-from fleet2d.component import register
+from fleet2d.configuration.components import register
+from fleet2d.configuration.problems import problem, suggest
 from fleet2d.entities.place import ANY, matching_rooms
 from fleet2d.entities.users.resident import SECOND_US, Inhabitant, Setting, rooms_at
 from fleet2d.entities.users.spots import Seat, Spots, part_of, seats_at
 from fleet2d.errors import PlacementError
-from fleet2d.problems import problem, suggest
 from fleet2d.routines.activity import Activity, catalogue
 from fleet2d.routines.household import WELCOME, AnyHousehold, Household, Lives, MemberRooms
 from fleet2d.routines.life import Life
@@ -21,15 +21,15 @@ from fleet2d.routines.occupancy import ANY_ROOM
 from fleet2d.routines.periods import AWAY, AnyPeriod, with_absences
 from fleet2d.routines.persona import AnyPersona, Persona, bundled_persona
 from fleet2d.routines.planner import DAY_S, NO_GAP_S, PLANNED, REST, RESUMES, SLEEP, Doing
-from fleet2d.streams import Draws, stream_key
+from fleet2d.runtime.determinism import Draws, stream_key
 
 if TYPE_CHECKING:
-    from fleet2d.clock import Clock
     from fleet2d.entities.behavior import Actor
     from fleet2d.entities.place import Point, RoomChoice
     from fleet2d.floorplan.home.home import Home
     from fleet2d.floorplan.objects import PlacedObject
     from fleet2d.floorplan.plan import Room
+    from fleet2d.runtime.clock import Clock
 
 
 # All members must get the same rooms, whatever their radius: those of a body of this radius [m].

@@ -6,14 +6,13 @@ from typing import TYPE_CHECKING, NamedTuple, Self
 
 from pydantic import Field, model_validator
 
-from fleet2d.clock import midnight_of
-from fleet2d.component import Settings, register
+from fleet2d.configuration.components import Settings, register
+from fleet2d.configuration.problems import problem, problem_at
+from fleet2d.configuration.units import Duration, OnDays, TimeOfDay, format_time_of_day, weekdays_of
 from fleet2d.entities.behavior import Behavior, Situation
 from fleet2d.entities.place import Place, Point, RoomChoice, available_places, is_point, seat_at
 from fleet2d.entities.plan import Plan
-from fleet2d.problems import problem, problem_at
-from fleet2d.units import Duration, TimeOfDay, format_time_of_day
-from fleet2d.weekdays import OnDays, weekdays_of
+from fleet2d.runtime.clock import midnight_of
 
 if TYPE_CHECKING:
     from fleet2d.entities.behavior import Actor

@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable, Hashable, Sequence, Set
 from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
-from fleet2d.streams import Draws
+from fleet2d.runtime.determinism import Draws
 
 if TYPE_CHECKING:
     from fleet2d.entities.behavior import Actor

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Literal
 
-from fleet2d.component import register
+from fleet2d.configuration.components import register
 from fleet2d.floorplan.formats.native import plan_of
 from fleet2d.floorplan.formats.native_file import PlanFile, unchecked
 from fleet2d.floorplan.plan import FloorPlan

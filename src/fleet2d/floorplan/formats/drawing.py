@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 from pydantic import Field, TypeAdapter
 
-from fleet2d.component import register
+from fleet2d.configuration.components import register
+from fleet2d.configuration.units import InputPath, PositiveLength, Share
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.formats.occupancy import (
     RAY_WIDTH_M,
@@ -22,8 +23,6 @@ from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.source import in_file
 from fleet2d.kernels import Bool
 from fleet2d.kernels.space import label_parts
-from fleet2d.paths import InputPath
-from fleet2d.units import PositiveLength, Share
 
 THRESHOLD = 0.5
 

@@ -18,9 +18,9 @@ from pydantic import (
 )
 from pydantic_core import ErrorDetails
 
-from fleet2d.descriptions import DescribedModel
+from fleet2d.configuration.components import DescribedModel
+from fleet2d.configuration.problems import Location, problem, suggest
 from fleet2d.errors import FloorPlanError
-from fleet2d.problems import Location, problem, suggest
 
 # No home is as large: a coordinate beyond this is not in metres.
 MAX_COORDINATE_M = 100_000.0

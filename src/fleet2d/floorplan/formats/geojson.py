@@ -11,7 +11,8 @@ from pydantic import Field, TypeAdapter
 from shapely import MultiPolygon, Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from fleet2d.component import register
+from fleet2d.configuration.components import register
+from fleet2d.configuration.units import InputPath, Length
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.formats.fields import validate
 from fleet2d.floorplan.formats.geojson_file import (
@@ -36,9 +37,7 @@ from fleet2d.floorplan.rooms.passage import (
 )
 from fleet2d.floorplan.rooms.vocabulary import PRIORITY, UNKNOWN, room_type, usual_type
 from fleet2d.floorplan.source import FloorPlanSource, in_file, read_json
-from fleet2d.paths import InputPath
-from fleet2d.sums import sum_in_order
-from fleet2d.units import Length
+from fleet2d.runtime.determinism import sum_in_order
 
 WALL_M = 0.1
 # Distance of the entrance from a door that leads outside, and how far an entrance may be moved.

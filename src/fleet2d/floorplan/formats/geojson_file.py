@@ -17,12 +17,12 @@ from shapely import Point
 from shapely.geometry.base import BaseGeometry
 
 from fleet2d.bounds import POLYGONS
+from fleet2d.configuration.problems import suggest
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.formats.fields import MAX_COORDINATE_M, clean_coordinate, shown_value
 from fleet2d.floorplan.geometry.repair import repair
 from fleet2d.floorplan.rooms.vocabulary import room_type
 from fleet2d.kernels import F64
-from fleet2d.problems import suggest
 
 COLLECTION = "FeatureCollection"
 

@@ -8,13 +8,13 @@ from pydantic import BaseModel, ConfigDict, TypeAdapter
 from shapely import Polygon
 from shapely.geometry import MultiPolygon
 
-from fleet2d.component import register
+from fleet2d.configuration.components import register
+from fleet2d.configuration.units import InputPath
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.formats.fields import BoxSides, Listed, Point, Ring, list_of, validate
 from fleet2d.floorplan.geometry.repair import repair
 from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
 from fleet2d.floorplan.source import FloorPlanSource, in_file, read_json
-from fleet2d.paths import InputPath
 
 
 class _HouseFile(BaseModel):

@@ -17,7 +17,8 @@ import numpy as np
 import shapely
 from shapely import Polygon
 
-from fleet2d.component import register
+from fleet2d.configuration.components import register
+from fleet2d.configuration.units import InputPath
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.formats.fields import shown_value, validate
 from fleet2d.floorplan.formats.native_file import FORMAT, PLAN_FILE, VERSION, PlanFile, space_of
@@ -26,7 +27,6 @@ from fleet2d.floorplan.objects import PlacedObject, UsePlace
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.source import FloorPlanSource, in_file, read_document
 from fleet2d.kernels import Bool
-from fleet2d.paths import InputPath
 
 
 @register("floorplan", "native")

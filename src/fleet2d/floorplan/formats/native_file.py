@@ -16,6 +16,7 @@ from pydantic import (
 from pydantic_core import core_schema
 from shapely import MultiPolygon, Polygon
 
+from fleet2d.configuration.problems import problem
 from fleet2d.floorplan.formats.fields import (
     RING_SCHEMA,
     Coordinate,
@@ -29,7 +30,6 @@ from fleet2d.floorplan.objects import Blocks, PlacedObject, Posture, UsePlace
 from fleet2d.floorplan.plan import LabelledRegion
 from fleet2d.floorplan.rooms.doorways import DoorLine
 from fleet2d.floorplan.rooms.vocabulary import UNKNOWN, room_type
-from fleet2d.problems import problem
 
 FORMAT = "fleet2d-floorplan"
 VERSION = 1

@@ -8,11 +8,11 @@ import shapely
 from pydantic import Field
 from shapely import Polygon
 
+from fleet2d.configuration.units import Length
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.source import PixelSource
 from fleet2d.kernels import F64, Bool
 from fleet2d.kernels.space import count_steps, label_parts, squared_distance, trace_rings
-from fleet2d.units import Length
 
 SPECK_AREA_M2 = 0.02
 RAY_WIDTH_M = 0.3

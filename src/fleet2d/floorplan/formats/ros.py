@@ -11,7 +11,8 @@ import shapely
 from pydantic import Field
 from shapely import Polygon
 
-from fleet2d.component import register
+from fleet2d.configuration.components import register
+from fleet2d.configuration.units import InputPath, Length
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.formats.fields import MAX_COORDINATE_M, shown_value
 from fleet2d.floorplan.formats.occupancy import (
@@ -26,8 +27,6 @@ from fleet2d.floorplan.geometry.lattice import MAX_CELL_M, MIN_CELL_M
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.source import in_file, read_yaml
 from fleet2d.kernels import Bool
-from fleet2d.paths import InputPath
-from fleet2d.units import Length
 
 # The grey that map savers write for unknown; above this free_thresh it would count as free.
 UNKNOWN_GREY = 205 / 255

@@ -15,7 +15,8 @@ import shapely.affinity
 from shapely import LineString, MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from fleet2d.component import register
+from fleet2d.configuration.components import register
+from fleet2d.configuration.units import InputPath
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.formats.occupancy import outline
 from fleet2d.floorplan.formats.valetudo_file import (
@@ -39,7 +40,6 @@ from fleet2d.floorplan.rooms.vocabulary import UNKNOWN, usual_type
 from fleet2d.floorplan.source import PixelSource, in_file, read_json
 from fleet2d.kernels import F64, Bool
 from fleet2d.kernels.space import label_parts, squared_distance
-from fleet2d.paths import InputPath
 
 NoGo = Literal["keep_out", "wall", "ignore"]
 

@@ -6,10 +6,10 @@ from types import MappingProxyType
 
 from shapely import Polygon
 
+from fleet2d.configuration.problems import suggest
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.objects import Blocks, PlacedObject, Point, Posture, UsePlace
 from fleet2d.kernels.numbers import QUARTER, TURN, UNIT, cosine, in_radians, sine
-from fleet2d.problems import suggest
 
 Range = tuple[float, float]
 

@@ -13,7 +13,7 @@ from fleet2d.floorplan.furniture.interior import Interior
 from fleet2d.floorplan.furniture.room_view import FurnitureGroup, Piece
 from fleet2d.floorplan.plan import FloorPlan, Room
 from fleet2d.kernels import I64
-from fleet2d.streams import Draws, stream_key
+from fleet2d.runtime.determinism import Draws, stream_key
 
 # Sizes are drawn in steps of this [m].
 STEP = 0.05

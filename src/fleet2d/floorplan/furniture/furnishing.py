@@ -6,7 +6,9 @@ from typing import Self
 import shapely
 from pydantic import Field, model_validator
 
-from fleet2d.component import Settings
+from fleet2d.configuration.components import Settings
+from fleet2d.configuration.problems import problem_at, suggest
+from fleet2d.configuration.units import AngleDeg, Length, PositiveLength
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.arrangement import number_objects
 from fleet2d.floorplan.furniture.catalogue import FURNITURE, stand_furniture
@@ -14,8 +16,6 @@ from fleet2d.floorplan.home.standing import BODY_RADIUS, standing_cells, with_ap
 from fleet2d.floorplan.objects import Blocks, PlacedObject
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.kernels.numbers import TURN
-from fleet2d.problems import problem_at, suggest
-from fleet2d.units import AngleDeg, Length, PositiveLength
 
 # How far a piece may reach into a wall [m]: tape measures and traced walls differ by as much.
 WALL_TOLERANCE_M = 0.02

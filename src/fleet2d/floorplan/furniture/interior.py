@@ -18,7 +18,7 @@ from fleet2d.floorplan.objects import PlacedObject
 from fleet2d.floorplan.plan import FloorPlan, Room, rings
 from fleet2d.kernels import Bool
 from fleet2d.kernels.space import label_parts
-from fleet2d.streams import Draws
+from fleet2d.runtime.determinism import Draws
 
 DOOR_CLEARANCE = 0.9
 """Depth of the floor before a doorway that stays empty, on either side [m]."""

@@ -11,7 +11,7 @@ from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.geometry.lattice import COORDINATE_LIMIT
 from fleet2d.kernels import I32, I64
 from fleet2d.kernels.space import SUB, WALL, Mesh
-from fleet2d.sums import sum_in_order
+from fleet2d.runtime.determinism import sum_in_order
 
 GRID = 2
 """Walls lie on even lattice units; cell centres are odd, so no straight wall hits one."""

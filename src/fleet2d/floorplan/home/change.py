@@ -8,10 +8,10 @@ from typing import Annotated, Any, Self
 import numpy as np
 from pydantic import BeforeValidator, Field, PlainSerializer, WithJsonSchema, model_validator
 
-from fleet2d.component import Settings
+from fleet2d.configuration.components import Settings
+from fleet2d.configuration.problems import problem
+from fleet2d.configuration.units import format_duration, parse_duration
 from fleet2d.floorplan.objects import Point
-from fleet2d.problems import problem
-from fleet2d.units import format_duration, parse_duration
 
 VERBS = ("open", "shut", "lock", "unlock", "move", "room")
 

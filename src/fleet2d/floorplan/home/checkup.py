@@ -17,7 +17,7 @@ from fleet2d.floorplan.plan import FloorPlan, Room
 from fleet2d.floorplan.rooms.regions import LabelledRegion
 from fleet2d.floorplan.rooms.vocabulary import UNKNOWN
 from fleet2d.kernels import Bool
-from fleet2d.sums import sum_in_order
+from fleet2d.runtime.determinism import sum_in_order
 
 Severity = Literal["unlivable", "wrong", "odd"]
 

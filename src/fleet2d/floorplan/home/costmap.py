@@ -8,7 +8,8 @@ import shapely
 from numpy.typing import NDArray
 from pydantic import Field
 
-from fleet2d.component import Settings
+from fleet2d.configuration.components import Settings
+from fleet2d.configuration.units import Length
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.home.space import Space
 from fleet2d.floorplan.plan import FloorPlan
@@ -23,7 +24,6 @@ from fleet2d.kernels.space import (
     pull_taut,
     squared_distance,
 )
-from fleet2d.units import Length
 
 CLOSED = -1
 

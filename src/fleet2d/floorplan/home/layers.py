@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import model_validator
 
-from fleet2d.component import Settings
+from fleet2d.configuration.components import Settings
+from fleet2d.configuration.problems import problem_at, suggest
+from fleet2d.configuration.units import PositiveDuration
 from fleet2d.errors import ComponentError
 from fleet2d.floorplan.plan import FloorPlan
-from fleet2d.problems import problem_at, suggest
-from fleet2d.units import PositiveDuration
 
 LayerType = Literal[
     "bool", "int", "float", "int8", "int16", "int32", "int64", "uint8", "uint16", "uint32",

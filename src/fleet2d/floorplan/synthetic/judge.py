@@ -7,7 +7,7 @@ import shapely
 from fleet2d.floorplan.synthetic.geometry import PER_M, Box, Wall
 from fleet2d.floorplan.synthetic.layout import RoomLayout
 from fleet2d.floorplan.synthetic.program import SIZES
-from fleet2d.sums import sum_in_order
+from fleet2d.runtime.determinism import sum_in_order
 
 # Rooms that need a window, and the length of outer wall that it takes [units].
 _LIT = {"bedroom": 24, "living_room": 30, "kitchen": 16, "dining_room": 20, "office": 20}

@@ -10,7 +10,7 @@ from fleet2d.floorplan.synthetic.plans import Placing, across, columns, inline, 
 from fleet2d.floorplan.synthetic.program import Brief
 from fleet2d.floorplan.synthetic.request import LayoutRequest, is_promising
 from fleet2d.floorplan.synthetic.slicing import gross_area
-from fleet2d.sums import sum_in_order
+from fleet2d.runtime.determinism import sum_in_order
 
 # Share of the home's clear area that is in rooms; the rest is in door gaps.
 ROOMS_SHARE = 0.992

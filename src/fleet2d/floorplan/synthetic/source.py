@@ -4,15 +4,15 @@ from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
-from fleet2d.component import register
+from fleet2d.configuration.components import register
+from fleet2d.configuration.problems import problem
+from fleet2d.configuration.units import Length
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.source import FloorPlanSource
 from fleet2d.floorplan.synthetic.convert import floor_plan
 from fleet2d.floorplan.synthetic.generator import Style, generate
 from fleet2d.floorplan.synthetic.geometry import PER_M
 from fleet2d.floorplan.synthetic.program import LARGEST_M2, MAX_ROOMS_OF_A_KIND, SMALLEST_M2, Wishes
-from fleet2d.problems import problem
-from fleet2d.units import Length
 
 
 @register("floorplan", "synthetic")

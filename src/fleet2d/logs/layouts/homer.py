@@ -21,8 +21,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from fleet2d.bounds import one_line
-from fleet2d.clock import DAY_US
 from fleet2d.logs.log import ActivityLog, LogError, Reading, in_order, log_lines
+from fleet2d.runtime.clock import DAY_US
 
 AGENDA = re.compile(r"(\w+) \((\d{1,9}):(\d\d) - (?:(\d{1,9})\s?days? - )?(\d{1,9}):(\d\d)\)")
 SCRIPT = re.compile(r"### (\w+?)-\w+\.txt")

@@ -10,8 +10,8 @@ from pydantic import Field
 from fleet2d.algorithms.algorithm import Present
 from fleet2d.algorithms.history import History
 from fleet2d.algorithms.presence.belief import ANYONE, Presence
-from fleet2d.clock import DAY_S
-from fleet2d.component import register
+from fleet2d.configuration.components import register
+from fleet2d.configuration.units import PositiveDuration, Share
 from fleet2d.floorplan.home.home import Home
 from fleet2d.kernels import F64, I64
 from fleet2d.metrics.metric import Metric
@@ -30,7 +30,7 @@ from fleet2d.metrics.presence.occupancy import (
     steps_in_places,
     walking_distances,
 )
-from fleet2d.units import PositiveDuration, Share
+from fleet2d.runtime.clock import DAY_S
 
 MEAN = "mean"
 SHOWN = ("tv", "earth_mover_m", "inside", "burn_in_day")  # in the closing table

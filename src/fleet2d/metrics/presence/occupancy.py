@@ -8,13 +8,13 @@ from fleet2d.algorithms.algorithm import Present
 from fleet2d.algorithms.history import History
 from fleet2d.algorithms.observations import NOWHERE
 from fleet2d.algorithms.presence.belief import HOURS
-from fleet2d.clock import HOUR_US, midnight_of
+from fleet2d.configuration.units import micros
 from fleet2d.floorplan.cache import read_only
 from fleet2d.floorplan.home.home import Home
 from fleet2d.floorplan.home.space import Space
 from fleet2d.kernels import F64, I64, Bool
 from fleet2d.kernels.space import SUB
-from fleet2d.units import micros
+from fleet2d.runtime.clock import HOUR_US, midnight_of
 
 # Clearance that a person needs to walk from room to room [m].
 RADIUS = 0.2

@@ -10,7 +10,8 @@ from fleet2d.algorithms.algorithm import Present
 from fleet2d.algorithms.evidence import steps_of_bin
 from fleet2d.algorithms.history import History
 from fleet2d.algorithms.observations import NOWHERE
-from fleet2d.component import register
+from fleet2d.configuration.components import register
+from fleet2d.configuration.units import PositiveDuration
 from fleet2d.floorplan.home.home import Home
 from fleet2d.kernels import F64, I64, Bool
 from fleet2d.metrics.metric import Metric
@@ -25,7 +26,6 @@ from fleet2d.metrics.presence.scores import (
     skill,
     top_k,
 )
-from fleet2d.units import PositiveDuration
 
 # Upper ends of the classes of the gap since a user was last seen [min], and their names.
 GAP_ENDS = (1, 5, 15, 60, 240)

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from fleet2d.algorithms.presence.logarithm import natural_log
 from fleet2d.kernels import F64, I64
-from fleet2d.sums import sum_in_order
+from fleet2d.runtime.determinism import sum_in_order
 
 LEAST = 1e-6  # smaller probabilities are raised to this before taking logarithms
 MASSES = 15  # number of groups of about equal size, by forecast probability

@@ -41,7 +41,9 @@ def exporter(name: str) -> Exporter:
     if name in _modules():
         return cast("Exporter", importlib.import_module(f"{__name__}.{name}").export)
     if name not in _plugins().names:
-        from fleet2d.problems import suggest  # with pydantic, which the help needn't import
+        from fleet2d.configuration.problems import (
+            suggest,  # with pydantic, which the help needn't import
+        )
 
         raise InputError(f"there is no exporter {name!r}{suggest(name, formats())}")
     return cast("Exporter", _plugins()[name].load())

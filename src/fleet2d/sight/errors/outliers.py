@@ -5,10 +5,10 @@ from datetime import timedelta
 import numpy as np
 from pydantic import Field
 
-from fleet2d.component import register
+from fleet2d.configuration.components import register
+from fleet2d.configuration.units import Duration, Length, Share, micros
 from fleet2d.sight.camera_sightings import CameraSightings
 from fleet2d.sight.perception_error import PerceptionError
-from fleet2d.units import Duration, Length, Share, micros
 
 
 @register("perception_error", "outliers")

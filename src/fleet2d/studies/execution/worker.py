@@ -11,7 +11,7 @@ import traceback
 from contextlib import suppress
 from typing import IO, Any
 
-from fleet2d.garbage import rare_collections
+from fleet2d.memory import rare_collections
 from fleet2d.studies.execution.pipe import receive, send
 
 READY, RESULT, BROKEN = "ready", "result", "broken"

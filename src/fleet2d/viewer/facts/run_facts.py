@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import Any, Literal
 
 from fleet2d.artifacts.layers import PREFIX
+from fleet2d.configuration.units import parse_duration
 from fleet2d.errors import ArtifactError
 from fleet2d.palette import body_color
 from fleet2d.runs.run import Run
-from fleet2d.units import parse_duration
 from fleet2d.version import __version__
 from fleet2d.viewer.facts.contract import BodyFacts, CameraFacts, ColumnFacts, RunFacts, TableFacts
 from fleet2d.viewer.facts.home_facts import home_facts

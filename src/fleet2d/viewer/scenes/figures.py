@@ -11,7 +11,6 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import PowerNorm
 from matplotlib.figure import Figure
 
-from fleet2d.clock import midnight_of
 from fleet2d.errors import InputError
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.kernels import F64
@@ -29,6 +28,7 @@ from fleet2d.pictures.life import blurred
 from fleet2d.pictures.run import run_figure
 from fleet2d.pictures.theme import SCALE
 from fleet2d.runs.run import Run
+from fleet2d.runtime.clock import midnight_of
 from fleet2d.viewer.facts.run_facts import bodies_of
 from fleet2d.viewer.moments import clock_of
 from fleet2d.viewer.part import part_of_run

@@ -16,8 +16,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
-from fleet2d.errors import InputError
-from fleet2d.extras import extra
+from fleet2d.errors import InputError, extra
 from fleet2d.kernels import I64, U8
 from fleet2d.pictures.floorplan import drawing_style, figure_size
 from fleet2d.pictures.theme import apply_theme

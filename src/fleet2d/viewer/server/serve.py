@@ -7,8 +7,7 @@ import webbrowser
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from fleet2d.errors import InputError
-from fleet2d.extras import extra
+from fleet2d.errors import InputError, extra
 
 with extra("view", "watching needs a server"):
     import starlette  # noqa: F401 - the server needs it, too

@@ -14,17 +14,24 @@ A component in a module below its kind's package needs no import anywhere else.
 """
 
 import importlib
+import inspect
+import json
 import pkgutil
+import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
+from pathlib import PurePath
 from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
 
 from pydantic import (
+    BaseModel,
+    BeforeValidator,
     ConfigDict,
     GetCoreSchemaHandler,
     GetJsonSchemaHandler,
     ModelWrapValidatorHandler,
+    PydanticUserError,
     SerializationInfo,
     ValidationError,
     ValidationInfo,
@@ -33,15 +40,208 @@ from pydantic import (
 from pydantic.fields import FieldInfo
 from pydantic_core import CoreSchema, InitErrorDetails, core_schema
 
-from fleet2d.blame import may_be_ctrl_c, text_of
-from fleet2d.component_class import ComponentClass
-from fleet2d.descriptions import DescribedModel
-from fleet2d.errors import Fleet2DError, ScenarioError
-from fleet2d.problems import did_you_mean, problem, problem_at, rewrite, shown, unknown_key
-from fleet2d.user_modules import BrokenModule, class_path, import_class
+from fleet2d.bounds import one_line
+from fleet2d.configuration.problems import (
+    did_you_mean,
+    problem,
+    problem_at,
+    rewrite,
+    shown,
+    unknown_key,
+)
+from fleet2d.configuration.trust import BrokenModule, class_path, import_class
+from fleet2d.errors import Fleet2DError, ScenarioError, may_be_ctrl_c, text_of
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
+
+
+_SECTION = re.compile(r"^(?:Attributes|Examples?|Raises):$", re.MULTILINE)
+_ENTRY = re.compile(r"^    (\w[\w, ]*): (.*(?:\n {5,}.*)*)", re.MULTILINE)
+
+
+def descriptions(cls: type) -> dict[str, str]:
+    """Return what the section `Attributes` of a class says, and those of its bases, by name.
+
+    >>> class Lamp:
+    ...     '''A lamp.
+    ...
+    ...     Attributes:
+    ...         power, most: Its power [W],
+    ...             and the most that it can have.
+    ...     '''
+    >>> descriptions(Lamp)["most"]
+    'Its power [W], and the most that it can have.'
+    """
+    texts: dict[str, str] = {}
+    for base in reversed(cls.__mro__):
+        if base is BaseModel:
+            continue
+        _, _, section = inspect.cleandoc(vars(base).get("__doc__") or "").partition("Attributes:\n")
+        for names, text in _ENTRY.findall(section.partition("\n\n")[0]):
+            texts |= dict.fromkeys(names.split(", "), " ".join(text.split()))
+    return texts
+
+
+def summary(cls: type) -> str:
+    """Return the docstring of a class up to its first section."""
+    return _SECTION.split(inspect.cleandoc(cls.__doc__ or ""))[0].rstrip()
+
+
+class DescribedModel(BaseModel):
+    """A model whose JSON Schema takes the descriptions of its fields from docstrings.
+
+    A `description` of a field itself counts more.
+    """
+
+    # To build the first validator loads modules that a home without scenario doesn't need.
+    model_config = ConfigDict(defer_build=True)
+
+    @classmethod
+    def __get_pydantic_json_schema__(
+        cls, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        """Return the schema with descriptions."""
+        result = handler(schema)
+        definition = handler.resolve_ref_schema(result)
+        definition["description"] = summary(cls)
+        properties, texts = definition.get("properties", {}), descriptions(cls)
+        for name, field in cls.model_fields.items():
+            key = field.alias or name
+            if key in properties and name in texts and not field.description:
+                properties[key]["description"] = texts[name]
+        return result
+
+
+if TYPE_CHECKING:
+    from pydantic._internal._model_construction import ModelMetaclass
+else:
+    ModelMetaclass = type(BaseModel)
+
+
+class ComponentClass(ModelMetaclass):
+    """The metaclass of components, which explains errors in the declaration of fields."""
+
+    def __new__(
+        cls, name: str, bases: tuple[type, ...], namespace: dict[str, Any], **kwargs: Any
+    ) -> type:
+        """Create the class.
+
+        Raises:
+            TypeError: a field is declared in a way that can't be configuration.
+        """
+        # A user's class is built at once, so that the error stands where the class is declared.
+        kwargs.setdefault("defer_build", namespace["__module__"].startswith("fleet2d."))
+        try:
+            return super().__new__(cls, name, bases, namespace, **kwargs)
+        except PydanticUserError as error:
+            raise TypeError(_wrong_field(name, namespace, error)) from None
+
+
+def _wrong_field(name: str, namespace: Mapping[str, Any], error: PydanticUserError) -> str:
+    untyped = ("model-field-missing-annotation", "model-field-overridden")
+    attribute = re.search(r"`(\w+) = |Field '(\w+)'", error.message)
+    if error.code not in untyped or attribute is None:
+        reason = re.sub(r"<class '(?:\w+\.)*(\w+)'>", r"\1", error.message)
+        return f"{name} has a field that can't be configuration: {reason.partition('. ')[0]}"
+    key = attribute[1] or attribute[2]
+    value = namespace.get(key)
+    kind = "str | None" if value is None else type(value).__name__
+    literal = json.dumps(value, ensure_ascii=False) if isinstance(value, str) else repr(value)
+    if len(literal) > 40 or isinstance(value, PurePath):
+        literal = "…"
+    return (
+        f"{name}.{key} has no type: write `{key}: {kind} = {literal}` for configuration, "
+        f"`{key}: ClassVar[{kind}] = {literal}` for a constant"
+    )
+
+
+_FORM = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,99}")
+
+
+def _check_names(entries: Any) -> Any:
+    """Refuse names that can't be part of a key path, a file name or a table name."""
+    if isinstance(entries, Mapping):
+        for name in entries:
+            if not _FORM.fullmatch(str(name)):
+                raise problem_at(
+                    (name,),
+                    f"the name {one_line(repr(name))} must be letters, digits, '_' and '-', a"
+                    " letter first, 100 characters at most",
+                )
+    return entries
+
+
+def _name_as_type(entries: Any) -> Any:
+    """Let `ltp_error: {of: ltp}` stand for `ltp_error: {type: ltp_error, of: ltp}`."""
+    if not isinstance(entries, Mapping):
+        return entries
+    return {
+        name: {"type": name, **entry} if isinstance(entry, Mapping) else entry
+        for name, entry in entries.items()
+    }
+
+
+CheckNames = BeforeValidator(_check_names)
+"""Declares that the keys of a mapping are names of entries."""
+
+NameAsType = BeforeValidator(_name_as_type)
+"""Declares that an entry without a `type` is of the type of its name."""
+
+
+def split_short_form(data: Any, body_fields: Iterable[str]) -> Any:
+    """Move the fields of an entity's only behavior from beside its body's into ``behaviors``.
+
+    >>> split_short_form({"type": "meander", "radius": 0.2, "pause": 3}, ["radius"])
+    {'radius': 0.2, 'behaviors': [{'type': 'meander', 'pause': 3}]}
+    """
+    if isinstance(data, str):
+        return {"behaviors": [data]}
+    if not isinstance(data, Mapping) or "type" not in data:
+        return data
+    if "behaviors" in data:
+        raise problem_at(("behaviors",), "give 'type' (one behavior) or 'behaviors', not both")
+    body = {key: value for key, value in data.items() if key in set(body_fields)}
+    return {**body, "behaviors": [{k: v for k, v in data.items() if k not in body}]}
+
+
+class ShortForm:
+    """Lets an entity's only behavior be written beside its body: ``Annotated[User, ShortForm()]``.
+
+    Errors in the behavior's fields name the keys as they are written.
+    """
+
+    def __get_pydantic_core_schema__(
+        self, source: type[BaseModel], handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        """Validate ``source`` from both forms."""
+        body = source.model_fields.keys() - {"behaviors"}
+
+        def move(line: InitErrorDetails) -> InitErrorDetails:
+            if line["loc"][:2] == ("behaviors", 0):
+                line["loc"] = line["loc"][2:]
+                if "known" in line["ctx"] and len(line["loc"]) == 1:
+                    line["type"] = unknown_key(line["loc"][0], {*line["ctx"]["known"], *body})
+            return line
+
+        def validate(data: Any, validate_long: Callable[[Any], Any]) -> Any:
+            long = split_short_form(data, body)
+            try:
+                return validate_long(long)
+            except ValidationError as error:
+                raise error if long is data else rewrite(error, move) from None
+
+        return core_schema.no_info_wrap_validator_function(validate, handler(source))
+
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        """Return a mark with the body's keys, for `fleet2d.scenario.schema` to add short forms."""
+        long = handler(schema)
+        body = dict(handler.resolve_ref_schema(long)["properties"])
+        kind = body.pop("behaviors")["items"]["x-kind"]
+        return {"anyOf": [long], "x-short-form": {"kind": kind, "body": body}}
+
 
 PACKAGES = {
     "floorplan": "fleet2d.floorplan",

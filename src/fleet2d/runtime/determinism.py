@@ -1,11 +1,12 @@
-"""Random streams: one for each component and purpose, addressed by step.
+"""What makes results the same everywhere: random streams addressed by step, and sums in order.
 
-A draw is a function of (seed, component's path in the scenario, purpose, step, number of the draw).
-It doesn't depend on the order in which components run, on other components, or on their draws.
+Each component has a random stream for each purpose. A draw is a function of (seed, component's path
+in the scenario, purpose, step, number of the draw). It doesn't depend on the order in which
+components run, on other components, or on their draws.
 """
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import TypeVar
 
 import numpy as np
@@ -50,3 +51,19 @@ class Draws(StepDraws):
             j = self.below(i + 1)
             order[i], order[j] = order[j], order[i]
         return order
+
+
+def sum_in_order(values: Iterable[float]) -> float:
+    """Return the sum of some floats, added from the first to the last.
+
+    The built-in `sum` does this up to Python 3.11; later versions compensate for rounding, so that
+    the last digits of a stored value would depend on the version.
+
+    Example:
+        >>> sum_in_order([0.1] * 10)
+        0.9999999999999999
+    """
+    total = 0.0
+    for value in values:
+        total += value
+    return total

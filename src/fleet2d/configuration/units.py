@@ -1,49 +1,82 @@
-"""Physical quantities with units: types for the fields of a configuration.
+"""Types for the fields of a configuration: quantities with units, paths, days of the week.
 
-Each type reads a number in SI units (angles: degrees) or text with a unit, converts it exactly, and
-refuses values that are not finite. Models dump to JSON in the canonical spelling.
+Each quantity reads a number in SI units (angles: degrees) or text with a unit, converts it exactly,
+and refuses values that are not finite. Models dump to JSON in the canonical spelling.
 """
 
 import math
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import time, timedelta
 from decimal import Decimal
 from fractions import Fraction
+from functools import partial
 from numbers import Real
-from typing import Annotated, Any
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import AfterValidator, BeforeValidator, PlainSerializer, WithJsonSchema
+from pydantic import AfterValidator, BeforeValidator, Field, PlainSerializer, WithJsonSchema
 from pydantic_core import PydanticCustomError
 
+from fleet2d.configuration.problems import problem, shown
 from fleet2d.errors import ScenarioError
-from fleet2d.paths import InputPath, Text, folder_of
-from fleet2d.problems import problem, shown
 
-__all__ = [
-    "LONGEST_DURATION",
-    "AngleDeg",
-    "Duration",
-    "InputPath",
-    "Length",
-    "PositiveDuration",
-    "PositiveLength",
-    "Quantity",
-    "Share",
-    "Speed",
-    "Text",
-    "TimeOfDay",
-    "TurnRateDeg",
-    "folder_of",
-    "format_duration",
-    "format_time_of_day",
-    "micros",
-    "parse_duration",
-    "parse_time_of_day",
-    "problem",
-    "whole_steps",
+
+class Text(str):
+    """A string from a scenario, with the folder of its file."""
+
+    __slots__ = ("folder",)
+    folder: Path
+
+    def __new__(cls, text: str, folder: Path) -> Self:
+        """Attach ``folder`` to ``text``."""
+        self = super().__new__(cls, text)
+        self.folder = folder
+        return self
+
+    def __getnewargs__(self) -> tuple[str, Path]:  # type: ignore[override]
+        """Preserve the folder in copies and pickles."""
+        return str(self), self.folder
+
+
+def folder_of(text: object) -> Path:
+    """Return the folder that a relative path starts from.
+
+    >>> folder_of(Text("plan.json", Path("/homes")))
+    PosixPath('/homes')
+    """
+    return text.folder if isinstance(text, Text) else Path.cwd()
+
+
+def _existing(value: object, *, is_folder_allowed: bool = False) -> Path:
+    kind = "file or folder" if is_folder_allowed else "file"
+    if not isinstance(value, str | Path) or not str(value):
+        raise problem(f"expected the path of a {kind}, got {shown(value)}")
+    path = (folder_of(value) / Path(value).expanduser()).resolve()
+    if not (path.is_file() or (is_folder_allowed and path.is_dir())):
+        reason = "a folder, not a file" if path.is_dir() else f"no such {kind}"
+        raise problem(f"{reason}: {path}")
+    return path
+
+
+_SCHEMA = WithJsonSchema(
+    {
+        "type": "string",
+        "description": "path, relative to the file it is written in",
+        "x-quantity": "path",
+    }
+)
+
+InputPath = Annotated[Path, BeforeValidator(_existing), _SCHEMA]
+"""An existing file. Relative paths start from the folder of the YAML they are written in, on the
+command line and in Python from the current one; dumped as absolute."""
+
+InputFileOrFolder = Annotated[
+    Path, BeforeValidator(partial(_existing, is_folder_allowed=True)), _SCHEMA
 ]
+"""An existing file or folder, likewise."""
+
 
 LONGEST_DURATION = timedelta(days=365_250)  # 1000 years: microseconds stay far inside int64
 MOST_DIGITS = 400  # of a number: fractions with very many digits would fill the memory
@@ -396,3 +429,36 @@ TimeOfDay = Annotated[
     ),
 ]
 """A time of day: the time since midnight, 00:00 to 24:00; a timedelta in Python."""
+
+
+WEEKDAYS = ("monday", "tuesday", "wednesday", "thursday", "friday", "saturday", "sunday")
+GROUPS = {"daily": range(7), "weekdays": range(5), "weekend": range(5, 7)}
+Days = Literal[
+    "daily", "weekdays", "weekend",
+    "monday", "tuesday", "wednesday", "thursday", "friday", "saturday", "sunday",
+]  # fmt: skip
+"""The name of a day or of a group of days of the week."""
+OnDays = Days | Annotated[tuple[Days, ...], Field(min_length=1)]
+"""One such name, or a list of them."""
+
+
+def weekdays_of(names: str | Sequence[str] | None) -> set[int]:
+    """Return days of the week by their names, 0 is Monday; None: no day.
+
+    >>> sorted(weekdays_of(["weekend", "friday"])), weekdays_of(None)
+    ([4, 5, 6], set())
+    """
+    if isinstance(names, str):
+        names = (names,)
+    return {day for name in names or () for day in _days_of(name)}
+
+
+def _days_of(name: str) -> Sequence[int]:
+    if name in GROUPS:
+        return GROUPS[name]
+    if name in WEEKDAYS:
+        return (WEEKDAYS.index(name),)
+    raise problem(
+        f"unknown day {name!r}; there are: {', '.join((*GROUPS, *WEEKDAYS))}, or a list of those"
+        " like 'monday,friday'"
+    )

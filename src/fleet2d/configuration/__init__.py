@@ -1,0 +1,1 @@
+"""Configuration: YAML documents, components, their typed fields, and which code may run."""

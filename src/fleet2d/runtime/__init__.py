@@ -1,0 +1,1 @@
+"""What every run builds upon: simulated time, events, and reproducible randomness."""
