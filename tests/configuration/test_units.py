@@ -5,16 +5,20 @@ import pickle
 from datetime import timedelta
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import BaseModel, TypeAdapter, ValidationError
+from pydantic_core import PydanticCustomError
 
 from fleet2d.configuration.units import (
+    GROUPS,
     LONGEST_DURATION,
+    WEEKDAYS,
     AngleDeg,
+    Days,
     Duration,
     InputPath,
     Length,
@@ -28,6 +32,7 @@ from fleet2d.configuration.units import (
     format_duration,
     micros,
     parse_duration,
+    weekdays_of,
     whole_steps,
 )
 from fleet2d.errors import ScenarioError
@@ -233,3 +238,18 @@ def test_no_multiple_of_the_step_is_refused(duration: timedelta) -> None:
 
 def test_multiple_of_the_step_is_counted() -> None:
     assert 3 == whole_steps(timedelta(seconds=6), 2_000_000, "period")
+
+
+def test_every_name_that_a_scenario_may_give_stands_for_days() -> None:
+    assert (*GROUPS, *WEEKDAYS) == get_args(Days)
+    assert set(range(7)) == weekdays_of("daily") == weekdays_of(WEEKDAYS)
+    assert weekdays_of("daily") == weekdays_of(("weekdays", "weekend"))
+
+
+def test_monday_is_the_first_day() -> None:
+    assert [{day} for day in range(7)] == [weekdays_of(name) for name in WEEKDAYS]
+
+
+def test_unknown_day_is_told_with_the_known() -> None:
+    with pytest.raises(PydanticCustomError, match="unknown day 'mondy'; there are: daily, "):
+        weekdays_of(["weekend", "mondy"])

@@ -1,11 +1,17 @@
-"""Random streams: one for each component and purpose, addressed by step."""
+"""Random streams addressed by step, and sums that are the same in every version of Python."""
 
+import builtins
+import sys
+from collections.abc import Iterable
 from itertools import product
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from fleet2d.runtime.determinism import Draws, stream_key
+import fleet2d
+from fleet2d.runtime.determinism import Draws, stream_key, sum_in_order
 
 
 def test_every_seed_path_and_purpose_has_a_stream_of_its_own() -> None:
@@ -71,3 +77,40 @@ def test_a_choice_is_one_of_the_items() -> None:
 def test_a_bound_that_can_not_be_is_refused(bound: int) -> None:
     with pytest.raises(ValueError, match="bound"):
         Draws(stream_key(1, "p", "q"), 0).below(bound)
+
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+
+
+def test_floats_are_added_one_after_the_other() -> None:
+    values = [1e16, 1.0, -1e16, 0.1]
+    assert sum_in_order(values) == ((1e16 + 1.0) - 1e16) + 0.1 == 0.1
+
+
+@pytest.mark.parametrize(
+    "scenario",
+    [
+        [None],
+        [EXAMPLES / "family.yaml"],
+        [EXAMPLES / "learning_robot.yaml"],
+        [EXAMPLES / "smart_home.yaml"],
+        [None, "floorplan={type: synthetic, area_m2: 60}"],
+    ],
+)
+def test_a_run_adds_no_floats_by_the_built_in_sum(
+    scenario: list[Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The mover's distance of the bundled month had another last digit in Python 3.13 than in 3.11."""
+    calls: set[str] = set()
+    built_in = builtins.sum
+
+    def checked(values: Iterable[Any], start: Any = 0) -> Any:
+        total = built_in(values, start)
+        caller = sys._getframe(1)
+        if type(total) is float and caller.f_globals["__name__"].startswith("fleet2d"):
+            calls.add(f"{caller.f_code.co_filename}:{caller.f_lineno}")
+        return total
+
+    monkeypatch.setattr(builtins, "sum", checked)
+    fleet2d.run(*scenario, "simulation.duration=1 d", seed=4)
+    assert not calls

@@ -16,10 +16,12 @@ from fleet2d.configuration.components import (
     Component,
     OneOf,
     Settings,
+    ShortForm,
     base_of,
     components,
     lookup,
     register,
+    split_short_form,
 )
 from fleet2d.configuration.units import Duration, Length, Text
 from fleet2d.errors import ScenarioError
@@ -308,3 +310,55 @@ def test_one_of_refuses_an_instance_of_another_kind() -> None:
         kind: ClassVar[str] = "stranger"
 
     assert errors(Shelf, {"top": Stranger()}) == {"top": "expected a gadget, got a Stranger"}
+
+
+__all__ = ["gadgets"]  # a fixture
+
+
+class Body(Settings):
+    """What an entity looks like to the short form."""
+
+    radius: Length = 0.2
+    behaviors: tuple[Annotated[Component, OneOf("gadget")], ...] = ()
+
+
+SHORT = Annotated[Body, ShortForm()]
+
+
+@pytest.mark.parametrize(
+    ("written", "split"),
+    [
+        ({"type": "lamp", "radius": 1, "watts": 2},
+         {"radius": 1, "behaviors": [{"type": "lamp", "watts": 2}]}),
+        ("lamp", {"behaviors": ["lamp"]}),
+        ({"radius": 1}, {"radius": 1}),
+        ({"behaviors": ["lamp"]}, {"behaviors": ["lamp"]}),
+        (3, 3),
+    ],
+)  # fmt: skip
+def test_split_short_form(written: object, split: object) -> None:
+    assert split == split_short_form(written, ["radius"])
+
+
+def test_short_form_equals_long_form() -> None:
+    adapter: TypeAdapter[Body] = TypeAdapter(SHORT)
+
+    assert adapter.validate_python(
+        {"radius": 1, "behaviors": [{"type": "lamp", "watts": 2}]}
+    ) == adapter.validate_python({"type": "lamp", "radius": 1, "watts": 2})
+
+
+def test_short_form_errors_name_keys_as_written() -> None:
+    assert errors(SHORT, {"type": "lamp", "radius": "x", "watts": 0, "radiu": 1}) == {
+        "radius": "expected a length, got 'x': write a number in m, or like '0.2 m', '20 cm', '5 mm'",
+        "watts": "Input should be greater than 0",
+        "radiu": "unknown key 'radiu': did you mean 'radius'? "
+        "Allowed here: cell, radius, warm_up, watts",
+    }
+    assert ["type"] == list(errors(SHORT, {"type": "lmap"}))
+
+
+def test_short_form_beside_behaviors_is_refused() -> None:
+    assert errors(SHORT, {"type": "lamp", "behaviors": []}) == {
+        "behaviors": "give 'type' (one behavior) or 'behaviors', not both"
+    }
