@@ -274,7 +274,7 @@ def compare_peers(row: Row, home: Any, poses: list[Any], python: str) -> None:
 
 def areas_differ(home: Any, poses: list[Any], answer: dict[str, Any]) -> str:
     """Say how many visible areas differ."""
-    from fleet2d.sight.region import VisibleRegion
+    from fleet2d.sight.fov import VisibleRegion
 
     lattice = home.plan.lattice
     ours = [

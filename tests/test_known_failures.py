@@ -28,9 +28,8 @@ from fleet2d.entities.robots.patrol import Patrol
 from fleet2d.entities.users.schedule import Agenda, Item, Schedule
 from fleet2d.errors import Fleet2DError, InputError
 from fleet2d.scenario.model import SimulationSettings
-from fleet2d.sight.camera import Camera
-from fleet2d.sight.region import VisibleRegion
-from fleet2d.sight.settings import SightSettings
+from fleet2d.sight.camera import Camera, SightSettings
+from fleet2d.sight.fov import VisibleRegion
 
 
 @pytest.fixture(scope="module")

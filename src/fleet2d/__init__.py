@@ -47,10 +47,10 @@ if TYPE_CHECKING:
     from fleet2d.runs.run import open_run as open_run
     from fleet2d.scenario.model import Scenario as Scenario
     from fleet2d.scenario.model import load_scenario as load_scenario
-    from fleet2d.sight.camera_sightings import CameraSightings as CameraSightings
     from fleet2d.sight.fov import FieldOfView as FieldOfView
+    from fleet2d.sight.fov import VisibleRegion as VisibleRegion
+    from fleet2d.sight.perception_error import CameraSightings as CameraSightings
     from fleet2d.sight.perception_error import PerceptionError as PerceptionError
-    from fleet2d.sight.region import VisibleRegion as VisibleRegion
     from fleet2d.studies.api import map_runs as map_runs
     from fleet2d.studies.api import study as study
     from fleet2d.studies.reader import Study as Study
@@ -60,7 +60,7 @@ _HOME_OF = {
     "Actor": "entities.actor",
     "Algorithm": "algorithms.algorithm",
     "Behavior": "entities.behavior",
-    "CameraSightings": "sight.camera_sightings",
+    "CameraSightings": "sight.perception_error",
     "ComponentError": "errors",
     "Drive": "entities.drives.drive",
     "Duration": "configuration.units",
@@ -90,7 +90,7 @@ _HOME_OF = {
     "Situation": "entities.behavior",
     "SpanView": "engine.interrupts.interrupt",
     "Study": "studies.reader",
-    "VisibleRegion": "sight.region",
+    "VisibleRegion": "sight.fov",
     "load_floorplan": "floorplan.load",
     "load_scenario": "scenario.model",
     "map_runs": "studies.api",

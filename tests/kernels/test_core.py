@@ -33,9 +33,8 @@ from fleet2d.kernels.sight import (
     new_memory,
 )
 from fleet2d.kernels.space import Corners
-from fleet2d.sight.camera import Camera
+from fleet2d.sight.camera import Camera, TableContext, error_tables, stack_lenses
 from fleet2d.sight.perception import Perception
-from fleet2d.sight.tables import TableContext, error_tables, stack_lenses
 
 PACKAGE = Path(fleet2d.__file__).parent
 SOURCES = sorted(PACKAGE.rglob("*.py"))

@@ -19,8 +19,7 @@ from fleet2d.kernels.sight import (
     near_wedge,
     points_in_view,
 )
-from fleet2d.sight.camera import Camera
-from fleet2d.sight.tables import stack_lenses
+from fleet2d.sight.camera import Camera, stack_lenses
 
 MIDDLE = round(SIDE_M / 2 * UNITS_PER_M)
 OFFSET = st.integers(-4000, 4000)

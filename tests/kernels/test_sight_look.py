@@ -32,9 +32,8 @@ from fleet2d.kernels.sight import (
     look,
     new_memory,
 )
-from fleet2d.sight.camera import Camera, Lens
+from fleet2d.sight.camera import Camera, Lens, TableContext, error_tables, stack_lenses
 from fleet2d.sight.perception import Perception
-from fleet2d.sight.tables import TableContext, error_tables, stack_lenses
 
 ANGLES = [1, 90, 180, 181, 359, 360]
 EIGHTHS = [0, 512, 1024, 1536, 2048, 2560, 3072, 3584]

@@ -12,9 +12,8 @@ from tests.strategies import quick
 import fleet2d.kernels.sight as k
 from fleet2d.kernels import I64
 from fleet2d.kernels.numbers import heading_of
-from fleet2d.sight.camera import Camera
+from fleet2d.sight.camera import Camera, error_tables
 from fleet2d.sight.perception import Perception
-from fleet2d.sight.tables import error_tables
 
 KEY = np.uint64(12345)
 VECTOR = st.tuples(st.integers(-9000, 9000), st.integers(-9000, 9000))

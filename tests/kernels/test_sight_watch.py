@@ -25,8 +25,7 @@ from fleet2d.kernels.sight import (
     settle,
     watch,
 )
-from fleet2d.sight.camera import Camera
-from fleet2d.sight.tables import TableContext, stack_lenses
+from fleet2d.sight.camera import Camera, TableContext, stack_lenses
 
 SINES = np.array([half_sine(half) for half in range(8192)], np.int64)
 SECOND = 1_000_000

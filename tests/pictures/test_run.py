@@ -37,7 +37,7 @@ from fleet2d.pictures.actogram import (
 from fleet2d.pictures.life import best_view, field_of_view, opacity
 from fleet2d.pictures.run import draw_run, run_figure
 from fleet2d.pictures.traces import BodyTrace, trace_of
-from fleet2d.sight.region import VisibleRegion
+from fleet2d.sight.fov import VisibleRegion
 
 MEANDER = {"type": "meander"}
 START = datetime(2026, 1, 5)

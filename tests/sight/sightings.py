@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fleet2d import CameraSightings, Home
-from fleet2d.sight.camera_sightings import ErrorStream
+from fleet2d.sight.perception_error import ErrorStream
 
 
 def sightings(

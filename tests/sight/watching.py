@@ -16,9 +16,8 @@ from fleet2d.kernels.motion import Window
 from fleet2d.kernels.sight import MOST_GHOSTS, LookRule, SightMemory, look, new_memory
 from fleet2d.kernels.space import Mesh
 from fleet2d.runtime.determinism import stream_key
-from fleet2d.sight.camera import Camera
+from fleet2d.sight.camera import Camera, TableContext, error_tables, stack_lenses
 from fleet2d.sight.perception import Perception
-from fleet2d.sight.tables import TableContext, error_tables, stack_lenses
 
 UNITS_PER_M = 1280  # cells of 5 cm
 SIDE_M = 20.0

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from fleet2d import CameraSightings, PerceptionError
-from fleet2d.sight.errors.miscalibration import Miscalibration
-from fleet2d.sight.errors.outliers import Outliers
+from fleet2d.sight.miscalibration import Miscalibration
+from fleet2d.sight.outliers import Outliers
 from fleet2d.testing import check_perception_error
 
 COUNT = itertools.count()

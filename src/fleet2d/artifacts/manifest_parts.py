@@ -12,6 +12,7 @@ from typing import Annotated, Any
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 from fleet2d.configuration.units import parse_duration
+from fleet2d.sight.camera import USUAL_ANGLE_DEG, USUAL_RANGE_M
 
 # The farthest that a camera sees [m]: far beyond any home.
 _FARTHEST_M = 1000.0
@@ -49,8 +50,8 @@ class _StoredPan(_StoredPart):
 
 
 class _StoredCamera(_StoredPart):
-    range: Annotated[_Pair, AfterValidator(_check_range)] = [0.0, 4.5]
-    angle_deg: Annotated[float, Field(gt=0, le=360)] = 108.0
+    range: Annotated[_Pair, AfterValidator(_check_range)] = list(USUAL_RANGE_M)
+    angle_deg: Annotated[float, Field(gt=0, le=360)] = USUAL_ANGLE_DEG
     offset: _Pair = [0.0, 0.0]
     heading_deg: float = 0.0
     pan: _StoredPan | None = None

@@ -254,7 +254,7 @@ PACKAGES = {
     "metric": "fleet2d.metrics",
     "interrupt": "fleet2d.engine.interrupts",
     "sight": "fleet2d.sight",
-    "perception_error": "fleet2d.sight.errors",
+    "perception_error": "fleet2d.sight",
     "intervention": "fleet2d.interventions",
 }
 """Where the built-in components of each kind live."""

@@ -7,7 +7,7 @@ from fleet2d.interventions.bodies import heading_of
 from fleet2d.interventions.intervention import Lasting, robot, user
 from fleet2d.interventions.robots import check_camera, check_truth, disturb
 from fleet2d.interventions.world import World
-from fleet2d.sight.disturbance import Disturbance, FalseSighting
+from fleet2d.sight.camera import Disturbance, FalseSighting
 
 UNKNOWN = "unknown"
 

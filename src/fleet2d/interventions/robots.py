@@ -14,7 +14,7 @@ from fleet2d.interventions.bodies import check_reach
 from fleet2d.interventions.intervention import Intervention, Lasting, body, robot
 from fleet2d.interventions.world import World
 from fleet2d.runtime.events import EventKind
-from fleet2d.sight.disturbance import Disturbance
+from fleet2d.sight.camera import Disturbance
 from fleet2d.sight.perception import Perception
 
 # The behavior of Fleet2D that responds to each command.

@@ -18,6 +18,7 @@ from fleet2d.metrics.metric import Metric
 from fleet2d.metrics.survival import kaplan_meier, quantile, restricted_mean
 from fleet2d.runtime.determinism import sum_in_order
 from fleet2d.runtime.events import Event
+from fleet2d.sight.camera import USUAL_RANGE_M
 
 ENDS = ("found", "not_at_home", "gave_up")
 
@@ -86,7 +87,7 @@ class TimeToFind(Metric):
     }
 
     deadline: PositiveDuration = timedelta(minutes=10)
-    sight: Length = Field(default=4.5, gt=0)
+    sight: Length = Field(default=USUAL_RANGE_M[1], gt=0)
     radius: Length = Field(default=0.15, gt=0, le=2)
 
     def start(self, home: Home) -> None:

@@ -17,9 +17,9 @@ from fleet2d.palette import TEXT_COLOR, VIEW_COLOR, VIEW_EDGE
 from fleet2d.pictures.floorplan import check_picture, figure_size, floorplan_axes, picture
 from fleet2d.pictures.layers import layer_on_axes
 from fleet2d.pictures.life import SightWalls, field_of_view
+from fleet2d.sight.camera import USUAL_ANGLE_DEG, USUAL_RANGE_M
 from fleet2d.sight.flashlight import Flashlight
-from fleet2d.sight.fov import FieldOfView
-from fleet2d.sight.region import VisibleRegion
+from fleet2d.sight.fov import FieldOfView, VisibleRegion
 
 ROBOT_COLOR = "#22344f"
 RADIUS_M = 0.17
@@ -39,8 +39,8 @@ class CameraPose(NamedTuple):
     x: float
     y: float
     heading_deg: float
-    far: float = 4.5
-    angle_deg: float = 108.0
+    far: float = USUAL_RANGE_M[1]
+    angle_deg: float = USUAL_ANGLE_DEG
 
     def reach(self, plan: FloorPlan) -> Reach:
         """Return its range and angle in the integers of the kernels."""

@@ -21,7 +21,7 @@ from fleet2d.kernels import F64, Bool
 from fleet2d.kernels.space import Mesh
 from fleet2d.palette import VIEW_COLOR, VIEW_EDGE
 from fleet2d.pictures.traces import BodyTrace
-from fleet2d.sight.region import VisibleRegion, WallPlan
+from fleet2d.sight.fov import VisibleRegion, WallPlan
 
 BLUR_M = 0.14  # standard deviation of the spot of a body, about its own size
 REACH = 5  # radius of the blur [standard deviations]; with less, spots have square edges

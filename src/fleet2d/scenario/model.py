@@ -25,7 +25,7 @@ from fleet2d.metrics.metric import Metric
 from fleet2d.scenario.compose import compose
 from fleet2d.scenario.expectation_field import ExpectationField
 from fleet2d.scenario.explain import explain
-from fleet2d.sight.settings import SightSettings
+from fleet2d.sight.camera import SightSettings
 
 
 def _parse_local_time(value: Any) -> Any:

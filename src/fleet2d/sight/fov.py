@@ -1,15 +1,105 @@
-"""Fields of view: the base of the methods that a scenario can choose by `sight.method`."""
+"""Fields of view: the region visible from a place, and the base of all methods."""
 
 from abc import abstractmethod
-from typing import ClassVar
+from functools import cached_property
+from typing import ClassVar, Protocol
 
 import numpy as np
+import numpy.typing as npt
 
 from fleet2d.configuration.components import Component
+from fleet2d.errors import PlacementError
+from fleet2d.floorplan.geometry.lattice import Lattice
 from fleet2d.floorplan.home.home import Home
-from fleet2d.kernels import I64, Bool
-from fleet2d.kernels.sight import Reach, points_in_reach
-from fleet2d.kernels.space import CELL_CENTRE, SUB
+from fleet2d.kernels import F64, I64, Bool
+from fleet2d.kernels.sight import Reach, points_in_reach, region_contains_points, region_outline
+from fleet2d.kernels.sight import visible_region as visible_region_fast
+from fleet2d.kernels.space import CELL_CENTRE, SUB, Mesh
+
+
+class WallPlan(Protocol):
+    """Protocol of plans with walls, as lines of sight need them: such as a floor plan."""
+
+    @property
+    def mesh(self) -> Mesh:
+        """The free space between the walls."""
+
+    @property
+    def lattice(self) -> Lattice:
+        """Converts metres to lattice units and back."""
+
+
+class VisibleRegion:
+    """The region visible from one place: star-shaped, exact in lattice units.
+
+    A point is in the region if and only if the straight line from the eye to it touches no wall and
+    no corner, so the outline isn't part of the region.
+
+    Attributes:
+        eye: The place (x, y) [lattice units].
+        right: int32 (n,), for each piece of the region the mesh vertex on its right border.
+        wall: int32 (n,), the wall edge of each piece, 3 * triangle + k.
+
+    Example:
+        >>> import shapely
+        >>> from fleet2d.floorplan.plan import FloorPlan
+        >>> corners = [(0, 0), (4, 0), (4, 2), (2, 2), (2, 4), (0, 4)]
+        >>> hall = FloorPlan.build("L", shapely.Polygon(corners))
+        >>> region = VisibleRegion(hall, x=1.0, y=3.0)
+        >>> round(region.area_m2, 3), region.contains([(1.0, 1.0), (3.5, 1.5)]).tolist()
+        (10.0, [True, False])
+    """
+
+    def __init__(self, plan: WallPlan, x: float, y: float) -> None:
+        """Compute the region visible from (x, y).
+
+        Args:
+            plan: A floor plan.
+            x: Position of the eye [m].
+            y: Position of the eye [m].
+
+        Raises:
+            PlacementError: The eye is outside free space or on a wall.
+        """
+        self._mesh, self._lattice = plan.mesh, plan.lattice
+        eye = self._lattice.to_lattice((x, y))
+        self.eye = (int(eye[0]), int(eye[1]))
+        self.right, self.wall = visible_region_fast(self._mesh, *self.eye)
+        if len(self.right) == 0:
+            raise PlacementError(
+                f"({x:g}, {y:g}) m is in a wall or outside the home, so nothing is visible from "
+                "there. Choose a place in free space."
+            )
+
+    @cached_property
+    def _outline(self) -> tuple[F64, float]:
+        return region_outline(self._mesh, *self.eye, self.right, self.wall)
+
+    @property
+    def area_m2(self) -> float:
+        """The area of the region [m²]."""
+        return self._outline[1] / self._lattice.units_per_m**2
+
+    def polygon(self) -> F64:
+        """Return the corners of the outline, counter-clockwise: float64 (n, 2) [m]."""
+        outline, _ = self._outline
+        differs = (outline != np.roll(outline, 1, axis=0)).any(axis=1)
+        return self._lattice.to_metres(outline[differs])
+
+    def contains(self, points: npt.ArrayLike) -> Bool:
+        """Return which points are visible.
+
+        Args:
+            points: (…, 2) [m]; each counts as the nearest lattice point.
+
+        Returns:
+            bool (…).
+        """
+        lattice_points = self._lattice.to_lattice(points)
+        flat = np.ascontiguousarray(lattice_points.reshape(-1, 2))
+        is_inside = region_contains_points(self._mesh, *self.eye, self.right, self.wall, flat)
+        return is_inside.reshape(lattice_points.shape[:-1])
+
 
 __all__ = ["Bool", "FieldOfView", "Reach"]
 

@@ -1,12 +1,276 @@
-"""The base of errors of perception, which change what a camera perceived of people."""
+"""The base of errors of perception, and the sightings of a camera that they change."""
 
+import dataclasses
 from abc import abstractmethod
-from typing import TYPE_CHECKING, Any, ClassVar
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from fleet2d.configuration.components import Component
+from fleet2d.configuration.units import micros
+from fleet2d.errors import ComponentError
+from fleet2d.floorplan.home.home import Home
+from fleet2d.floorplan.objects import POSTURES
+from fleet2d.kernels import F64, I16, I64, Bool
+from fleet2d.kernels.motion import rooms_at
+from fleet2d.kernels.numbers import BELL_STD, QUARTER, TURN, UNIT, half_sines, random_bells
+from fleet2d.kernels.sight import NOBODY, ONE, random_shares
+from fleet2d.runtime.clock import DAY_US, HOUR_US, midnight_of
+from fleet2d.runtime.determinism import stream_key
 
-if TYPE_CHECKING:
-    from fleet2d.sight.camera_sightings import CameraSightings
+FARTHEST_M = 10_000.0
+"""Largest coordinate of a perceived position [m]."""
+MOST = 1e6
+"""Largest absolute value of other numbers."""
+MOST_OF_A_LOOK = 64
+"""Draws of the false positives of one look; what is beyond repeats them."""
+FALSE_POSITIVE = "a false positive"
+
+
+@dataclass(frozen=True)
+class ErrorStream:
+    """The address of the random draws of one error of one camera.
+
+    Attributes:
+        seed: The seed of the run.
+        path: The path of the robot, "robots.astro".
+        name: The camera and the error.
+    """
+
+    seed: int
+    path: str
+    name: str
+
+    def key(self, purpose: str, person: str = "") -> np.uint64:
+        """Return the key of the stream for a purpose, and a person where it is about one."""
+        return stream_key(self.seed, self.path, f"{self.name}: {purpose}: {person}")
+
+
+@dataclass(frozen=True, eq=False)
+class CameraSightings:
+    """The people that one camera noticed in some looks: n sightings, one element each.
+
+    The arrays are read-only; `replace` and `moved` return changed sightings. Values are those of
+    the table of observations, with the errors that come before. Users are numbers, -1 for nobody.
+
+    Attributes:
+        camera: Name of the camera.
+        users: Names of the users: user 0 is the first.
+        home: The home.
+        start: Local time of step 0.
+        step_s: Length of a step [s].
+        step: Step of the look: int64 (n,).
+        user: Who it seems to be, -1 if not recognized: int64 (n,).
+        x: Perceived position [m]: float64 (n,).
+        y: Perceived position [m]: float64 (n,).
+        heading: Perceived heading [rad]: float64 (n,).
+        posture: Perceived posture, 0 stands, 1 sits, 2 lies: int64 (n,).
+        noticed: Whether it is noticed at all, true at first: bool (n,).
+        true_user: Who it is, -1 for a false positive: int64 (n,).
+        true_x: True position [m]: float64 (n,).
+        true_y: True position [m]: float64 (n,).
+        true_heading: True heading [rad]: float64 (n,).
+        true_posture: True posture: int64 (n,).
+        camera_x: Where the camera is [m]: float64 (n,).
+        camera_y: Where the camera is [m]: float64 (n,).
+        camera_heading: Where it looks [rad]: float64 (n,).
+    """
+
+    camera: str
+    users: Sequence[str]
+    home: Home
+    start: datetime
+    step_s: float
+    step: I64
+    user: I64
+    x: F64
+    y: F64
+    heading: F64
+    posture: I64
+    noticed: Bool
+    true_user: I64
+    true_x: F64
+    true_y: F64
+    true_heading: F64
+    true_posture: I64
+    camera_x: F64
+    camera_y: F64
+    camera_heading: F64
+    _stream: ErrorStream = ErrorStream(0, "", "")
+
+    def __post_init__(self) -> None:
+        """Make the arrays read-only."""
+        for value in vars(self).values():
+            if isinstance(value, np.ndarray):
+                value.setflags(write=False)
+
+    def __len__(self) -> int:
+        """Return the number of sightings."""
+        return len(self.step)
+
+    @property
+    def distance(self) -> F64:
+        """Perceived distance from the camera [m]: float64 (n,)."""
+        return np.sqrt((self.x - self.camera_x) ** 2 + (self.y - self.camera_y) ** 2)
+
+    @property
+    def hour(self) -> F64:
+        """Time of day of the look [hours], from 0 to 24: float64 (n,)."""
+        midnight_us = micros(self.start - midnight_of(self.start))
+        day_us = (midnight_us + self.step * round(self.step_s * 1e6)) % DAY_US
+        return day_us / HOUR_US
+
+    @property
+    def true_room(self) -> I16:
+        """Room of the true position, an index of `home.rooms`, -1 in none: int16 (n,)."""
+        plan = self.home.plan
+        x, y = plan.lattice.to_lattice(np.stack([self.true_x, self.true_y], axis=1)).T
+        rooms: I16 = rooms_at(plan.room_of_place, x.copy(), y.copy())
+        return rooms
+
+    def replace(
+        self,
+        *,
+        x: ArrayLike | None = None,
+        y: ArrayLike | None = None,
+        heading: ArrayLike | None = None,
+        posture: ArrayLike | None = None,
+        user: ArrayLike | None = None,
+        noticed: ArrayLike | None = None,
+    ) -> "CameraSightings":
+        """Return the sightings with other values: for each an array (n,), or one value for all.
+
+        Stored values are rounded: positions to the lattice of the home, headings to 1/4096 turn.
+
+        Args:
+            x: Perceived position [m].
+            y: Perceived position [m].
+            heading: Perceived heading [rad], any number of turns.
+            posture: Perceived posture: 0, 1 or 2.
+            user: Who it seems to be; -1: not recognized.
+            noticed: Whether it is noticed.
+
+        Raises:
+            ComponentError: A value has another shape, isn't finite, or is out of bounds.
+        """
+        new: dict[str, Any] = {}
+        for name, value in (("x", x), ("y", y)):
+            if value is not None:
+                new[name] = self._numbers(name, value, FARTHEST_M, " m")
+        if heading is not None:
+            new["heading"] = self._numbers("heading", heading, MOST)
+        if posture is not None:
+            new["posture"] = self._codes("posture", posture, 0, len(POSTURES))
+        if user is not None:
+            new["user"] = self._codes("user", user, NOBODY, len(self.users))
+        if noticed is not None:
+            new["noticed"] = self._array("noticed", noticed, "b", "true and false")
+        return dataclasses.replace(self, **new)
+
+    def moved(
+        self, *, turn_deg: ArrayLike = 0.0, scale: ArrayLike = 1.0, offset: ArrayLike = 0.0
+    ) -> "CameraSightings":
+        """Return the sightings at other places, as seen from the camera; headings stay.
+
+        Args:
+            turn_deg: Angle by which they are turned round the camera, counter-clockwise, rounded to
+                1/8192 turn (0.044 degrees).
+            scale: Factor of the distance.
+            offset: What is added to the distance [m]; the sum is at least 0.
+
+        Raises:
+            ComponentError: A value has another shape, isn't finite, or moves them out of bounds.
+        """
+        turns = self._numbers("turn_deg", turn_deg, MOST) / 360 * (2 * TURN)
+        factor, added = self._numbers("scale", scale, MOST), self._numbers("offset", offset, MOST)
+        distance, sines = self.distance, half_sines()
+        target = np.maximum(0.0, distance * factor + added)
+        stretch = target / np.where(distance > 0, distance, 1.0)
+        angle = np.rint(turns).astype(np.int64)
+        along = sines[(angle + 2 * QUARTER) % (2 * TURN)] / UNIT * stretch
+        up = sines[angle % (2 * TURN)] / UNIT * stretch
+        dx, dy = self.x - self.camera_x, self.y - self.camera_y
+        return self.replace(
+            x=self.camera_x + (dx * along - dy * up), y=self.camera_y + (dx * up + dy * along)
+        )
+
+    def uniform(self, purpose: str, *, at: ArrayLike | None = None, shared: bool = False) -> F64:
+        """Return random numbers from 0 to 1, 1 excluded: float64 (n,).
+
+        Equal arguments give equal numbers; each purpose, person, camera and error has its own.
+
+        Args:
+            purpose: What is drawn.
+            at: What the numbers depend on besides, (n,) or one for all, rounded down; None: the
+                step. `step // 60` gives all sightings of a person in sixty steps the same number.
+            shared: Whether all people have the same numbers.
+        """
+        return self._draw(random_shares, purpose, at, shared) / ONE
+
+    def bell(self, purpose: str, *, at: ArrayLike | None = None, shared: bool = False) -> F64:
+        """Return bell-shaped random numbers, mean 0, standard deviation 1: float64 (n,).
+
+        They are cut at 4.88; arguments are those of `uniform`.
+        """
+        return self._draw(random_bells, purpose, at, shared) / BELL_STD
+
+    def _draw(self, draw: Any, purpose: str, at: ArrayLike | None, shared: bool) -> F64:
+        steps = self.step if at is None else np.floor(self._numbers("at", at, 2.0**53))
+        steps = np.ascontiguousarray(steps, np.int64)
+        draws = np.empty(len(self))
+        if shared:
+            draws[:] = draw(self._stream.key(purpose), steps)
+            return draws
+        for person in np.unique(self.true_user).tolist():
+            rows = np.flatnonzero(self.true_user == person)
+            name, addresses = FALSE_POSITIVE, steps[rows]
+            if person == NOBODY:  # a look may have several
+                first = np.searchsorted(self.step[rows], self.step[rows])
+                addresses = addresses * MOST_OF_A_LOOK + (np.arange(len(rows)) - first)
+            else:
+                name = self.users[person]
+            draws[rows] = draw(self._stream.key(purpose, name), addresses)
+        return draws
+
+    def _array(self, name: str, value: ArrayLike, kinds: str, what: str) -> NDArray[Any]:
+        """Return an array (n,) of a value.
+
+        Raises:
+            ComponentError: It has another shape or type.
+        """
+        array = np.asarray(value)
+        if array.shape not in ((), (len(self),)):
+            raise ComponentError(
+                f"{name} has the shape {array.shape}: expected ({len(self)},), an element for each"
+                " sighting, or one value for all"
+            )
+        if array.dtype.kind not in kinds:
+            raise ComponentError(f"{name} holds {array.dtype}: expected {what}")
+        return np.array(np.broadcast_to(array, (len(self),)))
+
+    def _numbers(self, name: str, value: ArrayLike, most: float, unit: str = "") -> F64:
+        array = self._array(name, value, "fiu", "numbers").astype(np.float64)
+        wrong = np.flatnonzero(~(np.isfinite(array) & (np.abs(array) <= most)))
+        if len(wrong):
+            raise ComponentError(
+                f"{name} is {array[wrong[0]]:g} for the look at step {self.step[wrong[0]]}:"
+                f" expected a number from -{most:,.0f} to {most:,.0f}{unit}"
+            )
+        return array
+
+    def _codes(self, name: str, value: ArrayLike, least: int, end: int) -> I64:
+        array = self._array(name, value, "iu", "integers").astype(np.int64)
+        wrong = np.flatnonzero((array < least) | (array >= end))
+        if len(wrong):
+            raise ComponentError(
+                f"{name} is {array[wrong[0]]} for the look at step {self.step[wrong[0]]}:"
+                f" expected {least} to {end - 1}"
+            )
+        return array
 
 
 class PerceptionError(Component):

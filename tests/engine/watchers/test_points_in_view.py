@@ -14,11 +14,10 @@ from fleet2d.floorplan.home.home import Home
 from fleet2d.kernels import U64, Bool
 from fleet2d.kernels.motion import Poses
 from fleet2d.kernels.sight import Lenses, Reach, UserPoses, camera_pose
-from fleet2d.sight.camera import Camera
+from fleet2d.sight.camera import Camera, TableContext, stack_lenses
 from fleet2d.sight.flashlight import Flashlight
 from fleet2d.sight.fov import FieldOfView
 from fleet2d.sight.line_of_sight import LineOfSight
-from fleet2d.sight.tables import TableContext, stack_lenses
 from fleet2d.sight.visibility_polygon import VisibilityPolygon
 
 HERE = f"{TESTS.as_posix()}/engine/watchers/test_points_in_view"

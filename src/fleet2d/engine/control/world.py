@@ -12,7 +12,7 @@ from fleet2d.floorplan.home.change import HomeChange
 from fleet2d.floorplan.home.home import Home
 from fleet2d.runtime.clock import Clock
 from fleet2d.runtime.events import Event, EventKind
-from fleet2d.sight.disturbance import Disturbance
+from fleet2d.sight.camera import Disturbance
 
 
 class EngineWorld:

@@ -9,8 +9,8 @@ from fleet2d.engine.tables.shared_columns import HEADING, STEP, TIME, X, Y, away
 from fleet2d.engine.tables.trajectories import trajectory_table
 from fleet2d.engine.watchers.cameras import Cameras
 from fleet2d.engine.watchers.sensors import Sensors
+from fleet2d.floorplan.objects import POSTURES
 from fleet2d.runs.key_kinds import KEY_KINDS
-from fleet2d.sight.perception import POSTURES
 
 
 def table_specs(

@@ -43,11 +43,10 @@ from fleet2d.kernels.sight import (
 from fleet2d.runtime.clock import midnight_of
 from fleet2d.runtime.determinism import stream_key
 from fleet2d.runtime.events import Event
-from fleet2d.sight.disturbance import Disturbance
+from fleet2d.sight.camera import Disturbance, TableContext, error_tables, is_perfect, stack_lenses
 from fleet2d.sight.fov import FieldOfView
 from fleet2d.sight.line_of_sight import LineOfSight
 from fleet2d.sight.perception import Perception
-from fleet2d.sight.tables import TableContext, error_tables, is_perfect, stack_lenses
 
 # The name of the random stream of each draw.
 USER_STREAMS = {

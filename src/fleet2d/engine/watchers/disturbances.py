@@ -14,9 +14,8 @@ from fleet2d.kernels.sight import (
     SightingColumn,
     SightMemory,
 )
-from fleet2d.sight.disturbance import Disturbance, of_camera
+from fleet2d.sight.camera import Disturbance, TableContext, of_camera
 from fleet2d.sight.perception import Perception
-from fleet2d.sight.tables import TableContext
 
 # Squared distance beyond which a dark camera sees nobody.
 NOT_EVEN_AT_0 = -1

@@ -13,7 +13,7 @@ from fleet2d.kernels import F64, I64, Bool
 from fleet2d.kernels.sight import NEVER, SightRecord, WatchSetup, empty_pose_cache, settle, watch
 from fleet2d.kernels.space import Mesh
 from fleet2d.runtime.events import Event
-from fleet2d.sight.tables import TableContext, stack_lenses
+from fleet2d.sight.camera import TableContext, stack_lenses
 
 # Slots of the cache of poses, which holds half as many. A round through a large home has a few
 # thousand poses.

@@ -14,9 +14,8 @@ from fleet2d.kernels.motion import Window
 from fleet2d.kernels.numbers import TURN, in_radians
 from fleet2d.kernels.sight import NOBODY, About, SightMemory, camera_poses
 from fleet2d.kernels.sight import SightingColumn as Column
-from fleet2d.sight.camera_sightings import CameraSightings, ErrorStream
 from fleet2d.sight.perception import Perception
-from fleet2d.sight.perception_error import PerceptionError
+from fleet2d.sight.perception_error import CameraSightings, ErrorStream, PerceptionError
 
 if TYPE_CHECKING:
     from fleet2d.engine.watchers.cameras import Cameras

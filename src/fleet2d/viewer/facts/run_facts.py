@@ -10,6 +10,7 @@ from fleet2d.configuration.units import parse_duration
 from fleet2d.errors import ArtifactError
 from fleet2d.palette import body_color
 from fleet2d.runs.run import Run
+from fleet2d.sight.camera import USUAL_ANGLE_DEG, USUAL_RANGE_M
 from fleet2d.version import __version__
 from fleet2d.viewer.facts.contract import BodyFacts, CameraFacts, ColumnFacts, RunFacts, TableFacts
 from fleet2d.viewer.facts.home_facts import home_facts
@@ -89,7 +90,7 @@ def _cameras(settings: Mapping[str, Any]) -> list[CameraFacts]:
 
 
 def _camera(name: str, camera: Mapping[str, Any]) -> CameraFacts:
-    near, far = camera.get("range", (0.0, 4.5))
+    near, far = camera.get("range", USUAL_RANGE_M)
     forward, left = camera.get("offset", (0.0, 0.0))
     pan = camera.get("pan") or {}
     dwell = parse_duration(pan.get("dwell", "5 s"))
@@ -97,7 +98,7 @@ def _camera(name: str, camera: Mapping[str, Any]) -> CameraFacts:
         name=name,
         near=near,
         far=far,
-        angle=math.radians(camera.get("angle_deg", 108.0)),
+        angle=math.radians(camera.get("angle_deg", USUAL_ANGLE_DEG)),
         forward=forward,
         left=left,
         heading=math.radians(camera.get("heading_deg", 0.0)),

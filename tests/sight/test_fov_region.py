@@ -7,7 +7,7 @@ from shapely.geometry import Polygon
 
 from fleet2d.errors import PlacementError
 from fleet2d.floorplan.plan import FloorPlan
-from fleet2d.sight.region import VisibleRegion
+from fleet2d.sight.fov import VisibleRegion
 
 L_SHAPE = FloorPlan.build("L", Polygon([(-3, 1), (1, 1), (1, 3), (-1, 3), (-1, 5), (-3, 5)]))
 

@@ -6,8 +6,7 @@ from pydantic import Field
 
 from fleet2d.configuration.components import register
 from fleet2d.configuration.units import AngleDeg, Length
-from fleet2d.sight.camera_sightings import CameraSightings
-from fleet2d.sight.perception_error import PerceptionError
+from fleet2d.sight.perception_error import CameraSightings, PerceptionError
 
 
 @register("perception_error", "miscalibration")

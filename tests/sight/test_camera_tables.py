@@ -8,9 +8,8 @@ from tests.sight.watching import LATTICE, UNITS_PER_M, scene
 
 import fleet2d.kernels.sight as k
 from fleet2d.errors import ScenarioError
-from fleet2d.sight.camera import Camera
+from fleet2d.sight.camera import Camera, error_tables, is_perfect, stack_lenses
 from fleet2d.sight.perception import Perception
-from fleet2d.sight.tables import error_tables, is_perfect, stack_lenses
 
 USERS = ("ana", "ben", "cleo")
 

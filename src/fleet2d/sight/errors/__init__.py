@@ -1,1 +1,0 @@
-"""Errors of perception: one module for each."""
