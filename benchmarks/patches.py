@@ -2,7 +2,7 @@
 
     python benchmarks/patches.py --seeds 10 --days 14
 
-The same runs with patches of other lengths (`fleet2d.algorithms.patches.SIDE`), a robot on rounds
+The same runs with patches of other sizes (`fleet2d.algorithms.evidence.SIDE_M`), a robot on rounds
 of ten minutes a room in the bundled home: by how much the share of a room differs from that with
 patches of 1 m.
 """
@@ -12,7 +12,7 @@ import multiprocessing
 from typing import Any
 
 import fleet2d
-from fleet2d.algorithms import patches
+from fleet2d.algorithms import evidence
 
 SIDES = (0.7, 0.85, 1.2, 1.5)
 ROUNDS = {"type": "patrol", "order": "random", "dwell": "10 min"}
@@ -22,7 +22,7 @@ ESTIMATORS = ("exposure_ratio", "likelihood")
 
 def all_shares(seeds: int, days: int, side: float) -> list[Shares]:
     """Return the shares for each seed, of patches so long; runs of a process share theirs."""
-    patches.SIDE_M = side
+    evidence.SIDE_M = side
     return [shares(seed, days) for seed in range(seeds)]
 
 

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.algorithms.presence.worlds import evidence_of
 from tests.entities.robots.robots import events, home_with
 from tests.scenes import path, run, scenario, table
 from typer.testing import CliRunner
 
 import fleet2d
-from fleet2d.algorithms.evidence import SightingCounts
-from fleet2d.algorithms.presence.counts import Bins
+from fleet2d.algorithms.evidence import Evidence
 from fleet2d.algorithms.presence.sighting_share import SightingShare
 from fleet2d.cli.app import app
 from fleet2d.engine.simulation import Simulation
@@ -89,15 +89,14 @@ def test_path_every_wants_a_timedelta() -> None:
 
 def test_sums_of_a_wrong_width_name_the_line_of_the_user() -> None:
     class Own(SightingShare):
-        def sums(self, bins: Bins) -> Any:
-            return np.zeros((len(bins.day), self.users + 1, 1))
+        def sums(self, evidence: Evidence) -> Any:
+            return np.zeros((len(evidence), self.users + 1, 1))
 
     own = Own()
     own.begin(rooms=3, users=2)
-    day = np.array([1], np.int64)
-    bins = Bins(day, day, 60, np.zeros((1, 3)), SightingCounts.of(np.zeros((1, 3, 3), np.int64)))
+    evidence = evidence_of(np.zeros((1, 3)), np.zeros((1, 3, 3), np.int64))
     with pytest.raises(ComponentError, match=r"Own\.sums returned .*test_defects\.py:\d+, in sums"):
-        own.observe(bins)
+        own.observe(evidence)
 
 
 def test_shutting_a_doorway_without_a_door_says_how_to_hang_one() -> None:

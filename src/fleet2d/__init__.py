@@ -13,8 +13,8 @@ from fleet2d.version import __version__ as __version__
 if TYPE_CHECKING:
     from fleet2d.algorithms.algorithm import Algorithm as Algorithm
     from fleet2d.algorithms.algorithm import Present as Present
+    from fleet2d.algorithms.algorithm import RoomDistribution as RoomDistribution
     from fleet2d.algorithms.history import History as History
-    from fleet2d.algorithms.output import RoomDistribution as RoomDistribution
     from fleet2d.configuration.components import register as register
     from fleet2d.configuration.units import Duration as Duration
     from fleet2d.configuration.units import Length as Length
@@ -81,7 +81,7 @@ _HOME_OF = {
     "PerceptionError": "sight.perception_error",
     "Plan": "entities.plan",
     "Present": "algorithms.algorithm",
-    "RoomDistribution": "algorithms.output",
+    "RoomDistribution": "algorithms.algorithm",
     "Route": "entities.drives.drive",
     "Run": "runs.run",
     "Scenario": "scenario.model",

@@ -8,7 +8,7 @@ import pytest
 from tests.scenes import TESTS, everything, run
 
 from fleet2d import Algorithm, History, Present
-from fleet2d.algorithms.evidence import SightingRows, count_seen, steps_of_bin
+from fleet2d.algorithms.evidence import SightingCounts, steps_of_bin
 from fleet2d.errors import ComponentError
 
 HERE = f"{TESTS.as_posix()}/algorithms/test_evidence"
@@ -45,9 +45,9 @@ class Unsaid(Algorithm):
         return {"bins": len(history.evidence)}
 
 
-def sightings(rows: list[tuple[int, int, int]]) -> SightingRows:
-    """Return sightings of (step, user, room)."""
-    return SightingRows(*np.array(rows, np.int64).reshape(-1, 3).T)
+def columns(rows: list[tuple[int, int, int]]) -> Any:
+    """Return observations of (step, user, room) as columns."""
+    return np.array(rows, np.int64).reshape(-1, 3).T.copy()
 
 
 def test_bins_last_a_minute_or_a_step() -> None:
@@ -57,16 +57,16 @@ def test_bins_last_a_minute_or_a_step() -> None:
 
 
 def test_users_perceived_by_two_robots_count_once_and_strangers_only_as_anyone() -> None:
-    rows = [(60, 0, 1), (60, 0, 1), (61, 0, 1), (61, -1, 1), (119, 1, 0), (120, -1, 0), (180, 0, 0)]
+    rows = [(0, 0, 1), (0, 0, 1), (1, 0, 1), (1, -1, 1), (59, 1, 0), (60, -1, 0), (120, 0, 0)]
 
-    seen = count_seen(sightings(rows), 60, 2, 60, 2, 2).dense
+    seen = SightingCounts.of_observations(*columns(rows), 60, (2, 3, 2)).dense
 
     assert [[0, 2], [1, 0], [1, 2]] == seen[0].tolist()
     assert [[0, 0], [0, 0], [1, 0]] == seen[1].tolist()
 
 
 def test_nobody_perceived_is_evidence_of_zeros() -> None:
-    assert 0 == count_seen(sightings([]), 0, 3, 60, 1, 2).dense.sum()
+    assert 0 == SightingCounts.of_observations(*columns([]), 60, (3, 2, 2)).dense.sum()
 
 
 def evidence_of(period: str, what: str = "Tell", **settings: Any) -> Any:

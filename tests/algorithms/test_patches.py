@@ -10,8 +10,8 @@ from tests.scenes import TESTS, everything, run
 
 import fleet2d
 from fleet2d import Algorithm, History, Present
+from fleet2d.algorithms.evidence import MOST_PATCHES, SIDE_M, patches_of, whole_rooms
 from fleet2d.algorithms.observations import NOWHERE
-from fleet2d.algorithms.patches import MOST_PATCHES, SIDE_M, patches_of, whole_rooms
 
 HERE = f"{TESTS.as_posix()}/algorithms/test_patches"
 
@@ -60,24 +60,23 @@ def test_rooms_that_nothing_joins_are_on_islands_of_their_own(shared_data: Path)
     assert all(patches_of(plan).island is None for plan in plans(shared_data))
 
 
-class Tell(Algorithm):
+class PatchSums(Algorithm):
     """Puts out by how much evidence by patches differs from that by rooms."""
 
     needs: ClassVar[Set[str]] = {"evidence"}
 
     def update(self, history: History, state: Present) -> Mapping[str, Any]:
-        evidence, parts = history.evidence, history.evidence.parts
-        assert parts is not None
-        first = np.flatnonzero(np.diff(parts.room, prepend=-1))
-        cells = np.add.reduceat(parts.cells, first)
-        watched = np.add.reduceat(parts.watched * parts.cells, first, axis=1) / cells
-        seen = np.add.reduceat(parts.seen, first, axis=2)
+        evidence, patches = history.evidence, history.evidence.by_patch
+        first = np.flatnonzero(np.diff(patches.room, prepend=-1))
+        cells = np.add.reduceat(patches.cells, first)
+        watched = np.add.reduceat(patches.watched * patches.cells, first, axis=1) / cells
+        seen = np.add.reduceat(patches.seen, first, axis=2)
         return {
             "watched": float(np.abs(watched - evidence.watched).max()),
             "seen": int((seen - evidence.seen).min()),
-            "less": float((parts.shown - parts.watched).min()),
-            "most": float(parts.shown.max()),
-            "sightings": int(parts.seen.sum()),
+            "less": float((patches.shown - patches.watched).min()),
+            "most": float(patches.shown.max()),
+            "sightings": int(patches.seen.sum()),
         }
 
 
@@ -85,7 +84,7 @@ class Tell(Algorithm):
 def test_evidence_by_patches_sums_up_to_that_by_rooms(max_span: int | None) -> None:
     content = everything("1 h")
     content["robots"] = {"astro": content["robots"]["astro"]}
-    content["algorithms"] = {"tell": {"type": f"{HERE}:Tell", "period": "10 min"}}
+    content["algorithms"] = {"tell": {"type": f"{HERE}:PatchSums", "period": "10 min"}}
     rows = run(content, max_span=max_span).tables["tell"].to_pandas()
     assert rows["watched"].max() < 1e-12
     assert 0 == rows["seen"].min()  # who is taken to be in two patches at once counts in both

@@ -10,7 +10,7 @@ from tests.scenes import Cli, digests, run, scenario, table
 
 import fleet2d
 from fleet2d import Algorithm, Behavior, Metric
-from fleet2d.algorithms.output import RoomDistribution
+from fleet2d.algorithms.algorithm import RoomDistribution
 from fleet2d.algorithms.presence.belief import Presence
 from fleet2d.algorithms.presence.estimator import Estimator
 from fleet2d.algorithms.presence.model import Model

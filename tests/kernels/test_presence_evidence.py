@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from fleet2d.algorithms.presence.anyone import with_anyone
+from fleet2d.algorithms.presence.belief import with_anyone
 from fleet2d.kernels import F64, I64, Bool
 from fleet2d.kernels.presence import PeoplePlaces, gather_views, sum_places
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from tests.reference import presence as slow
 
 from fleet2d.algorithms.presence.chain_model import steps_of
-from fleet2d.algorithms.presence.day_evidence import distinct
+from fleet2d.algorithms.presence.people import distinct
 from fleet2d.kernels.presence import Moments, StayModel, Stretches, advance, follow, smooth
 
 SIZES = (2, 1, 3, 1)  # three rooms of so many patches, and away

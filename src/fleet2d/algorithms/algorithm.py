@@ -1,19 +1,193 @@
-"""Algorithms: components that learn from the history of a run, with an output at each update."""
+"""Algorithms: components that learn from the history of a run, and the outputs that they return."""
 
-from collections.abc import Mapping, Sequence, Set
+from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Protocol, runtime_checkable
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from fleet2d.algorithms.history import History
 from fleet2d.algorithms.learned import check_shapes, run_state
 from fleet2d.configuration.components import Component
+from fleet2d.configuration.problems import suggest
 from fleet2d.configuration.units import InputPath, PositiveDuration
+from fleet2d.errors import ComponentError
+from fleet2d.floorplan.home.change import HomeChanges
 from fleet2d.floorplan.home.home import Home
+from fleet2d.kernels import F64
 from fleet2d.runtime.determinism import Draws, stream_key
+
+WITHHELD = "withheld"
+"""Stands for an output that nobody may read."""
+FROZEN = "frozen"
+"""Stands for the newest output at the moment at which an intervention freezes it."""
+
+# The columns of every table.
+RESERVED = frozenset({"step", "time"})
+
+
+@runtime_checkable
+class Tabular(Protocol):
+    """Protocol of outputs of other classes, which convert themselves to rows."""
+
+    def to_columns(self, rooms: Sequence[str]) -> Mapping[str, ArrayLike]:
+        """Return columns of equal length, by name.
+
+        Args:
+            rooms: The names of the home's rooms, in the order of their indices.
+        """
+
+
+class RoomDistribution:
+    """A probability for each room: weights divided by their sum (uniform if the sum is zero).
+
+    Attributes:
+        share: float64 (rooms,), sums to one.
+
+    Raises:
+        ComponentError: A weight is negative or not a number.
+
+    Example:
+        >>> RoomDistribution([3, 1, 0, 0]).share
+        array([0.75, 0.25, 0.  , 0.  ])
+    """
+
+    def __init__(self, weights: ArrayLike) -> None:
+        values = np.array(weights, dtype=np.float64)
+        if values.ndim != 1 or not len(values):
+            raise ComponentError(
+                f"a room distribution needs one weight per room, got shape {values.shape}"
+            )
+        if not (np.isfinite(values).all() and (values >= 0).all()):
+            raise ComponentError(
+                f"a room distribution needs finite weights of 0 or more, got {values}"
+            )
+        total = values.sum()
+        self.share: F64 = values / total if total > 0 else np.full(len(values), 1 / len(values))
+
+    def __repr__(self) -> str:
+        """Show the shares."""
+        return f"RoomDistribution({self.share.round(4).tolist()})"
+
+
+class Outputs(Mapping[str, Any]):
+    """The newest output of each algorithm: a read-only mapping by name.
+
+    Args:
+        newest: The outputs, by name.
+        known: The names of all algorithms, also of those without an output so far.
+
+    Example:
+        >>> outputs = Outputs({"ltp": 3}, ["ltp", "rtp"])
+        >>> outputs["ltp"], outputs.get("rtp"), "rtp" in outputs
+        (3, None, False)
+        >>> outputs["xyz"]
+        Traceback (most recent call last):
+        fleet2d.errors.ComponentError: there is no algorithm 'xyz'. There are: ltp, rtp
+    """
+
+    def __init__(self, newest: Mapping[str, Any], known: Iterable[str]) -> None:
+        self._newest, self._known = newest, tuple(known)
+
+    def __getitem__(self, name: str) -> Any:
+        """Return an output.
+
+        Raises:
+            ComponentError: There is no such algorithm, or it has no output so far.
+        """
+        if name in self._newest:
+            return self._newest[name]
+        if name in self._known:
+            raise ComponentError(
+                f"{name!r} has no output yet: use outputs.get({name!r}), which is None until then"
+            )
+        raise ComponentError(f"there is no algorithm {name!r}{suggest(name, self._known)}")
+
+    def get(self, name: str, default: Any = None) -> Any:
+        """Return an output, or `default` if there is none so far."""
+        return self._newest.get(name, default)
+
+    def __contains__(self, name: object) -> bool:
+        """Return whether an algorithm has an output so far."""
+        return name in self._newest
+
+    def __iter__(self) -> Iterator[str]:
+        """Iterate over the names of the algorithms with an output."""
+        return iter(self._newest)
+
+    def __len__(self) -> int:
+        """Return the number of outputs."""
+        return len(self._newest)
+
+
+def to_columns(output: Any, rooms: Sequence[str], where: str) -> dict[str, NDArray[Any]]:
+    """Return an output as columns of equal length: a distribution, one row, or arrays.
+
+    Args:
+        output: A RoomDistribution (columns room, share), HomeChanges (change, target), a mapping
+            of names to numbers or strings (one row), a mapping of names to arrays of one length,
+            or an object whose `to_columns` returns such a mapping.
+        rooms: The names of the rooms.
+        where: The component's path, for errors.
+
+    Raises:
+        ComponentError: The output is none of these, or holds a number that isn't finite.
+
+    Example:
+        >>> to_columns({"sightings": 3}, [], "algorithms.mine")
+        {'sightings': array([3])}
+    """
+    if isinstance(output, RoomDistribution):
+        if len(output.share) != len(rooms):
+            raise ComponentError(
+                f"{where} returned {len(output.share)} shares, but the home has {len(rooms)} rooms"
+            )
+        return {"room": np.array(rooms, dtype=object), "share": output.share}
+    if isinstance(output, HomeChanges):
+        return output.to_columns()
+    if not isinstance(output, Mapping) and isinstance(output, Tabular):
+        output = output.to_columns(rooms)
+    if not isinstance(output, Mapping) or not output:
+        raise ComponentError(
+            f"{where} returned {output!r}, expected a RoomDistribution, or a mapping of names to"
+            " numbers or to arrays of one length"
+        )
+    columns = {
+        str(name): _column(np.atleast_1d(np.asarray(value))) for name, value in output.items()
+    }
+    for name, values in columns.items():
+        _check_column(name, values, where)
+    lengths = {name: len(values) for name, values in columns.items()}
+    if len(set(lengths.values())) > 1:
+        raise ComponentError(f"{where} returned arrays of different lengths: {lengths}")
+    return columns
+
+
+def _check_column(name: str, values: NDArray[Any], where: str) -> None:
+    if name in RESERVED:
+        raise ComponentError(f"{where} returned {name!r}, a column that every table has: rename it")
+    if values.ndim != 1:
+        raise ComponentError(
+            f"{where} returned {name!r} of shape {values.shape}, expected a number or an array of"
+            " one dimension"
+        )
+    is_text = values.dtype.kind == "O" and all(
+        issubclass(cls, str) for cls in set(map(type, values.tolist()))
+    )
+    if values.dtype.kind not in "biuf" and not is_text:
+        example = values.tolist()[0] if values.dtype.kind == "O" else values.dtype
+        raise ComponentError(
+            f"{where} returned {name!r} with {example}, expected numbers or strings"
+        )
+    if values.dtype.kind == "f" and not np.isfinite(values).all():
+        raise ComponentError(f"{where} returned {name!r} with a value that is not finite: {values}")
+
+
+def _column(values: NDArray[Any]) -> NDArray[Any]:
+    return values.astype(object) if values.dtype.kind == "U" else values
 
 
 @dataclass(frozen=True)

@@ -1,22 +1,154 @@
-"""Evidence: what robots watched, and which users they perceived there, in bins of time."""
+"""Evidence: what robots watched, and where they perceived users, by rooms and by patches of rooms.
+
+Rows of observations are counted by user, bin and patch; with the share of each patch in view, these
+counts are what algorithms learn presence from.
+"""
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple, Self
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise
+from typing import NamedTuple, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fleet2d.algorithms.patches import Patches
+from fleet2d.algorithms.observations import NOWHERE, frozen
 from fleet2d.floorplan.cache import read_only
-from fleet2d.kernels import F64, I64, U8, Bool
+from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.kernels import F64, I16, I64, U8, Bool
 from fleet2d.kernels.presence import gather_views, list_sightings
+from fleet2d.kernels.space import label_triangles, rasterize_cells
+from fleet2d.runtime.clock import DAY_US, MICROSECOND, Clock, midnight_of
+
+# Side of a patch [m], approximately; larger where a room would have more than about MOST_PATCHES.
+SIDE_M = 1.0
+MOST_PATCHES = 12
+
+# Length of a bin [us]; one step where a step is longer.
+BIN_US = 60_000_000
+
+
+@dataclass(frozen=True)
+class Patches:
+    """The rooms of a floor plan, divided into patches.
+
+    Attributes:
+        of_cell: int16 (rows, columns), the patch of each cell; NOWHERE outside rooms.
+        room: int64 (patches,), ascending, the room of each patch; each room has at least one.
+        cells: int64 (patches,), number of cells of each patch.
+        island: int64 (rooms,), which island of the free space holds each room, where nothing joins
+            the islands; None: it is all one.
+    """
+
+    of_cell: I16
+    room: I64
+    cells: I64
+    island: I64 | None = None
+
+    @cached_property
+    def first(self) -> I64:
+        """The first patch of each room: int64 (rooms,)."""
+        return read_only(np.flatnonzero(np.diff(self.room, prepend=-1)))
+
+    @cached_property
+    def room_cells(self) -> I64:
+        """Number of cells of each room, at least 1: int64 (rooms,)."""
+        cells: I64 = np.maximum(np.add.reduceat(self.cells, self.first), 1)
+        return read_only(cells)
+
+
+def whole_rooms(plan: FloorPlan) -> Patches:
+    """Return each room as one patch."""
+    rooms, count = plan.room_of_cell, len(plan.rooms)
+    cells = np.bincount(rooms[rooms != NOWHERE], minlength=count)
+    return Patches(rooms, read_only(np.arange(count)), read_only(cells), islands(plan))
+
+
+def patches_of(plan: FloorPlan) -> Patches:
+    """Divide the bounding box of each room into equal boxes along both axes.
+
+    Example:
+        >>> import fleet2d
+        >>> plan = fleet2d.load_floorplan()
+        >>> patches = patches_of(plan)
+        >>> len(plan.rooms), len(patches.room), round(float(plan.rooms[2].area_m2))
+        (14, 122, 40)
+        >>> living = patches.room == 2
+        >>> int(living.sum()), bool(patches.cells[living].sum() == plan.rooms[2].cells)
+        (12, True)
+    """
+    rooms, count = plan.room_of_cell, len(plan.rooms)
+    row, column = np.nonzero(rooms != NOWHERE)
+    room = rooms[row, column].astype(np.int64)
+    total = np.bincount(room, minlength=count)
+    side = np.maximum(SIDE_M / plan.lattice.cell, np.sqrt(np.ceil(total / MOST_PATCHES)))
+    box_row, box_rows = _divide(row, room, side, count)
+    box_column, box_columns = _divide(column, room, side, count)
+    boxes = box_rows * box_columns
+    first = np.cumsum(boxes) - boxes
+    box = first[room] + box_row * box_columns[room] + box_column
+    cells = np.bincount(box, minlength=int(boxes.sum()))
+    is_patch = cells > 0
+    is_patch[first[total == 0]] = True
+    number = np.cumsum(is_patch) - 1
+    of_cell = np.full(rooms.shape, NOWHERE, np.int16)
+    of_cell[row, column] = number[box]
+    room = np.repeat(np.arange(count), boxes)[is_patch]
+    cells = read_only(cells[is_patch])
+    return Patches(read_only(of_cell), read_only(room), cells, islands(plan))
+
+
+def islands(plan: FloorPlan) -> I64 | None:
+    """Return the part of the free space that holds each room: int64 (rooms,).
+
+    Rooms with floor in the same part, and parts with floor in the same room, count as one. None if
+    the free space is in one part.
+
+    Example:
+        >>> import fleet2d
+        >>> print(islands(fleet2d.load_floorplan()))
+        None
+    """
+    if len(plan.polygons) == 1:
+        return None
+    triangle = rasterize_cells(plan.mesh, plan.lattice.rows, plan.lattice.columns)
+    part = np.where(triangle >= 0, label_triangles(plan.mesh.neighbors)[triangle], NOWHERE)
+    is_floor = (plan.room_of_cell != NOWHERE) & (part != NOWHERE)
+    pairs = np.unique(np.stack([plan.room_of_cell, part], axis=-1)[is_floor], axis=0)
+    island = np.arange(len(plan.rooms))
+    for number in np.unique(pairs[:, 1]):
+        rooms = pairs[pairs[:, 1] == number, 0]
+        island[np.isin(island, island[rooms])] = island[rooms].min()
+    return read_only(island)
+
+
+def _divide(place: I64, room: I64, side: F64, count: int) -> tuple[I64, I64]:
+    """Divide the extent of each room along one axis into equal parts.
+
+    Args:
+        place: int64 (cells,), row or column of each cell.
+        room: int64 (cells,), room of each cell.
+        side: float64 (rooms,), length of a part, approximately [cells].
+        count: Number of rooms.
+
+    Returns:
+        The part that each cell is in, int64 (cells,), and the number of parts, int64 (rooms,).
+    """
+    low, high = np.full(count, np.iinfo(np.int64).max), np.full(count, -1)
+    np.minimum.at(low, room, place)
+    np.maximum.at(high, room, place)
+    extent = np.maximum(high - low + 1, 1)
+    parts = np.maximum(1, np.rint(extent / side)).astype(np.int64)
+    part: I64 = (place - low[room]) * parts[room] // extent[room]
+    return part, parts
+
 
 # Length of a bin [us]; one step where a step is longer.
 BIN_US = 60_000_000
 
 
 class SightingCounts(NamedTuple):
-    """At how many steps of each bin users were perceived in each place, where that isn't 0.
+    """The steps of each bin at which users were perceived in each place, where that isn't 0.
 
     Attributes:
         user: int64 (n,), ascending, row of the user; the last row counts anybody.
@@ -31,6 +163,21 @@ class SightingCounts(NamedTuple):
     place: I64
     steps: I64
     shape: tuple[int, int, int]
+
+    @classmethod
+    def of_observations(
+        cls, step: I64, user: I64, place: I64, bin_steps: int, shape: tuple[int, int, int]
+    ) -> Self:
+        """Count observations; several of a user in a place at one step count once.
+
+        Args:
+            step: int64 (n,), ascending, step of each observation since the first bin began.
+            user: int64 (n,), row of the recognized user, below 0 if not recognized.
+            place: int64 (n,), where the user was perceived.
+            bin_steps: Steps of a bin.
+            shape: Numbers of bins, of users + 1, and of places.
+        """
+        return cls(*list_sightings(step, user, place, bin_steps, *shape), shape)
 
     @classmethod
     def of(cls, seen: I64) -> Self:
@@ -49,8 +196,6 @@ class SightingCounts(NamedTuple):
     @classmethod
     def joined(cls, parts: Sequence[Self]) -> Self:
         """Return the counts of consecutive bins as one."""
-        if len(parts) == 1:
-            return parts[0]
         first = np.cumsum([0, *(part.shape[0] for part in parts)]).tolist()
         user, place, steps = (
             np.concatenate([getattr(part, name) for part in parts])
@@ -83,15 +228,18 @@ class SightingCounts(NamedTuple):
     def unknown(self) -> Bool:
         """Whether somebody was perceived who wasn't recognized as a user: bool (bins, places).
 
-        True where somebody was perceived at more steps than all users were recognized, added up.
+        True where somebody was perceived at more steps than all users were recognized, added up;
+        nowhere without users, where everybody is the same person.
         """
         bins, users, places = self.shape
+        if users == 1:
+            return read_only(np.zeros((bins, places), np.bool_))
         signed = np.where(self.user == users - 1, self.steps, -self.steps)
         excess = np.bincount(self.bin * places + self.place, signed, bins * places)
         return read_only((excess > 0).reshape(bins, places))
 
 
-class Parts(NamedTuple):
+class PatchEvidence(NamedTuple):
     """Evidence by patches of rooms, each of which is mostly in view as a whole or not at all.
 
     Attributes:
@@ -100,18 +248,18 @@ class Parts(NamedTuple):
         watched: float64 (bins, patches), as in Evidence.
         shown: float64 (bins, patches), the largest share of each patch's cells in view at one step
             of the bin; with several robots, that of the robot that saw most of it.
+        shown_255: uint8 (bins, patches), `shown` times 255, rounded.
         sightings: Where users were perceived, by patches.
-        shown_parts: uint8 (bins, patches), `shown` times 255; None: not computed yet.
-        island: int64 (rooms,), which part of the home holds each room, where nothing joins the
-            parts; None: it has one part.
+        island: int64 (rooms,), which island of the home holds each room, where nothing joins the
+            islands; None: it is all one.
     """
 
     room: I64
     cells: I64
     watched: F64
     shown: F64
+    shown_255: U8
     sightings: SightingCounts
-    shown_parts: U8 | None = None
     island: I64 | None = None
 
     @property
@@ -120,32 +268,32 @@ class Parts(NamedTuple):
         return self.sightings.dense
 
 
-class Evidence(NamedTuple):
-    """What robots watched, and which users they perceived there, in bins of equal length.
+@dataclass(frozen=True)
+class Evidence:
+    """What robots watched, and where they perceived users, in bins of equal length.
 
     Looks at which nobody was perceived are evidence, too: they distinguish a user who is somewhere
     else from one in a room that no robot looked at.
 
     Attributes:
-        begin: First step of the first bin.
+        day: int64 (bins,), the day of each bin, as `date.toordinal` counts.
+        minute: int64 (bins,), begin of each bin [minutes since midnight].
         bin_steps: Steps of a bin; bins begin at step 0, and last a minute, or a step if that is
             longer.
         watched: float64 (bins, rooms), share of each room's cells in view, averaged over the steps
             of the bin; with several robots, that of the robot that saw most of the room.
         sightings: Where users were perceived, by rooms.
-        parts: The same by patches of rooms; None: each room is one patch.
-
-    Example:
-        >>> counts = SightingCounts.of(np.array([[[30, 0], [30, 0]]]))
-        >>> Evidence(0, 60, np.array([[0.5, 0.0]]), counts).seen.tolist()
-        [[[30, 0], [30, 0]]]
+        by_patch: The same by patches of rooms.
+        begin: First step of the first bin.
     """
 
-    begin: int
+    day: I64
+    minute: I64
     bin_steps: int
     watched: F64
     sightings: SightingCounts
-    parts: Parts | None = None
+    by_patch: PatchEvidence
+    begin: int
 
     @property
     def seen(self) -> I64:
@@ -159,6 +307,30 @@ class Evidence(NamedTuple):
         """Return the number of bins."""
         return len(self.watched)
 
+    def between(self, begin: int, end: int) -> Self:
+        """Return the evidence of the bins `begin` to `end` - 1."""
+        rows, patches = slice(begin, end), self.by_patch
+        return replace(
+            self,
+            day=self.day[rows],
+            minute=self.minute[rows],
+            watched=self.watched[rows],
+            sightings=self.sightings.between(begin, end),
+            by_patch=patches._replace(
+                watched=patches.watched[rows],
+                shown=patches.shown[rows],
+                shown_255=patches.shown_255[rows],
+                sightings=patches.sightings.between(begin, end),
+            ),
+            begin=self.begin + begin * self.bin_steps,
+        )
+
+    @property
+    def days(self) -> list[Self]:
+        """The evidence of each day."""
+        ends = [*(np.flatnonzero(np.diff(self.day)) + 1).tolist(), len(self)]
+        return [self.between(a, b) for a, b in pairwise([0, *ends]) if a < b]
+
 
 def steps_of_bin(step_us: int) -> int:
     """Return the number of steps of a bin.
@@ -170,58 +342,49 @@ def steps_of_bin(step_us: int) -> int:
     return max(1, BIN_US // step_us)
 
 
-class SightingRows(NamedTuple):
-    """Users that were perceived, in order of time; arrays of one length."""
-
-    step: I64
-    user: I64  # index of the recognized user, below 0 if not recognized
-    room: NDArray[np.integer[Any]]  # NOWHERE for none
-
-
 def gather(
-    first: int,
+    clock: Clock,
+    begin: int,
     bin_steps: int,
     patches: Patches,
     cells: I64,
-    sightings: SightingRows,
+    observed: tuple[I64, I64, I64],
     users: int,
 ) -> Evidence:
-    """Return the evidence of consecutive bins.
+    """Return the evidence of consecutive bins, with read-only arrays.
 
     Args:
-        first: First step of the first bin.
+        clock: The steps of the run.
+        begin: First step of the first bin.
         bin_steps: Steps of a bin.
         patches: The patches of the rooms.
         cells: int64 (bins, robots, 2, patches), number of cells of each patch in view of each
             robot: the sum over the steps of the bin, and the maximum.
-        sightings: Users that were perceived, with patches in place of rooms.
+        observed: The observations in order: step, row of the recognized user (below 0 if not
+            recognized), and patch, int64 (n,) each.
         users: Number of users.
     """
-    watched, by_patch, shown, shown_parts = gather_views(
+    watched, by_patch, shown, shown_255 = gather_views(
         cells, patches.room, patches.cells, patches.room_cells, bin_steps
     )
-    bins, in_room = len(cells), sightings._replace(room=patches.room[sightings.room])
-    parts = Parts(
-        patches.room,
-        patches.cells,
-        by_patch,
-        shown,
-        count_seen(sightings, first, bins, bin_steps, users, len(patches.room)),
-        shown_parts,
-        patches.island,
+    step, user, patch = observed
+    size = len(cells), users + 1
+    in_patches = SightingCounts.of_observations(
+        step - begin, user, patch, bin_steps, (*size, len(patches.room))
     )
-    in_rooms = count_seen(in_room, first, bins, bin_steps, users, len(patches.first))
-    return Evidence(first, bin_steps, watched, in_rooms, parts)
+    in_rooms = SightingCounts.of_observations(
+        step - begin, user, patches.room[patch], bin_steps, (*size, len(patches.first))
+    )
+    day, minute = times_of_bins(clock, begin, bin_steps, len(cells))
+    of_patches = PatchEvidence(
+        patches.room, patches.cells, by_patch, shown, shown_255, in_patches, patches.island
+    )
+    return Evidence(*frozen((day, minute, bin_steps, watched, in_rooms, of_patches, begin)))
 
 
-def count_seen(
-    sightings: SightingRows, begin: int, bins: int, bin_steps: int, users: int, rooms: int
-) -> SightingCounts:
-    """Count, per bin and room, the steps at which each user was perceived.
-
-    Several sightings of a user in a room in one step count once.
-    """
-    shape = (bins, users + 1, rooms)
-    user, room = sightings.user.astype(np.int64), sightings.room.astype(np.int64)
-    counts = list_sightings(sightings.step - begin, user, room, bin_steps, *shape)
-    return SightingCounts(*counts, shape)
+def times_of_bins(clock: Clock, begin: int, bin_steps: int, bins: int) -> tuple[I64, I64]:
+    """Return the day of each bin, as `date.toordinal` counts, and its begin [minutes]."""
+    since_midnight = (clock.start - midnight_of(clock.start)) // MICROSECOND
+    steps = begin + np.arange(bins, dtype=np.int64) * bin_steps
+    day, time_us = np.divmod(since_midnight + steps * clock.step_us, DAY_US)
+    return clock.start.toordinal() + day, time_us // 60_000_000

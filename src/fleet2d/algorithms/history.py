@@ -6,10 +6,9 @@ from functools import cached_property
 import numpy as np
 
 from fleet2d.algorithms.evidence import Evidence
-from fleet2d.algorithms.frozen import frozen
+from fleet2d.algorithms.log import BodyPoses
 from fleet2d.algorithms.log import Log as Log
-from fleet2d.algorithms.observations import Looks, Observations, Truth, truth
-from fleet2d.algorithms.poses import BodyPoses
+from fleet2d.algorithms.observations import Looks, Observations, Truth, frozen
 from fleet2d.errors import ComponentError
 from fleet2d.kernels import I32, I64, Bool
 from fleet2d.runtime.events import Event
@@ -82,7 +81,7 @@ class History:
     @cached_property
     def observations(self) -> Observations:
         """What the robots perceived."""
-        return self.log.perceived(self.first, self.end)
+        return self.log.observations(self.first, self.end)
 
     @cached_property
     def readings(self) -> Readings:
@@ -108,8 +107,7 @@ class History:
             ComponentError: The component is an algorithm.
         """
         self._check_metric("truth")
-        log = self.log
-        return frozen(truth(log.home.plan, log.seen(self.first, self.end).whole, log.activities))
+        return frozen(Truth.behind(self.observations))
 
     @cached_property
     def looks(self) -> Looks:
@@ -119,7 +117,7 @@ class History:
             ComponentError: The component is an algorithm.
         """
         self._check_metric("looks")
-        return frozen(self.log.looks(self.first, self.end, self.log.users))
+        return frozen(self.log.looks(self.first, self.end))
 
     @cached_property
     def exposure(self) -> I64:
@@ -143,7 +141,7 @@ class History:
                 whole number of minutes.
         """
         self._check_needs("evidence")
-        return frozen(self.log.evidence(self.first, self.end, self.log.users))
+        return self.log.evidence(self.first, self.end)
 
     def _check_needs(self, need: str) -> None:
         if need not in self.needs:

@@ -1,22 +1,211 @@
-"""The log of a run: motions, observations and events, as far back as components may look."""
+"""The log of a run: poses, observations and events, as far back as components may look."""
 
+from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Mapping, Sequence, Set
-from typing import NamedTuple, Protocol
+from functools import cached_property
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
-from fleet2d.algorithms.activities import Activities
-from fleet2d.algorithms.blocks import Blocks
-from fleet2d.algorithms.evidence import Evidence, SightingRows, gather
-from fleet2d.algorithms.observations import Looks, NearestRooms, Observations, Rows
-from fleet2d.algorithms.patches import Patches
-from fleet2d.algorithms.poses import BodyPoses, Path
+from fleet2d.algorithms.evidence import Evidence, Patches, gather
+from fleet2d.algorithms.observations import (
+    NOWHERE,
+    Activities,
+    Looks,
+    NearestRooms,
+    Observations,
+    frozen,
+)
 from fleet2d.errors import ComponentError
+from fleet2d.floorplan.cache import read_only
 from fleet2d.floorplan.home.home import Home
-from fleet2d.kernels import I64
-from fleet2d.kernels.motion import Window
+from fleet2d.kernels import F64, I16, I64, U8, Bool
+from fleet2d.kernels.motion import Poses, Window, count_together, rooms_at, sum_moves
+from fleet2d.kernels.numbers import in_radians
 from fleet2d.kernels.sight import SightingColumn as Column
+from fleet2d.runtime.clock import Clock
 from fleet2d.runtime.events import HOME, Event, EventKind
+
+
+class Blocks:
+    """Consecutive arrays, each for an interval of steps; only their first dimension differs.
+
+    Example:
+        >>> blocks = Blocks()
+        >>> blocks.append(0, 2, np.array([1, 2]))
+        >>> blocks.append(2, 5, np.array([3, 4, 5]))
+        >>> blocks.touching(1, 3)[0], blocks.touching(2, 4)[1].tolist()
+        (0, [3, 4, 5])
+        >>> blocks.forget(2)
+        >>> blocks.touching(0, 9)
+        (2, array([3, 4, 5]))
+    """
+
+    def __init__(self) -> None:
+        """Begin without blocks."""
+        self._begins: list[int] = []
+        self._ends: list[int] = []
+        self._rows: list[NDArray[Any]] = []
+
+    def append(self, begin: int, end: int, rows: NDArray[Any]) -> None:
+        """Append the rows of the stretch from `begin` up to before `end`, the latest so far."""
+        self._begins.append(begin)
+        self._ends.append(end)
+        self._rows.append(rows)
+
+    def touching(self, begin: int, end: int) -> tuple[int, NDArray[Any] | None]:
+        """Return all blocks that overlap a stretch of time, joined, and their begin."""
+        overlap = self._touching(begin, end)
+        blocks = self._rows[overlap]
+        if not blocks:
+            return begin, None
+        rows = blocks[0] if len(blocks) == 1 else np.concatenate(blocks)
+        return self._begins[overlap.start], rows
+
+    def each_touching(self, begin: int, end: int) -> list[NDArray[Any]]:
+        """Return each block that overlaps a stretch of time."""
+        return self._rows[self._touching(begin, end)]
+
+    def _touching(self, begin: int, end: int) -> slice:
+        return slice(bisect_right(self._ends, begin), bisect_left(self._begins, end))
+
+    def forget(self, before: int) -> None:
+        """Drop the blocks that end by `before`."""
+        past = slice(bisect_right(self._ends, before))
+        del self._begins[past], self._ends[past], self._rows[past]
+
+
+class Path(Protocol):
+    """Protocol of runs of equal pose of one body, such as `fleet2d.kernels.motion.Window`."""
+
+    @property
+    def first(self) -> int:
+        """The first step."""
+
+    @property
+    def end(self) -> int:
+        """One past the last step."""
+
+    @property
+    def step(self) -> I64:
+        """First step of each run."""
+
+    @property
+    def x(self) -> I64:
+        """Position along x of each run [lattice units]."""
+
+    @property
+    def y(self) -> I64:
+        """Position along y of each run [lattice units]."""
+
+    @property
+    def heading(self) -> I64:
+        """Heading of each run [1/4096 turn]."""
+
+    @property
+    def away(self) -> U8:
+        """Not 0 for runs away from home."""
+
+
+class BodyPoses:
+    """Poses of one body, one entry per step; columns are computed on demand."""
+
+    def __init__(self, home: Home, runs: Path) -> None:
+        self._home, self._runs = home, runs
+
+    def __len__(self) -> int:
+        """Return the number of steps."""
+        return self._runs.end - self._runs.first
+
+    @cached_property
+    def _lengths(self) -> I64:
+        """Number of steps of each run of equal pose."""
+        return np.diff(self._runs.step, append=self._runs.end)
+
+    @cached_property
+    def xy(self) -> F64:
+        """Positions: float64 (n, 2) [m]; while away, the place at which the body left."""
+        lattice = self._home.plan.lattice
+        xy = lattice.to_metres(np.stack([self._runs.x, self._runs.y], axis=-1))
+        return read_only(np.repeat(xy, self._lengths, axis=0))
+
+    def at(self, index: int) -> tuple[float, float]:
+        """Return the position (x, y) [m] at one step; -1 is the last."""
+        runs = self._runs
+        step = runs.first + range(len(self))[index]
+        run = int(np.searchsorted(runs.step, step, side="right")) - 1
+        x, y = self._home.plan.lattice.to_metres((runs.x[run], runs.y[run])).tolist()
+        return x, y
+
+    @property
+    def x(self) -> F64:
+        """Positions along x [m]."""
+        return self.xy[:, 0]
+
+    @property
+    def y(self) -> F64:
+        """Positions along y [m]."""
+        return self.xy[:, 1]
+
+    @cached_property
+    def heading(self) -> F64:
+        """Headings, counter-clockwise from +x, 0 to 2 pi [rad]."""
+        radians: F64 = in_radians(self._runs.heading)
+        return read_only(np.repeat(radians, self._lengths))
+
+    @cached_property
+    def away(self) -> Bool:
+        """Whether the body is away from home: bool (n,)."""
+        return read_only(np.repeat(self._runs.away.astype(bool), self._lengths))
+
+    @cached_property
+    def room(self) -> I16:
+        """Index of the room, NOWHERE while the body is away: int16 (n,)."""
+        return read_only(np.repeat(self._rooms, self._lengths))
+
+    @cached_property
+    def _rooms(self) -> I16:
+        """Index of the room of each run."""
+        runs = self._runs
+        room = rooms_at(self._home.plan.room_of_place, runs.x, runs.y)
+        return np.where(runs.away != 0, np.int16(NOWHERE), room)
+
+    @cached_property
+    def visits(self) -> tuple[I64, I64, I16]:
+        """Stretches of steps in one room: begin, end and room of each, each (stretches,).
+
+        Steps are counted from `first`; the room is NOWHERE while the body is away.
+        """
+        rooms = self._rooms
+        first = np.flatnonzero(np.append(True, rooms[1:] != rooms[:-1])[: len(rooms)])
+        begin = self._runs.step[first] - self._runs.first
+        return frozen((begin, np.append(begin, len(self))[1:], rooms[first]))
+
+    @cached_property
+    def time_in_rooms(self) -> I64:
+        """Number of steps in each room, and last away: int64 (rooms + 1,)."""
+        begin, end, room = self.visits
+        counts = np.zeros(len(self._home.rooms) + 1, np.int64)
+        np.add.at(counts, room, end - begin)  # NOWHERE is the last
+        return read_only(counts)
+
+    @cached_property
+    def steps_at_home(self) -> int:
+        """Number of steps at which the body isn't away."""
+        return int(self._lengths[self._runs.away == 0].sum())
+
+    def steps_together(self, other: "BodyPoses") -> int:
+        """Return the number of steps at which two bodies are in the same room."""
+        (begin, _, room), (other_begin, _, other_room) = self.visits, other.visits
+        return count_together(begin, room, other_begin, other_room, len(self))
+
+    @cached_property
+    def distance(self) -> float:
+        """Length of the way from the first to the last step [m]."""
+        runs = self._runs
+        moved = sum_moves(Poses(runs.x, runs.y, runs.heading, runs.away))
+        return moved / self._home.plan.lattice.units_per_m
 
 
 class SensorRow(NamedTuple):
@@ -39,19 +228,24 @@ class Log:
     """The motions and observations of a run, as far back as components may look."""
 
     def __init__(
-        self, home: Home, names: Sequence[str], motions: Motions, activities: Activities
+        self,
+        home: Home,
+        clock: Clock,
+        names: Sequence[str],
+        motions: Motions,
+        activities: Activities,
     ) -> None:
         """Begin an empty log.
 
         Args:
             home: The home.
+            clock: The steps of the run.
             names: Names of the bodies, users first.
             motions: The motions of the bodies.
             activities: What users do.
         """
-        self.home = home
+        self.home, self.clock = home, clock
         self.index = {name: row for row, name in enumerate(names)}
-        self.users = activities.users
         self.activities = activities
         self._motions = motions
         self._observations = Blocks()  # (n, OBSERVATION), by step
@@ -130,32 +324,31 @@ class Log:
                 int(rows[0, Column.STEP]), int(rows[-1, Column.STEP]) + 1, rows
             )
 
-    def seen(self, first: int, end: int) -> Rows:
-        """Return the rows of the observations of the steps from `first` to `end` - 1."""
+    def observations(self, first: int, end: int) -> Observations:
+        """Return the observations of the steps from `first` to `end` - 1."""
         blocks = self._observations.each_touching(first, end)
-        return Rows(
+        return Observations(
+            self.home.plan,
+            self._rooms,
             [
                 rows[slice(*np.searchsorted(rows[:, Column.STEP], (first, end)).tolist())]
                 for rows in blocks
-            ]
+            ],
+            self.activities,
         )
-
-    def perceived(self, first: int, end: int) -> Observations:
-        """Return the observations of the steps from `first` to `end` - 1."""
-        return Observations(self.home.plan, self._rooms, self.seen(first, end), self.activities)
 
     def count_looks(self, step: int, counts: Sequence[I64]) -> None:
         """Store how often each robot's cameras have looked and noticed before `step`."""
         if counts:
             self._looks[step] = np.concatenate(counts)
 
-    def looks(self, first: int, end: int, users: int) -> Looks:
+    def looks(self, first: int, end: int) -> Looks:
         """Return the looks in the steps from `first` to `end` - 1.
 
         Raises:
             ComponentError: No counts were stored at `first` or `end`.
         """
-        none = np.zeros((len(self.cameras), users, 2), np.int64)
+        none = np.zeros((len(self.cameras), self.activities.users, 2), np.int64)
         counts = _known_at(self._looks, end, none) - _known_at(self._looks, first, none)
         robots = np.array([robot for robot, _ in self.cameras], np.int32)
         names = tuple(name for _, name in self.cameras)
@@ -174,7 +367,7 @@ class Log:
         begin, self._next_bin = self._next_bin, self._next_bin + len(bins)
         self._bins.append(begin, self._next_bin, bins)
 
-    def evidence(self, first: int, end: int, users: int) -> Evidence:
+    def evidence(self, first: int, end: int) -> Evidence:
         """Return the evidence of the steps from `first` to `end` - 1.
 
         Raises:
@@ -192,10 +385,17 @@ class Log:
         bins = bins[begin - since : last - since]
         if self._nearest_patches is None:
             self._nearest_patches = NearestRooms(self.home.plan, self.patches.of_cell)
-        rows = self.seen(first, end)
-        patch = self._nearest_patches.of(rows.column(Column.X), rows.column(Column.Y))
-        sightings = SightingRows(rows.column(Column.STEP), rows.column(Column.IDENTITY), patch)
-        return gather(first, self.bin_steps, self.patches, bins, sightings, users)
+        seen = self.observations(first, end)
+        patch = seen.room_in(self._nearest_patches).astype(np.int64)
+        return gather(
+            self.clock,
+            first,
+            self.bin_steps,
+            self.patches,
+            bins,
+            (seen.step, seen.user.astype(np.int64), patch),
+            self.activities.users,
+        )
 
     def exposure(self, first: int, end: int) -> I64:
         """Return how much of each room each robot had in view in the steps `first` to `end` - 1.

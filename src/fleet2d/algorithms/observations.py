@@ -1,44 +1,150 @@
-"""Observations: what the robots perceived, and the truth behind it."""
+"""Observations: what robots perceived of people and their activities, and the truth behind it."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
+from numpy.typing import NDArray
 
-from fleet2d.algorithms.activities import ROBOT, Activities, Names
 from fleet2d.floorplan.cache import read_only
 from fleet2d.floorplan.plan import FloorPlan
-from fleet2d.kernels import F64, I8, I16, I32, I64
+from fleet2d.kernels import F64, I8, I16, I32, I64, U64
 from fleet2d.kernels.motion import rooms_at
 from fleet2d.kernels.numbers import in_radians
+from fleet2d.kernels.sight import ONE, random_shares
 from fleet2d.kernels.sight import SightingColumn as Column
 from fleet2d.kernels.space import fill_from_neighbors
 
+Names = NDArray[np.object_]  # str, or None where no activity is known
+
+# A row of observations is a row of the sight kernel, followed by the robot's index.
+ROBOT = len(Column)
+NOTHING = 0  # the code for no known activity
+
+
+@dataclass(frozen=True)
+class ActivitySense:
+    """How one camera perceives activities.
+
+    Attributes:
+        latency: Steps from a look to its observations.
+        keys: uint64 (users,), the key of the random stream of each user.
+        confusion: For each activity, the probabilities of being mistaken for others; None: this
+            camera perceives no activities.
+    """
+
+    latency: int
+    keys: U64
+    confusion: Mapping[str, Mapping[str, float]] | None
+
+
+class Activities:
+    """The activities of each user over time, and how the cameras of each robot perceive them.
+
+    Attributes:
+        are_perceived: Whether any camera perceives activities.
+
+    Example:
+        >>> sense = ActivitySense(0, np.array([7], np.uint64), {"cook": {"bake": 1.0}})
+        >>> activities = Activities(1, {(0, 0): sense})
+        >>> activities.begin(0, 10, "cook")
+        >>> rows = np.zeros((2, ROBOT + 1), np.int64)
+        >>> rows[:, Column.STEP] = 9, 10
+        >>> activities.true(rows).tolist(), activities.perceived(rows).tolist()
+        ([None, 'cook'], [None, 'bake'])
+    """
+
+    def __init__(self, users: int, senses: Mapping[tuple[int, int], ActivitySense]) -> None:
+        """Begin without activities; `senses` are by index of the robot and of its camera."""
+        self._senses = dict(senses)
+        self.are_perceived = any(sense.confusion is not None for sense in senses.values())
+        self._codes: dict[str | None, int] = {None: NOTHING}
+        self._begun: list[tuple[list[int], list[int]]] = [([], [NOTHING]) for _ in range(users)]
+
+    @property
+    def users(self) -> int:
+        """Number of users."""
+        return len(self._begun)
+
+    def begin(self, user: int, step: int, activity: str) -> None:
+        """Record the activity of a user from a step on; steps must not decrease."""
+        steps, codes = self._begun[user]
+        if not self.are_perceived:  # then only the present one is asked for
+            steps.clear()
+            codes.clear()
+        steps.append(step)
+        codes.append(self._code(activity))
+
+    def now(self, user: int) -> str | None:
+        """Return the activity that a user began last; None if none is known."""
+        return list(self._codes)[self._begun[user][1][-1]]
+
+    def true(self, rows: I64) -> Names:
+        """Return the true activity of the user of each row at its look: object (n,)."""
+        return self._names(self._codes_of(rows)[0])
+
+    def perceived(self, rows: I64) -> Names:
+        """Return the perceived activity of the user of each row: object (n,)."""
+        return self._names(self._codes_of(rows)[1])
+
+    def _code(self, activity: str) -> int:
+        return self._codes.setdefault(activity, len(self._codes))
+
+    def _names(self, codes: I64) -> Names:
+        return np.array(list(self._codes), object)[codes]
+
+    def _codes_of(self, rows: I64) -> tuple[I64, I64]:
+        """Return the codes of the true and of the perceived activities: int64 (n,) each."""
+        true, perceived = (np.full(len(rows), NOTHING, np.int64) for _ in range(2))
+        if not self.are_perceived:
+            return true, perceived
+        for (robot, camera), sense in self._senses.items():
+            is_camera = (rows[:, ROBOT] == robot) & (rows[:, Column.CAMERA] == camera)
+            for user, (steps, codes) in enumerate(self._begun):
+                index = np.flatnonzero(is_camera & (rows[:, Column.USER] == user))
+                looks = rows[index, Column.STEP] - sense.latency
+                position = np.searchsorted(np.array(steps, np.int64), looks, side="right")
+                true[index] = np.array(codes, np.int64)[position]
+                if sense.confusion is not None:
+                    draws = random_shares(sense.keys[user], looks)
+                    perceived[index] = self._confused(true[index], draws, sense.confusion)
+        return true, perceived
+
+    def _confused(self, true: I64, draws: I64, confusion: Mapping[str, Mapping[str, float]]) -> I64:
+        """Return the codes of perceived activities, by random draws [2**-31]."""
+        perceived = true.copy()
+        for activity, others in confusion.items():
+            ends = np.rint(np.cumsum(list(others.values())) * ONE).astype(np.int64)
+            outcomes = np.array([self._code(name) for name in (*others, activity)], np.int64)
+            index = np.flatnonzero(true == self._code(activity))
+            perceived[index] = outcomes[np.searchsorted(ends, draws[index], side="right")]
+        return perceived
+
+
 NOWHERE = -1  # the room of a body that is away
-NO_NAMES: Names = np.empty(0, object)
 OBSERVATION = ROBOT + 1  # number of columns of a row of observations
 
 
-class Rows:
-    """Rows of observations in consecutive blocks; columns are joined on demand."""
+def frozen(value: Any) -> Any:
+    """Return a value with read-only views in place of its arrays, in tuples of any depth.
 
-    def __init__(self, blocks: Sequence[I64]) -> None:
-        self._blocks = blocks or [np.empty((0, OBSERVATION), np.int64)]
+    Components share arrays, so none of them may change one.
 
-    def __len__(self) -> int:
-        """Return the number of rows."""
-        return sum(map(len, self._blocks))
-
-    def column(self, number: int) -> I64:
-        """Return a column of all rows: int64 (n,); of a single block it is a view."""
-        columns = [block[:, number] for block in self._blocks]
-        return columns[0] if len(columns) == 1 else np.concatenate(columns)
-
-    @cached_property
-    def whole(self) -> I64:
-        """All columns of all rows: int64 (n, OBSERVATION)."""
-        return np.concatenate(self._blocks) if len(self._blocks) > 1 else self._blocks[0]
+    Example:
+        >>> counts = np.zeros(3)
+        >>> frozen((counts, "x"))[0].flags.writeable, counts.flags.writeable
+        (False, True)
+    """
+    if isinstance(value, np.ndarray):
+        view = value.view()
+        view.setflags(write=False)
+        return view
+    if isinstance(value, tuple):
+        parts = map(frozen, value)
+        return type(value)(*parts) if hasattr(value, "_fields") else tuple(parts)
+    return value
 
 
 class Observations:
@@ -50,34 +156,56 @@ class Observations:
     """
 
     def __init__(
-        self, plan: FloorPlan, rooms: "NearestRooms", rows: Rows, activities: Activities
+        self,
+        plan: FloorPlan,
+        rooms: "NearestRooms",
+        blocks: Sequence[I64],
+        activities: Activities,
     ) -> None:
-        self._plan, self._rooms, self._rows, self._activities = plan, rooms, rows, activities
+        """Keep the rows.
+
+        Args:
+            plan: The floor plan.
+            rooms: The rooms of the plan.
+            blocks: Consecutive rows, int64 (n, OBSERVATION); columns are only joined on demand.
+            activities: What users do.
+        """
+        self._plan, self._rooms, self._activities = plan, rooms, activities
+        self._blocks = blocks or [np.empty((0, OBSERVATION), np.int64)]
 
     def __len__(self) -> int:
         """Return the number of observations."""
-        return len(self._rows)
+        return sum(map(len, self._blocks))
+
+    def _column(self, number: int) -> I64:
+        columns = [block[:, number] for block in self._blocks]
+        return columns[0] if len(columns) == 1 else np.concatenate(columns)
+
+    @cached_property
+    def _rows(self) -> I64:
+        """All columns of all rows: int64 (n, OBSERVATION)."""
+        return self._blocks[0] if len(self._blocks) == 1 else np.concatenate(self._blocks)
 
     @cached_property
     def step(self) -> I64:
         """Step at which the observation became known: int64 (n,)."""
-        return read_only(self._rows.column(Column.STEP))
+        return read_only(self._column(Column.STEP))
 
     @cached_property
     def robot(self) -> I32:
         """Index of the robot: int32 (n,)."""
-        return read_only(self._rows.column(ROBOT).astype(np.int32))
+        return read_only(self._column(ROBOT).astype(np.int32))
 
     @cached_property
     def user(self) -> I32:
         """Index of the recognized user, NOBODY if not recognized: int32 (n,)."""
-        return read_only(self._rows.column(Column.IDENTITY).astype(np.int32))
+        return read_only(self._column(Column.IDENTITY).astype(np.int32))
 
     @cached_property
     def _xy(self) -> F64:
         return read_only(
             self._plan.lattice.to_metres(
-                np.stack([self._rows.column(Column.X), self._rows.column(Column.Y)], 1)
+                np.stack([self._column(Column.X), self._column(Column.Y)], axis=1)
             )
         )
 
@@ -94,27 +222,31 @@ class Observations:
     @cached_property
     def room(self) -> I16:
         """Room of the perceived position, or the nearest room: int16 (n,)."""
-        return read_only(self._rooms.of(self._rows.column(Column.X), self._rows.column(Column.Y)))
+        return read_only(self.room_in(self._rooms))
+
+    def room_in(self, rooms: "NearestRooms") -> I16:
+        """Return the nearest of some rooms, or patches, to each perceived position: int16 (n,)."""
+        return rooms.of(self._column(Column.X), self._column(Column.Y))
 
     @cached_property
     def heading(self) -> F64:
         """Perceived heading [rad]: float64 (n,)."""
-        return read_only(in_radians(self._rows.column(Column.HEADING)))
+        return read_only(in_radians(self._column(Column.HEADING)))
 
     @cached_property
     def posture(self) -> I8:
         """Perceived posture, 0 stands, 1 sits, 2 lies: int8 (n,)."""
-        return read_only(self._rows.column(Column.POSTURE).astype(np.int8))
+        return read_only(self._column(Column.POSTURE).astype(np.int8))
 
     @cached_property
     def camera(self) -> I8:
         """Index among the robot's cameras: int8 (n,)."""
-        return read_only(self._rows.column(Column.CAMERA).astype(np.int8))
+        return read_only(self._column(Column.CAMERA).astype(np.int8))
 
     @cached_property
     def activity(self) -> Names:
         """Perceived activity; None where activities aren't perceived: object (n,)."""
-        return read_only(self._activities.perceived(self._rows.whole))
+        return read_only(self._activities.perceived(self._rows))
 
 
 class Truth(NamedTuple):
@@ -128,7 +260,21 @@ class Truth(NamedTuple):
     y: F64
     heading: F64  # [rad]
     posture: I8
-    activity: Names = NO_NAMES  # activity of the user; None where its behavior records none
+    activity: Names  # activity of the user; None where its behavior records none
+
+    @classmethod
+    def behind(cls, observations: Observations) -> Self:
+        """Return the truth behind observations."""
+        rows = observations._rows
+        xy = observations._plan.lattice.to_metres(rows[:, [Column.TRUE_X, Column.TRUE_Y]])
+        return cls(
+            rows[:, Column.USER].astype(np.int32),
+            xy[:, 0],
+            xy[:, 1],
+            in_radians(rows[:, Column.TRUE_HEADING]),
+            rows[:, Column.TRUE_POSTURE].astype(np.int8),
+            observations._activities.true(rows),
+        )
 
 
 class Looks(NamedTuple):
@@ -152,7 +298,7 @@ class NearestRooms:
                 None: its room.
         """
         self._plan = plan
-        self._rooms = None if of_cell is None else _shared(fill_from_neighbors(of_cell))
+        self._rooms = None if of_cell is None else read_only(fill_from_neighbors(of_cell))
 
     def of(self, x: I64, y: I64) -> I16:
         """Return the rooms of places [lattice units]; NOWHERE only in a home without rooms."""
@@ -161,26 +307,7 @@ class NearestRooms:
         rooms: I16 = rooms_at(self._rooms, x, y)
         while len(rooms) and rooms.min() == NOWHERE and self._plan.rooms:
             padded = np.pad(self._rooms, 1, constant_values=NOWHERE)
-            self._rooms = _shared(fill_from_neighbors(padded)[1:-1, 1:-1])
+            filled = fill_from_neighbors(padded)[1:-1, 1:-1]
+            self._rooms = read_only(np.ascontiguousarray(filled))
             rooms = rooms_at(self._rooms, x, y)
         return rooms
-
-
-def _shared(rooms: I16) -> I16:
-    """Return a map of rooms as a contiguous, read-only array."""
-    rooms = np.ascontiguousarray(rooms)
-    rooms.setflags(write=False)
-    return rooms
-
-
-def truth(plan: FloorPlan, rows: I64, activities: Activities) -> Truth:
-    """Return the truth behind rows of observations."""
-    xy = plan.lattice.to_metres(rows[:, [Column.TRUE_X, Column.TRUE_Y]])
-    return Truth(
-        rows[:, Column.USER].astype(np.int32),
-        xy[:, 0],
-        xy[:, 1],
-        in_radians(rows[:, Column.TRUE_HEADING]),
-        rows[:, Column.TRUE_POSTURE].astype(np.int8),
-        activities.true(rows),
-    )

@@ -186,7 +186,7 @@ def _check_reads(scenario: Scenario, actors: list[DecidingActor]) -> None:
 
 def _log(basis: Basis, cameras: list[Cameras], recorder: Recorder) -> Log:
     names = [actor.name for actor in basis.actors]
-    log = Log(basis.home, names, basis.bodies, recorder.activities)
+    log = Log(basis.home, basis.clock, names, basis.bodies, recorder.activities)
     log.cameras = [(group.index, name) for group in cameras for name in group.names]
     log.beliefs = {c.owner.name: c.drift.believed for c in cameras if c.drift is not None}
     return log

@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fleet2d.algorithms.activities import ROBOT
 from fleet2d.algorithms.log import Log
-from fleet2d.algorithms.observations import OBSERVATION
+from fleet2d.algorithms.observations import OBSERVATION, ROBOT
 from fleet2d.artifacts.store import RunStore
 from fleet2d.engine.bodies import Bodies
 from fleet2d.engine.gauges.block import Block

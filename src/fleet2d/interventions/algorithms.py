@@ -4,7 +4,7 @@ from typing import Any, ClassVar, Self
 
 from pydantic import Field, model_validator
 
-from fleet2d.algorithms.output import FROZEN, WITHHELD, RoomDistribution
+from fleet2d.algorithms.algorithm import FROZEN, WITHHELD, RoomDistribution
 from fleet2d.configuration.components import register
 from fleet2d.configuration.problems import problem, suggest
 from fleet2d.configuration.units import InputPath

@@ -7,7 +7,7 @@ import numpy as np
 
 from fleet2d.algorithms.algorithm import Present
 from fleet2d.algorithms.history import History
-from fleet2d.algorithms.poses import BodyPoses
+from fleet2d.algorithms.log import BodyPoses
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.kernels import F64, I64, Bool
 from fleet2d.kernels.sight import points_in_sight

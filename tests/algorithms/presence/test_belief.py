@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from fleet2d.algorithms.presence.belief import Presence, WeeklyPresence, slot_of_week
-from fleet2d.algorithms.presence.counts import DayCounts
+from fleet2d.algorithms.presence.estimator import DayCounts
 from fleet2d.errors import ComponentError
 
 NOON = datetime(2026, 1, 5, 12)

@@ -5,10 +5,17 @@ from datetime import timedelta
 import numpy as np
 import pytest
 from pydantic import ValidationError
-from tests.algorithms.presence.worlds import MONDAY, any_evidence, bins_of, pieces
+from tests.algorithms.presence.worlds import (
+    MONDAY,
+    SUNDAY_LATE,
+    any_evidence,
+    evidence_of,
+    patch_evidence,
+    pieces,
+)
 from tests.reference import presence as slow
 
-from fleet2d.algorithms.evidence import Evidence, Parts, SightingCounts
+from fleet2d.algorithms.evidence import Evidence
 from fleet2d.algorithms.presence.estimator import Estimator
 from fleet2d.algorithms.presence.exposure_ratio import AuditOnly, ExposureRatio
 from fleet2d.algorithms.presence.fremen import Fremen
@@ -77,7 +84,7 @@ def independent(bins: int, share: F64, seed: int) -> Evidence:
     watched[np.arange(bins), looks] = 1
     hit = (where == looks) & (random.random(bins) < 0.95)
     seen[hit, :, looks[hit]] = 1
-    return Evidence(0, 1, watched, SightingCounts.of(seen))
+    return evidence_of(watched, seen)
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -85,14 +92,14 @@ def test_exposure_ratio_estimates_the_truth_from_independent_looks(seed: int) ->
     """Counts are binomial; each ratio is within 4.5 standard errors but once in 150,000 times."""
     truth = np.array([0.4, 0.2, 0.15, 0.05, 0.2])
     collected = independent(40_000, truth, seed)
-    presence = learned(ExposureRatio(), bins_of(collected), rooms=4, users=1, length=1440)
+    presence = learned(ExposureRatio(), collected, rooms=4, users=1, length=1440)
     looks = collected.watched.sum(axis=0)
     chance = truth[:4] * 0.95
     error = 4.5 * np.sqrt(chance * (1 - chance) / looks)
     ratios = presence.with_away("u0")[:4] * 0.95
     assert (np.abs(ratios - chance) < error + 2 / looks).all()  # and the bin beforehand
     # The share of sightings is off by what rooms are watched.
-    naive = learned(SightingShare(), bins_of(collected), rooms=4, users=1, length=1440)
+    naive = learned(SightingShare(), collected, rooms=4, users=1, length=1440)
     assert np.abs(naive.share("u0") - truth[:4] / 0.8).max() > 0.1
 
 
@@ -108,21 +115,19 @@ def test_exposure_ratio_by_patches_finds_a_user_who_stays_in_a_corner() -> None:
     shown = np.eye(4)[looks][:, :3] * 1.0
     seen = np.repeat((np.eye(3)[where] * shown)[:, None], 2, axis=1).astype(np.int64)
     room, first = np.array([0, 0, 1]), [0, 2]
-    parts = Parts(room, np.array([5, 5, 10]), shown, shown, SightingCounts.of(seen))
-    by_room = np.add.reduceat(shown * parts.cells, first, axis=1) / 10
-    in_rooms = SightingCounts.of(np.add.reduceat(seen, first, axis=2))
-    collected = Evidence(0, 1, by_room, in_rooms, parts)
-    presence = learned(
-        ExposureRatio(detection=1.0), bins_of(collected), rooms=2, users=1, length=9999
-    )
+    by_patch = patch_evidence(room, np.array([5, 5, 10]), shown, seen)
+    by_room = np.add.reduceat(shown * by_patch.cells, first, axis=1) / 10
+    in_rooms = np.add.reduceat(seen, first, axis=2)
+    collected = evidence_of(by_room, in_rooms, by_patch=by_patch)
+    presence = learned(ExposureRatio(detection=1.0), collected, rooms=2, users=1, length=9999)
     assert [0.6, 0.4] == pytest.approx(presence.share("u0").tolist(), abs=0.03)
-    blind = bins_of(collected)._replace(by_patch=None)
+    blind = evidence_of(by_room, in_rooms)
     assert learned(ExposureRatio(), blind, rooms=2, users=1, length=9999).share("u0")[0] < 0.4
 
 
 @pytest.mark.parametrize("cls", ALL)
 def test_without_any_evidence_all_rooms_are_alike_and_nobody_is_away(cls: type[Estimator]) -> None:
-    none = any_evidence(1).part(0, 0)
+    none = any_evidence(1).between(0, 0)
     result = learned(cls(), none)
     for user in ("u0", "u1", "anyone"):
         assert [1 / 3] * 3 == pytest.approx(result.share(user).tolist())
@@ -136,7 +141,7 @@ def test_a_user_never_seen_has_a_distribution_and_an_only_room_has_all(
     bins = any_evidence(2, bins=60, rooms=1)
     seen = bins.seen.copy()
     seen[:, 0] = 0
-    bins = bins._replace(sightings=SightingCounts.of(seen))
+    bins = evidence_of(bins.watched, seen, SUNDAY_LATE, bins.bin_steps)
     result = learned(cls(), bins, rooms=1)
     for user in result.names:
         assert [1.0] == result.share(user).tolist()
@@ -192,7 +197,7 @@ def test_old_evidence_fades_with_the_half_life(cls: type[Estimator]) -> None:
     for half_life in (None, 1.0):
         estimator = cls()
         estimator.begin(2, 1, half_life)
-        for part in pieces(bins_of(Evidence(0, 1, watched, SightingCounts.of(seen))), 720):
+        for part in pieces(evidence_of(watched, seen), 720):
             estimator.observe(part)
         shares.append(estimator.presence(["u0"], MONDAY).share("u0")[1])
     assert 2 / 12 == pytest.approx(shares[0], abs=0.08)
@@ -203,7 +208,7 @@ def test_old_evidence_fades_with_the_half_life(cls: type[Estimator]) -> None:
 def test_intervals_contain_the_estimate_and_need_two_whole_days(cls: type[Estimator]) -> None:
     estimator = cls()
     estimator.begin(4, 1)
-    collected = bins_of(independent(6 * 1440, np.array([0.4, 0.2, 0.15, 0.05, 0.2]), 1))
+    collected = independent(6 * 1440, np.array([0.4, 0.2, 0.15, 0.05, 0.2]), 1)
     parts = pieces(collected, 1440)
     for part in parts[:2]:
         estimator.observe(part)
@@ -234,7 +239,7 @@ def test_intervals_cover_the_truth_about_as_often_as_stated() -> None:
     for seed in range(30):
         estimator = ExposureRatio()
         estimator.begin(4, 1)
-        estimator.observe(bins_of(independent(12 * 1440, truth, seed)))
+        estimator.observe(independent(12 * 1440, truth, seed))
         low, high = estimator.interval(np.uint64(seed), 0.8)
         covered += ((low[0, :4] <= truth[:4] / 0.8) & (truth[:4] / 0.8 <= high[0, :4])).sum()
     assert 0.63 < covered / 120 < 0.92

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from tests.algorithms.presence.worlds import DAY, MONDAY, bins_of, pieces
+from tests.algorithms.presence.worlds import DAY, MONDAY, evidence_of, pieces
 from tests.reference import presence as slow
 
-from fleet2d.algorithms.evidence import Evidence, SightingCounts
+from fleet2d.algorithms.evidence import Evidence
 from fleet2d.algorithms.presence.fremen import Fremen
 
 
@@ -22,7 +22,7 @@ def rhythmic(days: int, seed: int) -> Evidence:
     watched[np.arange(bins), looks] = part
     hit = (where == looks) & (random.random(bins) < part)
     seen[hit, :, looks[hit]] = 1
-    return Evidence(0, 1, watched, SightingCounts.of(seen))
+    return evidence_of(watched, seen)
 
 
 @pytest.mark.parametrize("days", [1, 4])
@@ -31,13 +31,13 @@ def test_forecasts_equal_the_definition(days: int) -> None:
     # With weights as published: in view as a whole or not at all.
     collected.watched[:] = collected.watched > 0
     last = 1  # of the next day, which ends the days before
-    extra = Evidence(
-        0, 1, np.concatenate([collected.watched, collected.watched[:last]]),
-        SightingCounts.of(np.concatenate([collected.seen, collected.seen[:last]])),
-    )  # fmt: skip
+    extra = evidence_of(
+        np.concatenate([collected.watched, collected.watched[:last]]),
+        np.concatenate([collected.seen, collected.seen[:last]]),
+    )
     estimator = Fremen()
     estimator.begin(3, 1)
-    for part in pieces(bins_of(extra), 360):
+    for part in pieces(extra, 360):
         estimator.observe(part)
     minutes = np.array([777, 9999])
     by_order = estimator._by_order(minutes)
@@ -53,7 +53,7 @@ def test_forecasts_equal_the_definition(days: int) -> None:
 def test_a_daily_rhythm_is_detected_and_its_order_chosen() -> None:
     estimator = Fremen()
     estimator.begin(3, 1)
-    for part in pieces(bins_of(rhythmic(9, 1))):
+    for part in pieces(rhythmic(9, 1)):
         estimator.observe(part)
     week = estimator.presence(["u0"], MONDAY).by_hour_of_week("u0")
     assert week[[9, 12, 18, 36, 100 + 8], 0].min() > 0.6
@@ -66,7 +66,7 @@ def test_a_daily_rhythm_is_detected_and_its_order_chosen() -> None:
 def test_before_a_day_is_over_all_rooms_are_alike() -> None:
     estimator = Fremen()
     estimator.begin(3, 1)
-    estimator.observe(bins_of(rhythmic(1, 2)).part(0, 600))
+    estimator.observe(rhythmic(1, 2).between(0, 600))
     presence = estimator.presence(["u0"], MONDAY)
     assert [1 / 3] * 3 == presence.share("u0").tolist()
     assert 0.0 == presence.away("u0")

@@ -1,5 +1,7 @@
 """The likelihood estimator: against the truth that people were drawn from, under each robot."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from tests.algorithms.presence.worlds import (
@@ -7,8 +9,8 @@ from tests.algorithms.presence.worlds import (
     DETECTION,
     MONDAY,
     any_evidence,
-    bins_of,
     evidence,
+    evidence_of,
     follow,
     hangout,
     patrol,
@@ -19,10 +21,10 @@ from tests.algorithms.presence.worlds import (
 )
 
 from fleet2d.algorithms.evidence import Evidence, SightingCounts
-from fleet2d.algorithms.presence.anyone import unknown_seen, with_anyone
-from fleet2d.algorithms.presence.counts import Bins, joined
+from fleet2d.algorithms.presence.belief import with_anyone
 from fleet2d.algorithms.presence.exposure_ratio import AuditOnly, ExposureRatio
 from fleet2d.algorithms.presence.likelihood import Likelihood
+from fleet2d.algorithms.presence.people import DayEvidence
 from fleet2d.algorithms.presence.sighting_share import SightingShare
 from fleet2d.kernels import F64, I64
 from fleet2d.metrics.presence.distances import total_variation
@@ -40,13 +42,13 @@ def test_observations_of_no_user_are_unknown() -> None:
     bins = any_evidence(10, users=1)
     seen = np.zeros_like(bins.seen)
     seen[3, 1, 2] = 6
-    bins = bins._replace(sightings=SightingCounts.of(seen))
-    assert [[3, 2]] == np.argwhere(unknown_seen(bins)).tolist()
+    bins = replace(bins, sightings=SightingCounts.of(seen))
+    assert [[3, 2]] == np.argwhere(bins.sightings.unknown).tolist()
 
 
 def learn(estimator, collected, rooms: int, users: int = 1):
     estimator.begin(rooms, users)
-    for part in pieces(bins_of(collected), 240):
+    for part in pieces(collected, 240):
         estimator.observe(part)
     return estimator.presence([f"u{i}" for i in range(users)], MONDAY)
 
@@ -140,12 +142,11 @@ def test_independent_patrol_is_fair_to_all() -> None:
             assert total_variation(truth, learn(estimator, collected, 5).share("u0")) < 0.08
 
 
-def test_pieces_of_evidence_join_to_the_whole() -> None:
-    bins = any_evidence(11)
-    whole = joined(pieces(bins, 7))
+def test_pieces_of_a_day_join_to_the_whole() -> None:
+    day = any_evidence(11).days[1]
+    whole = DayEvidence.joined([DayEvidence.of(piece) for piece in pieces(day, 7)])
     columns = [
-        [*each[:4], *each.sightings, *each.parts[:4], *each.parts.sightings, each.parts.seen]
-        for each in (bins, whole)
+        [*each[:-1], *each.sightings, each.sightings.dense] for each in (DayEvidence.of(day), whole)
     ]
     for one, other in zip(*columns, strict=True):
         assert np.array_equal(one, other)
@@ -176,16 +177,16 @@ def two_of_four(t: int, at: int, sees: bool, sightings: I64, random: np.random.G
     return int(random.integers(2)) if t % 10 == 0 else at
 
 
-def with_islands(bins: Bins, island: list[int]) -> Bins:
+def with_islands(bins: Evidence, island: list[int]) -> Evidence:
     """The same evidence in a home whose rooms are in these parts."""
-    return bins._replace(by_patch=bins.parts._replace(island=np.array(island)))
+    return replace(bins, by_patch=bins.by_patch._replace(island=np.array(island)))
 
 
 def a_week_of_two_rooms(seed: int, island: list[int] | None) -> tuple[Likelihood, F64, float]:
     """Learn of a person who uses two rooms of four; return also the truth, and the error."""
     where = person(7 * DAY, 2, seed)
     where[where == 2] = 4
-    bins, estimator = bins_of(evidence(where, 4, two_of_four, seed)), Likelihood()
+    bins, estimator = evidence(where, 4, two_of_four, seed), Likelihood()
     estimator.begin(4, 1)
     for part in pieces(bins if island is None else with_islands(bins, island), 240):
         estimator.observe(part)
@@ -223,7 +224,7 @@ def test_a_part_of_the_home_counts_from_when_a_robot_looks_into_it() -> None:
     where = np.repeat([0, 2], 2 * DAY)
     watched = np.eye(4)[where]
     seen = np.repeat((watched > 0).astype(np.int64)[:, None], 2, axis=1)
-    bins = with_islands(bins_of(Evidence(0, 1, watched, SightingCounts.of(seen))), [0, 0, 2, 2])
+    bins = with_islands(evidence_of(watched, seen), [0, 0, 2, 2])
     estimator = Likelihood()
     estimator.begin(4, 1)
     for part in pieces(bins, 360):

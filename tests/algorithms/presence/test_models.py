@@ -7,15 +7,16 @@ import pytest
 from tests.algorithms.presence.worlds import (
     DAY,
     MONDAY,
+    SUNDAY_LATE,
     any_evidence,
-    bins_of,
     evidence,
+    evidence_of,
     patrol,
     person,
     pieces,
 )
 
-from fleet2d.algorithms.evidence import Evidence, SightingCounts
+from fleet2d.algorithms.evidence import Evidence
 from fleet2d.algorithms.presence.belief import BeliefSeries, Presence
 from fleet2d.algorithms.presence.chain_model import (
     Filter,
@@ -24,7 +25,6 @@ from fleet2d.algorithms.presence.chain_model import (
     SemiMarkov,
     steps_of,
 )
-from fleet2d.algorithms.presence.counts import Bins
 from fleet2d.algorithms.presence.exposure_ratio import ExposureRatio
 from fleet2d.algorithms.presence.model import HourOfWeek, LastSeen, LongTerm, Model
 from fleet2d.configuration.components import components
@@ -35,7 +35,7 @@ ALL = list(components("presence_model").values())
 MINUTE = 60_000_000
 
 
-def followed(model: Model, bins: Bins, rooms: int, users: int, length: int = 60) -> Presence:
+def followed(model: Model, bins: Evidence, rooms: int, users: int, length: int = 60) -> Presence:
     """What a model believes at the end; its track is of all bins."""
     model.begin(rooms, users, MONDAY.toordinal())
     beliefs = [model.observe(part) for part in pieces(bins, length)]
@@ -59,11 +59,12 @@ def test_the_future_changes_nothing(cls: type[Model]) -> None:
     """What is believed of a bin is the same whatever comes behind its update."""
     bins = any_evidence(2, bins=120)
     other = any_evidence(3, bins=120)
-    mixed = Bins(
-        bins.day, bins.minute, bins.bin_steps,
+    mixed = evidence_of(
         np.concatenate([bins.watched[:60], other.watched[60:]]),
-        SightingCounts.of(np.concatenate([bins.seen[:60], other.seen[60:]])),
-    )  # fmt: skip
+        np.concatenate([bins.seen[:60], other.seen[60:]]),
+        SUNDAY_LATE,
+        bins.bin_steps,
+    )
     one, two = (followed(cls(), b, 3, 2).track for b in (bins, mixed))
     assert np.array_equal(one.home[:60], two.home[:60])
     if cls in (LastSeen, *CHAINS):  # bin by bin, too
@@ -99,7 +100,7 @@ def test_long_term_is_the_estimate_before_the_update() -> None:
 
 
 def test_hour_of_week_distinguishes_hours() -> None:
-    bins = bins_of(evidence(person(3 * DAY, 3, 5), 3, patrol, 5))
+    bins = evidence(person(3 * DAY, 3, 5), 3, patrol, 5)
     model = HourOfWeek(estimator=ExposureRatio(), smoothing=1)
     now = followed(model, bins, 3, 1)
     week = model.estimator.weekly(["u0"], MONDAY, 1)
@@ -112,26 +113,25 @@ def test_markov_decay_is_the_row_of_the_power_since_the_last_sighting() -> None:
     watched, seen = np.ones((40, 3)), np.zeros((40, 2, 3), np.int64)
     seen[4, :, 1] = 1
     model = MarkovDecay()
-    track = followed(model, bins_of(Evidence(0, 1, watched, SightingCounts.of(seen))), 3, 1).track
+    track = followed(model, evidence_of(watched, seen), 3, 1).track
     steps = steps_of(model.learner.people.model_of(0))
     for t in (4, 5, 20, 39):
         power = np.linalg.matrix_power(steps, t - 4)[1]
         belief = np.append(track.home[t, 0] * (1 - track.away[t, 0]), track.away[t, 0])
         assert np.abs(belief - power).max() < 5e-3  # a false alarm is possible, too
     # Three rooms in view in vain: the filter knows that the user is out.
-    filtered = followed(
-        Filter(), bins_of(Evidence(0, 1, watched, SightingCounts.of(seen))), 3, 1
-    ).track
+    filtered = followed(Filter(), evidence_of(watched, seen), 3, 1).track
     assert filtered.away[39, 0] > 0.9 > 0.4 > track.away[39, 0]
 
 
 @pytest.mark.parametrize("cls", CHAINS)
 def test_a_forecast_equals_filtering_without_evidence(cls: type[Model]) -> None:
     bins = any_evidence(6, bins=60, users=1)
-    after = bins.part(30, 60)
-    blind = Bins(after.day, after.minute, 6, after.watched * 0, SightingCounts.of(after.seen * 0))
+    after = bins.between(30, 60)
+    start = SUNDAY_LATE + timedelta(minutes=30)
+    blind = evidence_of(after.watched * 0, after.seen * 0, start, 6)
     model = cls()
-    now = followed(model, bins.part(0, 30), 3, 1)
+    now = followed(model, bins.between(0, 30), 3, 1)
     home, away = model.observe(blind)
     for k in (1, 7, 30):
         later = now.at(MONDAY + timedelta(minutes=k))
@@ -145,12 +145,12 @@ def test_a_forecast_equals_filtering_without_evidence(cls: type[Model]) -> None:
 
 
 def test_a_forecast_does_not_change_with_later_evidence() -> None:
-    bins = bins_of(evidence(person(DAY + 60, 3, 7), 3, patrol, 7))
+    bins = evidence(person(DAY + 60, 3, 7), 3, patrol, 7)
     model = Filter()
-    now = followed(model, bins.part(0, DAY), 3, 1)
+    now = followed(model, bins.between(0, DAY), 3, 1)
     soon = datetime(2026, 1, 5, 1)
     before = now.at(soon).with_away("u0")
-    model.observe(bins.part(DAY, DAY + 60))  # learns from the day before
+    model.observe(bins.between(DAY, DAY + 60))  # learns from the day before
     assert before.tolist() == now.at(soon).with_away("u0").tolist()
 
 
@@ -159,7 +159,7 @@ def test_each_rung_of_the_ladder_is_better_than_the_one_below() -> None:
     scores = {cls: [] for cls in (LastSeen, LongTerm, MarkovDecay, Filter)}
     for seed in range(3):
         where = person(20 * DAY, 5, seed)
-        bins = bins_of(evidence(where, 5, patrol, seed))
+        bins = evidence(where, 5, patrol, seed)
         for cls, values in scores.items():
             track = followed(cls(), bins, 5, 1, length=360).track
             home, away = track.home[10 * DAY :, 0], track.away[10 * DAY :, 0]
@@ -178,7 +178,7 @@ def test_learning_continues_from_a_learned_state(cls: type[Model]) -> None:
     followed(one, bins, 3, 2)
     other.begin(3, 2, MONDAY.toordinal())
     other.recall(one.remember())
-    home, _ = other.observe(any_evidence(9).part(20, 21))
+    home, _ = other.observe(any_evidence(9).between(20, 21))
     assert np.abs(home.sum(axis=2) - 1).max() < 1e-9
     if cls in CHAINS:
         for part, same in zip(one.learner.people.model, other.learner.people.model, strict=True):
@@ -202,7 +202,7 @@ def test_models_with_hours_are_better_for_people_with_regular_hours() -> None:
     scores = {cls: [] for cls in (SemiMarkov, RoutineModel)}
     for seed in range(2):
         where = sleeper(20, seed)
-        bins = bins_of(evidence(where, 3, patrol, seed))
+        bins = evidence(where, 3, patrol, seed)
         for cls, values in scores.items():
             track = followed(cls(), bins, 3, 1).track
             home, away = track.home[10 * DAY :, 0], track.away[10 * DAY :, 0]
@@ -213,7 +213,7 @@ def test_models_with_hours_are_better_for_people_with_regular_hours() -> None:
 
 def test_a_forecast_of_the_routine_uses_the_hours_until_then() -> None:
     where = sleeper(8, 3)
-    now = followed(RoutineModel(), bins_of(evidence(where, 3, patrol, 3)), 3, 1)
+    now = followed(RoutineModel(), evidence(where, 3, patrol, 3), 3, 1)
     night = now.at(MONDAY + timedelta(hours=3)).with_away("u0")
     noon = now.at(MONDAY + timedelta(hours=13)).with_away("u0")
     assert night[0] > 0.6 > 0.4 > noon[0]

@@ -1,20 +1,21 @@
 """What is learned of a person: expected counts against those of all paths, and the model from them."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
-from tests.algorithms.presence.worlds import MONDAY
+from tests.algorithms.presence.worlds import MONDAY, evidence_of, patch_evidence
 from tests.kernels.test_presence_stays import PATCHES, PLACES, ROOM, by_state, case, twin
 
-from fleet2d.algorithms.evidence import Evidence, Parts, SightingCounts
-from fleet2d.algorithms.presence.counts import Bins, in_time
-from fleet2d.algorithms.presence.day_evidence import DayEvidence, distinct
+from fleet2d.algorithms.evidence import Evidence, SightingCounts
 from fleet2d.algorithms.presence.people import (
     STAY,
+    DayEvidence,
     People,
     Prior,
     StateLayout,
+    distinct,
     model_of,
 )
 from fleet2d.kernels.presence import Moments, Stretches, merge_bins, smooth
@@ -86,17 +87,17 @@ def test_transitions_are_counts_by_time_plus_one_prior_event() -> None:
     assert 10 / 1000 == pytest.approx(model.restless[0])
 
 
-def bins_of(shown: Any, seen: Any, start: int = 0) -> Bins:
+def bins_of(shown: Any, seen: Any, start: int = 0) -> Evidence:
     """One user's evidence of two rooms, the first of two patches; bins of a minute of 10 steps."""
     shown, seen = np.array(shown, float), np.repeat(np.array(seen)[:, None], 2, axis=1)
     room = np.array([0, 0, 1])
     by_room = np.stack([shown[:, :2].mean(axis=1), shown[:, 2]], axis=1)
-    parts = Parts(room, np.array([4, 4, 8]), shown, shown, SightingCounts.of(seen))
-    in_rooms = SightingCounts.of(np.stack([seen[..., :2].sum(axis=-1), seen[..., 2]], axis=-1))
-    return in_time(Evidence(start * 10, 10, by_room, in_rooms, parts), MONDAY, 6_000_000)
+    by_patch = patch_evidence(room, np.array([4, 4, 8]), shown, seen)
+    in_rooms = np.stack([seen[..., :2].sum(axis=-1), seen[..., 2]], axis=-1)
+    return evidence_of(by_room, in_rooms, MONDAY, 10, by_patch, begin=start * 10)
 
 
-def stretches_of(bins: Bins, longest: int) -> Stretches:
+def stretches_of(bins: Evidence, longest: int) -> Stretches:
     return DayEvidence.of(bins).stretches(0, longest)
 
 
@@ -115,9 +116,8 @@ def test_equal_bins_are_merged_within_an_hour() -> None:
 
 def test_where_somebody_unknown_was_seen_nothing_is_watched_in_vain() -> None:
     bins = bins_of([[1, 1, 1]], [[0, 0, 0]])
-    assert bins.by_patch is not None
     seen = np.array([[[0, 0, 0], [0, 0, 4]]])  # anybody, but not the user
-    bins = bins._replace(by_patch=bins.by_patch._replace(sightings=SightingCounts.of(seen)))
+    bins = replace(bins, by_patch=bins.by_patch._replace(sightings=SightingCounts.of(seen)))
     assert [255, 255, 0, 0] == stretches_of(bins, longest=1).shown[0].tolist()
 
 
@@ -142,7 +142,7 @@ def test_revisited_days_count_once() -> None:
     seen = (np.eye(3)[looks] * (random.random((3 * 1440, 1)) < 0.3) * 5).astype(int)
     bins = bins_of(shown, seen)
     people = People(StateLayout.of(bins, 2), PRIOR, 1, longest=1)
-    days = [DayEvidence.of(bins.part(day * 1440, (day + 1) * 1440)) for day in range(3)]
+    days = [DayEvidence.of(bins.between(day * 1440, (day + 1) * 1440)) for day in range(3)]
     for day in days:
         people.end_day(day)
     for _ in range(20):
@@ -155,17 +155,16 @@ def test_revisited_days_count_once() -> None:
     assert 3 * 1440 == pytest.approx(people.total.time.sum(), rel=1e-9)
 
 
-def crowd_of(count: int, bins: int, seed: int) -> Bins:
+def crowd_of(count: int, bins: int, seed: int) -> Evidence:
     """Evidence of several users of two rooms, most of whom are hardly ever seen."""
     random = np.random.default_rng(seed)
     shown = random.choice([0, 0, 0.4, 1], (bins // 4 + 1, 3)).repeat(4, axis=0)[:bins]
     seen = np.where(random.random((bins, count + 1, 3)) < 0.02, random.integers(1, 9), 0)
     seen[:, -1] = seen.max(axis=1)
     base = bins_of(shown, seen[:, 0])
-    assert base.by_patch is not None
     by_patch = base.by_patch._replace(sightings=SightingCounts.of(seen))
     in_rooms = np.stack([seen[..., :2].max(axis=-1), seen[..., 2]], axis=-1)
-    return base._replace(by_patch=by_patch, sightings=SightingCounts.of(in_rooms))
+    return replace(base, by_patch=by_patch, sightings=SightingCounts.of(in_rooms))
 
 
 @pytest.mark.parametrize("count", [1, 3, 4, 13])
@@ -179,10 +178,10 @@ def test_people_learn_together_as_each_alone_to_the_last_bit(count: int, stages:
         rows = day.sightings.user == user
         own = SightingCounts(*(column[rows] for column in day.sightings[:4]), (300, 2, 3))
         only = day._replace(sightings=own._replace(user=np.zeros(rows.sum(), np.int64)))
-        person.follow(only.part(0, 100))
+        person.follow(only.between(0, 100))
         person.end_day(only)
         person.revisit(0, 0.7, only)
-    people.follow(day.part(0, 100))
+    people.follow(day.between(0, 100))
     people.end_day(day)
     people.revisit(0, 0.7, day)
     for user, person in enumerate(alone):

@@ -5,11 +5,12 @@ from datetime import datetime
 
 import numpy as np
 
-from fleet2d.algorithms.evidence import Evidence, SightingCounts
-from fleet2d.algorithms.presence.counts import Bins, in_time
+from fleet2d.algorithms.evidence import Evidence, PatchEvidence, SightingCounts, times_of_bins
 from fleet2d.kernels import F64, I64
+from fleet2d.runtime.clock import Clock
 
 MONDAY = datetime(2026, 1, 5)
+SUNDAY_LATE = datetime(2026, 1, 4, 23, 40)
 DAY = 1440
 DETECTION = 0.95
 
@@ -51,7 +52,7 @@ def evidence(where: I64, rooms: int, policy: Policy, seed: int) -> Evidence:
         if sees_person:
             seen[t, :, at] = 1
             sightings[at] += 1
-    return Evidence(0, 1, watched, SightingCounts.of(seen))
+    return evidence_of(watched, seen)
 
 
 def patrol(t: int, at: int, sees_person: bool, sightings: I64, random: np.random.Generator) -> int:
@@ -72,14 +73,33 @@ def follow(t: int, at: int, sees_person: bool, sightings: I64, random: np.random
     return at if sees_person else (at + 1) % len(sightings)
 
 
-def bins_of(collected: Evidence, start: datetime = MONDAY) -> Bins:
-    """Evidence of bins of a minute."""
-    return in_time(collected, start, 60_000_000)
+def evidence_of(
+    watched: F64,
+    seen: I64,
+    start: datetime = MONDAY,
+    bin_steps: int = 1,
+    by_patch: PatchEvidence | None = None,
+    begin: int = 0,
+) -> Evidence:
+    """Evidence in bins of a minute; without patches, each room is one."""
+    bins, rooms = watched.shape
+    sightings = SightingCounts.of(seen)
+    clock = Clock(start, 60_000_000 // bin_steps, begin + bins * bin_steps)
+    day, minute = times_of_bins(clock, begin, bin_steps, bins)
+    by_patch = by_patch or patch_evidence(np.arange(rooms), np.ones(rooms, int), watched, seen)
+    return Evidence(day, minute, bin_steps, watched, sightings, by_patch, begin)
 
 
-def pieces(bins: Bins, length: int = 60) -> list[Bins]:
+def patch_evidence(room: I64, cells: I64, shown: F64, seen: I64) -> PatchEvidence:
+    """Evidence by patches that are watched for whole bins."""
+    shown_255 = np.rint(255 * np.minimum(shown, 1)).astype(np.uint8)
+    return PatchEvidence(room, cells, shown, shown, shown_255, SightingCounts.of(seen))
+
+
+def pieces(evidence: Evidence, length: int = 60) -> list[Evidence]:
     """The same evidence in pieces, as updates bring it."""
-    return [bins.part(i, min(i + length, len(bins.day))) for i in range(0, len(bins.day), length)]
+    begins = range(0, len(evidence), length)
+    return [evidence.between(i, min(i + length, len(evidence))) for i in begins]
 
 
 def shares_at_home(where: I64, rooms: int) -> F64:
@@ -88,18 +108,16 @@ def shares_at_home(where: I64, rooms: int) -> F64:
     return counts / counts.sum()
 
 
-def any_evidence(seed: int, bins: int = 40, users: int = 2, rooms: int = 3, steps: int = 6) -> Bins:
-    """Evidence without rhyme or reason, from Sunday 22:10 on, so that it has two days."""
+def any_evidence(
+    seed: int, bins: int = 40, users: int = 2, rooms: int = 3, steps: int = 6
+) -> Evidence:
+    """Evidence without rhyme or reason, from Sunday 23:40 on, so that it has two days."""
     random = np.random.default_rng(seed)
     watched = random.choice([0.0, 0.3, 0.3, 0.7, 1.0], (bins, rooms))
     hit = (random.random((bins, users + 1, rooms)) < 0.15) & (watched[:, None] > 0)
     seen = np.where(hit, random.integers(1, steps + 1, hit.shape), 0)
     seen[:, -1] = np.maximum(seen[:, -1], seen[:, :-1].max(axis=1, initial=0))
-    return in_time(
-        Evidence(0, steps, watched, SightingCounts.of(seen)),
-        datetime(2026, 1, 4, 23, 40),
-        10_000_000,
-    )
+    return evidence_of(watched, seen, SUNDAY_LATE, steps)
 
 
 def main() -> None:
@@ -113,7 +131,7 @@ def main() -> None:
         errors = []
         for seed in range(6):
             where = person(30 * DAY, 5, seed)
-            bins, row = bins_of(evidence(where, 5, policy, seed)), []
+            bins, row = evidence(where, 5, policy, seed), []
             for estimator in (SightingShare(), ExposureRatio(), Likelihood()):
                 estimator.begin(5, 1)
                 for part in pieces(bins, 240):

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tests.reference import presence as slow
 
-from fleet2d.algorithms.presence.logarithm import natural_log
+from fleet2d.algorithms.presence.estimator import natural_log
 from fleet2d.metrics.presence.distances import (
     earth_mover,
     jensen_shannon,

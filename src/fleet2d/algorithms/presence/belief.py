@@ -246,3 +246,27 @@ def slot_of_week(time: datetime, slots: int = HOURS) -> int:
     """
     seconds = ((time.weekday() * 24 + time.hour) * 60 + time.minute) * 60 + time.second
     return seconds * slots // (7 * 86400)
+
+
+def with_anyone(chains: list[F64], unknown: Bool | None = None) -> F64:
+    """Add the row of anyone to the probabilities of the users' places.
+
+    A room is empty if each user, independently of the others, is somewhere else; it certainly has
+    somebody in it where an unknown person was perceived; None: nowhere.
+
+    Args:
+        chains: Each user's probability of each place, float64 (bins, rooms + 1).
+        unknown: bool (bins, rooms), where an unknown person was perceived; None: nowhere.
+
+    Returns:
+        float64 (bins, users + 1, rooms + 1).
+    """
+    if unknown is None:
+        unknown = np.zeros_like(chains[0][:, :-1], np.bool_)
+    empty = np.where(unknown, 0.0, 1.0)
+    all_away = np.where(unknown.any(axis=1), 0.0, 1.0)
+    for places in chains:
+        empty = empty * (1 - np.minimum(places[:, :-1], 1))
+        all_away = all_away * places[:, -1]
+    anyone = np.concatenate([1 - empty, all_away[:, None]], axis=1)
+    return np.stack([*chains, anyone], axis=1)

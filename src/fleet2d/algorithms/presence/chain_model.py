@@ -1,4 +1,4 @@
-"""Models of real-time presence that follow each person through a Markov chain over rooms."""
+"""Habits: transition probabilities that depend on the hour of the day."""
 
 from collections.abc import Mapping, Sequence
 from datetime import datetime, timedelta
@@ -8,19 +8,69 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from pydantic import Field
 
-from fleet2d.algorithms.presence.anyone import unknown_seen, with_anyone
-from fleet2d.algorithms.presence.belief import BeliefSeries, Presence
-from fleet2d.algorithms.presence.counts import Bins
-from fleet2d.algorithms.presence.day_evidence import DayEvidence, by_day
+from fleet2d.algorithms.evidence import Evidence
+from fleet2d.algorithms.presence.belief import BeliefSeries, Presence, with_anyone
 from fleet2d.algorithms.presence.estimator import normalized
-from fleet2d.algorithms.presence.habits import Habits
 from fleet2d.algorithms.presence.likelihood import Likelihood
 from fleet2d.algorithms.presence.model import Model
-from fleet2d.algorithms.presence.people import StateLayout
+from fleet2d.algorithms.presence.people import DayEvidence, StateLayout
 from fleet2d.configuration.components import register
 from fleet2d.configuration.units import Share
-from fleet2d.kernels import F64, I64
+from fleet2d.kernels import F64, I64, Bool
 from fleet2d.kernels.presence import StayModel, Stretches, advance, follow
+
+WEEKEND = 5  # its first day, Monday being 0
+FEWEST_BINS = 1440  # with fewer bins of evidence, hours aren't distinguished
+MAX_RATIO = 20.0  # largest ratio, and inverse of the smallest, of an hour's share to the mean share
+LEAST = 1e-9
+MAX_LEAVE = 0.5  # largest probability per bin to leave, unless it was larger before
+
+
+class Habits(NamedTuple):
+    """Time spent in each place, by hour of the week.
+
+    Attributes:
+        week: float64 (168, rooms + 2), bins in each room, away, and all, from Monday 00:00.
+        total: float64 (rooms + 2,), the same over all hours.
+        smoothing: Bins of average evidence that are added to each hour.
+    """
+
+    week: F64
+    total: F64
+    smoothing: float
+
+    def at(self, model: StayModel, weekday: int, hour: int) -> StayModel:
+        """Return the transition probabilities at an hour.
+
+        Let c be the share of time in each place at that hour of working days, or of weekends,
+        divided by the share over all hours, clipped to 1/20 … 20. The probability T_ij to go from i
+        to j becomes T_ij sqrt(c_j / c_i). If T is reversible and has the overall shares p as its
+        stationary distribution, the result has those of the hour: the flow p_i c_i T_ij
+        sqrt(c_j / c_i) = p_i T_ij sqrt(c_i c_j) is symmetric.
+
+        Args:
+            model: The transition probabilities over all hours.
+            weekday: Day of the week, 0 is Monday.
+            hour: Hour of the day.
+        """
+        if self.total[-1] < FEWEST_BINS:
+            return model
+        days = self.week.reshape(7, 24, -1)[:, hour]
+        same_days = days[:WEEKEND] if weekday < WEEKEND else days[WEEKEND:]
+        at_hour = same_days.sum(axis=0) + self.smoothing / self.total[-1] * self.total
+        mean_share, share = self.total[:-1] / self.total[-1], at_hour[:-1] / at_hour[-1]
+        ratio = np.maximum(share, LEAST) / np.maximum(mean_share, LEAST)
+        pull = np.sqrt(np.clip(ratio, 1 / MAX_RATIO, MAX_RATIO))
+        places = len(pull)
+        leave = (1 - model.stay)[:, np.newaxis] * model.follow
+        leave[:, :places] *= pull / np.repeat(pull, len(model.stay) // places)[:, np.newaxis]
+        chance = np.zeros(len(leave))
+        for column in leave.T:  # summed in the same order on every machine
+            chance += column
+        follow = leave / np.maximum(chance, LEAST)[:, np.newaxis]
+        most = np.maximum(1 - model.stay, MAX_LEAVE)
+        return model._replace(stay=1 - np.minimum(chance, most), follow=follow)
+
 
 FARTHEST = 10_080  # bins ahead; later forecasts equal the one at this horizon
 
@@ -94,18 +144,15 @@ class ChainPresence(Presence):
         return ChainPresence(self.users, ahead, time, self._bin_us)
 
 
-def split(places: list[F64], users: int, bins: Bins | None) -> tuple[F64, F64]:
+def split(places: list[F64], users: int, unknown: Bool | None) -> tuple[F64, F64]:
     """Return shares of rooms given at home, and of away, for each user and last for anyone.
 
     Args:
         places: For each person, float64 (bins, rooms + 1), the probability of each place.
         users: Number of users; without users there is one person, of anyone.
-        bins: The evidence, in which unknown people may be seen; None: no unknown people.
+        unknown: bool (bins, rooms), where an unknown person was perceived; None: nowhere.
     """
-    rows = places[0][:, np.newaxis]
-    if users:
-        no_unknown = np.zeros((len(places[0]), places[0].shape[1] - 1), bool)
-        rows = with_anyone(places, no_unknown if bins is None else unknown_seen(bins))
+    rows = with_anyone(places, unknown) if users else places[0][:, np.newaxis]
     return normalized(np.maximum(rows[..., :-1], 0)), np.clip(rows[..., -1], 0, 1)
 
 
@@ -183,17 +230,17 @@ class Filter(Model):
         self.learner.begin(rooms, users)
         self.followers: list[Follower] = []
 
-    def observe(self, bins: Bins) -> tuple[F64, F64]:
+    def observe(self, evidence: Evidence) -> tuple[F64, F64]:
         """Return the filtered belief after each bin."""
-        days = [self._observe_day(day) for day in by_day(bins)]
+        days = [self._observe_day(day) for day in evidence.days]
         home, away = (np.concatenate(parts) for parts in zip(*days, strict=True))
         return home, away
 
-    def _observe_day(self, bins: Bins) -> tuple[F64, F64]:
-        day, people = self.learner.add(bins)
+    def _observe_day(self, evidence: Evidence) -> tuple[F64, F64]:
+        day, people = self.learner.add(evidence)
         self.followers = self.followers or [Follower(people.layout) for _ in range(people.count)]
         places = [self._follow(user, day, people.model_of(user)) for user in range(people.count)]
-        return split(places, self.users, bins)
+        return split(places, self.users, evidence.sightings.unknown)
 
     def _follow(self, user: int, day: DayEvidence, model: StayModel) -> F64:
         stretches = day.stretches(user, 1)
@@ -243,7 +290,7 @@ class RoutineModel(SemiMarkov):
     """The semi-Markov filter with transitions by the hour, towards the rooms usual at that time.
 
     From the second day on, transitions depend on the hour of working days and of weekends, by the
-    shares of time spent in each room at that hour (`fleet2d.algorithms.presence.habits`).
+    shares of time spent in each room at that hour (`fleet2d.algorithms.presence.chain_model`).
 
     It is right where days are similar. It fails where they aren't: it is too sure of the routine.
 
@@ -258,7 +305,7 @@ class RoutineModel(SemiMarkov):
         hours = day.minute // 60
         ends = [0, *(np.flatnonzero(np.diff(hours)) + 1).tolist(), len(hours)]
         places = []
-        for part in (day.part(a, b) for a, b in pairwise(ends)):
+        for part in (day.between(a, b) for a, b in pairwise(ends)):
             at_hour = habits.at(model, (day.number - 1) % 7, int(part.minute[0]) // 60)
             places.append(self.followers[user].follow(at_hour, part.stretches(user, 1)))
         return np.concatenate(places)

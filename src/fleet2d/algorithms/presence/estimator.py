@@ -1,4 +1,4 @@
-"""The base of estimators of long-term presence."""
+"""The base of estimators of long-term presence, and sums over days and hours of the week."""
 
 from collections.abc import Mapping, Sequence
 from datetime import datetime
@@ -6,13 +6,170 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
-from fleet2d.algorithms.presence.belief import Presence, WeeklyPresence
-from fleet2d.algorithms.presence.counts import Bins, DayCounts
+from fleet2d.algorithms.evidence import Evidence
+from fleet2d.algorithms.learned import array_of
+from fleet2d.algorithms.presence.belief import HOURS, Presence, WeeklyPresence
 from fleet2d.configuration.components import Component
 from fleet2d.errors import ComponentError
-from fleet2d.kernels import F64
+from fleet2d.kernels import F64, I64
 from fleet2d.kernels.presence import resampled
+
+EXACT = 1 << 40
+
+
+class DayCounts:
+    """Sums of values over bins: for today by hour, and for earlier days, with decaying weights.
+
+    A day that is k days old has the weight 2**(-k / half_life). The order of summation doesn't
+    depend on how often the sums are updated.
+
+    Attributes:
+        days: The finished days, as ordinals.
+        by_day: float64 (days, *shape), the sum of each finished day, unweighted.
+        week: float64 (168, *shape), the weighted sum of each hour of the week, without today.
+        finished: float64 (*shape), the weighted sum of the finished days.
+        today: Ordinal of the present day; 0 before the first.
+        hours: float64 (24, *shape), the sums of the hours of today.
+
+    Example:
+        >>> counts = DayCounts((2,))
+        >>> values = np.array([[1.0, 0], [2, 0], [0, 4]])
+        >>> counts.add(np.array([1, 1, 2]), np.array([0, 60, 0]), values)
+        >>> counts.total.tolist(), counts.days
+        ([3.0, 4.0], [1])
+    """
+
+    def __init__(self, shape: tuple[int, ...], half_life: float | None = None) -> None:
+        """Begin without days.
+
+        Args:
+            shape: Shape of the values of a bin.
+            half_life: Days after which a day counts half; None: all days count equally.
+        """
+        # Rounded so that all math libraries agree.
+        self.fade = 1.0 if half_life is None else round(0.5 ** (1 / half_life) * EXACT) / EXACT
+        self.shape = shape
+        self.days: list[int] = []
+        self.by_day = np.zeros((0, *shape))
+        self.week = np.zeros((HOURS, *shape))
+        self.finished = np.zeros(shape)
+        self.today = 0
+        self.hours = np.zeros((24, *shape))
+
+    def add(self, day: I64, minute: I64, values: F64) -> None:
+        """Add the values of the next bins, in order of time.
+
+        Args:
+            day: int64 (bins,), ordinals.
+            minute: int64 (bins,), since midnight.
+            values: float64 (bins, *shape).
+        """
+        if not len(day):
+            return
+        slot = day * 24 + minute // 60
+        first = np.concatenate([[0], np.flatnonzero(np.diff(slot)) + 1])
+        self.add_hours(slot[first], np.add.reduceat(values, first, axis=0))
+
+    def add_hours(self, hours: I64, sums: F64) -> None:
+        """Add sums of hours to the counts; the hours follow those added before, in order of time.
+
+        Args:
+            hours: int64 (hours,), as ordinal * 24 + hour of the day.
+            sums: float64 (hours, *shape).
+        """
+        for hour, part in zip(hours.tolist(), sums, strict=True):
+            if hour // 24 != self.today:
+                self.begin_day(hour // 24)
+            self.hours[hour % 24] += part
+
+    def begin_day(self, day: int) -> None:
+        """End the present day, if there is one, and reduce the weights of older days."""
+        if self.today:
+            self._end(self.today, self.hours, day)
+        self.today = day
+        self.hours = np.zeros((24, *self.shape))
+
+    def put(self, day: int, old: F64, new: F64) -> None:
+        """Replace the sums of the hours of a day: float64 (24, *shape) each."""
+        change = new - old
+        if day == self.today:
+            self.hours = self.hours + change
+            return
+        weight, monday = self.faded(self.today - day), (day - 1) % 7 * 24
+        self.by_day[self.days.index(day)] += change.sum(axis=0)
+        self.finished = self.finished + weight * change.sum(axis=0)
+        self.week[monday : monday + 24] += weight * change
+
+    def _end(self, day: int, hours: F64, next_day: int) -> None:
+        self.days.append(day)
+        total = hours.sum(axis=0)
+        self.by_day = np.concatenate([self.by_day, total[None]])
+        monday = (day - 1) % 7 * 24
+        self.week[monday : monday + 24] += hours
+        weight = self.faded(next_day - day)
+        self.finished = (self.finished + total) * weight
+        if weight < 1.0:
+            self.week *= weight  # in place: of many users it is large
+
+    def faded(self, days: int) -> float:
+        """Return the weight of a day after a number of further days, by repeated products."""
+        weight = 1.0
+        if self.fade < 1.0:
+            for _ in range(min(days, 100_000)):
+                weight *= self.fade
+        return weight
+
+    @property
+    def total(self) -> F64:
+        """The weighted sum of all days: float64 (*shape)."""
+        return self.finished + self.hours.sum(axis=0)
+
+    @property
+    def by_hour_of_week(self) -> F64:
+        """The weighted sum of each hour of the week from Monday 00:00: float64 (168, *shape)."""
+        week = self.week.copy()
+        if self.today:
+            monday = (self.today - 1) % 7 * 24
+            week[monday : monday + 24] += self.hours
+        return week
+
+    @property
+    def weighted_days(self) -> F64:
+        """The sums of the finished days times their weights: float64 (days, *shape)."""
+        weights = np.array([self.faded(self.today - day) for day in self.days])
+        return self.by_day * weights.reshape(-1, *(1 for _ in self.shape))
+
+    def remember(self) -> dict[str, NDArray[np.generic]]:
+        """Return everything as arrays."""
+        return {
+            "days": np.array([*self.days, self.today], np.int64),
+            "by_day": self.by_day,
+            "week": self.week,
+            "over": self.finished,
+            "hours": self.hours,
+        }
+
+    def recall(self, learned: dict[str, NDArray[np.generic]], today: int) -> None:
+        """Restore what `remember` returned, as if it had ended before a day.
+
+        Args:
+            learned: The learned state.
+            today: Ordinal of the day that begins. Learned days are moved by whole weeks before it.
+        """
+        day = 1 << 31
+        *days, last = array_of(learned, "days", (-1,), np.int64, most=day).tolist()
+        weeks = max(0, -((today - 1 - last) // 7))
+        self.days = [day - 7 * weeks for day in days]
+        self.by_day = array_of(learned, "by_day", (len(days), *self.shape))
+        self.week = array_of(learned, "week", self.week.shape)
+        self.finished = array_of(learned, "over", self.shape)
+        self.hours = array_of(learned, "hours", self.hours.shape)
+        self.today = last - 7 * weeks if last else 0
+        if self.today:
+            self.begin_day(today)
+
 
 REPLICATES = 200  # of the bootstrap
 FEWEST_DAYS = 2  # fewest days that say anything about how much days differ
@@ -44,7 +201,7 @@ class Estimator(Component):
         """Return the number of columns of `sums` for each user."""
         raise NotImplementedError
 
-    def sums(self, bins: Bins) -> F64:
+    def sums(self, evidence: Evidence) -> F64:
         """Return numbers for each bin that add up over bins: float64 (bins, users + 1, width).
 
         The last column is 1: it counts bins.
@@ -62,17 +219,17 @@ class Estimator(Component):
         """
         raise NotImplementedError
 
-    def observe(self, bins: Bins) -> None:
+    def observe(self, evidence: Evidence) -> None:
         """Add the next bins of evidence."""
-        sums = np.asarray(self.sums(bins))
-        expected = (len(bins.day), self.users + 1, self.width(self.rooms))
+        sums = np.asarray(self.sums(evidence))
+        expected = (len(evidence), self.users + 1, self.width(self.rooms))
         if sums.shape != expected:
             raise ComponentError(
                 f"{type(self).__name__}.sums returned an array of shape {sums.shape}, expected"
                 f" {expected}: bins, users + 1, and width({self.rooms})"
                 f"{_source_line(type(self))}"
             )
-        self.counts.add(bins.day, bins.minute, sums)
+        self.counts.add(evidence.day, evidence.minute, sums)
 
     def presence(self, users: Sequence[str], time: datetime) -> Presence:
         """Return the presence from all evidence so far, over all time."""
@@ -158,3 +315,27 @@ def normalized(weights: F64) -> F64:
     """
     total = weights.sum(axis=-1, keepdims=True)
     return np.where(total > 0, weights / np.where(total > 0, total, 1), 1 / weights.shape[-1])
+
+
+LN_2 = 0.6931471805599453
+ROOT_HALF = 0.7071067811865476
+TERMS = 11  # of the series: the first left out is below 1e-17 of the sum
+
+
+def natural_log(values: ArrayLike) -> F64:
+    """Return natural logarithms of numbers above 0, by series: to 3 units in the last place.
+
+    Of m 2^e with m from sqrt(1/2) to sqrt(2), it is e ln 2 + 2 artanh((m - 1) / (m + 1)).
+
+    Example:
+        >>> natural_log([1.0, 10.0]).round(12).tolist()
+        [0.0, 2.302585092994]
+    """
+    mantissa, exponent = np.frexp(np.asarray(values, np.float64))
+    low = mantissa < ROOT_HALF
+    m, e = np.where(low, 2 * mantissa, mantissa), np.where(low, exponent - 1, exponent)
+    s = (m - 1) / (m + 1)
+    square, series = s * s, np.zeros_like(s)
+    for k in range(TERMS, -1, -1):
+        series = series * square + 1 / (2 * k + 1)
+    return e * LN_2 + 2 * s * series

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from pydantic import Field, model_validator
 
-from fleet2d.algorithms.presence.counts import Bins
+from fleet2d.algorithms.evidence import Evidence
 from fleet2d.algorithms.presence.estimator import Estimator, normalized
 from fleet2d.configuration.components import register
 from fleet2d.configuration.problems import problem
@@ -23,7 +23,7 @@ class ExposureRatio(Estimator):
     """Sightings in each room divided by the time watched, patch by patch: sum of n_p / e_p.
 
     n_p is the time at which the user was perceived in patch p of the room
-    (`fleet2d.algorithms.patches`), e_p the time for which the patch was watched, both in bins; a
+    (`fleet2d.algorithms.evidence`), e_p the time for which the patch was watched, both in bins; a
     patch half in view counts half (the form of the estimator of Horvitz and Thompson). Shares are
     these sums, divided by that of all rooms. It goes by patches because people use few places of a
     room: the part that a robot watches may be one where nobody ever is, or the only seat.
@@ -53,14 +53,14 @@ class ExposureRatio(Estimator):
         """Return the number of columns of `sums`: seen and watched of each patch, and bins."""
         return 2 * len(self.room) + 1
 
-    def observe(self, bins: Bins) -> None:
+    def observe(self, evidence: Evidence) -> None:
         """Add the next bins of evidence; the first ones define the patches."""
-        room = bins.parts.room
+        room = evidence.by_patch.room
         if not np.array_equal(room, self.room):
             if self.is_recalled:
                 raise _foreign(len(self.room), int(self.room.max()) + 1)
             self._divide(room)
-        super().observe(bins)
+        super().observe(evidence)
 
     def _divide(self, room: I64) -> None:
         """Begin anew with the given patches."""
@@ -80,15 +80,18 @@ class ExposureRatio(Estimator):
         super().recall(learned, today)
         self.is_recalled = True
 
-    def sums(self, bins: Bins) -> F64:
+    def sums(self, evidence: Evidence) -> F64:
         """Return seen and watched of each patch, in bins."""
         return seen_and_watched(
-            bins.parts.seen, bins.parts.watched, self.is_counted(bins), bins.bin_steps
+            evidence.by_patch.seen,
+            evidence.by_patch.watched,
+            self.is_counted(evidence),
+            evidence.bin_steps,
         )
 
-    def is_counted(self, bins: Bins) -> Bool:
+    def is_counted(self, evidence: Evidence) -> Bool:
         """Return whether each bin counts: bool (bins,)."""
-        return np.ones(len(bins.day), bool)
+        return np.ones(len(evidence), bool)
 
     def shares(self, sums: F64) -> tuple[F64, F64]:
         """Return the sums of ratios, normalized, and the remainder as away."""
@@ -162,9 +165,9 @@ class AuditOnly(ExposureRatio):
             )
         return self
 
-    def is_counted(self, bins: Bins) -> Bool:
+    def is_counted(self, evidence: Evidence) -> Bool:
         """Return whether each bin begins in an audit: bool (bins,)."""
         every, length = (
             max(1, duration // timedelta(minutes=1)) for duration in (self.every, self.length)
         )
-        return bins.minute % every < length
+        return evidence.minute % every < length

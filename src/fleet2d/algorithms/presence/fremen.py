@@ -8,12 +8,11 @@ from typing import Any, ClassVar
 import numpy as np
 from pydantic import Field
 
+from fleet2d.algorithms.evidence import Evidence
 from fleet2d.algorithms.learned import array_of
 from fleet2d.algorithms.presence.belief import HOURS, Presence, WeeklyPresence
-from fleet2d.algorithms.presence.counts import Bins
-from fleet2d.algorithms.presence.estimator import Estimator, normalized
+from fleet2d.algorithms.presence.estimator import Estimator, natural_log, normalized
 from fleet2d.algorithms.presence.exposure_ratio import ratios, seen_and_watched
-from fleet2d.algorithms.presence.logarithm import natural_log
 from fleet2d.configuration.components import register
 from fleet2d.configuration.units import Share
 from fleet2d.kernels import F64, I64
@@ -64,10 +63,10 @@ class Fremen(Estimator):
         """Return the number of columns of `sums`: seen and watched of each room, and bins."""
         return 2 * rooms + 1
 
-    def sums(self, bins: Bins) -> F64:
+    def sums(self, evidence: Evidence) -> F64:
         """Return seen and watched of each room, in bins."""
-        is_counted = np.ones(len(bins.day), bool)
-        return seen_and_watched(bins.seen, bins.watched, is_counted, bins.bin_steps)
+        is_counted = np.ones(len(evidence), bool)
+        return seen_and_watched(evidence.seen, evidence.watched, is_counted, evidence.bin_steps)
 
     def shares(self, sums: F64) -> tuple[F64, F64]:
         """Return the shares by the static models, which have no periods."""
@@ -86,15 +85,10 @@ class Fremen(Estimator):
         self.day: list[tuple[I64, F64]] = []  # samples of the present day
         self.week: tuple[F64, F64] | None = None  # the forecast for each hour
 
-    def observe(self, bins: Bins) -> None:
+    def observe(self, evidence: Evidence) -> None:
         """Add the next bins of evidence; periods are selected anew when a day is over."""
-        ends = [*(np.flatnonzero(np.diff(bins.day)) + 1).tolist(), len(bins.day)]
-        begin = 0
-        for end in ends:
-            if begin == end:
-                continue
-            part = bins.part(begin, end)
-            begin, today = end, int(part.day[0])
+        for part in evidence.days:
+            today = int(part.day[0])
             self.first = self.first or today
             if today != self.counts.today and self.day:
                 self._end_day(today)

@@ -7,10 +7,9 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from fleet2d.algorithms.presence.counts import Bins
-from fleet2d.algorithms.presence.day_evidence import DayEvidence, by_day
+from fleet2d.algorithms.evidence import Evidence
 from fleet2d.algorithms.presence.estimator import FEWEST_DAYS, Estimator, normalized
-from fleet2d.algorithms.presence.people import People, Prior, StateLayout
+from fleet2d.algorithms.presence.people import DayEvidence, People, Prior, StateLayout
 from fleet2d.configuration.components import register
 from fleet2d.configuration.units import Share
 from fleet2d.errors import ComponentError
@@ -26,7 +25,7 @@ STORED_DAYS = 64
 class Likelihood(Estimator):
     """Expected share of time in each room given all evidence, in a hidden Markov chain.
 
-    Each user is in one patch of one room, or away (`fleet2d.algorithms.patches`). The length of a
+    Each user is in one patch of one room, or away (`fleet2d.algorithms.evidence`). The length of a
     stay in a room is geometric, or with several `stages` a sum of geometric lengths (a Coxian
     distribution: a hidden semi-Markov model); then the user goes to another room. During a stay the
     user changes patch at times. A user who comes to a patch is in its visible part with the
@@ -152,17 +151,17 @@ class Likelihood(Estimator):
         high = np.where(is_hidden, most_unseen / (seen + unseen), high * at_home / seen)
         return low, np.minimum(high, 1)
 
-    def observe(self, bins: Bins) -> None:
+    def observe(self, evidence: Evidence) -> None:
         """Process the next bins of evidence."""
-        for day in by_day(bins):
+        for day in evidence.days:
             part, people = self.add(day)
             self.counts.add_hours(*self._by_hour(people.follow(part), part))
 
-    def add(self, bins: Bins) -> tuple[DayEvidence, People]:
+    def add(self, evidence: Evidence) -> tuple[DayEvidence, People]:
         """Add evidence of one day, which is learned from when the next day begins."""
-        people = self.people = self.people or self._create_people(bins)
-        self._look_into(bins, people)
-        part = DayEvidence.of(bins)
+        people = self.people = self.people or self._create_people(evidence)
+        self._look_into(evidence, people)
+        part = DayEvidence.of(evidence)
         if part.number != self.counts.today:
             if self.parts:
                 self._end_day(part.number, people)
@@ -170,8 +169,8 @@ class Likelihood(Estimator):
         self.parts.append(part)
         return part, people
 
-    def _create_people(self, bins: Bins) -> People:
-        layout, prior = StateLayout.of(bins, self.stages), Prior(self.detection, self.restless)
+    def _create_people(self, evidence: Evidence) -> People:
+        layout, prior = StateLayout.of(evidence, self.stages), Prior(self.detection, self.restless)
         people = People(layout, prior, max(self.users, 1), self.together)
         if self.learned and not people.recall(self.learned):
             raise ComponentError(
@@ -181,13 +180,13 @@ class Likelihood(Estimator):
             )
         return people
 
-    def _look_into(self, bins: Bins, people: People) -> None:
+    def _look_into(self, evidence: Evidence, people: People) -> None:
         """Note the watched rooms; people can only be in rooms that are joined with one of them."""
-        is_watched = self.is_watched | bins.watched.any(axis=0)
+        is_watched = self.is_watched | evidence.watched.any(axis=0)
         if np.array_equal(is_watched, self.is_watched):
             return
         before, self.is_watched = self._possible_rooms, is_watched
-        self.island = bins.parts.island
+        self.island = evidence.by_patch.island
         if not np.array_equal(self._possible_rooms, before):
             people.confine(np.append(self._possible_rooms, True).astype(np.float64))
 

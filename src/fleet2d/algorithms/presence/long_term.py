@@ -11,7 +11,6 @@ from fleet2d.algorithms.algorithm import Algorithm, Present
 from fleet2d.algorithms.history import History
 from fleet2d.algorithms.learned import check_numbers
 from fleet2d.algorithms.presence.belief import Presence
-from fleet2d.algorithms.presence.counts import in_time
 from fleet2d.algorithms.presence.estimator import Estimator
 from fleet2d.configuration.components import OneOf, register
 from fleet2d.configuration.problems import problem
@@ -20,13 +19,54 @@ from fleet2d.floorplan.home.home import Home
 from fleet2d.kernels import F64
 from fleet2d.runtime.determinism import stream_key
 
-MINUTE = timedelta(minutes=1)
 DAY = timedelta(days=1)
 SECOND_US = 1_000_000
 
 
+class PresenceAlgorithm(Algorithm):
+    """Base of algorithms of presence: a component of theirs learns from the evidence."""
+
+    needs: ClassVar[Set[str]] = frozenset({"evidence"})
+
+    def start(self, home: Home) -> None:
+        """Begin without evidence."""
+        self.rooms = len(home.rooms)
+        self.has_begun = False
+        self.learned_state: Mapping[str, Any] | None = None
+
+    @property
+    def _learner(self) -> Any:
+        """The component that learns: an estimator, or a model."""
+        raise NotImplementedError
+
+    def _prepare(self, learner: Any, users: int, start: datetime) -> None:
+        """Begin a run with what was learned in another one."""
+        raise NotImplementedError
+
+    def _begin_once(self, state: Present) -> None:
+        if not self.has_begun:
+            self._prepare(self._learner, len(state.users), state.start)
+            self.has_begun = True
+
+    def check_learned(self, users: Sequence[str], start: datetime) -> None:
+        """Restore the learned state in a copy, which raises if it doesn't fit the users."""
+        if self.learned_state is not None:
+            check_numbers("", self.learned_state, self.type_name)
+            self._prepare(self._learner.model_copy(deep=True), len(users), start)
+
+    def remember(self) -> dict[str, Any]:
+        """Return the learned state, from which another run can start."""
+        if self.has_begun:
+            return self._learner.remember()
+        return {} if self.learned_state is None else dict(self.learned_state)
+
+    def recall(self, learned: Mapping[str, Any]) -> None:
+        """Restore the learned state of another run."""
+        self.learned_state = learned or None
+
+
 @register("algorithm", "long_term_presence", aliases=("ltp",))
-class LongTermPresence(Algorithm):
+class LongTermPresence(PresenceAlgorithm):
     """Share of time that each user, and anyone, spends in each room, from robots' evidence.
 
     Its output is a `Presence`: `share` is given at home, `with_away` of all time; with `by:
@@ -39,8 +79,6 @@ class LongTermPresence(Algorithm):
         half_life: Age at which evidence counts half; null: all evidence counts alike.
         interval: Coverage of its intervals, such as 0.9.
     """
-
-    needs: ClassVar[Set[str]] = frozenset({"evidence"})
 
     estimator: Annotated[Estimator, OneOf("presence_estimator")] = cast("Any", "exposure_ratio")
     by: Literal["overall", "hour_of_week"] = "overall"
@@ -61,41 +99,32 @@ class LongTermPresence(Algorithm):
 
     def start(self, home: Home) -> None:
         """Begin without evidence."""
-        self.rooms = len(home.rooms)
-        self.has_begun = False
-        self.learned_state: Mapping[str, Any] | None = None
+        super().start(home)
         self.ends: tuple[F64, F64] | None = None
+        self.until = -1  # the last finished day that the interval knows
 
     def update(self, history: History, state: Present) -> Presence:
         """Process the evidence of the period; return the presence from all evidence so far."""
-        step_us = round(history.step_s * SECOND_US)
+        self._begin_once(state)
         evidence = history.evidence
-        bins = in_time(evidence, state.start, step_us)
-        if not self.has_begun:
-            self._begin(state)
-        self.estimator.observe(bins)
-        time = state.time + timedelta(microseconds=step_us)
+        self.estimator.observe(evidence)
+        step = timedelta(microseconds=round(history.step_s * SECOND_US))
+        time = state.time + step
         if self.by == "hour_of_week":
-            smoothing = self.smoothing / timedelta(microseconds=bins.bin_steps * step_us)
+            smoothing = self.smoothing / (evidence.bin_steps * step)
             return self.estimator.weekly(state.users, time, smoothing)
         presence = self.estimator.presence(state.users, time)
         return presence if self.interval is None else self._with_interval(presence, state)
 
-    def _begin(self, state: Present) -> None:
-        self._prepare(self.estimator, len(state.users), state.start)
-        self.has_begun, self.until = True, -1
+    @property
+    def _learner(self) -> Estimator:
+        return self.estimator
 
-    def _prepare(self, estimator: Estimator, users: int, start: datetime) -> None:
+    def _prepare(self, learner: Estimator, users: int, start: datetime) -> None:
         half_life = None if self.half_life is None else self.half_life / DAY
-        estimator.begin(self.rooms, users, half_life)
+        learner.begin(self.rooms, users, half_life)
         if self.learned_state is not None:
-            estimator.recall(self.learned_state, start.toordinal())
-
-    def check_learned(self, users: Sequence[str], start: datetime) -> None:
-        """Restore the learned state in a copy, which raises if it doesn't fit the users."""
-        if self.learned_state is not None:
-            check_numbers("", self.learned_state, self.type_name)
-            self._prepare(self.estimator.model_copy(deep=True), len(users), start)
+            learner.recall(self.learned_state, start.toordinal())
 
     def _with_interval(self, presence: Presence, state: Present) -> Presence:
         """Add the interval, which is updated when a day is over and always holds the estimate."""
@@ -109,13 +138,3 @@ class LongTermPresence(Algorithm):
         share = np.concatenate([home, away[:, np.newaxis]], axis=1)
         ends = np.minimum(self.ends[0], share), np.maximum(self.ends[1], share)
         return Presence(presence.users, home, away, presence.time, ends)
-
-    def remember(self) -> dict[str, Any]:
-        """Return the learned state, from which another run can start."""
-        if not self.has_begun:
-            return {} if self.learned_state is None else dict(self.learned_state)
-        return self.estimator.remember()
-
-    def recall(self, learned: Mapping[str, Any]) -> None:
-        """Restore the learned state of another run."""
-        self.learned_state = learned or None

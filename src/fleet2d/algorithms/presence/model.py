@@ -7,8 +7,8 @@ from typing import Annotated, Any, ClassVar, cast
 import numpy as np
 from pydantic import Field
 
+from fleet2d.algorithms.evidence import Evidence
 from fleet2d.algorithms.presence.belief import HOURS, BeliefSeries, Presence, WeeklyPresence
-from fleet2d.algorithms.presence.counts import Bins
 from fleet2d.algorithms.presence.estimator import Estimator
 from fleet2d.configuration.components import Component, OneOf, register
 from fleet2d.kernels import F64
@@ -34,7 +34,7 @@ class Model(Component):
         """
         self.rooms, self.users = rooms, users
 
-    def observe(self, bins: Bins) -> tuple[F64, F64]:
+    def observe(self, evidence: Evidence) -> tuple[F64, F64]:
         """Process the next bins of evidence; return the belief after each bin.
 
         The belief after a bin may use evidence up to that bin only.
@@ -79,9 +79,9 @@ class LastSeen(Model):
         super().begin(rooms, users, day)
         self.last = np.full(users + 1, NEVER)
 
-    def observe(self, bins: Bins) -> tuple[F64, F64]:
+    def observe(self, evidence: Evidence) -> tuple[F64, F64]:
         """Return the last room of each user after each bin."""
-        seen = bins.seen
+        seen = evidence.seen
         room = np.where(np.any(seen > 0, axis=2), seen.argmax(axis=2), NEVER)
         room = np.concatenate([self.last[np.newaxis], room])
         newest = np.where(room != NEVER, np.arange(len(room))[:, np.newaxis], 0)
@@ -108,11 +108,11 @@ class LongTerm(Model):
         self.day = day
         self.estimator.begin(rooms, users)
 
-    def observe(self, bins: Bins) -> tuple[F64, F64]:
+    def observe(self, evidence: Evidence) -> tuple[F64, F64]:
         """Return the belief before these bins, repeated for each of them."""
         home, away = self.estimator.shares(self.estimator.counts.total)
-        self.estimator.observe(bins)
-        count = len(bins.day)
+        self.estimator.observe(evidence)
+        count = len(evidence)
         return np.repeat(home[np.newaxis], count, axis=0), np.repeat(away[np.newaxis], count, 0)
 
     def remember(self) -> dict[str, Any]:
@@ -134,11 +134,11 @@ class HourOfWeek(LongTerm):
 
     smoothing: float = Field(default=60, gt=0)
 
-    def observe(self, bins: Bins) -> tuple[F64, F64]:
+    def observe(self, evidence: Evidence) -> tuple[F64, F64]:
         """Return the belief before these bins, for the hour of each of them."""
         home, away = self.week()
-        self.estimator.observe(bins)
-        hour = ((bins.day - 1) * 24 + bins.minute // 60) % HOURS
+        self.estimator.observe(evidence)
+        hour = ((evidence.day - 1) * 24 + evidence.minute // 60) % HOURS
         return home[hour], away[hour]
 
     def week(self) -> tuple[F64, F64]:

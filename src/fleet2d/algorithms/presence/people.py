@@ -1,15 +1,116 @@
-"""The stays of people: hidden Markov models, learned from all days."""
+"""The stays of people: hidden Markov models, learned from the evidence of all days."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Self
 
 import numpy as np
 
-from fleet2d.algorithms.presence.counts import Bins
-from fleet2d.algorithms.presence.day_evidence import DayEvidence
-from fleet2d.kernels import F64, I64
-from fleet2d.kernels.presence import Moments, PeoplePlaces, StayModel, follow_people, smooth_people
+from fleet2d.algorithms.evidence import Evidence, SightingCounts
+from fleet2d.kernels import F64, I64, U8, Bool
+from fleet2d.kernels.presence import (
+    Moments,
+    PeopleEvidence,
+    PeoplePlaces,
+    StayModel,
+    Stretches,
+    follow_people,
+    merge_bins,
+    smooth_people,
+)
+
+
+class DayEvidence(NamedTuple):
+    """Evidence of one day, or of a part of it.
+
+    Attributes:
+        number: The day, as `date.toordinal` counts.
+        minute: int64 (bins,), beginning of each bin [minutes since midnight].
+        unknown: bool (bins, rooms), where an unknown person was perceived.
+        view: int64 (bins,), the row of `views`.
+        views: uint8 (views, patches + 1), how much of each patch was watched, 0 to WHOLE_PATCH,
+            as in Stretches; consecutive rows differ.
+        sightings: Where users were perceived, by patches.
+    """
+
+    number: int
+    minute: I64
+    unknown: Bool
+    view: I64
+    views: U8
+    sightings: SightingCounts
+
+    @classmethod
+    def of(cls, evidence: Evidence) -> Self:
+        """Return the evidence of bins of one day."""
+        sightings = evidence.by_patch.sightings
+        # Where somebody unknown was perceived, who may be any user, nothing is watched in vain.
+        watched = np.where(sightings.unknown, np.uint8(0), evidence.by_patch.shown_255)
+        watched = np.pad(watched, ((0, 0), (0, 1)))  # away, the last patch, is never watched
+        return cls(
+            int(evidence.day[0]),
+            evidence.minute,
+            evidence.sightings.unknown,
+            *distinct(watched),
+            sightings,
+        )
+
+    @classmethod
+    def joined(cls, parts: Sequence[Self]) -> Self:
+        """Return consecutive parts of a day as one."""
+        if len(parts) == 1:
+            return parts[0]
+        return cls(
+            parts[0].number,
+            np.concatenate([part.minute for part in parts]),
+            np.concatenate([part.unknown for part in parts]),
+            *distinct(np.concatenate([part.views[part.view] for part in parts])),
+            SightingCounts.joined([part.sightings for part in parts]),
+        )
+
+    def between(self, begin: int, end: int) -> Self:
+        """Return the bins from `begin` to `end` - 1."""
+        rows = slice(begin, end)
+        sightings = self.sightings.between(begin, end)
+        return self._replace(
+            minute=self.minute[rows],
+            unknown=self.unknown[rows],
+            view=self.view[rows],
+            sightings=sightings,
+        )
+
+    def stretches(self, user: int, longest: int) -> Stretches:
+        """Return the evidence of one user, with runs of identical consecutive bins merged.
+
+        Args:
+            user: Row of the user; the last row is anybody.
+            longest: Largest number of bins in a stretch.
+        """
+        seen = self.sightings.of_user(user)
+        return merge_bins(self.minute, self.view, self.views, seen, longest)
+
+    def of_people(self, count: int) -> PeopleEvidence:
+        """Return the evidence of the first `count` users; without users, the first is anybody."""
+        user, seen_bin, patch, steps, _ = self.sightings
+        begin = np.searchsorted(user, np.arange(count + 1)).astype(np.int64)
+        return PeopleEvidence(self.minute, self.view, self.views, begin, seen_bin, patch, steps)
+
+
+def distinct(rows: U8) -> tuple[I64, U8]:
+    """Return rows (n, width) without repetitions of the row before.
+
+    Returns:
+        For each row the number of the one that it is equal to, int64 (n,), and these, uint8.
+
+    Example:
+        >>> number, rows = distinct(np.array([[0, 9], [0, 9], [3, 9], [0, 9]], np.uint8))
+        >>> number.tolist(), rows.tolist()
+        ([0, 0, 1, 2], [[0, 9], [3, 9], [0, 9]])
+    """
+    is_new = np.ones(len(rows), bool)
+    is_new[1:] = (rows[1:] != rows[:-1]).any(axis=1)
+    return np.cumsum(is_new) - 1, rows[is_new]
+
 
 # Mean length of a stay before anything was learned, and of the first and last of several stages.
 # All in bins.
@@ -35,10 +136,10 @@ class StateLayout(NamedTuple):
     possible: F64
 
     @classmethod
-    def of(cls, bins: Bins, stages: int) -> Self:
+    def of(cls, evidence: Evidence, stages: int) -> Self:
         """Return the states for the rooms and patches of evidence."""
-        room, cells = bins.parts.room, bins.parts.cells
-        rooms = bins.watched.shape[1]
+        room, cells = evidence.by_patch.room, evidence.by_patch.cells
+        rooms = evidence.watched.shape[1]
         floor = np.maximum(cells, 1)
         spread = np.append(floor / np.bincount(room, floor, minlength=rooms)[room], 1.0)
         return cls(np.append(room, rooms), spread, rooms, stages, np.ones(rooms + 1))

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from fleet2d.algorithms.presence.counts import Bins
+from fleet2d.algorithms.evidence import Evidence
 from fleet2d.algorithms.presence.estimator import Estimator, normalized
 from fleet2d.configuration.components import register
 from fleet2d.kernels import F64
@@ -26,11 +26,11 @@ class SightingShare(Estimator):
         """Return the number of columns of `sums`: one for each room, and three counts of bins."""
         return rooms + 3
 
-    def sums(self, bins: Bins) -> F64:
+    def sums(self, evidence: Evidence) -> F64:
         """Return sightings per room, then bins: watched, watched without a sighting, and all."""
-        seen = bins.seen.astype(np.float64)
+        seen = evidence.seen.astype(np.float64)
         is_seen = np.any(seen > 0, axis=2)
-        has_view = np.any(bins.watched > 0, axis=1)[:, np.newaxis] | is_seen
+        has_view = np.any(evidence.watched > 0, axis=1)[:, np.newaxis] | is_seen
         return np.concatenate(
             [seen, np.stack([has_view, has_view & ~is_seen, np.ones_like(is_seen)], axis=-1)],
             axis=-1,

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from fleet2d.algorithms.output import to_columns
+from fleet2d.algorithms.algorithm import to_columns
 from fleet2d.configuration.problems import suggest
 from fleet2d.engine.gauges.block import Block
 from fleet2d.engine.gauges.gauges import (

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from fleet2d.algorithms.activities import ROBOT
+from fleet2d.algorithms.observations import ROBOT
 from fleet2d.engine.gauges.block import Block
 from fleet2d.entities.battery import Course
 from fleet2d.entities.behavior import Actor

@@ -10,9 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from fleet2d.algorithms.activities import Activities
 from fleet2d.algorithms.log import SensorRow
-from fleet2d.algorithms.observations import NearestRooms, Observations, Rows, truth
+from fleet2d.algorithms.observations import Activities, NearestRooms, Observations, Truth
 from fleet2d.engine.basis import Basis
 from fleet2d.engine.tables.definitions import camera_names
 from fleet2d.engine.tables.key_frames import KeyFrames
@@ -141,8 +140,8 @@ class Recorder:
     def _store_observations(self) -> None:
         if not self._observations:
             return
-        rows, self._observations = Rows(self._observations), []
-        o = Observations(self.home.plan, self._rooms, rows, self.activities)
+        o = Observations(self.home.plan, self._rooms, self._observations, self.activities)
+        self._observations = []
         columns: dict[str, Any] = {
             **self._times(o.step),
             "robot": o.robot,
@@ -152,7 +151,7 @@ class Recorder:
             "room": o.room.astype(np.int32),
         }
         if self._camera_codes:
-            t = truth(self.home.plan, rows.whole, self.activities)
+            t = Truth.behind(o)
             is_user = t.user >= 0
             columns |= {
                 "heading": o.heading,

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fleet2d.algorithms.activities import ActivitySense
+from fleet2d.algorithms.observations import ActivitySense
 from fleet2d.configuration.units import micros
 from fleet2d.engine.basis import Basis
 from fleet2d.engine.bodies import Bodies, poses_of

@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fleet2d.algorithms.algorithm import Algorithm
-from fleet2d.algorithms.evidence import steps_of_bin
+from fleet2d.algorithms.evidence import Patches, patches_of, steps_of_bin, whole_rooms
 from fleet2d.algorithms.log import Log
-from fleet2d.algorithms.patches import Patches, patches_of, whole_rooms
 from fleet2d.artifacts.layers import layer_rows, layer_table
 from fleet2d.configuration.components import Component
 from fleet2d.configuration.problems import suggest

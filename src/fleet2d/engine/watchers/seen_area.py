@@ -4,7 +4,7 @@ from collections.abc import Collection, Sequence
 
 import numpy as np
 
-from fleet2d.algorithms.patches import Patches
+from fleet2d.algorithms.evidence import Patches
 from fleet2d.engine.bodies import Bodies
 from fleet2d.engine.watchers.watcher import Watcher
 from fleet2d.entities.behavior import Actor

@@ -5,9 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from fleet2d.algorithms.algorithm import Present
+from fleet2d.algorithms.algorithm import Present, RoomDistribution
 from fleet2d.algorithms.history import History
-from fleet2d.algorithms.output import RoomDistribution
 from fleet2d.algorithms.presence.belief import BeliefSeries, Presence
 from fleet2d.errors import ComponentError
 from fleet2d.kernels import F64, I64

@@ -6,7 +6,7 @@ the same on every machine.
 
 import numpy as np
 
-from fleet2d.algorithms.presence.logarithm import LN_2, natural_log
+from fleet2d.algorithms.presence.estimator import LN_2, natural_log
 from fleet2d.kernels import F64
 from fleet2d.kernels.presence import earth_mover as minimal_cost
 

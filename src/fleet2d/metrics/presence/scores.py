@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fleet2d.algorithms.presence.logarithm import natural_log
+from fleet2d.algorithms.presence.estimator import natural_log
 from fleet2d.kernels import F64, I64
 from fleet2d.runtime.determinism import sum_in_order
 

@@ -3,7 +3,7 @@
 import numpy as np
 from tests.sight.watching import agree
 
-from fleet2d.algorithms.activities import ROBOT, Activities, ActivitySense
+from fleet2d.algorithms.observations import ROBOT, Activities, ActivitySense
 from fleet2d.kernels.sight import SightingColumn as Column
 
 KEYS = np.array([3, 4], np.uint64)

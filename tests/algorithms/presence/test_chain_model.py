@@ -5,8 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fleet2d.algorithms.presence.chain_model import steps_of
-from fleet2d.algorithms.presence.habits import Habits
+from fleet2d.algorithms.presence.chain_model import Habits, steps_of
 from fleet2d.kernels.presence import StayModel
 
 PLACES = 4

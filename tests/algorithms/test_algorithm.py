@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fleet2d import RoomDistribution
-from fleet2d.algorithms.output import to_columns
+from fleet2d.algorithms.algorithm import to_columns
 from fleet2d.errors import ComponentError
 
 
