@@ -9,8 +9,9 @@ import pytest
 from tests.scenes import everything, scenario
 
 import fleet2d
-from fleet2d.engine.interventions import OUTSIDE, DueIntervention, read_intervention
+from fleet2d.engine.interventions import OUTSIDE, DueIntervention, read_record
 from fleet2d.errors import InputError, PlacementError, ScenarioError
+from fleet2d.interventions.intervention import parse_intervention
 from fleet2d.runtime.events import Event
 
 
@@ -211,5 +212,6 @@ def test_a_branch_keeps_what_was_done_and_what_is_to_be_done() -> None:
 
 def test_interventions_are_read_as_they_are_written() -> None:
     content = {"do": "put", "step": 3, "entity": "ana", "to": [1.5, 2.0], "heading_deg": 5.0}
-    step, act = read_intervention(content)
+    step, fields = read_record(content)
+    act = parse_intervention(fields)
     assert content == DueIntervention(step, OUTSIDE, 0, act).record

@@ -2,7 +2,8 @@
 
 Interventions from outside are recorded with their steps, so that a run can be repeated from its
 manifest. Those of the scenario's script are recorded for readers, with their place in the script:
-when the run is repeated, the scenario applies them again.
+when the run is repeated, the scenario applies them again. The manifest of an unfinished run has the
+requests from outside, also those that still wait for a time or an event.
 """
 
 from bisect import insort
@@ -15,8 +16,8 @@ from fleet2d.interventions.intervention import (
     Intervention,
     Lasting,
     dump_intervention,
-    parse_intervention,
 )
+from fleet2d.interventions.script import WHEN
 from fleet2d.interventions.when import Trigger
 from fleet2d.runtime.clock import Clock
 from fleet2d.runtime.events import Event
@@ -31,7 +32,7 @@ class DueIntervention(NamedTuple):
     Attributes:
         step: The step.
         rank: ENDS, SCRIPT or OUTSIDE.
-        number: Its order within a rank: its place in the script, or the order of requests.
+        number: Its order within a rank: its place in the script or among the requests.
         act: The intervention.
         by: Its place in the scenario, like "script.0"; empty for one from outside.
     """
@@ -52,7 +53,7 @@ class DueIntervention(NamedTuple):
         """The entry of the manifest.
 
         Example:
-            >>> DueIntervention(60, OUTSIDE, 0, read_intervention({"replan": "astro"})[1]).record
+            >>> DueIntervention(60, OUTSIDE, 0, parse_intervention({"replan": "astro"})).record
             {'do': 'replan', 'step': 60, 'entity': 'astro'}
         """
         fields = dump_intervention(self.act)
@@ -68,6 +69,7 @@ class PendingIntervention:
         trigger: The event.
         repeats: Whether it is applied at every such event, not only at the first.
         delay_us: Time from the event to the intervention [us].
+        since: The first step whose events count: earlier ones may become known later.
         act: The intervention.
         rank, number, by: See `DueIntervention`.
         last: The last step for which it was put into the queue; -1: none.
@@ -76,6 +78,7 @@ class PendingIntervention:
     trigger: Trigger
     repeats: bool
     delay_us: int
+    since: int
     act: Intervention
     rank: int
     number: int
@@ -93,40 +96,31 @@ class Interventions:
 
     Attributes:
         done: Records of those that were applied, in order, for the manifest.
+        requests: Records of all that was requested from outside, in order: at once at a step, or
+            at a time or on an event after it.
         waiting: Those that wait for an event.
         lasting: Those with a duration that are active, in the order of their begin.
     """
 
     def __init__(self, clock: Clock) -> None:
         self.done: list[dict[str, Any]] = []
+        self.requests: list[dict[str, Any]] = []
         self.waiting: list[PendingIntervention] = []
         self.lasting: list[Lasting] = []
         self._clock = clock
         self._queue: list[DueIntervention] = []
-        self._count = 0
+        self._ends = 0
+        self._origins: list[str] = []  # of `done`: empty for what was requested to happen at once
 
-    def next_number(self) -> int:
-        """Return a number above all earlier ones."""
-        self._count += 1
-        return self._count
+    def request(self, act: Intervention, step: int) -> None:
+        """Schedule an intervention from outside at a step, after all earlier requests."""
+        due = DueIntervention(step, OUTSIDE, len(self.requests), act)
+        self.requests.append(due.record)
+        self.add(due)
 
-    def repeat(self, records: Sequence[Mapping[str, Any]]) -> None:
-        """Schedule the interventions in the records of another run."""
-        for record in records:
-            step, intervention = read_intervention(record)
-            self.add(intervention, step)
-
-    def add(
-        self,
-        act: Intervention,
-        step: int,
-        rank: int = OUTSIDE,
-        number: int | None = None,
-        by: str = "",
-    ) -> None:
-        """Schedule an intervention at a step, after those of its rank that were added before."""
-        number = self.next_number() if number is None else number
-        insort(self._queue, DueIntervention(step, rank, number, act, by), key=lambda due: due[:3])
+    def add(self, due: DueIntervention) -> None:
+        """Schedule an intervention."""
+        insort(self._queue, due, key=lambda due: due[:3])
 
     def next_due(self) -> int | None:
         """Return the step of the next intervention; None if none is scheduled."""
@@ -144,10 +138,21 @@ class Interventions:
             yield due
             if due.ends:
                 continue
+            self._record(due)
+            if due.act.lasts is not None and any(act is due.act for act in self.lasting):
+                ends_us = due.step * self._clock.step_us + micros(due.act.lasts)
+                ends = max(self._clock.step_at_or_after(ends_us), due.step + 1)
+                self._ends += 1
+                self.add(DueIntervention(ends, ENDS, self._ends, due.act))
+
+    def _record(self, due: DueIntervention) -> None:
+        request = self.requests[due.number] if due.rank == OUTSIDE else None
+        if request is not None and WHEN.isdisjoint(request):
+            self.done.append(request)
+            self._origins.append("")
+        else:
             self.done.append(due.record)
-            if due.act.lasts is not None:
-                ends = due.step * self._clock.step_us + micros(due.act.lasts)
-                self.add(due.act, max(self._clock.step_at_or_after(ends), due.step + 1), ENDS)
+            self._origins.append(due.by if request is None else f"request.{due.number}")
 
     def undo(self, applies: Callable[[Lasting], bool]) -> list[Lasting]:
         """Remove the active interventions to which a condition applies, and return them."""
@@ -156,6 +161,11 @@ class Interventions:
             self._forget(act)
             self._queue = [due for due in self._queue if not (due.ends and due.act is act)]
         return removed
+
+    def leave_out(self, act: Intervention) -> None:
+        """Note that an intervention, the last that `take` yielded, could not be applied."""
+        if isinstance(act, Lasting):
+            self._forget(act)
 
     def _forget(self, act: Lasting) -> None:
         """Remove an active intervention, by identity: another may be equal to it."""
@@ -173,29 +183,39 @@ class Interventions:
         """
         for event in events:
             for waiting in self.waiting:
-                if waiting.is_over or not waiting.trigger.fits(event):
+                is_early = event.step < waiting.since
+                if is_early or waiting.is_over or not waiting.trigger.fits(event):
                     continue
                 after = event.step * self._clock.step_us + waiting.delay_us
                 step = max(self._clock.step_at_or_after(after), event.step + 1)
                 if step != waiting.last:
-                    self.add(waiting.act, step, waiting.rank, waiting.number, waiting.by)
+                    rank, number, by = waiting.rank, waiting.number, waiting.by
+                    self.add(DueIntervention(step, rank, number, waiting.act, by))
                     waiting.last = step
 
     @property
     def records(self) -> list[dict[str, Any]]:
-        """Records of what was applied, and of what is scheduled from outside."""
-        return [*self.done, *(due.record for due in self._queue if due.rank == OUTSIDE)]
+        """Records of an unfinished run: what has followed from a script or request, and requests.
+
+        An intervention that was requested to happen at once is its request.
+        """
+        followed = [
+            {**record, "by": origin}
+            for record, origin in zip(self.done, self._origins, strict=True)
+            if origin
+        ]
+        return [*followed, *self.requests]
 
 
-def read_intervention(content: Mapping[str, Any]) -> tuple[int, Intervention]:
-    """Return the step and the intervention of a record in a manifest.
+def read_record(content: Mapping[str, Any]) -> tuple[int, dict[str, Any]]:
+    """Return the step of a record in a manifest, and what happens as `parse_intervention` reads it.
 
     Example:
-        >>> read_intervention({"do": "replan", "step": 60, "entity": "astro"})[0]
-        60
+        >>> read_record({"do": "replan", "step": 60, "entity": "astro"})
+        (60, {'do': 'replan', 'entity': 'astro'})
     """
     fields = {key: value for key, value in content.items() if key not in ("step", "by")}
-    return int(content.get("step", 0)), parse_intervention(fields)
+    return int(content.get("step", 0)), fields
 
 
 def is_from_outside(content: Mapping[str, Any]) -> bool:

@@ -12,7 +12,7 @@ from fleet2d.algorithms.log import Log
 from fleet2d.engine.control.world import EngineWorld
 from fleet2d.engine.state import State
 from fleet2d.entities.behavior import Situation
-from fleet2d.errors import blame
+from fleet2d.errors import InputError, blame
 from fleet2d.floorplan.home.change import HomeChanges
 
 
@@ -32,7 +32,10 @@ class Span:
 
 
 def intervene(state: State, span: Span) -> None:
-    """Apply the interventions that are due at this step."""
+    """Apply the interventions that are due at this step.
+
+    One that has become impossible since it was requested is left out, with a note in the manifest.
+    """
     due = state.interventions.next_due()
     if due is None or due > span.first:
         return
@@ -40,8 +43,14 @@ def intervene(state: State, span: Span) -> None:
     for item in state.interventions.take(span.first):
         if item.ends:
             item.act.end(world)
-        else:
+            continue
+        try:
+            item.act.check(world)
             item.act.begin(world)
+        except InputError as error:
+            state.interventions.leave_out(item.act)
+            source = item.by or f"the intervention {item.act.type_name}"
+            state.store.manifest.notes.append(f"step {span.first}: {source} was left out: {error}")
     if state.interventions.waiting:  # maybe for fewer events now
         state.wait_for(state.requested)
 

@@ -8,7 +8,7 @@ from fleet2d.artifacts.store import RunStore
 from fleet2d.configuration.problems import suggest
 from fleet2d.engine.basis import Basis
 from fleet2d.engine.bodies import Bodies
-from fleet2d.engine.control.script import schedule
+from fleet2d.engine.control.script import schedule_script
 from fleet2d.engine.home_changes import Changes
 from fleet2d.engine.interventions import Interventions
 from fleet2d.engine.learners import Learners
@@ -97,7 +97,7 @@ def set_up(scenario: Scenario, clock: Clock, seed: int, store: RunStore) -> Stat
     for index, entry in enumerate(scenario.script):
         path = f"script.{index}"
         with _locate_errors(scenario, path), _prefix_errors(path):
-            schedule(state, entry, 0, index)
+            schedule_script(state, entry, index)
     for name, expectation in scenario.expect.items():
         # It imports much that other scenarios don't need.
         from fleet2d.engine.expectations.expect import expect

@@ -12,6 +12,7 @@ from fleet2d.artifacts.manifest import Status
 from fleet2d.artifacts.store import RunStore
 from fleet2d.artifacts.unfinished import UnfinishedRun
 from fleet2d.configuration.trust import current_trust, restrict
+from fleet2d.engine.control.script import repeat
 from fleet2d.engine.expectations.verdicts import Judging
 from fleet2d.engine.interventions import is_from_outside
 from fleet2d.engine.lifecycle import (
@@ -103,7 +104,7 @@ class Simulation(Judging):
         self._state = set_up(self.scenario, self.clock, self.seed, self._store)
         # The scenario's own script repeats its interventions itself.
         outside = [dict(record) for record in interventions if is_from_outside(record)]
-        self._state.interventions.repeat(outside)
+        repeat(self._state, outside)
         self._pace: Pace | None = None
         self._is_stopping = self._has_failed = False
         self._run: Run | None = None  # set when it is finished
@@ -155,10 +156,13 @@ class Simulation(Judging):
         return run
 
     def catch_up(self, interventions: Sequence[Mapping[str, Any]]) -> None:
-        """Repeat the interventions from outside after the checkpoint of the run."""
-        records = self._state.interventions.records
+        """Repeat the interventions that were requested after the checkpoint of the run."""
         outside = [record for record in interventions if is_from_outside(record)]
-        self._state.interventions.repeat([record for record in outside if record not in records])
+        repeat(self._state, outside[len(self._state.interventions.requests) :])
+
+    def _keep_requests(self) -> None:
+        if self._keeper is not None:
+            self._keeper.update_manifest(self._state)
 
     def __deepcopy__(self, memo: dict[int, object]) -> Self:
         """Return an independent copy of the simulation.

@@ -14,6 +14,7 @@ from typing import Protocol
 
 from fleet2d.configuration.units import micros
 from fleet2d.entities.behavior import Actor, Behavior, Command, SightEvent, Situation, holds
+from fleet2d.entities.body import Pose
 from fleet2d.entities.giving_way import JUST_WAITED, GivesWay, Surroundings, WaitForPeople, resumed
 from fleet2d.entities.place import Point, RoomChoice
 from fleet2d.entities.plan import Plan
@@ -308,6 +309,7 @@ class DecidingActor(Actor):
         arbiter: Asks its behaviors.
         order: The order that decides in place of its behaviors; None: there is none.
         is_stuck: Whether it can't move, whatever its behaviors or an order want.
+        is_displaced: Whether it was ever put somewhere: it may be where no way leads out.
         passes_until: Before that step it goes round people, and may come near without touching.
     """
 
@@ -315,7 +317,7 @@ class DecidingActor(Actor):
         super().__post_init__()
         self.arbiter = Arbiter(self.behaviors)
         self.order: Order | None = None
-        self.is_stuck = False
+        self.is_stuck = self.is_displaced = False
         self.passes_until = 0
         self._chosen: Plan | None = None  # by `choose` or `goes_on`, for the next `decide`
         self._waiting: WaitForPeople | None = None
@@ -325,11 +327,18 @@ class DecidingActor(Actor):
 
     def choose(self, plan: Plan) -> None:
         """Set the plan that its next decision, which is due now, results in."""
-        self._chosen, self._waiting = plan, None
+        self._chosen, self._waiting, self.order = plan, None, None
 
     def obey(self, order: Order | None, step: int) -> None:
         """Follow an order from a step on, in place of its behaviors; None: follow them again."""
         self.order, self._waiting, self.arbiter.own = order, None, frozenset()
+        self._chosen = None
+        self.decide_anew(step)
+
+    def put(self, pose: Pose, step: int) -> None:
+        """Be at a pose from a step on, and decide anew there: a plan from elsewhere is void."""
+        self.state, self._chosen, self._waiting = pose, None, None
+        self.is_displaced, self.part = True, self._present_part()
         self.decide_anew(step)
 
     def decide_anew(self, step: int) -> None:
@@ -473,11 +482,15 @@ class DecidingActor(Actor):
         self.ask(min(steps, default=None))
 
     def _ask_behavior(self, behavior: Behavior | Order, now: Situation) -> Plan | None:
-        """Return the plan of a behavior or an order; one to wait if a door or a cost blocks it."""
+        """Return the plan of a behavior or an order.
+
+        Where a place can't be reached because the home has changed, or the body was put elsewhere,
+        it is a plan to wait: the way may open again.
+        """
         try:
             return behavior.decide(now)
         except (PlacementError, NoWayError) as error:
-            if not self.home.hinders:
+            if not (self.home.hinders or self.home.version or self.is_displaced):
                 raise
             plan, reason = now.plan(), str(error)
             if self._blocked != (reason, now.step):  # else the row was written before the wait

@@ -58,14 +58,13 @@ class Put(BodyIntervention):
         """
         actor = body(world, self.entity)
         x, y = self._place(actor, world)
-        part = actor.space.part_at(x, y)
-        if part < 0:
+        if actor.space.part_at(x, y) < 0:
             x_m, y_m = actor.home.plan.lattice.to_metres((x, y)).round(2).tolist()
             raise PlacementError(
                 f"{actor.path}: there is no room for its body at ({x_m:g}, {y_m:g}) m"
             )
         heading = heading_of(self.heading_deg)
-        world.move(actor, Pose(x, y, actor.state.heading if heading is None else heading, 0), part)
+        world.move(actor, Pose(x, y, actor.state.heading if heading is None else heading, 0))
 
     def _place(self, actor: Actor, world: World) -> tuple[int, int]:
         item = None if is_point(self.to) else furniture_of(actor, self.to)
@@ -153,10 +152,24 @@ class Decide(BodyIntervention):
 
     plan: Annotated[dict[str, Any], AfterValidator(check_data)]
 
+    def check(self, world: World) -> None:
+        """Refuse a plan that the body can't follow."""
+        plan_of(body(world, self.entity), world.step, self.plan)
+
     def begin(self, world: World) -> None:
-        """Let the body follow the plan from the present step on."""
-        actor = body(world, self.entity)
-        actor.choose(plan_of(actor, world.step, self.plan))
+        """Let the body follow the plan from the present step on, and from where it begins.
+
+        The body may have been put elsewhere at the same step, after the plan was made.
+        """
+        actor, rows = body(world, self.entity), self.plan["rows"]
+        plan = plan_of(actor, world.step, self.plan)
+        if rows and rows[0][0] == world.step * world.clock.step_us:
+            _, x, y, heading, away = rows[0]
+            begin = Pose(x, y, heading % TURN, away)
+            if begin != actor.state:
+                world.move(actor, begin)
+                plan = plan_of(actor, world.step, self.plan)
+        actor.choose(plan)
         actor.decide_anew(world.step)
 
 

@@ -19,7 +19,7 @@ from fleet2d.interventions.intervention import Intervention, Verb
 from fleet2d.interventions.when import ClockTime, On, When
 
 # The keys that stand beside those of an intervention.
-WHEN = ("at", "on", "each", "delay")
+WHEN = frozenset({"at", "on", "each", "delay"})
 
 
 class Entry(Settings):

@@ -71,8 +71,8 @@ class World(Protocol):
     def replace(self, algorithm: str, output: object) -> None:
         """Let all but metrics read another output of an algorithm; see `Learners.replace`."""
 
-    def move(self, actor: DecidingActor, pose: Pose, part: int) -> None:
-        """Put a body at a pose in a part of its space, where it decides anew."""
+    def move(self, actor: DecidingActor, pose: Pose) -> None:
+        """Put a body at a pose, where it decides anew."""
 
     def drive(self, actor: DecidingActor) -> None:
         """Let a body follow only plans from outside from now on, not its behaviors."""

@@ -1,12 +1,16 @@
 """Commands that show runs: view, film, report."""
 
+from datetime import datetime, timedelta
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from fleet2d.errors import InputError, RunDirectoryError
 from fleet2d.options import ThemeChoice, TrustFiles, TrustFolders, restrict_to, split
+
+if TYPE_CHECKING:
+    from fleet2d.runs.run import Run
 
 
 def view(
@@ -41,7 +45,7 @@ def view(
     from fleet2d.viewer.server.live import watch_scenario
 
     with restrict_to(trust, trust_dir):
-        watch_scenario(
+        run = watch_scenario(
             scenario,
             overrides,
             seed=seed,
@@ -50,6 +54,23 @@ def view(
             open_browser=browser,
             announce=_announce,
         )
+    typer.echo(_where(run), err=True)
+    raise typer.Exit(130)
+
+
+def _where(run: "Run") -> str:
+    """Return a line that says how a run that was watched ended, and where it is."""
+    if run.directory is None:
+        return f"the run is {run.status}; it is not stored: name a directory by --out"
+    if run.status == "complete":
+        return f"stored in {run.directory}"
+    time = datetime.fromisoformat(run.manifest["start"]) + timedelta(
+        seconds=run.manifest["simulated_s"]
+    )
+    return (
+        f"interrupted at {time:%Y-%m-%d %H:%M}; what was simulated until then is in"
+        f" {run.directory}: continue it by `fleet2d resume {run.directory}`"
+    )
 
 
 def _view_runs(directories: list[Path], port: int, *, browser: bool) -> None:
@@ -64,6 +85,7 @@ def _view_runs(directories: list[Path], port: int, *, browser: bool) -> None:
         if not (path / FILE_NAME).exists():
             raise RunDirectoryError(f"{path} holds no run: give what `fleet2d run --out` wrote")
     PageServer(directories, port=port).show(open_browser=browser, announce=_announce)
+    raise typer.Exit(130)
 
 
 def _import_code(directories: list[Path]) -> None:

@@ -117,7 +117,7 @@ def test_robot_that_is_called_comes_and_stays(live: LiveRun) -> None:
     live.end()
     assert live.run is not None
     actions = [entry["do"] for entry in live.run.manifest["interventions"]]
-    assert ["drive", "decide", "decide"] == actions
+    assert ["send", "send"] == actions
 
 
 def test_steered_run_is_reproduced_from_its_manifest(tmp_path: Path) -> None:

@@ -11,16 +11,14 @@ from pydantic import ValidationError
 from fleet2d.algorithms.algorithm import Algorithm
 from fleet2d.configuration.problems import refusal, suggest
 from fleet2d.configuration.units import micros, parse_duration
-from fleet2d.engine.control.script import schedule
-from fleet2d.engine.control.world import EngineWorld
+from fleet2d.engine.control.script import request
 from fleet2d.engine.state import State
 from fleet2d.entities.decisions import DecidingActor
 from fleet2d.entities.plan import Plan, data_of
 from fleet2d.errors import InputError, ScenarioError
 from fleet2d.floorplan.home.change import HomeChange
 from fleet2d.floorplan.home.home import Home
-from fleet2d.interventions.intervention import Intervention, parse_intervention
-from fleet2d.interventions.script import WHEN, parse_entry
+from fleet2d.interventions.intervention import Intervention
 from fleet2d.interventions.verbs import Verbs
 from fleet2d.kernels.numbers import in_radians
 from fleet2d.runs.run import Run
@@ -47,6 +45,10 @@ class Steering(Verbs):
         self, end: int, on_progress: Callable[[Any], None] | None = None, spans: int | None = None
     ) -> None:
         """Simulate up to a step, or a number of spans."""
+
+    @abstractmethod
+    def _keep_requests(self) -> None:
+        """Write what was requested to the manifest of a run in a directory."""
 
     # State
 
@@ -262,13 +264,8 @@ class Steering(Verbs):
         """
         if self._run is not None:
             raise InputError("the run is finished: nothing can be done to it any more")
-        if isinstance(act, Mapping) and not act.keys().isdisjoint(WHEN):
-            schedule(self._state, parse_entry(act), self.step)
-            return
-        if isinstance(act, Mapping):
-            act = parse_intervention(act)
-        act.check(EngineWorld(self._state, self.step))
-        self._state.interventions.add(act, self.step)
+        if request(self._state, act, self.step):
+            self._keep_requests()
 
     def change(self, change: HomeChange | None = None, /, **keys: Any) -> None:
         """Change the home at the present step: ``simulation.change(shut="bath_door")``.

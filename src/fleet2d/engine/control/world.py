@@ -101,11 +101,10 @@ class EngineWorld:
         """Let all but metrics read another output of an algorithm; see `Learners.replace`."""
         self._state.learners.replace(algorithm, output)
 
-    def move(self, actor: DecidingActor, pose: Pose, part: int) -> None:
-        """Put a body at a pose in a part of its space, where it decides anew."""
+    def move(self, actor: DecidingActor, pose: Pose) -> None:
+        """Put a body at a pose, where it decides anew."""
         self._state.recorder.move_body(actor.row, self.step)
-        actor.state, actor.part = pose, part
-        actor.decide_anew(self.step)
+        actor.put(pose, self.step)
 
     def drive(self, actor: DecidingActor) -> None:
         """Let a body follow only plans from outside from now on, not its behaviors."""

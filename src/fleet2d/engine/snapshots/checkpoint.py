@@ -157,7 +157,7 @@ class CheckpointWriter:
         state.settle(step)
         state.recorder.drain()
         began = time.perf_counter()
-        self._update_manifest(state)
+        self.update_manifest(state)
         commit = self._store.commit(step, sync=sync)
         state.recorder.wall_s += time.perf_counter() - began
         self._next_commit = time.monotonic() + COMMIT_S
@@ -196,7 +196,7 @@ class CheckpointWriter:
             time.monotonic() + WAITING_S,
         )
 
-    def _update_manifest(self, state: State) -> None:
+    def update_manifest(self, state: State) -> None:
         """Update the interventions and the inputs in the manifest."""
         manifest = self._store.manifest
         has_inputs = manifest.add_inputs(state.interruptions.files)

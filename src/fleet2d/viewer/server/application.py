@@ -37,6 +37,9 @@ class LiveRoutes(Protocol):
     def routes(self) -> list[Route]:
         """Return its routes."""
 
+    def end_streams(self) -> None:
+        """End all open responses; called in the handler of a signal."""
+
 
 class ServedRuns:
     """The runs that are served; each is opened when it is first requested."""

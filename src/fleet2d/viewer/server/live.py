@@ -31,6 +31,7 @@ MOST_WAITING = 4_000  # frames in the queue of a page
 MOST_BODY = 4_096  # bytes of an order
 ORDER_WAIT_S = 10.0
 IDLE_S = 0.1
+FRAME_WAIT_S = 0.5  # less than the server waits for open responses when it ends
 ACTIONS = get_args(get_type_hints(LiveOrder)["action"])
 
 
@@ -60,7 +61,7 @@ class LiveRun:
         self._orders: queue.Queue[tuple[LiveOrder, queue.Queue[str]]] = queue.Queue()
         self._watchers: list[queue.Queue[LiveFrame]] = []
         self._lock = threading.Lock()
-        self._is_ending = False
+        self._is_ending = self._streams_end = False
         self._frame = self._state()
         self._thread = threading.Thread(target=self._run_loop, daemon=True, name="fleet2d-live")
 
@@ -185,16 +186,16 @@ class LiveRun:
                     watcher.put(frame)
 
     def frames(self) -> Iterator[list[LiveFrame]]:
-        """Yield the frames of the run from now on, in batches; an empty batch after a second."""
+        """Yield the frames of the run from now on, in batches; empty ones while there are none."""
         watcher: queue.Queue[LiveFrame] = queue.Queue()
         with self._lock:
             self._watchers.append(watcher)
             watcher.put({**self._frame, "events": [], "marks": []})
         try:
-            while not self._is_ending:
+            while not (self._is_ending or self._streams_end):
                 frames = []
                 try:
-                    frames.append(watcher.get(timeout=1.0))
+                    frames.append(watcher.get(timeout=FRAME_WAIT_S))
                 except queue.Empty:
                     yield []
                     continue
@@ -205,6 +206,10 @@ class LiveRun:
         finally:
             with self._lock:
                 self._watchers.remove(watcher)
+
+    def end_streams(self) -> None:
+        """Let all `frames` end, though the simulation goes on; no lock, as a signal calls it."""
+        self._streams_end = True
 
     def routes(self) -> list[Route]:
         """Return the routes of a running simulation."""
@@ -275,7 +280,7 @@ def watch_scenario(
     open_browser: bool = True,
     announce: Callable[[str], None] = print,
 ) -> Run:
-    """Run a scenario while it is watched; return the run once it is closed.
+    """Run a scenario while it is watched, until Ctrl-C; return the run as it is then.
 
     Args:
         scenario: As for ``fleet2d.run``.

@@ -25,6 +25,7 @@ MOST_CORNERS = 60
 class LiveEngine:
     """A running simulation.
 
+    A body that a page has called stays where it was called or placed last, until the next call.
     Watching has no effect on the run: its artifacts are the same, watched or not.
     """
 
@@ -163,21 +164,15 @@ class LiveEngine:
             )
         elif order["action"] == "place":
             self.simulation.put(name, self._near(name, place))
+            if name in self._called:
+                self.simulation.hold(name)
         elif order["action"] == "call":
-            self._call(name, place)
+            self.simulation.send(name, self._near(name, place))
+            self._called.add(name)
         elif order["action"] == "replan":
             self.simulation.replan(name)
         else:
             raise InputError(f"there is no intervention {order['action']!r}")
-
-    def _call(self, name: str, place: tuple[float, float]) -> None:
-        """Send a body to a place, where it stays; from then on it moves only by such calls."""
-        near = self._near(name, place)
-        if name not in self._called:
-            self.simulation.drive(name)
-            self._called.add(name)
-        plan = self.simulation.plan(name).go_to(near).stay()
-        self.simulation.decide(name, plan)
 
     def _near(self, name: str, place: tuple[float, float]) -> tuple[float, float]:
         """Return the free place for a body that is nearest to a point [m].

@@ -5,7 +5,9 @@ import socket
 import threading
 import webbrowser
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from pathlib import Path
+from types import FrameType
 
 from fleet2d.errors import InputError, extra
 
@@ -19,6 +21,20 @@ from fleet2d.viewer.server.guard import new_token
 
 HOST = "127.0.0.1"
 MOST_RUNS = 4
+
+
+class _Server(uvicorn.Server):
+    """A server that ends the streams of a running simulation, which else would keep it open."""
+
+    def __init__(self, config: uvicorn.Config, live: LiveRoutes | None) -> None:
+        super().__init__(config)
+        self._live = live
+
+    def handle_exit(self, sig: int, frame: FrameType | None) -> None:
+        """End the server on a signal."""
+        if self._live is not None:
+            self._live.end_streams()
+        super().handle_exit(sig, frame)
 
 
 class PageServer:
@@ -55,17 +71,19 @@ class PageServer:
         self.address = f"http://{HOST}:{self._port}/{token}/"
         self._runs = ServedRuns(sources)
         app = page_app(self._runs, token, self._port, live)
+        # Quiet: a page that is open when the server ends is no error.
         config = uvicorn.Config(
-            app, log_level="error", lifespan="off", ws="none", timeout_graceful_shutdown=1
+            app, log_level="critical", lifespan="off", ws="none", timeout_graceful_shutdown=1
         )
-        self._server = uvicorn.Server(config)
+        self._server = _Server(config, live)
 
     def show(self, *, open_browser: bool, announce: Callable[[str], None]) -> None:
         """Announce the address of the page, open a browser if requested, serve until Ctrl-C."""
         announce(self.address)
         if open_browser:
             webbrowser.open(self.address)
-        self.run()
+        with suppress(KeyboardInterrupt):
+            self.run()
 
     def run(self) -> None:
         """Serve until Ctrl-C."""

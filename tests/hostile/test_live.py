@@ -1,0 +1,331 @@
+"""Runs that are changed from outside: no order of interventions fails them, no kill loses one."""
+
+import json
+import signal
+import subprocess
+import sys
+import threading
+import time
+import urllib.request
+from collections.abc import Callable
+from datetime import timedelta
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from tests.engine.test_resume import cut_off
+from tests.scenes import AGENDA, OWN, scenario
+from tests.thorough import examples
+
+import fleet2d
+from fleet2d.errors import InputError
+
+USERS = ("ana", "ben", "gina")
+ROBOTS = ("astro", "bolt")
+BODIES = (*USERS, *ROBOTS)
+# The storage has no door: a body that is put there can't leave it.
+PLACES = (
+    "kitchen",
+    "bedroom",
+    "bathroom",
+    "living_room",
+    "storage",
+    "any",
+    (1.0, 3.0),
+    (10.0, 1.0),
+)
+CAMERA = {"range": [0.2, 4], "angle_deg": 120, "detection": 0.7, "lost_after": "4 s"}
+
+
+def home(*, doors: bool) -> dict[str, Any]:
+    """People and robots of all kinds; with doors that hinder them, or without."""
+    objects: dict[str, Any] = {
+        "motion": {"type": "motion_sensor", "at": [6.0, 1.0], "range": "3 m"},
+    }
+    if doors:
+        objects |= {
+            "bath_door": {"type": "door", "doorway": "bathroom_0", "closes_after": "10 s"},
+            "bath_contact": {"type": "contact_sensor", "of": "bath_door"},
+        }
+    battery = {
+        "driving": "10 min",
+        "standing": "30 min",
+        "charging": "5 min",
+        "charger": [0.5, 3.5],
+    }
+    behaviors = ["dock", {"type": "come", "stay": "10 s"}, "find", {"type": f"{OWN}:Greet"}]
+    return scenario(
+        "10 min",
+        users={
+            "ana": {"type": "schedule", "days": AGENDA, "rest": "living_room"},
+            "ben": {"type": "meander"},
+            "gina": "guest",
+        },
+        robots={
+            "astro": {
+                "camera": CAMERA,
+                "battery": battery,
+                "behaviors": [*behaviors, {"type": "patrol", "dwell": "20 s"}],
+                "gives_way": {},
+                "perception": {"false_positives": {"per_hour": 1}},
+            },
+            "bolt": {"camera": CAMERA, "type": "follow"},
+        },
+        objects=objects,
+        algorithms={"share": {"type": f"{OWN}:Share", "period": "2 min"}},
+        metrics={"sightings": {"period": "5 min"}},
+    )
+
+
+def any_of(*values: Any) -> st.SearchStrategy[Any]:
+    return st.sampled_from(values)
+
+
+def act(verb: str, names: st.SearchStrategy[Any], **fields: Any) -> st.SearchStrategy[Any]:
+    return st.fixed_dictionaries({verb: names}, optional=fields)
+
+
+users, robots, bodies, places = (any_of(*names) for names in (USERS, ROBOTS, BODIES, PLACES))
+durations = any_of("1 s", "7 s", "3 min")
+lasting = {"duration": durations}
+ACTS = st.one_of(
+    st.builds(dict, put=bodies, to=places),
+    act("send", bodies, **lasting).flatmap(lambda a: places.map(lambda to: {**a, "to": to})),
+    act("hold", bodies, **lasting),
+    act("release", bodies),
+    act("replan", bodies),
+    act("drive", bodies),
+    act("away", users, **lasting),
+    act("call_home", users, to=places, **lasting),
+    act("guest", users, to=places, **lasting),
+    st.builds(dict, activity=users, what=any_of("wash", "breakfast", "read", "nap")),
+    st.builds(dict, activity=users, what=any_of("wash", "nap"), to=places),
+    st.builds(dict, call=robots, to=places),
+    st.builds(dict, call=robots, find=users),
+    st.builds(dict, call=robots, dock=st.just(True)),
+    st.builds(dict, battery=robots, charge=any_of(0.0, 0.01, 0.5, 1.0)),
+    st.builds(dict, switch_off=robots, camera=st.just(True), duration=durations),
+    st.builds(dict, switch_off=bodies, behavior=any_of("patrol", "dock", "follow", "schedule")),
+    st.builds(dict, switch_on=bodies, behavior=any_of("patrol", "dock", "follow", "schedule")),
+    st.builds(dict, fault=robots, wheels=st.just(True), duration=durations),
+    st.builds(dict, fault=robots, dark=st.just(True)),
+    st.builds(dict, fault=robots, detection=any_of("0 %", 0.3)),
+    act("restore", any_of(*ROBOTS, "motion", "share")),
+    st.builds(dict, suppress=robots, user=users, duration=durations),
+    st.builds(dict, mistake=robots, user=users, taken_for=any_of(*USERS, "unknown")),
+    st.builds(dict, inject=robots, user=any_of(*USERS, "unknown"), spot=any_of((1.0, 3.0))),
+    st.builds(dict, stick=any_of("motion"), says=any_of("on", "off", "silent")),
+    act("reset", any_of("share")),
+    st.builds(dict, replace=any_of("share"), frozen=st.just(True), duration=durations),
+    st.builds(dict, replace=any_of("share"), withheld=st.just(True)),
+    act("open", any_of("bath_door")),
+    act("shut", any_of("bath_door")),
+    act("lock", any_of("bath_door")),
+    act("unlock", any_of("bath_door")),
+    st.builds(dict, room=any_of("kitchen_0"), type=any_of("bathroom")),
+)
+WAITS = st.builds(
+    lambda act, event, each, delay: {**act, "on": event, "each": each, "delay": delay},
+    ACTS,
+    any_of("activity", "user_seen", "called", "left_home", ["opened", "bath_door"], "sensor"),
+    st.booleans(),
+    any_of("0 s", "1 s", "9 s"),
+)
+# What is requested, and how many steps are simulated afterwards.
+ORDERS = st.tuples(
+    st.one_of(ACTS, WAITS, st.tuples(st.just("decide"), bodies, places)), any_of(0, 0, 1, 2, 13, 60)
+)
+
+
+def request(run: fleet2d.Simulation, order: Any) -> None:
+    """Request something; nothing may go wrong but that it is refused."""
+    try:
+        if isinstance(order, tuple):
+            _, name, place = order
+            run.drive(name)
+            run.decide(name, run.plan(name).go_to(place).stay(timedelta(seconds=20)))
+        else:
+            run.intervene(order)
+    except InputError:
+        pass
+
+
+@pytest.mark.parametrize("doors", [False, True])
+@settings(max_examples=examples(75))
+@given(orders=st.lists(ORDERS, max_size=12))
+def test_no_intervention_lets_a_run_fail(doors: bool, orders: list[Any]) -> None:
+    """A plan for a body that was then put elsewhere, or a room without a way out, ended the run."""
+    run = fleet2d.Simulation(home(doors=doors))
+    for order, steps in orders:
+        request(run, order)
+        run.advance(steps)
+    stored = run.run()
+    again = fleet2d.Simulation(home(doors=doors), interventions=stored.manifest["interventions"])
+    assert stored.digest == again.run().digest
+
+
+def decide(run: fleet2d.Simulation) -> None:
+    run.drive("astro")
+    run.decide("astro", run.plan("astro").go_to("kitchen").stay())
+
+
+def put(run: fleet2d.Simulation) -> None:
+    run.put("astro", "bedroom")
+
+
+@pytest.mark.parametrize(
+    ("orders", "room"),
+    [
+        ((decide, put), "bedroom_0"),
+        ((put, decide), "kitchen_0"),
+        ((put, decide, put), "bedroom_0"),
+        ((decide, lambda run: run.hold("astro"), put), "bedroom_0"),
+        ((decide, lambda run: run.send("astro", "bathroom")), "bathroom_0"),
+        ((lambda run: run.send("astro", "bathroom"), decide), "kitchen_0"),
+    ],
+)
+def test_the_last_of_several_orders_counts(
+    orders: tuple[Callable[[fleet2d.Simulation], None], ...], room: str
+) -> None:
+    """A plan and then a place at the same step failed the run: it "doesn't begin here and now"."""
+    content = scenario("10 min", robots={"astro": {"type": "patrol"}})
+    run = fleet2d.Simulation(content)
+    run.advance(60)
+    for order in orders:
+        order(run)
+    run.advance(120)
+    assert room == run.state["astro"]["room"]
+    stored = run.run()
+    again = fleet2d.Simulation(content, interventions=stored.manifest["interventions"]).run()
+    assert stored.digest == again.digest
+
+
+def test_an_intervention_that_has_become_impossible_is_left_out() -> None:
+    run = fleet2d.Simulation(home(doors=False))
+    run.advance(10)
+    run.drive("ana")
+    run.activity("ana", "wash")  # by a behavior, which no longer decides
+    stored = run.run()
+    (note,) = (note for note in stored.manifest["notes"] if "left out" in note)
+    assert note.startswith("step 10: the intervention activity was left out: ana has no activity")
+
+
+WAIT = {"on": ["activity", "ana", "wash"], "hold": "astro", "duration": "2 min"}
+LATER = {"at": "07:05", "send": "ana", "to": "kitchen"}
+
+
+@pytest.mark.parametrize("seconds", [1, 300])
+@pytest.mark.parametrize("act", [WAIT, LATER, {**WAIT, "each": True, "delay": "9 s"}])
+def test_what_waits_for_its_time_survives_a_kill(
+    tmp_path: Path, act: dict[str, Any], seconds: int
+) -> None:
+    """An intervention that waited for an event was lost if no checkpoint had been written yet."""
+
+    def steered(**more: Any) -> fleet2d.Simulation:
+        run = fleet2d.Simulation(home(doors=False), **more)
+        run.advance(20)
+        run.intervene(act)
+        return run
+
+    whole = steered().run()
+    assert 1 == len(whole.manifest["interventions"])
+    killed = steered(out=tmp_path / "run")
+    killed.advance(seconds)
+    resumed = fleet2d.resume(cut_off(killed))
+    assert whole.digest == resumed.digest
+    assert whole.manifest["interventions"] == resumed.manifest["interventions"]
+    assert fleet2d.reproduce(tmp_path / "run").same
+
+
+@pytest.mark.parametrize("checkpoint", ["off", "1 min"])
+def test_what_has_happened_after_a_wait_happens_once(tmp_path: Path, checkpoint: str) -> None:
+    """From the last checkpoint on, the wait and its record in the manifest both took effect."""
+
+    def steered(**more: Any) -> fleet2d.Simulation:
+        content = home(doors=False)
+        content["artifacts"]["checkpoint"] = checkpoint
+        run = fleet2d.Simulation(content, **more)
+        run.intervene(WAIT)
+        run.advance(165)
+        run.put("ana", "kitchen")
+        run.advance(10)
+        return run
+
+    whole = steered().run()
+    killed = steered(out=tmp_path / "run")
+    assert killed._keeper is not None
+    killed._keeper.commit(killed._state)
+    resumed = fleet2d.resume(cut_off(killed))
+    assert whole.digest == resumed.digest
+    assert ["hold", "put"] == [act["do"] for act in whole.manifest["interventions"]]
+    assert whole.manifest["interventions"] == resumed.manifest["interventions"]
+
+
+def test_only_events_after_a_request_count() -> None:
+    """What cameras had seen before, which became known late, was taken for the event."""
+    content = home(doors=False)
+    run = fleet2d.Simulation(content)
+    run.advance(400)
+    run.intervene({"on": "user_seen", "replan": "bolt"})
+    stored = run.run()
+    records = stored.manifest["interventions"]
+    assert [] == [record for record in records if record["step"] <= 400]
+    assert stored.digest == fleet2d.Simulation(content, interventions=records).run().digest
+
+
+class Page:
+    """A page of a running simulation, in a process of its own."""
+
+    def __init__(self, out: Path) -> None:
+        command = [sys.executable, "-m", "fleet2d.cli", "view", "bundled:base", "--no-browser"]
+        options = ["--seed", "4", "--out", str(out), "simulation.duration=20 d"]
+        pipe = subprocess.PIPE
+        self.process = subprocess.Popen([*command, *options], stdout=pipe, stderr=pipe, text=True)
+        assert self.process.stdout is not None
+        self.address = self.process.stdout.readline().strip().rstrip("/")
+        self.frames = 0
+
+    def order(self, action: str, target: str = "", value: float = 0, **place: float) -> None:
+        content = {"action": action, "target": target, "value": value, "x": 2.0, "y": 2.0, **place}
+        origin = "/".join(self.address.split("/")[:3])
+        headers = {"content-type": "application/json", "Origin": origin}
+        url, data = f"{self.address}/live/order", json.dumps(content).encode()
+        urllib.request.urlopen(urllib.request.Request(url, data, headers)).read()
+
+    def watch(self) -> None:
+        """Read the stream of frames until the server ends it."""
+        with urllib.request.urlopen(f"{self.address}/live/frames") as stream:
+            for _ in stream:
+                self.frames += 1
+
+
+def test_ctrl_c_with_an_open_page_is_one_line_and_loses_nothing(tmp_path: Path) -> None:
+    """It printed the traceback of the server, and not where the run was."""
+    page = Page(tmp_path / "run")
+    deadline = time.monotonic() + 20
+    while True:  # until the server listens
+        try:
+            page.order("step", value=600)
+            break
+        except OSError:
+            assert time.monotonic() < deadline
+            time.sleep(0.05)
+    watcher = threading.Thread(target=page.watch, daemon=True)
+    watcher.start()
+    for action, x in (("call", 2.0), ("place", 3.0), ("call", 3.5), ("place", 2.0)):
+        page.order(action, "astro", x=x)  # failed the run: four clicks while it was paused
+    page.order("resume")
+    while not page.frames:
+        time.sleep(0.01)
+    page.process.send_signal(signal.SIGINT)
+    _, errors = page.process.communicate(timeout=20)
+    assert 130 == page.process.returncode
+    (line,) = errors.splitlines()
+    assert line.startswith("interrupted at 2026-01-")
+    assert line.endswith(f"continue it by `fleet2d resume {tmp_path / 'run'}`")
+    resumed = fleet2d.resume(tmp_path / "run")
+    orders = ["send", "put", "hold", "send", "put", "hold"]
+    assert orders == [act["do"] for act in resumed.manifest["interventions"]]
+    assert fleet2d.reproduce(tmp_path / "run").same
