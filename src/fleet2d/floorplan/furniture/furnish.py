@@ -50,10 +50,10 @@ class FurnitureRule:
 def furnish(plan: FloorPlan, seed: int = 0, density: float = 1.0) -> FloorPlan:
     """Return a plan with furniture in its rooms, by their types.
 
-    No piece stands within 0.9 m before a doorway, or where it would cut a route: two free places
-    that a body of 0.25 m radius could walk between stay connected, and each piece is reachable. A
-    room that has furniture already, or an unknown type, stays as it is. The same plan and seed give
-    the same furniture on every machine.
+    No piece stands within 0.9 m before a doorway, or where it would cut a route: free places that
+    a body of 0.1 m to 0.25 m radius could walk between stay connected, and each piece is reachable.
+    A room that has furniture already, or an unknown type, stays as it is. The same plan and seed
+    give the same furniture on every machine.
 
     Args:
         plan: The home.

@@ -1,7 +1,11 @@
 """A home while furniture is put into it: its free cells, and the routes that must stay open."""
 
+from collections.abc import Iterable, Sequence
+
 import numpy as np
 import shapely
+from shapely import MultiPolygon, Polygon
+from shapely.geometry.base import BaseGeometry
 
 from fleet2d.floorplan.furniture.room_view import (
     FurnitureGroup,
@@ -12,7 +16,9 @@ from fleet2d.floorplan.furniture.room_view import (
     largest_part,
 )
 from fleet2d.floorplan.geometry.lattice import UNITS_PER_CELL
-from fleet2d.floorplan.home.space import Space
+from fleet2d.floorplan.geometry.mesh import GRID
+from fleet2d.floorplan.home.home import lattice_footprint
+from fleet2d.floorplan.home.space import Space, grow_shape, shrink
 from fleet2d.floorplan.home.standing import BODY_RADIUS, Window, grown_cells, with_approaches
 from fleet2d.floorplan.objects import PlacedObject
 from fleet2d.floorplan.plan import FloorPlan, Room, rings
@@ -22,6 +28,16 @@ from fleet2d.runtime.determinism import Draws
 
 DOOR_CLEARANCE = 0.9
 """Depth of the floor before a doorway that stays empty, on either side [m]."""
+
+THIN_RADIUS = 0.1
+"""The radius of the thinnest body whose routes furniture leaves open [m]."""
+NARROW_RADII = (0.225, 0.2, 0.175, 0.15, 0.125)
+"""Radii between those two, which matter in homes with passages that not every body fits through."""
+CUT_OFF_M2 = 0.25
+"""Furniture may cut off less than this of a body's space, such as a corner behind a bed [m²]."""
+
+# The outlines of the space of a body [lattice], by its radius [m].
+BodySpaces = dict[float, list[Polygon]]
 
 
 class Interior:
@@ -36,13 +52,15 @@ class Interior:
     def __init__(self, plan: FloorPlan) -> None:
         self.plan = plan
         self.objects: list[PlacedObject] = []
-        self.standing: Bool = Space(plan, BODY_RADIUS).part_of_cell >= 0
+        space = Space(plan, BODY_RADIUS)
+        self.standing: Bool = space.part_of_cell >= 0
         self.whole = whole_cells(plan)
         self.doors = door_cells(plan, self.standing)
         self.occupied = np.zeros_like(self.whole)
         self._views: dict[int, RoomView] = {}
         self._main: dict[int, Bool] = {}
         self._approached = np.zeros_like(self.whole)
+        self._spaces = _body_spaces(plan, space)
         for thing in plan.objects:
             window, covered = grown_cells(plan.lattice, thing.footprint, 0.0)
             self.occupied[window] |= covered
@@ -91,12 +109,15 @@ class Interior:
                 window, covered = grown_cells(self.plan.lattice, thing.footprint, BODY_RADIUS)
                 self.standing[window] &= ~covered
                 grown.append(window)
-        usable = None
+        usable = spaces = None
         if self._ways_stay_open(view, before, grown):
             usable = self._usable(view, things)
-        if usable is None:
+        if usable is not None:
+            spaces = self._spaces_with(usable)
+        if usable is None or spaces is None:
             self.standing[view.window] = before
             return False
+        self._spaces = spaces
         for thing in usable:
             self._record(thing)
         return True
@@ -130,6 +151,33 @@ class Interior:
             usable.append(reachable)
         return usable
 
+    def _spaces_with(self, things: list[PlacedObject]) -> BodySpaces | None:
+        """Return the spaces of bodies among further objects, or None if these cut a space in two.
+
+        Cells alone can't tell: between slanted walls, or for a thin body, there may be a way where
+        no two neighboring cells are free.
+        """
+        spaces: BodySpaces = {}
+        for radius, parts in self._spaces.items():
+            blocked = _blocked(self.plan, things, radius)
+            spaces[radius] = []
+            for part in parts:
+                pieces = _pieces(part, blocked)
+                if len(_large(self.plan, pieces)) > 1:
+                    return None
+                spaces[radius] += pieces[:1]
+        uses = [use for thing in (*self.objects, *things) for use in thing.uses]
+        approaches = [use.approach for use in uses if use.approach is not None]
+        if approaches:
+            x, y = self.plan.lattice.to_lattice(approaches).T
+            before, after = (
+                shapely.contains_xy(MultiPolygon(by_radius[BODY_RADIUS]), x, y)
+                for by_radius in (self._spaces, spaces)
+            )
+            if (before & ~after).any():
+                return None
+        return spaces
+
     def _reached(self, view: RoomView) -> Bool:
         """Return the largest connected part of the standing cells in and around a room."""
         index = view.room.index
@@ -148,6 +196,62 @@ class Interior:
             if use.approach is not None:
                 row, column = lattice.cell_of(*lattice.point_at(use.approach))
                 self._approached[row, column] = bool(self.standing[row, column])
+
+
+def _body_spaces(plan: FloorPlan, space: Space) -> BodySpaces:
+    """Return the spaces of bodies among the walls and objects of a plan.
+
+    Args:
+        plan: The plan.
+        space: The space of a body of `BODY_RADIUS` between its walls.
+    """
+
+    def among_objects(radius: float) -> list[Polygon]:
+        polygons = space.polygons
+        if radius != BODY_RADIUS:
+            polygons = shrink(plan.polygons, radius * plan.lattice.units_per_m)
+        blocked = _blocked(plan, plan.objects, radius)
+        return [piece for polygon in polygons for piece in _pieces(polygon, blocked)]
+
+    spaces = {radius: among_objects(radius) for radius in (BODY_RADIUS, THIN_RADIUS)}
+    if _has_narrow_places(plan, spaces):
+        spaces |= {radius: among_objects(radius) for radius in NARROW_RADII}
+    return spaces
+
+
+def _has_narrow_places(plan: FloorPlan, spaces: BodySpaces) -> bool:
+    """Return whether thin bodies get to places, or between places, where large ones don't."""
+    wide, thin = _large(plan, spaces[BODY_RADIUS]), np.array(spaces[THIN_RADIUS], np.object_)
+    inside = np.asarray(shapely.point_on_surface(wide))
+    if (shapely.contains(thin[:, None], inside).sum(axis=1) > 1).any():
+        return True
+    # The octagon of a body reaches up to 8 % farther than its radius.
+    reach = (1.09 * BODY_RADIUS - THIN_RADIUS) * plan.lattice.units_per_m
+    near = MultiPolygon(wide).buffer(reach, join_style="mitre")
+    return any(_large(plan, _pieces(part, near)) for part in thin)
+
+
+def _blocked(plan: FloorPlan, things: Iterable[PlacedObject], radius: float) -> BaseGeometry:
+    """Return where the middle of a body can't be because of objects [lattice]."""
+    # Further by the rounding of a space, so that what is connected here is connected in the space.
+    reach = radius * plan.lattice.units_per_m + GRID
+    solid = [lattice_footprint(plan, thing) for thing in things if thing.blocks != "nothing"]
+    return shapely.union_all([grow_shape(shapely.get_coordinates(s), reach) for s in solid])
+
+
+def _pieces(polygon: Polygon, without: BaseGeometry) -> list[Polygon]:
+    """Return the pieces of a polygon that lie outside of a shape, the largest first."""
+    if not polygon.intersects(without):
+        return [polygon]
+    pieces = shapely.get_parts(shapely.difference(polygon, without)).tolist()
+    polygons = [piece for piece in pieces if piece.geom_type == "Polygon"]
+    return sorted(polygons, key=lambda piece: -piece.area)
+
+
+def _large(plan: FloorPlan, polygons: Sequence[Polygon]) -> list[Polygon]:
+    """Return the polygons [lattice] that furniture may not cut off."""
+    least = CUT_OFF_M2 * plan.lattice.units_per_m**2
+    return [polygon for polygon in polygons if polygon.area >= least]
 
 
 def _hull(slices: list[slice], start: int) -> slice:

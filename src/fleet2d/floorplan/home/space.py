@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import shapely
 from numpy.typing import NDArray
-from shapely import Polygon
+from shapely import MultiPoint, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from fleet2d.errors import FloorPlanError
@@ -45,7 +45,8 @@ class Space:
 
     Attributes:
         radius: The body's radius [m].
-        mesh: Triangles of the space [lattice]; empty when the body fits nowhere.
+        polygons: The space's outlines [lattice].
+        mesh: The same in triangles.
         part_of_cell: The connected part that holds each cell's centre, int32 (rows, columns), -1
             where the body can't be.
         parts: Number of connected parts; part 0 holds the most cells.
@@ -81,13 +82,13 @@ class Space:
         reach = radius * lattice.units_per_m
         blocks = [np.asarray(o.exterior.coords) for o in obstacles]
         blocks += [np.array(segment, np.float64) for segment in shut]
-        polygons = _shrink(plan.polygons, reach, [grow_shape(block, reach) for block in blocks])
+        polygons = shrink(plan.polygons, reach, [grow_shape(block, reach) for block in blocks])
         if not polygons:
             raise FloorPlanError(
                 f"a body of radius {radius:g} m fits nowhere in {plan.name}: give it a smaller"
                 " radius or check the scale of the plan"
             )
-        self._polygons = polygons
+        self.polygons = polygons
         self.mesh: Mesh = build_mesh(polygons, lattice.columns, lattice.rows)
         triangles = rasterize_cells(self.mesh, lattice.rows, lattice.columns)
         part = label_triangles(self.mesh.neighbors)
@@ -230,7 +231,7 @@ class Space:
         """Return the vertices at which the border turns into the space."""
         vertices = self.mesh.vertices
         before, at, after = [], [], []
-        for polygon in self._polygons:
+        for polygon in self.polygons:
             for ring in (polygon.exterior, *polygon.interiors):
                 points = np.asarray(ring.coords)[:-1].astype(np.int64)
                 before.append(np.roll(points, 1, axis=0))
@@ -253,7 +254,7 @@ class Space:
         )
 
 
-def _shrink(
+def shrink(
     polygons: Sequence[Polygon], radius: float, blocked: Sequence[BaseGeometry] = ()
 ) -> list[Polygon]:
     """Shrink polygons by an octagon of at least `radius` to each side.
@@ -293,9 +294,19 @@ def grow_shape(corners: F64, radius: float) -> BaseGeometry:
         corners: Two ends, or the closed ring of an outline, float64 (n, 2).
         radius: The radius of the body [lattice].
     """
-    walls = _grow_walls(corners, _octagon(radius))
-    solid = [Polygon(corners)] if len(corners) > 3 else []
-    return shapely.union_all([*walls, *solid])
+    octagon = _octagon(radius)
+    if len(corners) < 4:
+        return shapely.union_all(_grow_walls(corners, octagon))
+    solid = Polygon(corners)
+    if is_convex(solid):
+        ends = (corners[:-1, None] + octagon).reshape(-1, 2)
+        return MultiPoint(ends).convex_hull
+    return shapely.union_all([*_grow_walls(corners, octagon), solid])
+
+
+def is_convex(polygon: Polygon) -> bool:
+    """Return whether a polygon is convex, but for rounding."""
+    return not polygon.interiors and polygon.area >= polygon.convex_hull.area * (1 - 1e-9)
 
 
 def _grow_walls(ring: F64, octagon: I64) -> NDArray[np.object_]:

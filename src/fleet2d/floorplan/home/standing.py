@@ -8,7 +8,7 @@ import shapely
 from shapely import LineString, Point, Polygon
 
 from fleet2d.floorplan.geometry.lattice import UNITS_PER_CELL, Lattice
-from fleet2d.floorplan.home.space import Space
+from fleet2d.floorplan.home.space import Space, is_convex
 from fleet2d.floorplan.objects import PlacedObject, UsePlace
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.kernels import I64, Bool
@@ -64,7 +64,7 @@ def grown_cells(lattice: Lattice, footprint: Polygon, radius: float) -> tuple[Wi
     reach = radius * lattice.units_per_m + HALF + SLACK
     a, b = int(np.ceil(reach)), int(np.ceil(reach * 0.41421357))
     octagon = np.array([(a, b), (b, a), (-b, a), (-a, b), (-a, -b), (-b, -a), (b, -a), (a, -b)])
-    pieces = [footprint] if _is_convex(footprint) else _triangles(footprint)
+    pieces = [footprint] if is_convex(footprint) else _triangles(footprint)
     hulls = []
     for piece in pieces:
         corners = lattice.to_lattice(shapely.get_coordinates(piece)[:-1])
@@ -167,10 +167,6 @@ def _window(lattice: Lattice, points: I64) -> Window:
     rows = slice(*np.clip((y0, y1 + 1), 0, lattice.rows).tolist())
     columns = slice(*np.clip((x0, x1 + 1), 0, lattice.columns).tolist())
     return rows, columns
-
-
-def _is_convex(footprint: Polygon) -> bool:
-    return not footprint.interiors and footprint.area >= footprint.convex_hull.area * (1 - 1e-9)
 
 
 def _triangles(footprint: Polygon) -> list[Polygon]:
