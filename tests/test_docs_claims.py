@@ -25,8 +25,7 @@ from fleet2d.floorplan.synthetic.source import Synthetic
 from fleet2d.interventions.intervention import verbs
 from fleet2d.kernels.numbers import TURN
 from fleet2d.kernels.space import SUB
-from fleet2d.routines.manners import Manners
-from fleet2d.routines.persona import bundled_names
+from fleet2d.routines.persona import Manners, bundled_names
 from fleet2d.studies.specification import StudyFile
 from fleet2d.testing.rate import rate_test
 

@@ -14,8 +14,9 @@ constexpr std::size_t MOST = 480;  // parts of a day
 
 class InterruptedDay {
 public:
-    InterruptedDay(const InterruptionRules& rules, StepDraws& draws, const std::vector<PlannedDoing>& day)
-        : rules_(rules), draws_(draws), waited_(rules.needs.size(), false) {
+    InterruptedDay(const InterruptionRules& rules, StepDraws& draws, const std::vector<PlannedDoing>& day,
+                   const PrivateRooms* rooms)
+        : rules_(rules), draws_(draws), rooms_(rooms), waited_(rules.needs.size(), false) {
         for (const Need& need : rules.needs) due_.push_back(day.front().begin + draw_part(need.every));
         for (std::size_t k = 0; k < day.size(); ++k) {
             number_ = static_cast<i64>(k);
@@ -155,24 +156,49 @@ private:
         if (latest < doing_.end && latest >= time && time > latest - SHORTEST_REST) time = latest;
         time = std::min(time, latest);
         if (latest < now_ + (fresh_ ? SHORTEST_REST : 0) || result.size() + 2 * steps.size() > MOST) return false;
+        i64 room = ANY_ROOM;
+        const auto is_private = [&](const Timed& step) { return !private_rooms(step.step->activity).empty(); };
+        if (const auto first = std::find_if(steps.begin(), steps.end(), is_private); first != steps.end()) {
+            const std::optional<FreeSlot> slot =
+                free_slot(private_rooms(first->step->activity), time, latest, doing_.end - latest);
+            if (!slot) return false;
+            time = slot->begin;
+            room = slot->room;
+        }
         if (time > now_) go_on(time);
         for (const Timed& step : steps) {
-            result.push_back({-1, step.step->activity, time, time + step.takes, Role::INTERRUPTS});
+            result.push_back({-1, step.step->activity, time, time + step.takes, Role::INTERRUPTS, room});
             time += step.takes;
         }
         now_ = time;
         return true;
     }
 
+    // The rooms where an activity is done alone; none: it isn't.
+    const std::vector<i64>& private_rooms(i64 activity) const {
+        static const std::vector<i64> NONE;
+        return rooms_ ? rooms_->rooms[at(activity)] : NONE;
+    }
+
+    // When one of the rooms is free: at once, if the person is already alone in it.
+    std::optional<FreeSlot> free_slot(const std::vector<i64>& rooms, i64 time, i64 latest, i64 takes) const {
+        const bool is_alone = !private_rooms(doing_.activity).empty();
+        if (is_alone && std::find(rooms.begin(), rooms.end(), doing_.room) != rooms.end()) {
+            return FreeSlot{time, doing_.end, doing_.room};
+        }
+        return rooms_->use.free(rooms, time, latest, takes, doing_.end);
+    }
+
     // Add the planned doing up to a time.
     void go_on(i64 until) {
-        result.push_back({number_, doing_.activity, now_, until, fresh_ ? Role::PLANNED : Role::RESUMES});
+        result.push_back({number_, doing_.activity, now_, until, fresh_ ? Role::PLANNED : Role::RESUMES, doing_.room});
         now_ = until;
         fresh_ = false;
     }
 
     const InterruptionRules& rules_;
     StepDraws& draws_;
+    const PrivateRooms* rooms_;
     Bits bits_;
     std::vector<i64> due_;      // when each need occurs next
     std::vector<bool> waited_;  // whether each need has waited for the end of an activity since it was due
@@ -184,8 +210,9 @@ private:
 
 }  // namespace
 
-std::vector<DayPart> interrupt(const InterruptionRules& rules, StepDraws& draws, const std::vector<PlannedDoing>& day) {
-    return std::move(InterruptedDay(rules, draws, day).result);
+std::vector<DayPart> interrupt(const InterruptionRules& rules, StepDraws& draws, const std::vector<PlannedDoing>& day,
+                               const PrivateRooms* rooms) {
+    return std::move(InterruptedDay(rules, draws, day, rooms).result);
 }
 
 }  // namespace fleet2d

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "random.hpp"
+#include "room_use.hpp"
 
 namespace fleet2d {
 
@@ -53,15 +54,19 @@ struct InterruptionRules {
 
 struct PlannedDoing {
     i64 activity, begin, end;
+    i64 room;
 };
 
 struct DayPart {
     i64 planned;  // number of the planned doing that it is a part of, -1 for an interruption
     i64 activity, begin, end;
     Role role;
+    i64 room;
 };
 
-// A day with interruptions, which has no gap if the planned one has none.
-std::vector<DayPart> interrupt(const InterruptionRules& rules, StepDraws& draws, const std::vector<PlannedDoing>& day);
+// A day with interruptions, which has no gap if the planned one has none. Interruptions for which a room has to be free
+// are put off or left out while others use it.
+std::vector<DayPart> interrupt(const InterruptionRules& rules, StepDraws& draws, const std::vector<PlannedDoing>& day,
+                               const PrivateRooms* rooms = nullptr);
 
 }  // namespace fleet2d

@@ -12,50 +12,26 @@ constexpr i64 MILLION = 1'000'000;
 constexpr int ORDERS = 5;  // drawn before a job is left out
 constexpr i64 ANY = std::numeric_limits<i64>::max();
 
-// Jobs in order; the last ones of `preferred` and `latest` are those of sleep.
-struct Chain {
-    std::vector<std::size_t> jobs;
-    std::vector<i64> preferred;  // the drawn beginning
-    std::vector<i64> latest;     // the latest possible beginning
-};
-
 class Planner {
 public:
-    Planner(const DayPlan& plan, StepDraws& draws, i64 wake, i64 next_wake)
-        : plan_(plan), draws_(draws), wake_(wake), next_wake_(next_wake) {
-        for (const Job& job : plan.jobs) chosen_.push_back(draws.below(MILLION) < job.chance);
-    }
+    Planner(const DayPlan& plan, StepDraws& draws, std::vector<bool> chosen, i64 wake, i64 next_wake)
+        : plan_(plan), draws_(draws), chosen_(std::move(chosen)), wake_(wake), next_wake_(next_wake) {}
 
     std::vector<Doing> day;
 
     // Draw jobs and their order until they fit; returns whether they do.
-    bool run() {
+    bool run(const PrivateRooms* rooms) {
         for (int tries = 1;; ++tries) {
-            const Chain chain = draw_chain(tries % ORDERS == 0);
-            if (fits(chain)) {
-                fill_day(chain);
+            const JobOrder order = draw_order(tries % ORDERS == 0);
+            if (order.fits) {
+                fill_day(order, rooms);
                 return true;
             }
             if (tries % ORDERS == 0 && !leave_out()) return false;
         }
     }
 
-private:
-    const Job& job(std::size_t number) const { return plan_.jobs[number]; }
-
-    // Leave out the least probable job, of equal ones the last; returns whether there is one.
-    bool leave_out() {
-        std::size_t least = plan_.jobs.size();
-        for (std::size_t i = 0; i < plan_.jobs.size(); ++i) {
-            if (!chosen_[i] || job(i).needed) continue;
-            if (least == plan_.jobs.size() || job(i).chance <= job(least).chance) least = i;
-        }
-        if (least == plan_.jobs.size()) return false;
-        chosen_[least] = false;
-        return true;
-    }
-
-    Chain draw_chain(bool by_deadline) {
+    JobOrder draw_order(bool by_deadline) {
         struct Draft {
             bool drawn = false;
             i64 preferred = 0, part = 0, rank = 0;
@@ -63,7 +39,7 @@ private:
         std::vector<Draft> drafts(plan_.jobs.size());
         const i64 latest_bed = std::min(plan_.sleep.longest, next_wake_ - plan_.least_sleep);
         const i64 bed = plan_.sleep.draw(draws_, latest_bed);
-        Chain chain;
+        JobOrder order;
         for (std::size_t i = 0; i < drafts.size(); ++i) {
             const Job& own = job(i);
             const auto is_drawn = [&](i64 k) { return drafts[static_cast<std::size_t>(k)].drawn; };
@@ -86,15 +62,31 @@ private:
                 draft.rank = std::max(draft.rank, before.rank);
             }
             drafts[i] = draft;
-            chain.jobs.push_back(i);
+            order.jobs.push_back(i);
         }
-        std::sort(chain.jobs.begin(), chain.jobs.end(), [&](std::size_t a, std::size_t b) {
+        std::sort(order.jobs.begin(), order.jobs.end(), [&](std::size_t a, std::size_t b) {
             return std::tie(drafts[a].part, drafts[a].rank, a) < std::tie(drafts[b].part, drafts[b].rank, b);
         });
-        for (const std::size_t i : chain.jobs) chain.preferred.push_back(drafts[i].preferred);
-        chain.preferred.push_back(bed);
-        chain.latest = latest(chain.jobs, latest_bed);
-        return chain;
+        for (const std::size_t i : order.jobs) order.preferred.push_back(drafts[i].preferred);
+        order.preferred.push_back(bed);
+        order.latest = latest(order.jobs, latest_bed);
+        order.fits = fits(order);
+        return order;
+    }
+
+private:
+    const Job& job(std::size_t number) const { return plan_.jobs[number]; }
+
+    // Leave out the least probable job, of equal ones the last; returns whether there is one.
+    bool leave_out() {
+        std::size_t least = plan_.jobs.size();
+        for (std::size_t i = 0; i < plan_.jobs.size(); ++i) {
+            if (!chosen_[i] || job(i).needed) continue;
+            if (least == plan_.jobs.size() || job(i).chance <= job(least).chance) least = i;
+        }
+        if (least == plan_.jobs.size()) return false;
+        chosen_[least] = false;
+        return true;
     }
 
     // The latest beginning of each job so that all later ones fit before `bed`, and `bed`.
@@ -108,28 +100,37 @@ private:
         return result;
     }
 
-    bool fits(const Chain& chain) const {
+    bool fits(const JobOrder& order) const {
         i64 earliest = wake_;
-        for (std::size_t i = 0; i < chain.jobs.size(); ++i) {
-            const Job& own = job(chain.jobs[i]);
+        for (std::size_t i = 0; i < order.jobs.size(); ++i) {
+            const Job& own = job(order.jobs[i]);
             if (own.starts) earliest = std::max(earliest, own.starts->shortest);
-            if (earliest > chain.latest[i]) return false;
+            if (earliest > order.latest[i]) return false;
             earliest += own.takes.shortest;
         }
-        return std::max(earliest, plan_.sleep.shortest) <= chain.latest.back();
+        return std::max(earliest, plan_.sleep.shortest) <= order.latest.back();
     }
 
-    void fill_day(const Chain& chain) {
+    void fill_day(const JobOrder& order, const PrivateRooms* rooms) {
         i64 now = wake_;
-        for (std::size_t i = 0; i < chain.jobs.size(); ++i) {
-            const Job& own = job(chain.jobs[i]);
-            const i64 begin = std::min(next_begin(own, now, chain.preferred[i]), chain.latest[i]);
-            const i64 end = begin + own.takes.draw(draws_, std::min(own.until, chain.latest[i + 1]) - begin);
+        for (std::size_t i = 0; i < order.jobs.size(); ++i) {
+            const Job& own = job(order.jobs[i]);
+            i64 begin = std::min(next_begin(own, now, order.preferred[i]), order.latest[i]);
+            i64 end_by = std::min(own.until, order.latest[i + 1]), room = ANY_ROOM;
+            if (rooms && !rooms->rooms[order.jobs[i]].empty()) {
+                const std::optional<FreeSlot> slot =
+                    rooms->use.free(rooms->rooms[order.jobs[i]], begin, order.latest[i], own.takes.shortest, end_by);
+                if (!slot) continue;
+                begin = slot->begin;
+                end_by = slot->end;
+                room = slot->room;
+            }
+            const i64 end = begin + own.takes.draw(draws_, end_by - begin);
             fill(now, begin);
-            day.push_back({own.activity, begin, end, static_cast<i64>(chain.jobs[i])});
+            day.push_back({own.activity, begin, end, static_cast<i64>(order.jobs[i]), room});
             now = end;
         }
-        i64 bed = std::min(std::max(now, chain.preferred.back()), chain.latest.back());
+        i64 bed = std::min(std::max(now, order.preferred.back()), order.latest.back());
         if (bed - now < NO_GAP && now >= plan_.sleep.shortest) bed = now;
         fill(now, bed);
         day.push_back({plan_.asleep, bed, next_wake_, -1});
@@ -177,13 +178,13 @@ private:
 
     const DayPlan& plan_;
     StepDraws& draws_;
-    const i64 wake_, next_wake_;
     std::vector<bool> chosen_;
+    const i64 wake_, next_wake_;
 };
 
 }  // namespace
 
-i64 Law::position(i64 value) const {
+i64 Distribution::position(i64 value) const {
     const i64 i = std::upper_bound(knots.begin(), knots.end(), value) - knots.begin() - 1;
     const i64 top = static_cast<i64>(knots.size()) - 1;
     if (i < 0) return 0;
@@ -192,7 +193,7 @@ i64 Law::position(i64 value) const {
     return (i << BITS) + ((value - below) << BITS) / (above - below);
 }
 
-i64 Law::draw(StepDraws& draws, i64 high) const {
+i64 Distribution::draw(StepDraws& draws, i64 high) const {
     const i64 end = high >= longest ? last : position(high);
     high = std::min(high, longest);
     if (shortest >= high) return std::min(shortest, high);
@@ -203,9 +204,16 @@ i64 Law::draw(StepDraws& draws, i64 high) const {
     return std::min(std::max(knots[i] + part, shortest), high);
 }
 
-std::vector<Doing> plan_day(const DayPlan& plan, StepDraws& draws, i64 wake, i64 next_wake) {
-    Planner planner(plan, draws, wake, next_wake);
-    return planner.run() ? std::move(planner.day) : std::vector<Doing>{};
+JobOrder draw_order(const DayPlan& plan, StepDraws& draws, const std::vector<bool>& chosen, i64 wake, i64 next_wake,
+                    bool by_deadline) {
+    return Planner(plan, draws, chosen, wake, next_wake).draw_order(by_deadline);
+}
+
+std::vector<Doing> plan_day(const DayPlan& plan, StepDraws& draws, i64 wake, i64 next_wake, const PrivateRooms* rooms) {
+    std::vector<bool> chosen;
+    for (const Job& job : plan.jobs) chosen.push_back(draws.below(MILLION) < job.chance);
+    Planner planner(plan, draws, std::move(chosen), wake, next_wake);
+    return planner.run(rooms) ? std::move(planner.day) : std::vector<Doing>{};
 }
 
 }  // namespace fleet2d

@@ -7,11 +7,12 @@
 #include <vector>
 
 #include "random.hpp"
+#include "room_use.hpp"
 
 namespace fleet2d {
 
 // A distribution over whole seconds: quantiles at evenly spaced probabilities, between bounds.
-struct Law {
+struct Distribution {
     static constexpr int BITS = 24;  // of the fraction in a position among the knots
 
     std::vector<i64> knots;  // ascending
@@ -21,14 +22,14 @@ struct Law {
     i64 middle() const { return knots[knots.size() / 2]; }
     // The position of a value among the knots.
     i64 position(i64 value) const;
-    // A value from the law, conditional on being at most `high`; `high` if the law has none.
+    // A value conditional on being at most `high`; `high` if all values are above it.
     i64 draw(StepDraws& draws, i64 high) const;
 };
 
 struct Job {
     i64 activity;
-    std::optional<Law> starts;  // none: right after the job before it, on waking or before bed
-    Law takes;
+    std::optional<Distribution> starts;  // none: right after the job before it, on waking or before bed
+    Distribution takes;
     i64 until;               // its latest end
     std::vector<i64> after;  // numbers of the jobs before it, all lower than its own
     i64 chance;              // of it on a day [per million]
@@ -42,12 +43,12 @@ struct Job {
 struct Pastime {
     i64 activity;
     i64 weight;
-    Law takes;
+    Distribution takes;
     i64 first, last;  // it may begin in between
 };
 
 struct DayPlan {
-    Law sleep;
+    Distribution sleep;
     i64 least_sleep;
     std::vector<Job> jobs;
     std::vector<Pastime> pastimes;
@@ -57,9 +58,24 @@ struct DayPlan {
 struct Doing {
     i64 activity, begin, end;
     i64 job;  // its number, -1: none
+    i64 room = ANY_ROOM;
 };
 
-// The doings from `wake` to `next_wake`, without a gap; none if the jobs that are needed don't fit.
-std::vector<Doing> plan_day(const DayPlan& plan, StepDraws& draws, i64 wake, i64 next_wake);
+// Jobs in the order of a day. The last of `preferred` and of `latest` is that of going to bed.
+struct JobOrder {
+    std::vector<std::size_t> jobs;
+    std::vector<i64> preferred;  // the drawn beginning
+    std::vector<i64> latest;     // the latest possible beginning
+    bool fits = false;           // whether all of them fit into the day
+};
+
+// Draw the order of some jobs, by their preferred beginnings or else by their latest ones.
+JobOrder draw_order(const DayPlan& plan, StepDraws& draws, const std::vector<bool>& chosen, i64 wake, i64 next_wake,
+                    bool by_deadline);
+
+// The doings from `wake` to `next_wake`, without a gap; none if the jobs that are needed don't fit. A job whose rooms
+// others use all the time is left out.
+std::vector<Doing> plan_day(const DayPlan& plan, StepDraws& draws, i64 wake, i64 next_wake,
+                            const PrivateRooms* rooms = nullptr);
 
 }  // namespace fleet2d

@@ -12,7 +12,7 @@ constexpr i64 SECOND = 1'000'000;         // us
 constexpr i64 NEARLY_OVER = 90 * SECOND;  // before the end of a stint in which no small move begins
 constexpr u64 AFTER_MIDNIGHT = 512;       // added to the address of draws for the part after midnight
 constexpr u64 SIDE_BITS = 10;             // turns aside are up to an eighth of a turn
-constexpr i64 ANY = i64{1} << 62;         // no bound of a law
+constexpr i64 ANY = i64{1} << 62;         // above all values of a distribution
 
 template <class T>
 const T& chosen(const std::vector<T>& options, StepDraws& draws) {

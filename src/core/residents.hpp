@@ -49,7 +49,7 @@ struct Scene {
     std::vector<i64> seats;          // none: anywhere in the rooms
     std::vector<i64> stores;         // the rooms from which things are fetched
     std::vector<SmallMove> moves;    // turns on the spot come first
-    std::optional<Law> fetch_takes;  // how long somebody is away to fetch something [s]; none: nothing is fetched
+    std::optional<Distribution> fetch_takes;  // how long somebody is away to fetch something [s]; none: nothing is fetched
 };
 
 // A time in which an activity is done.

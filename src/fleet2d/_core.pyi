@@ -1459,41 +1459,68 @@ class Interruptions:
 
     def __init__(self, needs: Sequence[tuple[Sequence[tuple[int, int, Sequence[int]]], Sequence[int], Sequence[int] | None, tuple[int, int, int, int], int, tuple[int, int] | None, Sequence[int]]], errands: Sequence[tuple[tuple[int, int, Sequence[int]], Sequence[int] | None, Sequence[int] | None]], away: Sequence[int], uninterruptible: Sequence[int], sleep: int, activities: int) -> None: ...
 
-    def interrupt(self, draws: StepDraws, day: Sequence[tuple[int, int, int]]) -> list[tuple[int, int, int, int, int]]:
+    def interrupt(self, draws: StepDraws, day: Sequence[tuple[int, int, int, int]], use: RoomUse | None = None, rooms: Sequence[Sequence[int]] = []) -> list[tuple[int, int, int, int, int, int]]:
         """
         Put interruptions into a day.
 
         Args:
             draws: The draws of the day's interruptions.
-            day: Activity, begin and end of each planned doing, without a gap.
+            day: Activity, begin, end, and room, or -1, of each planned doing, without a gap.
+            use: When others use private rooms; None: never.
+            rooms: The rooms where each activity is done alone, the preferred one first; none: it isn't.
 
         Returns:
-            The number of the planned doing, -1 for an interruption; activity, begin, end and role of each part.
+            The number of the planned doing, -1 for an interruption; activity, begin, end, role and room of each part.
         """
 
     def __getstate__(self) -> tuple[list[tuple[list[tuple[int, int, list[int]]], list[int], list[int] | None, tuple[int, int, int, int], int, tuple[int, int] | None, list[int]]], list[tuple[tuple[int, int, list[int]], list[int] | None, list[int] | None]], list[int], list[int], int, int]: ...
 
     def __setstate__(self, arg: tuple[Sequence[tuple[Sequence[tuple[int, int, Sequence[int]]], Sequence[int], Sequence[int] | None, tuple[int, int, int, int], int, tuple[int, int] | None, Sequence[int]]], Sequence[tuple[tuple[int, int, Sequence[int]], Sequence[int] | None, Sequence[int] | None]], Sequence[int], Sequence[int], int, int], /) -> None: ...
 
+class RoomUse:
+    """
+    When people use rooms that only one can use at a time; times in seconds.
+    """
+
+    def __init__(self) -> None: ...
+
+    def add(self, room: int, begin: int, end: int) -> None:
+        """Add a time in which somebody uses a room."""
+
+    def free(self, rooms: Sequence[int], begin: int, latest: int, shortest: int, end_by: int) -> tuple[int, int, int] | None:
+        """
+        Return the first time at which one of some rooms is free for long enough.
+
+        Args:
+            rooms: The rooms, the preferred one first.
+            begin: The earliest beginning.
+            latest: The latest beginning.
+            shortest: The least duration.
+            end_by: The latest end.
+
+        Returns:
+            Begin, end and room; None if there is no such time.
+        """
+
 class DayPlanner:
     """
     Draws days of a template; times in seconds since midnight.
 
-    A law is its quantiles, its least and largest value, and the positions of these among the quantiles.
+    A distribution is its quantiles, its least and largest value, and the positions of these among the quantiles.
 
     Args:
-        sleep: The law of going to bed.
+        sleep: The distribution of going to bed.
         least_sleep: The least duration of sleep.
-        jobs: Of each the activity, the law of its beginning, or None, and of its duration; its latest end; the jobs before
+        jobs: Of each the activity, the distribution of its beginning, or None, and of its duration; its latest end; the jobs before
             it; its chance per million; whether it is needed; -1 on waking, 1 before bed, else 0.
-        pastimes: Of each the activity, the weight, the law of its duration, and from when to when it may begin.
+        pastimes: Of each the activity, the weight, the distribution of its duration, and from when to when it may begin.
         rest: The activity without any.
         asleep: The activity that is sleep.
     """
 
     def __init__(self, sleep: tuple[Sequence[int], int, int, int, int], least_sleep: int, jobs: Sequence[tuple[int, tuple[Sequence[int], int, int, int, int] | None, tuple[Sequence[int], int, int, int, int], int, Sequence[int], int, bool, int]], pastimes: Sequence[tuple[int, int, tuple[Sequence[int], int, int, int, int], int, int]], rest: int, asleep: int) -> None: ...
 
-    def plan(self, draws: StepDraws, wake: int, next_wake: int) -> list[tuple[int, int, int, int]]:
+    def plan(self, draws: StepDraws, wake: int, next_wake: int, use: RoomUse | None = None, rooms: Sequence[Sequence[int]] = []) -> list[tuple[int, int, int, int, int]]:
         """
         Draw a day.
 
@@ -1501,9 +1528,26 @@ class DayPlanner:
             draws: The day's draws.
             wake: When it begins.
             next_wake: When the next day begins.
+            use: When others use private rooms; None: never.
+            rooms: The rooms where each job is done alone, the preferred one first; none: it isn't.
 
         Returns:
-            Activity, begin, end, and number of the job, or -1, of each doing; none if the jobs fit in no order.
+            Activity, begin, end, number of the job, or -1, and room, or -1, of each doing; none if the jobs fit in no order.
+        """
+
+    def draw_order(self, draws: StepDraws, chosen: Sequence[bool], wake: int, next_wake: int, by_deadline: bool) -> tuple[list[int], list[int], bool]:
+        """
+        Draw an order of some jobs.
+
+        Args:
+            draws: The draws.
+            chosen: Whether each job is done.
+            wake: When the day begins.
+            next_wake: When the next day begins.
+            by_deadline: Order them by their latest beginnings instead of the drawn ones.
+
+        Returns:
+            The numbers of the jobs in order; the latest beginning of each, and of going to bed; and whether they fit.
         """
 
     def __getstate__(self) -> tuple[tuple[list[int], int, int, int, int], int, list[tuple[int, tuple[list[int], int, int, int, int] | None, tuple[list[int], int, int, int, int], int, list[int], int, bool, int]], list[tuple[int, int, tuple[list[int], int, int, int, int], int, int]], int, int]: ...
@@ -1534,7 +1578,7 @@ class Scene:
         seats: The places at furniture where it is done; none: anywhere in the rooms.
         stores: The rooms from which things are fetched.
         moves: The kind of each small move, 0 turns, 1 walks, 2 trips to fetch something, and the times between them.
-        fetch_takes: The law of how long somebody is away to fetch something [s]; None: nothing is fetched.
+        fetch_takes: The distribution of how long somebody is away to fetch something [s]; None: nothing is fetched.
     """
 
     def __init__(self, setting: object | None, activity: int, away: bool, choose: int, posture: int, rooms: Sequence[int], seats: Sequence[int], stores: Sequence[int], moves: Sequence[tuple[int, Waits]], fetch_takes: tuple[Sequence[int], int, int, int, int] | None) -> None: ...

@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from fleet2d.kernels.motion import Interruptions
+from fleet2d.kernels.motion import Interruptions, RoomUse
 from fleet2d.kernels.numbers import StepDraws
 
 OFTEN = list(range(1, 257))
@@ -47,11 +47,16 @@ def test_wrong_rules_are_refused(part: str, value: Any, message: str) -> None:
     ("day", "message"),
     [
         ([], "must have a doing"),
-        ([(3, 0, 9)], "no such activity"),
-        ([(1, 9, 8)], "end after they begin"),
-        ([(1, 0, 2**20)], "within 2"),
+        ([(3, 0, 9, -1)], "no such activity"),
+        ([(1, 9, 8, -1)], "end after they begin"),
+        ([(1, 0, 2**20, -1)], "within 2"),
     ],
 )
 def test_wrong_days_are_refused(day: Any, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         rules().interrupt(StepDraws(1, 2), day)
+
+
+def test_rooms_are_those_of_the_activities() -> None:
+    with pytest.raises(ValueError, match="rooms must be those of each activity"):
+        rules().interrupt(StepDraws(1, 2), [(1, 0, 9, -1)], RoomUse(), [[], []])

@@ -5,11 +5,11 @@ from typing import Any
 
 import pytest
 
-from fleet2d.kernels.motion import DayPlanner
+from fleet2d.kernels.motion import DayPlanner, RoomUse
 from fleet2d.kernels.numbers import StepDraws
 
 LAW = ([60, 600], 60, 600, 0, 1 << 24)
-NONE = ([0, 600], 0, 600, 0, 1 << 24)
+NONE = ([0, 1], 0, 1, 0, 1 << 24)
 JOB = (2, None, LAW, 80_000, [], 1_000_000, True, -1)
 PASTIME = (3, 1, LAW, 0, 90_000)
 
@@ -25,8 +25,8 @@ def test_a_day_has_no_gap_and_ends_asleep() -> None:
     for planner in (plan(), pickle.loads(pickle.dumps(plan()))):
         rows = planner.plan(StepDraws(1, 2), 25_000, 110_000)
         assert [25_000, *(row[2] for row in rows)] == [*(row[1] for row in rows), 110_000]
-        assert (1, -1) == rows[-1][::3]
-        assert [0] == [job for _, _, _, job in rows if job >= 0]
+        assert (1, -1, -1) == (rows[-1][0], *rows[-1][3:])
+        assert [0] == [job for _, _, _, job, _ in rows if job >= 0]
 
 
 @pytest.mark.parametrize(
@@ -59,7 +59,7 @@ def test_a_needed_job_that_fits_nowhere_leaves_no_day() -> None:
         ("jobs", [(2, None, ([-1, 9], -1, 9, 0, 1), *JOB[3:])], "jobs must take 0 s or more"),
         ("pastimes", [(3, 0, LAW, 0, 9)], "weights must be 1"),
         ("pastimes", [(3, 2**30, LAW, 0, 9)] * 2, "the sum of all weights"),
-        ("pastimes", [(3, 1, NONE, 0, 9)], "pastimes must take 1 s or more"),
+        ("pastimes", [(3, 1, NONE, 0, 9)], "pastimes must take 0 s or more"),
     ],
 )
 def test_wrong_plans_are_refused(part: str, value: Any, message: str) -> None:
@@ -70,3 +70,35 @@ def test_wrong_plans_are_refused(part: str, value: Any, message: str) -> None:
 def test_a_day_far_from_midnight_is_refused() -> None:
     with pytest.raises(ValueError, match="within 2"):
         plan().plan(StepDraws(1, 2), 25_000, 2**20)
+
+
+def test_a_pastime_that_may_take_no_time_leaves_a_day() -> None:
+    short = ([0, 600], 0, 600, 0, 1 << 24)
+    rows = plan(pastimes=[(3, 1, short, 0, 90_000), (4, 1, short, 0, 90_000)]).plan(
+        StepDraws(1, 2), 25_000, 110_000
+    )
+    assert {3, 4} < {row[0] for row in rows}
+
+
+def test_rooms_are_those_of_the_jobs() -> None:
+    with pytest.raises(ValueError, match="rooms must be those of each job"):
+        plan().plan(StepDraws(1, 2), 25_000, 110_000, RoomUse(), [])
+    with pytest.raises(ValueError, match="chosen must be of each job"):
+        plan().draw_order(StepDraws(1, 2), [True, True], 25_000, 110_000, False)
+
+
+def test_a_room_is_free_between_two_uses() -> None:
+    """The slot lasts until the next use; of two rooms, the one that is free first."""
+    use = RoomUse()
+    use.add(7, 100, 200)
+    use.add(7, 260, 300)
+    use.add(9, 0, 150)
+
+    assert (200, 260, 7) == use.free([7], 90, 250, 30, 400)
+    assert (150, 400, 9) == use.free([7, 9], 90, 250, 30, 400)
+    assert (90, 400, 8) == use.free([7, 8], 90, 250, 30, 400)
+    assert use.free([7], 90, 199, 30, 400) is None
+    with pytest.raises(ValueError, match="must end after it begins"):
+        use.add(7, 300, 299)
+    with pytest.raises(ValueError, match="within 2"):
+        use.free([7], 0, 2**41, 1, 9)

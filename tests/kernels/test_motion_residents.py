@@ -17,7 +17,7 @@ from fleet2d.entities.users.resident import MOVE_KINDS, SECOND_US, KnownHome, Se
 from fleet2d.floorplan.objects import POSTURES
 from fleet2d.kernels.motion import LastStint, Legs, Resident, Scene, Waits
 from fleet2d.routines.activity import Activity
-from fleet2d.routines.laws import uniform
+from fleet2d.routines.distributions import uniform
 
 HOMES = {
     "furnished": {"floorplan": {"type": "bundled", "furnish": True}},

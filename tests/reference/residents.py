@@ -8,7 +8,7 @@ from fleet2d.entities.plan import Plan
 from fleet2d.entities.users.resident import KnownHome, Setting
 from fleet2d.entities.users.spots import Seat, Spot
 from fleet2d.kernels.numbers import TURN, Bits, turn_between
-from fleet2d.routines.laws import exponential
+from fleet2d.routines.distributions import exponential
 from fleet2d.routines.planner import PLANNED, RESUMES
 from fleet2d.runtime.determinism import Draws
 

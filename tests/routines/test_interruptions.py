@@ -10,22 +10,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
+from tests.reference.interruptions import CERTAIN, MOST, SlowInterruptions
+from tests.reference.planner import RoomTimes
 from tests.routines.days import DAY_S, MONDAY
 
-from fleet2d.routines.interruption_rules import (
-    CERTAIN,
-    ErrandRule,
-    InterruptionRules,
-    InterruptionStep,
-    NeedRule,
-    in_numbers,
-)
-from fleet2d.routines.interruptions import (
-    MOST,
-    _InterruptedDay,
-    interrupt,
-    without_interruptions,
-)
+from fleet2d.kernels.motion import Interruptions, RoomUse
+from fleet2d.routines.interruptions import interrupt, without_interruptions
 from fleet2d.routines.life import Life
 from fleet2d.routines.persona import Persona, bundled_names, bundled_persona
 from fleet2d.routines.planner import INTERRUPTS, RESUMES, SLEEP, Doing
@@ -51,45 +41,61 @@ QUANTILES = st.integers(1, 20_000).map(
     lambda longest: tuple(1 + i * longest // 256 for i in range(256))
 )
 CHANCES = st.sampled_from([0, 100, 700, CERTAIN])
-PLACES = ("rest", "toilet", "cook", "work", "walk", "sleep", "wash_hands")
-GROUPS = st.frozensets(st.sampled_from(PLACES))
-STEPS = st.builds(InterruptionStep, st.sampled_from(PLACES[:3]), CHANCES, QUANTILES, st.just(False))
-NEEDS = st.builds(
-    NeedRule,
-    st.lists(STEPS, min_size=1, max_size=3).map(tuple), QUANTILES, st.none() | QUANTILES,
-    CHANCES, CHANCES, CHANCES, CHANCES, st.integers(0, 4000),
-    st.none() | st.tuples(st.integers(0, 86_399), st.integers(0, 86_399)), GROUPS,
+REST, TOILET, COOK, WORK, WALK, ASLEEP, WASH = range(7)  # activities
+SOME = st.lists(st.integers(REST, WASH), unique=True)
+STEPS = st.tuples(st.integers(REST, COOK), CHANCES, QUANTILES)
+NEEDS = st.tuples(
+    st.lists(STEPS, min_size=1, max_size=3), QUANTILES, st.none() | QUANTILES,
+    st.tuples(CHANCES, CHANCES, CHANCES, CHANCES), st.integers(0, 4000),
+    st.none() | st.tuples(st.integers(0, 86_399), st.integers(0, 86_399)), SOME,
 )  # fmt: skip
-ERRANDS = st.builds(ErrandRule, STEPS, GROUPS, GROUPS)
-DAYS = st.lists(st.tuples(st.sampled_from(PLACES), st.integers(1, 20_000)), min_size=1, max_size=12)
+ERRANDS = st.tuples(STEPS, st.none() | SOME, st.none() | SOME)
+DAYS = st.lists(
+    st.tuples(st.integers(REST, WASH), st.integers(1, 20_000), st.integers(-1, 2)),
+    min_size=1, max_size=12,
+)  # fmt: skip
+ROOMS = st.lists(
+    st.lists(st.integers(-1, 2), max_size=2, unique=True), min_size=WASH + 1, max_size=WASH + 1
+)
+USES = st.none() | st.lists(
+    st.tuples(st.integers(-1, 2), st.integers(20_000, 120_000), st.integers(0, 9000)), max_size=9
+)
 
 
-@given(st.lists(NEEDS, max_size=3), st.lists(ERRANDS, max_size=3), GROUPS, DAYS, st.integers(0, 99))
+@given(
+    st.lists(NEEDS, max_size=3), st.lists(ERRANDS, max_size=3), SOME, DAYS, USES, ROOMS,
+    st.integers(0, 99),
+)  # fmt: skip
 def test_the_core_interrupts_a_day_as_python_does(
-    needs: Any, errands: Any, firm: Any, lengths: Any, number: int
+    needs: Any, errands: Any, firm: Any, lengths: Any, uses: Any, rooms: Any, number: int
 ) -> None:
-    numbers = {name: number for number, name in enumerate(PLACES)}
-    away = frozenset({"work", "walk"})
-    core = in_numbers(needs, errands, away, firm, numbers)
-    rules = InterruptionRules(
-        tuple(needs), tuple(errands), away, firm, frozenset(), PLACES, numbers, core
-    )
-    ends = list(accumulate((length for _, length in lengths), initial=25_000))
-    day = [Doing(name, *span) for (name, _), span in zip(lengths, pairwise(ends), strict=True)]
-    slow = _InterruptedDay(rules, Draws(np.uint64(5), number), day, None).result
-    assert slow == interrupt(rules, Draws(np.uint64(5), number), day)
-    copies = rules._replace(core=pickle.loads(pickle.dumps(core)))
-    assert slow == interrupt(copies, Draws(np.uint64(5), number), day)
+    parts = needs, errands, [WORK, WALK], firm, ASLEEP, WASH + 1
+    core, twin = Interruptions(*parts), SlowInterruptions(*parts)
+    ends = accumulate((length for _, length, _ in lengths), initial=25_000)
+    spans = zip(lengths, pairwise(ends), strict=True)
+    day = [(activity, begin, end, room) for (activity, _, room), (begin, end) in spans]
+    use, times = (None, None) if uses is None else (RoomUse(), RoomTimes())
+    for room, begin, lasts in uses or ():
+        for each in (use, times):
+            each.add(room, begin, begin + lasts)
+    slow = twin.interrupt(Draws(np.uint64(5), number), day, times, rooms)
+    for each in (core, pickle.loads(pickle.dumps(core))):
+        assert slow == each.interrupt(Draws(np.uint64(5), number), day, use, rooms)
 
 
 @pytest.mark.parametrize("name", bundled_names())
 def test_the_days_of_bundled_personas_are_those_of_python(name: str) -> None:
     lived = life(bundled_persona(name))
     rules = lived.persona.interruptions
+    twin = SlowInterruptions(*rules.core.__getstate__())
     for ordinal in range(MONDAY, MONDAY + 60):
         plan = lived.draw_uninterrupted(ordinal, lived.template(ordinal))
-        slow = _InterruptedDay(rules, Draws(np.uint64(9), ordinal), plan, None).result
-        assert slow == interrupt(rules, Draws(np.uint64(9), ordinal), plan)
+        rows = [(rules.numbers[d.activity], d.begin, d.end, d.room) for d in plan]
+        slow = twin.interrupt(Draws(np.uint64(9), ordinal), rows)
+        fast = interrupt(rules, Draws(np.uint64(9), ordinal), plan)
+        assert [(rules.names[a], b, e, role) for _, a, b, e, role, _ in slow] == [
+            (d.activity, d.begin, d.end, d.role) for d in fast
+        ]
 
 
 @pytest.mark.parametrize("name", bundled_names())

@@ -5,7 +5,7 @@ from datetime import datetime
 import pytest
 from pydantic import ValidationError
 
-from fleet2d.routines.periods import Period, with_absences
+from fleet2d.routines.household import Period, with_absences
 from fleet2d.routines.planner import Doing
 
 MIDNIGHT = datetime(2026, 1, 5)

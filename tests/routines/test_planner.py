@@ -9,13 +9,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
+from tests.reference.planner import RoomTimes, SlowPlanner
 from tests.routines.days import DAY_S, MONDAY, violations
 from tests.thorough import THOROUGH, examples
 
+from fleet2d.kernels.motion import RoomUse
 from fleet2d.routines.interruptions import without_interruptions
 from fleet2d.routines.life import Life
 from fleet2d.routines.persona import Persona, bundled_names, bundled_persona
-from fleet2d.routines.planner import Doing, plan_day
+from fleet2d.routines.planner import Doing
 
 HOUR = 3600
 
@@ -265,12 +267,23 @@ def test_any_template_is_either_refused_or_kept(do: dict[str, Any], seed: int) -
 
 
 def same_in_python(lived: Life, ordinal: int) -> None:
-    """Check that the core plans the same day as Python does for members of households."""
+    """Check that the core plans the same day as its twin, also if others use private rooms."""
     plan, span = lived.template(ordinal), (lived.wake(ordinal), lived.wake(ordinal + 1) + DAY_S)
-    core, python = lived.draws(ordinal), lived.draws(ordinal)
-    assert plan.core is not None
-    assert plan_day(plan._replace(core=None), python, *span) == plan_day(plan, core, *span)
-    assert python.below(1 << 30) == core.below(1 << 30)
+    twin, use, times = SlowPlanner(*plan.core.__getstate__()), RoomUse(), RoomTimes()
+    for room, begin in ((3, 25_000), (3, 26_000), (5, 25_500), (3, 60_000), (5, 59_000)):
+        for each in (use, times):
+            each.add(room, begin + 60 * (ordinal % 60), begin + 6000)
+    rooms = [((3, 5), (), (5,))[i % 3] for i in range(len(plan.jobs))]
+    for shared in ((None, None), (use, times)):
+        core, python = lived.draws(ordinal), lived.draws(ordinal)
+        slow = twin.plan(python, *span, shared[1], rooms)
+        assert slow == plan.core.plan(core, *span, shared[0], rooms)
+        assert python.below(1 << 30) == core.below(1 << 30)
+    chosen = [job.needed for job in plan.jobs]
+    for by_deadline in (False, True):
+        core, python = lived.draws(ordinal), lived.draws(ordinal)
+        slow = twin.draw_order(python, chosen, *span, by_deadline)
+        assert slow == plan.core.draw_order(core, chosen, *span, by_deadline)
 
 
 @pytest.mark.parametrize("name", bundled_names())
@@ -278,6 +291,19 @@ def test_the_core_plans_days_as_python_does(name: str) -> None:
     lived = life(bundled_persona(name))
     for ordinal in range(MONDAY, MONDAY + 60):
         same_in_python(lived, ordinal)
+
+
+def test_pastimes_that_always_take_no_time_are_refused() -> None:
+    """Two of them took turns forever, and the run never began."""
+    takes = {"takes": ["0 s", "1 s"]}
+    with pytest.raises(ValidationError, match="'read' may take 0 s"):
+        Persona.model_validate(
+            {
+                "activities": {"read": takes, "tv": takes},
+                "leisure": {"read": 1, "tv": 1},
+                "days": {"any_day": {"on": "daily"}},
+            }
+        )
 
 
 def test_sleep_over_midnight_belongs_to_the_day_before() -> None:

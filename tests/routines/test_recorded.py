@@ -9,7 +9,7 @@ from tests.routines.days import MONDAY
 from fleet2d.routines.household import Household, Lives
 from fleet2d.routines.life import Life
 from fleet2d.routines.persona import Persona
-from fleet2d.routines.recorded import parse_day, write_day
+from fleet2d.routines.planner import parse_day, write_day
 
 DAYS = [
     "06:50 wash, 07:10 breakfast, 07:30 work, 17:00 cook, 18:00 tv, 22:30 sleep, 31:00 end",

@@ -8,7 +8,7 @@
 #include <map>
 
 #include "arrays.hpp"
-#include "laws.hpp"
+#include "distributions.hpp"
 #include "legs.hpp"
 #include "routes.hpp"
 #include "subjects.hpp"
@@ -66,7 +66,7 @@ struct OwnedScene : Scene {
 
 OwnedScene scene_of(nb::object setting, i64 activity, bool away, i64 choose, i64 posture, Numbers rooms, Numbers seats,
                     Numbers stores, const std::vector<std::pair<i64, std::shared_ptr<Waits>>>& moves,
-                    const std::optional<LawRow>& fetch_takes) {
+                    const std::optional<DistributionRow>& fetch_takes) {
     require(0 <= choose && choose <= static_cast<i64>(Choice::HERE), "choose must be 0 to 3");
     require(!away || moves.empty(), "somebody who is away makes no small moves");
     OwnedScene scene{{activity,
@@ -88,7 +88,7 @@ OwnedScene scene_of(nb::object setting, i64 activity, bool away, i64 choose, i64
         require(waits != nullptr, "moves must have times between them");
         scene.moves.emplace_back(static_cast<MoveKind>(kind), waits);
     }
-    if (fetch_takes) scene.fetch_takes = law_of(*fetch_takes);
+    if (fetch_takes) scene.fetch_takes = distribution_of(*fetch_takes);
     require(!scene.fetch_takes || scene.fetch_takes->shortest >= 0, "to fetch something must take 0 s or more");
     return scene;
 }
@@ -257,12 +257,12 @@ Args:
     seats: The places at furniture where it is done; none: anywhere in the rooms.
     stores: The rooms from which things are fetched.
     moves: The kind of each small move, 0 turns, 1 walks, 2 trips to fetch something, and the times between them.
-    fetch_takes: The law of how long somebody is away to fetch something [s]; None: nothing is fetched.)")
+    fetch_takes: The distribution of how long somebody is away to fetch something [s]; None: nothing is fetched.)")
         .def(
             "__init__",
             [](OwnedScene* self, nb::object setting, i64 activity, bool away, i64 choose, i64 posture, Numbers rooms,
                Numbers seats, Numbers stores, const std::vector<std::pair<i64, std::shared_ptr<Waits>>>& moves,
-               const std::optional<LawRow>& fetch_takes) {
+               const std::optional<DistributionRow>& fetch_takes) {
                 new (self) OwnedScene(scene_of(std::move(setting), activity, away, choose, posture, std::move(rooms),
                                                std::move(seats), std::move(stores), moves, fetch_takes));
             },

@@ -15,8 +15,7 @@ import numpy as np
 import shapely
 from pydantic import BeforeValidator, PlainSerializer, WithJsonSchema
 
-from fleet2d.configuration.problems import did_you_mean
-from fleet2d.configuration.units import problem
+from fleet2d.configuration.problems import did_you_mean, problem
 from fleet2d.errors import PlacementError
 from fleet2d.floorplan.furniture.catalogue import FURNITURE
 from fleet2d.floorplan.objects import PlacedObject

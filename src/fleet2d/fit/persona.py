@@ -14,7 +14,7 @@ from fleet2d.fit.timeline import MINUTES, ActivityPlace, Timeline
 from fleet2d.logs.log import AWAY, LogError
 from fleet2d.logs.rooms import USUAL
 from fleet2d.routines.persona import Persona
-from fleet2d.routines.recorded import RecordedDay, write_day
+from fleet2d.routines.planner import RecordedDay, write_day
 
 BLOCK = 180  # length of a part of the day that has pastimes of its own [min]
 QUANTILES = 21  # the most quantiles of a law of durations

@@ -9,7 +9,7 @@ from fleet2d.fit.persona import FittedPersona
 from fleet2d.fit.timeline import MINUTES, Timeline
 from fleet2d.kernels import I16
 from fleet2d.routines.activity import Activity, seconds
-from fleet2d.routines.laws import KNOTS, exponential
+from fleet2d.routines.distributions import KNOTS, exponential
 from fleet2d.routines.life import Life
 from fleet2d.routines.planner import Doing
 from fleet2d.runtime.clock import DAY_S

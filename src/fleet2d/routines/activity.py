@@ -1,18 +1,51 @@
 """Activities: what people do, where, for how long, and how much they move meanwhile."""
 
+from dataclasses import dataclass
 from datetime import timedelta
 from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import model_validator
+from pydantic import GetJsonSchemaHandler, model_validator
+from pydantic_core import CoreSchema
 
 from fleet2d.configuration.components import Settings
 from fleet2d.configuration.documents import read_document
 from fleet2d.configuration.problems import problem, suggest
 from fleet2d.configuration.units import Duration, PositiveDuration, format_duration
-from fleet2d.routines import laws
-from fleet2d.routines.schema_forms import SchemaForms
+from fleet2d.routines.distributions import (
+    Distribution,
+    empirical,
+    exponential,
+    gamma,
+    lognormal,
+    normal,
+    uniform,
+)
+
+FORMS: dict[str, dict[str, Any]] = {
+    "text": {"type": "string"},
+    "number": {"type": "number"},
+    "pair": {"type": "array", "minItems": 2, "maxItems": 2},
+    "extension": {"type": "object", "description": "a mapping that extends another"},
+}
+
+
+@dataclass(frozen=True, init=False)
+class SchemaForms:
+    """Lists the short forms of a field: ``Annotated[Period, SchemaForms("pair")]``."""
+
+    forms: tuple[str, ...]
+
+    def __init__(self, *forms: Literal["text", "number", "pair", "extension"]) -> None:
+        object.__setattr__(self, "forms", forms)
+
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        """Add the forms to the schema."""
+        return {"anyOf": [handler(schema), *(FORMS[form] for form in self.forms)]}
+
 
 FOLDER = Path(__file__).parent
 SECOND = timedelta(seconds=1)
@@ -25,7 +58,7 @@ def seconds(duration: timedelta) -> int:
     return duration // SECOND
 
 
-class DurationLaw(Settings):
+class DurationDistribution(Settings):
     """A law of durations: how long something takes.
 
     Short forms: ``30 min`` is a lognormal law of that mean, ``[20 min, 40 min]`` a uniform law.
@@ -76,25 +109,29 @@ class DurationLaw(Settings):
             raise problem("the longest duration is below one second: make it longer")
         return self
 
-    def table(self) -> laws.Law:
+    def table(self) -> Distribution:
         """Return the law as a table of quantiles [s]."""
         mean = seconds(self.mean)
         std = seconds(self.std) if self.std is not None else int(mean * USUAL_SPREAD)
         low = None if self.at_least is None else seconds(self.at_least)
         high = None if self.at_most is None else seconds(self.at_most)
         if self.law == "fixed" or (std == 0 and self.law != "measured" and self.law != "uniform"):
-            return laws.uniform(mean, mean)
+            return uniform(mean, mean)
         if self.law == "uniform":
-            return laws.uniform(low or 0, high or 0)
+            return uniform(low or 0, high or 0)
         if self.law == "measured":
-            return laws.empirical([seconds(d) for d in self.quantiles]).within(low, high)
+            return empirical([seconds(d) for d in self.quantiles]).within(low, high)
         if self.law == "exponential":
-            return laws.exponential(mean).within(low, high)
-        make = {"lognormal": laws.lognormal, "gamma": laws.gamma, "normal": laws.normal}[self.law]
+            return exponential(mean).within(low, high)
+        make = {
+            "lognormal": lognormal,
+            "gamma": gamma,
+            "normal": normal,
+        }[self.law]
         return make(mean, std).within(low, high)
 
 
-AnyDurationLaw = Annotated[DurationLaw, SchemaForms("text", "number", "pair")]
+AnyDurationDistribution = Annotated[DurationDistribution, SchemaForms("text", "number", "pair")]
 """A law of durations, in any form."""
 
 
@@ -126,12 +163,12 @@ class Activity(Settings):
     exclusive: bool = False
     choose: Literal["own", "nearest", "each_time", "here"] = "own"
     interruptible: bool = True
-    takes: AnyDurationLaw = DurationLaw()
+    takes: AnyDurationDistribution = DurationDistribution()
     shifts: PositiveDuration | None = None
     moves: PositiveDuration | None = None
     fetches: PositiveDuration | None = None
     fetches_from: tuple[str, ...] = ("kitchen", "any")
-    fetch_takes: AnyDurationLaw = DurationLaw(mean=timedelta(minutes=2))
+    fetch_takes: AnyDurationDistribution = DurationDistribution(mean=timedelta(minutes=2))
 
 
 @cache

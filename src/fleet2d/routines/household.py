@@ -1,14 +1,8 @@
-"""Households: people whose days depend on each other.
+"""Periods in which a person is away from home, whatever the plan of the day is."""
 
-Every member computes the days of all members, from the same random streams: they agree, and nothing
-depends on the order in which they are asked. Days are drawn in the order of the members, with joint
-activities as appointments. A member keeps out of private rooms while they are used by earlier
-members, and by all members whose previous day isn't over yet.
-"""
-
-from bisect import insort
 from collections.abc import Mapping, Sequence
-from datetime import date, datetime
+from dataclasses import replace
+from datetime import date, datetime, timedelta
 from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, Self
@@ -20,13 +14,13 @@ from fleet2d.configuration.documents import read_document
 from fleet2d.configuration.problems import Location, did_you_mean, problem, problem_at, shown
 from fleet2d.configuration.units import OnDays, Share, folder_of, weekdays_of
 from fleet2d.errors import ScenarioError
-from fleet2d.routines.activity import AnyDurationLaw, find_activity
-from fleet2d.routines.laws import uniform
+from fleet2d.kernels.motion import RoomUse
+from fleet2d.routines.activity import AnyDurationDistribution, SchemaForms, find_activity
+from fleet2d.routines.distributions import uniform
 from fleet2d.routines.life import Life
-from fleet2d.routines.occupancy import ANY_ROOM, Occupancy
-from fleet2d.routines.periods import AnyPeriod, with_absences
 from fleet2d.routines.persona import AnyPersona, Dates, Timing, holds_on
 from fleet2d.routines.planner import (
+    ANY_ROOM,
     DAY_S,
     INTERRUPTS,
     MILLION,
@@ -38,10 +32,94 @@ from fleet2d.routines.planner import (
     DayPlan,
     Doing,
     Job,
+    PrivateRooms,
 )
-from fleet2d.routines.schema_forms import SchemaForms
 from fleet2d.routines.templates import starts
 from fleet2d.runtime.determinism import Draws, stream_key
+
+SECOND = timedelta(seconds=1)
+AWAY = "holiday"
+
+
+def _moment(value: Any) -> Any:
+    """Read a date as the midnight that begins it."""
+    if isinstance(value, str) and len(value) == 10:
+        return f"{value}T00:00"
+    if hasattr(value, "year") and not isinstance(value, datetime):
+        return datetime(value.year, value.month, value.day)
+    return value
+
+
+Moment = Annotated[datetime, BeforeValidator(_moment)]
+
+
+class Period(Settings):
+    """A period of time; short form: ``[2026-02-14, 2026-02-21T18:00]``.
+
+    Attributes:
+        begins: When it begins, local time.
+        ends: When it is over.
+    """
+
+    begins: Moment
+    ends: Moment
+
+    @model_validator(mode="before")
+    @classmethod
+    def _read_short_form(cls, data: Any) -> Any:
+        if isinstance(data, list | tuple) and len(data) == 2:
+            return {"begins": data[0], "ends": data[1]}
+        return data
+
+    @model_validator(mode="after")
+    def _goes_forward(self) -> "Period":
+        if self.begins.tzinfo or self.ends.tzinfo:
+            raise problem("times of a scenario are local: leave out the time zone")
+        if self.ends <= self.begins:
+            raise problem(
+                f"it begins at {self.begins}, which is not before its end at {self.ends}: swap them"
+            )
+        return self
+
+    def seconds_since(self, midnight: datetime) -> tuple[int, int]:
+        """Return its beginning and end [s since a midnight]."""
+        return (self.begins - midnight) // SECOND, (self.ends - midnight) // SECOND
+
+
+AnyPeriod = Annotated[Period, SchemaForms("pair")]
+"""A period, in any form."""
+
+
+def with_absences(
+    day: Sequence[Doing], midnight: datetime, away: Sequence[Period], visits: Sequence[Period]
+) -> list[Doing]:
+    """Return a day with a person's absences from home in place of what is planned then.
+
+    Args:
+        day: The doings of the day, without a gap.
+        midnight: The midnight that begins the day's date.
+        away: The periods in which the person is away.
+        visits: If any, the only periods in which the person is at home.
+    """
+    begin, end = day[0].begin, day[-1].end
+    absences = [period.seconds_since(midnight) for period in away]
+    if visits:
+        stays = sorted(period.seconds_since(midnight) for period in visits)
+        lasts, firsts = [begin, *(b for _, b in stays)], [*(a for a, _ in stays), end]
+        absences += [(a, b) for a, b in zip(lasts, firsts, strict=True) if a < b]
+    for first, last in absences:
+        day = _cut(day, max(first, begin), min(last, end))
+    return list(day)
+
+
+def _cut(day: Sequence[Doing], first: int, last: int) -> list[Doing]:
+    """Return a day with an absence from `first` to `last` [s]."""
+    if first >= last:
+        return list(day)
+    before = [doing._replace(end=min(doing.end, first)) for doing in day if doing.begin < first]
+    after = [doing._replace(begin=max(doing.begin, last)) for doing in day if doing.end > last]
+    return [*before, Doing(AWAY, first, last), *after]
+
 
 MemberRooms = Mapping[str, Mapping[str, Sequence[int]]]
 # The number of days that are kept after they were drawn.
@@ -71,7 +149,7 @@ class JointActivity(Timing):
     who: tuple[str, ...] = ()
     on: OnDays | None = None
     dates: Dates = ()
-    takes: AnyDurationLaw | None = None
+    takes: AnyDurationDistribution | None = None
     probability: Share = 1.0
 
     @model_validator(mode="after")
@@ -248,31 +326,25 @@ class Lives:
         """Draw the days of all members for a date."""
         joint_jobs = self._joint_jobs(ordinal)
         yesterday = self._cache.get(ordinal - 1, {})
-        times: dict[int, list[tuple[int, int]]] = {}
+        use = RoomUse()
         for name, doings in yesterday.items():
-            self._add_use(times, name, doings, -DAY_S)
+            self._add_use(use, name, doings, -DAY_S)
         days: dict[str, Sequence[Doing]] = {}
         for name, life in self._lives.items():
             plan = life.template(ordinal)
             for job, members in joint_jobs:
                 if not members or name in members:
                     plan = _with_job(plan, job)
-            day = life.draw_day(ordinal, plan, Occupancy(self._rooms[name], times))
+            day = life.draw_day(ordinal, plan, PrivateRooms(self._rooms[name], use))
             days[name] = self._with_absences(name, day, ordinal)
-            self._add_use(times, name, days[name])
+            self._add_use(use, name, days[name])
         return self._with_welcomes(ordinal, days) if self.household.welcome else days
 
-    def _add_use(
-        self,
-        times: dict[int, list[tuple[int, int]]],
-        name: str,
-        doings: Sequence[Doing],
-        shift: int = 0,
-    ) -> None:
-        """Add the times at which a member uses private rooms, by room, shifted by some seconds."""
+    def _add_use(self, use: RoomUse, name: str, doings: Sequence[Doing], shift: int = 0) -> None:
+        """Add the times at which a member uses private rooms, shifted by some seconds."""
         for doing in doings:
             if doing.end + shift > 0 and self._is_exclusive(name, doing):
-                insort(times.setdefault(doing.room, []), (doing.begin + shift, doing.end + shift))
+                use.add(doing.room, doing.begin + shift, doing.end + shift)
 
     def _with_absences(self, name: str, day: Sequence[Doing], ordinal: int) -> Sequence[Doing]:
         """Return a member's day, away from home on trips and, for visitors, between visits."""
@@ -344,4 +416,4 @@ def _with_job(plan: DayPlan, job: Job) -> DayPlan:
         jobs.append(job)
     else:
         jobs[index] = job._replace(after=jobs[index].after)
-    return plan._replace(jobs=tuple(jobs), core=None)
+    return replace(plan, jobs=tuple(jobs))

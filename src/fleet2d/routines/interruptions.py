@@ -1,21 +1,25 @@
-"""Interruptions: needs and errands that are inserted into a planned day.
+"""Needs and errands: what interrupts the planned days of people, and where its numbers are from."""
 
-Each interruption lies within one activity, which is resumed afterwards: all activities of the plan
-begin and end as planned. A day's interruptions are a function of its date and its plan alone.
-"""
+from collections.abc import Mapping, Sequence
+from datetime import timedelta
+from functools import cache
+from pathlib import Path
+from typing import Annotated, Any, NamedTuple, Self
 
-from collections.abc import Sequence
+from pydantic import Field, model_validator
 
-from fleet2d.kernels.numbers import Bits
-from fleet2d.routines.interruption_rules import (
-    CERTAIN,
-    CHANCE_BITS,
-    QUANTILE_BITS,
-    InterruptionRules,
-    InterruptionStep,
-    Quantiles,
+from fleet2d.configuration.components import Settings
+from fleet2d.configuration.documents import read_document
+from fleet2d.configuration.problems import problem
+from fleet2d.configuration.units import Duration, Share, TimeOfDay
+from fleet2d.kernels.motion import Interruptions
+from fleet2d.routines.activity import (
+    Activity,
+    AnyDurationDistribution,
+    DurationDistribution,
+    SchemaForms,
+    seconds,
 )
-from fleet2d.routines.occupancy import ANY_ROOM, Occupancy
 from fleet2d.routines.planner import (
     DAY_S,
     FINISHES,
@@ -24,37 +28,257 @@ from fleet2d.routines.planner import (
     RESUMES,
     SLEEP,
     Doing,
+    PrivateRooms,
     new_doing,
 )
 from fleet2d.runtime.determinism import Draws
 
-# The least duration of the rest of an activity after an interruption [s].
-SHORTEST_REST_S = 60
-# Within this time before waking, no need interrupts sleep [s].
-LAST_SLEEP_S = 1800
-# The most doings of a day, whose numbers are part of the addresses of random draws.
-MOST = 480
+FOLDER = Path(__file__).parent
+# The least mean time between two occurrences of a need.
+SHORTEST_INTERVAL = timedelta(minutes=5)
+
+
+class Need(Settings):
+    """Something that builds up, and then interrupts an activity, which is resumed afterwards.
+
+    Short form: ``2 h`` is a need with that mean time between two occurrences.
+
+    Attributes:
+        activity: The activity; left out: the name of the need.
+        every: Time awake between two occurrences.
+        asleep: Time asleep until it wakes the person; left out: it never does.
+        on_waking: Probability that it is met first on waking.
+        before_bed: Probability that it is met last before sleep.
+        before_leaving: Probability that it is met last before leaving home.
+        on_return: Probability that it is met first on coming home.
+        between: The times of day at which it occurs; left out: at any.
+        met_by: Activities that meet it, too: it builds up again after them.
+        takes: Its duration; left out: that of the activity.
+        then: Activities that follow at once, with their probability.
+        patience: It waits for the end of an activity that ends within this time.
+        source: The source of its numbers, for readers.
+    """
+
+    activity: str = ""
+    every: AnyDurationDistribution
+    asleep: AnyDurationDistribution | None = None
+    on_waking: Share = 0.0
+    before_bed: Share = 0.0
+    before_leaving: Share = 0.0
+    on_return: Share = 0.0
+    between: tuple[TimeOfDay, TimeOfDay] | None = None
+    met_by: tuple[str, ...] = ()
+    takes: AnyDurationDistribution | None = None
+    then: dict[str, Share] = Field(default_factory=dict)
+    patience: Duration = timedelta(minutes=10)
+    source: str = ""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _read_short_form(cls, data: Any) -> Any:
+        return {"every": data} if isinstance(data, str | int | float | timedelta) else data
+
+    @model_validator(mode="after")
+    def _leaves_time(self) -> Self:
+        for key, law in (("every", self.every), ("asleep", self.asleep)):
+            if law is not None and law.table().mean() < seconds(SHORTEST_INTERVAL):
+                raise problem(f"'{key}' is less than 5 min on average: make it 5 min or longer")
+        return self
+
+
+class Errand(Settings):
+    """A short task between two activities: to fetch, put away or look at something.
+
+    Short form: a number is its probability.
+
+    Attributes:
+        activity: The activity; left out: the name of the errand.
+        probability: Its probability at each such change of activity.
+        after: Activities after which it is done; left out: after any.
+        before: Activities before which it is done; left out: before any.
+        takes: Its duration; left out: that of the activity.
+        source: The source of its numbers, for readers.
+    """
+
+    activity: str = ""
+    probability: Share
+    after: tuple[str, ...] = ()
+    before: tuple[str, ...] = ()
+    takes: AnyDurationDistribution | None = None
+    source: str = ""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _read_short_form(cls, data: Any) -> Any:
+        return {"probability": data} if isinstance(data, int | float) else data
+
+
+AnyNeed = Annotated[Need, SchemaForms("text", "number")]
+AnyErrand = Annotated[Errand, SchemaForms("number")]
+
+
+@cache
+def usual_needs() -> dict[str, Need]:
+    """Return the needs of an adult, which personas without needs of their own have.
+
+    >>> sorted(usual_needs())
+    ['call', 'drink', 'toilet']
+    """
+    data = read_document(FOLDER / "needs.yaml").data["needs"]
+    return {name: Need.model_validate(fields) for name, fields in data.items()}
+
+
+@cache
+def usual_errands() -> dict[str, Errand]:
+    """Return the errands of an adult, which personas without errands of their own have."""
+    data = read_document(FOLDER / "needs.yaml").data["errands"]
+    return {name: Errand.model_validate(fields) for name, fields in data.items()}
+
+
+def activities_of(needs: Mapping[str, Need], errands: Mapping[str, Errand]) -> set[str]:
+    """Return the names of the activities of needs and errands."""
+    names = {need.activity or name for name, need in needs.items()}
+    names |= {what for need in needs.values() for what in need.then}
+    return names | {errand.activity or name for name, errand in errands.items()}
+
+
+def named_activities(
+    needs: Mapping[str, Need], errands: Mapping[str, Errand]
+) -> list[tuple[tuple[str, ...], str]]:
+    """Return pairs of keys in the persona and the activity that needs and errands name there."""
+    named: list[tuple[tuple[str, ...], str]] = []
+    for name, need in needs.items():
+        named.append((("needs", name), need.activity or name))
+        named += [(("needs", name, "then", what), what) for what in need.then]
+        named += [(("needs", name, "met_by"), what) for what in need.met_by]
+    for name, errand in errands.items():
+        named.append((("errands", name), errand.activity or name))
+        named += [(("errands", name, "after"), what) for what in errand.after]
+        named += [(("errands", name, "before"), what) for what in errand.before]
+    return named
+
+
+# Probabilities have this many bits, and distributions 2 to this power quantiles: few bits of a draw
+# suffice.
+CHANCE_BITS, QUANTILE_BITS = 10, 8
+
+Quantiles = tuple[int, ...]
+StepRow = tuple[int, int, Quantiles]
+
+
+class InterruptionRules(NamedTuple):
+    """What interrupts the days of a person.
+
+    Attributes:
+        core: The needs and errands, by numbers of activities.
+        names: The activities by number.
+        numbers: The number of each of them.
+        exclusive: Activities that are done alone in their room.
+    """
+
+    core: Interruptions
+    names: tuple[str, ...]
+    numbers: Mapping[str, int]
+    exclusive: frozenset[str]
+
+
+def interruption_rules(
+    needs: Mapping[str, Need], errands: Mapping[str, Errand], activities: Mapping[str, Activity]
+) -> InterruptionRules:
+    """Return the rules of needs and errands.
+
+    Args:
+        needs: The needs, by name.
+        errands: The errands, by name.
+        activities: All activities that a day may have, with those of needs and errands.
+    """
+    numbers = {name: number for number, name in enumerate(activities)}
+
+    def step(name: str, chance: float, takes: DurationDistribution | None = None) -> StepRow:
+        return numbers[name], _chance(chance), _quantiles(takes or activities[name].takes)
+
+    def of(names: Sequence[str]) -> list[int] | None:
+        return sorted({numbers[name] for name in names}) or None
+
+    need_rows = [
+        (
+            [
+                step(need.activity or name, 1.0, need.takes),
+                *(step(then, chance) for then, chance in need.then.items()),
+            ],
+            _quantiles(need.every),
+            None if need.asleep is None else _quantiles(need.asleep),
+            (
+                _chance(need.on_waking),
+                _chance(need.before_bed),
+                _chance(need.before_leaving),
+                _chance(need.on_return),
+            ),
+            seconds(need.patience),
+            None if need.between is None else _hours(need.between),
+            of(need.met_by) or [],
+        )
+        for name, need in needs.items()
+    ]
+    errand_rows = [
+        (
+            step(errand.activity or name, errand.probability, errand.takes),
+            of(errand.after),
+            of(errand.before),
+        )
+        for name, errand in errands.items()
+    ]
+    away = [numbers[name] for name, activity in activities.items() if activity.away]
+    exclusive = frozenset(name for name, activity in activities.items() if activity.exclusive)
+    firm = [numbers[n] for n, a in activities.items() if a.exclusive or not a.interruptible]
+    core = Interruptions(need_rows, errand_rows, away, firm, numbers[SLEEP], len(numbers))
+    return InterruptionRules(core, tuple(activities), numbers, exclusive)
+
+
+def _hours(between: tuple[timedelta, timedelta]) -> tuple[int, int]:
+    """Return the begin of some hours of the day [s since midnight], and how long they last [s]."""
+    return seconds(between[0]), seconds(between[1] - between[0]) % DAY_S
+
+
+def _chance(share: float) -> int:
+    """Return a probability in parts of 1024."""
+    return round(share * (1 << CHANCE_BITS))
+
+
+def _quantiles(distribution: DurationDistribution) -> Quantiles:
+    """Return quantiles of a distribution between its bounds [s]."""
+    return tuple(max(1, value) for value in distribution.table().quantiles(1 << QUANTILE_BITS))
 
 
 def interrupt(
-    rules: InterruptionRules, draws: Draws, day: Sequence[Doing], occupancy: Occupancy | None = None
+    rules: InterruptionRules,
+    draws: Draws,
+    day: Sequence[Doing],
+    private: PrivateRooms | None = None,
 ) -> list[Doing]:
     """Return a day with interruptions.
+
+    Each lies within one activity, which is resumed afterwards: all activities of the plan begin and
+    end as planned. A day's interruptions are a function of its date and its plan alone.
 
     Args:
         rules: The needs and errands of the person.
         draws: The random draws of the day's interruptions.
         day: The planned day, without a gap.
-        occupancy: When others use private rooms; None: never.
+        private: The rooms that others may use; None: nobody does.
     """
-    if occupancy is not None:
-        return _InterruptedDay(rules, draws, day, occupancy).result
-    rows = [(rules.numbers[doing.activity], doing.begin, doing.end) for doing in day]
+    rows = [(rules.numbers[name], begin, end, room) for name, begin, end, _, room, _ in day]
+    use, rooms = None, list[Sequence[int]]()
+    if private is not None:
+        use = private.use
+        rooms = [private.of(name) if name in rules.exclusive else () for name in rules.names]
     return [
-        new_doing((rules.names[activity], begin, end, "", ANY_ROOM, role))
+        new_doing((rules.names[activity], begin, end, "", room, role))
         if planned < 0
         else _part(day[planned], begin, end, role)
-        for planned, activity, begin, end, role in rules.core.interrupt(draws, rows)
+        for planned, activity, begin, end, role, room in rules.core.interrupt(
+            draws, rows, use, rooms
+        )
     ]
 
 
@@ -80,190 +304,3 @@ def without_interruptions(day: Sequence[Doing]) -> list[Doing]:
             planned.append(doing._replace(begin=begin))
         begin = doing.end
     return planned
-
-
-class _InterruptedDay:
-    """A day of a member of a household to which interruptions are added, doing by doing.
-
-    Attributes:
-        result: The doings so far.
-        due: When each need occurs next [s].
-        has_waited: Whether each need has waited for the end of an activity since it was due.
-        doing: The planned doing to which interruptions are added.
-        now: The end of its last part so far [s].
-        end: Its end [s].
-        is_fresh: Whether no interruption was added to it so far.
-    """
-
-    def __init__(
-        self,
-        rules: InterruptionRules,
-        draws: Draws,
-        day: Sequence[Doing],
-        occupancy: Occupancy | None,
-    ) -> None:
-        self.rules, self.bits, self.occupancy = rules, Bits(draws), occupancy
-        self.result: list[Doing] = []
-        begin = day[0].begin
-        self.due = [begin + self._draw_part(need.every) for need in rules.needs]
-        self.has_waited = [False] * len(rules.needs)
-        for k, doing in enumerate(day):
-            self.now, self.end, self.doing, self.is_fresh = doing.begin, doing.end, doing, True
-            before = day[k - 1].activity if k else SLEEP
-            after = day[k + 1].activity if k + 1 < len(day) else SLEEP
-            if doing.activity in rules.away:
-                self._skip_needs()
-            elif doing.activity == SLEEP:
-                self._interrupt_sleep(before)
-            else:
-                self._interrupt_activity(before, after)
-            if self.now == doing.begin:
-                self.result.append(doing)
-            elif self.now < self.end:
-                self._continue(self.end)
-            else:
-                self._mark_finishing()
-
-    def _mark_finishing(self) -> None:
-        """Mark the last interruptions as the end of their activity, which isn't resumed."""
-        i = len(self.result) - 1
-        while self.result[i].role == INTERRUPTS:
-            self.result[i] = self.result[i]._replace(role=FINISHES)
-            i -= 1
-
-    def _skip_needs(self) -> None:
-        """Let needs that occur out of the home be met there."""
-        for i, need in enumerate(self.rules.needs):
-            if self.due[i] < self.end:
-                self.due[i] = self.end + self._draw_part(need.every)
-
-    def _interrupt_sleep(self, before: str) -> None:
-        """Add errands and needs before sleep, and needs in the night."""
-        if before != SLEEP:
-            self._do_errands(before)
-            for i, need in enumerate(self.rules.needs):
-                if self._happens(need.before_bed):
-                    self._meet(i, self.now)
-        for i, need in enumerate(self.rules.needs):
-            self.due[i] = max(self.due[i], self.end)
-            if need.asleep is None:
-                continue
-            at = self.now + self._draw_time(need.asleep)
-            while at < self.end - LAST_SLEEP_S:
-                self._meet(i, at)
-                at = max(at, self.now) + self._draw_time(need.asleep)
-            self.due[i] = self.end + self._draw_part(need.every)
-
-    def _interrupt_activity(self, before: str, after: str) -> None:
-        """Add errands and needs to an activity at home, in order of time."""
-        needs, away, activity = self.rules.needs, self.rules.away, self.doing.activity
-        if before != activity and before != SLEEP:
-            self._do_errands(before)
-        wakes, begins_anew = before == SLEEP, before == SLEEP or before in away
-        for i, need in enumerate(needs):
-            if begins_anew and self._happens(need.on_waking if wakes else need.on_return):
-                self._meet(i, self.now)
-            if activity in need.met_by:
-                self.due[i] = self.end + self._draw_time(need.every)
-        self._meet_due_needs(after)
-        if after in away:
-            for i, need in enumerate(needs):
-                if self._happens(need.before_leaving):
-                    self._meet(i, self.end)
-
-    def _meet_due_needs(self, after: str) -> None:
-        """Meet the needs that are due before the activity ends, or put them off until its end."""
-        needs = self.rules.needs
-        is_uninterruptible = self.doing.activity in self.rules.uninterruptible
-        while needs:
-            first = min(self.due)
-            i, at = self.due.index(first), max(first, self.now)
-            if at >= self.end:
-                return
-            waits = is_uninterruptible or (
-                not self.has_waited[i] and self.end - at <= needs[i].patience
-            )
-            if waits and after not in self.rules.away:
-                self.due[i], self.has_waited[i] = self.end, True
-            else:
-                self._meet(i, self.end if waits else at)
-
-    def _happens(self, chance: int) -> bool:
-        """Draw whether something of a probability happens, given in parts of CERTAIN."""
-        return chance > 0 and (chance >= CERTAIN or self.bits.take(CHANCE_BITS) < chance)
-
-    def _draw_time(self, quantiles: Quantiles) -> int:
-        """Draw a time from a law [s]."""
-        return quantiles[self.bits.take(QUANTILE_BITS)]
-
-    def _draw_part(self, quantiles: Quantiles) -> int:
-        """Draw a time from a law, and a uniform part of it [s]."""
-        return (self._draw_time(quantiles) * self.bits.take(QUANTILE_BITS)) >> QUANTILE_BITS
-
-    def _do_errands(self, before: str) -> None:
-        """Add the errands between the activity before and the present one."""
-        for errand in self.rules.errands:
-            fits = (not errand.after or before in errand.after) and (
-                not errand.before or self.doing.activity in errand.before
-            )
-            if fits and self._happens(errand.step.chance):
-                self._insert([(errand.step, self._draw_time(errand.step.takes))], self.now)
-
-    def _meet(self, number: int, at: int) -> None:
-        """Meet a need at a time, or shortly before the end of the activity, if there is time."""
-        need = self.rules.needs[number]
-        self.due[number] = max(at, self.now) + self._draw_time(need.every)
-        self.has_waited[number] = False
-        if need.window and (at - need.window[0]) % DAY_S > need.window[1]:
-            return
-        activity = self.doing.activity
-        steps = [
-            (step, self._draw_time(step.takes))
-            for step in need.steps
-            if step.activity != activity and self._happens(step.chance)
-        ]
-        if steps and not self._insert(steps, at):
-            self.due[number] = self.end
-
-    def _insert(self, steps: Sequence[tuple[InterruptionStep, int]], at: int) -> bool:
-        """Insert steps into the activity at about a time; return whether there is room for them."""
-        duration = sum(takes for _, takes in steps)
-        latest = self.end - duration
-        if latest < self.end and latest >= at > latest - SHORTEST_REST_S:
-            at = latest
-        at = min(at, latest)
-        first = self.now + SHORTEST_REST_S if self.is_fresh else self.now
-        if latest < first or len(self.result) > MOST - 2 * len(steps):
-            return False
-        room = -1
-        if self.occupancy is not None and any(step.exclusive for step, _ in steps):
-            slot = self._free_room(steps, at, latest, duration)
-            if slot is None:
-                return False
-            at, room = slot
-        if at > self.now:
-            self._continue(at)
-        for step, takes in steps:
-            self.result.append(Doing(step.activity, at, at + takes, "", room, INTERRUPTS))
-            at += takes
-        self.now = at
-        return True
-
-    def _free_room(
-        self, steps: Sequence[tuple[InterruptionStep, int]], at: int, latest: int, duration: int
-    ) -> tuple[int, int] | None:
-        """Return the first time at which one of the rooms is free for long enough, and the room."""
-        assert self.occupancy is not None
-        name = next(step.activity for step, _ in steps if step.exclusive)
-        room, rooms = self.doing.room, self.occupancy.rooms_of(name)
-        if self.doing.activity in self.rules.private and room in rooms:
-            return at, room  # the person is already alone in it
-        slot = self.occupancy.free(name, at, latest, duration, self.end)
-        return None if slot is None else (slot.begin, slot.room)
-
-    def _continue(self, until: int) -> None:
-        """Add the planned doing up to a time."""
-        activity, _, _, task, room, role = self.doing
-        role = role if self.is_fresh else RESUMES
-        self.result.append(Doing(activity, self.now, until, task, room, role))
-        self.now, self.is_fresh = until, False

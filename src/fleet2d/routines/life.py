@@ -4,10 +4,18 @@ from collections.abc import Sequence
 from datetime import date
 
 from fleet2d.routines.interruptions import interrupt
-from fleet2d.routines.occupancy import Occupancy
 from fleet2d.routines.persona import Persona
-from fleet2d.routines.planner import DAY_S, DayPlan, Doing, plan_day
-from fleet2d.routines.recorded import draw_recorded, draw_source, in_free_rooms, with_jobs
+from fleet2d.routines.planner import (
+    DAY_S,
+    DayPlan,
+    Doing,
+    PrivateRooms,
+    draw_recorded,
+    draw_source,
+    in_free_rooms,
+    plan_day,
+    with_jobs,
+)
 from fleet2d.runtime.determinism import Draws, stream_key
 
 # The number of days that are kept after they were drawn.
@@ -69,23 +77,22 @@ class Life:
         return self._cache[ordinal]
 
     def draw_day(
-        self, ordinal: int, plan: DayPlan, occupancy: Occupancy | None = None
+        self, ordinal: int, plan: DayPlan, private: PrivateRooms | None = None
     ) -> Sequence[Doing]:
         """Draw a day from a plan, which may differ from its template's, with interruptions."""
-        day = self.draw_uninterrupted(ordinal, plan, occupancy)
-        rules = self.persona.interruptions
-        if not (rules.needs or rules.errands):
+        day = self.draw_uninterrupted(ordinal, plan, private)
+        if not (self.persona.needs or self.persona.errands):
             return day
-        return interrupt(rules, Draws(self._needs, ordinal), day, occupancy)
+        return interrupt(self.persona.interruptions, Draws(self._needs, ordinal), day, private)
 
     def draw_uninterrupted(
-        self, ordinal: int, plan: DayPlan, occupancy: Occupancy | None = None
+        self, ordinal: int, plan: DayPlan, private: PrivateRooms | None = None
     ) -> Sequence[Doing]:
         """Draw a day from a plan, without interruptions."""
         next_wake = self.wake(ordinal + 1) + DAY_S
         if plan.recorded is not None:
             first = draw_source(plan.recorded, Draws(self._wake, ordinal))
             day = draw_recorded(plan.recorded, first, self.draws(ordinal), next_wake)
-            private = self.persona.interruptions.private
-            return in_free_rooms(with_jobs(day, plan.jobs), private, occupancy)
-        return plan_day(plan, self.draws(ordinal), self.wake(ordinal), next_wake, occupancy)
+            exclusive = self.persona.interruptions.exclusive
+            return in_free_rooms(with_jobs(day, plan.jobs), exclusive, private)
+        return plan_day(plan, self.draws(ordinal), self.wake(ordinal), next_wake, private)

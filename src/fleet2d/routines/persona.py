@@ -1,4 +1,4 @@
-"""Personas: descriptions of people by their activities and the templates of their days."""
+"""Personas: descriptions of people by their activities, manners and the templates of their days."""
 
 from collections.abc import Mapping
 from datetime import date, timedelta
@@ -20,6 +20,7 @@ from fleet2d.configuration.problems import did_you_mean, problem, problem_at, sh
 from fleet2d.configuration.units import (
     WEEKDAYS,
     Duration,
+    Length,
     OnDays,
     Share,
     TimeOfDay,
@@ -28,21 +29,65 @@ from fleet2d.configuration.units import (
     weekdays_of,
 )
 from fleet2d.errors import ScenarioError
-from fleet2d.routines.activity import Activity, AnyDurationLaw, catalogue, find_activity
-from fleet2d.routines.interruption_rules import InterruptionRules, interruption_rules
-from fleet2d.routines.manners import Manners
-from fleet2d.routines.needs import (
+from fleet2d.routines.activity import (
+    Activity,
+    AnyDurationDistribution,
+    DurationDistribution,
+    SchemaForms,
+    catalogue,
+    find_activity,
+)
+from fleet2d.routines.interruptions import (
     AnyErrand,
     AnyNeed,
+    InterruptionRules,
     activities_of,
+    interruption_rules,
     named_activities,
     usual_errands,
     usual_needs,
 )
-from fleet2d.routines.planner import REST, SLEEP, DayPlan
-from fleet2d.routines.recorded import AnyRecordedDay
-from fleet2d.routines.schema_forms import SchemaForms
+from fleet2d.routines.planner import REST, SLEEP, AnyRecordedDay, DayPlan
 from fleet2d.routines.templates import check, day_plans
+
+
+class Manners(Settings):
+    """How a person reacts to robots; distances are between the middles of the bodies.
+
+    A person who lies, is out of the home, or has no line of sight to a robot doesn't notice it.
+
+    Attributes:
+        notices: Distance at which a robot is noticed [m].
+        turns: Probability of turning to it then.
+        looks: How long the person looks at it.
+        in_the_way: Distance at which a robot that drives up is in the way [m].
+        steps_aside: Probability of stepping aside then, if the person stands.
+        too_close: Distance below which a robot is too close [m].
+        patience: How long a robot may stand too close.
+        leaves: Probability of leaving for another room after that.
+        leaves_for: How long the person stays there.
+        hears: Distance at which its call is heard [m].
+        comes: Probability of coming when it calls.
+        comes_for: How long the person stays with it.
+        stops: Probability that a person who left or came doesn't resume the activity.
+    """
+
+    notices: Length = Field(default=2.5, gt=0)
+    turns: Share = 0.5
+    looks: AnyDurationDistribution = DurationDistribution(
+        law="uniform", at_least=timedelta(seconds=4), at_most=timedelta(seconds=12)
+    )
+    in_the_way: Length = Field(default=0.9, gt=0)
+    steps_aside: Share = 0.8
+    too_close: Length = Field(default=0.7, gt=0)
+    patience: Duration = timedelta(seconds=30)
+    leaves: Share = 0.3
+    leaves_for: AnyDurationDistribution = DurationDistribution(mean=timedelta(minutes=5))
+    hears: Length = Field(default=10.0, gt=0)
+    comes: Share = 0.7
+    comes_for: AnyDurationDistribution = DurationDistribution(mean=timedelta(seconds=40))
+    stops: Share = 0.1
+
 
 BUNDLED = Path(__file__).parent / "personas"
 DAY = timedelta(days=1)
@@ -122,7 +167,7 @@ class Task(Timing):
 
     activity: str = ""
     until: TimeOfDay | None = None
-    takes: AnyDurationLaw | None = None
+    takes: AnyDurationDistribution | None = None
     after: tuple[str, ...] = ()
     on_waking: bool = False
     before_bed: bool = False
@@ -304,7 +349,7 @@ class Persona(Settings):
     def used_activities(self) -> dict[str, Activity]:
         """The activities that its days may have, by name."""
         names = {job.activity for plan in self.plans.values() for job in plan.jobs}
-        names |= {fill.activity for plan in self.plans.values() for fill in plan.fills}
+        names |= {option.activity for plan in self.plans.values() for option in plan.pastimes}
         names |= {n for day in self.days.values() for r in day.recorded for n in r.activities}
         names |= activities_of(self.needs, self.errands)
         return {name: self.activity(name) for name in sorted(names | {REST, SLEEP})}

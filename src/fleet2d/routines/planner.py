@@ -1,4 +1,4 @@
-"""The planner of days: draws a random day that satisfies all constraints of a template.
+"""Days of people: the doings of a day, and how random ones are drawn that satisfy a template.
 
 A day lasts from waking to the next waking. It is a chain of jobs in a drawn order. With windows for
 their begins and bounds on their durations, it is a simple temporal network, which two passes solve:
@@ -8,23 +8,31 @@ to Idrees, Singh, Xu and Glas: "A Framework for Realistic Simulation of Daily Hu
 arXiv 2311.15400, who propagate constraints both ways through a day.)
 
 If the jobs of a day don't fit, another order is drawn, a few times; then one job is left out: of
-those that aren't needed every day, the one that is done on the fewest days.
+those that aren't needed every day, the one that is done on the fewest days. The core draws the
+days, see ``src/core/planner.hpp``.
+
+A day of a template with recorded days follows one of them. When an activity ends at about the time
+of day at which the same activity ended on another recorded day, the new day may continue with that
+one instead. So durations and hours are those of the log, but new days differ from the recorded
+ones. (Local resampling, as with k nearest neighbours by Lall and Sharma 1996, Water Resources
+Research 32:679.)
 """
 
-from collections.abc import Callable, Collection, Sequence
-from functools import partial
-from typing import TYPE_CHECKING, NamedTuple
+from bisect import bisect_left, bisect_right
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property, partial
+from itertools import pairwise
+from typing import Annotated, Any, NamedTuple
 
-from fleet2d.kernels.motion import DayPlanner
-from fleet2d.routines.laws import Law, draw_weighted
-from fleet2d.routines.occupancy import ANY_ROOM, Occupancy
+from pydantic import BeforeValidator, PlainSerializer, WithJsonSchema
+
+from fleet2d.configuration.problems import problem
+from fleet2d.kernels.motion import DayPlanner, RoomUse
+from fleet2d.routines.distributions import Distribution
 from fleet2d.runtime.determinism import Draws
 
-if TYPE_CHECKING:
-    from fleet2d.routines.recorded import Recording
-
 DAY_S = 86_400
-ORDERS = 5  # drawn before a job is left out
 # A gap shorter than this is not filled: the next doing begins at once [s].
 NO_GAP_S = 300
 MILLION = 1_000_000
@@ -32,6 +40,8 @@ NEVER = 1 << 40  # later than any time [s]
 PLANNED, INTERRUPTS, RESUMES, FINISHES = 0, 1, 2, 3
 REST = "rest"
 SLEEP = "sleep"
+# The room of what needs none for itself, and the only one of a household whose rooms are unknown.
+ANY_ROOM = -1
 
 
 class Doing(NamedTuple):
@@ -42,7 +52,7 @@ class Doing(NamedTuple):
         begin: Its beginning [s since the midnight of the day's date].
         end: Its end, which is the beginning of the next doing.
         task: The template's task; empty for pastimes and sleep.
-        room: The index of its room, if its household has chosen one; else -1.
+        room: The index of its room, if its household has chosen one; else ANY_ROOM.
         role: PLANNED, or of an interruption: INTERRUPTS a planned doing, RESUMES it afterwards, or
             FINISHES it, so that it isn't resumed.
     """
@@ -59,15 +69,32 @@ class Doing(NamedTuple):
 new_doing: Callable[[tuple[str, int, int, str, int, int]], Doing] = partial(tuple.__new__, Doing)
 
 
+class PrivateRooms(NamedTuple):
+    """Rooms that only one member of a household uses at a time, as one member knows them.
+
+    Attributes:
+        rooms: For each activity that is done only in such rooms, their indices, the preferred one
+            first.
+        use: When others use them.
+    """
+
+    rooms: Mapping[str, Sequence[int]]
+    use: RoomUse
+
+    def of(self, activity: str) -> Sequence[int]:
+        """Return the rooms of an exclusive activity, by index, the preferred one first."""
+        return self.rooms.get(activity, (ANY_ROOM,))
+
+
 class Job(NamedTuple):
     """A task in the form that the planner uses; times in seconds since the day's midnight.
 
     Attributes:
         task: The name of the task.
         activity: Its activity.
-        starts: The law of its beginning; None: right after the job before it,
-            on waking or before bed.
-        takes: The law of its duration.
+        starts: The distribution of its beginning; None: right after the job before it, on waking or
+            before bed.
+        takes: The distribution of its duration.
         until: Its latest end.
         after: The indices of the jobs before it, all lower than its own.
         chance: Its probability on a day [per million].
@@ -78,8 +105,8 @@ class Job(NamedTuple):
 
     task: str
     activity: str
-    starts: Law | None
-    takes: Law
+    starts: Distribution | None
+    takes: Distribution
     until: int
     after: tuple[int, ...] = ()
     chance: int = MILLION
@@ -87,258 +114,301 @@ class Job(NamedTuple):
     exclusive: bool = False
     place: int = 0
 
-    @property
-    def follows(self) -> bool:
-        """Whether it begins right after another job."""
-        return self.starts is None and self.place == 0
 
-
-class Fill(NamedTuple):
+class PastimeOption(NamedTuple):
     """A pastime in the form that the planner uses; it may begin from `first` to `last` [s]."""
 
     activity: str
     weight: int
-    takes: Law
+    takes: Distribution
     first: int
     last: int
 
 
-class DayPlan(NamedTuple):
+@dataclass(frozen=True)
+class DayPlan:
     """A template in the form that the planner uses; with `recorded` days, new ones resemble those.
 
     Attributes:
         name: The name of the template.
-        wake: The law of waking [s].
-        sleep: The law of going to bed [s].
+        wake: The distribution of waking [s].
+        sleep: The distribution of going to bed [s].
         least_sleep: The least duration of sleep [s].
         jobs: The tasks.
-        fills: The pastimes.
+        pastimes: What fills the time between them.
         recorded: The recorded days, if the template has some.
-        core: The same plan by numbers of activities, for days in which nobody else uses private
-            rooms; None: there is none.
-        names: The activities by number.
     """
 
     name: str
-    wake: Law
-    sleep: Law
+    wake: Distribution
+    sleep: Distribution
     least_sleep: int
     jobs: tuple[Job, ...]
-    fills: tuple[Fill, ...]
+    pastimes: tuple[PastimeOption, ...]
     recorded: "Recording | None" = None
-    core: DayPlanner | None = None
-    names: tuple[str, ...] = ()
 
-    def in_core(self) -> "DayPlan":
-        """Return the plan with what draws days in the core."""
-        if any(fill.takes.shortest < 1 for fill in self.fills):
-            return self._replace(core=None)
-        activities = [*(job.activity for job in self.jobs), *(fill.activity for fill in self.fills)]
-        names = tuple(dict.fromkeys((REST, SLEEP, *activities)))
-        number = {name: number for number, name in enumerate(names)}
+    @cached_property
+    def activities(self) -> tuple[str, ...]:
+        """The activities by their numbers in the core."""
+        jobs, pastimes = (job.activity for job in self.jobs), (p.activity for p in self.pastimes)
+        return tuple(dict.fromkeys((REST, SLEEP, *jobs, *pastimes)))
+
+    @cached_property
+    def core(self) -> DayPlanner:
+        """The plan in the core."""
+        number = {name: number for number, name in enumerate(self.activities)}
         jobs = [
-            (
-                number[job.activity], job.starts, job.takes, job.until, job.after, job.chance,
-                job.needed, job.place,
-            )
-            for job in self.jobs
-        ]  # fmt: skip
-        fills = [(number[f.activity], f.weight, f.takes, f.first, f.last) for f in self.fills]
-        core = DayPlanner(self.sleep, self.least_sleep, jobs, fills, number[REST], number[SLEEP])
-        return self._replace(core=core, names=names)
-
-
-class Chain(NamedTuple):
-    """Jobs in order, with sleep as an additional last one in `preferred` and `latest`.
-
-    Attributes:
-        jobs: The jobs.
-        preferred: The drawn beginning of each [s].
-        latest: The latest possible beginning of each [s].
-    """
-
-    jobs: list[Job]
-    preferred: list[int]
-    latest: list[int]
+            (number[activity], starts, takes, until, after, chance, needed, place)
+            for _, activity, starts, takes, until, after, chance, needed, _, place in self.jobs
+        ]
+        pastimes = [
+            (number[activity], weight, takes, first, last)
+            for activity, weight, takes, first, last in self.pastimes
+        ]
+        return DayPlanner(self.sleep, self.least_sleep, jobs, pastimes, number[REST], number[SLEEP])
 
 
 def plan_day(
-    plan: DayPlan, draws: Draws, wake: int, next_wake: int, occupancy: Occupancy | None = None
+    plan: DayPlan, draws: Draws, wake: int, next_wake: int, private: PrivateRooms | None = None
 ) -> list[Doing]:
-    """Draw a day.
+    """Draw a day; a task whose private rooms are in use all the time is left out.
 
     Args:
         plan: The plan of the day's template.
         draws: The day's random draws.
         wake: When the day begins [s since its midnight].
         next_wake: When the next day begins [s since its midnight].
-        occupancy: When others use private rooms; None: never.
+        private: The rooms that others may use; None: nobody does.
 
     Returns:
         The doings from `wake` to `next_wake`, without a gap.
+
+    Raises:
+        RuntimeError: The tasks fit in no order.
     """
-    if occupancy is None and plan.core is not None:
-        rows = plan.core.plan(draws, wake, next_wake)
-        if not rows:
-            raise _too_full(plan)
-        return [
-            new_doing((plan.names[activity], begin, end, _task(plan, job), ANY_ROOM, PLANNED))
-            for activity, begin, end, job in rows
+    use, rooms = None, list[Sequence[int]]()
+    if private is not None:
+        use, own = private.use, private.rooms
+        rooms = [
+            private.of(job.activity) if job.exclusive or job.activity in own else ()
+            for job in plan.jobs
         ]
-    chain = _feasible_chain(plan, draws, wake, next_wake)
-    day: list[Doing] = []
-    now = wake
-    for i, job in enumerate(chain.jobs):
-        end_by = min(job.until, chain.latest[i + 1])
-        begin = min(_next_begin(job, now, chain.preferred[i]), chain.latest[i])
-        room = ANY_ROOM
-        if occupancy is not None and (job.exclusive or job.activity in occupancy.rooms):
-            shortest = job.takes.shortest
-            slot = occupancy.free(job.activity, begin, chain.latest[i], shortest, end_by)
-            if slot is None:  # others use its rooms all the time: it is left out
-                continue
-            begin, end_by, room = slot
-        end = begin + job.takes.draw(draws, None, end_by - begin)
-        _fill(plan.fills, day, draws, now, begin)
-        day.append(Doing(job.activity, begin, end, job.task, room))
-        now = end
-    bed = min(max(now, chain.preferred[-1]), chain.latest[-1])
-    bed = now if bed - now < NO_GAP_S and now >= plan.sleep.shortest else bed
-    _fill(plan.fills, day, draws, now, bed)
-    day.append(Doing(SLEEP, bed, next_wake))
-    return day
+    rows = plan.core.plan(draws, wake, next_wake, use, rooms)
+    if not rows:
+        raise RuntimeError(
+            f"the tasks of day {plan.name!r} fit in no order between waking and bedtime:"
+            " shorten some, widen their times, or give some a probability below 1"
+        )
+    names, tasks = plan.activities, [*(job.task for job in plan.jobs), ""]  # the last is job -1
+    return [
+        new_doing((names[activity], begin, end, tasks[job], room, PLANNED))
+        for activity, begin, end, job, room in rows
+    ]
 
 
-def _task(plan: DayPlan, job: int) -> str:
-    """Return the name of a job by its number; none below 0."""
-    return plan.jobs[job].task if job >= 0 else ""
+# Probability of a switch to another day where one is possible [in 16ths], and the largest distance
+# between the times of both days [s].
+CROSSING, REACH_S = 6, 1200
+# A doing that lasts at least this many times the shift ends at its recorded time.
+TAKES_UP = 4
+LEAST_S = 30  # the least duration of a doing
+END = "end"
 
 
-def _too_full(plan: DayPlan) -> RuntimeError:
-    return RuntimeError(
-        f"the tasks of day {plan.name!r} fit in no order between waking and bedtime:"
-        " shorten some, widen their times, or give some a probability below 1"
-    )
+class RecordedDay(NamedTuple):
+    """A recorded day; times in seconds since its midnight.
+
+    Attributes:
+        begins: The beginning of each activity, ascending.
+        activities: The activities; the last one is sleep.
+        end: The beginning of the next day.
+    """
+
+    begins: tuple[int, ...]
+    activities: tuple[str, ...]
+    end: int
 
 
-def _next_begin(job: Job, now: int, preferred: int) -> int:
-    """Return when a job begins: at the preferred time, or `now` if that is a little earlier."""
-    begin = max(now, preferred)
-    is_soon = begin - now < NO_GAP_S and (job.starts is None or job.starts.shortest <= now)
-    return now if is_soon else begin
+def parse_day(value: Any) -> RecordedDay:
+    """Read a recorded day: ``06:43 wash, 06:55 breakfast, 22:31 sleep, 30:45 end``.
+
+    Hours from 24 on are those of the next date.
+
+    >>> parse_day("07:00 wash, 23:00 sleep, 31:10 end").end
+    112200
+    """
+    if isinstance(value, RecordedDay):
+        return value
+    if not isinstance(value, str):
+        raise problem(f"expected a recorded day like '07:00 wash, …, 30:45 end', got {value!r}")
+    times, names = [], []
+    for entry in value.split(","):
+        time, _, name = entry.strip().partition(" ")
+        hours, colon, minutes = time.partition(":")
+        if not (colon and hours.isdigit() and minutes.isdigit() and name):
+            raise problem(
+                f"expected a time and an activity like '07:00 wash', got {entry.strip()!r}"
+            )
+        times.append(int(hours) * 3600 + int(minutes) * 60)
+        names.append(name.strip())
+    for before, after in pairwise(times):
+        if after <= before:
+            hint = f"; write {_clock(after + DAY_S)} if it is on the next date"
+            raise problem(
+                f"times must ascend: {_clock(after)} follows {_clock(before)}"
+                f"{hint if after < DAY_S else ''}"
+            )
+    if len(names) < 3 or names[-1] != END or names[-2] != SLEEP:
+        raise problem("a recorded day ends asleep: its last entries are 'sleep' and 'end'")
+    return RecordedDay(tuple(times[:-1]), tuple(names[:-1]), times[-1])
 
 
-def _feasible_chain(plan: DayPlan, draws: Draws, wake: int, next_wake: int) -> Chain:
-    """Draw jobs and their order, until they fit into the day."""
-    chosen = {i for i, job in enumerate(plan.jobs) if draws.below(MILLION) < job.chance}
-    tries = 0
-    while True:
-        chain = draw_chain(plan, draws, chosen, wake, next_wake, tries % ORDERS == ORDERS - 1)
-        if fits(plan, chain, wake):
-            return chain
-        tries += 1
-        if tries % ORDERS == 0:
-            job = _least_needed(plan.jobs, chosen)
-            if job is None:
-                raise _too_full(plan)
-            chosen.remove(job)
+def write_day(day: RecordedDay) -> str:
+    """Write a recorded day in the form that `parse_day` reads."""
+    entries = [*zip(day.begins, day.activities, strict=True), (day.end, END)]
+    return ", ".join(f"{_clock(at)} {name}" for at, name in entries)
 
 
-def _least_needed(jobs: Sequence[Job], chosen: Collection[int]) -> int | None:
-    """Return the index of the job to leave out: the least probable, of equal ones the last."""
-    return min(
-        (i for i in chosen if not jobs[i].needed), key=lambda i: (jobs[i].chance, -i), default=None
-    )
+def _clock(at: int) -> str:
+    return f"{at // 3600:02}:{at // 60 % 60:02}"
 
 
-def draw_chain(
-    plan: DayPlan,
-    draws: Draws,
-    chosen: Collection[int],
-    wake: int,
-    next_wake: int,
-    by_deadline: bool = False,
-) -> Chain:
-    """Draw preferred begins of the chosen jobs, and order the jobs by them.
+AnyRecordedDay = Annotated[
+    RecordedDay,
+    BeforeValidator(parse_day),
+    PlainSerializer(write_day),
+    WithJsonSchema(
+        {"type": "string", "examples": ["07:00 wash, 07:20 work, 23:00 sleep, 31:00 end"]}
+    ),
+]
+
+
+class Recording(NamedTuple):
+    """Recorded days, with an index of the ends of their activities.
+
+    Attributes:
+        days: The recorded days.
+        endings: For each activity, the times at which it ended, ascending [s], and the numbers of
+            the day and of the activity in the day for each of them.
+    """
+
+    days: tuple[RecordedDay, ...]
+    endings: dict[str, tuple[list[int], list[tuple[int, int]]]]
+
+
+def to_recording(days: Sequence[RecordedDay]) -> Recording:
+    """Return recorded days with the index of their endings."""
+    ends: dict[str, list[tuple[int, tuple[int, int]]]] = {}
+    for d, day in enumerate(days):
+        for i, name in enumerate(day.activities[:-1]):
+            ends.setdefault(name, []).append((day.begins[i + 1], (d, i)))
+    endings = {}
+    for name, of_activity in ends.items():
+        of_activity.sort()
+        endings[name] = ([time for time, _ in of_activity], [at for _, at in of_activity])
+    return Recording(tuple(days), endings)
+
+
+def draw_source(recording: Recording, draws: Draws) -> int:
+    """Draw the number of the recorded day with which a new day begins."""
+    return draws.below(len(recording.days))
+
+
+def draw_recorded(recording: Recording, first: int, draws: Draws, next_wake: int) -> list[Doing]:
+    """Draw a day that begins like a recorded one.
 
     Args:
-        plan: The plan of the day's template.
+        recording: The recorded days.
+        first: The number of the recorded day that it begins like.
         draws: The day's random draws.
-        chosen: The indices of the jobs to do.
-        wake: When the day begins [s].
         next_wake: When the next day begins [s].
-        by_deadline: Order them by their latest begins instead.
+
+    Returns:
+        The doings until `next_wake`, without a gap; the last one is sleep.
     """
-    latest_bed = min(plan.sleep.longest, next_wake - plan.least_sleep)
-    bed = plan.sleep.draw(draws, None, latest_bed)
-    preferred: dict[int, int] = {}
-    ranks: dict[int, tuple[int, int, int]] = {}  # part of the day, time, index
-    for i, job in enumerate(plan.jobs):
-        before = [k for k in job.after if k in preferred]
-        if i not in chosen or (job.follows and not before):
+    d, i = first, 0
+    day = recording.days[d]
+    now, shift = day.begins[0], 0
+    result: list[Doing] = []
+    while i < len(day.activities) - 1 and now < next_wake - LEAST_S:
+        over = day.begins[i + 1]
+        if shift and over - day.begins[i] >= TAKES_UP * abs(shift):
+            shift = 0
+        end = min(max(over + shift, now + LEAST_S), next_wake)
+        result.append(Doing(day.activities[i], now, end))
+        now = end
+        if draws.below(16) < CROSSING:
+            d, i = _draw_ending(recording, day.activities[i], now, draws) or (d, i)
+            day = recording.days[d]
+            shift = now - day.begins[i + 1]
+        i += 1
+    if now < next_wake:
+        result.append(Doing(SLEEP, now, next_wake))
+    elif result[-1].activity != SLEEP:
+        result[-1] = result[-1]._replace(activity=SLEEP)
+    return _merge_repeats(result)
+
+
+def _draw_ending(
+    recording: Recording, activity: str, now: int, draws: Draws
+) -> tuple[int, int] | None:
+    """Draw an ending of an activity at about a time: numbers of the day and of the activity."""
+    times, positions = recording.endings[activity]
+    low, high = bisect_left(times, now - REACH_S), bisect_right(times, now + REACH_S)
+    return positions[low + draws.below(high - low)] if high > low else None
+
+
+def _merge_repeats(day: Sequence[Doing]) -> list[Doing]:
+    """Merge successive doings of the same activity."""
+    result: list[Doing] = []
+    for doing in day:
+        if result and result[-1].activity == doing.activity:
+            result[-1] = result[-1]._replace(end=doing.end)
+        else:
+            result.append(doing)
+    return result
+
+
+def in_free_rooms(
+    day: Sequence[Doing], exclusive: Iterable[str], private: PrivateRooms | None
+) -> list[Doing]:
+    """Return a day without doings whose private rooms others use; the doing before lasts longer.
+
+    Args:
+        day: The doings of the day.
+        exclusive: The activities that need a room which nobody else uses.
+        private: The rooms that others may use; None: nobody does.
+    """
+    if private is None:
+        return list(day)
+    alone, result = {*exclusive, *private.rooms}, list[Doing]()
+    begin = day[0].begin
+    for doing in day:
+        room = ANY_ROOM
+        if doing.activity in alone:
+            rooms, duration = private.of(doing.activity), doing.end - doing.begin
+            slot = private.use.free(rooms, doing.begin, doing.begin, duration, doing.end)
+            if slot is None or slot[1] < doing.end:
+                continue  # the doing before lasts longer, or the next one begins earlier
+            room = slot[2]
+        if result:
+            result[-1] = result[-1]._replace(end=doing.begin)
+        result.append(doing._replace(begin=doing.begin if result else begin, room=room))
+    if result:
+        result[-1] = result[-1]._replace(end=day[-1].end)
+    return result or list(day)
+
+
+def with_jobs(day: Sequence[Doing], jobs: Iterable[Job]) -> list[Doing]:
+    """Return a day with joint jobs in place of what is planned then, unless the person sleeps."""
+    for job in jobs:
+        assert job.starts is not None
+        begin = job.starts.shortest
+        end = begin + job.takes.shortest
+        asleep = any(d.activity == SLEEP and d.begin < end and begin < d.end for d in day)
+        if asleep or begin < day[0].begin:
             continue
-        part, begin = job.place, wake
-        if job.starts is not None:
-            begin = job.starts.draw(draws)
-        elif job.place > 0:
-            begin = bed - job.takes.knots[len(job.takes.knots) // 2]
-        elif before:
-            part = -1
-        preferred[i] = max([begin, *(preferred[k] for k in before)])
-        rank = job.starts.longest if by_deadline and job.starts is not None else begin
-        ranks[i] = (
-            max([part, *(ranks[k][0] for k in before)]),
-            max([rank, *(ranks[k][1] for k in before)]),
-            i,
-        )
-    order = sorted(preferred, key=lambda i: ranks[i])
-    jobs = [plan.jobs[i] for i in order]
-    return Chain(jobs, [*(preferred[i] for i in order), bed], _latest(jobs, latest_bed))
-
-
-def _latest(jobs: Sequence[Job], bed: int) -> list[int]:
-    """Return the latest begin of each job so that all later ones fit before `bed`, and `bed`."""
-    latest = [bed]
-    for job in reversed(jobs):
-        last = min(job.until, latest[-1]) - job.takes.shortest
-        latest.append(last if job.starts is None else min(last, job.starts.longest))
-    return latest[::-1]
-
-
-def fits(plan: DayPlan, chain: Chain, wake: int) -> bool:
-    """Return whether all jobs of a chain fit into a day that begins at `wake`."""
-    earliest = wake
-    for job, last in zip(chain.jobs, chain.latest, strict=False):
-        if job.starts is not None:
-            earliest = max(earliest, job.starts.shortest)
-        if earliest > last:
-            return False
-        earliest += job.takes.shortest
-    return max(earliest, plan.sleep.shortest) <= chain.latest[-1]
-
-
-def _fill(fills: Sequence[Fill], day: list[Doing], draws: Draws, begin: int, end: int) -> None:
-    """Fill the time from `begin` to `end` with pastimes, and with rest where no pastime fits."""
-    while begin < end:
-        last = day[-1].activity if day else ""
-        options = [
-            fill
-            for fill in fills
-            if fill.first <= begin <= fill.last
-            and fill.takes.shortest <= end - begin
-            and fill.activity != last
-        ]
-        if not options:
-            over = min(end, begin + NO_GAP_S)
-            if last == REST and not day[-1].task:
-                day[-1] = day[-1]._replace(end=over)
-            else:
-                day.append(Doing(REST, begin, over))
-            begin = over
-            continue
-        fill = options[draw_weighted(draws, [fill.weight for fill in options])]
-        over = begin + fill.takes.draw(draws, None, end - begin)
-        if end - over < NO_GAP_S and end - begin <= fill.takes.longest:
-            over = end
-        day.append(Doing(fill.activity, begin, over))
-        begin = over
+        before = [d._replace(end=min(d.end, begin)) for d in day if d.begin < begin]
+        after = [d._replace(begin=max(d.begin, end)) for d in day if d.end > end]
+        day = [*before, Doing(job.activity, begin, end, job.task), *after]
+    return list(day)

@@ -1,5 +1,6 @@
 """Plans of the templates of a persona, in the form of the planner, and checks that they work."""
 
+from collections.abc import Sequence
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -7,19 +8,16 @@ import numpy as np
 
 from fleet2d.configuration.problems import problem_at
 from fleet2d.routines.activity import seconds
-from fleet2d.routines.laws import Law, normal, uniform
+from fleet2d.routines.distributions import Distribution, normal, uniform
 from fleet2d.routines.planner import (
     DAY_S,
     MILLION,
     NEVER,
-    Chain,
     DayPlan,
-    Fill,
     Job,
-    draw_chain,
-    fits,
+    PastimeOption,
+    to_recording,
 )
-from fleet2d.routines.recorded import to_recording
 from fleet2d.runtime.determinism import Draws
 
 if TYPE_CHECKING:
@@ -70,9 +68,10 @@ def _day_plan(persona: "Persona", name: str, day: "DayTemplate") -> DayPlan:
     order = _in_order(day.do)
     jobs = tuple(_job(persona, task, day.do[task], order, dawn) for task in order)
     leisure = persona.leisure if day.leisure is None else day.leisure
-    fills = tuple(_fill(persona, activity, p, dawn) for activity, p in leisure.items())
-    plan = DayPlan(name, wake, sleep, seconds(day.sleep.at_least), jobs, fills)
-    return plan.in_core()
+    pastimes = tuple(
+        _pastime(persona, name, activity, pastime, dawn) for activity, pastime in leisure.items()
+    )
+    return DayPlan(name, wake, sleep, seconds(day.sleep.at_least), jobs, pastimes)
 
 
 def _recorded_plan(name: str, day: "DayTemplate") -> DayPlan:
@@ -115,15 +114,20 @@ def _timed(timing: "Timing") -> bool:
     return timing.at is not None or timing.between is not None
 
 
-def _fill(persona: "Persona", activity: str, pastime: "Pastime", dawn: int) -> Fill:
+def _pastime(
+    persona: "Persona", day: str, activity: str, pastime: "Pastime", dawn: int
+) -> PastimeOption:
     first, last = 0, NEVER
     if pastime.between is not None:
         first, last = window(pastime.between, dawn)
     takes = persona.activity(activity).takes.table()
-    return Fill(activity, max(1, round(pastime.weight * 1000)), takes, first, last)
+    if takes.shortest < 1 and takes.longest < 2:  # time would stand still
+        inside = ("leisure",) if persona.days[day].leisure is None else ("days", day, "leisure")
+        raise problem_at((*inside, activity), f"{activity!r} may take 0 s: let it take a second")
+    return PastimeOption(activity, max(1, round(pastime.weight * 1000)), takes, first, last)
 
 
-def starts(timing: "Timing", dawn: int) -> Law:
+def starts(timing: "Timing", dawn: int) -> Distribution:
     """Return the distribution of the time at which an activity begins [s since midnight].
 
     The day begins at `dawn` or later.
@@ -208,49 +212,56 @@ def _check_appointments(name: str, plan: DayPlan) -> None:
 
 def _check_room(name: str, plan: DayPlan, next_wake: int) -> None:
     """Refuse a template whose needed tasks don't fit in the shortest day."""
-    needed = {i for i, job in enumerate(plan.jobs) if job.needed}
-    wake = plan.wake.longest
-    key = np.uint64(0)
-    trials = (
-        draw_chain(plan, Draws(key, trial), needed, wake, next_wake, by_deadline=trial == 0)
-        for trial in range(TRIALS)
-    )
-    first = next(trials)
-    if fits(plan, first, wake) or any(fits(plan, chain, wake) for chain in trials):
-        return
-    key_path, message = _conflict(first, wake)
+    needed = [job.needed for job in plan.jobs]
+    wake, key = plan.wake.longest, np.uint64(0)
+    first: tuple[list[int], list[int]] | None = None
+    for trial in range(TRIALS):
+        order, latest, fits = plan.core.draw_order(
+            Draws(key, trial), needed, wake, next_wake, trial == 0
+        )
+        if fits:
+            return
+        first = first or (order, latest)
+    assert first is not None
+    key_path, message = _conflict([plan.jobs[i] for i in first[0]], first[1], wake)
     raise problem_at(("days", name, *key_path), message)
 
 
-def _conflict(chain: Chain, wake: int) -> tuple[tuple[str, ...], str]:
-    """Return the key of the first impossible job of a chain, and a message with the reason."""
-    names = [*(job.task for job in chain.jobs), "sleep"]
+def _conflict(jobs: Sequence[Job], latest: Sequence[int], wake: int) -> tuple[tuple[str, ...], str]:
+    """Return the key of the first impossible one of some jobs, and a message with the reason.
+
+    Args:
+        jobs: The jobs in order.
+        latest: The latest beginning of each, and of going to bed [s].
+        wake: When the day begins [s].
+    """
+    names = [*(job.task for job in jobs), "sleep"]
     now = wake
-    for i, job in enumerate(chain.jobs):
+    for i, job in enumerate(jobs):
         now = now if job.starts is None else max(now, job.starts.shortest)
-        if now > chain.latest[i]:
+        if now > latest[i]:
             until, takes = i, 0  # the first job from here on whose own window limits its beginning
-            while chain.latest[until] == chain.latest[until + 1] - chain.jobs[until].takes.shortest:
-                takes += chain.jobs[until].takes.shortest
+            while latest[until] == latest[until + 1] - jobs[until].takes.shortest:
+                takes += jobs[until].takes.shortest
                 until += 1
-                if until == len(chain.jobs):
+                if until == len(jobs):
                     break
             path = ("do", job.task)
             day = f"on a day that begins at {clock(wake)}"
             if until == i:
                 return path, (
-                    f"{job.task!r} has to begin by {clock(chain.latest[i])}, but what comes before"
+                    f"{job.task!r} has to begin by {clock(latest[i])}, but what comes before"
                     f" it is over at {clock(now)} at the earliest, {day}"
                 )
             between = " and ".join(repr(name) for name in names[i:until])
             return path, (
                 f"{day} {job.task!r} can begin at {clock(now)} at the earliest, and {between}"
                 f" {'takes' if until == i + 1 else 'take'} {span(takes)} at least, but"
-                f" {names[until]!r} has to begin by {clock(chain.latest[until])}: widen a window,"
+                f" {names[until]!r} has to begin by {clock(latest[until])}: widen a window,"
                 " shorten what is done, or give a task a probability below 1"
             )
         now += job.takes.shortest
     return ("sleep",), (
         f"what has to be done in the day takes until {clock(now)}, but sleep begins at"
-        f" {clock(chain.latest[-1])} at the latest"
+        f" {clock(latest[-1])} at the latest"
     )

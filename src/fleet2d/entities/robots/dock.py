@@ -6,7 +6,8 @@ from typing import ClassVar, Self
 from pydantic import model_validator
 
 from fleet2d.configuration.components import register
-from fleet2d.configuration.units import Share, problem
+from fleet2d.configuration.problems import problem
+from fleet2d.configuration.units import Share
 from fleet2d.entities.behavior import Actor, Behavior, Situation
 from fleet2d.entities.plan import Plan
 from fleet2d.errors import ScenarioError

@@ -8,13 +8,13 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from fleet2d.configuration.components import register
+from fleet2d.configuration.problems import problem
 from fleet2d.configuration.units import (
     Duration,
     Length,
     PositiveDuration,
     Share,
     TimeOfDay,
-    problem,
 )
 from fleet2d.entities.behavior import Actor, Command, Situation
 from fleet2d.entities.giving_way import resumed

@@ -6,7 +6,8 @@ from typing import ClassVar, Literal, Self
 from pydantic import model_validator
 
 from fleet2d.configuration.components import register
-from fleet2d.configuration.units import Duration, problem
+from fleet2d.configuration.problems import problem
+from fleet2d.configuration.units import Duration
 from fleet2d.entities.behavior import Actor, Behavior, Situation
 from fleet2d.entities.place import Place, Point, available_places, stops_at
 from fleet2d.entities.plan import Plan

@@ -11,7 +11,7 @@ from fleet2d.entities.behavior import Behavior, Situation
 from fleet2d.entities.place import available_rooms
 from fleet2d.entities.plan import Plan
 from fleet2d.entities.users.spots import Spots
-from fleet2d.routines.activity import AnyDurationLaw, DurationLaw
+from fleet2d.routines.activity import AnyDurationDistribution, DurationDistribution
 from fleet2d.runtime.determinism import Draws
 
 if TYPE_CHECKING:
@@ -37,8 +37,12 @@ class Pet(Behavior):
     """
 
     rooms: tuple[str, ...] = ()
-    nap: AnyDurationLaw = DurationLaw(mean=timedelta(minutes=50), std=timedelta(minutes=40))
-    stop: AnyDurationLaw = DurationLaw(mean=timedelta(seconds=40), std=timedelta(seconds=40))
+    nap: AnyDurationDistribution = DurationDistribution(
+        mean=timedelta(minutes=50), std=timedelta(minutes=40)
+    )
+    stop: AnyDurationDistribution = DurationDistribution(
+        mean=timedelta(seconds=40), std=timedelta(seconds=40)
+    )
     spots: tuple[int, int] = (3, 12)
     stays_in_room: float = Field(default=0.6, ge=0, le=1)
 

@@ -9,12 +9,16 @@ from fleet2d.entities.users.resident import Inhabitant, rooms_at
 from fleet2d.entities.users.spots import Spots
 from fleet2d.routines import survey
 from fleet2d.routines.activity import catalogue
-from fleet2d.routines.interruption_rules import interruption_rules
-from fleet2d.routines.interruptions import interrupt
-from fleet2d.routines.laws import draw_weighted
-from fleet2d.routines.needs import activities_of, usual_errands, usual_needs
+from fleet2d.routines.distributions import draw_weighted
+from fleet2d.routines.interruptions import (
+    activities_of,
+    interrupt,
+    interruption_rules,
+    usual_errands,
+    usual_needs,
+)
 from fleet2d.routines.planner import REST, Doing
-from fleet2d.routines.timeuse import activities, draw_works_at_home, to_doings
+from fleet2d.routines.survey import activities, draw_works_at_home, to_doings
 from fleet2d.runtime.determinism import Draws, stream_key
 
 if TYPE_CHECKING:

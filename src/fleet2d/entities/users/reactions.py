@@ -9,8 +9,8 @@ from fleet2d.entities.behavior import Attention, Behavior, SightEvent, Situation
 from fleet2d.entities.place import points_at_distance
 from fleet2d.entities.plan import Plan
 from fleet2d.kernels.numbers import TURN, heading_of, turn_between
-from fleet2d.routines.laws import Law
-from fleet2d.routines.manners import Manners
+from fleet2d.routines.distributions import Distribution
+from fleet2d.routines.persona import Manners
 from fleet2d.runtime.determinism import Draws
 
 if TYPE_CHECKING:
@@ -132,7 +132,7 @@ class Reactions(Behavior):
         plan.stay(PASSING)
 
     def _look_at(
-        self, now: Situation, plan: Plan, event: SightEvent, law: Law, draws: Draws
+        self, now: Situation, plan: Plan, event: SightEvent, law: Distribution, draws: Draws
     ) -> None:
         x, y = _robot(now, event)
         plan.turn_by(turn_between(plan.heading, heading_of(x - plan.x, y - plan.y)) / TURN)

@@ -17,9 +17,8 @@ from fleet2d.errors import PlacementError
 from fleet2d.floorplan.objects import POSTURES
 from fleet2d.kernels.motion import LastStint, Resident, Scene, Waits
 from fleet2d.routines.activity import Activity, seconds
-from fleet2d.routines.laws import Law, exponential
-from fleet2d.routines.occupancy import ANY_ROOM
-from fleet2d.routines.planner import NO_GAP_S, REST, SLEEP, Doing
+from fleet2d.routines.distributions import Distribution, exponential
+from fleet2d.routines.planner import ANY_ROOM, NO_GAP_S, REST, SLEEP, Doing
 from fleet2d.runtime.determinism import Draws
 
 if TYPE_CHECKING:
@@ -74,7 +73,7 @@ class Setting(NamedTuple):
     seats: list[Seat]
     stores: list["Room"]
     small_moves: tuple[SmallMove, ...]
-    fetch_takes: Law | None
+    fetch_takes: Distribution | None
 
 
 T = TypeVar("T", bound=Hashable)

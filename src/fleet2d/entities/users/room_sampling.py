@@ -16,8 +16,8 @@ from fleet2d.entities.users.spots import Spot, Spots
 from fleet2d.errors import PlacementError
 from fleet2d.floorplan.geometry.lattice import UNITS_PER_CELL
 from fleet2d.kernels import I64
-from fleet2d.routines.activity import AnyDurationLaw, DurationLaw
-from fleet2d.routines.laws import draw_weighted
+from fleet2d.routines.activity import AnyDurationDistribution, DurationDistribution
+from fleet2d.routines.distributions import draw_weighted
 from fleet2d.runtime.determinism import Draws, sum_in_order
 
 if TYPE_CHECKING:
@@ -66,7 +66,7 @@ class RoomSampling(Behavior):
     shares: dict[str, float] = Field(
         min_length=1, examples=[{"living_room": 0.4, "bedroom": 0.4, "kitchen": 0.2}]
     )
-    dwell: AnyDurationLaw = DurationLaw(
+    dwell: AnyDurationDistribution = DurationDistribution(
         law="gamma", mean=timedelta(minutes=30), std=timedelta(minutes=20)
     )
 

@@ -15,12 +15,19 @@ from fleet2d.entities.users.resident import SECOND_US, Inhabitant, Setting, room
 from fleet2d.entities.users.spots import Seat, Spots, part_of, seats_at
 from fleet2d.errors import PlacementError
 from fleet2d.routines.activity import Activity, catalogue
-from fleet2d.routines.household import WELCOME, AnyHousehold, Household, Lives, MemberRooms
+from fleet2d.routines.household import (
+    AWAY,
+    WELCOME,
+    AnyHousehold,
+    AnyPeriod,
+    Household,
+    Lives,
+    MemberRooms,
+    with_absences,
+)
 from fleet2d.routines.life import Life
-from fleet2d.routines.occupancy import ANY_ROOM
-from fleet2d.routines.periods import AWAY, AnyPeriod, with_absences
 from fleet2d.routines.persona import AnyPersona, Persona, bundled_persona
-from fleet2d.routines.planner import DAY_S, NO_GAP_S, PLANNED, REST, RESUMES, SLEEP, Doing
+from fleet2d.routines.planner import ANY_ROOM, DAY_S, NO_GAP_S, PLANNED, REST, RESUMES, SLEEP, Doing
 from fleet2d.runtime.determinism import Draws, stream_key
 
 if TYPE_CHECKING:
@@ -54,7 +61,7 @@ def private_rooms(household: Household, home: "Home") -> MemberRooms:
     private = {
         room
         for name, persona in household.members.items()
-        for activity in persona.interruptions.private & set(rooms[name])
+        for activity in persona.interruptions.exclusive & set(rooms[name])
         for room in rooms[name][activity]
     }
     return {

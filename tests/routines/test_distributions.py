@@ -8,10 +8,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fleet2d.routines.laws import (
+from fleet2d.routines.distributions import (
     KNOTS,
     NORMAL,
-    Law,
+    Distribution,
     draw_weighted,
     empirical,
     exp,
@@ -27,7 +27,7 @@ from fleet2d.runtime.determinism import Draws, stream_key
 KEY = stream_key(4, "users.ana", "law")
 
 
-def drawn(law: Law, count: int = 6000) -> list[int]:
+def drawn(law: Distribution, count: int = 6000) -> list[int]:
     streams = [Draws(KEY, step) for step in range(count // 100)]
     return [law.draw(draws) for draws in streams for _ in range(100)]
 

@@ -32,7 +32,7 @@ NORMAL = tuple(-z / 1e5 for z in reversed(_BELL)) + tuple(z / 1e5 for z in _BELL
 """Standard normal quantiles, -2.66 to 2.66: a normal law is cut there."""
 
 
-class Law(NamedTuple):
+class Distribution(NamedTuple):
     """A distribution over whole seconds.
 
     Attributes:
@@ -100,7 +100,7 @@ class Law(NamedTuple):
         inside = [min(max(knot, self.shortest), self.longest) for knot in self.knots]
         return sum_in_order((a + b) / 2 for a, b in pairwise(inside)) / (len(inside) - 1)
 
-    def within(self, shortest: int | None, longest: int | None) -> "Law":
+    def within(self, shortest: int | None, longest: int | None) -> "Distribution":
         """Return the law cut to bounds [s]."""
         return _bounded(
             self.knots,
@@ -119,12 +119,14 @@ def position(knots: Sequence[int], value: int) -> int:
     return (i << _BITS) + ((value - knots[i]) << _BITS) // (knots[i + 1] - knots[i])
 
 
-def _bounded(knots: tuple[int, ...], shortest: int, longest: int) -> Law:
+def _bounded(knots: tuple[int, ...], shortest: int, longest: int) -> Distribution:
     """Return the law of knots between two bounds."""
-    return Law(knots, shortest, longest, position(knots, shortest), position(knots, longest))
+    return Distribution(
+        knots, shortest, longest, position(knots, shortest), position(knots, longest)
+    )
 
 
-def _law(quantile: Callable[[float], float]) -> Law:
+def _law(quantile: Callable[[float], float]) -> Distribution:
     """Return the law whose quantiles are a function of those of the standard normal law."""
     knots: list[int] = []
     for z in NORMAL:
@@ -134,7 +136,7 @@ def _law(quantile: Callable[[float], float]) -> Law:
 
 
 @lru_cache(None)
-def lognormal(mean_s: float, std_s: float) -> Law:
+def lognormal(mean_s: float, std_s: float) -> Distribution:
     """Return the lognormal law of a mean and a standard deviation [s]."""
     ratio = std_s / mean_s
     variance = log(1 + ratio * ratio)
@@ -143,7 +145,7 @@ def lognormal(mean_s: float, std_s: float) -> Law:
 
 
 @lru_cache(None)
-def gamma(mean_s: float, std_s: float) -> Law:
+def gamma(mean_s: float, std_s: float) -> Distribution:
     """Return the gamma law of a mean and a standard deviation [s], after Wilson and Hilferty."""
     ninth = (std_s / mean_s) * (std_s / mean_s) / 9  # 1 / (9 k), k the shape
 
@@ -155,24 +157,24 @@ def gamma(mean_s: float, std_s: float) -> Law:
 
 
 @lru_cache(None)
-def normal(mean_s: float, std_s: float) -> Law:
+def normal(mean_s: float, std_s: float) -> Distribution:
     """Return the normal law of a mean and a standard deviation [s], cut at 0."""
     return _law(lambda z: max(mean_s + std_s * z, 0.0))
 
 
 @lru_cache(None)
-def exponential(mean_s: float) -> Law:
+def exponential(mean_s: float) -> Distribution:
     """Return the exponential law of a mean [s]: the time to the next event of a Poisson process."""
     knots = [int(-mean_s * log((KNOTS - i - 0.5) / KNOTS) + 0.5) for i in range(KNOTS)]
     return _bounded(tuple(knots), knots[0], knots[-1])
 
 
-def uniform(low_s: int, high_s: int) -> Law:
+def uniform(low_s: int, high_s: int) -> Distribution:
     """Return the uniform law of whole seconds from `low_s` to `high_s`."""
     return _bounded((low_s, high_s), low_s, high_s)
 
 
-def empirical(quantiles: Sequence[int]) -> Law:
+def empirical(quantiles: Sequence[int]) -> Distribution:
     """Return the law of measured quantiles at evenly spaced probabilities from 0 to 1 [s]."""
     return _bounded(tuple(quantiles), quantiles[0], quantiles[-1])
 
