@@ -32,7 +32,7 @@ from fleet2d.artifacts.seal import verify_run
 from fleet2d.artifacts.store import RunStore
 from fleet2d.artifacts.table_writer import TableWriter
 from fleet2d.artifacts.unfinished import UnfinishedRun
-from fleet2d.engine.snapshots.checkpoint import CheckpointWriter
+from fleet2d.engine.checkpoint import CheckpointWriter
 
 
 @contextmanager
@@ -145,7 +145,7 @@ import tempfile
 from pathlib import Path
 import journal, pyarrow.parquet
 from fleet2d.artifacts import unfinished
-from fleet2d.engine.snapshots import checkpoint
+from fleet2d.engine import checkpoint
 checkpoint.COMMIT_S = checkpoint.COMPUTING_S = checkpoint.WAITING_S = unfinished.SYNC_S = 1e9
 """
     )

@@ -19,15 +19,14 @@ from typing import Any
 import fleet2d
 from fleet2d.engine import phases, simulation
 from fleet2d.engine.bodies import Bodies
+from fleet2d.engine.cameras import Cameras
+from fleet2d.engine.collisions import Clearance
+from fleet2d.engine.encounters import Encounters
+from fleet2d.engine.layers import LayerBook, SeenArea
 from fleet2d.engine.learners import Learners
+from fleet2d.engine.recorder import Recorder
+from fleet2d.engine.sensors import Sensors
 from fleet2d.engine.simulation import Simulation
-from fleet2d.engine.tables.recorder import Recorder
-from fleet2d.engine.watchers.cameras import Cameras
-from fleet2d.engine.watchers.clearance import Clearance
-from fleet2d.engine.watchers.encounters import Encounters
-from fleet2d.engine.watchers.layers import LayerBook
-from fleet2d.engine.watchers.seen_area import SeenArea
-from fleet2d.engine.watchers.sensors import Sensors
 from fleet2d.entities.decisions import DecidingActor
 from fleet2d.metrics.metric import Metric
 

@@ -85,8 +85,8 @@ def algorithms() -> tuple[Any, Any]:
 
 def in_the_loop() -> float:
     """Return what it takes to decide whether a user is in view, over the month [ns]."""
+    from fleet2d.engine.cameras import Cameras
     from fleet2d.engine.simulation import Simulation
-    from fleet2d.engine.watchers.cameras import Cameras
 
     class Timed(Cameras):
         seconds, steps = 0.0, 0

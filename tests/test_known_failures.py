@@ -315,7 +315,7 @@ CHANGES: dict[tuple[type, str], dict[str, Any]] = {
         "outputs": False,
     },
     (SightSettings, "sight"): {
-        "method": {"type": f"{TESTS.as_posix()}/engine/watchers/test_points_in_view:XRay"},
+        "method": {"type": f"{TESTS.as_posix()}/engine/test_cameras_points:XRay"},
         "people_occlude": True,
     },
 }  # fmt: skip
@@ -325,7 +325,7 @@ ELSEWHERE = {
     (Robot, "localization"): "tests/entities/test_localization",
     (Robot, "color"): "tests/pictures: pictures",
     (User, "opens_doors"): "tests/engine/test_home_changes: there is no door in this home",
-    (Robot, "gives_way"): "tests/engine/watchers/test_clearance: it meets nobody on its way here",
+    (Robot, "gives_way"): "tests/engine/test_collisions_clearance: it meets nobody on its way here",
     (Robot, "opens_doors"): "tests/engine/test_home_changes: there is no door in this home",
     (ArtifactSettings, "checkpoint"): "tests/engine/test_resume: a file, no table",
     (ArtifactSettings, "learned"): "tests/algorithms/test_learned: a file, no table",
@@ -338,7 +338,7 @@ ELSEWHERE = {
     (
         SightSettings,
         "seen_every",
-    ): "tests/engine/watchers/test_layers: nobody asks for the seen area here",
+    ): "tests/engine/test_layers: nobody asks for the seen area here",
     (SimulationSettings, "speedup"): "test_pace: wall time",
 }
 CASES = [

@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from fleet2d.configuration.units import Duration as Duration
     from fleet2d.configuration.units import Length as Length
     from fleet2d.configuration.units import Share as Share
-    from fleet2d.engine.interrupts.interrupt import Interrupt as Interrupt
-    from fleet2d.engine.interrupts.interrupt import SpanView as SpanView
+    from fleet2d.engine.encounters import Interrupt as Interrupt
+    from fleet2d.engine.encounters import SpanView as SpanView
     from fleet2d.engine.reproduce import reproduce as reproduce
     from fleet2d.engine.resume import resume as resume
     from fleet2d.engine.run import run as run

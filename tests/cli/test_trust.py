@@ -10,8 +10,8 @@ import pytest
 from tests.scenes import Cli, fleet2d_process
 
 from fleet2d.artifacts.store import RunStore
-from fleet2d.engine.snapshots import arrays
-from fleet2d.engine.snapshots.snapshot import read_state
+from fleet2d.engine import snapshot
+from fleet2d.engine.snapshot import read_state
 from fleet2d.errors import ArtifactError
 
 OWN = """
@@ -127,12 +127,12 @@ def hostile() -> dict[str, bytes]:
         "a type": pickle.dumps(np.dtype("U5")),
         "an array": pickle.dumps(np.zeros(3)),
         "objects from bytes, our way": pickle.dumps(
-            Call(arrays.plain_array, "O", (1,), bytes(8), "C", True)
+            Call(snapshot.plain_array, "O", (1,), bytes(8), "C", True)
         ),
         "a forged shape": pickle.dumps(
-            Call(arrays.plain_array, "<f8", (10**9,), bytes(8), "C", True)
+            Call(snapshot.plain_array, "<f8", (10**9,), bytes(8), "C", True)
         ),
-        "a function of ours": pickle.dumps(arrays._reducers),
+        "a function of ours": pickle.dumps(snapshot._reducers),
         "no pickle": b"hello",
     }
 
@@ -171,7 +171,7 @@ def _refusal(content: bytes, constants: dict[str, object]) -> ArtifactError:
 def test_arrays_come_back(array: Any) -> None:
     buffer = io.BytesIO()
     pickler = pickle.Pickler(buffer, 5)
-    pickler.dispatch_table = arrays.REDUCERS
+    pickler.dispatch_table = snapshot.REDUCERS
     pickler.dump([array, array.dtype, array.ravel()[0] if array.size else None])
     back, kind, _ = pickle.loads(buffer.getvalue())
     assert array.tolist() == back.tolist()

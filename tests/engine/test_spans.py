@@ -60,8 +60,8 @@ def test_every_table_is_the_same_however_rows_are_gathered_and_stored(
     """Blocks of poses, rows on their way to the store and row groups all end somewhere else."""
     monkeypatch.setattr("fleet2d.engine.state.MOST_STEPS", 1)
     monkeypatch.setattr("fleet2d.engine.state.LEAST_STEPS", steps)
-    monkeypatch.setattr("fleet2d.engine.tables.recorder.MOST_ROWS", gathered)
-    monkeypatch.setattr("fleet2d.engine.tables.recorder.ROWS_OF_A_BODY", 0)
+    monkeypatch.setattr("fleet2d.engine.recorder.MOST_ROWS", gathered)
+    monkeypatch.setattr("fleet2d.engine.recorder.ROWS_OF_A_BODY", 0)
     store = functools.partial(RunStore, flush_rows=rows)
     monkeypatch.setattr("fleet2d.engine.simulation.RunStore", store)
     assert digests(whole) == digests(run(everything()))

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from fleet2d.algorithms.log import Log
-from fleet2d.engine.control.world import EngineWorld
+from fleet2d.engine.script import EngineWorld
 from fleet2d.engine.state import State
 from fleet2d.entities.behavior import Situation
 from fleet2d.errors import InputError, blame

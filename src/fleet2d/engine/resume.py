@@ -16,9 +16,9 @@ from fleet2d.artifacts.unfinished import (
     remove_leftovers,
 )
 from fleet2d.configuration.trust import Trust, refuse_untrusted, restrict
+from fleet2d.engine.checkpoint import Checkpoint, UnusableCheckpointError
 from fleet2d.engine.inputs import changed_inputs
 from fleet2d.engine.simulation import Simulation
-from fleet2d.engine.snapshots.checkpoint import Checkpoint, UnusableCheckpointError
 from fleet2d.errors import RunDirectoryError
 from fleet2d.runs.run import LEARNED_NAME, Run
 from fleet2d.scenario.model import load_scenario

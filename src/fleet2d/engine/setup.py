@@ -6,22 +6,18 @@ from contextlib import contextmanager
 from fleet2d.algorithms.log import Log
 from fleet2d.artifacts.store import RunStore
 from fleet2d.configuration.problems import suggest
-from fleet2d.engine.basis import Basis
-from fleet2d.engine.bodies import Bodies
-from fleet2d.engine.control.script import schedule_script
+from fleet2d.engine.bodies import Basis, Bodies
+from fleet2d.engine.cameras import Cameras, open_cameras
+from fleet2d.engine.collisions import BlockedWays, Clearance
+from fleet2d.engine.encounters import SIGHT_EVENTS, Encounters, Interruptions
 from fleet2d.engine.home_changes import Changes
 from fleet2d.engine.interventions import Interventions
+from fleet2d.engine.layers import LayerBook, lay_layers
 from fleet2d.engine.learners import Learners
+from fleet2d.engine.recorder import Recorder, activities_of, table_specs
+from fleet2d.engine.script import schedule_script
+from fleet2d.engine.sensors import Sensors
 from fleet2d.engine.state import InView, State
-from fleet2d.engine.tables.definitions import table_specs
-from fleet2d.engine.tables.recorder import Recorder, activities_of
-from fleet2d.engine.watchers.blocking import BlockedWays
-from fleet2d.engine.watchers.cameras import Cameras, open_cameras
-from fleet2d.engine.watchers.clearance import Clearance
-from fleet2d.engine.watchers.encounters import Encounters
-from fleet2d.engine.watchers.interruptions import SIGHT_EVENTS, Interruptions
-from fleet2d.engine.watchers.layers import LayerBook, lay_layers
-from fleet2d.engine.watchers.sensors import Sensors
 from fleet2d.entities.decisions import DecidingActor
 from fleet2d.entities.objects.door import Door
 from fleet2d.errors import ComponentError, PlacementError, ScenarioError

@@ -12,7 +12,7 @@ from fleet2d.artifacts.manifest import Status
 from fleet2d.artifacts.store import RunStore
 from fleet2d.artifacts.unfinished import UnfinishedRun
 from fleet2d.configuration.trust import current_trust, restrict
-from fleet2d.engine.control.script import repeat
+from fleet2d.engine.checkpoint import Checkpoint, CheckpointWriter
 from fleet2d.engine.expectations.verdicts import Judging
 from fleet2d.engine.interventions import is_from_outside
 from fleet2d.engine.lifecycle import (
@@ -23,9 +23,9 @@ from fleet2d.engine.lifecycle import (
 )
 from fleet2d.engine.pace import Pace
 from fleet2d.engine.phases import PHASES, Span
+from fleet2d.engine.script import repeat
 from fleet2d.engine.setup import set_up
-from fleet2d.engine.snapshots.checkpoint import Checkpoint, CheckpointWriter
-from fleet2d.engine.snapshots.snapshot import (
+from fleet2d.engine.snapshot import (
     Constants,
     copy_state,
     open_snapshot,

@@ -10,20 +10,17 @@ import numpy as np
 from fleet2d.algorithms.log import Log
 from fleet2d.algorithms.observations import OBSERVATION, ROBOT
 from fleet2d.artifacts.store import RunStore
-from fleet2d.engine.bodies import Bodies
+from fleet2d.engine.bodies import Bodies, Watcher
+from fleet2d.engine.cameras import Cameras
+from fleet2d.engine.collisions import BlockedWays, Clearance
+from fleet2d.engine.encounters import Encounters, Interruptions
 from fleet2d.engine.gauges.block import Block
 from fleet2d.engine.home_changes import Changes
 from fleet2d.engine.interventions import Interventions
+from fleet2d.engine.layers import LayerBook
 from fleet2d.engine.learners import Learners
-from fleet2d.engine.tables.recorder import Recorder
-from fleet2d.engine.watchers.blocking import BlockedWays
-from fleet2d.engine.watchers.cameras import Cameras
-from fleet2d.engine.watchers.clearance import Clearance
-from fleet2d.engine.watchers.encounters import Encounters
-from fleet2d.engine.watchers.interruptions import Interruptions
-from fleet2d.engine.watchers.layers import LayerBook
-from fleet2d.engine.watchers.sensors import Sensors
-from fleet2d.engine.watchers.watcher import Watcher
+from fleet2d.engine.recorder import Recorder
+from fleet2d.engine.sensors import Sensors
 from fleet2d.entities.behavior import SightEvent
 from fleet2d.entities.decisions import DecidingActor
 from fleet2d.floorplan.home.home import Home

@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.engine.watchers.test_sensors import household, plan  # noqa: F401  (a fixture)
+from tests.engine.test_sensors import household, plan  # noqa: F401  (a fixture)
 from tests.scenes import run, scenario
 
 from fleet2d.errors import RunDirectoryError

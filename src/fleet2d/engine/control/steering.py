@@ -11,7 +11,7 @@ from pydantic import ValidationError
 from fleet2d.algorithms.algorithm import Algorithm
 from fleet2d.configuration.problems import refusal, suggest
 from fleet2d.configuration.units import micros, parse_duration
-from fleet2d.engine.control.script import request
+from fleet2d.engine.script import request
 from fleet2d.engine.state import State
 from fleet2d.entities.decisions import DecidingActor
 from fleet2d.entities.plan import Plan, data_of

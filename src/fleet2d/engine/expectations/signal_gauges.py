@@ -7,6 +7,7 @@ import numpy as np
 
 from fleet2d.algorithms.algorithm import to_columns
 from fleet2d.configuration.problems import suggest
+from fleet2d.engine.cameras import Cameras
 from fleet2d.engine.gauges.block import Block
 from fleet2d.engine.gauges.gauges import (
     ActivityGauge,
@@ -26,7 +27,6 @@ from fleet2d.engine.gauges.gauges import (
     outline,
 )
 from fleet2d.engine.state import State
-from fleet2d.engine.watchers.cameras import Cameras
 from fleet2d.errors import ScenarioError
 from fleet2d.expectations import quantities, states
 from fleet2d.expectations.signals import Measurement

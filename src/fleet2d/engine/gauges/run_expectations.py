@@ -11,7 +11,7 @@ from fleet2d.artifacts.table import Column, TableSpec
 from fleet2d.engine.gauges.block import Block
 from fleet2d.engine.gauges.gauges import BatteryGauge, Gauge, ValueGauge
 from fleet2d.engine.learners import Learners
-from fleet2d.engine.tables.shared_columns import STEP, TIME
+from fleet2d.engine.trajectories import STEP, TIME
 from fleet2d.entities.behavior import Actor
 from fleet2d.expectations.expectation import Expectation, RunSignals
 from fleet2d.expectations.signals import Measurement

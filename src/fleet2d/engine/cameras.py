@@ -1,52 +1,213 @@
-"""The cameras of a body in a run: their memory from span to span, and what they perceive."""
+"""Disturbed cameras: the effect of interventions on the tables of the kernel that looks."""
 
+import math
 from collections.abc import Iterator, Sequence, Set
+from fractions import Fraction
 from typing import NamedTuple
 
 import numpy as np
 
 from fleet2d.algorithms.observations import ActivitySense
 from fleet2d.configuration.units import micros
-from fleet2d.engine.basis import Basis
-from fleet2d.engine.bodies import Bodies, poses_of
-from fleet2d.engine.watchers.disturbances import (
-    carry_over,
-    dark_cameras,
-    forced_of,
-    injected_by,
-    present_errors,
-    worsen,
-)
-from fleet2d.engine.watchers.points_in_view import points_seen
-from fleet2d.engine.watchers.sight_events import sight_events
-from fleet2d.engine.watchers.watcher import Watcher
+from fleet2d.engine.bodies import Basis, Bodies, Watcher, poses_of
+from fleet2d.engine.sighting_errors import sight_events
 from fleet2d.entities.behavior import Actor, SightEvent
 from fleet2d.entities.localization import Drift, Localization
-from fleet2d.errors import ScenarioError, blame
-from fleet2d.kernels import I64
+from fleet2d.errors import ComponentError, ScenarioError, blame
+from fleet2d.floorplan.home.home import Home
+from fleet2d.kernels import I64, U64
+from fleet2d.kernels.motion import Poses
 from fleet2d.kernels.sight import (
+    FORCED_IDENTITY,
+    FORCED_MISS,
     MOST_GHOSTS,
     USER_LOST,
     USER_SEEN,
     About,
     GhostDraw,
+    Lenses,
     LookRule,
+    Reach,
+    SightingColumn,
     SightMemory,
     UserDraw,
     UserPoses,
     look,
     new_memory,
+    view_queries,
 )
 from fleet2d.kernels.sight import (
-    SightingColumn as Column,
+    ViewQueryColumn as Query,
 )
+from fleet2d.kernels.space import SUB
 from fleet2d.runtime.clock import midnight_of
 from fleet2d.runtime.determinism import stream_key
 from fleet2d.runtime.events import Event
-from fleet2d.sight.camera import Disturbance, TableContext, error_tables, is_perfect, stack_lenses
+from fleet2d.sight.camera import (
+    Disturbance,
+    TableContext,
+    error_tables,
+    is_perfect,
+    of_camera,
+    stack_lenses,
+)
 from fleet2d.sight.fov import FieldOfView
 from fleet2d.sight.line_of_sight import LineOfSight
 from fleet2d.sight.perception import Perception
+
+# Squared distance beyond which a dark camera sees nobody.
+NOT_EVEN_AT_0 = -1
+
+
+def present_errors(disturbances: Sequence[Disturbance], camera: str) -> Perception | None:
+    """Return the present errors of a camera, by the latest intervention; None: the usual ones."""
+    errs = [
+        disturbance.errs
+        for disturbance in of_camera(disturbances, camera)
+        if disturbance.errs is not None
+    ]
+    return errs[-1] if errs else None
+
+
+def dark_cameras(disturbances: Sequence[Disturbance], cameras: Sequence[str]) -> list[int]:
+    """Return the cameras that see nothing, by number."""
+    return [
+        c
+        for c, camera in enumerate(cameras)
+        if any(disturbance.dark for disturbance in of_camera(disturbances, camera))
+    ]
+
+
+def worsen(lenses: Lenses, disturbances: Sequence[Disturbance], cameras: Sequence[str]) -> None:
+    """Change lenses in place: dark cameras see nobody, others notice people less often."""
+    lenses.widest[dark_cameras(disturbances, cameras)] = NOT_EVEN_AT_0
+    for c, camera in enumerate(cameras):
+        for disturbance in of_camera(disturbances, camera):
+            chance = Fraction(int(lenses.chance[c])) * Fraction(disturbance.detection)
+            lenses.chance[c] = round(chance)
+
+
+def forced_of(
+    disturbances: Sequence[Disturbance], cameras: Sequence[str], people: Sequence[str]
+) -> I64:
+    """Return what each person in view is perceived as, (cameras, people); see About.FORCED."""
+    index = {name: u for u, name in enumerate(people)} | {"": -1}
+    forced = np.zeros((len(cameras), len(people)), np.int64)
+    for c, camera in enumerate(cameras):
+        for disturbance in of_camera(disturbances, camera):
+            if disturbance.missed is not None:
+                forced[c, index[disturbance.missed]] = FORCED_MISS
+            if disturbance.mistaken is not None:
+                user, other = disturbance.mistaken
+                forced[c, index[user]] = FORCED_IDENTITY + index[other]
+    return forced
+
+
+def injected_by(
+    disturbances: Sequence[Disturbance], cameras: Sequence[str], context: TableContext
+) -> I64:
+    """Return the false sightings of cameras that aren't dark, (n, 5); see ErrorTables."""
+    dark = dark_cameras(disturbances, cameras)
+    index = {name: u for u, name in enumerate(context.users)} | {"": -1}
+    rows = [
+        (
+            c,
+            index[sighting.user],
+            *context.lattice.to_lattice((sighting.x, sighting.y)),
+            sighting.heading,
+        )
+        for c, camera in enumerate(cameras)
+        for disturbance in of_camera(disturbances, camera)
+        if (sighting := disturbance.injected) is not None and c not in dark
+    ]
+    return np.array(rows, np.int64).reshape(-1, 5)
+
+
+def carry_over(memory: SightMemory, old: SightMemory, forced: I64) -> SightMemory:
+    """Return the memory of cameras for other errors, with the content of the old memory.
+
+    Args:
+        memory: The new memory, of a robot that has seen nobody.
+        old: The memory of the same cameras so far.
+        forced: What each user in view is perceived as from now on, (cameras, users).
+    """
+    about = old.about.copy()
+    about[..., About.FORCED.value] = forced
+    rows = max(memory.backlog.shape[1], int(old.waiting[:, 1].max(initial=0)))
+    backlog = np.zeros((len(about), rows, len(SightingColumn)), np.int64)
+    waiting = np.zeros_like(old.waiting)
+    for c, (begin, length) in enumerate(old.waiting.tolist()):
+        places = (begin + np.arange(length)) % max(1, old.backlog.shape[1])
+        backlog[c, :length], waiting[c, 1] = old.backlog[c, places], length
+    return SightMemory(old.noticed, old.seen, about, backlog, waiting)
+
+
+# Methods may round points to cells, so points this far outside the field of view are checked, too.
+SLACK = 2 * SUB
+
+
+def points_seen(
+    method: FieldOfView,
+    home: Home,
+    lenses: Lenses,
+    robot: Poses,
+    crowd: UserPoses,
+    first: int,
+    step_us: int,
+) -> U64:
+    """Return which points of each body are in view of each camera at each step.
+
+    Args:
+        method: The method of sight.
+        home: The home.
+        lenses: The cameras.
+        robot: The n poses of the owner of the cameras.
+        crowd: The other bodies.
+        first: The step of the first pose.
+        step_us: Length of a step [us].
+
+    Returns:
+        uint64 (cameras, bodies, n), bit i for point i.
+
+    Raises:
+        ComponentError: The method doesn't return a bool for each point.
+    """
+    widest = np.array(
+        [[(math.isqrt(squared) + SLACK) ** 2 for squared in row] for row in lenses.widest.tolist()],
+        np.int64,
+    ).reshape(lenses.widest.shape)
+    queries, number = view_queries(
+        lenses, widest, SLACK, robot, crowd.x, crowd.y, crowd.away, first, step_us
+    )
+    answers = np.zeros(len(queries) + 1, np.uint64)
+    has_moved = queries[1:, : Query.EYE_HEADING + 1] != queries[:-1, : Query.EYE_HEADING + 1]
+    has_moved[:, Query.BODY] = False
+    begins = [0, *(np.flatnonzero(has_moved.any(axis=1)) + 1).tolist()] if len(queries) else []
+    for begin, end in zip(begins, [*begins[1:], len(queries)], strict=False):
+        answers[begin + 1 : end + 1] = _answers(method, home, lenses, queries[begin:end])
+    return answers[number]
+
+
+def _answers(method: FieldOfView, home: Home, lenses: Lenses, queries: I64) -> U64:
+    """Return which points of each body are in view, for one pose of one camera."""
+    camera, _, x, y, heading = queries[0, : Query.EYE_HEADING + 1].tolist()
+    reach = Reach(
+        int(lenses.near_squared[camera]),
+        int(lenses.far_squared[camera]),
+        int(lenses.half_angle[camera]),
+    )
+    bodies = lenses.bodies[camera, queries[:, Query.BODY], : int(lenses.points[camera]) + 1]
+    points = (bodies + queries[:, None, [Query.BODY_X, Query.BODY_Y]]).reshape(-1, 2)
+    flags: object = method.sees(home, x, y, heading, reach, points)  # a user's own may be wrong
+    if not isinstance(flags, np.ndarray) or flags.dtype != bool or flags.shape != (len(points),):
+        raise ComponentError(
+            f"{type(method).__name__} returned {flags!r}, expected a bool array of shape"
+            f" ({len(points)},), a value for each point"
+        )
+    in_view = flags.reshape(len(queries), -1)
+    bits: U64 = np.uint64(1) << np.arange(in_view.shape[1], dtype=np.uint64)
+    return in_view @ bits
+
 
 # The name of the random stream of each draw.
 USER_STREAMS = {
@@ -67,7 +228,7 @@ GHOST_STREAMS = {
     GhostDraw.HEADING: "faces",
 }
 
-NOTHING: I64 = np.zeros((0, len(Column)), np.int64)
+NOTHING: I64 = np.zeros((0, len(SightingColumn)), np.int64)
 
 
 class Cameras(Watcher):
@@ -174,7 +335,7 @@ class Cameras(Watcher):
         self.errors = self.errors._replace(injected=injected)
         self.sighting_errors = None
         if self.drift is not None or any(p and p.errors for p in perceptions):
-            from fleet2d.engine.watchers.sighting_errors import SightingErrors  # few runs need them
+            from fleet2d.engine.sighting_errors import SightingErrors  # few runs need them
 
             self.sighting_errors = SightingErrors(self, perceptions)
         self.errs = self.may_err or any(has_errors) or self.sighting_errors is not None
@@ -283,9 +444,9 @@ class Cameras(Watcher):
         self.next_step = end
         if len(rows):
             self._sightings.append(rows)
-        identity = rows[:, Column.IDENTITY]  # -1, somebody unknown, is the last row
-        self.perceived[identity, 0] = rows[:, Column.X]
-        self.perceived[identity, 1] = rows[:, Column.Y]
+        identity = rows[:, SightingColumn.IDENTITY]  # -1, somebody unknown, is the last row
+        self.perceived[identity, 0] = rows[:, SightingColumn.X]
+        self.perceived[identity, 1] = rows[:, SightingColumn.Y]
         names, entity = self.event_names, self.owner.name
         return [
             Event(step, entity, names[kind], self.name_of(identity))

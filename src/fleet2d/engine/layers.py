@@ -1,6 +1,6 @@
-"""The layers of a run: those of what robots have seen, and when each layer is stored."""
+"""The seen area of a robot: the cells that its cameras have had in view, and when."""
 
-from collections.abc import Set
+from collections.abc import Collection, Sequence, Set
 from dataclasses import dataclass
 from datetime import timedelta
 from typing import Any, Literal
@@ -15,16 +15,193 @@ from fleet2d.artifacts.layers import layer_rows, layer_table
 from fleet2d.configuration.components import Component
 from fleet2d.configuration.problems import suggest
 from fleet2d.configuration.units import whole_steps
-from fleet2d.engine.basis import Basis
-from fleet2d.engine.watchers.seen_area import SeenArea
+from fleet2d.engine.bodies import Basis, Bodies, Watcher
+from fleet2d.entities.behavior import Actor
 from fleet2d.entities.entity import Robot
 from fleet2d.errors import ComponentError
 from fleet2d.floorplan.home.costmap import CostmapSettings, costs_of
 from fleet2d.floorplan.home.home import Home
 from fleet2d.floorplan.home.layers import COSTMAP, SEEN_LAYERS, Layer, LayerSettings, LayerType
 from fleet2d.floorplan.source import FloorPlanSource
+from fleet2d.kernels import F64, I64, Bool
+from fleet2d.kernels.sight import NEVER, SightRecord, WatchSetup, empty_pose_cache, settle, watch
+from fleet2d.kernels.space import Mesh
 from fleet2d.metrics.metric import Metric
+from fleet2d.runtime.events import Event
 from fleet2d.scenario.model import Scenario
+from fleet2d.sight.camera import TableContext, stack_lenses
+
+# Slots of the cache of poses, which holds half as many. A round through a large home has a few
+# thousand poses.
+SLOTS = 1 << 14
+# Most steps in one call of the kernel.
+LONGEST = 1 << 16
+
+
+class SeenArea(Watcher):
+    """The cells that the cameras of one robot have had in view since the start.
+
+    A cell is in view at a step if its centre is: not too near or far, within the angle, and no wall
+    touches the line to it, from the exact pose of the camera at that step.
+
+    Attributes:
+        robot: The robot.
+        row: Its row among the bodies.
+        next_step: The first step that is not included.
+    """
+
+    def __init__(
+        self,
+        robot: Actor,
+        row: int,
+        patches: Patches,
+        bodies: Bodies,
+        *,
+        every: int = 1,
+        keeps_last: bool = True,
+        bin_steps: int = 0,
+    ) -> None:
+        """Start with no cell seen.
+
+        Args:
+            robot: The robot.
+            row: Its row among the bodies.
+            patches: The parts of rooms that bins distinguish.
+            bodies: All bodies of the run.
+            every: Steps between two looks; each look stands for so many steps.
+            keeps_last: Whether `last_seen` is available.
+            bin_steps: Steps in a bin of exposure, for `take_bins`; 0: no bins.
+        """
+        assert isinstance(robot.entity, Robot)
+        self.robot, self.row, self.every, self._patches = robot, row, every, patches
+        self._bodies = bodies
+        plan = robot.home.plan
+        lattice, step_us = plan.lattice, robot.clock.step_us
+        lenses = [c.lens(lattice.units_per_m, step_us) for c in robot.entity.eyes.values()]
+        context = TableContext([], [], lattice, step_us, robot.path)
+        self._names = tuple(robot.entity.eyes)
+        self._lenses = stack_lenses(lenses, [False] * len(lenses), context)
+        self._open_lenses = self._lenses
+        grid, none = (lattice.rows, lattice.columns), (0, 0)
+        self._record = SightRecord(
+            first=np.full(grid, NEVER, np.int64),
+            last=np.full(grid if keeps_last else none, NEVER, np.int64),
+            exposure=np.zeros(len(patches.room), np.int64),
+            counted=np.full(grid if len(lenses) > 1 else none, NEVER, np.int64),
+            binned=np.zeros(none, np.int64),
+            most=np.zeros(none, np.int64),
+        )
+        self._bin_steps = bin_steps
+        # Cells in view, summed and at most, from bin _first_bin on.
+        self._bins = np.zeros((0, 2, len(patches.room)), np.int64)
+        self._first_bin = 0
+        self._cache = empty_pose_cache(SLOTS, len(patches.room))
+        self._set_walls(robot.home.walls)
+
+    def _set_walls(self, walls: Mesh) -> None:
+        """Use other walls, and clear the cache of poses."""
+        self._setup = WatchSetup(
+            walls,
+            self._lenses,
+            self._patches.of_cell,
+            self.robot.clock.step_us,
+            self.every,
+            max(self._bin_steps, 1),
+        )
+        self._cache.last[:] = self._cache.settled[:] = NEVER
+        self._cache.used[0] = 0
+
+    def darken(self, cameras: Collection[str]) -> None:
+        """Let these cameras see nothing from the present step on, and all others see normally."""
+        self._settle()
+        is_dark = [name in cameras for name in self._names]
+        near, far = self._open_lenses.near_squared, self._open_lenses.far_squared
+        self._lenses = self._open_lenses._replace(near_squared=np.where(is_dark, far + 1, near))
+        self._set_walls(self.robot.home.walls)
+
+    def take(self, bodies: Bodies, end: int) -> Sequence[Event]:
+        """Look from the robot's poses in the steps from `next_step` to `end` - 1."""
+        walls = self.robot.home.walls
+        if walls is not self._setup.walls:
+            self._settle()
+            self._set_walls(walls)
+        while self.next_step < end:
+            first, until = self.next_step, min(end, self.next_step + LONGEST)
+            self.next_step = until
+            runs = bodies.runs(self.row, first, until)
+            record, bins = self._record, self._new_bins(first, until)
+            if self._bin_steps:
+                record = record._replace(binned=bins[:, 0], most=bins[:, 1])
+            watch(self._setup, runs, 0, first, until, self._cache, record)
+            if self._bin_steps:
+                self._collect_bins(first, bins)
+        return ()
+
+    def catch_up(self) -> None:
+        """Look up to the present step."""
+        self.take(self._bodies, self._bodies.step)
+
+    def _new_bins(self, begin: int, end: int) -> I64:
+        """Return the bins that steps reach, not set yet: int64 (bins, 2, patches)."""
+        if not self._bin_steps:
+            return self._bins
+        count = (end - 1) // self._bin_steps - begin // self._bin_steps + 1
+        return np.empty((count, *self._bins.shape[1:]), np.int64)
+
+    def _collect_bins(self, begin: int, bins: I64) -> None:
+        """Collect the bins of the steps from `begin` to the present one."""
+        first = begin // self._bin_steps - self._first_bin
+        open_bins = self._bins[first:]  # the last bin, if it has earlier steps
+        if len(open_bins):
+            bins[0, 0] += open_bins[0, 0]
+            bins[0, 1] = np.maximum(bins[0, 1], open_bins[0, 1])
+        self._bins = np.concatenate([self._bins[:first], bins]) if first else bins
+
+    def _settle(self) -> None:
+        if len(self._record.last):
+            settle(self._setup, self._cache, self._record.last)
+
+    @property
+    def exposure(self) -> I64:
+        """Cells of each room in view, summed over the steps so far: int64 (rooms,), a copy."""
+        self.catch_up()
+        return np.add.reduceat(self._record.exposure, self._patches.first)
+
+    def take_bins(self, end: int) -> I64:
+        """Return and remove the exposure of the bins that end by step `end`.
+
+        Returns:
+            int64 (bins, 2, patches): cells of each patch in view, the sum over the steps of each
+            bin, and the maximum at one step.
+        """
+        self.catch_up()
+        count = end // self._bin_steps - self._first_bin
+        bins, self._bins = self._bins[:count], self._bins[count:]
+        self._first_bin += count
+        return bins
+
+    def explored(self) -> Bool:
+        """Return which cells were ever in view, bool (rows, columns)."""
+        self.catch_up()
+        return self._record.first != NEVER
+
+    def first_seen(self) -> I64:
+        """Return the first step with each cell in view, int64 (rows, columns); -1: never."""
+        self.catch_up()
+        return self._record.first.copy()
+
+    def last_seen(self) -> I64:
+        """Return the last step with each cell in view, int64 (rows, columns); -1: never."""
+        self.catch_up()
+        self._settle()
+        return self._record.last.copy()
+
+    def time_since_seen(self) -> F64:
+        """Return the time since each cell was in view [s], float64 (rows, columns), NaN: never."""
+        last = self.last_seen()
+        steps = np.where(last == NEVER, np.nan, self.next_step - 1 - last)
+        return steps * (self.robot.clock.step_us / 1e6)
+
 
 NEEDS = ("evidence", "exposure", *SEEN_LAYERS)
 

@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.engine.watchers.test_cameras import looks
+from tests.engine.test_cameras import looks
 from tests.scenes import OWN, digests, everything, run, table
 
 import fleet2d
-from fleet2d.engine.watchers.cameras import Cameras
-from fleet2d.engine.watchers.sighting_errors import SightingErrors
+from fleet2d.engine.cameras import Cameras
+from fleet2d.engine.sighting_errors import SightingErrors
 from fleet2d.runs.run import Run
 
 ERRORS = OWN.replace("own_components", "own_errors")

@@ -15,13 +15,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.engine.watchers.test_perceiving import full
+from tests.engine.test_cameras_perceiving import full
 from tests.scenes import digests, every_step, everything, process, run, scenario
 from tests.thorough import THOROUGH
 
 import fleet2d
 from fleet2d import Algorithm, Behavior, Plan, Simulation, Situation
-from fleet2d.engine.snapshots.snapshot import MAGIC, may_refer, open_snapshot
+from fleet2d.engine.snapshot import MAGIC, may_refer, open_snapshot
 from fleet2d.errors import ArtifactError, ComponentError, InputError
 from fleet2d.runtime.events import Event
 
@@ -463,10 +463,10 @@ def named(module: str, name: str) -> bytes:
         ("numpy", "f2py.subprocess.Popen"),
         ("numpy", "load"),
         ("fleet2d.runtime.clock", "np.f2py.subprocess.Popen"),
-        ("fleet2d.engine.snapshots.snapshot", "pickle.loads"),
-        ("fleet2d.engine.snapshots.snapshot", "Path"),
-        ("fleet2d.engine.snapshots.snapshot", "json.loads"),
-        ("fleet2d.engine.snapshots.snapshot", "_Reader"),
+        ("fleet2d.engine.snapshot", "pickle.loads"),
+        ("fleet2d.engine.snapshot", "Path"),
+        ("fleet2d.engine.snapshot", "json.loads"),
+        ("fleet2d.engine.snapshot", "_Reader"),
         ("fleet2d.engine.run", "run"),
         ("fleet2d.engine.simulation", "Simulation"),
         ("fleet2d.artifacts.arrow", "ParquetTable"),

@@ -3,23 +3,29 @@
 A state refers to constants of the run: its scenario, floor plan, clock. A snapshot contains only
 their names. A copy shares the constants; a file is read with those of a run that was set up from
 the same scenario.
+
+Arrays are stored in files as a plain type and the bytes: NumPy's own pickle format trusts the sizes
+and flags in a file, so that a wrong file can crash the process or worse.
 """
 
+import copyreg
 import hashlib
 import io
 import json
 import pickle
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from types import BuiltinFunctionType, FunctionType
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, Literal
+
+import numpy as np
+from numpy.typing import NDArray
 
 from fleet2d.artifacts.chunk import ColumnChunk
 from fleet2d.artifacts.plain import plain
 from fleet2d.configuration.trust import is_scenario_module, public_name
 from fleet2d.engine.inputs import components_of
-from fleet2d.engine.snapshots import arrays
 from fleet2d.engine.state import State
 from fleet2d.entities.body import RandomWalk, Track
 from fleet2d.errors import ArtifactError
@@ -30,6 +36,94 @@ from fleet2d.kernels.space import Mesh
 from fleet2d.routines.persona import Persona
 from fleet2d.scenario.model import Scenario
 from fleet2d.version import __version__
+
+# Booleans, numbers, times and text of a fixed length.
+_PLAIN = frozenset("biufcmMSU")
+# Arrays of fewer bytes are copied when they are written.
+_SMALL_BYTES = 4096
+
+
+def plain_type(text: str) -> np.dtype[Any]:
+    """Return a type of plain values.
+
+    Raises:
+        ArtifactError: It is another type.
+    """
+    dtype = np.dtype(str(text))
+    if dtype.kind not in _PLAIN:
+        raise ArtifactError(f"arrays of {dtype} can't be stored in a file: use a plain type")
+    return dtype
+
+
+def plain_array(
+    text: str, shape: Sequence[int], content: bytes, order: str, is_writable: bool
+) -> NDArray[Any]:
+    """Return an array of plain values from its bytes.
+
+    Example:
+        >>> plain_array("<i4", (2,), bytes(8), "C", True)
+        array([0, 0], dtype=int32)
+    """
+    kind = plain_type(text)
+    values = np.frombuffer(bytes(content), kind) if content else np.empty(0, kind)
+    array = np.array(values).reshape(tuple(shape), order="F" if order == "F" else "C")
+    array.setflags(write=bool(is_writable))
+    return array
+
+
+def object_array(shape: Sequence[int], content: Sequence[Any]) -> NDArray[Any]:
+    """Return an array of Python objects."""
+    values = np.empty(len(content), object)
+    values[:] = content
+    return values.reshape(tuple(shape))
+
+
+def plain_scalar(text: str, content: bytes) -> Any:
+    """Return a single value of a plain type."""
+    return np.frombuffer(bytes(content), plain_type(text))[0]
+
+
+def _reduce_array(array: NDArray[Any]) -> tuple[Any, ...]:
+    if array.dtype == object:
+        return object_array, (array.shape, list(array.ravel()))
+    text = plain_type(array.dtype.str).str
+    order: Literal["C", "F"] = (
+        "F" if array.flags.f_contiguous and not array.flags.c_contiguous else "C"
+    )
+    return plain_array, (text, array.shape, _content(array, order), order, array.flags.writeable)
+
+
+def _content(array: NDArray[Any], order: Literal["C", "F"]) -> bytes | pickle.PickleBuffer:
+    """Return the bytes of an array; those of a large one are not copied."""
+    if array.nbytes < _SMALL_BYTES or not (array.flags.c_contiguous or array.flags.f_contiguous):
+        return array.tobytes(order)
+    view = array.ravel(order).view(np.uint8)
+    view.setflags(write=False)  # else it would be stored as a bytearray
+    return pickle.PickleBuffer(view.data)
+
+
+def _reduce_scalar(value: Any) -> tuple[Any, ...]:
+    return plain_scalar, (plain_type(value.dtype.str).str, value.tobytes())
+
+
+def _reduce_type(kind: np.dtype[Any]) -> tuple[Any, ...]:
+    return plain_type, (plain_type(kind.str).str,)
+
+
+def _reducers() -> dict[type, Any]:
+    scalars = set(np.sctypeDict.values())
+    types = {type(np.dtype(scalar)) for scalar in scalars - {np.void, np.object_}}
+    return {
+        **copyreg.dispatch_table,
+        np.ndarray: _reduce_array,
+        **dict.fromkeys(scalars - {np.void, np.object_}, _reduce_scalar),
+        **dict.fromkeys(types, _reduce_type),
+    }
+
+
+REDUCERS = _reducers()
+"""The `dispatch_table` of a pickler for arrays, their values and their types."""
+
 
 _HASH = type(hashlib.sha256())
 
@@ -78,11 +172,11 @@ _NO_STATE = (
     "fleet2d.cli",
     "fleet2d.configuration.components",
     "fleet2d.configuration.documents",
-    "fleet2d.engine.snapshots.checkpoint",
+    "fleet2d.engine.checkpoint",
     "fleet2d.engine.resume",
     "fleet2d.engine.run",
     "fleet2d.engine.simulation",
-    "fleet2d.engine.snapshots.snapshot",
+    "fleet2d.engine.snapshot",
     "fleet2d.fit",
     "fleet2d.leaves",
     "fleet2d.configuration.trust",
@@ -263,7 +357,7 @@ class _StateWriter(pickle.Pickler):
         self._names = {id(value): name for name, value in constants.items()}
         self._shared = shared
         if shared is None:
-            self.dispatch_table = arrays.REDUCERS
+            self.dispatch_table = REDUCERS
         self._packages = {} if shared is not None else _packages_of(constants)
         self._checked: set[int] = set()  # references to classes that are allowed, by id
 
@@ -331,7 +425,7 @@ class _StateReader(pickle.Unpickler):
                 f"the file refers to {module}.{name}, which can't be part of a state"
             )
         value = super().find_class(module, name)
-        is_allowed = name in _ALLOWED.get(module, ()) or module == arrays.__name__
+        is_allowed = name in _ALLOWED.get(module, ()) or module == __name__
         # Only a class that the module defines: a class that it imports could be any.
         is_own = isinstance(value, type) and (value.__module__, value.__qualname__) == (
             module,
@@ -356,7 +450,7 @@ def may_refer(module: str, name: str, packages: Collection[str] = ()) -> bool:
         >>> may_refer("fleet2d.engine.state", "State"), may_refer("os", "system")
         (True, False)
     """
-    if name in _ALLOWED.get(module, ()) or (module == arrays.__name__ and name in _CONSTRUCTORS):
+    if name in _ALLOWED.get(module, ()) or (module == __name__ and name in _CONSTRUCTORS):
         return True
     if f"{module}.".startswith(tuple(f"{package}." for package in _NO_STATE)):
         return False

@@ -13,7 +13,7 @@ from fleet2d.artifacts.settings import ArtifactSettings
 from fleet2d.artifacts.store import RunStore
 from fleet2d.artifacts.unfinished import Commit
 from fleet2d.configuration.units import micros
-from fleet2d.engine.snapshots.snapshot import (
+from fleet2d.engine.snapshot import (
     Constants,
     UnstorableStateError,
     open_snapshot,

@@ -8,7 +8,7 @@ from tests.scenes import TESTS, digests, everything, flat_path, run, scenario, t
 
 import fleet2d
 from fleet2d import Behavior
-from fleet2d.engine.watchers.points_in_view import points_seen
+from fleet2d.engine.cameras import points_seen
 from fleet2d.errors import ComponentError, Fleet2DError, InputError
 from fleet2d.floorplan.home.home import Home
 from fleet2d.kernels import U64, Bool
@@ -20,7 +20,7 @@ from fleet2d.sight.fov import FieldOfView
 from fleet2d.sight.line_of_sight import LineOfSight
 from fleet2d.sight.visibility_polygon import VisibilityPolygon
 
-HERE = f"{TESTS.as_posix()}/engine/watchers/test_points_in_view"
+HERE = f"{TESTS.as_posix()}/engine/test_cameras_points"
 SECOND = 1_000_000
 ODD = {
     "range": [0.3, 5], "angle_deg": 140, "offset": [0.1, -0.04], "heading_deg": 30, "body_points": 6,

@@ -20,7 +20,7 @@ from fleet2d.kernels import I64
 from fleet2d.kernels.numbers import half_sine
 from fleet2d.runs.layers import layer_names, layer_steps, read_layer
 
-HERE = f"{TESTS.as_posix()}/engine/watchers/test_layers"
+HERE = f"{TESTS.as_posix()}/engine/test_layers"
 SINES = np.array([half_sine(half) for half in range(8192)], np.int64)
 SEEN = {"explored": {}, "first_seen": {}, "last_seen": {}, "time_since_seen": {}}
 CAMERA = {"range": [0.3, 3], "angle_deg": 120}

@@ -10,9 +10,7 @@ import numpy as np
 
 from fleet2d.algorithms.log import SensorRow
 from fleet2d.configuration.problems import suggest
-from fleet2d.engine.basis import Basis
-from fleet2d.engine.bodies import Bodies, PoseBlock
-from fleet2d.engine.watchers.watcher import Watcher
+from fleet2d.engine.bodies import Basis, Bodies, PoseBlock, Watcher
 from fleet2d.entities.objects.home_object import (
     Sensor,
     SensorFault,

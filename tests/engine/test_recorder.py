@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 from tests.scenes import digests, every_step, everything, run, scenario, table
 
-from fleet2d.engine.tables import recorder
+from fleet2d.engine import recorder
 
 
 def small(**artifacts: Any) -> dict[str, Any]:

@@ -9,8 +9,8 @@ from tests.scenes import OWN, everything, scenario
 
 import fleet2d
 from fleet2d.engine import phases
+from fleet2d.engine.cameras import Cameras
 from fleet2d.engine.phases import PHASES, Span
-from fleet2d.engine.watchers.cameras import Cameras
 from fleet2d.kernels.sight import new_memory
 
 

@@ -3,7 +3,7 @@
 from typing import Any
 
 import pytest
-from tests.engine.watchers.test_points_in_view import HERE, METHODS, with_odd_cameras
+from tests.engine.test_cameras_points import HERE, METHODS, with_odd_cameras
 from tests.reference.look import hides
 from tests.scenes import digests, each_step, run, scenario
 

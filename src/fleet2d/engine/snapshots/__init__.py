@@ -1,1 +1,0 @@
-"""Copies of the state of a run, in memory and in files."""

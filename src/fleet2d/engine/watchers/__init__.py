@@ -1,1 +1,0 @@
-"""Watchers: they follow the bodies of a run and emit events: cameras, sensors, encounters."""
