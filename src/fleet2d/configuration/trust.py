@@ -1,6 +1,8 @@
 """Users' own code: which of it may run, and its import from the folder of a scenario.
 
-No code of a stored run or of a foreign scenario runs unless the user trusts it.
+No code of a stored run or of a foreign scenario runs unless the user trusts it. What runs is
+compiled from the source that was listed, whose hash was shown: bytecode, extension modules and
+other files beside it are not importable while trust is restricted.
 """
 
 import ast
@@ -16,10 +18,11 @@ import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
-from dataclasses import dataclass
-from importlib.machinery import PathFinder
+from dataclasses import dataclass, field
+from importlib.abc import MetaPathFinder
+from importlib.machinery import ModuleSpec, PathFinder, SourceFileLoader
 from pathlib import Path
-from types import ModuleType
+from types import CodeType, ModuleType
 from typing import Any, Self
 from weakref import WeakKeyDictionary
 
@@ -28,70 +31,25 @@ from fleet2d.configuration.problems import did_you_mean
 from fleet2d.configuration.units import folder_of
 from fleet2d.errors import InputError, RunDirectoryError, ScenarioError, may_be_ctrl_c, text_of
 
-
-def with_imports(files: Iterable[Path], folder: Path) -> list[Path]:
-    """Return files of modules, and the files in their folder that they import, each once.
-
-    An import by a computed name is not found, and neither is one by other code than the modules.
-
-    Args:
-        files: The files of the modules.
-        folder: The folder in which imports are searched first.
-
-    Example:
-        >>> import tempfile
-        >>> folder = Path(tempfile.mkdtemp())
-        >>> _ = (folder / "mine.py").write_text("import numpy, helpers")
-        >>> _ = (folder / "helpers.py").write_text("SPEED = 1")
-        >>> [path.name for path in with_imports([folder / "mine.py"], folder)]
-        ['mine.py', 'helpers.py']
-    """
-    known = dict.fromkeys(files)
-    queue = list(known)
-    while queue:
-        new = dict.fromkeys(_imports_of(queue.pop(), folder)).keys() - known.keys()
-        known |= dict.fromkeys(sorted(new))
-        queue += sorted(new)
-    return list(known)
-
-
-def _imports_of(file: Path, folder: Path) -> Iterator[Path]:
-    """Yield the existing files of the modules that a module may import."""
-    for node in _nodes_of(file):
-        if isinstance(node, ast.Import):
-            for alias in node.names:
-                yield from _files_of(folder, alias.name.split("."))
-        elif isinstance(node, ast.ImportFrom):
-            start = file.parents[node.level - 1] if 0 < node.level <= len(file.parents) else folder
-            module = node.module.split(".") if node.module else []
-            for alias in node.names:
-                yield from _files_of(start, [*module, alias.name])
-
-
-def _nodes_of(file: Path) -> Iterator[ast.AST]:
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # they are about the user's text
-            tree = ast.parse(read_bytes(file, FILE_BYTES))
-    except (SyntaxError, ValueError, RecursionError, MemoryError, OSError, InputError):
-        return  # it can't be imported either
-    yield from ast.walk(tree)
-
-
-def _files_of(folder: Path, parts: list[str]) -> Iterator[Path]:
-    """Yield the files of a module and of its packages, as far as they exist."""
-    for part in parts:
-        folder = folder / part
-        yield from filter(Path.is_file, (folder / "__init__.py", folder.with_name(f"{part}.py")))
-
-
 # Files that a message lists, at most.
 _MOST_LISTED = 20
+
+_PREFIX = "fleet2d_scenario_"
+# The folders of scenarios by the packages that their modules are imported into.
+_FOLDERS: dict[str, Path] = {}
+# The folders of the modules that are being imported now, innermost last.
+_SEARCHED: list[Path] = []
+# The folders of components in modules that a scenario's modules imported from beside them.
+_BESIDE: WeakKeyDictionary[type, Path] = WeakKeyDictionary()
 
 
 @dataclass(frozen=True)
 class Trust:
-    """The files and folders whose code may run: absolute paths, with links resolved.
+    """The files and folders whose code may run.
+
+    Attributes:
+        files: The SHA-256 of each file when it was named, by its absolute path without links.
+        folders: Folders all of whose files may run, as absolute paths without links.
 
     Example:
         >>> trust = Trust.of(["/etc"])
@@ -99,30 +57,45 @@ class Trust:
         (True, False)
     """
 
-    files: frozenset[Path] = frozenset()
+    files: Mapping[Path, str] = field(default_factory=dict)
     folders: tuple[Path, ...] = ()
 
     @classmethod
     def of(cls, paths: Iterable[str | Path]) -> Self:
-        """Return the trust in files and folders.
+        """Return the trust in files, as they are now, and folders.
 
         Raises:
-            InputError: One doesn't exist.
+            InputError: One doesn't exist, or can't be read.
         """
-        files, folders = set(), []
+        files, folders = {}, []
         for path in map(Path, paths):
             if not path.exists():
                 raise InputError(f"{path} can't be trusted: there is no such file or folder")
             if path.is_dir():
                 folders.append(path.resolve())
-            else:
-                files.add(path.resolve())
-        return cls(frozenset(files), tuple(folders))
+                continue
+            try:
+                files[path.resolve()] = _sha256(read_bytes(path, FILE_BYTES))
+            except OSError as error:
+                raise InputError(f"{path} can't be trusted: {error.strerror}") from None
+        return cls(files, tuple(folders))
 
     def allows(self, path: Path) -> bool:
         """Whether the code in a file may run."""
         path = path.resolve()
-        return path in self.files or any(path.is_relative_to(folder) for folder in self.folders)
+        return path in self.files or self._is_in_folder(path)
+
+    def has_changed(self, path: Path, content: bytes) -> bool:
+        """Whether a file that was named has another content than then."""
+        path = path.resolve()
+        return not self._is_in_folder(path) and self.files.get(path) != _sha256(content)
+
+    def _is_in_folder(self, path: Path) -> bool:
+        return any(path.is_relative_to(folder) for folder in self.folders)
+
+
+def _sha256(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()
 
 
 _TRUST: ContextVar[Trust | None] = ContextVar("trust", default=None)
@@ -153,21 +126,19 @@ def current_trust() -> Trust | None:
     return _TRUST.get()
 
 
-def check_trust(name: str, files: Sequence[Path]) -> None:
-    """Refuse to import a user's own component whose files aren't trusted.
+def check_trust(name: str, files: Iterable[Path]) -> None:
+    """Refuse to import a module whose files aren't trusted.
 
     Args:
-        name: The component, as the scenario names it.
+        name: The module or component, for the message.
         files: The files that would run.
 
     Raises:
         ScenarioError: A file is not trusted.
     """
     trust = _TRUST.get()
-    if trust is None:
-        return
     for file in files:
-        if not trust.allows(file):
+        if trust is not None and not trust.allows(file):
             raise ScenarioError(f"{name!r} would run {file}: name it by --trust if you trust it")
 
 
@@ -213,7 +184,7 @@ def _refusal(title: str, content: object, trust: Trust) -> str:
     if not code:
         return ""
     lines = [
-        f"  {file} ({', '.join(keys[:3])}{', …' * (len(keys) > 3)})"
+        f"  {file} ({', '.join(keys[:3])}{', …' * (len(keys) > 3)}){_shown_hash(file)}"
         for file, keys in list(code.items())[:_MOST_LISTED]
     ]
     if len(code) > _MOST_LISTED:
@@ -228,6 +199,12 @@ def _refusal(title: str, content: object, trust: Trust) -> str:
     )
 
 
+def _shown_hash(file: Path) -> str:
+    with suppress(OSError, InputError):
+        return f" SHA-256 {_sha256(read_bytes(file, FILE_BYTES))}"
+    return ""
+
+
 def code_of(scenario: object) -> dict[Path, list[str]]:
     """Return the files that a scenario would run and that aren't loaded, each with the keys of it.
 
@@ -235,14 +212,12 @@ def code_of(scenario: object) -> dict[Path, list[str]]:
         >>> code_of({"algorithms": {"share": {"type": "/home/ana/mine:Share"}}})
         {PosixPath('/home/ana/mine.py'): ['algorithms.share.type']}
     """
-    from fleet2d.configuration.units import folder_of
-
     code: dict[Path, list[str]] = {}
     for key, name in _class_paths(scenario, ()):
         path = name.rpartition(":")[0].removesuffix(".py")
         parent, slash, module = path.rpartition("/")
         try:
-            files = files_of((folder_of(name) / (parent + slash)).resolve(), module)
+            files = _files_to_run((folder_of(name) / (parent + slash)).resolve(), module)
         except (OSError, ValueError):
             continue  # it is not a path: the import will fail
         if name.startswith("bundled:") and not any(file.is_file() for file in files):
@@ -273,14 +248,86 @@ def _is_class_path(text: str) -> bool:
     return bool(colon) and all(part.isidentifier() for part in parts)
 
 
-_PREFIX = "fleet2d_scenario_"
-# The folders of scenarios by the packages that their modules are imported into, and the reverse.
-_FOLDERS: dict[str, Path] = {}
-_PACKAGES: dict[Path, str] = {}
-# The folders of the modules that are being imported now, innermost last.
-_SEARCHED: list[Path] = []
-# The folders of components in modules that a scenario's modules imported from beside them.
-_BESIDE: WeakKeyDictionary[type, Path] = WeakKeyDictionary()
+def _files_to_run(folder: Path, name: str) -> list[Path]:
+    """Return the files that importing a module would run, unless it is loaded already.
+
+    For a module that doesn't exist it is the file that the module would have.
+    """
+    file = _source_of(folder, name)
+    if file is None:
+        top = name.partition(".")[0]
+        if top == "fleet2d" or name in sys.modules:
+            return []
+        installed = PathFinder.find_spec(top, sys.path)
+        origin = installed.origin if installed else None
+        return [Path(origin) if origin else folder.joinpath(*name.split(".")).with_suffix(".py")]
+    for full_name in (name, f"{_package_name(folder)}.{name}"):
+        if getattr(sys.modules.get(full_name), "__file__", None) == str(file):
+            return []
+    return with_imports(_files_of(folder, name.split(".")), folder)
+
+
+def _source_of(folder: Path, name: str) -> Path | None:
+    """Return the file with the source of a module in a folder, None if there is none."""
+    path = folder.joinpath(*name.split("."))
+    candidates = (path / "__init__.py", path.with_suffix(".py"))
+    return next(filter(Path.is_file, candidates), None)
+
+
+def with_imports(files: Iterable[Path], folder: Path) -> list[Path]:
+    """Return files of modules, and the files in their folder that they import, each once.
+
+    Imports are read from the text: nothing is run. An import by a computed name is not found.
+
+    Args:
+        files: The files of the modules.
+        folder: The folder in which imports are searched first.
+
+    Example:
+        >>> import tempfile
+        >>> folder = Path(tempfile.mkdtemp())
+        >>> _ = (folder / "mine.py").write_text("import numpy, helpers")
+        >>> _ = (folder / "helpers.py").write_text("SPEED = 1")
+        >>> [path.name for path in with_imports([folder / "mine.py"], folder)]
+        ['mine.py', 'helpers.py']
+    """
+    known = dict.fromkeys(files)
+    queue = list(known)
+    while queue:
+        new = dict.fromkeys(_imports_of(queue.pop(), folder)).keys() - known.keys()
+        known |= dict.fromkeys(sorted(new))
+        queue += sorted(new)
+    return list(known)
+
+
+def _imports_of(file: Path, folder: Path) -> Iterator[Path]:
+    """Yield the existing files of the modules that a module may import."""
+    for node in _nodes_of(file):
+        if isinstance(node, ast.Import):
+            for alias in node.names:
+                yield from _files_of(folder, alias.name.split("."))
+        elif isinstance(node, ast.ImportFrom):
+            start = file.parents[node.level - 1] if 0 < node.level <= len(file.parents) else folder
+            module = node.module.split(".") if node.module else []
+            for alias in node.names:
+                yield from _files_of(start, [*module, alias.name])
+
+
+def _nodes_of(file: Path) -> Iterator[ast.AST]:
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # they are about the user's text
+            tree = ast.parse(read_bytes(file, FILE_BYTES))
+    except (SyntaxError, ValueError, RecursionError, MemoryError, OSError, InputError):
+        return  # it can't be imported either
+    yield from ast.walk(tree)
+
+
+def _files_of(folder: Path, parts: Sequence[str]) -> Iterator[Path]:
+    """Yield the files of a module and of its packages, as far as they exist."""
+    for part in parts:
+        folder = folder / part
+        yield from filter(Path.is_file, (folder / "__init__.py", folder.with_name(f"{part}.py")))
 
 
 class BrokenModule(ScenarioError):
@@ -289,29 +336,6 @@ class BrokenModule(ScenarioError):
     def __init__(self, name: str, cause: str) -> None:
         super().__init__(f"can't import {name!r}: {cause}")
         self.cause = cause
-
-
-@contextmanager
-def importable(folder: Path) -> Iterator[None]:
-    """Search imports in ``folder``, too, and remove its modules from `sys.modules` afterwards.
-
-    If a module changes the current folder, this is undone: other paths are relative to it.
-
-    Two scenarios may each have a ``helpers.py``: each imports its own.
-    """
-    old_modules, current_folder = set(sys.modules), Path.cwd()
-    sys.path.insert(0, str(folder))
-    _SEARCHED.append(folder)
-    try:
-        yield
-    finally:
-        os.chdir(current_folder)
-        _SEARCHED.pop()
-        sys.path.remove(str(folder))
-        for name in set(sys.modules) - old_modules:
-            file = getattr(sys.modules[name], "__file__", None)
-            if file and not is_scenario_module(name) and Path(file).is_relative_to(folder):
-                del sys.modules[name]
 
 
 def import_class(name: str, *, is_plugin: bool = False) -> object:
@@ -331,7 +355,7 @@ def import_class(name: str, *, is_plugin: bool = False) -> object:
     if not all(part.isidentifier() for part in (*module_name.split("."), *qualname.split("."))):
         raise ScenarioError(f"can't import {name!r}: write module:Class or folder/module:Class")
     if not is_plugin:
-        check_trust(name, files_of(folder, module_name))
+        check_trust(name, _files_to_run(folder, module_name))
     try:
         module = _import_module(folder, module_name)
     except BaseException as error:  # the user's module may raise anything
@@ -352,9 +376,140 @@ def import_class(name: str, *, is_plugin: bool = False) -> object:
     return value
 
 
+def _import_module(folder: Path, name: str) -> ModuleType:
+    """Import a module from ``folder`` into the folder's package, else as an installed module."""
+    file = _source_of(folder, name)
+    if file is None:
+        return importlib.import_module(name)
+    module = sys.modules.get(name)
+    if module is not None and getattr(module, "__file__", None) == str(file):
+        return module
+    package = _package_name(folder)
+    if package not in _FOLDERS:
+        sys.modules[package] = ModuleType(package)
+        sys.modules[package].__path__ = [str(folder)]
+        _FOLDERS[package] = folder
+    with _importable(folder):
+        return importlib.import_module(f"{package}.{name}")
+
+
+def _package_name(folder: Path) -> str:
+    """Return the name of the package whose modules are those in a folder."""
+    return f"{_PREFIX}{hashlib.sha256(str(folder).encode()).hexdigest()[:16]}"
+
+
+@contextmanager
+def _importable(folder: Path) -> Iterator[None]:
+    """Search imports in ``folder``, too, and remove its modules from `sys.modules` afterwards.
+
+    If a module changes the current folder, this is undone: other paths are relative to it.
+
+    Two scenarios may each have a ``helpers.py``: each imports its own.
+    """
+    old_modules, current_folder = set(sys.modules), Path.cwd()
+    if _FINDER not in sys.meta_path:
+        sys.meta_path.insert(sys.meta_path.index(PathFinder), _FINDER)
+    sys.path.insert(0, str(folder))
+    _SEARCHED.append(folder)
+    try:
+        yield
+    finally:
+        os.chdir(current_folder)
+        _SEARCHED.pop()
+        sys.path.remove(str(folder))
+        for name in set(sys.modules) - old_modules:
+            module = sys.modules[name]
+            places = [getattr(module, "__file__", None), *getattr(module, "__path__", ())]
+            is_beside = any(_is_beside(Path(place), folder) for place in places if place)
+            if is_beside and not is_scenario_module(name):
+                del sys.modules[name]
+
+
+def _is_beside(file: Path, folder: Path) -> bool:
+    """Whether a file is in a folder, but in no environment that is installed there."""
+    return file.is_relative_to(folder) and "site-packages" not in file.relative_to(folder).parts
+
+
+class _SourceFinder(MetaPathFinder):
+    """Finds modules of scenarios' folders by their source.
+
+    While trust is restricted nothing else is found there: no bytecode and no extension module.
+    """
+
+    def find_spec(
+        self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
+    ) -> ModuleSpec | None:
+        """Return how to import a module; None: it is not in the folder of a scenario.
+
+        Raises:
+            ModuleNotFoundError: It is there, and has no source.
+        """
+        parent, _, name = fullname.rpartition(".")
+        if path is None:
+            folders = _SEARCHED[-1:]
+        else:
+            folders = [Path(entry) for entry in path] if _is_own_package(parent) else []
+        for folder in folders:
+            if (file := _source_of(folder, name)) is not None:
+                loader = _SourceLoader(fullname, str(file))
+                is_package = file.name == "__init__.py"
+                own = ModuleSpec(fullname, loader, origin=str(file), is_package=is_package)
+                own.has_location = True
+                return _own(own, [str(file.parent)] if is_package else None)
+        if not folders or _TRUST.get() is None:
+            return None
+        spec = None if path else PathFinder.find_spec(fullname, _path_without(folders[0]))
+        packages = [str(folder / name) for folder in folders if _is_bare_package(folder / name)]
+        if spec is None and packages:
+            return _own(ModuleSpec(fullname, None, is_package=True), packages)
+        if spec is None and PathFinder.find_spec(fullname, path) is not None:
+            raise ModuleNotFoundError(f"No source of module {fullname!r}", name=fullname)
+        return spec
+
+
+def _own(spec: ModuleSpec, places: list[str] | None) -> ModuleSpec:
+    """Return a specification of a module in the folder of a scenario, marked as such."""
+    spec.submodule_search_locations, spec.loader_state = places, _FOLDERS
+    return spec
+
+
+def _is_own_package(name: str) -> bool:
+    spec = getattr(sys.modules.get(name), "__spec__", None)
+    return name in _FOLDERS or (spec is not None and spec.loader_state is _FOLDERS)
+
+
+def _is_bare_package(folder: Path) -> bool:
+    """Whether a folder is a package without `__init__.py`, or any file in its place."""
+    return folder.is_dir() and not any(folder.glob("__init__.*"))
+
+
+def _path_without(folder: Path) -> list[str]:
+    return [entry for entry in sys.path if Path(entry).resolve() != folder]
+
+
+class _SourceLoader(SourceFileLoader):
+    """Compiles the very source that is trusted; bytecode is neither read nor written."""
+
+    def get_code(self, fullname: str) -> CodeType:
+        """Return the code of the module.
+
+        Raises:
+            ScenarioError: Its source isn't trusted, or has changed since it was named.
+        """
+        file, trust = Path(self.path), _TRUST.get()
+        check_trust(public_name(fullname), [file])
+        content = read_bytes(file, FILE_BYTES)
+        if trust is not None and trust.has_changed(file, content):
+            raise ScenarioError(f"{file} has changed since it was named by --trust: read it again")
+        return self.source_to_code(content, self.path)
+
+
+_FINDER = _SourceFinder()
+
+
 def public_name(text: str) -> str:
     """Return a text with modules as users know them, without the package of their folder."""
-    return re.sub(rf"\b{_PREFIX}[0-9a-f]+\.", "", text)
+    return re.sub(rf"\b{_PREFIX}[0-9a-f]+(\.?)", lambda match: "" if match[1] else ".", text)
 
 
 def _modules(folder: Path, name: str) -> list[str]:
@@ -381,10 +536,11 @@ def _no_class(module: ModuleType, qualname: str, folder: Path) -> str:
 
 def _failure(error: BaseException, folder: Path) -> str:
     """Return where in the user's files an import failed, and how."""
-    message = f"{type(error).__name__}: {public_name(text_of(error))}"
     if isinstance(error, SyntaxError) and error.filename:
         file = _short_path(error.filename, folder)
         return f"{file}:{error.lineno}: {type(error).__name__}: {error.msg}"
+    is_ours = isinstance(error, ScenarioError)
+    message = f"{'' if is_ours else f'{type(error).__name__}: '}{public_name(text_of(error))}"
     frames = [
         frame
         for frame in traceback.extract_tb(error.__traceback__)
@@ -401,74 +557,17 @@ def _short_path(file: str, folder: Path) -> str:
     return path.relative_to(folder).as_posix() if path.is_relative_to(folder) else file
 
 
-def files_of(folder: Path, name: str) -> list[Path]:
-    """Return the files that importing a module would run, unless it is loaded already.
-
-    For a module that doesn't exist it is the file that the module would have.
-    """
-    parts = name.split(".")
-    file = folder.joinpath(*parts).with_suffix(".py")
-    package = file.with_suffix("") / "__init__.py"
-    if not (file.is_file() or package.is_file()):
-        if parts[0] == "fleet2d" or name in sys.modules:
-            return []
-        installed = PathFinder.find_spec(parts[0], sys.path)
-        origin = installed.origin if installed else None
-        return [Path(origin) if origin else file]
-    for full_name in (name, f"{_PACKAGES.get(folder)}.{name}"):
-        if getattr(sys.modules.get(full_name), "__file__", None) in (str(file), str(package)):
-            return []
-    return _files_in(folder, name)
-
-
-def _files_in(folder: Path, name: str) -> list[Path]:
-    """Return the files of a module in a folder and of its packages, and what they import there."""
-    return with_imports(_own_files(folder, name), folder)
-
-
-def _own_files(folder: Path, name: str) -> list[Path]:
-    """Return the files of a module in a folder and of its packages."""
-    parts = name.split(".")
-    packages = [folder.joinpath(*parts[:n], "__init__.py") for n in range(1, len(parts) + 1)]
-    file = folder.joinpath(*parts).with_suffix(".py")
-    return [path for path in (*packages, file) if path.is_file()]
-
-
 def source_files(cls: type) -> list[Path]:
     """Return the file of a user's own class, and the files beside it that it imports."""
     package, _, name = cls.__module__.partition(".")
-    if package in _FOLDERS:
-        return _files_in(_FOLDERS[package], name)
-    if cls in _BESIDE:
-        return _files_in(_BESIDE[cls], cls.__module__)
+    folder = _FOLDERS.get(package) or _BESIDE.get(cls)
+    if folder is not None:
+        parts = (name if package in _FOLDERS else cls.__module__).split(".")
+        return with_imports(_files_of(folder, parts), folder)
     source = None
     with suppress(TypeError, OSError):  # a class of an interactive session
         source = inspect.getsourcefile(cls)
     return [Path(source)] if source and Path(source).is_file() else []
-
-
-def _import_module(folder: Path, name: str) -> ModuleType:
-    """Import a module from ``folder`` into the folder's package, else as an installed module."""
-    file = folder.joinpath(*name.split(".")).with_suffix(".py")
-    package = file.with_suffix("") / "__init__.py"
-    if not (file.is_file() or package.is_file()):
-        return importlib.import_module(name)
-    module = sys.modules.get(name)
-    if module is not None and getattr(module, "__file__", None) in (str(file), str(package)):
-        return module
-    with importable(folder):
-        return importlib.import_module(f"{_folder_package(folder)}.{name}")
-
-
-def _folder_package(folder: Path) -> str:
-    """Return the name of a package whose modules are those in ``folder``."""
-    name = f"{_PREFIX}{hashlib.sha256(str(folder).encode()).hexdigest()[:16]}"
-    if name not in _FOLDERS:
-        package = ModuleType(name)
-        package.__path__ = [str(folder)]
-        sys.modules[name] = package
-        _FOLDERS[name], _PACKAGES[folder] = folder, name
-    return name
 
 
 def is_scenario_module(name: str) -> bool:
@@ -483,7 +582,7 @@ def class_path(cls: type) -> str:
         return f"{_FOLDERS[package].as_posix()}/{module}:{cls.__qualname__}"
     # A module that imports another one beside it: that one will be known by its folder, too.
     file = getattr(sys.modules.get(cls.__module__), "__file__", None)
-    if file and _SEARCHED and Path(file) in _own_files(_SEARCHED[-1], cls.__module__):
+    if file and _SEARCHED and Path(file) in _files_of(_SEARCHED[-1], cls.__module__.split(".")):
         _BESIDE[cls] = _SEARCHED[-1]
         return f"{_SEARCHED[-1].as_posix()}/{cls.__module__}:{cls.__qualname__}"
     return f"{cls.__module__}:{cls.__qualname__}"
