@@ -1,7 +1,7 @@
 // Functions for the segmentation of rooms: which places see each other, which label is nearest.
 #pragma once
 
-#include "sight.hpp"
+#include "line_of_sight.hpp"
 
 namespace fleet2d {
 

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "headings.hpp"
-#include "sight.hpp"
+#include "line_of_sight.hpp"
 
 namespace fleet2d {
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "random.hpp"
-#include "sight.hpp"
+#include "line_of_sight.hpp"
 
 namespace fleet2d {
 namespace {

@@ -11,7 +11,7 @@
 // does, so the pieces don't depend on the triangulation.
 #pragma once
 
-#include "sight.hpp"
+#include "line_of_sight.hpp"
 
 namespace fleet2d {
 

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "random.hpp"
-#include "sight.hpp"
+#include "line_of_sight.hpp"
 
 namespace fleet2d {
 namespace {

@@ -4,7 +4,7 @@
 #include <limits>
 
 #include "grid.hpp"
-#include "sight.hpp"
+#include "line_of_sight.hpp"
 
 namespace fleet2d {
 namespace {

@@ -574,26 +574,26 @@ def mark_spans(spans: numpy.typing.NDArray[numpy.int32], mask: numpy.typing.NDAr
 
 NEVER: int = -1
 
-def watch(setup: tuple[Any, ...], window: Window, body: int, first: int, end: int, cache: tuple[Any, ...], record: tuple[Any, ...]) -> None:
+def record_coverage(setup: tuple[Any, ...], window: Window, body: int, first: int, end: int, cache: tuple[Any, ...], record: tuple[Any, ...]) -> None:
     """
     Record what a robot sees in the steps from `first` to `end` - 1.
 
     Args:
-        setup: Its cameras and the home, a `WatchSetup`.
+        setup: Its cameras and the home, a `CoverageSetup`.
         window: The motion of the bodies.
         body: Number of the robot among the bodies.
         first: The first step.
         end: One past the last step.
         cache: The cached poses; emptied when the table is half full.
-        record: What it has seen; `last` isn't updated for poses in the cache: see `settle`.
+        record: What it has seen; `last` isn't updated for poses in the cache: see `settle_coverage`.
     """
 
-def settle(setup: tuple[Any, ...], cache: tuple[Any, ...], seen: numpy.typing.NDArray[numpy.int64]) -> None:
+def settle_coverage(setup: tuple[Any, ...], cache: tuple[Any, ...], seen: numpy.typing.NDArray[numpy.int64]) -> None:
     """
     Update the last step of each cell for the poses in the cache.
 
     Args:
-        setup: Its cameras and the home, a `WatchSetup`.
+        setup: Its cameras and the home, a `CoverageSetup`.
         cache: The cached poses.
         seen: Out: int64 (rows, columns), the last step at which each cell was in view, -1 for never.
     """
@@ -940,7 +940,7 @@ USER_LOST: int = 0
 
 USER_SEEN: int = 1
 
-def look(walls: Mesh, lenses: tuple[Any, ...], errors: tuple[Any, ...], rule: tuple[Any, ...], window: Window, body: int, first_other: int, memory: tuple[Any, ...], shown: numpy.typing.NDArray[numpy.uint64] | None = None, radii: numpy.typing.NDArray[numpy.int64] | None = None) -> tuple[int, numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64]]:
+def detect(walls: Mesh, lenses: tuple[Any, ...], errors: tuple[Any, ...], rule: tuple[Any, ...], window: Window, body: int, first_other: int, memory: tuple[Any, ...], shown: numpy.typing.NDArray[numpy.uint64] | None = None, radii: numpy.typing.NDArray[numpy.int64] | None = None) -> tuple[int, numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64]]:
     """
     Look at all others in the steps of a window, up to the first with an event that stops it.
 

@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 from tests.engine.test_cameras_points import HERE, METHODS, with_odd_cameras
-from tests.reference.look import hides
+from tests.reference.detections import hides
 from tests.scenes import digests, each_step, run, scenario
 
 from fleet2d.expectations import in_view, never

@@ -23,12 +23,12 @@ from fleet2d.kernels.motion import Breakpoints, WalkRule, empty_poses
 from fleet2d.kernels.presence import Moments, PeopleEvidence, StayModel, Stretches
 from fleet2d.kernels.sight import (
     NEVER,
+    CoverageRecord,
+    CoverageSetup,
+    DetectionRule,
     ErrorTables,
     Lenses,
-    LookRule,
     Reach,
-    SightRecord,
-    WatchSetup,
     empty_pose_cache,
     new_memory,
 )
@@ -58,7 +58,7 @@ def test_the_stub_equals_the_output_of_nanobind() -> None:
 
 
 def test_the_core_has_functions_classes_and_constants() -> None:
-    assert {"look", "watch", "locate", "visible_region"} <= FUNCTIONS
+    assert {"detect", "record_coverage", "locate", "visible_region"} <= FUNCTIONS
     assert {"Mesh", "Routes", "Window", "Timelines", "UserDraw"} <= CLASSES
     assert all(
         isinstance(PUBLIC[n], int | float | np.ndarray) for n in {*PUBLIC} - FUNCTIONS - CLASSES
@@ -202,18 +202,18 @@ def track() -> Breakpoints:
     return Breakpoints(row, row // 20_000, row // 30_000, row % 4096, np.zeros(5, np.uint8))
 
 
-def setup() -> WatchSetup:
+def setup() -> CoverageSetup:
     patches = np.full((HOME.rows, HOME.columns), -1, np.int16)
     patches[:6], patches[6:12] = 0, 1
-    return WatchSetup(MESH, lenses(), patches, SECOND, 1, 4)
+    return CoverageSetup(MESH, lenses(), patches, SECOND, 1, 4)
 
 
-def record() -> SightRecord:
+def record() -> CoverageRecord:
     def never() -> Any:
         return np.full((HOME.rows, HOME.columns), NEVER, np.int64)
 
     bins = (np.zeros((3, 2), np.int64) for _ in range(2))
-    return SightRecord(never(), never(), np.zeros(2, np.int64), never(), *bins)
+    return CoverageRecord(never(), never(), np.zeros(2, np.int64), never(), *bins)
 
 
 def model() -> StayModel:
@@ -390,8 +390,8 @@ CALLS: dict[str, Args] = {
     "region_outline": lambda: (MESH, 200, 200, *region()),
     "cells_in_view": lambda: (MESH, 200, 200, 5, Reach(0, 90_000, 800), HOME.rows, HOME.columns),
     "mark_spans": lambda: (np.array([[0, 1, 3], [2, 0, 0]], np.int32), MASK.copy()),
-    "watch": lambda: (setup(), window(), 0, 0, STEPS, empty_pose_cache(8, 2), record()),
-    "settle": lambda: (setup(), empty_pose_cache(8, 2), record().last),
+    "record_coverage": lambda: (setup(), window(), 0, 0, STEPS, empty_pose_cache(8, 2), record()),
+    "settle_coverage": lambda: (setup(), empty_pose_cache(8, 2), record().last),
     "trace_track": lambda: (track(), 0, SECOND, poses()),
     "time_route": lambda: (POINTS[:2].copy(), 5, 7, 1000.0, 500.0),
     "trace_meander": lambda: (
@@ -443,11 +443,11 @@ CALLS: dict[str, Args] = {
     "turn_and_stretch": lambda: (300, 40, 50, 302, 400),
     "perceived_offset": lambda: (errors().table, errors().keys, 0, 1, 5, 300, 40),
     "perceived_posture": lambda: (errors().table, 0, 1, 2**30),
-    "look": lambda: (
+    "detect": lambda: (
         MESH,
         lenses(),
         errors(),
-        LookRule(5, SECOND, 0, 60, False, True),
+        DetectionRule(5, SECOND, 0, 60, False, True),
         window(),
         0,
         1,
@@ -683,7 +683,7 @@ def test_arrays_of_another_type_are_refused(name: str, places: list[Path_]) -> N
             array.ravel() if array.ndim > 1 else array.reshape(-1, 1),
             array.tolist(),
             object()
-            if name == "look" and at in ((8,), (9,))
+            if name == "detect" and at in ((8,), (9,))
             else None,  # there, it may be left out
             memoryview(array),
         ]
@@ -730,11 +730,11 @@ def test_named_tuples_of_another_length_are_refused(name: str, places: list[Path
 
 WRITTEN = {
     "mark_spans": [(1,)],
-    "watch": [*((5, i) for i in range(5)), *((6, i) for i in range(6))],
-    "settle": [*((1, i) for i in range(5)), (2,)],
+    "record_coverage": [*((5, i) for i in range(5)), *((6, i) for i in range(6))],
+    "settle_coverage": [*((1, i) for i in range(5)), (2,)],
     "trace_track": [(3, i) for i in range(4)],
     "trace_meander": [(5, i) for i in range(4)],
-    "look": [(7, i) for i in range(5)],
+    "detect": [(7, i) for i in range(5)],
     "follow": [(2,), (3,)],
     "smooth": [(4, i) for i in range(5)],
     "follow_people": [(3,)],
@@ -805,7 +805,7 @@ def test_an_optional_array_that_has_to_be_copied_lives_as_long_as_the_call() -> 
     still, away = np.full((USERS + 1, steps), 300), np.ones((USERS + 1, steps), np.uint8)
     bodies = _core.Window(0, still, still, still, away, away.astype(np.int8))
     shown = np.ones((steps, USERS, 2), np.uint64).T
-    end, *_ = _core.look(*CALLS["look"]()[:4], bodies, 0, 1, new_memory(2, USERS, steps), shown)
+    end, *_ = _core.detect(*CALLS["detect"]()[:4], bodies, 0, 1, new_memory(2, USERS, steps), shown)
     assert end == steps
 
 

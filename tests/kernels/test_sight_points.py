@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from shapely.geometry import Polygon
 from tests.homes import all_homes, awkward_points, behind_corners, home_of
-from tests.reference.sight import visible
+from tests.reference.line_of_sight import visible
 from tests.strategies import homes, quick, seeds
 
 from fleet2d.kernels import I64

@@ -17,7 +17,7 @@ from tests.homes import (
     houseexpo,
     shuffled,
 )
-from tests.reference.sight import visible_area
+from tests.reference.line_of_sight import visible_area
 from tests.strategies import homes, quick, seeds
 
 from fleet2d.kernels import F64, I32

@@ -15,7 +15,7 @@ from tests.homes import (
     home_of,
     shuffled,
 )
-from tests.reference.sight import is_inside, on_any_wall
+from tests.reference.line_of_sight import is_inside, on_any_wall
 from tests.strategies import homes, quick, seeds
 
 from fleet2d.kernels.space import (

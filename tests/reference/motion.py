@@ -6,8 +6,8 @@ from fractions import Fraction
 
 import numpy as np
 from tests.reference.headings import cosine, sine
+from tests.reference.line_of_sight import visible
 from tests.reference.random import random_bell, random_below
-from tests.reference.sight import visible
 
 from fleet2d.kernels import I64
 

@@ -13,7 +13,7 @@ from tests.homes import home_of
 from fleet2d.floorplan.geometry.lattice import Lattice
 from fleet2d.kernels import F64, I8, I64
 from fleet2d.kernels.motion import Window
-from fleet2d.kernels.sight import MOST_GHOSTS, LookRule, SightMemory, look, new_memory
+from fleet2d.kernels.sight import MOST_GHOSTS, DetectionRule, SightMemory, detect, new_memory
 from fleet2d.kernels.space import Mesh
 from fleet2d.runtime.determinism import stream_key
 from fleet2d.sight.camera import Camera, TableContext, error_tables, stack_lenses
@@ -78,7 +78,9 @@ class Watch:
         for i in range(errors.ghost_keys.shape[1]):
             errors.ghost_keys[0, i] = stream_key(self.seed, "robots.r", f"{i} ghost")
         burst = count + MOST_GHOSTS * int(errors.has_ghosts[0])
-        rule = LookRule(lens.patience, step_us, round(self.start_h * 3.6e9), burst, False, False)
+        rule = DetectionRule(
+            lens.patience, step_us, round(self.start_h * 3.6e9), burst, False, False
+        )
         if self.memory is None:
             self.memory = new_memory(1, count, burst * (lens.latency // lens.period + 2))
         robot = (
@@ -90,7 +92,7 @@ class Watch:
         poses = _lattice(np.concatenate([robot[None], self.users]))
         window = Window(self.first, *poses, np.zeros((count + 1, steps), np.uint8), posture)
         lenses = stack_lenses([lens], [True], scene)
-        done, sightings, *_ = look(self.walls, lenses, errors, rule, window, 0, 1, self.memory)
+        done, sightings, *_ = detect(self.walls, lenses, errors, rule, window, 0, 1, self.memory)
         assert done == steps
         return sightings.T
 

@@ -1,6 +1,6 @@
 #include "mesh.hpp"
 
-#include "../sight.hpp"
+#include "../line_of_sight.hpp"
 #include "subjects.hpp"
 
 namespace fleet2d {

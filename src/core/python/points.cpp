@@ -3,7 +3,7 @@
 #include "lens.hpp"
 #include "mesh.hpp"
 #include "poses.hpp"
-#include "sight.hpp"
+#include "line_of_sight.hpp"
 #include "subjects.hpp"
 
 namespace fleet2d {

@@ -2,7 +2,7 @@
 
 #include "arrays.hpp"
 #include "mesh.hpp"
-#include "sight.hpp"
+#include "line_of_sight.hpp"
 #include "subjects.hpp"
 
 namespace fleet2d {

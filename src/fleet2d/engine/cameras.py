@@ -24,15 +24,15 @@ from fleet2d.kernels.sight import (
     USER_LOST,
     USER_SEEN,
     About,
+    DetectionRule,
     GhostDraw,
     Lenses,
-    LookRule,
     Reach,
     SightingColumn,
     SightMemory,
     UserDraw,
     UserPoses,
-    look,
+    detect,
     new_memory,
     view_queries,
 )
@@ -344,7 +344,7 @@ class Cameras(Watcher):
             self._sense_activities(perceptions)
         count = len(self.others)
         bursts = count + MOST_GHOSTS * self.errors.has_ghosts + len(self.errors.injected)
-        self.rule = LookRule(
+        self.rule = DetectionRule(
             patience=max(lens.patience for lens in lenses),
             step_us=clock.step_us,
             start_us=micros(clock.start - midnight_of(clock.start)),
@@ -488,7 +488,7 @@ class Cameras(Watcher):
                     self.method, home, lenses, poses, crowd, self.next_step, step_us
                 )
                 points[self._dark] = 0
-        count, sightings, step, identity, kind = look(
+        count, sightings, step, identity, kind = detect(
             home.walls,
             self.lenses,
             self.errors,

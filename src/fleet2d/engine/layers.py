@@ -24,7 +24,14 @@ from fleet2d.floorplan.home.home import Home
 from fleet2d.floorplan.home.layers import COSTMAP, SEEN_LAYERS, Layer, LayerSettings, LayerType
 from fleet2d.floorplan.source import FloorPlanSource
 from fleet2d.kernels import F64, I64, Bool
-from fleet2d.kernels.sight import NEVER, SightRecord, WatchSetup, empty_pose_cache, settle, watch
+from fleet2d.kernels.sight import (
+    NEVER,
+    CoverageRecord,
+    CoverageSetup,
+    empty_pose_cache,
+    record_coverage,
+    settle_coverage,
+)
 from fleet2d.kernels.space import Mesh
 from fleet2d.metrics.metric import Metric
 from fleet2d.runtime.events import Event
@@ -83,7 +90,7 @@ class SeenArea(Watcher):
         self._lenses = stack_lenses(lenses, [False] * len(lenses), context)
         self._open_lenses = self._lenses
         grid, none = (lattice.rows, lattice.columns), (0, 0)
-        self._record = SightRecord(
+        self._record = CoverageRecord(
             first=np.full(grid, NEVER, np.int64),
             last=np.full(grid if keeps_last else none, NEVER, np.int64),
             exposure=np.zeros(len(patches.room), np.int64),
@@ -100,7 +107,7 @@ class SeenArea(Watcher):
 
     def _set_walls(self, walls: Mesh) -> None:
         """Use other walls, and clear the cache of poses."""
-        self._setup = WatchSetup(
+        self._setup = CoverageSetup(
             walls,
             self._lenses,
             self._patches.of_cell,
@@ -132,7 +139,7 @@ class SeenArea(Watcher):
             record, bins = self._record, self._new_bins(first, until)
             if self._bin_steps:
                 record = record._replace(binned=bins[:, 0], most=bins[:, 1])
-            watch(self._setup, runs, 0, first, until, self._cache, record)
+            record_coverage(self._setup, runs, 0, first, until, self._cache, record)
             if self._bin_steps:
                 self._collect_bins(first, bins)
         return ()
@@ -159,7 +166,7 @@ class SeenArea(Watcher):
 
     def _settle(self) -> None:
         if len(self._record.last):
-            settle(self._setup, self._cache, self._record.last)
+            settle_coverage(self._setup, self._cache, self._record.last)
 
     @property
     def exposure(self) -> I64:

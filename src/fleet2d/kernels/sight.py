@@ -63,12 +63,12 @@ from fleet2d._core import (
     build_fans,
     camera_pose,
     cells_in_view,
+    detect,
     distance_bin,
     hides,
     in_wedge,
     length,
     line_of_sight,
-    look,
     mark_spans,
     near_wedge,
     notice_chance,
@@ -81,18 +81,18 @@ from fleet2d._core import (
     points_in_view,
     random_share,
     random_shares,
+    record_coverage,
     region_contains,
     region_contains_points,
     region_outline,
     regions_of_cells,
-    settle,
+    settle_coverage,
     steady_chance,
     turn_and_stretch,
     vertices_seen_from_point,
     vertices_seen_from_vertex,
     view_queries,
     visible_region,
-    watch,
 )
 from fleet2d.kernels import I8, I16, I32, I64, U8, U64
 from fleet2d.kernels.numbers import TURN, turned
@@ -128,31 +128,31 @@ __all__ = [
     "USER_LOST",
     "USER_SEEN",
     "About",
+    "CoverageRecord",
+    "CoverageSetup",
+    "DetectionRule",
     "ErrorTables",
     "GhostDraw",
     "Lenses",
-    "LookRule",
     "PoseCache",
     "Reach",
     "SightEvents",
     "SightMemory",
-    "SightRecord",
     "SightingColumn",
     "UserDraw",
     "UserPoses",
     "ViewQueryColumn",
-    "WatchSetup",
     "build_fans",
     "camera_pose",
     "camera_poses",
     "cells_in_view",
+    "detect",
     "distance_bin",
     "empty_pose_cache",
     "hides",
     "in_wedge",
     "length",
     "line_of_sight",
-    "look",
     "mark_spans",
     "near_wedge",
     "new_memory",
@@ -166,18 +166,18 @@ __all__ = [
     "points_in_view",
     "random_share",
     "random_shares",
+    "record_coverage",
     "region_contains",
     "region_contains_points",
     "region_outline",
     "regions_of_cells",
-    "settle",
+    "settle_coverage",
     "steady_chance",
     "turn_and_stretch",
     "vertices_seen_from_point",
     "vertices_seen_from_vertex",
     "view_queries",
     "visible_region",
-    "watch",
 ]
 
 
@@ -295,7 +295,7 @@ class SightEvents(NamedTuple):
     kind: I32  # USER_SEEN | USER_LOST
 
 
-class LookRule(NamedTuple):
+class DetectionRule(NamedTuple):
     """The settings that all cameras of a robot share."""
 
     patience: int  # steps without a sighting after which an identity counts as lost
@@ -326,7 +326,7 @@ class PoseCache(NamedTuple):
     Attributes:
         pose: int64 (slots, 4), x, y [lattice units], heading, and pan position of the cameras.
         last: int64 (slots,), last step with the pose, -1 for an empty slot.
-        settled: int64 (slots,), the last of these steps that `SightRecord.last` has counted.
+        settled: int64 (slots,), the last of these steps that `CoverageRecord.last` has counted.
         cells: int32 (slots, patches), number of cells of each patch in view.
         used: int64 (1,), number of used slots.
     """
@@ -338,18 +338,18 @@ class PoseCache(NamedTuple):
     used: I64
 
 
-class SightRecord(NamedTuple):
+class CoverageRecord(NamedTuple):
     """What a robot has seen since the start.
 
     Attributes:
         first: int64 (rows, columns), first step at which each cell was in view, -1 for never.
-        last: int64 (rows, columns), the last such step, up to the last call of `settle`; empty: not
-            recorded.
+        last: int64 (rows, columns), the last such step, up to the last call of `settle_coverage`;
+            empty: not recorded.
         exposure: int64 (patches,), cells of each patch in view, summed over the steps.
         counted: int64 (rows, columns), the last look that counted each cell, which several cameras
             may show; empty for one camera.
-        binned: int64 (bins, patches), as `exposure`, by time: `watch` overwrites the bins of its
-            steps; empty: not recorded.
+        binned: int64 (bins, patches), as `exposure`, by time: `record_coverage` overwrites the bins
+            of its steps; empty: not recorded.
         most: int64 (bins, patches), largest number of cells of each patch in view at a step,
             likewise.
     """
@@ -362,8 +362,8 @@ class SightRecord(NamedTuple):
     most: I64
 
 
-class WatchSetup(NamedTuple):
-    """The constants of a robot's watching.
+class CoverageSetup(NamedTuple):
+    """The constants of a robot's coverage.
 
     Attributes:
         walls: Mesh of the space that is free for sight; its borders are the walls.
@@ -372,7 +372,7 @@ class WatchSetup(NamedTuple):
             for none.
         step_us: Length of a step.
         every: It looks at multiples of this step; each look counts for this many steps.
-        bin_steps: Steps of a bin of `SightRecord.binned`; bins begin at step 0.
+        bin_steps: Steps of a bin of `CoverageRecord.binned`; bins begin at step 0.
     """
 
     walls: Mesh

@@ -7,7 +7,7 @@ import pytest
 import shapely
 from hypothesis import assume, given, settings
 from tests.homes import Home, all_homes, awkward_points, home_of
-from tests.reference.sight import is_inside, touches_any_wall
+from tests.reference.line_of_sight import is_inside, touches_any_wall
 from tests.strategies import homes, seeds
 from tests.thorough import examples
 

@@ -1,7 +1,7 @@
 // What a camera sees, as Python holds it: the named tuple `fleet2d.kernels.sight.Reach`.
 #pragma once
 
-#include "../seen.hpp"
+#include "../visible_cells.hpp"
 #include "arrays.hpp"
 
 namespace fleet2d {

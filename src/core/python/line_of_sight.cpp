@@ -1,6 +1,6 @@
-#include "sight.hpp"
+#include "line_of_sight.hpp"
 
-#include "../sight.hpp"
+#include "../line_of_sight.hpp"
 #include "mesh.hpp"
 #include "subjects.hpp"
 
@@ -23,7 +23,7 @@ bool sees(const Mesh& mesh, i64 qx, i64 qy, i64 px, i64 py) {
 
 }  // namespace
 
-void bind_sight(nb::module_& m) {
+void bind_line_of_sight(nb::module_& m) {
     m.def("line_of_sight", &sees_from_triangle, "mesh"_a, "qx"_a, "qy"_a, "triangle"_a, "px"_a, "py"_a,
           R"(Return whether p is visible from q: the segment between them touches no wall point.
 

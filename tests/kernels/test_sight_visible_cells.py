@@ -8,7 +8,7 @@ import shapely
 from hypothesis import given
 from shapely.geometry import Polygon
 from tests.homes import Home, all_homes, awkward_points, home_of, shuffled, transformed, turns
-from tests.reference import seen as slow
+from tests.reference import visible_cells as slow
 from tests.strategies import homes, quick, seeds
 
 from fleet2d.kernels import Bool

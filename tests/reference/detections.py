@@ -9,9 +9,9 @@ from typing import NamedTuple
 
 import numpy as np
 from tests.reference.headings import DIGITS, alignment, cosine, sine
+from tests.reference.line_of_sight import visible
 from tests.reference.motion import half_up
 from tests.reference.random import random_bell, random_below, random_bits
-from tests.reference.sight import visible
 
 import fleet2d.kernels.sight as k
 from fleet2d.kernels import I64
@@ -255,7 +255,7 @@ class Look(NamedTuple):
     counts: list[list[list[int]]]
 
 
-def look(
+def detect(
     walls: I64,
     eyes: list[Eye],
     robot: list[Body],

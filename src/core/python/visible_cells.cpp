@@ -1,4 +1,4 @@
-#include "seen.hpp"
+#include "visible_cells.hpp"
 
 #include "mesh.hpp"
 #include "subjects.hpp"
@@ -28,7 +28,7 @@ void mark_spans(View<const i32, 2> spans, View<bool, 2> mask) {
 
 }  // namespace
 
-void bind_seen(nb::module_& m) {
+void bind_visible_cells(nb::module_& m) {
     m.def(
         "cells_in_view",
         [](const Mesh& mesh, i64 x, i64 y, i64 heading, const Reach& reach, i64 rows, i64 columns) {

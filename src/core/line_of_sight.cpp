@@ -1,4 +1,4 @@
-#include "sight.hpp"
+#include "line_of_sight.hpp"
 
 #include <stdexcept>
 #include <vector>

@@ -1,4 +1,4 @@
-#include "look.hpp"
+#include "detections.hpp"
 
 #include <algorithm>
 #include <bit>
@@ -37,10 +37,10 @@ Sighting read(View<const i64> row) {
 void write(View<i64> row, const Sighting& sighting) { std::memcpy(row.data, &sighting, sizeof sighting); }
 
 // Finds the intervals in which a user is in view.
-class Lookout {
+class IntervalFinder {
 public:
-    Lookout(const Mesh& walls, const Lenses& lenses, const LookRule& rule, const Window& window, Onlooker onlooker,
-            View<const u64, 3> shown, View<const i64> radii)
+    IntervalFinder(const Mesh& walls, const Lenses& lenses, const DetectionRule& rule, const Window& window,
+                   Onlooker onlooker, View<const u64, 3> shown, View<const i64> radii)
         : walls_(walls),
           lenses_(lenses),
           rule_(rule),
@@ -71,7 +71,7 @@ private:
             const i64 run_end = window_.run_end(onlooker_.body, run);
             const i64 other_end = window_.run_end(other, other_run);
             const i64 end = std::min(run_end, other_end);
-            if (window_.away[run] == 0 && window_.away[other_run] == 0) look(camera, user, run, other_run, step, end);
+            if (window_.away[run] == 0 && window_.away[other_run] == 0) split(camera, user, run, other_run, step, end);
             step = end;
             if (run_end == end) ++run;
             if (other_end == end) ++other_run;
@@ -79,7 +79,7 @@ private:
     }
 
     // Add the intervals of steps `begin` to `end` - 1, in which both bodies rest; only the camera may pan.
-    void look(i64 camera, i64 user, i64 run, i64 other_run, i64 begin, i64 end) {
+    void split(i64 camera, i64 user, i64 run, i64 other_run, i64 begin, i64 end) {
         const i64 period = lenses_.period[camera];
         const Pose body{window_.x[run], window_.y[run], window_.heading[run]};
         const Pose other{window_.x[other_run], window_.y[other_run], window_.heading[other_run]};
@@ -155,7 +155,7 @@ private:
 
     const Mesh& walls_;
     const Lenses& lenses_;
-    const LookRule& rule_;
+    const DetectionRule& rule_;
     const Window& window_;
     const Onlooker onlooker_;
     const View<const u64, 3> shown_;
@@ -167,10 +167,10 @@ private:
 };
 
 // Visits the steps at which something may be noticed, become known, or be lost.
-class Watch {
+class Detector {
 public:
-    Watch(const Mesh& walls, const Lenses& lenses, const ErrorTables& errors, const LookRule& rule,
-          const Window& window, Onlooker onlooker, const SightMemory& memory, std::vector<Interval> intervals)
+    Detector(const Mesh& walls, const Lenses& lenses, const ErrorTables& errors, const DetectionRule& rule,
+             const Window& window, Onlooker onlooker, const SightMemory& memory, std::vector<Interval> intervals)
         : walls_(walls),
           lenses_(lenses),
           errors_(errors),
@@ -190,7 +190,7 @@ public:
         run_ = window.start[onlooker.body];
     }
 
-    LookResult look() {
+    DetectionResult run() {
         for (now_ = next_step(window_.first); now_ < window_.end; now_ = next_step(now_ + 1)) {
             take_up();
             const std::size_t before = result_.sightings.size();
@@ -417,7 +417,7 @@ private:
     const Mesh& walls_;
     const Lenses& lenses_;
     const ErrorTables& errors_;
-    const LookRule& rule_;
+    const DetectionRule& rule_;
     const Window& window_;
     const Onlooker onlooker_;
     const SightMemory& memory_;
@@ -430,16 +430,16 @@ private:
     i64 identities_in_view_ = 0;
     i64 run_ = 0;  // of the onlooker at the present step
     i64 now_ = 0;
-    LookResult result_{};
+    DetectionResult result_{};
 };
 
 }  // namespace
 
-LookResult look(const Mesh& walls, const Lenses& lenses, const ErrorTables& errors, const LookRule& rule,
-                const Window& window, Onlooker onlooker, const SightMemory& memory, View<const u64, 3> shown,
-                View<const i64> radii) {
-    auto intervals = Lookout(walls, lenses, rule, window, onlooker, shown, radii).intervals();
-    return Watch(walls, lenses, errors, rule, window, onlooker, memory, std::move(intervals)).look();
+DetectionResult detect(const Mesh& walls, const Lenses& lenses, const ErrorTables& errors, const DetectionRule& rule,
+                       const Window& window, Onlooker onlooker, const SightMemory& memory, View<const u64, 3> shown,
+                       View<const i64> radii) {
+    auto intervals = IntervalFinder(walls, lenses, rule, window, onlooker, shown, radii).intervals();
+    return Detector(walls, lenses, errors, rule, window, onlooker, memory, std::move(intervals)).run();
 }
 
 }  // namespace fleet2d

@@ -8,7 +8,7 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 from tests.homes import Home, home_of
-from tests.reference import seen as slow
+from tests.reference import visible_cells as slow
 from tests.strategies import quick, seeds
 
 from fleet2d.floorplan.geometry.lattice import Lattice
@@ -17,13 +17,13 @@ from fleet2d.kernels.motion import Poses, Window
 from fleet2d.kernels.numbers import half_sine
 from fleet2d.kernels.sight import (
     NEVER,
+    CoverageRecord,
+    CoverageSetup,
     Lenses,
-    SightRecord,
-    WatchSetup,
     camera_pose,
     empty_pose_cache,
-    settle,
-    watch,
+    record_coverage,
+    settle_coverage,
 )
 from fleet2d.sight.camera import Camera, TableContext, stack_lenses
 
@@ -128,27 +128,27 @@ def by_kernel(
     """
     shape = (FLAT.rows, FLAT.columns)
     several = len(lenses.near_squared) > 1
-    record = SightRecord(
+    record = CoverageRecord(
         np.full(shape, NEVER, np.int64), np.full(shape, NEVER, np.int64), np.zeros(ROOMS, np.int64),
         np.full(shape if several else (0, 0), NEVER, np.int64), np.zeros((8, ROOMS), np.int64),
         np.zeros((8, ROOMS), np.int64),
     )  # fmt: skip
-    setup = WatchSetup(FLAT.mesh, lenses, rooms_of(FLAT), SECOND, every, BIN)
+    setup = CoverageSetup(FLAT.mesh, lenses, rooms_of(FLAT), SECOND, every, BIN)
     binned, most = np.zeros((8, ROOMS), np.int64), np.zeros((8, ROOMS), np.int64)
     cache = empty_pose_cache(slots, ROOMS)
     begin = 0
     for end in [*ends, len(poses.x)]:
         if body is None:
             part = Poses(*(column[begin:end] for column in poses))
-            watch(setup, window_of(part, begin), 0, begin, end, cache, record)
+            record_coverage(setup, window_of(part, begin), 0, begin, end, cache, record)
         else:
-            watch(setup, window_of(poses, 0, 3, body), body, begin, end, cache, record)
+            record_coverage(setup, window_of(poses, 0, 3, body), body, begin, end, cache, record)
         reached = slice(begin // BIN, (end - 1) // BIN + 1)
         length = reached.stop - reached.start
         binned[reached] += record.binned[:length]
         most[reached] = np.maximum(most[reached], record.most[:length])
         begin = end
-    settle(setup, cache, record.last)
+    settle_coverage(setup, cache, record.last)
     lists = (record.exposure.tolist(), binned.tolist(), most.tolist())
     return Seen(record.first, record.last, *lists)
 
@@ -206,11 +206,11 @@ def test_sight_record_in_spans_equals_brute_force(
 def test_tables_that_do_not_fit_are_refused() -> None:
     shape, rooms = (FLAT.rows, FLAT.columns), rooms_of(FLAT)
     none = np.zeros((0, ROOMS), np.int64)
-    record = SightRecord(
+    record = CoverageRecord(
         np.full(shape, NEVER), np.zeros((0, 0), np.int64), np.zeros(ROOMS, np.int64),
         np.zeros((0, 0), np.int64), none, none,
     )  # fmt: skip
-    setup = WatchSetup(FLAT.mesh, lenses_of(*ONE), rooms, SECOND, 1, BIN)
+    setup = CoverageSetup(FLAT.mesh, lenses_of(*ONE), rooms, SECOND, 1, BIN)
     window = window_of(random_poses(np.random.default_rng(1), 60))
     far = window_of(Poses(*[np.full(3, 2**41)] * 3, np.zeros(3, np.uint8)))
     cache = empty_pose_cache(8, ROOMS)
@@ -237,6 +237,6 @@ def test_tables_that_do_not_fit_are_refused() -> None:
         ((setup, *steps, cache, bins), "a row for every bin"),
     ]:
         with pytest.raises(ValueError, match=message):
-            watch(*arguments)
+            record_coverage(*arguments)
     with pytest.raises(ValueError, match="seen must be"):
-        settle(setup, cache, record.last)
+        settle_coverage(setup, cache, record.last)

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from shapely.geometry import Polygon
 from tests.homes import Home, home_of
-from tests.reference import look as slow
+from tests.reference import detections as slow
 from tests.reference.random import key_of_word
 from tests.strategies import homes, quick, seeds
 
@@ -23,13 +23,13 @@ from fleet2d.kernels.sight import (
     USER_LOST,
     USER_SEEN,
     About,
+    DetectionRule,
     ErrorTables,
     Lenses,
-    LookRule,
     SightMemory,
     UserDraw,
+    detect,
     in_wedge,
-    look,
     new_memory,
 )
 from fleet2d.sight.camera import Camera, Lens, TableContext, error_tables, stack_lenses
@@ -174,7 +174,9 @@ def tables_of(eyes: Sequence[slow.Eye], scene: Scene) -> ErrorTables:
     return errors
 
 
-def kernel_args(eyes: Sequence[slow.Eye], scene: Scene) -> tuple[Lenses, ErrorTables, LookRule]:
+def kernel_args(
+    eyes: Sequence[slow.Eye], scene: Scene
+) -> tuple[Lenses, ErrorTables, DetectionRule]:
     """Return cameras as the kernel wants them."""
     lenses = [Lens(**eye._asdict()) for eye in eyes]
     count = len(scene.users)
@@ -183,7 +185,7 @@ def kernel_args(eyes: Sequence[slow.Eye], scene: Scene) -> tuple[Lenses, ErrorTa
     patience = max(eye.patience for eye in eyes)
     errors = tables_of(eyes, scene)
     burst = int((count + MOST_GHOSTS * errors.has_ghosts).sum())
-    rule = LookRule(patience, STEP_US, START_US, burst, False, False)
+    rule = DetectionRule(patience, STEP_US, START_US, burst, False, False)
     return stack_lenses(lenses, errs, about), errors, rule
 
 
@@ -217,7 +219,7 @@ def looked(
     lenses, errors, rule = kernel_args(eyes, scene)
     rule = rule._replace(stop_lost=stops[0], stop_seen=stops[1])
     before = memory.about.copy()
-    done, columns, *events = look(
+    done, columns, *events = detect(
         home.mesh, lenses, errors, rule, *scene.window(first), memory, scene.shown, scene.radii()
     )
     counts = (memory.about - before)[..., [About.IN_VIEW, About.NOTICED]]
@@ -242,7 +244,7 @@ def looked_slowly(
     """Return what the twin sees."""
     eyes, carried = listed(eye), carried or nothing_known(eye, scene)
     shown = scene.shown
-    result = slow.look(
+    result = slow.detect(
         home.walls,
         eyes,
         [slow.Body(x, y, bool(away), heading) for x, y, heading, away in scene.robot.tolist()],
@@ -857,7 +859,7 @@ def test_look_refuses_times_and_bodies_that_are_none(
     pan_us = np.array([change.get("pan_us", STEP_US)])
 
     with pytest.raises(ValueError, match=message):
-        look(
+        detect(
             ROOM.mesh,
             lenses._replace(pan_us=pan_us),
             errors,

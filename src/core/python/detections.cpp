@@ -1,4 +1,4 @@
-#include "../look.hpp"
+#include "../detections.hpp"
 
 #include "../occlusion.hpp"
 
@@ -22,10 +22,11 @@ struct border::Fields<SightMemory> {
                                                &SightMemory::backlog, &SightMemory::waiting);
 };
 template <>
-struct border::Fields<LookRule> {
+struct border::Fields<DetectionRule> {
     static constexpr auto name = nb::detail::const_name("tuple[typing.Any, ...]");
-    static constexpr auto members = std::tuple(&LookRule::patience, &LookRule::step_us, &LookRule::start_us,
-                                               &LookRule::burst, &LookRule::stop_lost, &LookRule::stop_seen);
+    static constexpr auto members =
+        std::tuple(&DetectionRule::patience, &DetectionRule::step_us, &DetectionRule::start_us, &DetectionRule::burst,
+                   &DetectionRule::stop_lost, &DetectionRule::stop_seen);
 };
 
 namespace {
@@ -44,7 +45,7 @@ void check_window(const Window& window, Onlooker onlooker, i64 users) {
 }
 
 // All moments of a window, and the ends of pans that begin in it, must be numbers above their beginnings.
-void check_moments(const LookRule& rule, const Window& window, const Lenses& lenses) {
+void check_moments(const DetectionRule& rule, const Window& window, const Lenses& lenses) {
     require(rule.step_us > 0, "step_us must be above 0");
     require(window.end < LATEST / rule.step_us, "steps must begin before 2**61 us");
     require(0 <= rule.start_us && rule.start_us < LATEST, "start_us must be in 0 to 2**61 - 1");
@@ -109,7 +110,7 @@ void check_memory(const SightMemory& memory, const Lenses& lenses, const ErrorTa
 
 }  // namespace
 
-void bind_look(nb::module_& m) {
+void bind_detections(nb::module_& m) {
     const auto column = [](std::size_t offset) { return static_cast<SightingColumn>(offset / sizeof(i64)); };
     nb::enum_<SightingColumn>(m, "SightingColumn", nb::is_arithmetic(), R"(The columns of a row of sightings.
 
@@ -131,8 +132,8 @@ is. X to POSTURE are as perceived.)")
     m.attr("USER_SEEN") = static_cast<i64>(SightEvent::SEEN);
 
     m.def(
-        "look",
-        [](const Mesh& walls, const Lenses& lenses, const ErrorTables& errors, const LookRule& rule,
+        "detect",
+        [](const Mesh& walls, const Lenses& lenses, const ErrorTables& errors, const DetectionRule& rule,
            const Window& window, i64 body, i64 first_other, const SightMemory& memory,
            std::optional<View<const u64, 3>> shown, std::optional<View<const i64>> radii) {
             check_lenses(lenses);
@@ -150,10 +151,10 @@ is. X to POSTURE are as perceived.)")
                 require(widths.size() == window.bodies(), "radii must have one for each body");
                 require(all_in_range(widths, 1, FATTEST), "radii must be in 1 to 2**17 - 1");
             }
-            LookResult result;
+            DetectionResult result;
             {
                 const nb::gil_scoped_release unlocked;
-                result = look(walls, lenses, errors, rule, window, {body, first_other}, memory, points, widths);
+                result = detect(walls, lenses, errors, rule, window, {body, first_other}, memory, points, widths);
             }
             const i64 count = static_cast<i64>(result.events.size());
             auto step = Array<i64>::empty({count}), identity = Array<i64>::empty({count});

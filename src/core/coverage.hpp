@@ -17,7 +17,7 @@ inline constexpr i64 LAST_MOMENT = i64{1} << 62;  // us: no step begins later
 struct PoseCache {
     View<i64, 2> pose;   // (slots, 4) x, y [lattice units], heading, and how far the cameras are panned
     View<i64> last;      // (slots,) the last step with the pose; NEVER for an empty slot
-    View<i64> settled;   // (slots,) the last such step that is in SightRecord::last
+    View<i64> settled;   // (slots,) the last such step that is in CoverageRecord::last
     View<i32, 2> cells;  // (slots, patches) cells of each patch in view
     View<i64> used;      // (1,) number of used slots
 
@@ -25,38 +25,38 @@ struct PoseCache {
 };
 
 // What a robot has seen since the start. A patch is a room, or a part of one.
-struct SightRecord {
+struct CoverageRecord {
     View<i64, 2> first;    // (rows, columns) the first step at which each cell was in view, or NEVER
-    View<i64, 2> last;     // (rows, columns) the last such step as far as `settle` was called; empty: not kept
+    View<i64, 2> last;     // (rows, columns) the last such step as far as `settle_coverage` was called; empty: not kept
     View<i64> exposure;    // (patches,) cells of each patch in view, summed over the steps
     View<i64, 2> counted;  // (rows, columns) the last look that counted each cell; empty for a single camera
-    View<i64, 2> binned;   // (bins, patches) as `exposure`, by time: `watch` sets as many anew as its steps reach;
-                           // empty: not kept
-    View<i64, 2> most;     // (bins, patches) the most cells of each patch in view at a step, likewise
+    View<i64, 2> binned;   // (bins, patches) as `exposure`, by time: `record_coverage` sets as many anew as its steps
+                          // reach; empty: not kept
+    View<i64, 2> most;  // (bins, patches) the most cells of each patch in view at a step, likewise
 
     i64 patches() const { return exposure.size(); }
     bool keeps_last() const { return last.size() > 0; }
     bool keeps_bins() const { return binned.size() > 0; }
 };
 
-// The constants of a robot's watching.
-struct WatchSetup {
+// The constants of a robot's coverage.
+struct CoverageSetup {
     Mesh walls;
     Lenses lenses;                     // the robot's cameras
     View<const i16, 2> patch_of_cell;  // (rows, columns) -1 for a cell of no patch
     i64 step_us;                       // length of a step
     i64 every;                         // it looks at multiples of this step; each look counts for this many steps
-    i64 bin_steps;                     // steps of a bin of SightRecord::binned; bins begin at step 0
+    i64 bin_steps;                     // steps of a bin of CoverageRecord::binned; bins begin at step 0
 
     i64 cameras() const { return lenses.near_squared.size(); }
 };
 
 // Record what a robot, which is a body of a window, sees in the steps first to end - 1. The cache is emptied when it
-// is half full. `record.last` isn't updated for poses in the cache: see `settle`.
-void watch(const WatchSetup& setup, const Window& window, i64 body, i64 first, i64 end, const PoseCache& cache,
-           const SightRecord& record);
+// is half full. `record.last` isn't updated for poses in the cache: see `settle_coverage`.
+void record_coverage(const CoverageSetup& setup, const Window& window, i64 body, i64 first, i64 end,
+                     const PoseCache& cache, const CoverageRecord& record);
 
 // Update `seen`, the last step of each cell, for the poses in the cache.
-void settle(const WatchSetup& setup, const PoseCache& cache, View<i64, 2> seen);
+void settle_coverage(const CoverageSetup& setup, const PoseCache& cache, View<i64, 2> seen);
 
 }  // namespace fleet2d

@@ -1,7 +1,7 @@
 """The slow, obvious twin of the seen area: every cell's centre is asked for by itself."""
 
 import numpy as np
-from tests.reference.sight import visible
+from tests.reference.line_of_sight import visible
 
 from fleet2d.kernels import I64, Bool
 

@@ -1,9 +1,9 @@
-#include "watch.hpp"
+#include "coverage.hpp"
 
 #include <algorithm>
 #include <stdexcept>
 
-#include "seen.hpp"
+#include "visible_cells.hpp"
 
 namespace fleet2d {
 namespace {
@@ -60,13 +60,13 @@ void count_cells(i64 patch, i64 count, View<i32> cells) {
 }
 
 // Finds the cells that a robot's cameras show.
-class Looker {
+class CameraCells {
 public:
-    explicit Looker(const WatchSetup& setup)
+    explicit CameraCells(const CoverageSetup& setup)
         : setup_(setup), finder_(setup.walls, setup.patch_of_cell.shape[0], setup.patch_of_cell.shape[1]) {}
 
     // The cells that one camera shows from a pose of the robot; valid until the next call.
-    const std::vector<Span>& look(i64 camera, View<const i64> pose, i64 step) {
+    const std::vector<Span>& of(i64 camera, View<const i64> pose, i64 step) {
         const Lenses& lenses = setup_.lenses;
         const auto clamped = [](i64 coordinate) { return std::clamp(coordinate, -FAR_AWAY, FAR_AWAY); };
         const Pose robot{clamped(pose[0]), clamped(pose[1]), pose[2] & (TURN - 1)};
@@ -76,18 +76,18 @@ public:
     }
 
 private:
-    const WatchSetup& setup_;
+    const CoverageSetup& setup_;
     CellFinder finder_;
 };
 
-void settle(const WatchSetup& setup, const PoseCache& cache, View<i64, 2> seen, Looker& looker) {
+void settle_coverage(const CoverageSetup& setup, const PoseCache& cache, View<i64, 2> seen, CameraCells& cells) {
     for (i64 slot = 0; slot < cache.slots(); ++slot) {
         const i64 step = cache.last[slot];
         if (step == cache.settled[slot]) continue;
         if (step < 0 || step > LAST_MOMENT / setup.step_us) throw std::invalid_argument("last must hold steps, or -1");
         cache.settled[slot] = step;
         for (i64 camera = 0; camera < setup.cameras(); ++camera) {
-            for (const Span& span : looker.look(camera, cache.pose[slot], step)) {
+            for (const Span& span : cells.of(camera, cache.pose[slot], step)) {
                 for (i64& last : cells_of(seen, span)) last = std::max(last, step);
             }
         }
@@ -95,12 +95,12 @@ void settle(const WatchSetup& setup, const PoseCache& cache, View<i64, 2> seen, 
 }
 
 // Processes runs of equal pose one after the other. It holds the present pose until the next one.
-class Watcher {
+class CoverageRecorder {
 public:
-    Watcher(const WatchSetup& setup, const PoseCache& cache, const SightRecord& record)
-        : setup_(setup), cache_(cache), record_(record), looker_(setup) {}
+    CoverageRecorder(const CoverageSetup& setup, const PoseCache& cache, const CoverageRecord& record)
+        : setup_(setup), cache_(cache), record_(record), cells_(setup) {}
 
-    void watch(const Window& window, i64 body, i64 first, i64 end);
+    void record(const Window& window, i64 body, i64 first, i64 end);
 
 private:
     // Hold another pose.
@@ -110,16 +110,16 @@ private:
     void look_from(i64 slot, i64 step);
     void mark(const Span& span, i64 step, View<i32> cells);
 
-    // Add the view of the held pose for the looks not added yet; `bin` is a row of SightRecord::binned.
+    // Add the view of the held pose for the looks not added yet; `bin` is a row of CoverageRecord::binned.
     void add_held(i64 bin);
 
     // Set the bins before `bin` that nothing was added to.
     void leave_empty(i64 bin);
 
-    const WatchSetup& setup_;
+    const CoverageSetup& setup_;
     const PoseCache& cache_;
-    const SightRecord& record_;
-    Looker looker_;
+    const CoverageRecord& record_;
+    CameraCells cells_;
     Stance held_{};
     i64 slot_ = -1;  // of the held pose; -1 for none
     i64 looks_ = 0;  // that aren't added yet
@@ -127,9 +127,9 @@ private:
     i64 begun_ = 0;  // bins that are set
 };
 
-void Watcher::take(const Stance& stance, i64 step) {
+void CoverageRecorder::take(const Stance& stance, i64 step) {
     if (2 * cache_.used[0] >= cache_.slots()) {
-        if (record_.keeps_last()) settle(setup_, cache_, record_.last, looker_);
+        if (record_.keeps_last()) settle_coverage(setup_, cache_, record_.last, cells_);
         std::fill(cache_.last.begin(), cache_.last.end(), NEVER);
         std::fill(cache_.settled.begin(), cache_.settled.end(), NEVER);
         cache_.used[0] = 0;
@@ -144,15 +144,15 @@ void Watcher::take(const Stance& stance, i64 step) {
     ++cache_.used[0];
 }
 
-void Watcher::look_from(i64 slot, i64 step) {
+void CoverageRecorder::look_from(i64 slot, i64 step) {
     const View<i32> cells = cache_.cells[slot];
     std::fill(cells.begin(), cells.end(), 0);
     for (i64 camera = 0; camera < setup_.cameras(); ++camera) {
-        for (const Span& span : looker_.look(camera, cache_.pose[slot], step)) mark(span, step, cells);
+        for (const Span& span : cells_.of(camera, cache_.pose[slot], step)) mark(span, step, cells);
     }
 }
 
-void Watcher::mark(const Span& span, i64 step, View<i32> cells) {
+void CoverageRecorder::mark(const Span& span, i64 step, View<i32> cells) {
     for (i64& first : cells_of(record_.first, span)) first = first == NEVER ? step : first;
     if (record_.keeps_last()) std::ranges::fill(cells_of(record_.last, span), step);
     const View<const i16> patches = cells_of(setup_.patch_of_cell, span);
@@ -171,7 +171,7 @@ void Watcher::mark(const Span& span, i64 step, View<i32> cells) {
     }
 }
 
-void Watcher::add_held(i64 bin) {
+void CoverageRecorder::add_held(i64 bin) {
     if (slot_ < 0) return;
     cache_.last[slot_] = last_look_;
     const i64 steps = looks_ * setup_.every, patches = record_.patches();
@@ -197,14 +197,14 @@ void Watcher::add_held(i64 bin) {
     for (i64 patch = 0; patch < patches; ++patch) most[patch] = std::max(most[patch], i64{cells[patch]});
 }
 
-void Watcher::leave_empty(i64 bin) {
+void CoverageRecorder::leave_empty(i64 bin) {
     for (; begun_ < bin; ++begun_) {
         std::ranges::fill(record_.binned[begun_], 0);
         std::ranges::fill(record_.most[begun_], 0);
     }
 }
 
-void Watcher::watch(const Window& window, i64 body, i64 first, i64 end) {
+void CoverageRecorder::record(const Window& window, i64 body, i64 first, i64 end) {
     const i64 every = setup_.every, bin_steps = setup_.bin_steps;
     const bool bins = record_.keeps_bins();
     const bool pans = std::any_of(setup_.lenses.pan_count.begin(), setup_.lenses.pan_count.end(),
@@ -251,14 +251,14 @@ void Watcher::watch(const Window& window, i64 body, i64 first, i64 end) {
 
 }  // namespace
 
-void watch(const WatchSetup& setup, const Window& window, i64 body, i64 first, i64 end, const PoseCache& cache,
-           const SightRecord& record) {
-    Watcher(setup, cache, record).watch(window, body, first, end);
+void record_coverage(const CoverageSetup& setup, const Window& window, i64 body, i64 first, i64 end,
+                     const PoseCache& cache, const CoverageRecord& record) {
+    CoverageRecorder(setup, cache, record).record(window, body, first, end);
 }
 
-void settle(const WatchSetup& setup, const PoseCache& cache, View<i64, 2> seen) {
-    Looker looker(setup);
-    settle(setup, cache, seen, looker);
+void settle_coverage(const CoverageSetup& setup, const PoseCache& cache, View<i64, 2> seen) {
+    CameraCells cells(setup);
+    settle_coverage(setup, cache, seen, cells);
 }
 
 }  // namespace fleet2d

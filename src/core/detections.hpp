@@ -47,7 +47,7 @@ struct IdentityEvent {
 };
 
 // The settings that all cameras of a robot share.
-struct LookRule {
+struct DetectionRule {
     i64 patience;    // steps without a sighting after which an identity counts as lost
     i64 step_us;     // length of a step
     i64 start_us;    // time of day at step 0
@@ -62,7 +62,7 @@ struct Onlooker {
     i64 first_other;  // the first of the others, as many as the lenses' users
 };
 
-struct LookResult {
+struct DetectionResult {
     i64 steps;  // done, the one that stopped it included
     std::vector<Sighting> sightings;
     std::vector<IdentityEvent> events;  // in order of (step, identity)
@@ -76,8 +76,8 @@ struct LookResult {
 //
 // `shown` holds (cameras, users, steps) the points in view, bit i for number i, where another method decides that;
 // else it is empty. `radii` are those of all bodies of the window, where they hide each other; else it is empty.
-LookResult look(const Mesh& walls, const Lenses& lenses, const ErrorTables& errors, const LookRule& rule,
-                const Window& window, Onlooker onlooker, const SightMemory& memory, View<const u64, 3> shown,
-                View<const i64> radii);
+DetectionResult detect(const Mesh& walls, const Lenses& lenses, const ErrorTables& errors, const DetectionRule& rule,
+                       const Window& window, Onlooker onlooker, const SightMemory& memory, View<const u64, 3> shown,
+                       View<const i64> radii);
 
 }  // namespace fleet2d

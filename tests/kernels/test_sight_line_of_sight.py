@@ -18,7 +18,7 @@ from tests.homes import (
     transformed,
     turns,
 )
-from tests.reference.sight import vertices_seen, visible, visible_exactly
+from tests.reference.line_of_sight import vertices_seen, visible, visible_exactly
 from tests.strategies import homes, quick, seeds
 
 from fleet2d.kernels import I64, Bool

@@ -1,10 +1,10 @@
-#include "../watch.hpp"
+#include "../coverage.hpp"
 
 #include "lens.hpp"
 #include "mesh.hpp"
-#include "seen.hpp"
 #include "subjects.hpp"
 #include "timelines.hpp"
+#include "visible_cells.hpp"
 
 namespace fleet2d {
 
@@ -16,24 +16,26 @@ struct border::Fields<PoseCache> {
 };
 
 template <>
-struct border::Fields<SightRecord> {
+struct border::Fields<CoverageRecord> {
     static constexpr auto name = nb::detail::const_name("tuple[typing.Any, ...]");
-    static constexpr auto members = std::tuple(&SightRecord::first, &SightRecord::last, &SightRecord::exposure,
-                                               &SightRecord::counted, &SightRecord::binned, &SightRecord::most);
+    static constexpr auto members =
+        std::tuple(&CoverageRecord::first, &CoverageRecord::last, &CoverageRecord::exposure, &CoverageRecord::counted,
+                   &CoverageRecord::binned, &CoverageRecord::most);
 };
 
 template <>
-struct border::Fields<WatchSetup> {
+struct border::Fields<CoverageSetup> {
     static constexpr auto name = nb::detail::const_name("tuple[typing.Any, ...]");
-    static constexpr auto members = std::tuple(&WatchSetup::walls, &WatchSetup::lenses, &WatchSetup::patch_of_cell,
-                                               &WatchSetup::step_us, &WatchSetup::every, &WatchSetup::bin_steps);
+    static constexpr auto members =
+        std::tuple(&CoverageSetup::walls, &CoverageSetup::lenses, &CoverageSetup::patch_of_cell,
+                   &CoverageSetup::step_us, &CoverageSetup::every, &CoverageSetup::bin_steps);
 };
 
 namespace {
 
 constexpr i64 LONGEST = i64{1} << 40;  // every, bin_steps: steps
 
-void check_watched(const WatchSetup& setup) {
+void check_watched(const CoverageSetup& setup) {
     check_lenses(setup.lenses);
     for (i64 camera = 0; camera < setup.cameras(); ++camera) {
         check_reach(
@@ -53,9 +55,9 @@ void check_glances(const PoseCache& cache) {
     require(0 <= cache.used[0] && cache.used[0] <= slots, "used must be the number of slots that are");
 }
 
-bool is_grid(View<i64, 2> cells, const WatchSetup& setup) { return cells.shape == setup.patch_of_cell.shape; }
+bool is_grid(View<i64, 2> cells, const CoverageSetup& setup) { return cells.shape == setup.patch_of_cell.shape; }
 
-void check_record(const WatchSetup& setup, const SightRecord& record) {
+void check_record(const CoverageSetup& setup, const CoverageRecord& record) {
     require(is_grid(record.first, setup) && (!record.keeps_last() || is_grid(record.last, setup)) &&
                 (setup.cameras() <= 1 || is_grid(record.counted, setup)),
             "first, last and counted must be as large as patch_of_cell");
@@ -64,8 +66,8 @@ void check_record(const WatchSetup& setup, const SightRecord& record) {
             "binned and most must both be (bins, patches)");
 }
 
-void check_steps(const WatchSetup& setup, const Window& window, i64 body, i64 first, i64 end,
-                 const SightRecord& record) {
+void check_steps(const CoverageSetup& setup, const Window& window, i64 body, i64 first, i64 end,
+                 const CoverageRecord& record) {
     require(0 <= body && body < window.bodies(), "there is no such body");
     require(window.first <= first && first <= end && end <= window.end, "the steps must lie within the window");
     require(all_in_range(window.x, -LONGEST, LONGEST) && all_in_range(window.y, -LONGEST, LONGEST),
@@ -78,44 +80,44 @@ void check_steps(const WatchSetup& setup, const Window& window, i64 body, i64 fi
 
 }  // namespace
 
-void bind_watch(nb::module_& m) {
+void bind_coverage(nb::module_& m) {
     m.attr("NEVER") = NEVER;
     m.def(
-        "watch",
-        [](const WatchSetup& setup, const Window& window, i64 body, i64 first, i64 end, const PoseCache& cache,
-           const SightRecord& record) {
+        "record_coverage",
+        [](const CoverageSetup& setup, const Window& window, i64 body, i64 first, i64 end, const PoseCache& cache,
+           const CoverageRecord& record) {
             check_watched(setup);
             check_glances(cache);
             check_record(setup, record);
             require(cache.cells.shape[1] == record.patches(), "cells must be (slots, patches)");
             check_steps(setup, window, body, first, end, record);
-            watch(setup, window, body, first, end, cache, record);
+            record_coverage(setup, window, body, first, end, cache, record);
         },
         "setup"_a, "window"_a, "body"_a, "first"_a, "end"_a, "cache"_a, "record"_a, Unlocked(),
         R"(Record what a robot sees in the steps from `first` to `end` - 1.
 
 Args:
-    setup: Its cameras and the home, a `WatchSetup`.
+    setup: Its cameras and the home, a `CoverageSetup`.
     window: The motion of the bodies.
     body: Number of the robot among the bodies.
     first: The first step.
     end: One past the last step.
     cache: The cached poses; emptied when the table is half full.
-    record: What it has seen; `last` isn't updated for poses in the cache: see `settle`.)");
+    record: What it has seen; `last` isn't updated for poses in the cache: see `settle_coverage`.)");
     m.def(
-        "settle",
-        [](const WatchSetup& setup, const PoseCache& cache, View<i64, 2> seen) {
+        "settle_coverage",
+        [](const CoverageSetup& setup, const PoseCache& cache, View<i64, 2> seen) {
             check_watched(setup);
             check_glances(cache);
             require(all_in_range<i64>(cache.last, NEVER, LATEST / setup.step_us), "last must hold steps, or -1");
             require(is_grid(seen, setup), "seen must be as large as patch_of_cell");
-            settle(setup, cache, seen);
+            settle_coverage(setup, cache, seen);
         },
         "setup"_a, "cache"_a, "seen"_a, Unlocked(),
         R"(Update the last step of each cell for the poses in the cache.
 
 Args:
-    setup: Its cameras and the home, a `WatchSetup`.
+    setup: Its cameras and the home, a `CoverageSetup`.
     cache: The cached poses.
     seen: Out: int64 (rows, columns), the last step at which each cell was in view, -1 for never.)");
 }

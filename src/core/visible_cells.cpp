@@ -1,4 +1,4 @@
-#include "seen.hpp"
+#include "visible_cells.hpp"
 
 #include <algorithm>
 #include <cmath>
