@@ -7,7 +7,6 @@
 namespace fleet2d {
 namespace {
 
-constexpr i64 NO_GAP = 300;  // a shorter gap is not filled: the next doing begins at once
 constexpr i64 MILLION = 1'000'000;
 constexpr int ORDERS = 5;  // drawn before a job is left out
 constexpr i64 ANY = std::numeric_limits<i64>::max();
@@ -131,7 +130,7 @@ private:
             now = end;
         }
         i64 bed = std::min(std::max(now, order.preferred.back()), order.latest.back());
-        if (bed - now < NO_GAP && now >= plan_.sleep.shortest) bed = now;
+        if (bed - now < NO_GAP_S && now >= plan_.sleep.shortest) bed = now;
         fill(now, bed);
         day.push_back({plan_.asleep, bed, next_wake_, -1});
     }
@@ -139,7 +138,7 @@ private:
     // When a job begins: at the preferred time, or `now` if that is a little earlier.
     static i64 next_begin(const Job& own, i64 now, i64 preferred) {
         const i64 begin = std::max(now, preferred);
-        return begin - now < NO_GAP && (!own.starts || own.starts->shortest <= now) ? now : begin;
+        return begin - now < NO_GAP_S && (!own.starts || own.starts->shortest <= now) ? now : begin;
     }
 
     // Fill a time with pastimes, and with rest where no pastime fits.
@@ -156,7 +155,7 @@ private:
                 weights += each.weight;
             }
             if (options.empty()) {
-                const i64 over = std::min(end, begin + NO_GAP);
+                const i64 over = std::min(end, begin + NO_GAP_S);
                 if (last == plan_.rest && day.back().job < 0) {
                     day.back().end = over;
                 } else {
@@ -170,7 +169,7 @@ private:
             for (; left >= options[i]->weight; ++i) left -= options[i]->weight;
             const Pastime& own = *options[i];
             i64 over = begin + own.takes.draw(draws_, end - begin);
-            if (end - over < NO_GAP && end - begin <= own.takes.longest) over = end;
+            if (end - over < NO_GAP_S && end - begin <= own.takes.longest) over = end;
             day.push_back({own.activity, begin, over, -1});
             begin = over;
         }

@@ -11,6 +11,8 @@
 
 namespace fleet2d {
 
+inline constexpr i64 NO_GAP_S = 300;  // a shorter gap is not filled: the next doing begins at once
+
 // A distribution over whole seconds: quantiles at evenly spaced probabilities, between bounds.
 struct Distribution {
     static constexpr int BITS = 24;  // of the fraction in a position among the knots

@@ -50,10 +50,10 @@ void Resident::live(const std::vector<Stint>& stints, u64 key, i64 until, bool c
 }
 
 bool Resident::do_stint(const Stint& stint, u64 key, i64 began, bool continues, LastStint& last) {
-    const Scene& scene = *stint.scene;
-    if (scene.rooms.empty() && !scene.away) {
+    const Venue& venue = *stint.venue;
+    if (venue.rooms.empty() && !venue.away) {
         if (course_.now.time <= began) {
-            course_.note(Happening::WAY_BLOCKED, scene.activity);
+            course_.note(Happening::WAY_BLOCKED, venue.activity);
             course_.stay_until(stint.end);
         }
         return false;
@@ -63,66 +63,66 @@ bool Resident::do_stint(const Stint& stint, u64 key, i64 began, bool continues, 
     if (!is_continued) {
         last.place.reset();
         if (stint.role == Role::PLANNED) last.base.reset();
-        if (scene.away) {
+        if (venue.away) {
             leave_home();
         } else if (!stint.stays) {
             if (stint.role == Role::RESUMES && last.base) {
                 last.place = last.base;
-                settle(scene, *last.base);
+                settle(venue, *last.base);
             } else {
-                last.place = go(scene, draws);
+                last.place = go(venue, draws);
             }
             if (stint.role == Role::PLANNED) last.base = last.place;
         }
-        course_.note(Happening::ACTIVITY, scene.activity);
+        course_.note(Happening::ACTIVITY, venue.activity);
     }
-    if (last.place && !scene.moves.empty()) last.place = move_about(scene, *last.place, stint.end, draws);
+    if (last.place && !venue.moves.empty()) last.place = move_about(venue, *last.place, stint.end, draws);
     last.number = stint.number;
     course_.stay_until(stint.end);
     return true;
 }
 
-Place Resident::go(const Scene& scene, StepDraws& draws) {
-    if (scene.choose == Choice::HERE) return stay_in_room(scene, draws);
-    const std::vector<i64>* seats = &scene.seats;
+Place Resident::go(const Venue& venue, StepDraws& draws) {
+    if (venue.choose == RoomPolicy::HERE) return stay_in_room(venue, draws);
+    const std::vector<i64>* seats = &venue.seats;
     std::vector<i64> nearest;
-    if (scene.choose == Choice::NEAREST && scene.rooms.size() > 1) {
-        nearest.push_back(home_.nearest(scene, {course_.now.x, course_.now.y}));
-        seats = &home_.seats(scene, nearest[0]);
+    if (venue.choose == RoomPolicy::NEAREST && venue.rooms.size() > 1) {
+        nearest.push_back(home_.nearest(venue, {course_.now.x, course_.now.y}));
+        seats = &home_.seats(venue, nearest[0]);
     }
-    const i64 room = chosen(nearest.empty() ? scene.rooms : nearest, draws);
-    if (scene.choose == Choice::EACH_TIME) seats = &home_.seats(scene, room);
+    const i64 room = chosen(nearest.empty() ? venue.rooms : nearest, draws);
+    if (venue.choose == RoomPolicy::EACH_TIME) seats = &home_.seats(venue, room);
     const Place place = seats->empty() ? Place{-1, chosen(home_.spots(room), draws)} : Place{chosen(*seats, draws), {}};
-    settle(scene, place);
+    settle(venue, place);
     return place;
 }
 
 // Use the furniture of the room, or else stay on the spot.
-Place Resident::stay_in_room(const Scene& scene, StepDraws& draws) {
+Place Resident::stay_in_room(const Venue& venue, StepDraws& draws) {
     course_.come_home();
     const Point at{course_.now.x, course_.now.y};
     const i64 room = home_.room_at(at);
     Place place{-1, at};
     if (room >= 0) {
-        const std::vector<i64>& seats = home_.seats(scene, room);
+        const std::vector<i64>& seats = home_.seats(venue, room);
         if (!seats.empty()) place.seat = chosen(seats, draws);
     }
-    settle(scene, place);
+    settle(venue, place);
     return place;
 }
 
 // Turn, move and fetch things until the stint is nearly over; returns the place at the end.
-Place Resident::move_about(const Scene& scene, Place place, i64 end, StepDraws& draws) {
+Place Resident::move_about(const Venue& venue, Place place, i64 end, StepDraws& draws) {
     Moment& now = course_.now;
     Bits bits;
     std::vector<i64> next;
-    for (const auto& [kind, waits] : scene.moves) next.push_back(now.time + waits->draw(draws, bits));
+    for (const auto& [kind, waits] : venue.moves) next.push_back(now.time + waits->draw(draws, bits));
     i64 facing = now.heading;
     end -= NEARLY_OVER;
     while (true) {
         const auto due = std::min_element(next.begin(), next.end());
         if (*due >= end) return place;
-        const auto& [kind, waits] = scene.moves[static_cast<std::size_t>(due - next.begin())];
+        const auto& [kind, waits] = venue.moves[static_cast<std::size_t>(due - next.begin())];
         if (kind == MoveKind::SHIFTS) {  // the first of the moves, also of those due at once
             i64 until = end;
             for (std::size_t i = 1; i < next.size(); ++i) until = std::min(until, next[i] + 1);
@@ -132,9 +132,9 @@ Place Resident::move_about(const Scene& scene, Place place, i64 end, StepDraws& 
         }
         course_.stay_until(*due);
         if (kind == MoveKind::MOVES) {
-            place = go_elsewhere(scene, place, draws);
+            place = go_elsewhere(venue, place, draws);
         } else {
-            fetch(scene, place, end, draws);
+            fetch(venue, place, end, draws);
         }
         facing = now.heading;
         *due = now.time + waits->draw(draws, bits);
@@ -142,18 +142,18 @@ Place Resident::move_about(const Scene& scene, Place place, i64 end, StepDraws& 
 }
 
 // Go from the furniture to a spot in the room, or from a spot to the furniture or another.
-Place Resident::go_elsewhere(const Scene& scene, const Place& place, StepDraws& draws) {
-    if (!scene.seats.empty() && place.seat < 0) return go(scene, draws);
-    const Place spot{-1, chosen(home_.spots(chosen(scene.rooms, draws)), draws)};
+Place Resident::go_elsewhere(const Venue& venue, const Place& place, StepDraws& draws) {
+    if (!venue.seats.empty() && place.seat < 0) return go(venue, draws);
+    const Place spot{-1, chosen(home_.spots(chosen(venue.rooms, draws)), draws)};
     walk(spot);
     return spot;
 }
 
 // Go to another room, stay there shortly, and come back, if there is time for it.
-void Resident::fetch(const Scene& scene, const Place& place, i64 end, StepDraws& draws) {
-    if (scene.stores.empty() || !scene.fetch_takes) return;
-    const i64 takes = scene.fetch_takes->draw(draws, ANY) * SECOND;
-    const i64 room = chosen(scene.stores, draws);
+void Resident::fetch(const Venue& venue, const Place& place, i64 end, StepDraws& draws) {
+    if (venue.stores.empty() || !venue.fetch_takes) return;
+    const i64 takes = venue.fetch_takes->draw(draws, ANY) * SECOND;
+    const i64 room = chosen(venue.stores, draws);
     const Point spot = chosen(home_.spots(room), draws);
     const std::optional<i64> wait = home_.wait(room, course_.now.time, takes);
     if (!wait || course_.now.time + *wait + takes >= end) return;
@@ -161,7 +161,7 @@ void Resident::fetch(const Scene& scene, const Place& place, i64 end, StepDraws&
     walk({-1, spot});
     course_.now.time += takes;
     course_.legs.mark(course_.now);
-    settle(scene, place);
+    settle(venue, place);
 }
 
 void Resident::leave_home() {
@@ -174,9 +174,9 @@ void Resident::leave_home() {
 }
 
 // Go to a place, and take the activity's posture, or else that of the furniture.
-void Resident::settle(const Scene& scene, const Place& place) {
+void Resident::settle(const Venue& venue, const Place& place) {
     walk(place);
-    if (scene.posture != STANDING) course_.take(scene.posture);
+    if (venue.posture != STANDING) course_.take(venue.posture);
 }
 
 void Resident::walk(const Place& place) {

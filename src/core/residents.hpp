@@ -31,7 +31,7 @@ struct Seat {
 };
 
 // How a room is chosen among several: always the same, the nearest one, any each time, the one where somebody is.
-enum class Choice : i64 { OWN, NEAREST, EACH_TIME, HERE };
+enum class RoomPolicy : i64 { OWN, NEAREST, EACH_TIME, HERE };
 
 // What somebody does now and then within an activity.
 enum class MoveKind : i64 { SHIFTS, MOVES, FETCHES };
@@ -40,21 +40,22 @@ enum class MoveKind : i64 { SHIFTS, MOVES, FETCHES };
 using SmallMove = std::pair<MoveKind, std::shared_ptr<Waits>>;
 
 // Where and how somebody does an activity.
-struct Scene {
+struct Venue {
     i64 activity;
     bool away;
-    Choice choose;
+    RoomPolicy choose;
     i64 posture;
     std::vector<i64> rooms;
-    std::vector<i64> seats;          // none: anywhere in the rooms
-    std::vector<i64> stores;         // the rooms from which things are fetched
-    std::vector<SmallMove> moves;    // turns on the spot come first
-    std::optional<Distribution> fetch_takes;  // how long somebody is away to fetch something [s]; none: nothing is fetched
+    std::vector<i64> seats;        // none: anywhere in the rooms
+    std::vector<i64> stores;       // the rooms from which things are fetched
+    std::vector<SmallMove> moves;  // turns on the spot come first
+    std::optional<Distribution>
+        fetch_takes;  // how long somebody is away to fetch something [s]; none: nothing is fetched
 };
 
 // A time in which an activity is done.
 struct Stint {
-    const Scene* scene;
+    const Venue* venue;
     i64 number;  // the address of its draws
     i64 end;     // us
     Role role;
@@ -99,10 +100,10 @@ public:
     // Points to stand on in a room, one or more.
     virtual const std::vector<Point>& spots(i64 room) = 0;
     // The places at furniture in a room for an activity.
-    virtual const std::vector<i64>& seats(const Scene& scene, i64 room) = 0;
+    virtual const std::vector<i64>& seats(const Venue& venue, i64 room) = 0;
     virtual const Seat& seat(i64 number) = 0;
     // The room for an activity that is nearest to a point.
-    virtual i64 nearest(const Scene& scene, Point at) = 0;
+    virtual i64 nearest(const Venue& venue, Point at) = 0;
     // The room that holds a point; -1: none.
     virtual i64 room_at(Point at) = 0;
     // How long to wait before a room may be used for a time [us]; none: not now.
@@ -128,15 +129,15 @@ public:
     void live(const std::vector<Stint>& stints, u64 key, i64 until, bool continues, LastStint& last);
 
     // Go to where an activity is done, and take its posture.
-    Place go(const Scene& scene, StepDraws& draws);
+    Place go(const Venue& venue, StepDraws& draws);
 
 private:
     bool do_stint(const Stint& stint, u64 key, i64 began, bool continues, LastStint& last);
-    Place move_about(const Scene& scene, Place place, i64 end, StepDraws& draws);
-    Place go_elsewhere(const Scene& scene, const Place& place, StepDraws& draws);
-    void fetch(const Scene& scene, const Place& place, i64 end, StepDraws& draws);
-    Place stay_in_room(const Scene& scene, StepDraws& draws);
-    void settle(const Scene& scene, const Place& place);
+    Place move_about(const Venue& venue, Place place, i64 end, StepDraws& draws);
+    Place go_elsewhere(const Venue& venue, const Place& place, StepDraws& draws);
+    void fetch(const Venue& venue, const Place& place, i64 end, StepDraws& draws);
+    Place stay_in_room(const Venue& venue, StepDraws& draws);
+    void settle(const Venue& venue, const Place& place);
     void walk(const Place& place);
     bool walk_route(Point to);
     void leave_home();

@@ -27,8 +27,8 @@ public:
         spans.insert(std::upper_bound(spans.begin(), spans.end(), span), span);
     }
 
-    // The first time from `begin` to `latest` from which one of the rooms is free for `shortest` seconds. It lasts until
-    // the next use of the room, or until `end_by`. Of rooms that are free at once, the first.
+    // The first time from `begin` to `latest` from which one of the rooms is free for `shortest` seconds. It lasts
+    // until the next use of the room, or until `end_by`. Of rooms that are free at once, the first.
     std::optional<FreeSlot> free(const std::vector<i64>& rooms, i64 begin, i64 latest, i64 shortest, i64 end_by) const {
         std::optional<FreeSlot> best;
         for (const i64 room : rooms) {

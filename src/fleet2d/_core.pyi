@@ -1442,6 +1442,25 @@ def earth_mover(start: numpy.typing.NDArray[numpy.float64], end: numpy.typing.ND
         float64 (n,).
     """
 
+CHANCE_BITS: int = 10
+
+QUANTILE_BITS: int = 8
+
+class Role(enum.Enum):
+    """What a part of a day is."""
+
+    PLANNED = 0
+    """As planned."""
+
+    INTERRUPTS = 1
+    """An interruption."""
+
+    RESUMES = 2
+    """What goes on after one."""
+
+    FINISHES = 3
+    """An interruption as the end of what it interrupts."""
+
 class Interruptions:
     """
     Needs and errands of a person, as numbers: times in seconds, chances of 1024.
@@ -1476,6 +1495,10 @@ class Interruptions:
     def __getstate__(self) -> tuple[list[tuple[list[tuple[int, int, list[int]]], list[int], list[int] | None, tuple[int, int, int, int], int, tuple[int, int] | None, list[int]]], list[tuple[tuple[int, int, list[int]], list[int] | None, list[int] | None]], list[int], list[int], int, int]: ...
 
     def __setstate__(self, arg: tuple[Sequence[tuple[Sequence[tuple[int, int, Sequence[int]]], Sequence[int], Sequence[int] | None, tuple[int, int, int, int], int, tuple[int, int] | None, Sequence[int]]], Sequence[tuple[tuple[int, int, Sequence[int]], Sequence[int] | None, Sequence[int] | None]], Sequence[int], Sequence[int], int, int], /) -> None: ...
+
+ANY_ROOM: int = -1
+
+NO_GAP_S: int = 300
 
 class RoomUse:
     """
@@ -1554,6 +1577,53 @@ class DayPlanner:
 
     def __setstate__(self, arg: tuple[tuple[Sequence[int], int, int, int, int], int, Sequence[tuple[int, tuple[Sequence[int], int, int, int, int] | None, tuple[Sequence[int], int, int, int, int], int, Sequence[int], int, bool, int]], Sequence[tuple[int, int, tuple[Sequence[int], int, int, int, int], int, int]], int, int], /) -> None: ...
 
+class RoomPolicy(enum.Enum):
+    """How a room is chosen among several."""
+
+    OWN = 0
+    """The same each time."""
+
+    NEAREST = 1
+    """The nearest one."""
+
+    EACH_TIME = 2
+    """Any, drawn each time."""
+
+    HERE = 3
+    """The one where somebody is."""
+
+class MoveKind(enum.Enum):
+    """
+    What somebody does now and then within an activity; of several due, the first.
+    """
+
+    SHIFTS = 0
+    """Turns on the spot."""
+
+    MOVES = 1
+    """Goes to another spot of the room, or to the furniture."""
+
+    FETCHES = 2
+    """Goes to another room, and comes back."""
+
+class Happening(enum.Enum):
+    """What happens on the way."""
+
+    ACTIVITY = 0
+    """An activity begins."""
+
+    WAY_BLOCKED = 1
+    """No way leads to it."""
+
+    USES = 2
+    """Furniture is used."""
+
+    LEFT_HOME = 3
+    """The home is left."""
+
+    CAME_HOME = 4
+    """The home is entered."""
+
 class Waits:
     """
     Times between two events.
@@ -1564,12 +1634,12 @@ class Waits:
 
     def __init__(self, quantiles: numpy.typing.NDArray[numpy.int64]) -> None: ...
 
-class Scene:
+class CoreVenue:
     """
     Where and how somebody does an activity.
 
     Args:
-        setting: What `seats` of the home is asked with.
+        asked_with: What `seats` and `nearest` of the home are asked with.
         activity: The number of the activity.
         away: Whether it is done out of the home.
         choose: How a room is chosen: 0 the same each time, 1 the nearest, 2 any, 3 the one where somebody is.
@@ -1581,7 +1651,7 @@ class Scene:
         fetch_takes: The distribution of how long somebody is away to fetch something [s]; None: nothing is fetched.
     """
 
-    def __init__(self, setting: object | None, activity: int, away: bool, choose: int, posture: int, rooms: Sequence[int], seats: Sequence[int], stores: Sequence[int], moves: Sequence[tuple[int, Waits]], fetch_takes: tuple[Sequence[int], int, int, int, int] | None) -> None: ...
+    def __init__(self, asked_with: object | None, activity: int, away: bool, choose: int, posture: int, rooms: Sequence[int], seats: Sequence[int], stores: Sequence[int], moves: Sequence[tuple[int, Waits]], fetch_takes: tuple[Sequence[int], int, int, int, int] | None) -> None: ...
 
 class LastStint:
     """What somebody did last, where, and what that interrupted."""
@@ -1606,19 +1676,19 @@ class Resident:
 
     def __init__(self, key: int | numpy.uint64, speed: float, turn_rate: float, routes: Routes | None, steps_off: Sequence[tuple[int, int, int, int]]) -> None: ...
 
-    def live(self, home: object, walk: object, legs: Legs, now: tuple[int, int, int, int, int], posture: int, stints: Sequence[tuple[Scene, int, int, int, bool]], until: int, continues: bool, last: LastStint) -> tuple[tuple[int, int, int, int, int], int, list[tuple[int, int]], list[tuple[int, int, int]]]:
+    def live(self, home: object, walk: object, legs: Legs, now: tuple[int, int, int, int, int], posture: int, stints: Sequence[tuple[CoreVenue, int, int, int, bool]], until: int, continues: bool, last: LastStint) -> tuple[tuple[int, int, int, int, int], int, list[tuple[int, int]], list[tuple[int, int, int]]]:
         """
         Do activities, one after the other, until the last one is over or one is blocked.
 
         Args:
-            home: What is asked about the home: spots(room), seats(setting, room), seat(number), nearest(setting, x, y),
+            home: What is asked about the home: spots(room), seats(asked_with, room), seat(number), nearest(asked_with, x, y),
                 room_at(x, y), wait(room, now, takes) and way_out().
             walk: Goes to a place where no route is known: from what this returns, and the place's number at furniture, or -1,
                 x and y, it returns the new end of the plan, and the posture.
             legs: Where breakpoints are added.
             now: The end of the plan: time [us], x, y [lattice], heading [1/4096 turn], away.
             posture: The posture then.
-            stints: Scene, address of draws, end [us], role, and whether it is done wherever somebody is, of each.
+            stints: Venue, address of draws, end [us], role, and whether it is done wherever somebody is, of each.
             until: After that, none begins [us].
             continues: Whether the first one may be a part of the last one.
             last: What was done last; it is updated.
@@ -1628,7 +1698,7 @@ class Resident:
             begins, 1 the way is blocked, 2 furniture is used, 3 the home is left, 4 or entered.
         """
 
-    def go(self, home: object, walk: object, legs: Legs, now: tuple[int, int, int, int, int], posture: int, scene: Scene, draws: StepDraws) -> tuple[tuple[int, int, int, int, int], int, list[tuple[int, int]], list[tuple[int, int, int]]]:
+    def go(self, home: object, walk: object, legs: Legs, now: tuple[int, int, int, int, int], posture: int, venue: CoreVenue, draws: StepDraws) -> tuple[tuple[int, int, int, int, int], int, list[tuple[int, int]], list[tuple[int, int, int]]]:
         """Go to where an activity is done, and take its posture; see `live`."""
 
 def encode_arrays(arrays: Sequence[numpy.typing.NDArray[Any]]) -> bytes:

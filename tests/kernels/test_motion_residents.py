@@ -13,9 +13,9 @@ from tests.thorough import examples
 
 import fleet2d
 from fleet2d.entities.plan import Plan
-from fleet2d.entities.users.resident import MOVE_KINDS, SECOND_US, KnownHome, Setting, SmallMove
+from fleet2d.entities.users.resident import MOVE_KINDS, SECOND_US, KnownHome, Venue
 from fleet2d.floorplan.objects import POSTURES
-from fleet2d.kernels.motion import LastStint, Legs, Resident, Scene, Waits
+from fleet2d.kernels.motion import CoreVenue, LastStint, Legs, Resident, Waits
 from fleet2d.routines.activity import Activity
 from fleet2d.routines.distributions import uniform
 
@@ -36,8 +36,8 @@ def person(home: str, body: str) -> tuple[Any, Any]:
 
 
 @st.composite
-def setting_of(draw: st.DrawFn, spots: Any, rooms: list[Any], kinds: list[str]) -> Setting:
-    """A setting with any rooms, furniture, moves and stores."""
+def venue_of(draw: st.DrawFn, spots: Any, rooms: list[Any], kinds: list[str]) -> Venue:
+    """A venue with any rooms, furniture, moves and stores."""
     own = draw(st.lists(st.sampled_from(rooms), max_size=3, unique=True))
     activity = Activity(
         away=draw(st.booleans()) and draw(st.booleans()),
@@ -46,14 +46,14 @@ def setting_of(draw: st.DrawFn, spots: Any, rooms: list[Any], kinds: list[str]) 
         objects=tuple(draw(st.lists(st.sampled_from(kinds), max_size=3)) if kinds else ()),
     )
     moves = [
-        SmallMove(kind, draw(st.sampled_from([1, 60, 900, 7200])))
+        (kind, draw(st.sampled_from([1, 60, 900, 7200])))
         for kind in MOVE_KINDS
         if draw(st.booleans()) and not activity.away
     ]
     seats = spots.at_furniture(activity.objects, own, activity.posture)
     stores = draw(st.lists(st.sampled_from(rooms), max_size=2))
     takes = draw(st.sampled_from([(0, 0), (1, 90), (600, 600), (9, 50_000)]))
-    return Setting(activity, own, list(seats), stores, tuple(moves), uniform(*takes))
+    return Venue(activity, own, list(seats), stores, tuple(moves), uniform(*takes))
 
 
 @settings(max_examples=examples(400), deadline=None)
@@ -64,7 +64,7 @@ def setting_of(draw: st.DrawFn, spots: Any, rooms: list[Any], kinds: list[str]) 
 def test_activities_equal_those_done_leg_by_leg(data: st.DataObject, who: tuple[str, str]) -> None:
     behavior, actor = person(*who)
     kinds = sorted({thing.type for thing in actor.home.objects if thing.uses})
-    any_setting = setting_of(behavior.spots, list(behavior.reachable_rooms), kinds)
+    any_venue = venue_of(behavior.spots, list(behavior.reachable_rooms), kinds)
     homes = KnownHome(behavior, actor), SlowHome(behavior, actor)
     plans = [Plan(actor, 0) for _ in homes]
     for _ in range(data.draw(st.integers(1, 3))):
@@ -73,13 +73,13 @@ def test_activities_equal_those_done_leg_by_leg(data: st.DataObject, who: tuple[
             end_us += data.draw(st.sampled_from([0, 1, 7, 100, 1800, 9000])) * SECOND_US
             number = data.draw(st.integers(0, 1))
             role, stays = data.draw(st.integers(0, 3)), data.draw(st.booleans())
-            scene = f"a{number}", data.draw(any_setting)
-            stints.append((scene, number, end_us, role, stays))
+            venue = f"a{number}", data.draw(any_venue)
+            stints.append((venue, number, end_us, role, stays))
         until_us = end_us - data.draw(st.sampled_from([0, 0, 3600])) * SECOND_US
         continues = data.draw(st.booleans())
         for plan, home in zip(plans, homes, strict=True):
             home.update()
-            rows = [(home.scene(*scene), *numbers) for scene, *numbers in stints]
+            rows = [(home.in_core(*venue), *numbers) for venue, *numbers in stints]
             home.live(plan, rows, until_us, continues=continues)
         one, other = ((vars(plan), plan.legs.rows().tolist()) for plan in plans)
         assert other[1] == one[1]
@@ -89,7 +89,7 @@ def test_activities_equal_those_done_leg_by_leg(data: st.DataObject, who: tuple[
 
 WAITS = Waits(np.array([5, 9]))
 LAW = ([1, 5], 1, 5, 0, 1 << 24)
-SCENE = (None, 0, False, 0, 0, [0], [], [1], [(1, WAITS)], LAW)
+VENUE = (None, 0, False, 0, 0, [0], [], [1], [(1, WAITS)], LAW)
 
 
 class Room:
@@ -105,13 +105,13 @@ class Room:
         return lambda *_: self.answers[name]
 
 
-def live(home: Any = None, scene: Scene | None = None, **changes: Any) -> Any:
+def live(home: Any = None, scene: CoreVenue | None = None, **changes: Any) -> Any:
     """Do an activity where no route is known."""
     stint = {"number": 0, "end": 1000, "role": 0, "stays": False} | changes
     now = changes.get("now", (0, 0, 0, 0, 0))
     walk = changes.get("walk", lambda course, place: ((course[0][0] + 7, *place[1:], 0, 0), 0))
     resident = Resident(1, 100.0, 100.0, None, [])
-    row = (scene or Scene(*SCENE), *(stint[n] for n in ("number", "end", "role", "stays")))
+    row = (scene or CoreVenue(*VENUE), *(stint[n] for n in ("number", "end", "role", "stays")))
     last = changes.get("last", LastStint())
     return resident.live(
         home or Room(), walk, Legs(), now, changes.get("posture", 0), [row], 1000, False, last
@@ -131,7 +131,7 @@ class Rooms(Room):
 
 
 def walks_of(
-    stints: list[tuple[Scene, int, int, int, bool]], **answers: Any
+    stints: list[tuple[CoreVenue, int, int, int, bool]], **answers: Any
 ) -> list[tuple[int, int]]:
     """Return the spots to which somebody walks, 7 us each, who does activities from 0 on."""
     spots = []
@@ -147,7 +147,7 @@ def walks_of(
 
 
 def test_who_was_interrupted_returns_to_where_the_planned_activity_was_done() -> None:
-    scenes = [Scene(None, 0, False, 0, 0, [room], [], [], [], None) for room in range(3)]
+    scenes = [CoreVenue(None, 0, False, 0, 0, [room], [], [], [], None) for room in range(3)]
     planned, interrupts, resumes = 0, 1, 2
     rows = [(scenes[0], 0, 100, planned), (scenes[1], 1, 200, interrupts)]
     rows += [(scenes[2], 2, 300, resumes)]
@@ -161,7 +161,7 @@ DUE_US = 7 + 10 * SECOND_US
 def test_no_move_begins_in_the_last_ninety_seconds() -> None:
     walks = {}
     for more_us in (0, 1):
-        moves = Scene(None, 0, False, 0, 0, [0, 1], [], [], [(1, EVERY_10_S)], None)
+        moves = CoreVenue(None, 0, False, 0, 0, [0, 1], [], [], [(1, EVERY_10_S)], None)
         end_us = DUE_US + 90 * SECOND_US + more_us
         walks[more_us] = [len(walks_of([(moves, number, end_us, 0, False)])) for number in range(9)]
     assert {1} == set(walks[0])
@@ -174,7 +174,7 @@ def test_nothing_is_fetched_without_time_to_wait_and_return(
     wait_us: int, more_us: int, walks: int
 ) -> None:
     takes_5_s = ([5, 5], 5, 5, 0, 1 << 24)
-    fetches = Scene(None, 0, False, 0, 0, [0], [], [1], [(2, EVERY_10_S)], takes_5_s)
+    fetches = CoreVenue(None, 0, False, 0, 0, [0], [], [1], [(2, EVERY_10_S)], takes_5_s)
     end_us = DUE_US + wait_us + 5 * SECOND_US + 90 * SECOND_US + more_us
     assert walks == len(walks_of([(fetches, 0, end_us, 0, False)], wait=wait_us))
 
@@ -194,7 +194,7 @@ def test_nothing_is_fetched_without_time_to_wait_and_return(
 )
 def test_wrong_scenes_are_refused(place: int, value: Any, message: str) -> None:
     with pytest.raises(ValueError, match=message):
-        Scene(*SCENE[:place], value, *SCENE[place + 1 :])
+        CoreVenue(*VENUE[:place], value, *VENUE[place + 1 :])
 
 
 @pytest.mark.parametrize("waits", [[], [0], [0, 0], [1, 2, 3], [-1, 5], [2**61]])

@@ -5,7 +5,7 @@ from datetime import timedelta
 from typing import Any
 
 from fleet2d.entities.plan import Plan
-from fleet2d.entities.users.resident import KnownHome, Setting
+from fleet2d.entities.users.resident import KnownHome, Venue
 from fleet2d.entities.users.spots import Seat, Spot
 from fleet2d.kernels.numbers import TURN, Bits, turn_between
 from fleet2d.routines.distributions import exponential
@@ -25,89 +25,89 @@ class SlowHome(KnownHome):
         self.place: AnyPlace | None = None
         self.base: AnyPlace | None = None
 
-    def scene(self, name: str, setting: Setting) -> Any:
-        return name, setting
+    def in_core(self, name: str, venue: Venue) -> Any:
+        return name, venue
 
     def live(self, plan: Plan, stints: Sequence[Any], until_us: int, *, continues: bool) -> None:
         began_us = plan.time_us
-        for (name, setting), number, end_us, role, stays in stints:
+        for (name, venue), number, end_us, role, stays in stints:
             if plan.time_us >= until_us:
                 return
             if plan.time_us >= end_us:
                 continue
-            if not setting.rooms and not setting.activity.away:
+            if not venue.rooms and not venue.activity.away:
                 if plan.time_us == began_us:
                     plan.note("way_blocked", name).stay_until(end_us)
                 return
             again = continues and number == self.number
             draws = Draws(self._person.key, number + 512 * again)
             if not again:
-                self.begin(plan, name, setting, role, stays, draws)
-            if self.place is not None and setting.small_moves:
-                self.place = self.move_about(plan, setting, self.place, end_us, draws)
+                self.begin(plan, name, venue, role, stays, draws)
+            if self.place is not None and venue.small_moves:
+                self.place = self.move_about(plan, venue, self.place, end_us, draws)
             self.number = number
             plan.stay_until(end_us)
 
     def begin(
-        self, plan: Plan, name: str, setting: Setting, role: int, stays: bool, draws: Draws
+        self, plan: Plan, name: str, venue: Venue, role: int, stays: bool, draws: Draws
     ) -> None:
         self.place = None
         if role == PLANNED:
             self.base = None
-        if setting.activity.away:
+        if venue.activity.away:
             plan.leave_home()
         elif not stays:
             if role == RESUMES and self.base is not None:
                 self.place = self.base
-                self.settle(plan, setting, self.base)
+                self.settle(plan, venue, self.base)
             else:
-                self.place = self.choose(plan, setting, draws)
+                self.place = self.choose(plan, venue, draws)
             if role == PLANNED:
                 self.base = self.place
         plan.note("activity", name)
 
-    def go(self, plan: Plan, activity: str, setting: Setting, draws: Draws) -> None:
-        self.choose(plan, setting, draws)
+    def go(self, plan: Plan, activity: str, venue: Venue, draws: Draws) -> None:
+        self.choose(plan, venue, draws)
 
-    def choose(self, plan: Plan, setting: Setting, draws: Draws) -> AnyPlace:
+    def choose(self, plan: Plan, venue: Venue, draws: Draws) -> AnyPlace:
         """Go to where an activity is done."""
-        kind, spots = setting.activity.choose, self._person.spots
-        rooms, seats = setting.rooms, setting.seats
+        kind, spots = venue.activity.choose, self._person.spots
+        rooms, seats = venue.rooms, venue.seats
         place: AnyPlace
         if kind == "here":
             plan.come_home()
             room = spots.room_at(plan.x, plan.y)
-            seats = [] if room is None else self.seats_in(setting, room)
+            seats = [] if room is None else self.seats_in(venue, room)
             place = draws.choice(seats) if seats else Spot(plan.x, plan.y)
         else:
             if kind == "nearest" and len(rooms) > 1:
                 rooms = [spots.nearest(rooms, plan.x, plan.y)]
-                seats = self.seats_in(setting, rooms[0])
+                seats = self.seats_in(venue, rooms[0])
             room = draws.choice(rooms)
             if kind == "each_time":
-                seats = self.seats_in(setting, room)
+                seats = self.seats_in(venue, room)
             place = draws.choice(seats or spots.in_room(room))
-        self.settle(plan, setting, place)
+        self.settle(plan, venue, place)
         return place
 
-    def seats_in(self, setting: Setting, room: Any) -> list[Seat]:
-        activity = setting.activity
+    def seats_in(self, venue: Venue, room: Any) -> list[Seat]:
+        activity = venue.activity
         return self._person.spots.at_furniture(activity.objects, (room,), activity.posture)
 
-    def settle(self, plan: Plan, setting: Setting, place: AnyPlace) -> None:
+    def settle(self, plan: Plan, venue: Venue, place: AnyPlace) -> None:
         if isinstance(place, Seat):
             plan.use(*place)
         else:
             place.walk(plan)
-        if setting.activity.posture != "stand":
-            plan.take(setting.activity.posture)
+        if venue.activity.posture != "stand":
+            plan.take(venue.activity.posture)
 
     def move_about(
-        self, plan: Plan, setting: Setting, place: AnyPlace, end_us: int, draws: Draws
+        self, plan: Plan, venue: Venue, place: AnyPlace, end_us: int, draws: Draws
     ) -> AnyPlace:
         """Turn, move and fetch things, each after times of its own."""
         bits, end_us, facing = Bits(draws), end_us - 90 * SECOND_US, plan.heading
-        means = {move.kind: move.mean_s for move in setting.small_moves}
+        means = dict(venue.small_moves)
 
         def wait(kind: str) -> int:
             return exponential(means[kind]).knots[bits.take(7)] * SECOND_US
@@ -125,27 +125,25 @@ class SlowHome(KnownHome):
                 continue
             plan.stay_until(due[kind])
             if kind == "fetches":
-                self.fetch(plan, setting, place, end_us, draws)
-            elif setting.seats and isinstance(place, Spot):
-                place = self.choose(plan, setting, draws)
+                self.fetch(plan, venue, place, end_us, draws)
+            elif venue.seats and isinstance(place, Spot):
+                place = self.choose(plan, venue, draws)
             else:
-                place = draws.choice(self._person.spots.in_room(draws.choice(setting.rooms)))
+                place = draws.choice(self._person.spots.in_room(draws.choice(venue.rooms)))
                 place.walk(plan)
             facing = plan.heading
             due[kind] = plan.time_us + wait(kind)
         return place
 
-    def fetch(
-        self, plan: Plan, setting: Setting, place: AnyPlace, end_us: int, draws: Draws
-    ) -> None:
-        if not setting.stores or setting.fetch_takes is None:
+    def fetch(self, plan: Plan, venue: Venue, place: AnyPlace, end_us: int, draws: Draws) -> None:
+        if not venue.stores or venue.fetch_takes is None:
             return
-        takes_us = setting.fetch_takes.draw(draws) * SECOND_US
-        room = draws.choice(setting.stores)
+        takes_us = venue.fetch_takes.draw(draws) * SECOND_US
+        room = draws.choice(venue.stores)
         spot = draws.choice(self._person.spots.in_room(room))
         wait_us = self.wait(room.index, plan.time_us, takes_us)
         if wait_us is not None and plan.time_us + wait_us + takes_us < end_us:
             plan.stay_until(plan.time_us + wait_us)
             spot.walk(plan)
             plan.stay(timedelta(microseconds=takes_us))
-            self.settle(plan, setting, place)
+            self.settle(plan, venue, place)

@@ -116,6 +116,15 @@ std::vector<PartRow> interrupted(const OwnedRules& self, StepDraws& draws, const
 }  // namespace
 
 void bind_interruptions(nb::module_& m) {
+    m.attr("CHANCE_BITS") = CHANCE_BITS;
+    m.attr("QUANTILE_BITS") = QUANTILE_BITS;
+
+    nb::enum_<Role>(m, "Role", "What a part of a day is.")
+        .value("PLANNED", Role::PLANNED, "As planned.")
+        .value("INTERRUPTS", Role::INTERRUPTS, "An interruption.")
+        .value("RESUMES", Role::RESUMES, "What goes on after one.")
+        .value("FINISHES", Role::FINISHES, "An interruption as the end of what it interrupts.");
+
     nb::class_<OwnedRules>(m, "Interruptions",
                            R"(Needs and errands of a person, as numbers: times in seconds, chances of 1024.
 

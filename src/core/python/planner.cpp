@@ -44,8 +44,8 @@ Pastime pastime_of(const PastimeRow& row) {
     return pastime;
 }
 
-OwnedPlan plan_of(DistributionRow sleep, i64 least_sleep, std::vector<JobRow> jobs, std::vector<PastimeRow> pastimes, i64 rest,
-                  i64 asleep) {
+OwnedPlan plan_of(DistributionRow sleep, i64 least_sleep, std::vector<JobRow> jobs, std::vector<PastimeRow> pastimes,
+                  i64 rest, i64 asleep) {
     DayPlan plan{distribution_of(sleep), least_sleep, {}, {}, rest, asleep};
     require(0 <= least_sleep && is_time(least_sleep), "least_sleep must be 0 to 2**36 s");
     require(static_cast<i64>(jobs.size()) < LATEST, "jobs must be fewer than 2**20");
@@ -67,12 +67,16 @@ void check_day(i64 wake, i64 next_wake) {
 }  // namespace
 
 void bind_planner(nb::module_& m) {
+    m.attr("ANY_ROOM") = ANY_ROOM;
+    m.attr("NO_GAP_S") = NO_GAP_S;
+
     nb::class_<RoomUse>(m, "RoomUse", "When people use rooms that only one can use at a time; times in seconds.")
         .def(nb::init<>())
         .def(
             "add",
             [](RoomUse& self, i64 room, i64 begin, i64 end) {
-                require(-NEVER < begin && begin <= end && end < NEVER, "a use must end after it begins, within 2**41 s");
+                require(-NEVER < begin && begin <= end && end < NEVER,
+                        "a use must end after it begins, within 2**41 s");
                 self.add(room, begin, end);
             },
             "room"_a, "begin"_a, "end"_a, "Add a time in which somebody uses a room.")

@@ -56,41 +56,41 @@ Waits waits_of(View<const i64> quantiles) {
     return {{quantiles.begin(), quantiles.end()}};
 }
 
-// A scene, and what Python knows it by.
-struct OwnedScene : Scene {
-    nb::object setting;
+// A venue, and what Python knows it by.
+struct OwnedVenue : Venue {
+    nb::object asked_with;
     // What was asked for: places at furniture by room, and the nearest room by point.
     mutable std::map<i64, Numbers> seats_in;
     mutable std::map<std::pair<i64, i64>, i64> nearest_to;
 };
 
-OwnedScene scene_of(nb::object setting, i64 activity, bool away, i64 choose, i64 posture, Numbers rooms, Numbers seats,
-                    Numbers stores, const std::vector<std::pair<i64, std::shared_ptr<Waits>>>& moves,
+OwnedVenue venue_of(nb::object asked_with, i64 activity, bool away, i64 choose, i64 posture, Numbers rooms,
+                    Numbers seats, Numbers stores, const std::vector<std::pair<i64, std::shared_ptr<Waits>>>& moves,
                     const std::optional<DistributionRow>& fetch_takes) {
-    require(0 <= choose && choose <= static_cast<i64>(Choice::HERE), "choose must be 0 to 3");
+    require(0 <= choose && choose <= static_cast<i64>(RoomPolicy::HERE), "choose must be 0 to 3");
     require(!away || moves.empty(), "somebody who is away makes no small moves");
-    OwnedScene scene{{activity,
+    OwnedVenue venue{{activity,
                       away,
-                      static_cast<Choice>(choose),
+                      static_cast<RoomPolicy>(choose),
                       checked_posture(posture),
                       std::move(rooms),
                       std::move(seats),
                       std::move(stores),
                       {},
                       std::nullopt},
-                     std::move(setting),
+                     std::move(asked_with),
                      {},
                      {}};
     require(moves.size() <= MOST_MOVES, "there are three kinds of small moves");
     for (const auto& [kind, waits] : moves) {
         require(0 <= kind && kind <= static_cast<i64>(MoveKind::FETCHES), "kinds of moves must be 0 to 2");
-        require(kind != static_cast<i64>(MoveKind::SHIFTS) || scene.moves.empty(), "turns come before other moves");
+        require(kind != static_cast<i64>(MoveKind::SHIFTS) || venue.moves.empty(), "turns come before other moves");
         require(waits != nullptr, "moves must have times between them");
-        scene.moves.emplace_back(static_cast<MoveKind>(kind), waits);
+        venue.moves.emplace_back(static_cast<MoveKind>(kind), waits);
     }
-    if (fetch_takes) scene.fetch_takes = distribution_of(*fetch_takes);
-    require(!scene.fetch_takes || scene.fetch_takes->shortest >= 0, "to fetch something must take 0 s or more");
-    return scene;
+    if (fetch_takes) venue.fetch_takes = distribution_of(*fetch_takes);
+    require(!venue.fetch_takes || venue.fetch_takes->shortest >= 0, "to fetch something must take 0 s or more");
+    return venue;
 }
 
 // A resident, and what is known of the home, as it was asked for.
@@ -139,11 +139,11 @@ public:
         }
         return spots;
     }
-    const Numbers& seats(const Scene& scene, i64 room) override {
-        const auto& own = static_cast<const OwnedScene&>(scene);
+    const Numbers& seats(const Venue& venue, i64 room) override {
+        const auto& own = static_cast<const OwnedVenue&>(venue);
         const auto known = own.seats_in.find(room);
         if (known != own.seats_in.end()) return known->second;
-        return own.seats_in[room] = nb::cast<Numbers>(home_.attr("seats")(own.setting, room));
+        return own.seats_in[room] = nb::cast<Numbers>(home_.attr("seats")(own.asked_with, room));
     }
     const Seat& seat(i64 number) override {
         const auto known = own_.seats.find(number);
@@ -153,9 +153,9 @@ public:
         checked(0, x, y, heading, 0);
         return own_.seats[number] = {{x, y}, heading, checked_posture(posture), point_of(from_x, from_y)};
     }
-    i64 nearest(const Scene& scene, Point at) override {
-        const auto& own = static_cast<const OwnedScene&>(scene);
-        return known(own.nearest_to, at, [&] { return home_.attr("nearest")(own.setting, at.x, at.y); });
+    i64 nearest(const Venue& venue, Point at) override {
+        const auto& own = static_cast<const OwnedVenue&>(venue);
+        return known(own.nearest_to, at, [&] { return home_.attr("nearest")(own.asked_with, at.x, at.y); });
     }
     i64 room_at(Point at) override {
         return known(own_.rooms_at, at, [&] { return home_.attr("room_at")(at.x, at.y); });
@@ -202,16 +202,16 @@ private:
     nb::handle home_, walk_;
 };
 
-using StintRow = std::tuple<const OwnedScene*, i64, i64, i64, bool>;
+using StintRow = std::tuple<const OwnedVenue*, i64, i64, i64, bool>;
 
 std::vector<Stint> stints_of(const std::vector<StintRow>& rows, i64 now) {
     std::vector<Stint> stints;
-    for (const auto& [scene, number, end, role, stays] : rows) {
-        require(scene != nullptr, "a stint must have a scene");
+    for (const auto& [venue, number, end, role, stays] : rows) {
+        require(venue != nullptr, "a stint must have a venue");
         require(0 <= number && number < LATEST, "numbers of stints must be 0 to 2**61");
         require(end <= LATEST && end - now < LONGEST_STINT, "stints must end within 2**38 us");
         require(0 <= role && role <= static_cast<i64>(Role::FINISHES), "roles must be 0 to 3");
-        stints.push_back({scene, number, end, static_cast<Role>(role), stays});
+        stints.push_back({venue, number, end, static_cast<Role>(role), stays});
     }
     return stints;
 }
@@ -226,17 +226,33 @@ CourseRow live(OwnedResident& self, nb::object home, nb::object walk, Legs& legs
 }
 
 CourseRow go(OwnedResident& self, nb::object home, nb::object walk, Legs& legs, MomentRow now, i64 posture,
-             const OwnedScene& scene, StepDraws& draws) {
-    require(!scene.rooms.empty(), "the scene must have a room");
+             const OwnedVenue& venue, StepDraws& draws) {
+    require(!venue.rooms.empty(), "the venue must have a room");
     AskedHome asked(self, home, walk);
     Course course{legs, std::apply(checked, now), checked_posture(posture), {}, {}};
-    Resident(asked, course, self.speed, self.turn_rate).go(scene, draws);
+    Resident(asked, course, self.speed, self.turn_rate).go(venue, draws);
     return take_row(course);
 }
 
 }  // namespace
 
 void bind_residents(nb::module_& m) {
+    nb::enum_<RoomPolicy>(m, "RoomPolicy", "How a room is chosen among several.")
+        .value("OWN", RoomPolicy::OWN, "The same each time.")
+        .value("NEAREST", RoomPolicy::NEAREST, "The nearest one.")
+        .value("EACH_TIME", RoomPolicy::EACH_TIME, "Any, drawn each time.")
+        .value("HERE", RoomPolicy::HERE, "The one where somebody is.");
+    nb::enum_<MoveKind>(m, "MoveKind", "What somebody does now and then within an activity; of several due, the first.")
+        .value("SHIFTS", MoveKind::SHIFTS, "Turns on the spot.")
+        .value("MOVES", MoveKind::MOVES, "Goes to another spot of the room, or to the furniture.")
+        .value("FETCHES", MoveKind::FETCHES, "Goes to another room, and comes back.");
+    nb::enum_<Happening>(m, "Happening", "What happens on the way.")
+        .value("ACTIVITY", Happening::ACTIVITY, "An activity begins.")
+        .value("WAY_BLOCKED", Happening::WAY_BLOCKED, "No way leads to it.")
+        .value("USES", Happening::USES, "Furniture is used.")
+        .value("LEFT_HOME", Happening::LEFT_HOME, "The home is left.")
+        .value("CAME_HOME", Happening::CAME_HOME, "The home is entered.");
+
     nb::class_<Waits>(m, "Waits", R"(Times between two events.
 
 Args:
@@ -245,10 +261,10 @@ Args:
             "__init__", [](Waits* self, View<const i64> quantiles) { new (self) Waits(waits_of(quantiles)); },
             "quantiles"_a);
 
-    nb::class_<OwnedScene>(m, "Scene", R"(Where and how somebody does an activity.
+    nb::class_<OwnedVenue>(m, "CoreVenue", R"(Where and how somebody does an activity.
 
 Args:
-    setting: What `seats` of the home is asked with.
+    asked_with: What `seats` and `nearest` of the home are asked with.
     activity: The number of the activity.
     away: Whether it is done out of the home.
     choose: How a room is chosen: 0 the same each time, 1 the nearest, 2 any, 3 the one where somebody is.
@@ -260,13 +276,13 @@ Args:
     fetch_takes: The distribution of how long somebody is away to fetch something [s]; None: nothing is fetched.)")
         .def(
             "__init__",
-            [](OwnedScene* self, nb::object setting, i64 activity, bool away, i64 choose, i64 posture, Numbers rooms,
+            [](OwnedVenue* self, nb::object asked_with, i64 activity, bool away, i64 choose, i64 posture, Numbers rooms,
                Numbers seats, Numbers stores, const std::vector<std::pair<i64, std::shared_ptr<Waits>>>& moves,
                const std::optional<DistributionRow>& fetch_takes) {
-                new (self) OwnedScene(scene_of(std::move(setting), activity, away, choose, posture, std::move(rooms),
+                new (self) OwnedVenue(venue_of(std::move(asked_with), activity, away, choose, posture, std::move(rooms),
                                                std::move(seats), std::move(stores), moves, fetch_takes));
             },
-            "setting"_a.none(), "activity"_a, "away"_a, "choose"_a, "posture"_a, "rooms"_a, "seats"_a, "stores"_a,
+            "asked_with"_a.none(), "activity"_a, "away"_a, "choose"_a, "posture"_a, "rooms"_a, "seats"_a, "stores"_a,
             "moves"_a, "fetch_takes"_a.none());
 
     nb::class_<LastStint>(m, "LastStint", "What somebody did last, where, and what that interrupted.")
@@ -301,14 +317,14 @@ Args:
              R"(Do activities, one after the other, until the last one is over or one is blocked.
 
 Args:
-    home: What is asked about the home: spots(room), seats(setting, room), seat(number), nearest(setting, x, y),
+    home: What is asked about the home: spots(room), seats(asked_with, room), seat(number), nearest(asked_with, x, y),
         room_at(x, y), wait(room, now, takes) and way_out().
     walk: Goes to a place where no route is known: from what this returns, and the place's number at furniture, or -1,
         x and y, it returns the new end of the plan, and the posture.
     legs: Where breakpoints are added.
     now: The end of the plan: time [us], x, y [lattice], heading [1/4096 turn], away.
     posture: The posture then.
-    stints: Scene, address of draws, end [us], role, and whether it is done wherever somebody is, of each.
+    stints: Venue, address of draws, end [us], role, and whether it is done wherever somebody is, of each.
     until: After that, none begins [us].
     continues: Whether the first one may be a part of the last one.
     last: What was done last; it is updated.
@@ -316,7 +332,7 @@ Args:
 Returns:
     The new end of the plan; the posture; when postures are taken; time, kind and detail of what happens: 0 an activity
     begins, 1 the way is blocked, 2 furniture is used, 3 the home is left, 4 or entered.)")
-        .def("go", &go, "home"_a, "walk"_a, "legs"_a, "now"_a, "posture"_a, "scene"_a, "draws"_a,
+        .def("go", &go, "home"_a, "walk"_a, "legs"_a, "now"_a, "posture"_a, "venue"_a, "draws"_a,
              "Go to where an activity is done, and take its posture; see `live`.");
 }
 

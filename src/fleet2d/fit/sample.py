@@ -49,7 +49,7 @@ def sample_persona(
 
 
 def _fetches(activity: Activity, doing: Doing, draws: Draws) -> list[tuple[int, int]]:
-    """Return begin and end [s] of each short trip during an activity, drawn as for inhabitants."""
+    """Return begin and end [s] of each short trip during an activity, drawn as for residents."""
     assert activity.fetches is not None
     wait, takes = exponential(seconds(activity.fetches)), activity.fetch_takes.table()
     times = []

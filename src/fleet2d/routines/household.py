@@ -14,18 +14,16 @@ from fleet2d.configuration.documents import read_document
 from fleet2d.configuration.problems import Location, did_you_mean, problem, problem_at, shown
 from fleet2d.configuration.units import OnDays, Share, folder_of, weekdays_of
 from fleet2d.errors import ScenarioError
-from fleet2d.kernels.motion import RoomUse
+from fleet2d.kernels.motion import ANY_ROOM, NO_GAP_S, RoomUse
 from fleet2d.routines.activity import AnyDurationDistribution, SchemaForms, find_activity
 from fleet2d.routines.distributions import uniform
 from fleet2d.routines.life import Life
 from fleet2d.routines.persona import AnyPersona, Dates, Timing, holds_on
 from fleet2d.routines.planner import (
-    ANY_ROOM,
     DAY_S,
     INTERRUPTS,
     MILLION,
     NEVER,
-    NO_GAP_S,
     PLANNED,
     RESUMES,
     SLEEP,

@@ -12,7 +12,7 @@ from fleet2d.configuration.components import Settings
 from fleet2d.configuration.documents import read_document
 from fleet2d.configuration.problems import problem
 from fleet2d.configuration.units import Duration, Share, TimeOfDay
-from fleet2d.kernels.motion import Interruptions
+from fleet2d.kernels.motion import CHANCE_BITS, QUANTILE_BITS, Interruptions
 from fleet2d.routines.activity import (
     Activity,
     AnyDurationDistribution,
@@ -157,10 +157,6 @@ def named_activities(
         named += [(("errands", name, "before"), what) for what in errand.before]
     return named
 
-
-# Probabilities have this many bits, and distributions 2 to this power quantiles: few bits of a draw
-# suffice.
-CHANCE_BITS, QUANTILE_BITS = 10, 8
 
 Quantiles = tuple[int, ...]
 StepRow = tuple[int, int, Quantiles]

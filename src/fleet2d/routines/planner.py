@@ -28,20 +28,17 @@ from typing import Annotated, Any, NamedTuple
 from pydantic import BeforeValidator, PlainSerializer, WithJsonSchema
 
 from fleet2d.configuration.problems import problem
-from fleet2d.kernels.motion import DayPlanner, RoomUse
+from fleet2d.kernels.motion import ANY_ROOM, DayPlanner, Role, RoomUse
 from fleet2d.routines.distributions import Distribution
 from fleet2d.runtime.determinism import Draws
 
 DAY_S = 86_400
-# A gap shorter than this is not filled: the next doing begins at once [s].
-NO_GAP_S = 300
 MILLION = 1_000_000
 NEVER = 1 << 40  # later than any time [s]
-PLANNED, INTERRUPTS, RESUMES, FINISHES = 0, 1, 2, 3
+PLANNED, INTERRUPTS = Role.PLANNED.value, Role.INTERRUPTS.value
+RESUMES, FINISHES = Role.RESUMES.value, Role.FINISHES.value
 REST = "rest"
 SLEEP = "sleep"
-# The room of what needs none for itself, and the only one of a household whose rooms are unknown.
-ANY_ROOM = -1
 
 
 class Doing(NamedTuple):

@@ -27,8 +27,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fleet2d.kernels import F64, I32
+from fleet2d.kernels.motion import NO_GAP_S
 from fleet2d.routines.distributions import KNOTS, Distribution, draw_weighted, lognormal, position
-from fleet2d.routines.planner import NO_GAP_S, Doing
+from fleet2d.routines.planner import Doing
 from fleet2d.runtime.determinism import Draws
 
 TABLE = Path(__file__).parent / "survey.json"

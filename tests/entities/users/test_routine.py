@@ -175,7 +175,7 @@ def test_a_family_eats_at_one_time_at_places_of_its_own() -> None:
 
 def test_a_couple_shares_a_bed_and_the_child_has_its_own() -> None:
     simulation = Simulation(family())
-    beds = {n: a.behaviors[0].settings["sleep"].seats for n, a in simulation.actors.items()}
+    beds = {n: a.behaviors[0].venues["sleep"].seats for n, a in simulation.actors.items()}
     assert beds["ana"][0].thing == beds["ben"][0].thing != beds["cleo"][0].thing
     assert beds["ana"] != beds["ben"]
 

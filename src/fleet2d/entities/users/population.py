@@ -5,7 +5,7 @@ from datetime import datetime, timedelta
 from typing import TYPE_CHECKING, Literal
 
 from fleet2d.configuration.components import register
-from fleet2d.entities.users.resident import Inhabitant, rooms_at
+from fleet2d.entities.users.resident import ResidentBehavior, rooms_at
 from fleet2d.entities.users.spots import Spots
 from fleet2d.routines import survey
 from fleet2d.routines.activity import catalogue
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 @register("behavior", "population")
-class Population(Inhabitant):
+class Population(ResidentBehavior):
     """Live as a person drawn from the American Time Use Survey 2022-2023.
 
     Among many such people, the share that does each activity at each hour is that of the survey,

@@ -1,4 +1,4 @@
-"""Settings: where and how a body does an activity in its home."""
+"""Residents: people who do one activity after another in the home, each at its venue."""
 
 from bisect import bisect_right
 from collections.abc import Hashable, Iterable, Iterator, Sequence
@@ -15,10 +15,20 @@ from fleet2d.entities.plan import Plan, new_note
 from fleet2d.entities.users.spots import Seat, Spot, Spots
 from fleet2d.errors import PlacementError
 from fleet2d.floorplan.objects import POSTURES
-from fleet2d.kernels.motion import LastStint, Resident, Scene, Waits
+from fleet2d.kernels.motion import (
+    ANY_ROOM,
+    NO_GAP_S,
+    CoreVenue,
+    Happening,
+    LastStint,
+    MoveKind,
+    Resident,
+    RoomPolicy,
+    Waits,
+)
 from fleet2d.routines.activity import Activity, seconds
 from fleet2d.routines.distributions import Distribution, exponential
-from fleet2d.routines.planner import ANY_ROOM, NO_GAP_S, REST, SLEEP, Doing
+from fleet2d.routines.planner import REST, SLEEP, Doing
 from fleet2d.runtime.determinism import Draws
 
 if TYPE_CHECKING:
@@ -29,34 +39,20 @@ if TYPE_CHECKING:
 
 
 SECOND_US = 1_000_000
-# The kinds of small moves; what comes first is done first of what is due at once.
-MOVE_KINDS = ("shifts", "moves", "fetches")
-# Times between moves that all people share.
-WAITS_KEPT = 512
+# How the core numbers ways of choosing rooms, small moves, and what happens.
+POLICIES, MOVE_KINDS, EVENTS = (
+    tuple(member.name.lower() for member in numbers)
+    for numbers in (RoomPolicy, MoveKind, Happening)
+)
 
 
-class SmallMove(NamedTuple):
-    """A kind of move within an activity.
-
-    Attributes:
-        kind: One of MOVE_KINDS.
-        mean_s: The mean time to the next such move [s].
-    """
-
-    kind: str
-    mean_s: int
-
-    def waits(self) -> Waits:
-        """Return the times to the next such move."""
-        return _exponential_waits(self.mean_s)
-
-
-@lru_cache(WAITS_KEPT)
-def _exponential_waits(mean_s: int) -> Waits:
+@lru_cache(512)  # most are the same for all people
+def exponential_waits(mean_s: int) -> Waits:
+    """Return random times between two moves, of a mean [s]."""
     return Waits(np.array(exponential(mean_s).knots, np.int64) * SECOND_US)
 
 
-class Setting(NamedTuple):
+class Venue(NamedTuple):
     """Where and how a body does an activity in its home.
 
     Attributes:
@@ -64,29 +60,27 @@ class Setting(NamedTuple):
         rooms: The rooms where it is done; none if it is done out of the home.
         seats: The places at furniture where it is done; none: anywhere in the rooms.
         stores: The rooms from which the body fetches things.
-        small_moves: The small moves within the activity.
-        fetch_takes: The law of how long the body is away to fetch something [s], if it does.
+        small_moves: The small moves within the activity, in the order of MOVE_KINDS: the kind,
+            and the mean time between two of each [s].
+        fetch_takes: The distribution of how long the body is away to fetch something [s], if it
+            does.
     """
 
     activity: Activity
     rooms: list["Room"]
     seats: list[Seat]
     stores: list["Room"]
-    small_moves: tuple[SmallMove, ...]
+    small_moves: tuple[tuple[str, int], ...]
     fetch_takes: Distribution | None
 
 
 T = TypeVar("T", bound=Hashable)
 
-# What these numbers of the core stand for.
-CHOICES = ("own", "nearest", "each_time", "here")
-EVENTS = ("activity", "way_blocked", "uses", "left_home", "came_home")
-
 PlanEnd = tuple[int, int, int, int, int]
 """Time [us], x, y [lattice], heading [1/4096 turn], and whether the body is away."""
 Course = tuple[PlanEnd, int, list[tuple[int, int]], list[tuple[int, int, int]]]
 """The end of a plan, its posture, and the postures and notes that were added; see `Resident`."""
-Stint = tuple[Scene, int, int, int, bool]
+Stint = tuple[CoreVenue, int, int, int, bool]
 """A time in which an activity is done; see `Resident.live`."""
 
 
@@ -112,18 +106,18 @@ class KnownHome:
     as long as doors and furniture stay as they are.
     """
 
-    def __init__(self, person: "Inhabitant", actor: "Actor") -> None:
+    def __init__(self, person: "ResidentBehavior", actor: "Actor") -> None:
         self._person, self._actor = person, actor
         self._last = LastStint()
         self._seats: Numbering[Seat] = Numbering()  # which `_last` refers to
         self._names: Numbering[str] = Numbering()  # of activities
-        self._scenes: dict[str, tuple[Setting, Scene]] = {}
+        self._core_venues: dict[str, tuple[Venue, CoreVenue]] = {}
         self._rooms: dict[int, Room] = {}
         self._resident: tuple[object, Resident | None] = None, None
 
     def __getstate__(self) -> dict[str, object]:
         """Leave out caches, which are made again."""
-        return {**self.__dict__, "_scenes": {}, "_rooms": {}, "_resident": (None, None)}
+        return {**self.__dict__, "_core_venues": {}, "_rooms": {}, "_resident": (None, None)}
 
     def live(self, plan: Plan, stints: Sequence[Stint], until_us: int, *, continues: bool) -> None:
         """Add activities to a plan, until the last one is over or shut doors block one.
@@ -138,10 +132,10 @@ class KnownHome:
         course = live(self, walk, plan.legs, *now, stints, until_us, continues, self._last)
         self._take(plan, course)
 
-    def go(self, plan: Plan, activity: str, setting: Setting, draws: Draws) -> None:
+    def go(self, plan: Plan, activity: str, venue: Venue, draws: Draws) -> None:
         """Go to where an activity is done, and take its posture."""
         go, walk, now = self.update().go, partial(self._walk, plan), _end_of(plan)
-        self._take(plan, go(self, walk, plan.legs, *now, self.scene(activity, setting), draws))
+        self._take(plan, go(self, walk, plan.legs, *now, self.in_core(activity, venue), draws))
 
     def update(self) -> Resident:
         """Forget an earlier arrangement of doors and furniture; return the body for the core."""
@@ -159,14 +153,14 @@ class KnownHome:
             resident = Resident(self._person.key, *rates, routes, steps_off)
             self._resident = present, resident
             self._rooms = {room.index: room for room in actor.home.rooms}
-            self._scenes.clear()
+            self._core_venues.clear()
         return resident
 
-    def scene(self, name: str, setting: Setting) -> Scene:
-        """Return the setting of an activity as the core needs it, after an `update`."""
-        known = self._scenes.get(name)
-        if known is None or known[0] is not setting:
-            known = self._scenes[name] = setting, self._make_scene(name, setting)
+    def in_core(self, name: str, venue: Venue) -> CoreVenue:
+        """Return the venue of an activity as the core needs it, after an `update`."""
+        known = self._core_venues.get(name)
+        if known is None or known[0] is not venue:
+            known = self._core_venues[name] = venue, self._make_core_venue(name, venue)
         return known[1]
 
     # What the core asks for.
@@ -175,9 +169,9 @@ class KnownHome:
         """Return the points of a room where the body stands."""
         return self._person.spots.in_room(self._rooms[room])
 
-    def seats(self, setting: Setting, room: int) -> list[int]:
+    def seats(self, venue: Venue, room: int) -> list[int]:
         """Return the numbers of the places for an activity at the furniture in a room."""
-        spots, activity, rooms = self._person.spots, setting.activity, (self._rooms[room],)
+        spots, activity, rooms = self._person.spots, venue.activity, (self._rooms[room],)
         return self._numbers_of(spots.at_furniture(activity.objects, rooms, activity.posture))
 
     def seat(self, number: int) -> tuple[int, int, int, int, int, int]:
@@ -189,9 +183,9 @@ class KnownHome:
         at = self._actor.place_at(*self._seats.things[number])
         return at.x, at.y, at.heading, POSTURES.index(at.posture), *at.approach
 
-    def nearest(self, setting: Setting, x: int, y: int) -> int:
+    def nearest(self, venue: Venue, x: int, y: int) -> int:
         """Return the room whose middle is nearest to a lattice point, in a straight line."""
-        return self._person.spots.nearest(setting.rooms, x, y).index
+        return self._person.spots.nearest(venue.rooms, x, y).index
 
     def room_at(self, x: int, y: int) -> int:
         """Return the room that holds a lattice point; -1 for none."""
@@ -208,19 +202,22 @@ class KnownHome:
 
     # What is prepared for it, and taken from it.
 
-    def _make_scene(self, name: str, setting: Setting) -> Scene:
-        activity = setting.activity
-        return Scene(
-            setting,
+    def _make_core_venue(self, name: str, venue: Venue) -> CoreVenue:
+        activity = venue.activity
+        return CoreVenue(
+            venue,
             self._names.of(name),
             activity.away,
-            CHOICES.index(activity.choose),
+            POLICIES.index(activity.choose),
             POSTURES.index(activity.posture),
-            [room.index for room in setting.rooms],
-            self._numbers_of(setting.seats),
-            [room.index for room in setting.stores],
-            [(MOVE_KINDS.index(move.kind), move.waits()) for move in setting.small_moves],
-            setting.fetch_takes,
+            [room.index for room in venue.rooms],
+            self._numbers_of(venue.seats),
+            [room.index for room in venue.stores],
+            [
+                (MOVE_KINDS.index(kind), exponential_waits(mean_s))
+                for kind, mean_s in venue.small_moves
+            ],
+            venue.fetch_takes,
         )
 
     def _numbers_of(self, seats: Sequence[Seat]) -> list[int]:
@@ -263,7 +260,7 @@ END = attrgetter("end")
 AHEAD_US = 1800 * SECOND_US
 
 
-class Inhabitant(Behavior):
+class ResidentBehavior(Behavior):
     """Base of behaviors that do activities: a subclass implements `day`, the doings of a day.
 
     Attributes:
@@ -273,7 +270,7 @@ class Inhabitant(Behavior):
     small_moves: bool = True
 
     def day(self, ordinal: int) -> Sequence[Doing]:
-        """Return what the inhabitant does on a day, given by its ordinal, until the next begins."""
+        """Return what the resident does on a day, given by its ordinal, until the next begins."""
         raise NotImplementedError
 
     def wait_for(self, room: int, clock: "Clock", begin_us: int, takes_us: int) -> int | None:
@@ -308,36 +305,36 @@ class Inhabitant(Behavior):
         self.planned_until = -1  # the step up to which the last plan goes
         self.given_up: tuple[int, int] | None = None  # the doing that is not to be continued
         self.reachable_rooms = actor.reachable_rooms()
-        self.settings = {name: self._setting(actor, a) for name, a in activities.items()}
+        self.venues = {name: self._venue(actor, a) for name, a in activities.items()}
         self._leave_out(actor)
-        exclusive = (s for s in self.settings.values() if s.activity.exclusive)
-        self.private_rooms = {room.index for setting in exclusive for room in setting.rooms}
+        exclusive = (s for s in self.venues.values() if s.activity.exclusive)
+        self.private_rooms = {room.index for venue in exclusive for room in venue.rooms}
         if sleeps_in is not None:
-            self.settings[SLEEP] = self._bed(actor, activities[SLEEP], sleeps_in, side)
+            self.venues[SLEEP] = self._bed(actor, activities[SLEEP], sleeps_in, side)
 
     def activities(self) -> tuple[str, ...]:
         """Return the activities of its persona."""
-        return tuple(self.settings)
+        return tuple(self.venues)
 
     def perform(self, plan: Plan, activity: str) -> None:
         """Go to where an activity is done, and take its posture."""
-        setting = self._at_present(self.settings[activity])
-        if setting.activity.away:
+        venue = self._at_present(self.venues[activity])
+        if venue.activity.away:
             plan.leave_home()
-        elif setting.rooms:
-            self.known_home.go(plan.come_home(), activity, setting, Draws(self.key, plan.time_us))
+        elif venue.rooms:
+            self.known_home.go(plan.come_home(), activity, venue, Draws(self.key, plan.time_us))
         else:
             raise PlacementError(f"{activity} can't be done at present: shut doors are in the way")
 
     def _leave_out(self, actor: "Actor") -> None:
         """Replace activities that this home has no room for by rest, and note it."""
-        impossible = [n for n, s in self.settings.items() if not (s.rooms or s.activity.away)]
+        impossible = [n for n, s in self.venues.items() if not (s.rooms or s.activity.away)]
         for name in impossible:
-            rooms = " or ".join(self.settings[name].activity.rooms)
+            rooms = " or ".join(self.venues[name].activity.rooms)
             actor.notes.append(
                 f"activities.{name}.rooms: left out, because this home has no {rooms}"
             )
-            self.settings[name] = self.settings[REST]
+            self.venues[name] = self.venues[REST]
 
     def decide(self, now: Situation) -> Plan:
         """Plan the rest of the date.
@@ -362,9 +359,9 @@ class Inhabitant(Behavior):
 
     def furniture(self, actor: "Actor", kind: str) -> str | None:
         """Return the name of a piece of furniture of a kind that it uses, its bed before others."""
-        sleeps = [self.settings[SLEEP]] if SLEEP in self.settings else []
-        for setting in (*sleeps, *self.settings.values()):
-            for seat in setting.seats:
+        sleeps = [self.venues[SLEEP]] if SLEEP in self.venues else []
+        for venue in (*sleeps, *self.venues.values()):
+            for seat in venue.seats:
                 if kind in (seat.thing, actor.home.object(seat.thing).type):
                     return seat.thing
         return None
@@ -395,55 +392,55 @@ class Inhabitant(Behavior):
         if which == self.given_up:
             doing = doing._replace(activity=REST)
         activity, begin, end, _, room, role = doing
-        setting = self.settings[activity]
+        venue = self.venues[activity]
         if room != ANY_ROOM or self.is_hindered:
-            setting = self._in_room(setting, room)
-        scene = self.known_home.scene(activity, self.seated(setting, which))
+            venue = self._in_room(venue, room)
+        core_venue = self.known_home.in_core(activity, self.seated(venue, which))
         stays = activity == REST and end - begin < NO_GAP_S
-        return scene, which[0] * DOINGS_A_DAY + which[1], end_us, role, stays
+        return core_venue, which[0] * DOINGS_A_DAY + which[1], end_us, role, stays
 
-    def seated(self, setting: Setting, which: tuple[int, int]) -> Setting:
-        """Return the setting with only the places at furniture that it has for the doing."""
-        return setting
+    def seated(self, venue: Venue, which: tuple[int, int]) -> Venue:
+        """Return the venue with only the places at furniture that it has for the doing."""
+        return venue
 
-    def _at_present(self, setting: Setting) -> Setting:
-        """Return the setting of an activity, without the rooms that shut doors block at present."""
-        rooms = self.spots.reachable(setting.rooms)
-        if rooms is setting.rooms:  # no door is shut
-            return setting
-        if len(rooms) < len(setting.rooms):
-            activity = setting.activity
+    def _at_present(self, venue: Venue) -> Venue:
+        """Return the venue of an activity, without the rooms that shut doors block at present."""
+        rooms = self.spots.reachable(venue.rooms)
+        if rooms is venue.rooms:  # no door is shut
+            return venue
+        if len(rooms) < len(venue.rooms):
+            activity = venue.activity
             seats = self.spots.at_furniture(activity.objects, rooms, activity.posture)
-            setting = setting._replace(rooms=rooms, seats=seats)
-        return setting._replace(stores=self.spots.reachable(setting.stores))
+            venue = venue._replace(rooms=rooms, seats=seats)
+        return venue._replace(stores=self.spots.reachable(venue.stores))
 
-    def _in_room(self, setting: Setting, index: int) -> Setting:
-        """Return the present setting of an activity; in a room that its household chose, if any."""
+    def _in_room(self, venue: Venue, index: int) -> Venue:
+        """Return the present venue of an activity; in a room that its household chose, if any."""
         if index != ANY_ROOM:
             room = next((room for room in self.reachable_rooms if room.index == index), None)
-            setting = setting if room is None else self._within(setting, room)
-        return self._at_present(setting) if self.is_hindered else setting
+            venue = venue if room is None else self._within(venue, room)
+        return self._at_present(venue) if self.is_hindered else venue
 
-    def _within(self, setting: Setting, room: "Room") -> Setting:
-        """Return the setting of an activity, in one room only."""
-        activity = setting.activity
+    def _within(self, venue: Venue, room: "Room") -> Venue:
+        """Return the venue of an activity, in one room only."""
+        activity = venue.activity
         seats = self.spots.at_furniture(activity.objects, (room,), activity.posture)
-        return setting._replace(rooms=[room], seats=seats)
+        return venue._replace(rooms=[room], seats=seats)
 
-    def _setting(self, actor: "Actor", activity: Activity) -> Setting:
+    def _venue(self, actor: "Actor", activity: Activity) -> Venue:
         if activity.away:
-            return Setting(activity, [], [], [], (), None)
+            return Venue(activity, [], [], [], (), None)
         rooms = (
             self._own_rooms(actor, activity.rooms)
             if activity.choose == "own"
             else self._all_rooms(actor, activity.rooms)
         )
         small_moves = [
-            SmallMove(kind, max(1, seconds(mean)))
+            (kind, max(1, seconds(mean)))
             for kind in MOVE_KINDS
             if self.small_moves and (mean := getattr(activity, kind)) is not None
         ]
-        return Setting(
+        return Venue(
             activity,
             rooms,
             self.spots.at_furniture(activity.objects, rooms, activity.posture),
@@ -452,14 +449,12 @@ class Inhabitant(Behavior):
             activity.fetch_takes.table() if activity.fetches else None,
         )
 
-    def _bed(
-        self, actor: "Actor", sleep: Activity, sleeps_in: int, side: tuple[int, int]
-    ) -> Setting:
-        """Return the setting of sleep for a member of a household, whose bed it may share."""
+    def _bed(self, actor: "Actor", sleep: Activity, sleeps_in: int, side: tuple[int, int]) -> Venue:
+        """Return the venue of sleep for a member of a household, whose bed it may share."""
         rooms = _match(actor, sleep.rooms)[1]
         room = rooms[sleeps_in % len(rooms)]
         seats = self.spots.at_furniture(sleep.objects, [room], sleep.posture, side)
-        return self._setting(actor, sleep)._replace(rooms=[room], seats=seats)
+        return self._venue(actor, sleep)._replace(rooms=[room], seats=seats)
 
     def _all_rooms(self, actor: "Actor", names: "RoomChoice") -> list["Room"]:
         """Return the reachable rooms of all kinds that a list names."""

@@ -11,9 +11,10 @@ from pydantic import model_validator
 from fleet2d.configuration.components import register
 from fleet2d.configuration.problems import problem, suggest
 from fleet2d.entities.place import ANY, matching_rooms
-from fleet2d.entities.users.resident import SECOND_US, Inhabitant, Setting, rooms_at
+from fleet2d.entities.users.resident import SECOND_US, ResidentBehavior, Venue, rooms_at
 from fleet2d.entities.users.spots import Seat, Spots, part_of, seats_at
 from fleet2d.errors import PlacementError
+from fleet2d.kernels.motion import ANY_ROOM, NO_GAP_S
 from fleet2d.routines.activity import Activity, catalogue
 from fleet2d.routines.household import (
     AWAY,
@@ -27,7 +28,7 @@ from fleet2d.routines.household import (
 )
 from fleet2d.routines.life import Life
 from fleet2d.routines.persona import AnyPersona, Persona, bundled_persona
-from fleet2d.routines.planner import ANY_ROOM, DAY_S, NO_GAP_S, PLANNED, REST, RESUMES, SLEEP, Doing
+from fleet2d.routines.planner import DAY_S, PLANNED, REST, RESUMES, SLEEP, Doing
 from fleet2d.runtime.determinism import Draws, stream_key
 
 if TYPE_CHECKING:
@@ -246,7 +247,7 @@ class Seating:
         return list({self._spot[seat]: seat for seat in reversed(seats)}.values())[::-1]
 
     def _rooms(self, rank: int, names: tuple[str, ...], bedroom: int | None) -> "Sequence[Room]":
-        """Return the rooms of an activity, as `Inhabitant` chooses them for this member."""
+        """Return the rooms of an activity, as `ResidentBehavior` chooses them for this member."""
         try:
             name, rooms = matching_rooms(names, self._home.rooms, usual_rooms(self._home))
         except PlacementError:  # then rest replaces the activity
@@ -296,7 +297,7 @@ WAY_US = 60 * SECOND_US
 
 
 @register("behavior", "routine")
-class Routine(Inhabitant):
+class Routine(ResidentBehavior):
     """Live by a persona: a day's activities with their times, durations, order and probability.
 
     Every day is drawn independently and satisfies the persona's template. An activity is done at
@@ -423,14 +424,14 @@ class Routine(Inhabitant):
                 return None
         return begins_us - begin_us
 
-    def seated(self, setting: Setting, which: tuple[int, int]) -> Setting:
-        """Return the setting with the place that the member of a household has for the doing."""
-        if self.household is None or not setting.seats:
-            return setting
+    def seated(self, venue: Venue, which: tuple[int, int]) -> Venue:
+        """Return the venue with the place that the member of a household has for the doing."""
+        if self.household is None or not venue.seats:
+            return venue
         places = self.seating.places(*which, self.spots.rank)
         if places is None or not all(self.spots.can_reach(seat) for seat in places):
-            return setting
-        return setting._replace(seats=list(places))
+            return venue
+        return venue._replace(seats=list(places))
 
     def _with_absences(self, day: Sequence[Doing], ordinal: int) -> Sequence[Doing]:
         if not self.away and not self.visits:
