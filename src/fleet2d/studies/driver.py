@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from fleet2d.configuration.trust import Trust, current_trust, restrict
-from fleet2d.errors import ArtifactError, Fleet2DError
+from fleet2d.errors import Fleet2DError
 from fleet2d.studies.design import (
     Design,
     FileHashes,
@@ -23,11 +23,9 @@ from fleet2d.studies.directory import (
     Counts,
     Meta,
     StudyDirectory,
-    statuses,
-    write_variants,
 )
 from fleet2d.studies.executors import Event, Executor, LostTask, TaskSchedule, WorkerTask
-from fleet2d.studies.parts import Part, drop_part
+from fleet2d.studies.parts import Part
 from fleet2d.studies.plan import (
     Changed,
     ReconciledPlan,
@@ -66,10 +64,10 @@ class StudyJob:
     tables: tuple[str, ...]
     trust: Trust | None = field(default_factory=current_trust)
 
-    def __call__(self, task: WorkerTask) -> bytes:
+    def __call__(self, task: WorkerTask) -> VariantRecord:
         """Run a variant; return its record, with the error if it fails."""
         with restrict(self.trust):
-            return record_of(task, self._outcome(task)).encode()
+            return record_of(task, self._outcome(task))
 
     def _outcome(self, task: WorkerTask) -> VariantOutcome:
         try:
@@ -167,8 +165,8 @@ def run_study(
     if not directory.exists():
         check_setups(checked.plan, executor, options.observer.on_check)
     with directory.locked():
-        parts = _intact_parts(directory, options.observer)
-        status_of = statuses(directory, parts)
+        parts = directory.intact_parts(options.observer.on_note)
+        status_of = directory.statuses(parts)
         reconciled = reconcile(checked.plan, directory, status_of, options.changed)
         variants = reconciled.plan.variants
         _write_plan(directory, checked, reconciled.plan)
@@ -195,15 +193,14 @@ def run_study(
         finally:
             keeper.pause()
         keeper.finish()
-        write_variants(directory)
-    final = statuses(directory, directory.parts())
-    return Counts.of([final.get(v.number) for v in variants])
+        directory.write_variants()
+        return directory.counts()
 
 
 def _record(event: Event) -> VariantRecord:
     if isinstance(event, LostTask):
         return record_of(event.task, VariantOutcome("failed", error=event.reason), event.attempts)
-    record = VariantRecord.decode(event.payload)
+    record: VariantRecord = event.payload
     return VariantRecord({**record.header, "attempts": event.attempts}, record.body)
 
 
@@ -246,19 +243,6 @@ class _ResultKeeper:
         self._is_open, self._commit_time = False, time.monotonic()
 
 
-def _intact_parts(directory: StudyDirectory, observer: Observer) -> list[Part]:
-    """Return the undamaged parts; drop the others, so that their variants are run again."""
-    intact = []
-    for part in directory.parts():
-        problem = part.problem(directory.storage, checksums=directory.storage.is_local)
-        if problem is None:
-            intact.append(part)
-            continue
-        observer.on_note(f"{problem}: the {part.variants} variants of that part are run again")
-        drop_part(directory.storage, part)
-    return intact
-
-
 def _write_plan(directory: StudyDirectory, checked: CheckedStudy, plan: StudyPlan) -> None:
     """Write the description of the study; its `study.json` last, which makes the folder a study."""
     file = checked.specification.file
@@ -272,13 +256,10 @@ def _write_plan(directory: StudyDirectory, checked: CheckedStudy, plan: StudyPla
         checked.plan.design.columns,
         file.populations,
         file.keep.tables,
-        tuple(comparison.model_dump(mode="json") for comparison in file.compare),
+        file.compare,
         source.read_text(encoding="utf-8") if source else "",
     )
-    try:
-        directory.write_meta(meta)
-    except TypeError as error:  # a Python value that JSON can't hold
-        raise ArtifactError(f"the study can't be described: {error}") from error
+    directory.write_meta(meta)
 
 
 def _describe(reconciled: ReconciledPlan, directory: StudyDirectory, observer: Observer) -> None:
