@@ -57,7 +57,7 @@ if TYPE_CHECKING:
     from fleet2d.studies.reader import open_study as open_study
 
 _HOME_OF = {
-    "Actor": "entities.actor",
+    "Actor": "entities.behavior",
     "Algorithm": "algorithms.algorithm",
     "Behavior": "entities.behavior",
     "CameraSightings": "sight.perception_error",
@@ -72,7 +72,7 @@ _HOME_OF = {
     "HomeChange": "floorplan.home.change",
     "HomeChanges": "floorplan.home.change",
     "InputError": "errors",
-    "Interrupt": "engine.interrupts.interrupt",
+    "Interrupt": "engine.encounters",
     "LabelledRegion": "floorplan.plan",
     "Leg": "entities.drives.drive",
     "Length": "configuration.units",
@@ -88,7 +88,7 @@ _HOME_OF = {
     "Share": "configuration.units",
     "Simulation": "engine.simulation",
     "Situation": "entities.behavior",
-    "SpanView": "engine.interrupts.interrupt",
+    "SpanView": "engine.encounters",
     "Study": "studies.reader",
     "VisibleRegion": "sight.fov",
     "load_floorplan": "floorplan.load",
