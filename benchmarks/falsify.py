@@ -9,8 +9,7 @@ from typing import Any
 
 from fleet2d.scenario.compose import compose
 from fleet2d.studies.executors import SerialExecutor
-from fleet2d.testing.search import FailureSearch, Subject, TryJob
-from fleet2d.testing.space import read_space
+from fleet2d.testing.search import FailureSearch, Subject, TryJob, read_space
 
 FOLDER = Path(__file__).parent
 SHARE = {"low": 0, "high": 1}

@@ -11,15 +11,10 @@ import argparse
 from pathlib import Path
 
 from fleet2d.fit.command import table
-from fleet2d.fit.compare import shares
-from fleet2d.fit.days import find_days
-from fleet2d.fit.persona import fit_persona
-from fleet2d.fit.picture import SAMPLED, draw_fit
-from fleet2d.fit.sample import sample_persona
-from fleet2d.fit.timeline import read_timeline
-from fleet2d.fit.validate import validate
-from fleet2d.logs.log import ActivityLog
-from fleet2d.logs.read import read_log
+from fleet2d.fit.persona import fit_persona, sample_persona, validate
+from fleet2d.fit.picture import SAMPLED, draw_persona
+from fleet2d.fit.timeline import find_days, read_timeline, shares
+from fleet2d.logs.log import ActivityLog, read_log
 
 LOGS = {
     "casas_al": "casas_al/events_10_days.txt",
@@ -49,7 +44,7 @@ def main() -> None:
         print(f"{'share of the time':20}{'log':>8}{'persona':>9}")
         for i, place in enumerate(timeline.places):
             print(f"{place:20}{real[i]:8.3f}{sampled[i]:9.3f}")
-        draw_fit(timeline, days, fitted, options.out / f"{name}.png", options.seed)
+        draw_persona(timeline, days, fitted, options.out / f"{name}.png", options.seed)
 
 
 if __name__ == "__main__":

@@ -11,7 +11,7 @@ from typing import Any
 
 from fleet2d.expectations import always, distance, eventually, seen
 from fleet2d.testing.claim import Claim, Variant
-from fleet2d.testing.running import run_trial
+from fleet2d.testing.trials import run_trial
 
 EVENING = {
     "simulation": {"start": "2026-01-05T17:00", "duration": "4 h", "seed": 0},

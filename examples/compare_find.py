@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from fleet2d import Simulation
-from fleet2d.metrics.survival import kaplan_meier, quantile, restricted_mean
+from fleet2d.metrics.metric import kaplan_meier, quantile, restricted_mean
 
 POLICIES = ("random", "nearest", "likeliest", "greedy", "exact", "receding")
 CALLS, DEADLINE, SPEED = (10, 13, 18, 21), 300.0, 0.6

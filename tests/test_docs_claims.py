@@ -27,7 +27,7 @@ from fleet2d.kernels.numbers import TURN
 from fleet2d.kernels.space import SUB
 from fleet2d.routines.persona import Manners, bundled_names
 from fleet2d.studies.specification import StudyFile
-from fleet2d.testing.rate import rate_test
+from fleet2d.testing.claim import rate_test
 
 ROOT = Path(__file__).parent.parent
 

@@ -12,7 +12,7 @@ from fleet2d.floorplan import source
 from fleet2d.floorplan.cache import Cache
 from fleet2d.floorplan.formats.bundled import HOMES
 from fleet2d.floorplan.home import home as homes
-from fleet2d.metrics.presence.occupancy import walking_distances
+from fleet2d.metrics.ltp_error import walking_distances
 
 SHORT = "simulation.duration=6 h"
 

@@ -14,7 +14,7 @@ from tests.scenes import flat_document, run, scenario, table
 
 from fleet2d import Algorithm, Metric
 from fleet2d.configuration.components import lookup
-from fleet2d.metrics.survival import kaplan_meier, quantile, restricted_mean
+from fleet2d.metrics.metric import kaplan_meier, quantile, restricted_mean
 from fleet2d.runs.run import Run
 
 BATTERY = {"driving": "20 min", "standing": "1 h", "charging": "10 min", "charger": [1.0, 3.0]}

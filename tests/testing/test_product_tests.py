@@ -10,7 +10,7 @@ from types import ModuleType
 import pytest
 
 from fleet2d.testing.claim import ATTRIBUTE
-from fleet2d.testing.running import run_claim
+from fleet2d.testing.trials import run_claim
 
 FOLDER = Path(__file__).parents[2] / "examples" / "product_tests"
 WORSE = tomllib.loads((FOLDER / "worse.toml").read_text())

@@ -6,8 +6,7 @@ import pytest
 from tests.scenes import AGENDA, scenario
 
 from fleet2d.testing.claim import Claim
-from fleet2d.testing.running import run_trial
-from fleet2d.testing.trials import Trial, comparable
+from fleet2d.testing.trials import Trial, comparable, run_trial
 
 PEOPLE = {"ana": {"type": "schedule", "days": AGENDA, "rest": "living_room"}}
 FLAT = Claim(scenario("2 h", users=PEOPLE, robots={"astro": "patrol"})).variants[0]

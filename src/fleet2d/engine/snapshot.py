@@ -169,7 +169,6 @@ _NO_STATE = (
     "fleet2d.artifacts.unfinished",
     "fleet2d.storage",
     "fleet2d.runs",
-    "fleet2d.calibrate",
     "fleet2d.cli",
     "fleet2d.configuration.components",
     "fleet2d.configuration.documents",

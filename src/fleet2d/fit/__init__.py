@@ -1,1 +1,1 @@
-"""Fitting: personas learned from logs, and how well they match other days of the logs."""
+"""Models fitted to logs: personas from diaries of people, perception from a robot's detections."""

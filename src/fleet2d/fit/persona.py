@@ -1,20 +1,38 @@
-"""Personas fitted to the days of a log: times of waking and sleep, tasks, and pastimes."""
+"""Personas fitted to the days of a log, and how well their days match days held back."""
 
 import math
+from bisect import bisect_right
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from datetime import date
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import yaml
 
-from fleet2d.fit.days import LivedDay, Stretch, sleep_states
-from fleet2d.fit.timeline import MINUTES, ActivityPlace, Timeline
+from fleet2d.fit.timeline import (
+    MINUTES,
+    ActivityPlace,
+    Distances,
+    LivedDay,
+    Stretch,
+    Timeline,
+    distances,
+    find_days,
+    sleep_states,
+)
+from fleet2d.kernels import I16
 from fleet2d.logs.log import AWAY, LogError
-from fleet2d.logs.rooms import USUAL
+from fleet2d.logs.placement import USUAL
+from fleet2d.routines.activity import Activity, seconds
+from fleet2d.routines.distributions import KNOTS, exponential
+from fleet2d.routines.life import Life
 from fleet2d.routines.persona import Persona
+from fleet2d.routines.planner import Doing
 from fleet2d.routines.planner import RecordedDay, write_day
+from fleet2d.runtime.clock import DAY_S
+from fleet2d.runtime.determinism import Draws, stream_key
 
 BLOCK = 180  # length of a part of the day that has pastimes of its own [min]
 QUANTILES = 21  # the most quantiles of a law of durations
@@ -377,3 +395,172 @@ def _flow(fields: Mapping[str, Any]) -> str:
     return yaml.safe_dump(
         dict(fields), default_flow_style=True, sort_keys=False, allow_unicode=True, width=math.inf
     ).strip()
+
+
+# The date of the first sampled day, a Monday.
+MONDAY = date(2017, 1, 2).toordinal()
+
+
+def sample_persona(
+    fitted: FittedPersona, timeline: Timeline, days: int, seed: int = 0
+) -> tuple[I16, I16]:
+    """Return days drawn from a persona: for each minute a state and a place.
+
+    Returns:
+        Indices of `timeline.states`, and of `timeline.places`; int16 (days, 1440) each.
+    """
+    life = Life(fitted.persona, seed, "fit")
+    key = stream_key(seed, "fit", "up at night")
+    places = timeline.places
+    place_of = {n: places.index(timeline.states[s].place) for n, s in fitted.states.items()}
+    states = np.zeros((days + 2) * DAY_S, np.int16)
+    rooms = np.zeros((days + 2) * DAY_S, np.int16)
+    for day in range(days + 1):  # the first night is of the day before the first
+        ordinal = MONDAY - 1 + day
+        for i, doing in enumerate(life.day(ordinal)):
+            begin, end = day * DAY_S + doing.begin, day * DAY_S + doing.end
+            states[begin:end] = fitted.states[doing.activity]
+            rooms[begin:end] = place_of[doing.activity]
+            activity = fitted.persona.activity(doing.activity)
+            if activity.fetches is not None and activity.fetches_from[0] in places:
+                place = places.index(activity.fetches_from[0])
+                for first, last in _fetches(activity, doing, Draws(key, ordinal * 1024 + i)):
+                    rooms[day * DAY_S + first : day * DAY_S + last] = place
+    sample = slice(DAY_S + 30, (days + 1) * DAY_S + 30, 60)  # the middles of the minutes
+    return states[sample].reshape(-1, MINUTES), rooms[sample].reshape(-1, MINUTES)
+
+
+def _fetches(activity: Activity, doing: Doing, draws: Draws) -> list[tuple[int, int]]:
+    """Return begin and end [s] of each short trip during an activity, drawn as for residents."""
+    assert activity.fetches is not None
+    wait, takes = exponential(seconds(activity.fetches)), activity.fetch_takes.table()
+    times = []
+    now = doing.begin + wait.knots[draws.below(KNOTS)]
+    while now < doing.end:
+        end = now + takes.draw(draws)
+        if end < doing.end:
+            times.append((now, end))
+        now = end + wait.knots[draws.below(KNOTS)]
+    return times
+
+
+def sample_days(labels: I16, days: int, seed: int = 0) -> I16:
+    """Return copies of whole days, drawn with replacement, int16 (days, 1440)."""
+    draws = Draws(stream_key(seed, "fit", "whole days"), 0)
+    return labels[[draws.below(len(labels)) for _ in range(days)]]
+
+
+def sample_markov(labels: I16, count: int, days: int, seed: int = 0) -> I16:
+    """Return days of the first-order Markov chain of some days' minutes, int16 (days, 1440).
+
+    Its transition probabilities are the relative frequencies of the label in the next minute. The
+    first label is drawn by the frequency of the labels.
+    """
+    follows = np.zeros((count, count), np.int64)
+    known = (labels[:, :-1] >= 0) & (labels[:, 1:] >= 0)
+    np.add.at(follows, (labels[:, :-1][known], labels[:, 1:][known]), 1)
+    share = np.bincount(labels[labels >= 0], minlength=count)
+    for label in range(count):
+        if not follows[label].any():
+            follows[label] = share
+    limits: list[list[int]] = follows.cumsum(axis=1).tolist()
+    draws = Draws(stream_key(seed, "fit", "markov"), 0)
+    out = np.empty(days * MINUTES, np.int16)
+    at = bisect_right(share.cumsum().tolist(), draws.below(int(share.sum())))
+    for minute in range(len(out)):
+        out[minute] = at
+        at = bisect_right(limits[at], draws.below(limits[at][-1]))
+    return out.reshape(-1, MINUTES)
+
+
+MODELS = (
+    "the persona", "copies of whole days", "a first-order Markov chain",
+    "the days they were fitted on",
+)  # fmt: skip
+# Two distances that differ by less than this count as equal.
+EQUAL = 0.0005
+FOLDS = 3
+SAMPLED = 700  # the number of days drawn from a persona, whole weeks
+CHAIN_DAYS = 140  # the number of days drawn from the chain
+
+
+class Validation(NamedTuple):
+    """Distances to held-back days, averaged over the folds.
+
+    Attributes:
+        days: The number of days, each held back once.
+        folds: The number of parts that were held back in turn.
+        rooms: The distances of rooms, for each model of MODELS.
+        activities: The distances of activities, for each model of MODELS.
+    """
+
+    days: int
+    folds: int
+    rooms: tuple[Distances, ...]
+    activities: tuple[Distances, ...]
+
+    def worse_than_copying(self) -> list[str]:
+        """Return a line for each measure in which the persona is worse than days copied from a log.
+
+        The measures compare in which rooms somebody is with the days held back.
+        """
+        persona, copies = self.rooms[0], self.rooms[1]
+        keys = {"dwell times (KS)": "ks", "hours": "hours", "time shares": "share"}
+        return [
+            f"{name} {getattr(persona, key):.3f}, copies {getattr(copies, key):.3f}"
+            for name, key in keys.items()
+            if getattr(persona, key) > getattr(copies, key) + EQUAL
+        ]
+
+
+def validate(
+    timeline: Timeline, folds: int = FOLDS, seed: int = 0, *, model: Model = "recorded"
+) -> Validation:
+    """Fit a persona to a part of the days and compare it with the others, for each part in turn.
+
+    With three parts, every third day is held back, so that each part has early and late days.
+
+    Raises:
+        LogError: There are too few days to hold any back.
+    """
+    days = find_days(timeline)
+    if len(days) < 3:
+        raise LogError(
+            f"the log has {len(days)} whole days, with a night before and after: three are needed"
+            " at least, to hold one back"
+        )
+    folds = min(folds, len(days))
+    rooms, activities = [], []
+    for fold in range(folds):
+        held = days[fold::folds]
+        rest = [day for day in days if day not in held]
+        of_rooms, of_activities = _fold(timeline, rest, held, seed, model)
+        rooms.append(of_rooms)
+        activities.append(of_activities)
+    return Validation(len(days), folds, _mean(rooms), _mean(activities))
+
+
+def _fold(
+    timeline: Timeline, rest: Sequence[LivedDay], held: Sequence[LivedDay], seed: int, model: Model
+) -> tuple[tuple[Distances, ...], tuple[Distances, ...]]:
+    """Return how far the days of each model are from days held back: in rooms, in activities."""
+    fitted = fit_persona(timeline, rest, model=model)
+    states, rooms = sample_persona(fitted, timeline, SAMPLED, seed)
+    rest_days, held_days = ([day.number for day in part] for part in (rest, held))
+    place_count, state_count = len(timeline.places), len(timeline.states)
+    result = []
+    for sampled, labels, count in (
+        (rooms, timeline.rooms, place_count),
+        (states, timeline.minutes, state_count),
+    ):
+        real: I16 = labels[held_days]
+        copies = sample_days(labels[rest_days], SAMPLED, seed)
+        chain = sample_markov(labels[rest_days], count, CHAIN_DAYS, seed)
+        models = (sampled, copies, chain, labels[rest_days])
+        result.append(tuple(distances(real, other, count) for other in models))
+    return result[0], result[1]
+
+
+def _mean(folds: Sequence[tuple[Distances, ...]]) -> tuple[Distances, ...]:
+    """Return the mean distances of each model over the folds."""
+    return tuple(Distances(*row) for row in np.mean(np.array(folds), axis=0).tolist())

@@ -1,4 +1,4 @@
-"""Pictures of fits: time shares by hour and durations of stays, of the log and of the persona."""
+"""Pictures of fits: of a persona beside its log, and of probabilities beside observed shares."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -6,20 +6,22 @@ from typing import Any
 
 import numpy as np
 
-from fleet2d.fit.compare import by_hour, dwell_times, shares
-from fleet2d.fit.days import LivedDay
-from fleet2d.fit.persona import FittedPersona
-from fleet2d.fit.sample import sample_markov, sample_persona
-from fleet2d.fit.timeline import Timeline
+from fleet2d.errors import extra
+from fleet2d.fit.likelihood import wilson
+from fleet2d.fit.perception import Calibration, ProbabilityGroup, recognized
+from fleet2d.fit.persona import FittedPersona, sample_markov, sample_persona
+from fleet2d.fit.timeline import LivedDay, Timeline, by_hour, dwell_times, shares
+from fleet2d.kernels import F64, Bool
 from fleet2d.logs.log import AWAY
 from fleet2d.palette import OTHER_COLOR, ROOM_COLORS
+from fleet2d.pictures.floorplan import check_picture, drawing_style, save_figure
 
 SAMPLED = 140
 LABELS = ("log", "persona", "Markov chain")
 LINES = ("#222222", "#c2410c", "#9aa5b1")
 
 
-def draw_fit(
+def draw_persona(
     timeline: Timeline, days: Sequence[LivedDay], fitted: FittedPersona, target: Path, seed: int = 0
 ) -> None:
     """Draw the days of the log, of the persona and of a Markov chain next to each other.
@@ -75,3 +77,82 @@ def _draw_stays(panels: Sequence[Any], sets: Sequence[Any], timeline: Timeline) 
         axes.set_xlabel("stay [min]", fontsize=8)
     panels[0].set_ylabel("share of the stays\nthat are over")
     panels[0].legend(frameon=False, fontsize=7, loc="lower right")
+
+
+with extra("viz", "drawing needs matplotlib"):
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+
+BINS = 12
+LEAST = 10  # the least mean number of rows per bin
+FIT_COLOR, OBSERVED_COLOR = "#2b6cb0", "#3d4148"
+
+
+def draw_calibration(calibration: Calibration, target: Path) -> None:
+    """Draw a fit to a file.
+
+    Raises:
+        InputError: The name ends with neither `.png` nor `.svg`, or the file can't be written.
+    """
+    check_picture(target)
+    with drawing_style():
+        figure = _figure(calibration)
+        save_figure(figure, target)
+
+
+def _figure(calibration: Calibration) -> Figure:
+    """Return a figure with a panel for each quantity, and one of predicted against observed."""
+    log, shares = calibration.log, calibration.detection.fit.shares
+    panels: list[tuple[str, str, F64, Bool, F64]] = []
+    for label, values in (
+        ("distance [m]", log.distance),
+        ("angle off the optical axis [deg]", log.bearing),
+        ("turned away from the camera [deg]", log.orientation),
+    ):
+        if values is not None:
+            panels.append(("noticed", label, values, log.detected, shares))
+    if calibration.identity is not None:
+        distance, right = log.distance[log.detected], recognized(log)
+        fitted = calibration.identity.right.fit.shares
+        panels.append(("recognized, if noticed", "distance [m]", distance, right, fitted))
+    figure = Figure(figsize=(3.4 * (len(panels) + 1), 3.4), layout="constrained", dpi=150)
+    axes = figure.subplots(1, len(panels) + 1, squeeze=False)[0]
+    for panel, (outcome, label, values, hits, fitted) in zip(axes[:-1], panels, strict=True):
+        _draw_shares(panel, values, hits, fitted)
+        panel.set(xlabel=label, ylim=(0, 1.02), ylabel=outcome)
+    axes[0].legend(frameon=False, fontsize=8, loc="upper right")
+    _draw_groups(axes[-1], calibration.detection.groups)
+    for panel in axes:
+        panel.spines[["top", "right"]].set_visible(False)
+    figure.suptitle(f"{log.path.name}: {len(log)} times in view", fontsize=10)
+    return figure
+
+
+def _draw_shares(axes: Axes, values: F64, detected: Bool, shares: F64) -> None:
+    """Draw observed shares with their intervals, and the mean fitted share of the same rows."""
+    bins = min(BINS, max(1, len(values) // LEAST))
+    edges = np.quantile(values, np.linspace(0, 1, bins + 1))
+    index = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, bins - 1)
+    rows = []
+    for part in range(bins):
+        inside = index == part
+        if inside.any():
+            hit = wilson(int(detected[inside].sum()), int(inside.sum()))
+            ends = (hit.value - (hit.low or 0.0), (hit.high or 1.0) - hit.value)
+            rows.append((values[inside].mean(), hit.value, *ends, shares[inside].mean()))
+    x, y, below, above, fit = np.array(rows).T
+    axes.plot(x, fit, color=FIT_COLOR, lw=2, label="fitted")
+    axes.errorbar(
+        x, y, yerr=[below, above], fmt="o", ms=4, color=OBSERVED_COLOR, lw=1, label="observed, 95 %"
+    )
+
+
+def _draw_groups(axes: Axes, groups: list[ProbabilityGroup]) -> None:
+    """Draw observed against predicted probabilities, with intervals."""
+    axes.plot([0, 1], [0, 1], color="#b0b5bd", lw=1)
+    for group in groups:
+        low, high = group.observed.low or 0.0, group.observed.high or 1.0
+        axes.plot([group.predicted] * 2, [low, high], color=OBSERVED_COLOR, lw=1)
+        axes.plot(group.predicted, group.observed.value, "o", ms=4, color=OBSERVED_COLOR)
+    axes.set(xlabel="predicted", ylabel="observed", xlim=(0, 1), ylim=(0, 1))

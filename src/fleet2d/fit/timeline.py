@@ -1,4 +1,4 @@
-"""Timelines: the activity and the kind of room of a log in each minute of each day."""
+"""The days of a log minute by minute, and distances between sets of days."""
 
 from collections import Counter
 from dataclasses import dataclass
@@ -9,11 +9,11 @@ import numpy as np
 
 from fleet2d.configuration.units import micros
 from fleet2d.floorplan.rooms.vocabulary import room_type
-from fleet2d.kernels import I16
+from fleet2d.kernels import F64, I16, Bool
 from fleet2d.logs.log import AWAY, ActivityLog, LogError
-from fleet2d.logs.rooms import DOOR, USUAL
-from fleet2d.logs.visits import UNKNOWN, LoggedVisit, VisitRule, visits_of
+from fleet2d.logs.placement import DOOR, UNKNOWN, USUAL, LoggedVisit, VisitRule, visits_of
 from fleet2d.runtime.clock import DAY_S
+from fleet2d.runtime.determinism import sum_in_order
 
 MINUTES = 1440
 UNKNOWN_STATE = -1
@@ -171,3 +171,190 @@ def runs(labels: I16) -> list[tuple[int, int, int]]:
     return list(
         zip(labels[begins].tolist(), begins.tolist(), (ends - begins).tolist(), strict=True)
     )
+
+
+# Being up for up to this long in the night doesn't end the night [min].
+UP_AT_NIGHT = 60
+SHORTEST_NIGHT = 120  # min
+NOON = MINUTES // 2
+
+
+class Stretch(NamedTuple):
+    """A time without a change of state: the state, its first minute and number of minutes."""
+
+    state: int
+    begin: int
+    length: int
+
+
+class LivedDay(NamedTuple):
+    """A day from waking to bed; minutes count from the midnight of its date.
+
+    Attributes:
+        number: The number of its date in the log, from 0.
+        wake: Its beginning.
+        bed: Its end.
+        next_wake: The beginning of the next day.
+        awake: The known stretches from `wake` to `bed`.
+        up: The stretches out of bed in the night after it.
+    """
+
+    number: int
+    wake: int
+    bed: int
+    next_wake: int
+    awake: tuple[Stretch, ...]
+    up: tuple[Stretch, ...]
+
+
+def sleep_states(timeline: Timeline) -> set[int]:
+    """Return the states that are sleep; in a log without activities, being in the bedroom."""
+    named = {i for i, state in enumerate(timeline.states) if is_sleep(state)}
+    return named or {i for i, s in enumerate(timeline.states) if s.place == "bedroom"}
+
+
+def find_days(timeline: Timeline) -> list[LivedDay]:
+    """Return the days whose night before and night after are known."""
+    flat = timeline.minutes.ravel()
+    asleep = np.isin(flat, list(sleep_states(timeline)))
+    nights = _nights(asleep, len(timeline.minutes))
+    days = []
+    for number in range(len(timeline.minutes)):
+        before, after = nights.get(number - 1), nights.get(number)
+        if before is None or after is None or before[1] >= after[0]:
+            continue
+        midnight = number * MINUTES
+        awake = _runs(flat, before[1], after[0], midnight)
+        night = _runs(flat, after[0], after[1], midnight)
+        up = tuple(r for r in night if not asleep[midnight + r.begin])
+        wake, bed, next_wake = before[1] - midnight, after[0] - midnight, after[1] - midnight
+        days.append(LivedDay(number, wake, bed, next_wake, awake, up))
+    return days
+
+
+def _nights(asleep: Bool, days: int) -> dict[int, tuple[int, int]]:
+    """Return begin and end [min] of the night after each day: the longest sleep, if several.
+
+    Night -1 is the one before the first day.
+    """
+    sleeps = [[begin, begin + n] for value, begin, n in runs(asleep.astype(np.int16)) if value]
+    joined: list[list[int]] = []
+    for begin, end in sleeps:
+        if joined and begin - joined[-1][1] <= UP_AT_NIGHT:
+            joined[-1][1] = end
+        else:
+            joined.append([begin, end])
+    nights: dict[int, tuple[int, int]] = {}
+    for begin, end in joined:
+        number = ((begin + end) // 2 - NOON) // MINUTES
+        longest = nights.get(number, (0, SHORTEST_NIGHT - 1))
+        if -1 <= number < days and end - begin > longest[1] - longest[0]:
+            nights[number] = (begin, end)
+    return nights
+
+
+def _runs(flat: I16, begin: int, end: int, midnight: int) -> tuple[Stretch, ...]:
+    return tuple(
+        Stretch(state, begin - midnight + first, length)
+        for state, first, length in runs(flat[begin:end])
+        if state >= 0
+    )
+
+
+HOURS = 24
+FEWEST_STAYS = 5  # the fewest stays at a place whose durations are compared
+
+
+class Distances(NamedTuple):
+    """Distances between sets of days, 0 where they are alike.
+
+    Attributes:
+        share: Total variation between the shares of time, 0 to 1.
+        hours: The same hour by hour, on average over the hours of a day.
+        ks: Largest gap between the distribution functions of the durations of stays, 0 to 1.
+        stay_min: Wasserstein distance between those durations [min].
+    """
+
+    share: float
+    hours: float
+    ks: float
+    stay_min: float
+
+
+def distances(real: I16, other: I16, count: int) -> Distances:
+    """Return the distances between days, labels int16 (days, 1440), -1 where unknown.
+
+    Durations are compared place by place, weighted by the number of stays in the real days. Stays
+    that midnight cuts, or of which an end is unknown, are left out in both.
+    """
+    pairs = [
+        (times, other_times)
+        for times, other_times in zip(
+            dwell_times(real, count), dwell_times(other, count), strict=True
+        )
+        if len(times) >= FEWEST_STAYS
+    ]
+    total = max(sum(len(times) for times, _ in pairs), 1)
+    hours = zip(by_hour(real, count), by_hour(other, count), strict=True)
+    return Distances(
+        share=_variation(shares(real, count), shares(other, count)),
+        hours=float(np.mean([_variation(a, b) for a, b in hours])),
+        ks=sum_in_order(len(a) * ks_distance(a, b) for a, b in pairs) / total,
+        stay_min=sum_in_order(len(a) * wasserstein(a, b) for a, b in pairs) / total,
+    )
+
+
+def shares(labels: I16, count: int) -> F64:
+    """Return the share of each label in the known time, float64 (count,)."""
+    known = labels[labels >= 0]
+    return np.bincount(known, minlength=count) / max(len(known), 1)
+
+
+def by_hour(labels: I16, count: int) -> F64:
+    """Return the shares of the labels in each hour of the day, (24, count)."""
+    hours = labels.reshape(len(labels), HOURS, MINUTES // HOURS)
+    return np.stack([shares(hours[:, hour], count) for hour in range(HOURS)])
+
+
+def dwell_times(labels: I16, count: int) -> list[F64]:
+    """Return the durations of the complete stays at each label [min], sorted."""
+    times: list[list[int]] = [[] for _ in range(count)]
+    for day in labels:
+        parts = runs(day)
+        for i, (label, _, length) in enumerate(parts):
+            is_inside = 0 < i < len(parts) - 1
+            if label >= 0 and is_inside and min(parts[i - 1][0], parts[i + 1][0]) >= 0:
+                times[label].append(length)
+    return [np.sort(np.array(lengths, np.float64)) for lengths in times]
+
+
+def ks_distance(a: F64, b: F64) -> float:
+    """Return the Kolmogorov-Smirnov distance of two sorted samples; 1 if either is empty.
+
+    >>> ks_distance(np.array([1.0, 2.0]), np.array([1.0, 3.0]))
+    0.5
+    """
+    if not len(a) or not len(b):
+        return 1.0
+    points = np.concatenate([a, b])
+    below_a = np.searchsorted(a, points, side="right") / len(a)
+    below_b = np.searchsorted(b, points, side="right") / len(b)
+    return float(np.abs(below_a - below_b).max())
+
+
+def wasserstein(a: F64, b: F64) -> float:
+    """Return the Wasserstein distance of two sorted samples; an empty one counts as a single 0.
+
+    >>> wasserstein(np.array([1.0, 2.0]), np.array([2.0, 5.0]))
+    2.0
+    """
+    a, b = (sample if len(sample) else np.zeros(1) for sample in (a, b))
+    points = np.sort(np.concatenate([a, b]))
+    below_a = np.searchsorted(a, points[:-1], side="right") / len(a)
+    below_b = np.searchsorted(b, points[:-1], side="right") / len(b)
+    return float((np.abs(below_a - below_b) * np.diff(points)).sum())
+
+
+def _variation(a: F64, b: F64) -> float:
+    """Return the total variation between two distributions."""
+    return float(np.abs(a - b).sum() / 2)

@@ -25,8 +25,7 @@ from fleet2d.bounds import (
 from fleet2d.configuration.problems import did_you_mean
 from fleet2d.configuration.units import micros
 from fleet2d.kernels import F64, I64, Bool
-from fleet2d.logs.log import LogError, PositionLog
-from fleet2d.logs.times import parse_time
+from fleet2d.logs.log import LogError, PositionLog, parse_time
 from fleet2d.runtime.clock import DAY_US
 
 NAMES = {

@@ -6,8 +6,7 @@ from fleet2d.algorithms.algorithm import Present
 from fleet2d.algorithms.history import History
 from fleet2d.configuration.components import register
 from fleet2d.floorplan.home.home import Home
-from fleet2d.metrics.metric import Metric
-from fleet2d.metrics.pairs import pairs_of
+from fleet2d.metrics.metric import Metric, pairs_of
 
 
 @register("metric", "co_presence")

@@ -10,8 +10,7 @@ from fleet2d.algorithms.algorithm import Present
 from fleet2d.algorithms.history import History
 from fleet2d.configuration.components import register
 from fleet2d.floorplan.home.home import Home
-from fleet2d.metrics.metric import Metric
-from fleet2d.metrics.pairs import in_sight, pairs_of
+from fleet2d.metrics.metric import Metric, in_sight, pairs_of
 from fleet2d.runtime.clock import DAY_S
 
 # Hall's zones, by the distance at which they end [m].

@@ -1,14 +1,21 @@
-"""Metrics: components that measure a run. They know the truth, and no component reads them."""
+"""The base of metrics, and what they share: pairs of robot and user, curves of survival."""
 
-from collections.abc import Mapping, Set
+from collections.abc import Iterator, Mapping, Sequence, Set
 from datetime import timedelta
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
 
 from fleet2d.algorithms.algorithm import Present
 from fleet2d.algorithms.history import History
+from fleet2d.algorithms.log import BodyPoses
 from fleet2d.configuration.components import Component
 from fleet2d.configuration.units import PositiveDuration
 from fleet2d.floorplan.home.home import Home
+from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.kernels import F64, I64, Bool
+from fleet2d.kernels.sight import points_in_sight
+from fleet2d.runtime.determinism import sum_in_order
 
 
 class Metric(Component):
@@ -53,3 +60,102 @@ class Metric(Component):
     def summary(cls, result: Mapping[str, Any]) -> Mapping[str, Any]:
         """Return the part of a result that the closing table shows; all of it by default."""
         return result
+
+
+class RobotUserPair(NamedTuple):
+    """A robot and a user over some steps.
+
+    Attributes:
+        robot: The robot's name.
+        user: The user's name.
+        robot_poses: Poses of the robot.
+        user_poses: Poses of the user.
+    """
+
+    robot: str
+    user: str
+    robot_poses: BodyPoses
+    user_poses: BodyPoses
+
+    @property
+    def at_home(self) -> Bool:
+        """Whether both are at home at each step: bool (steps,)."""
+        return ~(self.robot_poses.away | self.user_poses.away)
+
+    @property
+    def distance(self) -> F64:
+        """Distance between the centres at each step [m]: float64 (steps,), infinite while away."""
+        gap = self.robot_poses.xy - self.user_poses.xy
+        return np.where(self.at_home, np.sqrt((gap * gap).sum(axis=1)), np.inf)
+
+
+def pairs_of(history: History, state: Present) -> Iterator[RobotUserPair]:
+    """Yield every robot with every user."""
+    for robot in state.robots:
+        for user in state.users:
+            yield RobotUserPair(robot, user, history.poses(robot), history.poses(user))
+
+
+def in_sight(plan: FloorPlan, pair: RobotUserPair, steps: I64) -> Bool:
+    """Return whether no wall of the plan is between the two at each of some steps: bool (n,).
+
+    Doors count as open, and furniture as too low to block the view.
+    """
+    robot_xy = plan.lattice.to_lattice(pair.robot_poses.xy[steps])
+    user_xy = plan.lattice.to_lattice(pair.user_poses.xy[steps])
+    places = np.concatenate([robot_xy, user_xy], axis=1)
+    is_visible = np.zeros(len(steps), np.bool_)
+    if not len(places):
+        return is_visible
+    has_moved = (places[1:] != places[:-1]).any(axis=1)
+    begins = [0, *(np.flatnonzero(has_moved) + 1).tolist()]
+    for begin, end in zip(begins, [*begins[1:], len(places)], strict=True):
+        x, y = robot_xy[begin].tolist()
+        is_visible[begin:end] = points_in_sight(plan.mesh, x, y, user_xy[[begin]])[0]
+    return is_visible
+
+
+def kaplan_meier(times: Sequence[float], happened: Sequence[bool]) -> list[tuple[float, float]]:
+    """Return the survival curve: the share without an event by each time of an event.
+
+    Kaplan and Meier, Journal of the American Statistical Association 53, 1958. A time censored at t
+    counts as at risk up to and including t.
+
+    Args:
+        times: The duration of each observation.
+        happened: Whether the event happened at its end; else the time is censored.
+
+    Returns:
+        (time, share) pairs, ascending: the share without an event up to and including the time.
+
+    Example:
+        >>> kaplan_meier([1.0, 2.0, 2.0, 5.0], [True, False, True, False])
+        [(1.0, 0.75), (2.0, 0.5)]
+    """
+    share, curve = 1.0, list[tuple[float, float]]()
+    for time in sorted({t for t, h in zip(times, happened, strict=True) if h}):
+        at_risk = sum(t >= time for t in times)
+        events = sum(t == time and h for t, h in zip(times, happened, strict=True))
+        share *= 1 - events / at_risk
+        curve.append((time, share))
+    return curve
+
+
+def quantile(curve: Sequence[tuple[float, float]], share: float) -> float | None:
+    """Return the first time by which the event has happened for a share; None if it never has.
+
+    >>> quantile([(1.0, 0.75), (2.0, 0.5)], 0.5)
+    2.0
+    """
+    return next((time for time, rest in curve if rest <= 1 - share + 1e-12), None)
+
+
+def restricted_mean(curve: Sequence[tuple[float, float]], until: float) -> float:
+    """Return the area under the curve up to a time: the mean of min(time, until).
+
+    >>> restricted_mean([(1.0, 0.75), (2.0, 0.5)], 4.0)
+    2.75
+    """
+    times = [0.0, *(min(time, until) for time, _ in curve), until]
+    shares = [1.0, *(share for _, share in curve)]
+    return sum_in_order((np.diff(times) * np.array(shares)).tolist())

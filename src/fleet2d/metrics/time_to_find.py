@@ -14,8 +14,7 @@ from fleet2d.configuration.units import Length, PositiveDuration
 from fleet2d.floorplan.home.home import Home
 from fleet2d.kernels import F64
 from fleet2d.kernels.sight import points_in_sight
-from fleet2d.metrics.metric import Metric
-from fleet2d.metrics.survival import kaplan_meier, quantile, restricted_mean
+from fleet2d.metrics.metric import Metric, kaplan_meier, quantile, restricted_mean
 from fleet2d.runtime.determinism import sum_in_order
 from fleet2d.runtime.events import Event
 from fleet2d.sight.camera import USUAL_RANGE_M

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from fleet2d.errors import extra
-from fleet2d.metrics.presence.rtp_score import GAPS
+from fleet2d.metrics.rtp_score import GAPS
 from fleet2d.paper import feedback, ltp_gap, rtp_gap, speed
 from fleet2d.paper.months import interval
 from fleet2d.paper.result import Result

@@ -9,7 +9,7 @@ robot on patrol.
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from fleet2d.metrics.presence.rtp_score import ALL, GAPS
+from fleet2d.metrics.rtp_score import ALL, GAPS
 from fleet2d.paper.months import USER, OnProgress, PaperOptions, interval, month, run_study
 from fleet2d.paper.result import Result, Table, counted
 

@@ -9,7 +9,7 @@ import numpy as np
 from fleet2d.algorithms.presence.belief import ANYONE
 from fleet2d.errors import ArtifactError
 from fleet2d.kernels import F64, I64
-from fleet2d.metrics.presence.scores import (
+from fleet2d.metrics.rtp_score import (
     calibration_error,
     classwise_error,
     reliability_curve,

@@ -22,7 +22,7 @@ from fleet2d.studies.specification import SEED, Specification
 
 DIGITS = 32  # hexadecimal digits of a hash
 # Packages that run, show or evaluate simulations without changing their results.
-_LEAVES = ("studies", "cli", "pictures", "viewer", "paper", "fit", "calibrate", "published")
+_LEAVES = ("studies", "cli", "pictures", "viewer", "paper", "fit", "published")
 _SUFFIXES = (".py", ".so", ".yaml", ".json")
 _NO_EFFECT = ("max_span", "speedup")  # keys of `simulation` that change no result
 

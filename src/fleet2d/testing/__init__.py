@@ -7,15 +7,15 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from fleet2d.testing.algorithms import check_algorithm as check_algorithm
+    from fleet2d.testing.checks import check_algorithm as check_algorithm
+    from fleet2d.testing.checks import check_perception_error as check_perception_error
     from fleet2d.testing.claim import trial as trial
-    from fleet2d.testing.perception_errors import check_perception_error as check_perception_error
     from fleet2d.testing.trials import Trial as Trial
 
 _MODULE_OF = {
     "Trial": "trials",
-    "check_algorithm": "algorithms",
-    "check_perception_error": "perception_errors",
+    "check_algorithm": "checks",
+    "check_perception_error": "checks",
     "trial": "claim",
 }
 

@@ -49,8 +49,7 @@ def falsify(
 ) -> None:
     """Look for a home, a household, a timing or a seed that breaks what is expected."""
     from fleet2d.studies.api import make_executor
-    from fleet2d.testing.search import FailureSearch, TryJob
-    from fleet2d.testing.space import parse_over, read_space
+    from fleet2d.testing.search import FailureSearch, TryJob, parse_over, read_space
 
     if out.exists():
         raise RunDirectoryError(f"{out} exists already: name another file by --out")
@@ -126,7 +125,7 @@ def _check_expects(subject: "Subject", target: str) -> None:
 
 def describe_failure(failure: "FailingPoint", job: "TryJob", target: str, out: Path) -> list[str]:
     """Write the failing scenario, and its run beside it; return the lines of a report."""
-    from fleet2d.testing.failure import describe_trial
+    from fleet2d.testing.trials import describe_trial
 
     trial = job.run(failure.point, failure.seed)
     command = f"fleet2d test {out}"

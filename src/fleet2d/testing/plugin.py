@@ -12,7 +12,7 @@ import pytest
 
 if TYPE_CHECKING:
     from fleet2d.testing.claim import Claim
-    from fleet2d.testing.running import Body
+    from fleet2d.testing.trials import Body
 
 PROPERTY = "fleet2d"
 """The property of a test that holds the decision, also in JUnit XML."""
@@ -70,8 +70,7 @@ def pytest_pyfunc_call(pyfuncitem: pytest.Function) -> bool | None:
             pytest.fail("a test with `trial` needs @fleet2d.testing.trial(…)", pytrace=False)
         return None
     from fleet2d.testing.claim import SetUpError
-    from fleet2d.testing.failure import FailureFolder, explain
-    from fleet2d.testing.running import run_claim
+    from fleet2d.testing.trials import FailureFolder, explain, run_claim
 
     # pytest shows the lines of the test, but not those of its call to `fail`.
     __tracebackhide__ = _is_error

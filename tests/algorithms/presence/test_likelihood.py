@@ -27,7 +27,7 @@ from fleet2d.algorithms.presence.likelihood import Likelihood
 from fleet2d.algorithms.presence.people import DayEvidence
 from fleet2d.algorithms.presence.sighting_share import SightingShare
 from fleet2d.kernels import F64, I64
-from fleet2d.metrics.presence.distances import total_variation
+from fleet2d.metrics.ltp_error import total_variation
 
 
 def test_anyone_is_where_not_everybody_is_missing() -> None:

@@ -28,7 +28,7 @@ from fleet2d.algorithms.presence.chain_model import (
 from fleet2d.algorithms.presence.exposure_ratio import ExposureRatio
 from fleet2d.algorithms.presence.model import HourOfWeek, LastSeen, LongTerm, Model
 from fleet2d.configuration.components import components
-from fleet2d.metrics.presence.scores import log_loss
+from fleet2d.metrics.rtp_score import log_loss
 
 CHAINS = [MarkovDecay, Filter, SemiMarkov, RoutineModel]
 ALL = list(components("presence_model").values())

@@ -125,7 +125,7 @@ def main() -> None:
     from fleet2d.algorithms.presence.exposure_ratio import ExposureRatio
     from fleet2d.algorithms.presence.likelihood import Likelihood
     from fleet2d.algorithms.presence.sighting_share import SightingShare
-    from fleet2d.metrics.presence.distances import total_variation
+    from fleet2d.metrics.ltp_error import total_variation
 
     for policy in (patrol, hangout, follow):
         errors = []

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import pytest
-from tests.logs.test_read import ADLS, CASAS, HOMER, SENSORS
+from tests.logs.test_log import ADLS, CASAS, HOMER, SENSORS
 
 from fleet2d.logs import LogError, read_log
 from fleet2d.logs.layouts import layout_names, layout_of

@@ -27,11 +27,19 @@ from fleet2d.kernels.motion import time_route
 from fleet2d.kernels.numbers import TURN, heading_of
 from fleet2d.kernels.sight import line_of_sight
 from fleet2d.kernels.space import locate
-from fleet2d.logs.frame import Frame
-from fleet2d.logs.log import AWAY, ActivityLog, LogError, PositionLog
-from fleet2d.logs.read import Layout, read_log
-from fleet2d.logs.rooms import DOOR, RoomChoice, map_rooms
-from fleet2d.logs.visits import UNKNOWN, LoggedVisit, LoggedVisits, VisitRule, visits_of
+from fleet2d.logs import Layout
+from fleet2d.logs.log import AWAY, ActivityLog, LogError, PositionLog, read_log
+from fleet2d.logs.placement import (
+    DOOR,
+    UNKNOWN,
+    LogFrame,
+    LoggedVisit,
+    LoggedVisits,
+    RoomChoice,
+    VisitRule,
+    map_rooms,
+    visits_of,
+)
 from fleet2d.runtime.clock import DAY_US, midnight_of
 from fleet2d.runtime.determinism import sum_in_order
 
@@ -73,7 +81,7 @@ def report_rooms(
 
 
 def report_fixes(
-    log: PositionLog, fixes: "Fixes", follower: "FixFollower", thinned: int, frame: Frame
+    log: PositionLog, fixes: "Fixes", follower: "FixFollower", thinned: int, frame: LogFrame
 ) -> tuple[str, ...]:
     """Return lines about a log of positions: omitted and moved fixes, gaps, implausible legs."""
     lines = [_head(log, len(log.time_us), "fixes"), *log.notes]
@@ -533,7 +541,7 @@ class Replay(Behavior):
     columns: dict[str, str] = Field(default={})
     time_zone: str | None = None
     sort: bool = False
-    frame: Frame = Frame()
+    frame: LogFrame = LogFrame()
     rooms: RoomMap = Field(default={})
     day: int | Literal["date", "weekday"] = 0
     gaps: Literal["unknown", "hold", "walk"] = "unknown"

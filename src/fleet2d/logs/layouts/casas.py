@@ -13,8 +13,7 @@ from collections import Counter
 from pathlib import Path
 
 from fleet2d.bounds import one_line
-from fleet2d.logs.log import ActivityLog, LogError, Reading, in_order, log_lines
-from fleet2d.logs.times import parse_time, since
+from fleet2d.logs.log import ActivityLog, LogError, Reading, in_order, log_lines, parse_time, since
 
 LINE = re.compile(r"(\d{4}-\d\d?-\d\d?)\s+(\d+:\S+)\s+(\S+)\s+(\S+)\s+(\S+)(?:\s+(.*))?")
 ON = frozenset({"ON", "OPEN", "PRESENT"})

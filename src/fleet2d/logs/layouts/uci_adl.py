@@ -17,8 +17,16 @@ from pathlib import Path
 from typing import NamedTuple
 
 from fleet2d.bounds import one_line
-from fleet2d.logs.log import AWAY, ActivityLog, LogError, Reading, in_order, log_lines
-from fleet2d.logs.times import parse_time, since
+from fleet2d.logs.log import (
+    AWAY,
+    ActivityLog,
+    LogError,
+    Reading,
+    in_order,
+    log_lines,
+    parse_time,
+    since,
+)
 
 _TIME = r"(\d{4}-\d\d?-\d\d?\s+\d+:\S+)"
 LINE = re.compile(rf"{_TIME}\s+{_TIME}\s+(.*)")

@@ -1,7 +1,8 @@
-"""Errors of long-term presence against the true occupancy of rooms."""
+"""Errors of long-term presence: distances of the estimate from the true occupancy of rooms."""
 
 import math
 from collections.abc import Mapping, Sequence
+from datetime import timedelta
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -9,28 +10,225 @@ from pydantic import Field
 
 from fleet2d.algorithms.algorithm import Present
 from fleet2d.algorithms.history import History
-from fleet2d.algorithms.presence.belief import ANYONE, Presence
+from fleet2d.algorithms.observations import NOWHERE
+from fleet2d.algorithms.presence.belief import ANYONE, HOURS, Presence
+from fleet2d.algorithms.presence.estimator import LN_2, natural_log
 from fleet2d.configuration.components import register
-from fleet2d.configuration.units import PositiveDuration, Share
+from fleet2d.configuration.units import PositiveDuration, Share, micros
+from fleet2d.floorplan.cache import read_only
 from fleet2d.floorplan.home.home import Home
-from fleet2d.kernels import F64, I64
+from fleet2d.floorplan.home.space import Space
+from fleet2d.kernels import F64, I64, Bool
+from fleet2d.kernels.presence import earth_mover as minimal_cost
+from fleet2d.kernels.space import SUB
+from fleet2d.metrics.belief_reader import presence_of
 from fleet2d.metrics.metric import Metric
-from fleet2d.metrics.presence.belief_reader import presence_of
-from fleet2d.metrics.presence.distances import (
-    earth_mover,
-    jensen_shannon,
-    kl_divergence,
-    rank_correlation,
-    room_gaps,
-    total_variation,
-)
-from fleet2d.metrics.presence.occupancy import (
-    shares,
-    steps_by_hour,
-    steps_in_places,
-    walking_distances,
-)
-from fleet2d.runtime.clock import DAY_S
+from fleet2d.runtime.clock import DAY_S, HOUR_US, midnight_of
+
+
+def total_variation(truth: F64, estimate: F64) -> F64:
+    """Return 1/2 sum |p - q|: the largest difference in probability of any set of rooms, 0 to 1.
+
+    Like the other distances, it sums over the last axis.
+
+    Example:
+        >>> float(total_variation(np.array([0.5, 0.5]), np.array([0.75, 0.25])))
+        0.25
+    """
+    return np.abs(truth - estimate).sum(axis=-1) / 2
+
+
+def kl_divergence(truth: F64, estimate: F64, alpha: float = 1e-3) -> F64:
+    """Return sum p ln(p / q') in nats, with q' = (q + alpha) / (1 + alpha rooms).
+
+    p is the truth and q the estimate; the smoothing by `alpha` keeps it finite where an estimate
+    has ruled out a room. Rooms with p = 0 add nothing. At least 0 up to rounding, and above 0
+    even where p = q, by less than alpha times the number of rooms.
+
+    Example:
+        >>> float(kl_divergence(np.array([1.0, 0.0]), np.array([0.5, 0.5])).round(4))
+        0.6931
+    """
+    smoothed = (estimate + alpha) / (1 + alpha * estimate.shape[-1])
+    return _relative_entropy(truth, smoothed)
+
+
+def jensen_shannon(truth: F64, estimate: F64) -> F64:
+    """Return 1/2 KL(p || m) + 1/2 KL(q || m) with m = (p + q) / 2, to base 2: from 0 to 1.
+
+    Example:
+        >>> float(jensen_shannon(np.array([1.0, 0.0]), np.array([0.0, 1.0])))
+        1.0
+    """
+    middle = (truth + estimate) / 2
+    both = _relative_entropy(truth, middle) + _relative_entropy(estimate, middle)
+    return np.clip(both / (2 * LN_2), 0.0, 1.0)
+
+
+def _relative_entropy(p: F64, q: F64) -> F64:
+    is_positive = p > 0
+    ratio = np.where(is_positive, p, 1) / np.where(is_positive, q, 1)
+    return (p * natural_log(ratio)).sum(axis=-1)
+
+
+def room_gaps(truth: F64, estimate: F64) -> F64:
+    """Return |p - q| of each room."""
+    return np.abs(truth - estimate)
+
+
+def earth_mover(truth: F64, estimate: F64, cost: F64) -> F64:
+    """Return the least mean distance by which one distribution is moved onto the other.
+
+    The minimum of sum f_ij cost_ij over flows f >= 0 from room to room that turn q into p. Solved
+    exactly, by successive shortest paths; mass that both have in a room stays.
+
+    Args:
+        truth: float64 (..., rooms), each sums to one.
+        estimate: float64 (..., rooms), each sums to one.
+        cost: float64 (rooms, rooms), finite, distances on foot [m]; 0 on the diagonal, and the
+            triangle inequality holds.
+
+    Example:
+        >>> metres = np.array([[0.0, 4, 9], [4, 0, 5], [9, 5, 0]])
+        >>> float(earth_mover(np.array([0.5, 0.5, 0]), np.array([0.5, 0, 0.5]), metres))
+        2.5
+    """
+    rooms = len(cost)
+    moved = minimal_cost(estimate.reshape(-1, rooms), truth.reshape(-1, rooms), cost)
+    return moved.reshape(truth.shape[:-1])
+
+
+def rank_correlation(truth: F64, estimate: F64) -> F64:
+    """Return the rank correlation of the rooms: Kendall's tau, -1 to 1.
+
+    (concordant - discordant) / pairs, over the pairs of rooms that differ in truth; pairs tied in
+    the estimate are neither (Somers' D of the estimate given the truth: without ties Kendall's
+    tau). So it can be 1 with rooms that are never used. It is 1 if no rooms differ in truth.
+
+    Example:
+        >>> float(rank_correlation(np.array([0.6, 0.4, 0, 0]), np.array([0.5, 0.3, 0.2, 0])))
+        1.0
+        >>> float(rank_correlation(np.array([0.5, 0.3, 0.2]), np.array([0.5, 0.2, 0.3])).round(4))
+        0.3333
+    """
+    true = np.sign(truth[..., :, None] - truth[..., None, :])
+    signs = true * np.sign(estimate[..., :, None] - estimate[..., None, :])
+    pairs, balance = np.abs(true).sum(axis=(-2, -1)), signs.sum(axis=(-2, -1))
+    return np.where(pairs > 0, balance / np.maximum(pairs, 1), 1.0)
+
+
+# Clearance that a person needs to walk from room to room [m].
+RADIUS = 0.2
+
+
+def steps_in_places(history: History, state: Present) -> I64:
+    """Return the number of steps that each user was in each place: int64 (users + 1, rooms + 1).
+
+    The last column is away. The last row is for anyone: steps with somebody in the room, and last
+    with nobody at home.
+    """
+    rooms, users = len(state.home.rooms), state.users
+    counts = np.zeros((len(users) + 1, rooms + 1), np.int64)
+    for row, user in enumerate(users):
+        counts[row] = history.poses(user).time_in_rooms
+    if not users:
+        counts[-1, -1] = len(history)
+    elif len(users) == 1:
+        counts[-1] = counts[0]
+    else:
+        visits = [history.poses(user).visits for user in users]
+        begin, end, room = (np.concatenate(column) for column in zip(*visits, strict=True))
+        is_home = room != NOWHERE
+        begin, end, room = begin[is_home], end[is_home], room[is_home].astype(np.int64)
+        counts[-1, :-1] = _steps_in_any(begin, end, room, rooms)
+        counts[-1, -1] = len(history) - _steps_in_any(begin, end, 0 * room, 1)[0]
+    return counts
+
+
+def _steps_in_any(begin: I64, end: I64, group: I64, groups: int) -> I64:
+    """Return the number of steps in any stretch of each group, whose stretches may overlap."""
+    span = int(end.max(initial=0)) + 1
+    ends = np.concatenate([2 * (group * span + begin) + 1, 2 * (group * span + end)])
+    ends.sort()  # odd: a beginning; each group has as many ends as beginnings
+    is_in_any = np.cumsum(2 * (ends & 1) - 1)[:-1] > 0
+    at = ends >> 1
+    steps = np.zeros(groups, np.int64)
+    np.add.at(steps, at[:-1] // span, np.where(is_in_any, np.diff(at), 0))
+    return steps
+
+
+def steps_by_hour(history: History, state: Present) -> I64:
+    """Return the same by hour of the week: int64 (168, users + 1, rooms + 1)."""
+    rooms, users = len(state.home.rooms), state.users
+    counts = np.zeros((HOURS, len(users) + 1, rooms + 1), np.int64)
+    hour = hours_of_week(history, state)
+    for row, user in enumerate(users):
+        room = history.poses(user).room.astype(np.int64)
+        place = np.where(room == NOWHERE, rooms, room)
+        steps = np.bincount(hour * (rooms + 1) + place, minlength=HOURS * (rooms + 1))
+        counts[:, row] = steps.reshape(HOURS, rooms + 1)
+    first = np.concatenate([[0], np.flatnonzero(np.diff(hour)) + 1])
+    steps = np.add.reduceat(_anybody(history, state), first, axis=0, dtype=np.int64)
+    np.add.at(counts[:, -1], hour[first], steps)
+    return counts
+
+
+def hours_of_week(history: History, state: Present) -> I64:
+    """Return the hour of the week, from Monday 00:00, of each step of a history."""
+    monday = midnight_of(state.start)
+    monday -= timedelta(days=monday.weekday())
+    start_us = micros(state.start - monday)
+    steps = np.arange(history.first, history.end, dtype=np.int64)
+    return (start_us + steps * round(history.step_s * 1e6)) // HOUR_US % HOURS
+
+
+def _anybody(history: History, state: Present) -> Bool:
+    """Return whether each room had somebody in it, last nobody at home: bool (steps, rooms + 1)."""
+    change = np.zeros((len(history) + 1, len(state.home.rooms) + 1), np.int32)
+    for user in state.users:
+        begin, end, room = history.poses(user).visits
+        np.add.at(change, (begin, room), 1)  # NOWHERE is -1: the last column
+        np.add.at(change, (end, room), -1)
+    is_occupied: Bool = np.cumsum(change[:-1], axis=0) > 0
+    is_occupied[:, -1] = ~is_occupied[:, :-1].any(axis=1)
+    return is_occupied
+
+
+def shares(counts: I64, steps: float) -> tuple[F64, F64]:
+    """Return counts as shares of rooms given at home, NaN without any time there, and of away."""
+    rooms = counts[..., :-1].astype(np.float64)
+    total = rooms.sum(axis=-1, keepdims=True)
+    home = np.where(total > 0, rooms / np.where(total > 0, total, 1), np.nan)
+    return home, counts[..., -1] / max(steps, 1)
+
+
+def walking_distances(home: Home) -> F64:
+    """Return the distance on foot between the middles of each two rooms [m].
+
+    Without a route between them it is twice the longest distance.
+
+    Returns:
+        float64 (rooms, rooms), symmetric, read-only.
+    """
+    space = home.space(RADIUS)
+    return home.cached(("walking distances", space), lambda: read_only(_distances(home, space)))
+
+
+def _distances(home: Home, space: Space) -> F64:
+    lattice = home.plan.lattice
+    places = []
+    for room in home.rooms:
+        x, y = lattice.point_at(room.anchor_xy)
+        places.append(space.nearest(x, y, None, room.index) or (x, y))
+    columns, rows = np.array(places, np.int64).reshape(-1, 2).T // SUB
+    metres = np.array([space.distance_field(np.array([place]))[rows, columns] for place in places])
+    metres = np.minimum(metres, metres.T)
+    is_reachable = np.isfinite(metres)
+    longest = float(metres[is_reachable].max(initial=0.0)) or 1.0
+    metres = np.where(is_reachable, metres, 2 * longest)
+    np.fill_diagonal(metres, 0)
+    return metres
+
 
 MEAN = "mean"
 SHOWN = ("tv", "earth_mover_m", "inside", "burn_in_day")  # in the closing table

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from fleet2d.calibrate.log import DetectionLog
+from fleet2d.fit.perception import DetectionLog
 from fleet2d.kernels import F64
 
 TRUE = {

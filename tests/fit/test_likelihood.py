@@ -2,11 +2,10 @@
 
 import numpy as np
 import pytest
-from tests.calibrate.logs import TRUE, shares, simulated
+from tests.fit.detection_logs import TRUE, shares, simulated
 from tests.thorough import some
 
-from fleet2d.calibrate.factors import Constant, Falling, Orientation
-from fleet2d.calibrate.likelihood import ProductLikelihood, wilson
+from fleet2d.fit.likelihood import Constant, Falling, Orientation, ProductLikelihood, wilson
 from fleet2d.kernels import F64
 
 

@@ -14,7 +14,7 @@ import fleet2d
 from fleet2d.algorithms.presence.belief import Presence
 from fleet2d.errors import Fleet2DError
 from fleet2d.floorplan.home.home import Home
-from fleet2d.metrics.presence.occupancy import walking_distances
+from fleet2d.metrics.ltp_error import walking_distances
 
 ROOMS = [
     f"{name}_0" for name in ("living_room", "kitchen", "bedroom", "bathroom", "storage", "unknown")
@@ -251,7 +251,7 @@ def test_an_output_that_is_no_presence_is_refused() -> None:
 
 
 def test_burn_in_ends_where_the_error_stays_small() -> None:
-    from fleet2d.metrics.presence.ltp_error import LtpError
+    from fleet2d.metrics.ltp_error import LtpError
 
     metric = LtpError(of="ltp")
     metric.last, metric.within, metric.best, metric.days = {}, {}, {}, 0.0

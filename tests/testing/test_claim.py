@@ -7,7 +7,7 @@ import pytest
 
 from fleet2d.errors import InputError
 from fleet2d.kernels import Bool
-from fleet2d.testing.rate import RateTest, rate_test
+from fleet2d.testing.claim import RateTest, rate_test
 
 DECISIONS = 10_000
 CLAIMS = [(100, 0.95), (30, 0.9), (60, 0.5), (40, 1.0), (300, 0.98)]

@@ -12,22 +12,28 @@ from tests.thorough import some
 from fleet2d import cli
 from fleet2d.configuration.documents import read_document
 from fleet2d.fit.command import fit_routine
-from fleet2d.fit.compare import (
+from fleet2d.fit.persona import (
+    Validation,
+    fit_persona,
+    sample_markov,
+    sample_persona,
+    to_yaml,
+    validate,
+)
+from fleet2d.fit.timeline import (
+    MINUTES,
     Distances,
+    Timeline,
     by_hour,
     distances,
     dwell_times,
+    find_days,
     ks_distance,
+    read_timeline,
     shares,
     wasserstein,
 )
-from fleet2d.fit.days import find_days
-from fleet2d.fit.persona import fit_persona, to_yaml
-from fleet2d.fit.sample import sample_markov, sample_persona
-from fleet2d.fit.timeline import MINUTES, Timeline, read_timeline
-from fleet2d.fit.validate import Validation, validate
-from fleet2d.logs.log import ActivityLog, LogError
-from fleet2d.logs.read import read_log
+from fleet2d.logs.log import ActivityLog, LogError, read_log
 from fleet2d.routines.persona import Persona, read_persona
 from fleet2d.runtime.determinism import Draws, stream_key
 

@@ -15,8 +15,7 @@ import fleet2d
 from fleet2d.errors import Fleet2DError, InputError
 from fleet2d.studies.executors import SerialExecutor
 from fleet2d.testing import command
-from fleet2d.testing.search import FailureSearch
-from fleet2d.testing.space import parse_over, read_space
+from fleet2d.testing.search import FailureSearch, parse_over, read_space
 
 pytest.importorskip("optuna")
 

@@ -5,14 +5,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
-from tests.calibrate.logs import TRUE, falling, simulated, write
+from tests.fit.detection_logs import TRUE, falling, simulated, write
 from tests.scenes import run
 from tests.sight.watching import LATTICE, Watch, agree, around
 
-from fleet2d.calibrate.command import calibrate_perception, fragment, report
-from fleet2d.calibrate.log import DetectionLog, read_log
-from fleet2d.calibrate.perception import calibrate
 from fleet2d.errors import InputError
+from fleet2d.fit.command import calibrate_perception, fragment, report
+from fleet2d.fit.perception import DetectionLog, calibrate, read_log
 from fleet2d.kernels.sight import SightingColumn as Column
 from fleet2d.scenario.model import load_scenario
 from fleet2d.sight.camera import Camera, TableContext, error_tables

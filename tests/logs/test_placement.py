@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from fleet2d.logs.frame import Frame
+from fleet2d.logs.placement import LogFrame
 
 NUMBER = st.floats(-50, 50)
 
@@ -20,23 +20,23 @@ NUMBER = st.floats(-50, 50)
 def test_a_frame_does_what_complex_numbers_do_and_matches_find_it_again(
     scale: float, degrees: float, flip: bool, origin: tuple[float, float]
 ) -> None:
-    frame = Frame(scale=scale, rotation_deg=degrees, flip_y=flip, origin=origin)
+    frame = LogFrame(scale=scale, rotation_deg=degrees, flip_y=flip, origin=origin)
     log = np.array([[0.0, 0.0], [10.0, 0.0], [3.0, 7.0]])
     z = log[:, 0] + 1j * (-log[:, 1] if flip else log[:, 1])
     w = scale * np.exp(1j * np.radians(degrees)) * z + complex(*origin)
     expected = np.stack([w.real, w.imag], 1)
     assert expected == pytest.approx(frame.to_plan(log), abs=1e-9 * (1 + scale))
     matches = [{"log": a, "plan": b} for a, b in zip(log.tolist(), expected.tolist(), strict=True)]
-    fitted = Frame(flip_y=flip, matches=matches)
+    fitted = LogFrame(flip_y=flip, matches=matches)
     assert expected == pytest.approx(fitted.to_plan(log), abs=1e-6 * (1 + scale))
     assert fitted.errors().max() < 1e-6 * (1 + scale)
 
 
 def test_headings_turn_and_mirror_with_the_frame() -> None:
     east, north = 0.0, 0.25
-    turned = Frame(rotation_deg=90).turn_headings(np.array([east, north]))
+    turned = LogFrame(rotation_deg=90).turn_headings(np.array([east, north]))
     assert [0.25, 0.5] == pytest.approx(turned.tolist())
-    mirrored = Frame(flip_y=True).turn_headings(np.array([east, north]))
+    mirrored = LogFrame(flip_y=True).turn_headings(np.array([east, north]))
     assert [0.0, -0.25] == pytest.approx(mirrored.tolist())
 
 
@@ -52,4 +52,4 @@ def test_a_frame_that_says_too_much_or_too_little_is_refused(
     settings: dict[str, object], message: str
 ) -> None:
     with pytest.raises(ValidationError, match=message):
-        Frame.model_validate(settings)
+        LogFrame.model_validate(settings)

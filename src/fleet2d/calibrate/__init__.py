@@ -1,1 +1,0 @@
-"""Calibration: models fitted to logs of real devices; the core never imports it."""

@@ -1,1 +1,0 @@
-"""Metrics of presence: errors of long-term presence, and scores of real-time presence."""
