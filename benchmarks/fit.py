@@ -14,7 +14,8 @@ from fleet2d.fit.command import table
 from fleet2d.fit.persona import fit_persona, sample_persona, validate
 from fleet2d.fit.picture import SAMPLED, draw_persona
 from fleet2d.fit.timeline import find_days, read_timeline, shares
-from fleet2d.logs.log import ActivityLog, read_log
+from fleet2d.logs.layouts import read_log
+from fleet2d.logs.log import ActivityLog
 
 LOGS = {
     "casas_al": "casas_al/events_10_days.txt",

@@ -13,7 +13,8 @@ import numpy as np
 
 from fleet2d.fit.timeline import read_seconds, runs
 from fleet2d.kernels import I16
-from fleet2d.logs.log import AWAY, ActivityLog, LogError, read_log
+from fleet2d.logs.layouts import read_log
+from fleet2d.logs.log import AWAY, ActivityLog, LogError
 
 DAY_S, HOUR_S = 86_400, 3_600
 # A shorter time in a room is not counted as a visit [s].

@@ -11,7 +11,7 @@ from tests.sight.watching import LATTICE, Watch, agree, around
 
 from fleet2d.errors import InputError
 from fleet2d.fit.command import calibrate_perception, fragment, report
-from fleet2d.fit.perception import DetectionLog, calibrate, read_log
+from fleet2d.fit.perception import DetectionLog, calibrate, read_detections
 from fleet2d.kernels.sight import SightingColumn as Column
 from fleet2d.scenario.model import load_scenario
 from fleet2d.sight.camera import Camera, TableContext, error_tables
@@ -165,8 +165,10 @@ GOOD = {"distance": [1.0] * ROWS, "detected": [0, 1] * (ROWS // 2)}
 
 
 def test_angles_are_read_in_the_unit_that_their_column_tells(tmp_path: Path) -> None:
-    degrees = read_log(write(tmp_path / "a.csv", **GOOD, bearing_deg=[-30, 350] * (ROWS // 2)))
-    radians = read_log(
+    degrees = read_detections(
+        write(tmp_path / "a.csv", **GOOD, bearing_deg=[-30, 350] * (ROWS // 2))
+    )
+    radians = read_detections(
         write(tmp_path / "b.csv", **GOOD, bearing_rad=[-np.pi / 6, np.pi] * (ROWS // 2))
     )
     assert degrees.bearing is not None
@@ -209,7 +211,7 @@ def test_wrong_logs_are_errors_that_say_where_and_what(
     tmp_path: Path, columns: dict[str, list[object]], words: list[str]
 ) -> None:
     with pytest.raises(InputError) as caught:
-        read_log(write(tmp_path / "log.csv", **columns))
+        read_detections(write(tmp_path / "log.csv", **columns))
     for word in words:
         assert word in str(caught.value)
 
@@ -232,9 +234,9 @@ def test_a_picture_of_the_smallest_log_is_drawn_and_one_of_another_kind_refused(
 def test_a_file_that_is_no_text_is_an_error(tmp_path: Path) -> None:
     (tmp_path / "log.csv").write_bytes(b"\xff\xfed\x00")
     with pytest.raises(InputError, match="not text in UTF-8"):
-        read_log(tmp_path / "log.csv")
+        read_detections(tmp_path / "log.csv")
 
 
 def test_a_log_that_is_not_there_is_an_error(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="can't be read"):
-        read_log(tmp_path / "none.csv")
+        read_detections(tmp_path / "none.csv")

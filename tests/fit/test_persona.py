@@ -33,7 +33,8 @@ from fleet2d.fit.timeline import (
     shares,
     wasserstein,
 )
-from fleet2d.logs.log import ActivityLog, LogError, read_log
+from fleet2d.logs.layouts import read_log
+from fleet2d.logs.log import ActivityLog, LogError
 from fleet2d.routines.persona import Persona, read_persona
 from fleet2d.runtime.determinism import Draws, stream_key
 

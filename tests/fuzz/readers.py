@@ -17,16 +17,16 @@ import yaml
 from hypothesis import strategies as st
 from tests.floorplan.test_damaged_files import FORMATS, PGM
 from tests.fuzz.changes import lines, pieces, structures
-from tests.logs.test_log import ADLS, CASAS, HOMER, SENSORS
+from tests.logs.layouts.test_reading import ADLS, CASAS, HOMER, SENSORS
 from tests.scenes import flat_document, scenario
 
 import fleet2d
 from fleet2d.algorithms.learned import load_learned
 from fleet2d.artifacts.seal import verify_run
 from fleet2d.configuration.trust import Trust, restrict
-from fleet2d.fit.perception import read_log as read_detections
+from fleet2d.fit.perception import read_detections
 from fleet2d.floorplan.load import load_floorplan
-from fleet2d.logs import read_log
+from fleet2d.logs.layouts import read_log
 from fleet2d.routines.persona import BUNDLED as PERSONAS
 from fleet2d.scenario.model import load_scenario
 from fleet2d.studies.specification import read_specification

@@ -63,8 +63,8 @@ def fit_routine(
     """
     from fleet2d.fit.persona import fit_persona, to_yaml, validate
     from fleet2d.fit.timeline import find_days, read_timeline
-    from fleet2d.logs.layouts import layout_names
-    from fleet2d.logs.log import ActivityLog, LogError, read_log
+    from fleet2d.logs.layouts import layout_names, read_log
+    from fleet2d.logs.log import ActivityLog, LogError
 
     layouts = ["auto", *layout_names()]
     if layout not in layouts:
@@ -168,13 +168,13 @@ def calibrate_perception(
         InputError: The log can't be read or fitted, a file can't be written, or scipy is missing.
     """
     from fleet2d.errors import InputError
-    from fleet2d.fit.perception import calibrate, read_log
+    from fleet2d.fit.perception import calibrate, read_detections
 
     if picture is not None:
         from fleet2d.pictures.floorplan import check_picture
 
         check_picture(picture)
-    calibration = calibrate(read_log(path))
+    calibration = calibrate(read_detections(path))
     try:
         out.write_text(fragment(calibration, robot, extends), encoding="utf-8")
         if picture is not None:

@@ -71,7 +71,7 @@ class DetectionLog:
         return len(self.distance)
 
 
-def read_log(path: Path) -> DetectionLog:
+def read_detections(path: Path) -> DetectionLog:
     """Read a CSV file with a heading line.
 
     It has the columns `distance` [m] and `detected` (0 or 1); it may have `bearing_deg` or

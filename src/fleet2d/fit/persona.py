@@ -29,8 +29,7 @@ from fleet2d.routines.activity import Activity, seconds
 from fleet2d.routines.distributions import KNOTS, exponential
 from fleet2d.routines.life import Life
 from fleet2d.routines.persona import Persona
-from fleet2d.routines.planner import Doing
-from fleet2d.routines.planner import RecordedDay, write_day
+from fleet2d.routines.planner import Doing, RecordedDay, write_day
 from fleet2d.runtime.clock import DAY_S
 from fleet2d.runtime.determinism import Draws, stream_key
 

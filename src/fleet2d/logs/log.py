@@ -1,18 +1,17 @@
-"""Logs of people in one form for all layouts, and how a log is read."""
+"""Logs of people in one form for all layouts: readings of rooms, or position fixes."""
 
 import re
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from datetime import date, datetime, timedelta
-from itertools import islice, pairwise
+from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import NamedTuple
 
 from fleet2d.bounds import LOG_BYTES, LOG_DAYS, LOG_ROWS, check_file, one_line
 from fleet2d.errors import InputError
 from fleet2d.kernels import F64, I64
-from fleet2d.logs.layouts import layout_names, layout_of
 from fleet2d.runtime.clock import DAY_US
 
 # The most lines that a note lists.
@@ -198,81 +197,3 @@ def parse_time(text: str, path: Path, line: int) -> datetime:
 def since(first_day: date, moment: datetime) -> int:
     """Return the microseconds from the midnight that begins a day to a moment."""
     return (moment - datetime.combine(first_day, datetime.min.time())) // MICROSECOND
-
-
-if TYPE_CHECKING:
-    Layout = str
-else:
-    Layout = Literal[("auto", *layout_names(), "positions")]
-FIRST_LINES = 20
-
-
-def read_log(
-    path: str | Path,
-    layout: Layout = "auto",
-    *,
-    id: str | None = None,  # noqa: A002 - the name of the column
-    columns: Mapping[str, str] | None = None,
-    time_zone: str | None = None,
-    sort: bool = False,
-) -> ActivityLog | PositionLog:
-    """Read a log: a smart home's events, an activity script, or position fixes.
-
-    Args:
-        path: The file; or the folder, for a home that has several.
-        layout: The layout; "auto" recognizes it by its content.
-        id: The tag to read, of positions; see `read_positions`.
-        columns: The names of the columns of positions; see `read_positions`.
-        time_zone: The time zone of the home, for positions; see `read_positions`.
-        sort: Sort lines whose time runs backwards instead of refusing them.
-
-    Raises:
-        LogError: It is of no known layout, damaged, or contradicts itself.
-    """
-    path = Path(path)
-    if not path.exists():
-        raise LogError(f"no such file: {path}")
-    layout = _recognize(path) if layout == "auto" else layout
-    if layout == "positions":
-        # Imported here, as no other layout needs pyarrow.
-        from fleet2d.logs.positions import read_positions
-
-        return read_positions(path, id=id, columns=columns, time_zone=time_zone, sort=sort)
-    if id is not None or columns or time_zone is not None:
-        raise LogError(
-            f"{path} is of the layout {layout}: id, columns and time_zone are for positions"
-        )
-    return layout_of(layout).read(path, sort=sort)
-
-
-def _recognize(path: Path) -> str:
-    """Return the layout of a file or folder.
-
-    Raises:
-        LogError: It is of no known layout.
-    """
-    if path.is_dir():
-        layouts = map(_recognize_lines, sorted(path.glob("*.txt")))
-        layout = next((name for name in layouts if name and layout_of(name).FOLDERS), None)
-        if layout is None:
-            several = [name for name in layout_names() if layout_of(name).FOLDERS]
-            raise LogError(
-                f"{path}: no .txt file in this folder is of a layout with several files"
-                f" ({', '.join(several)}): for other layouts name the file"
-            )
-        return layout
-    if path.suffix.lower() in (".parquet", ".pq"):
-        return "positions"
-    layout = _recognize_lines(path) or ("positions" if path.suffix.lower() == ".csv" else None)
-    if layout is None:
-        names = ", ".join(layout_names())
-        raise LogError(f"{path} has no known layout: give 'format' ({names} or positions)")
-    return layout
-
-
-def _recognize_lines(file: Path) -> str | None:
-    """Return the layout that one of the first lines of a file shows, if one does."""
-    layouts = {name: layout_of(name) for name in layout_names()}
-    lines = (line for _, line in islice(log_lines(file), FIRST_LINES))
-    shown = (name for line in lines for name, layout in layouts.items() if layout.matches(line))
-    return next(shown, None)

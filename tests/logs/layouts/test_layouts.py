@@ -3,10 +3,10 @@
 from pathlib import Path
 
 import pytest
-from tests.logs.test_log import ADLS, CASAS, HOMER, SENSORS
+from tests.logs.layouts.test_reading import ADLS, CASAS, HOMER, SENSORS
 
-from fleet2d.logs import LogError, read_log
-from fleet2d.logs.layouts import layout_names, layout_of
+from fleet2d.logs.layouts import layout_names, layout_of, read_log
+from fleet2d.logs.log import LogError
 
 SAMPLES = {"casas": [CASAS], "homer": [HOMER], "uci_adl": [ADLS, SENSORS]}
 

@@ -1,4 +1,4 @@
-"""Layouts of logs of rooms and activities, one a module, by its name.
+"""Reading a log of any layout; layouts of rooms and activities are modules, by their names.
 
 A module has `read(path, *, sort=False)`, which returns an `ActivityLog`; `matches(line)`, which
 returns whether a line of a file shows this layout; and `FOLDERS`, whether it reads folders, too.
@@ -6,11 +6,12 @@ returns whether a line of a file shows this layout; and `FOLDERS`, whether it re
 
 import importlib
 import pkgutil
+from collections.abc import Mapping
+from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol, cast
+from typing import TYPE_CHECKING, Literal, Protocol, cast
 
-if TYPE_CHECKING:
-    from fleet2d.logs.log import ActivityLog
+from fleet2d.logs.log import ActivityLog, LogError, PositionLog, log_lines
 
 
 class LogLayout(Protocol):
@@ -21,7 +22,7 @@ class LogLayout(Protocol):
     def matches(self, line: str) -> bool:
         """Return whether a stripped line shows this layout, and no other."""
 
-    def read(self, path: Path, *, sort: bool = False) -> "ActivityLog":
+    def read(self, path: Path, *, sort: bool = False) -> ActivityLog:
         """Read a file, or a folder of files of one home."""
 
 
@@ -37,3 +38,81 @@ def layout_names() -> list[str]:
 def layout_of(name: str) -> LogLayout:
     """Return the module of a layout."""
     return cast("LogLayout", importlib.import_module(f"{__name__}.{name}"))
+
+
+if TYPE_CHECKING:
+    Layout = str
+else:
+    Layout = Literal[("auto", *layout_names(), "positions")]
+FIRST_LINES = 20
+
+
+def read_log(
+    path: str | Path,
+    layout: Layout = "auto",
+    *,
+    id: str | None = None,  # noqa: A002 - the name of the column
+    columns: Mapping[str, str] | None = None,
+    time_zone: str | None = None,
+    sort: bool = False,
+) -> ActivityLog | PositionLog:
+    """Read a log: a smart home's events, an activity script, or position fixes.
+
+    Args:
+        path: The file; or the folder, for a home that has several.
+        layout: The layout; "auto" recognizes it by its content.
+        id: The tag to read, of positions; see `read_positions`.
+        columns: The names of the columns of positions; see `read_positions`.
+        time_zone: The time zone of the home, for positions; see `read_positions`.
+        sort: Sort lines whose time runs backwards instead of refusing them.
+
+    Raises:
+        LogError: It is of no known layout, damaged, or contradicts itself.
+    """
+    path = Path(path)
+    if not path.exists():
+        raise LogError(f"no such file: {path}")
+    layout = _recognize(path) if layout == "auto" else layout
+    if layout == "positions":
+        # Imported here, as no other layout needs pyarrow.
+        from fleet2d.logs.positions import read_positions
+
+        return read_positions(path, id=id, columns=columns, time_zone=time_zone, sort=sort)
+    if id is not None or columns or time_zone is not None:
+        raise LogError(
+            f"{path} is of the layout {layout}: id, columns and time_zone are for positions"
+        )
+    return layout_of(layout).read(path, sort=sort)
+
+
+def _recognize(path: Path) -> str:
+    """Return the layout of a file or folder.
+
+    Raises:
+        LogError: It is of no known layout.
+    """
+    if path.is_dir():
+        layouts = map(_recognize_lines, sorted(path.glob("*.txt")))
+        layout = next((name for name in layouts if name and layout_of(name).FOLDERS), None)
+        if layout is None:
+            several = [name for name in layout_names() if layout_of(name).FOLDERS]
+            raise LogError(
+                f"{path}: no .txt file in this folder is of a layout with several files"
+                f" ({', '.join(several)}): for other layouts name the file"
+            )
+        return layout
+    if path.suffix.lower() in (".parquet", ".pq"):
+        return "positions"
+    layout = _recognize_lines(path) or ("positions" if path.suffix.lower() == ".csv" else None)
+    if layout is None:
+        names = ", ".join(layout_names())
+        raise LogError(f"{path} has no known layout: give 'format' ({names} or positions)")
+    return layout
+
+
+def _recognize_lines(file: Path) -> str | None:
+    """Return the layout that one of the first lines of a file shows, if one does."""
+    layouts = {name: layout_of(name) for name in layout_names()}
+    lines = (line for _, line in islice(log_lines(file), FIRST_LINES))
+    shown = (name for line in lines for name, layout in layouts.items() if layout.matches(line))
+    return next(shown, None)
