@@ -27,8 +27,7 @@ from fleet2d.kernels.motion import time_route
 from fleet2d.kernels.numbers import TURN, heading_of
 from fleet2d.kernels.sight import line_of_sight
 from fleet2d.kernels.space import locate
-from fleet2d.logs import Layout
-from fleet2d.logs.layouts import read_log
+from fleet2d.logs.layouts import Layout, read_log
 from fleet2d.logs.log import AWAY, ActivityLog, LogError, PositionLog
 from fleet2d.logs.placement import (
     DOOR,
