@@ -135,7 +135,8 @@ class PathReader:
                 low, high = -(-begin // stride) - before, -(-stop // stride) - before
                 part = slice(max(low, 0), min(high, len(steps)))
                 if part.start < part.stop:
-                    poses = Poses(*(values[part] for values in out))
+                    x, y, heading, away = out
+                    poses = Poses(x[part], y[part], heading[part], away[part])
                     self._trace(key, last_key, stop, steps[part], poses)
         rows, columns = plan.room_of_place.shape
         cells = out.y // SUB, out.x // SUB
@@ -181,8 +182,9 @@ class PathReader:
                     " was walked by other rules than those of its behavior 'meander', or by"
                     " another version"
                 )
-        for values, walked in zip(out, poses, strict=True):
-            values[:] = walked[steps - step]
+        at = steps - step
+        out.x[:], out.y[:] = poses.x[at], poses.y[at]
+        out.heading[:], out.away[:] = poses.heading[at], poses.away[at]
 
 
 @contextmanager

@@ -89,11 +89,11 @@ def status(
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
     """Print the progress of a study, even while it is being run."""
-    from fleet2d.studies.directory import StudyDirectory
+    from fleet2d.studies.directory import StudyDirectory, count
 
     directory = StudyDirectory(location)
     meta = directory.read_meta()
-    counts = directory.counts()
+    counts = count(directory)
     if as_json:
         typer.echo(json.dumps({"study": location, **vars(counts), "missing": counts.missing}))
         return
@@ -157,7 +157,8 @@ def report(
 
 def _print_plan(checked: "CheckedStudy", workers: int | None) -> None:
     """Print the axes, the first variants, and the time that all will take."""
-    from fleet2d.studies.executors import LocalExecutor, cores
+    from fleet2d.studies.execution.local import LocalExecutor
+    from fleet2d.studies.executors import cores
     from fleet2d.studies.plan import check_setups, forecast
     from fleet2d.studies.progress import in_words
 
@@ -226,20 +227,13 @@ def _interruptible(location: str | Path) -> Iterator[None]:
         signal.signal(signal.SIGTERM, handler)
 
 
-def tune(  # noqa: PLR0913 - options of the command line
+def tune(
     source: Annotated[Path, typer.Argument(metavar="STUDY.yaml", help="A study that tunes.")],
     out: Annotated[Path | None, typer.Option(help="A folder; left out: studies/NAME-tune.")] = None,
     workers: Workers = None,
     executor: Annotated[
         Literal["local", "ray", "serial"], typer.Option(help="Where the workers are.")
     ] = "local",
-    changed: Annotated[
-        Literal["redo"] | None,
-        typer.Option(help="redo: start anew if the folder holds another search."),
-    ] = None,
-    storage: Annotated[
-        str | None, typer.Option(help="A database for the trials: sqlite:///trials.db.")
-    ] = None,
     quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")] = False,
     trust: TrustFiles = None,
     trust_dir: TrustFolders = None,
@@ -254,9 +248,8 @@ def tune(  # noqa: PLR0913 - options of the command line
         specification = read_specification(source)
     folder = out or Path(default_location(f"{specification.name}-tune"))
     show = sys.stderr.isatty() and not quiet
-    runner = make_executor(executor, workers)
     with _interruptible(folder), restrict_to(trust, trust_dir), observing_trials(show=show) as bar:
-        result = search(specification, folder, runner, bar, changed=changed, storage=storage)
+        result = search(specification, folder, make_executor(executor, workers), bar)
     if quiet:
         return
     counts = ", ".join(f"{n} {state}" for state, n in result.trials.items())

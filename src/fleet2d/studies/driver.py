@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from fleet2d.configuration.trust import Trust, current_trust, restrict
-from fleet2d.errors import Fleet2DError
+from fleet2d.errors import ArtifactError, Fleet2DError
 from fleet2d.studies.design import (
     Design,
     FileHashes,
@@ -23,9 +23,11 @@ from fleet2d.studies.directory import (
     Counts,
     Meta,
     StudyDirectory,
+    statuses,
+    write_variants,
 )
 from fleet2d.studies.executors import Event, Executor, LostTask, TaskSchedule, WorkerTask
-from fleet2d.studies.parts import Part
+from fleet2d.studies.parts import Part, drop_part
 from fleet2d.studies.plan import (
     Changed,
     ReconciledPlan,
@@ -64,10 +66,10 @@ class StudyJob:
     tables: tuple[str, ...]
     trust: Trust | None = field(default_factory=current_trust)
 
-    def __call__(self, task: WorkerTask) -> VariantRecord:
+    def __call__(self, task: WorkerTask) -> bytes:
         """Run a variant; return its record, with the error if it fails."""
         with restrict(self.trust):
-            return record_of(task, self._outcome(task))
+            return record_of(task, self._outcome(task)).encode()
 
     def _outcome(self, task: WorkerTask) -> VariantOutcome:
         try:
@@ -165,8 +167,8 @@ def run_study(
     if not directory.exists():
         check_setups(checked.plan, executor, options.observer.on_check)
     with directory.locked():
-        parts = directory.intact_parts(options.observer.on_note)
-        status_of = directory.statuses(parts)
+        parts = _intact_parts(directory, options.observer)
+        status_of = statuses(directory, parts)
         reconciled = reconcile(checked.plan, directory, status_of, options.changed)
         variants = reconciled.plan.variants
         _write_plan(directory, checked, reconciled.plan)
@@ -193,14 +195,15 @@ def run_study(
         finally:
             keeper.pause()
         keeper.finish()
-        directory.write_variants()
-        return directory.counts()
+        write_variants(directory)
+    final = statuses(directory, directory.parts())
+    return Counts.of([final.get(v.number) for v in variants])
 
 
 def _record(event: Event) -> VariantRecord:
     if isinstance(event, LostTask):
         return record_of(event.task, VariantOutcome("failed", error=event.reason), event.attempts)
-    record: VariantRecord = event.payload
+    record = VariantRecord.decode(event.payload)
     return VariantRecord({**record.header, "attempts": event.attempts}, record.body)
 
 
@@ -243,6 +246,19 @@ class _ResultKeeper:
         self._is_open, self._commit_time = False, time.monotonic()
 
 
+def _intact_parts(directory: StudyDirectory, observer: Observer) -> list[Part]:
+    """Return the undamaged parts; drop the others, so that their variants are run again."""
+    intact = []
+    for part in directory.parts():
+        problem = part.problem(directory.storage, checksums=directory.storage.is_local)
+        if problem is None:
+            intact.append(part)
+            continue
+        observer.on_note(f"{problem}: the {part.variants} variants of that part are run again")
+        drop_part(directory.storage, part)
+    return intact
+
+
 def _write_plan(directory: StudyDirectory, checked: CheckedStudy, plan: StudyPlan) -> None:
     """Write the description of the study; its `study.json` last, which makes the folder a study."""
     file = checked.specification.file
@@ -256,10 +272,13 @@ def _write_plan(directory: StudyDirectory, checked: CheckedStudy, plan: StudyPla
         checked.plan.design.columns,
         file.populations,
         file.keep.tables,
-        file.compare,
+        tuple(comparison.model_dump(mode="json") for comparison in file.compare),
         source.read_text(encoding="utf-8") if source else "",
     )
-    directory.write_meta(meta)
+    try:
+        directory.write_meta(meta)
+    except TypeError as error:  # a Python value that JSON can't hold
+        raise ArtifactError(f"the study can't be described: {error}") from error
 
 
 def _describe(reconciled: ReconciledPlan, directory: StudyDirectory, observer: Observer) -> None:

@@ -163,14 +163,14 @@ class SetupJob:
     design: Design
     trust: Trust | None = field(default_factory=current_trust)
 
-    def __call__(self, task: WorkerTask) -> str:
-        """Return the error of a variant's set-up; empty if there is none."""
+    def __call__(self, task: WorkerTask) -> bytes:
+        """Return the error of a variant's set-up as text; empty if there is none."""
         try:
             with restrict(self.trust):
                 check_setup(self.design.scenario(task.index))
         except Fleet2DError as error:
-            return str(error)
-        return ""
+            return str(error).encode()
+        return b""
 
 
 def check_setups(
@@ -189,7 +189,7 @@ def check_setups(
         for done, event in enumerate(events):
             if on_progress is not None:
                 on_progress(done + 1, len(tasks))
-            text = event.reason if isinstance(event, LostTask) else event.payload
+            text = event.reason if isinstance(event, LostTask) else event.payload.decode()
             if text:
                 problems[event.task.index] = f"{plan.design.describe(event.task.index)}: {text}"
             if len(problems) == MOST_PROBLEMS:
@@ -323,17 +323,13 @@ def reconcile(
     Raises:
         RunDirectoryError: There are such results, and `changed` is None.
     """
-    with_results = set(finished)
-    if not directory.storage.exists(PLAN):
-        if with_results:
-            raise RunDirectoryError(
-                f"{directory.location}/{PLAN} is missing, and with it the variants of the results:"
-                " choose another --out"
-            )
+    try:
+        stored_rows = directory.read_table(PLAN, PLAN_COLUMNS[:3]).to_pylist()
+    except FileNotFoundError:
         return ReconciledPlan(plan, len(plan.variants), 0)
-    stored_rows = directory.plan(PLAN_COLUMNS[:3]).to_pylist()
     numbers = {row["identity"]: row[VARIANT] for row in stored_rows}
     present = {variant.identity for variant in plan.variants}
+    with_results = set(finished)
     stale = {
         row["scenario"]: row
         for row in stored_rows
@@ -411,7 +407,7 @@ def write_catalogue(
 ) -> None:
     """Write the plan and the scenarios of a study."""
     directory.storage.write(SCENARIOS, scenarios())
-    directory.storage.write_table(PLAN, plan_table(plan))
+    directory.write_table(PLAN, plan_table(plan))
 
 
 def stored_scenario(directory: StudyDirectory, number: int) -> dict[str, Any]:
@@ -420,15 +416,20 @@ def stored_scenario(directory: StudyDirectory, number: int) -> dict[str, Any]:
     Raises:
         RunDirectoryError: The study has no such variant.
     """
-    row_filter = [(VARIANT, "=", number)]
-    rows = directory.storage.read_table(PLAN, ["template", "seed"], row_filter).to_pylist()
+    import pyarrow.parquet as pq
+
+    filesystem, path = directory.storage.filesystem, directory.storage.path
+    rows = pq.read_table(
+        path(PLAN), filesystem=filesystem, filters=[(VARIANT, "=", number)],
+        columns=["template", "seed"],
+    ).to_pylist()  # fmt: skip
     if not rows:
         raise RunDirectoryError(f"{directory.location} has no variant {number}")
-    template_filter = [("template", "=", rows[0]["template"])]
-    with directory.storage.reading(SCENARIOS):
-        texts = directory.storage.read_table(SCENARIOS, filters=template_filter).to_pylist()
-        content: dict[str, Any] = json.loads(texts[0]["scenario"])
-        content["simulation"]["seed"] = rows[0]["seed"]
+    texts = pq.read_table(
+        path(SCENARIOS), filesystem=filesystem, filters=[("template", "=", rows[0]["template"])]
+    ).to_pylist()
+    content: dict[str, Any] = json.loads(texts[0]["scenario"])
+    content["simulation"]["seed"] = rows[0]["seed"]
     return content
 
 

@@ -1,22 +1,30 @@
 """Exporters, one format a module: `export` in it writes a stored run to a file for other programs.
 
-A format of an installed package is an entry point of the group `fleet2d.exporter`: such a function.
+A format of an installed package is an entry point of the group `fleet2d.exporter`: a function with
+the same arguments.
 """
 
 import ast
 import importlib
+import os
 import pkgutil
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, BinaryIO, cast
 
-from fleet2d.errors import InputError
+from fleet2d.errors import InputError, RunDirectoryError
+from fleet2d.storage.files import replacing
 
 if TYPE_CHECKING:
+    from fleet2d.runs.records import Selection
     from fleet2d.runs.run import Run
 
-Exporter = Callable[["Run", Path], str]
-"""Writes a run to a file, and returns a line about it."""
+Exporter = Callable[["Run", Path, "Selection"], str]
+"""Writes a part of a run to a file, and returns a line about it."""
+
+# Formats whose files have another suffix than the name of the format.
+_SUFFIXES = {".txt": "casas", ".rrd": "rerun", "": "rosbag2"}
 
 
 def formats() -> dict[str, str]:
@@ -26,6 +34,40 @@ def formats() -> dict[str, str]:
     """
     own = {name: _first_line(Path(__path__[0], f"{name}.py")) for name in _modules()}
     return dict(sorted({**dict.fromkeys(_plugins().names, ""), **own}.items()))
+
+
+def format_of(path: Path) -> str:
+    """Return the name of the format of a file with such a name.
+
+    Raises:
+        InputError: No format has this suffix.
+
+    Example:
+        >>> format_of(Path("week.mcap")), format_of(Path("bags/week"))
+        ('mcap', 'rosbag2')
+    """
+    name = _SUFFIXES.get(path.suffix.lower(), path.suffix.lower()[1:])
+    if name not in formats():
+        suffixes = ", ".join(f".{own}" for own in formats() if own not in _SUFFIXES.values())
+        raise InputError(
+            f"{path}: no format has the suffix {path.suffix!r}: name the format by --format, or"
+            f" write a file with one of {suffixes}, .rrd, .txt, or a folder"
+        )
+    return name
+
+
+@contextmanager
+def new_file(path: Path) -> Iterator[BinaryIO]:
+    """Yield a file that is there, whole, after the block, and replaces one of the same name.
+
+    Raises:
+        RunDirectoryError: It can't be written.
+    """
+    try:
+        with replacing(path) as handle, os.fdopen(handle, "wb", closefd=False) as file:
+            yield file
+    except OSError as error:
+        raise RunDirectoryError(f"{path} can't be written: {error.strerror or error}") from error
 
 
 def exporter(name: str) -> Exporter:

@@ -3,13 +3,15 @@
 from pathlib import Path
 
 from fleet2d.errors import RunDirectoryError
+from fleet2d.runs.exporters import new_file
+from fleet2d.runs.records import Records, Selection
 from fleet2d.runs.run import Run
 
 # The activity that CASAS writes where none is known.
 OTHER = "Other_Activity"
 
 
-def export(run: Run, path: Path) -> str:
+def export(run: Run, path: Path, part: Selection) -> str:
     """Write a line per reading: date, time, room, sensor, state, activity.
 
     Spaces in names become underscores, because spaces separate the columns.
@@ -17,6 +19,7 @@ def export(run: Run, path: Path) -> str:
     Args:
         run: A run whose scenario has sensors.
         path: The file to write.
+        part: The part of the run.
 
     Returns:
         A line with the number of readings.
@@ -29,16 +32,15 @@ def export(run: Run, path: Path) -> str:
             "the run has no table of sensors: add objects that sense to its scenario, such as"
             " hall: {type: motion_sensor, at: [1, 2]}"
         )
-    rows = run.tables["sensors"].to_pylist()
+    records = Records(run, part).chunks(poses=False, tables=["sensors"])
+    rows = [row for chunk in records for row in chunk.rows["sensors"]]
     lines = [
         f"{row['time']:%Y-%m-%d %H:%M:%S.%f} {_word(row['room'])} {_word(row['sensor'])}"
         f" {row['state']} {_word(row['activity']) or OTHER}\n"
         for row in rows
     ]
-    try:
-        path.write_text("".join(lines), encoding="utf-8")
-    except OSError as error:
-        raise RunDirectoryError(f"{path} can't be written: {error.strerror}") from error
+    with new_file(path) as file:
+        file.write("".join(lines).encode())
     return f"{len(lines)} readings in {path}"
 
 
