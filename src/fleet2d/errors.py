@@ -24,8 +24,25 @@ class Fleet2DError(Exception):
     """
 
     def __init__(self, *args: object) -> None:
-        """Shorten very long lines of the message, and very many."""
-        super().__init__(*(_cut(arg) if isinstance(arg, str) else arg for arg in args))
+        """Shorten very long lines of the message, and very many; escape control characters."""
+        texts = (_cut(printable(a, "\n\t")) if isinstance(a, str) else a for a in args)
+        super().__init__(*texts)
+
+
+def printable(text: str, others: str = "") -> str:
+    r"""Return text from a file for a terminal: control characters are escaped.
+
+    Args:
+        text: Any text.
+        others: Characters that are left as they are.
+
+    Example:
+        >>> printable("\x1b[2Jgone")
+        '\\x1b[2Jgone'
+    """
+    if text.isprintable():
+        return text
+    return "".join(c if c.isprintable() or c in others else repr(c)[1:-1] for c in text)
 
 
 def _cut(text: str) -> str:

@@ -145,6 +145,10 @@ def test_missing_and_foreign_files_are_named(run: Path) -> None:
     verification = verify_run(run)
     assert "is missing" == verification.differing["events.parquet"]
     assert ["learned/more.npz", "more.parquet"] == verification.foreign
+    assert "is not a file any more" == verification.differing["ltp.parquet"]
+    with pytest.raises(RunDirectoryError, match=r"ltp\.parquet is a link"):
+        open_run(run)
+    (run / "ltp.parquet").unlink()
     assert any("more.parquet" in note for note in open_run(run).notes)
     assert "more" not in open_run(run).tables
 

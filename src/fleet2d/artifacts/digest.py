@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fleet2d.artifacts.chunk import Chunk, ColumnChunk, Dictionary, new_dictionaries
+from fleet2d.artifacts.manifest import TableRecord, table_record
 from fleet2d.artifacts.table import Column, TableSpec
 from fleet2d.errors import ArtifactError
 
@@ -101,6 +102,12 @@ def digest_table(table: pa.Table, spec: TableSpec | None = None) -> str:
 
 def digest_tables(parts: Iterable[pa.Table], spec: TableSpec | None = None) -> str:
     """Return the digest of a table that comes in parts, in the order of its rows."""
+    return _digest_parts(parts, spec)[1]
+
+
+def _digest_parts(
+    parts: Iterable[pa.Table], spec: TableSpec | None = None
+) -> tuple[TableDigest, str]:
     from fleet2d.artifacts.arrow import chunks_of, spec_of
 
     digest: TableDigest | None = None
@@ -114,17 +121,27 @@ def digest_tables(parts: Iterable[pa.Table], spec: TableSpec | None = None) -> s
             digest.update(chunk, rows)
     if digest is None:
         raise ValueError("a table needs at least one part, even if it has no rows")
-    return digest.hexdigest(words)
+    return digest, digest.hexdigest(words)
 
 
 def digest_of_file(path: Path) -> str | None:
     """Return the digest of a stored table, None if it can't be read."""
-    from fleet2d.artifacts.arrow import read_row_groups
-
     try:
-        return digest_tables(read_row_groups(path))
+        return record_of_file(path).digest
     except ArtifactError:
         return None
+
+
+def record_of_file(path: Path) -> TableRecord:
+    """Return what a manifest says of a stored table, from its file.
+
+    Raises:
+        ArtifactError: The file can't be read.
+    """
+    from fleet2d.artifacts.arrow import read_row_groups
+
+    digest, text = _digest_parts(read_row_groups(path))
+    return table_record(digest.spec, digest.rows, text)
 
 
 def changed_tables(digests: Mapping[str, str], digest_of: Callable[[str], str | None]) -> list[str]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import datetime as dt
 import hashlib
-import stat
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path
@@ -15,20 +14,26 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationErr
 from fleet2d.artifacts.manifest_parts import Count, ManifestParts, time_problem
 from fleet2d.artifacts.plain import canonical, plain
 from fleet2d.artifacts.strict_json import read_json
-from fleet2d.artifacts.table import Kind
+from fleet2d.artifacts.table import Kind, TableSpec
 from fleet2d.artifacts.versions import versions
 from fleet2d.bounds import FILE_BYTES, read_bytes
 from fleet2d.configuration.problems import did_you_mean
-from fleet2d.errors import RunDirectoryError
-from fleet2d.storage.files import write_atomically
+from fleet2d.errors import RunDirectoryError, printable
+from fleet2d.storage.files import path_in, write_atomically
 
 if TYPE_CHECKING:
     from fleet2d.runtime.clock import Clock
 
 FORMAT = 2
 """Version of the layout of run directories; a reader refuses a later one."""
+SEALED_FORMAT = 2
+"""The first version whose runs have a seal."""
 
 FILE_NAME = "manifest.json"
+FLOORPLAN_NAME = "floorplan.json"
+"""The floor plan in a run directory, in Fleet2D's own format."""
+LEARNED_NAME = "learned"
+"""The folder in a run directory of what algorithms have learned."""
 
 # Problems of one manifest that a message lists, at most.
 _MOST_PROBLEMS = 5
@@ -78,6 +83,15 @@ class TableRecord(_Record):
     rows: Count
     digest: Sha256 | None = None
     columns: list[ColumnRecord] = []
+
+
+def table_record(spec: TableSpec, rows: int, digest: str) -> TableRecord:
+    """Return the record of a table with the columns of its spec."""
+    columns = [
+        ColumnRecord(name=column.name, kind=column.kind, unit=column.unit)
+        for column in spec.columns
+    ]
+    return TableRecord(rows=rows, digest=digest, columns=columns)
 
 
 class InputRecord(_Record):
@@ -278,10 +292,8 @@ class Manifest(BaseModel):
         Raises:
             RunDirectoryError: There is none, or it is not valid; the message says what is wrong.
         """
-        path = directory / FILE_NAME
+        path = path_in(directory, FILE_NAME)
         try:
-            if not is_regular(path):
-                raise RunDirectoryError(f"{path} is not a file: give the directory of a run")
             content = json_of(path, read_bytes(path, FILE_BYTES, RunDirectoryError))
         except FileNotFoundError as error:
             raise RunDirectoryError(
@@ -346,20 +358,11 @@ def json_of(path: Path, text: bytes) -> Any:
         raise _damaged(path, str(error)) from error
 
 
-def is_regular(path: Path) -> bool:
-    """Whether a path, links followed, is a file, not a device, pipe or folder.
-
-    Raises:
-        OSError: There is no such file, or its state can't be read.
-    """
-    return stat.S_ISREG(path.stat().st_mode)
-
-
 def _problems(error: ValidationError) -> str:
     """Return a message that names the wrong fields and what is wrong with each."""
     lines = []
     for line in error.errors(include_url=False)[:_MOST_PROBLEMS]:
-        key = ".".join(map(str, line["loc"]))
+        key = printable(".".join(map(str, line["loc"])))
         if line["type"] == "extra_forbidden":
             known = Manifest.model_fields if len(line["loc"]) == 1 else ()
             lines.append(f"{key} is not a field of a manifest{did_you_mean(key, known)}"[:200])

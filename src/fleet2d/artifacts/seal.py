@@ -12,23 +12,26 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from fleet2d.artifacts.digest import changed_tables, digest_of_file, run_digest, sha256_of
+from fleet2d.artifacts.digest import record_of_file, run_digest, sha256_of
 from fleet2d.artifacts.manifest import (
     FILE_NAME,
+    FLOORPLAN_NAME,
+    LEARNED_NAME,
+    SEALED_FORMAT,
     FileRecord,
     Manifest,
     Seal,
-    is_regular,
+    TableRecord,
     json_of,
 )
 from fleet2d.artifacts.plain import canonical
-from fleet2d.artifacts.unfinished import FOLDER, LOCK_NAME
+from fleet2d.artifacts.unfinished import CHECKPOINT_NAME, FOLDER, JOURNAL_NAME
 from fleet2d.bounds import FILE_BYTES, read_bytes
-from fleet2d.errors import ArtifactError, RunDirectoryError
+from fleet2d.errors import ArtifactError, RunDirectoryError, printable
+from fleet2d.storage.files import path_in
 
 # Files that may be added to a run later.
 _PICTURES = frozenset({"picture.png", "picture.svg"})
-_LEARNED = "learned"
 
 
 @dataclass(frozen=True)
@@ -61,10 +64,10 @@ def make_seal(manifest: Manifest, directory: Path) -> Seal:
     """
     paths = {path.name: path for path in directory.iterdir() if path.suffix == ".parquet"}
     paths = {name: path for name, path in paths.items() if path.stem in manifest.tables}
-    learned = directory / _LEARNED
+    learned = directory / LEARNED_NAME
     if learned.is_dir():
-        paths |= {f"{_LEARNED}/{path.name}": path for path in learned.glob("*.npz")}
-    plan = directory / "floorplan.json"
+        paths |= {f"{LEARNED_NAME}/{path.name}": path for path in learned.glob("*.npz")}
+    plan = directory / FLOORPLAN_NAME
     if plan.exists():
         paths[plan.name] = plan
     files = {name: _file_record(path) for name, path in sorted(paths.items())}
@@ -73,7 +76,7 @@ def make_seal(manifest: Manifest, directory: Path) -> Seal:
 
 
 def verify_run(directory: Path | str) -> Verification:
-    """Compare a stored run with its seal, without running or unpacking anything.
+    """Compare a stored run with its seal, and its tables with the manifest; nothing is run.
 
     Raises:
         RunDirectoryError: There is no run, or its manifest is not valid.
@@ -97,33 +100,42 @@ def verify_run(directory: Path | str) -> Verification:
             f"{root} has no digest, because its status is {manifest.status}: there is nothing to"
             " compare with; `fleet2d resume` continues the run"
         )
-    if manifest.seal is None:
-        return _without_seal(root, manifest)
     try:
-        text = read_bytes(root / FILE_NAME, FILE_BYTES, RunDirectoryError)
-        differing = _differing_fields(root, text, manifest.seal)
-        for name, record in manifest.seal.files.items():
-            if difference := _difference(root / name, record):
-                differing[name] = difference
-        differing |= _unsealed_tables(manifest)
-        foreign = foreign_files(root, manifest.seal.files.keys() | {FILE_NAME})
+        differing, notes = _differing_parts(root, manifest)
+        for name, table in manifest.tables.items():
+            file, entry = f"{name}.parquet", f"{FILE_NAME}: tables.{name}"
+            if not differing.keys() & {file, entry} and not _has_content(root, name, table):
+                differing[file] = "doesn't hold what the manifest says of it"
+        digests = {name: table.digest or "" for name, table in manifest.tables.items()}
+        if run_digest(digests) != manifest.digest:
+            differing.setdefault(f"{FILE_NAME}: digest", "is not that of the tables")
+        foreign = foreign_files(root, manifest)
     except OSError as error:
         raise ArtifactError(f"{root} can't be read: {error.strerror or error}") from error
-    return Verification(differing, foreign, digest=manifest.seal.digest)
+    digest = None if manifest.seal is None else manifest.seal.digest
+    return Verification(differing, foreign, notes, digest)
 
 
-def foreign_files(root: Path, run_files: set[str]) -> list[str]:
-    """Return the files of a run directory that are not part of the run.
+def foreign_files(root: Path, manifest: Manifest) -> list[str]:
+    """Return what is in a run directory and is not part of the run, as text for a terminal.
 
     Raises:
         OSError: The directory can't be read.
     """
-    names = {path.name for path in root.iterdir()}
-    learned = root / _LEARNED
-    if learned.is_dir() and not learned.is_symlink():
-        names |= {f"{_LEARNED}/{path.name}" for path in learned.iterdir()}
-        names.discard(_LEARNED)
-    return sorted(names - run_files - _PICTURES - {FOLDER, LOCK_NAME})
+    own = {FILE_NAME, FLOORPLAN_NAME, *(f"{name}.parquet" for name in manifest.tables)}
+    own |= {f"{LEARNED_NAME}/{name}.npz" for name in manifest.scenario.get("algorithms", {})}
+    if manifest.seal is not None:
+        own = {FILE_NAME, *manifest.seal.files}
+    if manifest.status != "complete":
+        own |= {f"{FOLDER}/{JOURNAL_NAME}", f"{FOLDER}/{CHECKPOINT_NAME}"}
+    names = set()
+    for path in root.iterdir():
+        is_link = path.is_symlink()
+        if path.name in (LEARNED_NAME, FOLDER) and path.is_dir() and not is_link:
+            names |= {f"{path.name}/{inner.name}" for inner in path.iterdir()}
+        elif not (path.name in _PICTURES and path.is_file() and not is_link):
+            names.add(path.name)
+    return sorted(map(printable, names - own))
 
 
 def digest_fields(content: Mapping[str, Any]) -> dict[str, str]:
@@ -147,8 +159,28 @@ def digest_fields(content: Mapping[str, Any]) -> dict[str, str]:
     }
 
 
-def _differing_fields(root: Path, text: bytes, seal: Seal) -> dict[str, str]:
-    """Return the fields of a manifest that are not as they were sealed."""
+def _differing_parts(root: Path, manifest: Manifest) -> tuple[dict[str, str], list[str]]:
+    """Return how files and fields differ from their seal, and remarks about what has none."""
+    if manifest.seal is not None:
+        differing = _differing_fields(root, manifest.seal)
+        for name, record in manifest.seal.files.items():
+            if difference := _difference(root, name, record):
+                differing[name] = difference
+        for name in manifest.tables:
+            if f"{name}.parquet" not in manifest.seal.files:
+                differing[f"{name}.parquet"] = "is not covered by the seal"
+        return differing, []
+    if manifest.format >= SEALED_FORMAT:
+        return {f"{FILE_NAME}: seal": "is missing"}, []
+    return {}, [
+        f"{root} has no seal (format {manifest.format}): the content of its tables was compared,"
+        " not its metrics, floor plan, learned state and the rest of the manifest"
+    ]
+
+
+def _differing_fields(root: Path, seal: Seal) -> dict[str, str]:
+    """Return the fields of the manifest that are not as they were sealed."""
+    text = read_bytes(path_in(root, FILE_NAME), FILE_BYTES, RunDirectoryError)
     content = json_of(root / FILE_NAME, text)
     fields = digest_fields(content)
     differing = {}
@@ -166,41 +198,27 @@ def _differing_fields(root: Path, text: bytes, seal: Seal) -> dict[str, str]:
     return differing
 
 
-def _unsealed_tables(manifest: Manifest) -> dict[str, str]:
-    """Return the tables that the manifest names and the seal doesn't cover."""
-    assert manifest.seal is not None
-    files = manifest.seal.files
-    return {
-        f"{name}.parquet": "is not covered by the seal"
-        for name in manifest.tables
-        if f"{name}.parquet" not in files
-    }
+def _has_content(root: Path, name: str, stored: TableRecord) -> bool:
+    """Whether the rows of a table's file have the digest, number and columns in the manifest."""
+    try:
+        record = record_of_file(path_in(root, f"{name}.parquet"))
+    except (ArtifactError, RunDirectoryError):
+        return False
+    return record == stored
 
 
-def _without_seal(root: Path, manifest: Manifest) -> Verification:
-    """Compare the tables of a run of format 1 with their digests, the only ones that it has."""
-    digests = {name: table.digest or "" for name, table in manifest.tables.items()}
-    tables = changed_tables(digests, lambda name: digest_of_file(root / f"{name}.parquet"))
-    differing = {f"{name}.parquet": "was changed" for name in tables}
-    if run_digest(digests) != manifest.digest:
-        differing[FILE_NAME] = "was changed"
-    run_files = {f"{name}.parquet" for name in manifest.tables} | {FILE_NAME, "floorplan.json"}
-    learned = {f"{_LEARNED}/{name}.npz" for name in manifest.scenario.get("algorithms", {})}
-    notes = [
-        f"{root} has no seal (format {manifest.format}): the content of its tables was compared,"
-        " not its metrics, floor plan, learned state and the rest of the manifest"
-    ]
-    return Verification(differing, foreign_files(root, run_files | learned), notes)
-
-
-def _difference(path: Path, record: FileRecord) -> str:
+def _difference(root: Path, name: str, record: FileRecord) -> str:
     """Return how a file differs from what was sealed; empty if it doesn't."""
     try:
-        if path.is_symlink() or not is_regular(path):
+        path = path_in(root, name)
+        size = path.stat().st_size
+        if not path.is_file():
             return "is not a file any more"
-        if path.stat().st_size != record.bytes:
-            return f"has {path.stat().st_size} bytes, {record.bytes} were stored"
+        if size != record.bytes:
+            return f"has {size} bytes, {record.bytes} were stored"
         return "" if _file_record(path) == record else "was changed"
+    except RunDirectoryError:
+        return "is not a file any more"
     except FileNotFoundError:
         return "is missing"
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from fleet2d.artifacts.buffer import TableBuffer
 from fleet2d.artifacts.chunk import Chunk
 from fleet2d.artifacts.digest import TableDigest
-from fleet2d.artifacts.manifest import ColumnRecord, TableRecord
+from fleet2d.artifacts.manifest import TableRecord, table_record
 from fleet2d.artifacts.unfinished import UnfinishedRun
 
 if TYPE_CHECKING:
@@ -62,8 +62,4 @@ class TableWriter:
 
     def record(self, digest: str) -> TableRecord:
         """Return the entry of the manifest about the table."""
-        columns = [
-            ColumnRecord(name=column.name, kind=column.kind, unit=column.unit)
-            for column in self.buffer.spec.columns
-        ]
-        return TableRecord(rows=self.digest.rows, digest=digest, columns=columns)
+        return table_record(self.buffer.spec, self.digest.rows, digest)

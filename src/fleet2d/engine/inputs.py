@@ -5,7 +5,7 @@ from pathlib import Path
 
 from pydantic import BaseModel
 
-from fleet2d.artifacts.manifest import Manifest, input_record, is_regular
+from fleet2d.artifacts.manifest import Manifest, input_record
 from fleet2d.configuration.components import Component
 from fleet2d.configuration.trust import source_files
 from fleet2d.errors import RunDirectoryError, blame
@@ -40,7 +40,7 @@ def changed_inputs(manifest: Manifest) -> list[str]:
     for record in manifest.inputs:
         path = Path(record.path)
         try:
-            if not is_regular(path):
+            if path.exists() and not path.is_file():
                 raise RunDirectoryError(
                     f"the run read {path}, which is not a file any more: restore it"
                 )

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from fleet2d.artifacts.directory import cannot_write
+from fleet2d.artifacts.manifest import FLOORPLAN_NAME
 from fleet2d.artifacts.store import RunStore
 from fleet2d.engine.inputs import input_files
 from fleet2d.engine.pace import Pace
@@ -18,7 +19,6 @@ from fleet2d.engine.state import State
 from fleet2d.errors import ArtifactError, blame
 from fleet2d.floorplan.formats.native import native_document
 from fleet2d.floorplan.home.home import Home
-from fleet2d.runs.run import FLOORPLAN_NAME
 from fleet2d.runtime.clock import Clock
 from fleet2d.scenario.model import Scenario
 

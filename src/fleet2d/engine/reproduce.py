@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from fleet2d.artifacts.manifest import FILE_NAME, SLOW, Manifest
+from fleet2d.artifacts.manifest import FILE_NAME, FLOORPLAN_NAME, LEARNED_NAME, SLOW, Manifest
 from fleet2d.artifacts.seal import verify_run
 from fleet2d.configuration.trust import Trust, refuse_untrusted, restrict
 from fleet2d.engine.gauges.run_expectations import TABLE
@@ -16,8 +16,9 @@ from fleet2d.engine.simulation import Simulation
 from fleet2d.errors import ArtifactError, InputError, RunDirectoryError
 from fleet2d.expectations.expectation import Expectation
 from fleet2d.expectations.verdict import Verdict
-from fleet2d.runs.run import FLOORPLAN_NAME, LEARNED_NAME, Run, open_run
+from fleet2d.runs.run import Run, open_run
 from fleet2d.scenario.model import load_scenario
+from fleet2d.storage.files import path_in, refuse_links
 
 # Fields that are compared in another way, or are the same for all runs.
 _COMPARED_APART = frozenset({"digest", "format", "scenario", "seal", "status", "tables", "notes"})
@@ -76,6 +77,7 @@ def reproduce_trusting(directory: str | Path, trust: Trust) -> Reproduction:
     manifest = Manifest.read(root)
     causes = [f"{path} has changed since" for path in changed_inputs(manifest)]
     refuse_untrusted(root, content["scenario"], content["interventions"], trust)
+    refuse_links(path_in(root, LEARNED_NAME))
     seal = verify_run(root)
     causes += [
         f"{name} in {directory} {change} after the run" for name, change in seal.differing.items()
@@ -180,7 +182,7 @@ def _files(old: Path, new: Path) -> list[str]:
     names = {FLOORPLAN_NAME}
     for root in (old, new):
         names |= {f"{LEARNED_NAME}/{path.name}" for path in (root / LEARNED_NAME).glob("*.npz")}
-    return [name for name in sorted(names) if not _are_equal(old / name, new / name)]
+    return [name for name in sorted(names) if not _are_equal(path_in(old, name), new / name)]
 
 
 def _are_equal(old: Path, new: Path) -> bool:

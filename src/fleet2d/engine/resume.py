@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from fleet2d.artifacts.directory import cannot_write
-from fleet2d.artifacts.manifest import FILE_NAME, Manifest
+from fleet2d.artifacts.manifest import FILE_NAME, LEARNED_NAME, Manifest
 from fleet2d.artifacts.store import RunStore
 from fleet2d.artifacts.unfinished import (
     FOLDER,
@@ -20,7 +20,7 @@ from fleet2d.engine.checkpoint import Checkpoint, UnusableCheckpointError
 from fleet2d.engine.inputs import changed_inputs
 from fleet2d.engine.simulation import Simulation
 from fleet2d.errors import RunDirectoryError
-from fleet2d.runs.run import LEARNED_NAME, Run
+from fleet2d.runs.run import Run
 from fleet2d.scenario.model import load_scenario
 from fleet2d.storage.files import refuse_links
 

@@ -8,7 +8,7 @@ from contextlib import ExitStack, nullcontext, suppress
 from pathlib import Path
 from typing import Any, BinaryIO, Self
 
-from fleet2d.artifacts.manifest import Status
+from fleet2d.artifacts.manifest import LEARNED_NAME, Status
 from fleet2d.artifacts.store import RunStore
 from fleet2d.artifacts.unfinished import UnfinishedRun
 from fleet2d.configuration.trust import current_trust, restrict
@@ -35,7 +35,7 @@ from fleet2d.engine.snapshot import (
 from fleet2d.engine.state import State
 from fleet2d.errors import ArtifactError, InputError
 from fleet2d.memory import rare_collections
-from fleet2d.runs.run import LEARNED_NAME, Run, run_of
+from fleet2d.runs.run import Run, run_of
 from fleet2d.runtime.clock import Clock
 from fleet2d.scenario.model import Scenario, load_scenario
 

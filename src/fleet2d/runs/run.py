@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fleet2d.artifacts.digest import changed_tables, digest_of_file, digest_table, run_digest
-from fleet2d.artifacts.manifest import FILE_NAME, Manifest
+from fleet2d.artifacts.manifest import FILE_NAME, FLOORPLAN_NAME, Manifest
 from fleet2d.artifacts.unfinished import Prefix
 from fleet2d.configuration.problems import suggest
-from fleet2d.errors import ArtifactError, RunDirectoryError
+from fleet2d.errors import ArtifactError, RunDirectoryError, printable
 from fleet2d.leaves import judges, views
-from fleet2d.storage.files import PARTIAL
+from fleet2d.storage.files import PARTIAL, path_in
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -26,12 +26,6 @@ if TYPE_CHECKING:
     from fleet2d.expectations.verdict import Verdict
     from fleet2d.floorplan.plan import FloorPlan
     from fleet2d.runs.trajectory import Trajectory
-
-
-FLOORPLAN_NAME = "floorplan.json"
-"""The floor plan in a run directory, in Fleet2D's own format."""
-LEARNED_NAME = "learned"
-"""The folder in a run directory of what algorithms have learned."""
 
 
 class Tables(Mapping[str, "pa.Table"]):
@@ -129,8 +123,8 @@ class Run:
         if self._plan is None:
             from fleet2d.floorplan.formats.native import read_native
 
-            path = Path() if self.directory is None else self.directory / FLOORPLAN_NAME
-            if not path.is_file():
+            path = path_in(self.directory or Path(), FLOORPLAN_NAME)
+            if self.directory is None or not path.is_file():
                 raise ArtifactError(f"{path} is missing: the run can't be shown in its home")
             source = self.manifest["scenario"].get("floorplan")
             cell = source.get("cell") if isinstance(source, dict) else None
@@ -298,7 +292,7 @@ class Run:
     def _digest_of(self, name: str) -> str | None:
         """Return the present digest of a table, None if it can't be read."""
         if self.directory is not None:
-            return digest_of_file(self.directory / f"{name}.parquet")
+            return digest_of_file(path_in(self.directory, f"{name}.parquet"))
         try:
             return digest_table(self.tables[name])
         except (ArtifactError, KeyError):
@@ -331,12 +325,12 @@ def open_run(directory: Path | str) -> Run:
     on_disk = {path.name.removesuffix(".parquet") for path in root.glob("*.parquet")}
     if manifest.digest is not None:
         foreign = sorted(f"{name}.parquet" for name in on_disk - manifest.tables.keys())
-        notes += [f"no part of the run: {', '.join(foreign)}"] if foreign else []
+        notes += [f"no part of the run: {printable(', '.join(foreign))}"] if foreign else []
         on_disk = set()
     names = []
     for name in sorted(on_disk | manifest.tables.keys()):
         try:
-            rows = count_rows(root / f"{name}.parquet")
+            rows = count_rows(path_in(root, f"{name}.parquet"))
         except ArtifactError as error:
             notes.append(str(error))
             if name not in manifest.tables:
@@ -354,7 +348,7 @@ def _read_table(root: Path, manifest: Manifest, name: str) -> pa.Table:
 
     record = manifest.tables.get(name)
     kinds = {column.name: column.kind for column in record.columns} if record else None
-    return read_parquet(root / f"{name}.parquet", kinds)
+    return read_parquet(path_in(root, f"{name}.parquet"), kinds)
 
 
 def run_of(store: RunStore) -> Run:
@@ -408,7 +402,7 @@ def _state_notes(root: Path, manifest: Manifest) -> list[str]:
         notes.append(f"{root} failed: it holds what was stored until then")
     names = sorted(path.name for path in root.glob(f"*.parquet{PARTIAL}"))
     if names:
-        notes.append(f"cut off and not readable: {', '.join(names)}")
+        notes.append(f"cut off and not readable: {printable(', '.join(names))}")
     return notes
 
 

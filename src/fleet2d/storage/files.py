@@ -84,7 +84,7 @@ def path_in(folder: Path | str, name: object) -> Path:
                     " it leads to"
                 )
             if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
-                raise RunDirectoryError(f"{path} is a device or a pipe, not a file: remove it")
+                raise RunDirectoryError(f"{path} is not a file, but a device or a pipe: remove it")
     return path
 
 
@@ -161,6 +161,22 @@ def write_atomically(path: Path, content: bytes | memoryview) -> None:
 def replacing(path: Path) -> Iterator[int]:
     """Yield the handle of a new file, which replaces a file atomically in the end.
 
+    Raises:
+        OSError: It can't be written; the old content is unchanged.
+    """
+    with partial_file(path) as partial:
+        handle = os.open(partial, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
+        try:
+            yield handle
+            sync(handle)
+        finally:
+            os.close(handle)
+
+
+@contextmanager
+def partial_file(path: Path) -> Iterator[Path]:
+    """Yield the path of a file to be written, which replaces a file atomically in the end.
+
     A link in place of either file is replaced; what it leads to is not touched.
 
     Raises:
@@ -169,12 +185,7 @@ def replacing(path: Path) -> Iterator[int]:
     partial = path.with_name(f"{path.name}{PARTIAL}")
     try:
         partial.unlink(missing_ok=True)  # left by a crash
-        handle = os.open(partial, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
-        try:
-            yield handle
-            sync(handle)
-        finally:
-            os.close(handle)
+        yield partial
         replace(path, partial)
     except Exception:
         with suppress(OSError):

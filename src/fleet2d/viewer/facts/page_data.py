@@ -12,6 +12,7 @@ from typing import Any
 
 from fleet2d.errors import ArtifactError
 from fleet2d.runs.run import Run
+from fleet2d.storage.files import path_in
 from fleet2d.viewer.facts.contract import RunFacts, SightingFacts, WallsFacts
 from fleet2d.viewer.facts.home_facts import walls_facts
 from fleet2d.viewer.facts.run_facts import run_facts, run_title
@@ -92,7 +93,7 @@ class PageData:
         if name not in self.run.tables:
             raise ArtifactError(f"the run has no table {name!r}")
         if self.run.directory is not None:
-            path = self.run.directory / f"{name}.parquet"
+            path = path_in(self.run.directory, f"{name}.parquet")
             if path.is_file():
                 return path
         # A run in memory, or an unfinished one, whose rows are in its journal.

@@ -11,6 +11,7 @@ from fleet2d.errors import ArtifactError
 from fleet2d.palette import body_color
 from fleet2d.runs.run import Run
 from fleet2d.sight.camera import USUAL_ANGLE_DEG, USUAL_RANGE_M
+from fleet2d.storage.files import path_in
 from fleet2d.version import __version__
 from fleet2d.viewer.facts.contract import BodyFacts, CameraFacts, ColumnFacts, RunFacts, TableFacts
 from fleet2d.viewer.facts.home_facts import home_facts
@@ -111,7 +112,7 @@ def _table_facts(run: Run, name: str) -> TableFacts:
     description = run.manifest["tables"].get(name)
     if description is None:  # the manifest of an unfinished run doesn't list its tables
         description = {"rows": _rows_of(run, name), "columns": _columns_of(run, name)}
-    path = None if run.directory is None else run.directory / f"{name}.parquet"
+    path = None if run.directory is None else path_in(run.directory, f"{name}.parquet")
     return TableFacts(
         name=name,
         rows=int(description["rows"]),

@@ -4,7 +4,6 @@ Only frames that differ from the one before are drawn: most of a day nobody move
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import suppress
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -21,6 +20,7 @@ from fleet2d.kernels import I64, U8
 from fleet2d.pictures.floorplan import drawing_style, figure_size
 from fleet2d.pictures.theme import apply_theme
 from fleet2d.runs.run import Run
+from fleet2d.storage.files import partial_file
 from fleet2d.viewer.scenes.stage import Stage
 from fleet2d.viewer.scenes.stamps import TextStamps
 
@@ -76,16 +76,15 @@ def write_film(
 
 def _store(path: Path, frames: Iterator[tuple[int, U8]], total: int, rate: Fraction) -> None:
     """Write a film under another name, and rename it when it is complete."""
-    unfinished = path.with_name(f".{path.name}.unfinished{path.suffix}")
-    write = _write_mp4 if path.suffix.lower() == ".mp4" else _write_pictures
+    kind = path.suffix.lower()[1:]
     try:
-        write(unfinished, frames, total, rate)
-        unfinished.replace(path)
+        with partial_file(path) as partial:
+            if kind == "mp4":
+                _write_mp4(partial, frames, total, rate)
+            else:
+                _write_pictures(partial, kind, frames, total, rate)
     except OSError as error:
         raise InputError(f"{path} can't be written: {error.strerror or error}") from error
-    finally:
-        with suppress(OSError):
-            unfinished.unlink(missing_ok=True)
 
 
 def _check(path: Path, speed: float, height: int) -> None:
@@ -152,7 +151,7 @@ def _frames(
 def _write_mp4(path: Path, frames: Iterator[tuple[int, U8]], total: int, rate: Fraction) -> None:
     with extra("film", "an MP4 film needs PyAV"):
         import av
-    with av.open(str(path), "w", options={"movflags": "faststart"}) as container:
+    with av.open(str(path), "w", format="mp4", options={"movflags": "faststart"}) as container:
         stream: Any = None
         frame: Any = None
         for number, pixels in frames:
@@ -173,9 +172,9 @@ def _write_mp4(path: Path, frames: Iterator[tuple[int, U8]], total: int, rate: F
 
 
 def _write_pictures(
-    path: Path, frames: Iterator[tuple[int, U8]], total: int, rate: Fraction
+    path: Path, kind: str, frames: Iterator[tuple[int, U8]], total: int, rate: Fraction
 ) -> None:
-    """Write a GIF or WebP, whose pictures have durations of their own."""
+    """Write a film of the kind gif or webp, whose pictures have durations of their own."""
     from PIL import Image
 
     numbers: list[int] = []
@@ -183,16 +182,17 @@ def _write_pictures(
     for number, pixels in frames:
         if len(pictures) >= MOST_PICTURES:
             raise InputError(
-                f"{path.suffix[1:].upper()} films have at most {MOST_PICTURES} pictures: choose a"
+                f"{kind.upper()} films have at most {MOST_PICTURES} pictures: choose a"
                 " higher --speed, a shorter stretch, or .mp4"
             )
         picture = Image.fromarray(pixels).convert("RGB")
         numbers.append(number)
-        is_gif = path.suffix.lower() == ".gif"
-        pictures.append(picture.quantize(128, dither=Image.Dither.NONE) if is_gif else picture)
+        pictures.append(
+            picture.quantize(128, dither=Image.Dither.NONE) if kind == "gif" else picture
+        )
     lengths = np.diff([*numbers, total]) * float(1000 / rate)
     durations = [max(20, round(length)) for length in lengths.tolist()]
     options = {"append_images": pictures[1:], "duration": durations, "loop": 0, "save_all": True}
-    if path.suffix.lower() == ".webp":
+    if kind == "webp":
         options |= {"quality": 80, "method": 2}
-    pictures[0].save(path, **options)
+    pictures[0].save(path, format=kind, **options)
