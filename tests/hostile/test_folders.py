@@ -204,8 +204,8 @@ def attack(run: Path, elsewhere: Path, use: Callable[[Path], Any]) -> str:
             assert len(message) < 1500
     assert before == state_of(elsewhere)
     for written in (run / "report.html", run.parent / "page.html"):
-        with suppress(OSError):
-            assert written.is_symlink() or SECRET not in written.read_text()
+        if written.is_file() and not written.is_symlink():
+            assert SECRET not in written.read_text()
     return message
 
 
@@ -220,7 +220,7 @@ def test_a_run_that_leads_elsewhere_harms_nothing(
     make: Callable[[Path], Path],
 ) -> None:
     source, use = make(root), READERS[command]
-    attacks = some(ATTACKS, 17 if command in ("reproduce", "resume") else 5)
+    attacks = some(ATTACKS, 29 if command in ("reproduce", "resume") else 9)
     for name, trick in attacks:
         run = shutil.copytree(source, tmp_path / "run")
         target = run / name
@@ -245,7 +245,7 @@ def test_a_figure_of_a_run_that_leads_elsewhere_harms_nothing(
 ) -> None:
     pytest.importorskip("matplotlib")
     names = ("key_frames.parquet", "floorplan.json", *FILES[FILES.index("picture.png") :])
-    attacks = some([(name, trick) for name in names for trick in TRICKS], 11)
+    attacks = some([(name, trick) for name in names for trick in TRICKS], 23)
     for name, trick in attacks:
         run = shutil.copytree(complete(root), tmp_path / "run")
         (run / name).unlink(missing_ok=True)
