@@ -13,7 +13,7 @@ from pydantic import BaseModel, TypeAdapter, ValidationError
 from fleet2d.cli.app import app
 from fleet2d.configuration.components import lookup
 from fleet2d.entities.behavior import Behavior
-from fleet2d.entities.localization import Localization
+from fleet2d.entities.equipment import Localization
 from fleet2d.sight.camera import Camera
 
 DOCS = Path(__file__).parent.parent / "docs"

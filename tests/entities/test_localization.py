@@ -8,7 +8,7 @@ from tests.scenes import digests, path, run, scenario, table
 
 import fleet2d
 from fleet2d import Algorithm
-from fleet2d.entities.localization import Drift, Localization
+from fleet2d.entities.equipment import Drift, Localization
 from fleet2d.errors import InputError
 from fleet2d.kernels.numbers import (
     TURN,

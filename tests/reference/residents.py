@@ -5,8 +5,7 @@ from datetime import timedelta
 from typing import Any
 
 from fleet2d.entities.plan import Plan
-from fleet2d.entities.users.resident import KnownHome, Venue
-from fleet2d.entities.users.spots import Seat, Spot
+from fleet2d.entities.users.resident import KnownHome, Seat, Spot, Venue
 from fleet2d.kernels.numbers import TURN, Bits, turn_between
 from fleet2d.routines.distributions import exponential
 from fleet2d.routines.planner import PLANNED, RESUMES

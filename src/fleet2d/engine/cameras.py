@@ -12,7 +12,7 @@ from fleet2d.configuration.units import micros
 from fleet2d.engine.bodies import Basis, Bodies, Watcher, poses_of
 from fleet2d.engine.sighting_errors import sight_events
 from fleet2d.entities.behavior import Actor, SightEvent
-from fleet2d.entities.localization import Drift, Localization
+from fleet2d.entities.equipment import Drift, Localization
 from fleet2d.errors import ComponentError, ScenarioError, blame
 from fleet2d.floorplan.home.home import Home
 from fleet2d.kernels import I64, U64

@@ -1,4 +1,4 @@
-"""Hours of the week in which something holds: ``weekdays 08:00-18:00``."""
+"""Behaviors and the bodies that they decide for: what a behavior is asked, knows and returns."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -10,8 +10,8 @@ from pydantic import BeforeValidator, PlainSerializer, WithJsonSchema
 from fleet2d.configuration.components import Component
 from fleet2d.configuration.problems import problem, shown
 from fleet2d.configuration.units import Duration, format_time_of_day, parse_time_of_day, weekdays_of
-from fleet2d.entities.battery import Charge
 from fleet2d.entities.body import NEVER, Body, Motion, Pose
+from fleet2d.entities.equipment import Charge
 from fleet2d.entities.place import ANY, Point, is_kind, is_point
 from fleet2d.entities.plan import Plan
 from fleet2d.errors import blame
@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 
 
 DAY = timedelta(days=1)
+# After this time, a body tries again to pass a shut door.
+DOOR_WAIT = timedelta(seconds=10)
 
 
 class HoursSpan(NamedTuple):

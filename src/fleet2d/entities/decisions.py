@@ -1,10 +1,14 @@
-"""Arbitration: which of a body's behaviors decides on its plan.
+"""Decisions: which plan a body follows next, chosen among its behaviors, orders and giving way.
 
 Behaviors are in order of priority, the highest first. When a body's plan is over or interrupted, it
 asks them in turn, and follows the first plan that one returns. While it follows the plan of one,
 those of higher priority may take over: when their hours begin, when their cooldown is over, at a
 time that they named, or at an event that they listen for. If none of them returns a plan, the
 present plan goes on as if they had not been asked.
+
+An order decides in place of the behaviors, until the body is released. A body has one order at a
+time. Nothing interrupts it, but a robot still gives way and its battery still runs down. An order
+ends after its duration, with the next order, or on release.
 """
 
 from collections.abc import Callable, Sequence
@@ -13,13 +17,20 @@ from datetime import datetime, timedelta
 from typing import Protocol
 
 from fleet2d.configuration.units import micros
-from fleet2d.entities.behavior import Actor, Behavior, Command, SightEvent, Situation, holds
+from fleet2d.entities.behavior import (
+    DOOR_WAIT,
+    Actor,
+    Behavior,
+    Command,
+    SightEvent,
+    Situation,
+    holds,
+)
 from fleet2d.entities.body import Pose
 from fleet2d.entities.giving_way import JUST_WAITED, GivesWay, Surroundings, WaitForPeople, resumed
 from fleet2d.entities.place import Point, RoomChoice
 from fleet2d.entities.plan import Plan
 from fleet2d.errors import ComponentError, NoWayError, PlacementError, blame
-from fleet2d.kernels.numbers import TURN, turn_between
 
 Ask = Callable[[Behavior, Situation], Plan | None]
 
@@ -259,7 +270,7 @@ class GoTo(Trip):
         """Go to the place, and turn."""
         plan.come_home().go_to(self._place, "send")
         if self._heading is not None:
-            plan.turn_by(turn_between(plan.heading, self._heading) / TURN)
+            plan.turn_to(self._heading)
 
 
 class GoOut(Trip):
@@ -297,8 +308,6 @@ class DoActivity(Trip):
 
 # Without a plan from any behavior, stand still this long, then ask again.
 PAUSE = timedelta(minutes=1)
-# With a shut door in the way, wait this long, then ask again.
-AT_A_DOOR = timedelta(seconds=10)
 
 
 @dataclass(eq=False)
@@ -495,6 +504,6 @@ class DecidingActor(Actor):
             plan, reason = now.plan(), str(error)
             if self._blocked != (reason, now.step):  # else the row was written before the wait
                 plan.note("way_blocked", reason)
-            plan.stay(AT_A_DOOR)
+            plan.stay(DOOR_WAIT)
             self._blocked = reason, self.clock.step_at_or_after(plan.time_us)
             return plan

@@ -8,13 +8,12 @@ from pydantic import Field, model_validator
 from fleet2d.configuration.components import OneOf
 from fleet2d.configuration.problems import problem_at
 from fleet2d.configuration.units import Length, Speed, TurnRateDeg
-from fleet2d.entities.battery import Battery
 from fleet2d.entities.behavior import Behavior
 from fleet2d.entities.body import BodySettings
 from fleet2d.entities.drives.differential import Differential
 from fleet2d.entities.drives.drive import Drive
+from fleet2d.entities.equipment import Battery, Localization
 from fleet2d.entities.giving_way import GivesWay
-from fleet2d.entities.localization import Localization
 from fleet2d.sight.camera import Camera
 from fleet2d.sight.perception import Perception
 

@@ -1,4 +1,9 @@
-"""Resuming: the rest of a plan that was interrupted, from wherever the body is by now."""
+"""Giving way: how plans go on when somebody is in the way.
+
+A robot stops in front of people, waits, and goes around them or gives up. Any body waits for
+another one that blocks it, or goes around it. The rest of a plan is resumed from wherever the body
+is by then.
+"""
 
 from collections.abc import Callable, Sequence
 from datetime import timedelta
@@ -85,7 +90,7 @@ def _rest(
         plan.go_to_point(*goal, route=route)
     except NoWayError:
         return None
-    plan.turn_by(turn_between(plan.heading, heading_at(track, stop, goes_on_us)) / TURN)
+    plan.turn_to(heading_at(track, stop, goes_on_us))
     later = plan.time_us - goes_on_us
     # Rows that were planned for the way there are written on arrival.
     plan.notes += [
@@ -355,8 +360,7 @@ def plan_around(now: Situation, interrupted: Plan, bodies: I64) -> Plan | None:
         return None
     since_us = max(int(rows[stop, 0]), begin_us)
     plan.go_to_point(*goal, route=route)
-    heading = heading_at(motion.breakpoints, stop, since_us)
-    plan.turn_by(turn_between(plan.heading, heading) / TURN)
+    plan.turn_to(heading_at(motion.breakpoints, stop, since_us))
     _continue(plan.stay_until(since_us), interrupted, begin_us, since_us, rest)
     return plan
 

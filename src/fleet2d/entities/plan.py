@@ -17,7 +17,7 @@ from fleet2d.floorplan.home.space import Space, straight_way
 from fleet2d.floorplan.objects import POSTURES, PlacedObject, Posture
 from fleet2d.kernels import I8, I64
 from fleet2d.kernels.motion import Breakpoints, Legs, WalkRule
-from fleet2d.kernels.numbers import TURN, turn_between
+from fleet2d.kernels.numbers import TURN, heading_of, turn_between
 from fleet2d.kernels.space import SUB
 from fleet2d.runtime.events import KINDS
 
@@ -177,7 +177,7 @@ class Plan:
             )
         else:
             self._step_to(at.x, at.y)
-            self._turn(turn_between(self.heading, at.heading))
+            self.turn_to(at.heading)
         self.take(at.posture)
         return self.note("uses", at.name)
 
@@ -240,6 +240,15 @@ class Plan:
         """Turn on the spot by a number of turns, counter-clockwise if positive."""
         self._turn(round(turns * TURN))
         return self
+
+    def turn_to(self, heading: int) -> Self:
+        """Turn on the spot to a heading [1/4096 turn], the shorter way."""
+        self._turn(turn_between(self.heading, heading))
+        return self
+
+    def face(self, x: int, y: int) -> Self:
+        """Turn on the spot towards a lattice point."""
+        return self.turn_to(heading_of(x - self.x, y - self.y))
 
     def _turn(self, headings: int) -> None:
         self._check_goes_on()

@@ -1,8 +1,8 @@
-"""Laws of durations and times of day, as tables of quantiles: the same on every machine.
+"""Distributions of durations and times of day, as tables of quantiles: the same on every machine.
 
-A law is stored as its quantiles at (i + 1/2) / KNOTS, in whole seconds, with linear interpolation.
-A draw within bounds inverts that curve between them: nothing is rejected, and the result has the
-conditional law. The tables are computed by + - * / and sqrt only.
+A distribution is stored as its quantiles at (i + 1/2) / KNOTS, in whole seconds, with linear
+interpolation. A draw within bounds inverts that curve between them: nothing is rejected, and the
+result has the conditional distribution. The tables are computed by + - * / and sqrt only.
 """
 
 import math

@@ -1,4 +1,4 @@
-"""Periods in which a person is away from home, whatever the plan of the day is."""
+"""Households: people whose days depend on each other."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""Needs and errands: what interrupts the planned days of people, and where its numbers are from."""
+"""Needs and errands: what interrupts the planned days of people."""
 
 from collections.abc import Mapping, Sequence
 from datetime import timedelta

@@ -1,4 +1,4 @@
-"""Personas: descriptions of people by their activities, manners and the templates of their days."""
+"""Personas: people described by their activities, manners, and the templates of their days."""
 
 from collections.abc import Mapping
 from datetime import date, timedelta

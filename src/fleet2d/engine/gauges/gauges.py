@@ -7,8 +7,8 @@ import numpy as np
 
 from fleet2d.algorithms.observations import ROBOT
 from fleet2d.engine.gauges.block import Block
-from fleet2d.entities.battery import Course
 from fleet2d.entities.behavior import Actor
+from fleet2d.entities.equipment import Course
 from fleet2d.expectations import states
 from fleet2d.expectations.trace import Trace, constant, joined, pulses, shortest
 from fleet2d.floorplan.home.home import Home

@@ -1,4 +1,4 @@
-"""The base of drives: when a robot is where on its route, and which way it faces."""
+"""Drives: when a robot is where on its route, and which way it faces."""
 
 import math
 from abc import abstractmethod

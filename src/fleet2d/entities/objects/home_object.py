@@ -1,4 +1,4 @@
-"""The base of objects that have a state of their own during a run."""
+"""Objects of a home that have a state during a run, and the base of those that sense people."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,7 +1,6 @@
-"""Beliefs of robots about where a person is, from the output of an algorithm."""
+"""What behaviors toward people share: where a person likely is, where to look, how near to come."""
 
 import math
-from datetime import timedelta
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,7 +12,7 @@ from fleet2d.entities.plan import Plan
 from fleet2d.errors import ComponentError, ScenarioError
 from fleet2d.floorplan.plan import Room
 from fleet2d.kernels import F64, I64, Bool
-from fleet2d.kernels.numbers import TURN, heading_of, turn_between
+from fleet2d.kernels.numbers import heading_of
 from fleet2d.kernels.sight import points_in_sight
 from fleet2d.kernels.space import CELL_CENTRE, SUB
 from fleet2d.runtime.determinism import sum_in_order
@@ -182,8 +181,6 @@ def centres(cells: I64) -> I64:
     return np.ascontiguousarray(cells[:, ::-1] * SUB + CELL_CENTRE)
 
 
-# Time after which a robot tries again to pass a shut door.
-AT_A_DOOR = timedelta(seconds=10)
 # Number of directions from a person in which points at a distance are tried.
 DIRECTIONS = 32
 
@@ -261,12 +258,6 @@ def approach(now: Situation, plan: Plan, x: float, y: float, distance: float) ->
     if spot != (plan.x, plan.y):
         plan.go_to_point(*spot)
     return plan
-
-
-def face(plan: Plan, x: int, y: int) -> Plan:
-    """Turn towards a lattice point."""
-    heading = int(heading_of(x - plan.x, y - plan.y))
-    return plan.turn_by(turn_between(plan.heading, heading) / TURN)
 
 
 def check_has_camera(actor: Actor, behavior: str) -> None:

@@ -1,4 +1,4 @@
-"""The rooms of a home as sites of a search: where to look round, and how long that takes."""
+"""Find: look for a person, room by room, by probabilities and distances."""
 
 from datetime import datetime, timedelta
 from itertools import pairwise
@@ -16,16 +16,14 @@ from fleet2d.configuration.units import (
     Share,
     TimeOfDay,
 )
-from fleet2d.entities.behavior import Actor, Command, Situation
+from fleet2d.entities.behavior import DOOR_WAIT, Actor, Command, Situation
 from fleet2d.entities.giving_way import resumed
 from fleet2d.entities.plan import Plan
 from fleet2d.entities.robots.approach import (
     ANYONE,
-    AT_A_DOOR,
     BeliefBehavior,
     approach,
     check_has_camera,
-    face,
     spot_back,
     viewpoints_of,
     way_seconds,
@@ -294,7 +292,7 @@ class Find(BeliefBehavior):
         back = spot_back(now, x, y, self.distance)
         if (plan.x, plan.y) == (now.actor.state.x, now.actor.state.y) != back:
             plan.go_to_point(*back)
-        face(plan, *now.home.plan.lattice.point_at((x, y)))
+        plan.face(*now.home.plan.lattice.point_at((x, y)))
         return plan.stay(self.stay)
 
     def _look_further(self, now: Situation, plan: Plan) -> Plan | None:
@@ -321,7 +319,7 @@ class Find(BeliefBehavior):
         if route:
             self.sites.look_round(plan, route[0]).interrupt_on("user_seen")
         else:  # shut doors block all sites
-            plan.stay(AT_A_DOOR)
+            plan.stay(DOOR_WAIT)
         self.plan = plan.ask_by(ends)
         return plan
 

@@ -9,7 +9,7 @@ from fleet2d.configuration.components import register
 from fleet2d.configuration.units import Duration, Length, PositiveDuration
 from fleet2d.entities.behavior import Actor, Behavior, Situation
 from fleet2d.entities.plan import Plan
-from fleet2d.entities.robots.approach import approach, check_has_camera, face
+from fleet2d.entities.robots.approach import approach, check_has_camera
 
 # Distance from where a person was lost at which it looks for the person [m].
 SOUGHT_FROM = 0.3
@@ -96,7 +96,7 @@ class Follow(Behavior):
         self.pause = min(2 * self.pause, longest) if is_resting else self.update
         self.last = x, y
         approach(now, plan, x, y, self.distance)
-        face(plan, *now.home.plan.lattice.point_at((x, y)))
+        plan.face(*now.home.plan.lattice.point_at((x, y)))
         until = now.time + self.pause
         if self.longest:
             until = min(until, self.since + self.longest)

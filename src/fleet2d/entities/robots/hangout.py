@@ -1,4 +1,4 @@
-"""Places to hang out at, rated by all that doesn't depend on where people are at present."""
+"""Hangout: stand near people without blocking their way, and move rarely."""
 
 from datetime import datetime, timedelta
 from itertools import combinations
@@ -15,8 +15,6 @@ from fleet2d.entities.place import available_rooms
 from fleet2d.entities.plan import Plan
 from fleet2d.entities.robots.approach import (
     BeliefBehavior,
-    Viewpoints,
-    face,
     sight_range,
     viewpoints_of,
 )
@@ -270,7 +268,6 @@ class Hangout(BeliefBehavior):
         self.penalty = self.blocking * self.places.block + self.personal_space * self.places.prox
         self.ways: tuple[Space, dict[tuple[int, int], F64]] = actor.space, {}
         self.explored = [r.index for r in actor.reachable_rooms() if r.index not in self.avoided]
-        self.viewpoints: tuple[int, dict[int, Viewpoints]] = actor.home.version, {}
         self.rated_by: F64 | None = None  # the probabilities behind `worth`
         self.worth = -self.penalty
         self.place: int | None = None
@@ -320,14 +317,8 @@ class Hangout(BeliefBehavior):
 
     def _explore(self, now: Situation, plan: Plan, room: int) -> None:
         """Look round in a room from viewpoints that show nearly all of it, by present walls."""
-        actor = now.actor
-        if self.viewpoints[0] != actor.home.version:
-            self.viewpoints = actor.home.version, {}
-        known = self.viewpoints[1]
-        if room not in known:
-            known[room] = viewpoints_of(actor, actor.home.rooms[room], ENOUGH, MOST_VIEWS)
-        plan.note("explores", actor.home.rooms[room].name)
-        for point in known[room].points:
+        plan.note("explores", now.home.rooms[room].name)
+        for point in viewpoints_of(now.actor, now.home.rooms[room], ENOUGH, MOST_VIEWS).points:
             if plan.reaches(*point):
                 plan.go_to_point(*point).turn_by(1.0)
 
@@ -364,7 +355,7 @@ class Hangout(BeliefBehavior):
         room = now.home.plan.rooms[int(self.places.room[self.place])]
         x, y = now.home.plan.lattice.point_at(room.anchor_xy)
         if (x, y) != (plan.x, plan.y):
-            face(plan, x, y)
+            plan.face(x, y)
 
     def _quiet_begins(self, until: datetime, time: datetime) -> datetime:
         """Return when the next quiet hours begin, or `until` if that is earlier."""

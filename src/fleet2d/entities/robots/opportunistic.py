@@ -9,7 +9,7 @@ from fleet2d.configuration.components import register
 from fleet2d.configuration.units import Duration, Length, Share
 from fleet2d.entities.behavior import Actor, Behavior, Situation
 from fleet2d.entities.plan import Plan
-from fleet2d.entities.robots.approach import approach, check_has_camera, face
+from fleet2d.entities.robots.approach import approach, check_has_camera
 
 
 @register("behavior", "opportunistic")
@@ -66,6 +66,6 @@ class Opportunistic(Behavior):
     def _approach(self, now: Situation, name: str, x: float, y: float) -> Plan:
         plan = now.plan().note("approaches", name)
         approach(now, plan, x, y, self.distance)
-        face(plan, *now.home.plan.lattice.point_at((x, y)))
+        plan.face(*now.home.plan.lattice.point_at((x, y)))
         plan.note("interacts", name).stay(self.interaction)
         return plan.note("interaction_over", name)

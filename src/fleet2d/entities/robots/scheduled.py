@@ -8,10 +8,9 @@ from pydantic import Field
 
 from fleet2d.configuration.components import Settings, register
 from fleet2d.configuration.units import Days, Duration, TimeOfDay, weekdays_of
-from fleet2d.entities.behavior import DAY, Actor, Behavior, Situation
+from fleet2d.entities.behavior import DAY, DOOR_WAIT, Actor, Behavior, Situation
 from fleet2d.entities.place import Place, stop_at
 from fleet2d.entities.plan import Plan
-from fleet2d.entities.robots.approach import AT_A_DOOR
 from fleet2d.runtime.clock import midnight_of
 
 
@@ -63,7 +62,7 @@ class Scheduled(Behavior):
     def wakes_at(self, now: Situation, plan: Plan) -> datetime | None:
         """Return when the next visit is due, or a shut door is tried again."""
         due = next((due for due, _ in self._due(max(self.last_decision, now.time))), None)
-        retry = now.time + AT_A_DOOR if self.pending else None
+        retry = now.time + DOOR_WAIT if self.pending else None
         return min((time for time in (due, retry) if time is not None), default=None)
 
     def decide(self, now: Situation) -> Plan | None:
@@ -77,7 +76,7 @@ class Scheduled(Behavior):
                 return self._visit(now, number)
         blocked = [number for due, number in self.pending if (due, number) in fresh]
         if blocked:
-            return now.plan().note("way_blocked", self._room_name(now, blocked[0])).stay(AT_A_DOOR)
+            return now.plan().note("way_blocked", self._room_name(now, blocked[0])).stay(DOOR_WAIT)
         return None
 
     def _visit(self, now: Situation, number: int) -> Plan:

@@ -10,7 +10,7 @@ from fleet2d.configuration.problems import problem
 from fleet2d.entities.behavior import Behavior, Situation
 from fleet2d.entities.place import available_rooms
 from fleet2d.entities.plan import Plan
-from fleet2d.entities.users.spots import Spots
+from fleet2d.entities.users.resident import Spots
 from fleet2d.routines.activity import AnyDurationDistribution, DurationDistribution
 from fleet2d.runtime.determinism import Draws
 

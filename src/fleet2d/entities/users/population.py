@@ -5,8 +5,7 @@ from datetime import datetime, timedelta
 from typing import TYPE_CHECKING, Literal
 
 from fleet2d.configuration.components import register
-from fleet2d.entities.users.resident import ResidentBehavior, rooms_at
-from fleet2d.entities.users.spots import Spots
+from fleet2d.entities.users.resident import ResidentBehavior, Spots, rooms_at
 from fleet2d.routines import survey
 from fleet2d.routines.activity import catalogue
 from fleet2d.routines.distributions import draw_weighted

@@ -8,7 +8,6 @@ from fleet2d.configuration.units import micros
 from fleet2d.entities.behavior import Attention, Behavior, SightEvent, Situation
 from fleet2d.entities.place import points_at_distance
 from fleet2d.entities.plan import Plan
-from fleet2d.kernels.numbers import TURN, heading_of, turn_between
 from fleet2d.routines.distributions import Distribution
 from fleet2d.routines.persona import Manners
 from fleet2d.runtime.determinism import Draws
@@ -134,8 +133,7 @@ class Reactions(Behavior):
     def _look_at(
         self, now: Situation, plan: Plan, event: SightEvent, law: Distribution, draws: Draws
     ) -> None:
-        x, y = _robot(now, event)
-        plan.turn_by(turn_between(plan.heading, heading_of(x - plan.x, y - plan.y)) / TURN)
+        plan.face(*_robot(now, event))
         plan.stay(timedelta(seconds=law.draw(draws)))
 
     def _points_around(

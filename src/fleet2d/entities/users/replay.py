@@ -1,4 +1,4 @@
-"""Reports of replays: how a log was interpreted, as lines of text."""
+"""Replay: be where a person was according to a log, in its rooms or at its positions."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -45,73 +45,6 @@ from fleet2d.runtime.determinism import sum_in_order
 
 if TYPE_CHECKING:
     from fleet2d.entities.behavior import Actor
-
-
-def report_rooms(
-    log: ActivityLog,
-    mapped: Mapping[str, RoomChoice | None],
-    logged: LoggedVisits,
-    rule: VisitRule,
-    paces: "Paces",
-    fastest: float,
-) -> tuple[str, ...]:
-    """Return lines about a log of rooms: which room each label means, omissions, gaps, haste."""
-    lines = [_head(log, len(log.readings), "readings"), *log.notes]
-    for label, count in sorted(log.rooms.items()):
-        choice = mapped[label]
-        meaning = "left out" if choice is None else f"taken for {choice[0]}"
-        lines.append(f"{label}: {meaning}, {count} readings")
-    if logged.overruled:
-        lines.append(
-            f"{logged.overruled} readings yield to later ones of another room in their step"
-        )
-    gaps = [visit for visit in logged.visits if visit.place == UNKNOWN]
-    hours = sum_in_order(
-        (min(v.last + 1, rule.steps) - max(v.first, 0)) * rule.step_us / 3.6e9 for v in gaps
-    )
-    if gaps:
-        lines.append(f"nobody knows where it is in {len(gaps)} gaps, {hours:.1f} h in all")
-    if paces.hurried:
-        lines.append(
-            f"{paces.hurried} of {paces.walks} walks are faster than the body walks, since the log"
-            f" leaves no more time; {paces.over} of them faster than {fastest:g} m/s, the fastest"
-            f" at {paces.fastest:.1f} m/s"
-        )
-    return tuple(lines)
-
-
-def report_fixes(
-    log: PositionLog, fixes: "Fixes", follower: "FixFollower", thinned: int, frame: LogFrame
-) -> tuple[str, ...]:
-    """Return lines about a log of positions: omitted and moved fixes, gaps, implausible legs."""
-    lines = [_head(log, len(log.time_us), "fixes"), *log.notes]
-    if frame.matches:
-        off = frame.errors()
-        lines.append(f"the frame fits its {len(off)} matches to {float(off.max()):.2f} m")
-    if thinned:
-        lines.append(f"{thinned} fixes are left out: one in a step is enough")
-    if fixes.outside:
-        lines.append(f"{fixes.outside} fixes are outside the home and left out")
-    if fixes.snapped:
-        lines.append(f"{fixes.snapped} fixes are moved to the nearest place where the body fits")
-    if follower.around:
-        lines.append(f"{follower.around} legs go around a wall that a straight line would cross")
-    if follower.gap_count:
-        hours = follower.unknown_us / 3.6e9
-        lines.append(f"nobody knows where it is in {follower.gap_count} gaps, {hours:.2f} h in all")
-    if follower.implausible:
-        metres = follower.top_speed / follower.actor.home.plan.lattice.units_per_m
-        lines.append(
-            f"{follower.implausible} legs are too fast to be true, up to {metres:.1f} m/s: check"
-            " the frame and the times"
-        )
-    return tuple(lines)
-
-
-def _head(log: ActivityLog | PositionLog, count: int, noun: str) -> str:
-    since = f" from {log.first_day}" if log.first_day else ""
-    days = f"{log.days} day{'' if log.days == 1 else 's'}"
-    return f"{log.path.name}, layout {log.layout}: {count} {noun} of {days}{since}"
 
 
 # Coordinates are clipped to this, far outside of any home [m].
@@ -199,13 +132,13 @@ class FixFollower:
         self.top_speed = 0.0
         self.heading = self._headings()
 
-    def follow(self, plan: "Plan") -> "Plan":
+    def follow(self, plan: Plan) -> Plan:
         """Fill a plan from its beginning, with a jump to the present fix, to the last fix."""
         time = self.fixes.time_us
         end_us = self.actor.clock.steps * self.actor.clock.step_us
         i = int(np.searchsorted(time, plan.time_us, side="right")) - 1
         if i < 0 or plan.time_us - time[i] > self.gap_us:
-            self._vanish(plan, plan.time_us)
+            _vanish(plan, plan.time_us)
         else:
             plan.follow(self._row(i, plan.time_us))
         for j in range(i + 1, len(time)):
@@ -216,7 +149,7 @@ class FixFollower:
             elif time[j] - time[j - 1] <= self.gap_us:
                 self._leg(plan, j - 1, j, plan.time_us)
             elif self.gaps == "unknown":
-                self._vanish(plan, plan.time_us + 1)  # at the fix itself it is known
+                _vanish(plan, plan.time_us + 1)  # at the fix itself it is known
                 self.gap_count += 1
                 self.unknown_us += int(time[j] - time[j - 1])
                 self._appear(plan, j)
@@ -226,7 +159,7 @@ class FixFollower:
                     leave = max(leave, int(time[j]) - self._takes(j - 1, j))
                 self._leg(plan, j - 1, j, leave)
         if len(time) and not plan.away and end_us - plan.time_us > self.gap_us:
-            self._vanish(plan, plan.time_us + 1)
+            _vanish(plan, plan.time_us + 1)
         return plan.stay()
 
     def _headings(self) -> I64:
@@ -247,11 +180,7 @@ class FixFollower:
         x, y = self.fixes.xy[i].tolist()
         return np.array([[at_us, x, y, self.heading[i], 0]], np.int64)
 
-    def _vanish(self, plan: "Plan", at_us: int) -> None:
-        """Make the body's position unknown: it is away, without having walked out."""
-        plan.jump(at_us, away=1).note("unknown")
-
-    def _appear(self, plan: "Plan", i: int) -> None:
+    def _appear(self, plan: Plan, i: int) -> None:
         x, y = self.fixes.xy[i].tolist()
         at_us, heading = int(self.fixes.time_us[i]), int(self.heading[i])
         plan.jump(at_us, x=x, y=y, heading=heading, away=0).note("known")
@@ -274,7 +203,7 @@ class FixFollower:
         rows = time_route(route, 0, heading, self.actor.speed, self.actor.turn_rate)
         return int(rows[-1, 0])
 
-    def _leg(self, plan: "Plan", i: int, j: int, leave_us: int) -> None:
+    def _leg(self, plan: Plan, i: int, j: int, leave_us: int) -> None:
         """Go from fix i, from a moment on, to fix j, at a constant speed."""
         route = self._route(i, j)
         arrive_us = int(self.fixes.time_us[j])
@@ -303,23 +232,6 @@ class FixFollower:
 BRIEF_US = 10_000_000
 
 
-@dataclass
-class Paces:
-    """Counts of the walks in a replay.
-
-    Attributes:
-        walks: The number of walks.
-        hurried: Those faster than the body walks, because the log leaves no more time.
-        over: Those of the hurried ones that are implausibly fast.
-        fastest: The speed of the fastest walk [m/s].
-    """
-
-    walks: int = 0
-    hurried: int = 0
-    over: int = 0
-    fastest: float = 0.0
-
-
 class RoomFollower:
     """Plans the way through visits: the body leaves each room in time for the next visit.
 
@@ -342,10 +254,11 @@ class RoomFollower:
         self.visits = visits
         self.at_once = at_once
         self.step_us = actor.clock.step_us
-        self.paces = Paces()
+        self.walks = self.hurried = self.implausible = 0
+        self.top_speed = 0.0  # of the walks [m/s]
         self._nearest: dict[int, Nearest] = {}
 
-    def follow(self, plan: "Plan", current: int, *, rejoin: bool) -> "Plan":
+    def follow(self, plan: Plan, current: int, *, rejoin: bool) -> Plan:
         """Fill a plan from its beginning, in visit `current`, to the end of the log.
 
         Args:
@@ -357,7 +270,7 @@ class RoomFollower:
         if rejoin:
             self._catch_up(plan, self.visits[current])
         elif self.visits[current].place == UNKNOWN:
-            self._vanish(plan, plan.time_us)
+            _vanish(plan, plan.time_us)
         else:
             self._appear(plan, self.visits[current], plan.time_us, known=False)
         for i in range(current + 1, len(self.visits)):
@@ -367,7 +280,7 @@ class RoomFollower:
             if arrive_us <= plan.time_us:  # still catching up
                 self._catch_up(plan, visit)
             elif visit.place == UNKNOWN:
-                self._vanish(plan, arrive_us)
+                _vanish(plan, arrive_us)
             elif before.place == UNKNOWN:
                 self._appear(plan, visit, arrive_us)
             else:
@@ -375,32 +288,28 @@ class RoomFollower:
         self._note_activities(plan, self.visits[-1])
         return plan.stay()
 
-    def _catch_up(self, plan: "Plan", visit: LoggedVisit) -> None:
+    def _catch_up(self, plan: Plan, visit: LoggedVisit) -> None:
         """Walk to a visit that has already begun."""
         if visit.place == UNKNOWN:
-            self._vanish(plan, plan.time_us)
+            _vanish(plan, plan.time_us)
         elif visit.place == AWAY:
             plan.leave_home()
         else:
             plan.go_to_point(*self._spot(visit, plan))
 
-    def _spot(self, visit: LoggedVisit, plan: "Plan") -> tuple[int, int]:
+    def _spot(self, visit: LoggedVisit, plan: Plan) -> tuple[int, int]:
         if visit.place in (DOOR, AWAY):
             return self.actor.way_out
         return self.actor.find((visit.place,), max(visit.first, 0) * self.step_us, "spot")
 
-    def _vanish(self, plan: "Plan", at_us: int) -> None:
-        """Make the body's position unknown: it is away, without having walked out."""
-        plan.jump(at_us, away=1).note("unknown")
-
-    def _appear(self, plan: "Plan", visit: LoggedVisit, at_us: int, *, known: bool = True) -> None:
+    def _appear(self, plan: Plan, visit: LoggedVisit, at_us: int, *, known: bool = True) -> None:
         """Put the body where the log has it."""
         x, y = self._spot(visit, plan)
         plan.jump(at_us, x=x, y=y, away=int(visit.place == AWAY))
         if known:
             plan.note("known", visit.place)
 
-    def _walk(self, plan: "Plan", before: LoggedVisit, visit: LoggedVisit) -> None:
+    def _walk(self, plan: Plan, before: LoggedVisit, visit: LoggedVisit) -> None:
         """Walk from one visit to the next, so as to arrive in time."""
         arrive_us = visit.first * self.step_us
         may_leave = max(plan.time_us, before.keep * self.step_us)
@@ -418,11 +327,11 @@ class RoomFollower:
         if visit.place == AWAY:
             plan.jump(arrive_us, away=1).note("left_home")
 
-    def _come_home(self, plan: "Plan", out: LoggedVisit, arrive_us: int) -> None:
+    def _come_home(self, plan: Plan, out: LoggedVisit, arrive_us: int) -> None:
         back_us = max(plan.time_us, min((out.last + 1) * self.step_us, arrive_us - 1))
         plan.jump(back_us, away=0).note("came_home")
 
-    def _near(self, plan: "Plan", spot: tuple[int, int]) -> tuple[int, int]:
+    def _near(self, plan: Plan, spot: tuple[int, int]) -> tuple[int, int]:
         """Return the place in the room of a spot that is nearest to the body."""
         plan_of_home = self.actor.home.plan
         room = plan_of_home.room_at(*plan_of_home.lattice.to_metres(spot).tolist())
@@ -433,7 +342,7 @@ class RoomFollower:
         x, y = self._nearest[room.index].of(np.array([[plan.x, plan.y]], np.int64))[0].tolist()
         return x, y
 
-    def _way(self, plan: "Plan", spot: tuple[int, int]) -> I64:
+    def _way(self, plan: Plan, spot: tuple[int, int]) -> I64:
         """Return the breakpoints of the way to a spot: time since its beginning, x, y, heading."""
         route = self.actor.space.route((plan.x, plan.y), spot)
         if route is None:  # a door is shut at present, but the log says that somebody went there
@@ -441,7 +350,7 @@ class RoomFollower:
         return time_route(route, 0, plan.heading, self.actor.speed, self.actor.turn_rate)
 
     def _set_out(
-        self, plan: "Plan", rows: I64, may_leave: int, arrive_us: int, before: LoggedVisit
+        self, plan: Plan, rows: I64, may_leave: int, arrive_us: int, before: LoggedVisit
     ) -> None:
         """Follow the breakpoints of a way, at a time and speed that let the body arrive in time."""
         takes = int(rows[-1, 0])
@@ -452,21 +361,21 @@ class RoomFollower:
         if self.at_once:
             leave = min(leave, max(may_leave, (before.last + 1) * self.step_us))
         window = arrive_us - leave
-        self.paces.walks += 1
+        self.walks += 1
         times = rows[:, 0]
         if takes > window:
             times = times * window // takes
-            self.paces.hurried += 1
+            self.hurried += 1
             speed = self.actor.entity.speed * takes / max(window, 1)
-            self.paces.over += speed > self.limit
-            self.paces.fastest = max(self.paces.fastest, speed)
+            self.implausible += speed > self.limit
+            self.top_speed = max(self.top_speed, speed)
         block = np.zeros((len(rows) + 1, 5), np.int64)
         block[:-1, 0], block[:-1, 1:4] = leave + times, rows[:, 1:]
         block[-1] = block[-2]
         block[-1, 0] = arrive_us
         plan.follow(block)
 
-    def _note_activities(self, plan: "Plan", visit: LoggedVisit) -> None:
+    def _note_activities(self, plan: Plan, visit: LoggedVisit) -> None:
         """Add rows for the activities of a visit, except those before the plan begins."""
         for step, activity in visit.activities:
             at_us = max(step, 0) * self.step_us
@@ -476,6 +385,77 @@ class RoomFollower:
 
 GAP_OF_ROOMS = timedelta(minutes=10)
 GAP_OF_FIXES = timedelta(minutes=1)
+
+
+def _vanish(plan: Plan, at_us: int) -> None:
+    """Make the body's position unknown: it is away, without having walked out."""
+    plan.jump(at_us, away=1).note("unknown")
+
+
+def report_rooms(
+    log: ActivityLog,
+    mapped: Mapping[str, RoomChoice | None],
+    logged: LoggedVisits,
+    rule: VisitRule,
+    follower: RoomFollower,
+) -> tuple[str, ...]:
+    """Return lines about a log of rooms: which room each label means, omissions, gaps, haste."""
+    lines = [_head(log, len(log.readings), "readings"), *log.notes]
+    for label, count in sorted(log.rooms.items()):
+        choice = mapped[label]
+        meaning = "left out" if choice is None else f"taken for {choice[0]}"
+        lines.append(f"{label}: {meaning}, {count} readings")
+    if logged.overruled:
+        lines.append(
+            f"{logged.overruled} readings yield to later ones of another room in their step"
+        )
+    gaps = [visit for visit in logged.visits if visit.place == UNKNOWN]
+    hours = sum_in_order(
+        (min(v.last + 1, rule.steps) - max(v.first, 0)) * rule.step_us / 3.6e9 for v in gaps
+    )
+    if gaps:
+        lines.append(f"nobody knows where it is in {len(gaps)} gaps, {hours:.1f} h in all")
+    if follower.hurried:
+        lines.append(
+            f"{follower.hurried} of {follower.walks} walks are faster than the body walks, since"
+            f" the log leaves no more time; {follower.implausible} of them faster than"
+            f" {follower.limit:g} m/s, the fastest at {follower.top_speed:.1f} m/s"
+        )
+    return tuple(lines)
+
+
+def report_fixes(
+    log: PositionLog, fixes: Fixes, follower: FixFollower, thinned: int, frame: LogFrame
+) -> tuple[str, ...]:
+    """Return lines about a log of positions: omitted and moved fixes, gaps, implausible legs."""
+    lines = [_head(log, len(log.time_us), "fixes"), *log.notes]
+    if frame.matches:
+        off = frame.errors()
+        lines.append(f"the frame fits its {len(off)} matches to {float(off.max()):.2f} m")
+    if thinned:
+        lines.append(f"{thinned} fixes are left out: one in a step is enough")
+    if fixes.outside:
+        lines.append(f"{fixes.outside} fixes are outside the home and left out")
+    if fixes.snapped:
+        lines.append(f"{fixes.snapped} fixes are moved to the nearest place where the body fits")
+    if follower.around:
+        lines.append(f"{follower.around} legs go around a wall that a straight line would cross")
+    if follower.gap_count:
+        hours = follower.unknown_us / 3.6e9
+        lines.append(f"nobody knows where it is in {follower.gap_count} gaps, {hours:.2f} h in all")
+    if follower.implausible:
+        metres = follower.top_speed / follower.actor.home.plan.lattice.units_per_m
+        lines.append(
+            f"{follower.implausible} legs are too fast to be true, up to {metres:.1f} m/s: check"
+            " the frame and the times"
+        )
+    return tuple(lines)
+
+
+def _head(log: ActivityLog | PositionLog, count: int, noun: str) -> str:
+    since = f" from {log.first_day}" if log.first_day else ""
+    days = f"{log.days} day{'' if log.days == 1 else 's'}"
+    return f"{log.path.name}, layout {log.layout}: {count} {noun} of {days}{since}"
 
 
 def _rooms(value: object) -> object:
@@ -621,12 +601,11 @@ class Replay(Behavior):
         )
         logged = visits_of(log, mapped, rule)
         self.visits = logged.visits
-        self.follower: RoomFollower | FixFollower = RoomFollower(
-            actor, self.visits, self.gaps == "walk", self.fastest
-        )
+        follower = RoomFollower(actor, self.visits, self.gaps == "walk", self.fastest)
+        self.follower: RoomFollower | FixFollower = follower
         # Planned once before the run, for the report on its walks.
-        self.follower.follow(Plan(actor, 0), 0, rejoin=False)
-        self.notes = report_rooms(log, mapped, logged, rule, self.follower.paces, self.fastest)
+        follower.follow(Plan(actor, 0), 0, rejoin=False)
+        self.notes = report_rooms(log, mapped, logged, rule, follower)
 
     def _start_fixes(self, actor: "Actor", log: PositionLog, begin_us: int) -> None:
         if self.rooms:

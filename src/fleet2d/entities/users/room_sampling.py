@@ -12,7 +12,7 @@ from fleet2d.configuration.problems import problem
 from fleet2d.entities.behavior import Behavior, Situation
 from fleet2d.entities.place import available_places
 from fleet2d.entities.plan import Plan
-from fleet2d.entities.users.spots import Spot, Spots
+from fleet2d.entities.users.resident import Spot, Spots
 from fleet2d.errors import PlacementError
 from fleet2d.floorplan.geometry.lattice import UNITS_PER_CELL
 from fleet2d.kernels import I64

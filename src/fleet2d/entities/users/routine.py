@@ -1,4 +1,4 @@
-"""Private rooms: where members of a household do activities that they don't share a room for."""
+"""Routine: days drawn from a persona, alone or in a household."""
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -11,8 +11,16 @@ from pydantic import model_validator
 from fleet2d.configuration.components import register
 from fleet2d.configuration.problems import problem, suggest
 from fleet2d.entities.place import ANY, matching_rooms
-from fleet2d.entities.users.resident import SECOND_US, ResidentBehavior, Venue, rooms_at
-from fleet2d.entities.users.spots import Seat, Spots, part_of, seats_at
+from fleet2d.entities.users.resident import (
+    SECOND_US,
+    ResidentBehavior,
+    Seat,
+    Spots,
+    Venue,
+    part_of,
+    rooms_at,
+    seats_at,
+)
 from fleet2d.errors import PlacementError
 from fleet2d.kernels.motion import ANY_ROOM, NO_GAP_S
 from fleet2d.routines.activity import Activity, catalogue
