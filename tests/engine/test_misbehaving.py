@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 import shapely
 from tests.scenes import fleet2d_process, process, scenario
+from tests.thorough import some
 
 import fleet2d
 from fleet2d import Algorithm, Behavior, Metric
@@ -225,13 +226,16 @@ class Odd(fleet2d.Algorithm):
 
 @pytest.mark.parametrize(
     ("how", "words"),
-    [
-        ("check", "mine:Odd failed while its keys were checked: SystemExit: 0"),
-        ("files", "mine:Odd failed when it was started: SystemExit: 0"),
-        ("start", "algorithms.odd failed when it was started: SystemExit: 0"),
-        ("start: interrupt", "algorithms.odd failed when it was started: KeyboardInterrupt"),
-        ("check: interrupt", "mine:Odd failed while its keys were checked: KeyboardInterrupt"),
-    ],
+    some(
+        [
+            ("check", "mine:Odd failed while its keys were checked: SystemExit: 0"),
+            ("files", "mine:Odd failed when it was started: SystemExit: 0"),
+            ("start", "algorithms.odd failed when it was started: SystemExit: 0"),
+            ("start: interrupt", "algorithms.odd failed when it was started: KeyboardInterrupt"),
+            ("check: interrupt", "mine:Odd failed while its keys were checked: KeyboardInterrupt"),
+        ],
+        2,
+    ),
 )
 def test_code_that_ends_the_program_before_the_run_is_named(
     tmp_path: Path, how: str, words: str
@@ -259,11 +263,20 @@ class Stops(fleet2d.Algorithm):
 
 @pytest.mark.parametrize(
     ("number", "command"),
-    [
-        ("SIGINT", ("run", "algorithms.own.type=mine:Stops")),
-        ("SIGINT", ("study", "run", "study.yaml", "--executor", "serial", "--trust", "mine.py")),
-        ("SIGTERM", ("study", "run", "study.yaml", "--executor", "serial", "--trust", "mine.py")),
-    ],
+    some(
+        [
+            ("SIGINT", ("run", "algorithms.own.type=mine:Stops")),
+            (
+                "SIGINT",
+                ("study", "run", "study.yaml", "--executor", "serial", "--trust", "mine.py"),
+            ),
+            (
+                "SIGTERM",
+                ("study", "run", "study.yaml", "--executor", "serial", "--trust", "mine.py"),
+            ),
+        ],
+        2,
+    ),
 )
 def test_a_signal_during_the_code_of_a_component_is_not_its_error(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: str, command: tuple[str, ...]
