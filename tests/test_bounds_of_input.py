@@ -16,7 +16,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from fleet2d.algorithms.learned import load_learned
+from fleet2d.algorithms.algorithm import load_learned
 from fleet2d.artifacts.arrow import read_parquet
 from fleet2d.artifacts.manifest import Manifest
 from fleet2d.bounds import BOUNDS, FILE_BYTES, Bound, one_line, read_bytes

@@ -21,7 +21,7 @@ from tests.logs.layouts.test_reading import ADLS, CASAS, HOMER, SENSORS
 from tests.scenes import flat_document, scenario
 
 import fleet2d
-from fleet2d.algorithms.learned import load_learned
+from fleet2d.algorithms.algorithm import load_learned
 from fleet2d.artifacts.seal import verify_run
 from fleet2d.configuration.trust import Trust, restrict
 from fleet2d.fit.perception import read_detections

@@ -11,9 +11,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fleet2d.algorithms.algorithm import FROZEN, WITHHELD, Algorithm, Outputs, Present, to_columns
+from fleet2d.algorithms.algorithm import (
+    FROZEN,
+    WITHHELD,
+    Algorithm,
+    Outputs,
+    Present,
+    load_learned,
+    save_learned,
+    to_columns,
+)
 from fleet2d.algorithms.history import History, Log
-from fleet2d.algorithms.learned import load_learned, save_learned
 from fleet2d.artifacts.table import Column, Kind, TableSpec
 from fleet2d.configuration.problems import suggest
 from fleet2d.configuration.units import micros, whole_steps

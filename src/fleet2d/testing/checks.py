@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from fleet2d.algorithms.algorithm import Algorithm
-from fleet2d.algorithms.learned import load_learned, save_learned
+from fleet2d.algorithms.algorithm import Algorithm, load_learned, save_learned
 from fleet2d.engine.simulation import Simulation
 from fleet2d.errors import ComponentError, Fleet2DError
 from fleet2d.runs.run import Run

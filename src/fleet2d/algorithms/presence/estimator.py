@@ -8,8 +8,8 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fleet2d.algorithms.algorithm import array_of
 from fleet2d.algorithms.evidence import Evidence
-from fleet2d.algorithms.learned import array_of
 from fleet2d.algorithms.presence.belief import HOURS, Presence, WeeklyPresence
 from fleet2d.configuration.components import Component
 from fleet2d.errors import ComponentError

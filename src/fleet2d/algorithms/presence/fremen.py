@@ -8,8 +8,8 @@ from typing import Any, ClassVar
 import numpy as np
 from pydantic import Field
 
+from fleet2d.algorithms.algorithm import array_of
 from fleet2d.algorithms.evidence import Evidence
-from fleet2d.algorithms.learned import array_of
 from fleet2d.algorithms.presence.belief import HOURS, Presence, WeeklyPresence
 from fleet2d.algorithms.presence.estimator import Estimator, natural_log, normalized
 from fleet2d.algorithms.presence.exposure_ratio import ratios, seen_and_watched

@@ -7,9 +7,8 @@ from typing import Annotated, Any, ClassVar, Literal, cast
 import numpy as np
 from pydantic import Field, model_validator
 
-from fleet2d.algorithms.algorithm import Algorithm, Present
+from fleet2d.algorithms.algorithm import Algorithm, Present, check_numbers
 from fleet2d.algorithms.history import History
-from fleet2d.algorithms.learned import check_numbers
 from fleet2d.algorithms.presence.belief import Presence
 from fleet2d.algorithms.presence.estimator import Estimator
 from fleet2d.configuration.components import OneOf, register

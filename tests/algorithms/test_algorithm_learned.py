@@ -10,7 +10,7 @@ import pytest
 from tests.scenes import TESTS, everything, run
 
 from fleet2d import Algorithm, History, Home, Present
-from fleet2d.algorithms.learned import load_learned, save_learned
+from fleet2d.algorithms.algorithm import load_learned, save_learned
 from fleet2d.errors import ComponentError, InputError
 
 HERE = f"{TESTS.as_posix()}/algorithms/test_learned"
