@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, cast
 import typer
 
 from fleet2d.cli.verdicts import print_expectations
+from fleet2d.errors import ArtifactError
 
 if TYPE_CHECKING:
     from fleet2d.metrics.metric import Metric
@@ -22,12 +23,24 @@ _LOADED = time.perf_counter()
 
 
 def print_results(result: "Run", *, as_json: bool, quiet: bool) -> None:
-    """Print the results of a run: as one JSON object, as a table, or nothing."""
+    """Print the results of a run: as one JSON object, as a table, or nothing.
+
+    Raises:
+        ArtifactError: They can't be written; the run is stored nevertheless.
+    """
     summary = summary_of(result)
-    if as_json:
-        typer.echo(json.dumps(summary))
-    elif not quiet:
-        print_summary(summary, result)
+    try:
+        if as_json:
+            typer.echo(json.dumps(summary))
+        elif not quiet:
+            print_summary(summary, result)
+    except BrokenPipeError:  # its reader has seen enough
+        raise
+    except OSError as error:
+        raise ArtifactError(
+            f"the results can't be printed ({error.strerror or error}): the run is stored in"
+            f" {result.directory}"
+        ) from error
 
 
 def summary_of(run: "Run") -> dict[str, Any]:
@@ -83,9 +96,9 @@ def print_summary(summary: dict[str, Any], run: "Run") -> None:
         console.print(f"{hidden} more numbers are in the run: --json shows them", highlight=False)
     print_expectations(console, run.manifest["expectations"])
     for note in run.notes or run.manifest["notes"]:
-        console.print(f"note: {note}", highlight=False)
+        console.print(f"note: {note}", highlight=False, markup=False)
     console.print(f"seed {summary['seed']}, digest {summary['digest'][:16]}", highlight=False)
-    console.print(f"stored in {summary['run_dir']}", highlight=False, soft_wrap=True)
+    console.print(f"stored in {summary['run_dir']}", highlight=False, soft_wrap=True, markup=False)
 
 
 def _text(value: Any, unit: str) -> str:

@@ -3,6 +3,7 @@
 import json
 import os
 import signal
+import sys
 import threading
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
@@ -96,8 +97,11 @@ def deferred_interrupt(stop: Callable[[], None]) -> Iterator[None]:
     def on_signal(number: int, _: Any) -> None:
         stop()
         restore()
-        with suppress(OSError):  # not by sys.stderr, whose methods the signal may have interrupted
-            os.write(2, _MESSAGES[signal.Signals(number)])
+        # Not by sys.stderr, whose methods the signal may have interrupted. If stderr was closed,
+        # its number may be that of another file.
+        if sys.__stderr__ is not None:
+            with suppress(OSError):
+                os.write(2, _MESSAGES[signal.Signals(number)])
 
     for number in _MESSAGES:
         signal.signal(number, on_signal)
