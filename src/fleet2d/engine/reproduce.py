@@ -10,7 +10,7 @@ from typing import Any
 from fleet2d.artifacts.manifest import FILE_NAME, FLOORPLAN_NAME, LEARNED_NAME, SLOW, Manifest
 from fleet2d.artifacts.seal import verify_run
 from fleet2d.configuration.trust import Trust, refuse_untrusted, restrict
-from fleet2d.engine.gauges.run_expectations import TABLE
+from fleet2d.engine.expectations import TABLE
 from fleet2d.engine.inputs import changed_inputs
 from fleet2d.engine.simulation import Simulation
 from fleet2d.errors import ArtifactError, InputError, RunDirectoryError

@@ -95,11 +95,8 @@ def set_up(scenario: Scenario, clock: Clock, seed: int, store: RunStore) -> Stat
         with _locate_errors(scenario, path), _prefix_errors(path):
             schedule_script(state, entry, index)
     for name, expectation in scenario.expect.items():
-        # It imports much that other scenarios don't need.
-        from fleet2d.engine.expectations.expect import expect
-
         with _locate_errors(scenario, f"expect.{name}"):
-            expect(state, scenario, clock, name, expectation, 0)
+            state.expect(scenario, name, expectation, 0)
     return state
 
 

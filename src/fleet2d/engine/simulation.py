@@ -6,14 +6,14 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack, nullcontext, suppress
 from pathlib import Path
-from typing import Any, BinaryIO, Self
+from typing import TYPE_CHECKING, Any, BinaryIO, Self
 
 from fleet2d.artifacts.manifest import LEARNED_NAME, Status
 from fleet2d.artifacts.store import RunStore
 from fleet2d.artifacts.unfinished import UnfinishedRun
 from fleet2d.configuration.trust import current_trust, restrict
 from fleet2d.engine.checkpoint import Checkpoint, CheckpointWriter
-from fleet2d.engine.expectations.verdicts import Judging
+from fleet2d.engine.control.steering import Steering
 from fleet2d.engine.interventions import is_from_outside
 from fleet2d.engine.lifecycle import (
     EngineFacts,
@@ -39,11 +39,15 @@ from fleet2d.runs.run import Run, run_of
 from fleet2d.runtime.clock import Clock
 from fleet2d.scenario.model import Scenario, load_scenario
 
+if TYPE_CHECKING:
+    from fleet2d.expectations.expectation import Expectation
+    from fleet2d.expectations.verdict import Verdict
+
 # Fewer steps are simulated without a handler for Ctrl-C.
 SHORT = 100
 
 
-class Simulation(Judging):
+class Simulation(Steering):
     """A run in progress: step it, run it until a time or event, read its state, copy it.
 
     Attributes:
@@ -400,3 +404,89 @@ class Simulation(Judging):
             self.finish("failed")
         if self.directory is not None and self._run is not None:
             error.add_note(f"the run until then, {self.time}, is in {self.directory}")
+
+    # Expectations
+
+    def expect(self, expectation: "Expectation | str", name: str = "") -> str:
+        """Expect something from the next step on; the verdict is in the run's manifest.
+
+        Args:
+            expectation: The expectation, or its text as in a scenario.
+            name: Its name; empty: its text.
+
+        Returns:
+            The name.
+
+        Raises:
+            InputError: It names something unknown or an impossible event, or its time is beyond
+                the run.
+
+        Example:
+            >>> import fleet2d
+            >>> simulation = fleet2d.Simulation(None, "simulation.duration=4 h", seed=4)
+            >>> simulation.expect("eventually(room(ana) == kitchen, within=2 h)", name="eats")
+            'eats'
+            >>> simulation.run_until("02:01")
+            >>> simulation.verdicts()["eats"].decided
+            True
+        """
+        if self._run is not None or self.done:
+            raise InputError(
+                "the run is finished: add expectations before its end, or call judge(…) on the run"
+            )
+        expectation = _parsed(expectation)
+        self._state.settle(self.step)
+        name = name or str(expectation)
+        self._state.expect(self.scenario, name, expectation, self.step)
+        return name
+
+    def verdicts(self) -> "dict[str, Verdict]":
+        """Return the present verdicts on all expectations, by name.
+
+        A verdict that can't change any more is `decided`; a test may end then.
+        """
+        if self._state.expectations is None:
+            return {}
+        if self._run is None:
+            self._state.settle(self.step)
+        return self._state.expectations.verdicts(ended=self.done)
+
+    def judge(self, expectation: "Expectation | str", name: str = "") -> "Verdict":
+        """Return the verdict on an expectation from the step on at which it was first requested.
+
+        Raises:
+            InputError: See `expect`; or no step has been simulated since.
+        """
+        expectation = _parsed(expectation)
+        name = name or str(expectation)
+        expectations = self._state.expectations
+        if expectations is None or name not in expectations.entries:
+            self.expect(expectation, name)
+        verdict = self.verdicts().get(name)
+        if verdict is None:
+            raise InputError(
+                f"{name} was added after the last step, so there is nothing to judge: simulate at"
+                " least one step, and call judge() again"
+            )
+        return verdict
+
+    def _store_verdicts(self, results: Mapping[str, Any], status: Status) -> None:
+        """Store the verdicts on all expectations."""
+        expectations = self._state.expectations
+        if expectations is not None and status != "failed":
+            store = self._state.store
+            ended = status == "complete"
+            store.manifest.expectations = expectations.finish(results, store, ended=ended)
+
+    def _expect_again(self, expectations: Mapping[str, Mapping[str, Any]]) -> None:
+        """Add the expectations of a stored run that are not in its scenario."""
+        for name, content in expectations.items():
+            if name not in self.scenario.expect:
+                expectation = _parsed(content["expectation"])
+                self._state.expect(self.scenario, name, expectation, content["first"])
+
+
+def _parsed(expectation: "Expectation | str") -> "Expectation":
+    from fleet2d.expectations.parse import parse_expectation
+
+    return parse_expectation(expectation) if isinstance(expectation, str) else expectation

@@ -14,7 +14,6 @@ from fleet2d.engine.bodies import Bodies, Watcher
 from fleet2d.engine.cameras import Cameras
 from fleet2d.engine.collisions import BlockedWays, Clearance
 from fleet2d.engine.encounters import Encounters, Interruptions
-from fleet2d.engine.gauges.block import Block
 from fleet2d.engine.home_changes import Changes
 from fleet2d.engine.interventions import Interventions
 from fleet2d.engine.layers import LayerBook
@@ -27,9 +26,11 @@ from fleet2d.floorplan.home.home import Home
 from fleet2d.kernels import I64
 from fleet2d.kernels.sight import SightingColumn as Column
 from fleet2d.runtime.events import Event, EventKind, EventStream, new_event
+from fleet2d.scenario.model import Scenario
 
 if TYPE_CHECKING:
-    from fleet2d.engine.gauges.run_expectations import RunExpectations
+    from fleet2d.engine.expectations import RunExpectations
+    from fleet2d.expectations.expectation import Expectation
 
 # The most steps that watchers process together: fewer if there are many bodies.
 MOST_STEPS = 1 << 16
@@ -114,6 +115,24 @@ class State:
             cameras.awaited = awaited
         self.sensors.awaited = EventKind.SENSOR in awaited
 
+    def expect(self, scenario: Scenario, name: str, expectation: "Expectation", since: int) -> None:
+        """Add an expectation that is judged from a step on; see `RunExpectations.add`."""
+        # It imports much that other runs don't need.
+        from fleet2d.engine.expectations import RunExpectations
+
+        if self.expectations is None:
+            self.expectations = RunExpectations(
+                scenario,
+                self.actors,
+                self.bodies,
+                self.changes,
+                self.sensors,
+                [*self.user_cameras, *self.cameras],
+                self.recorder.activities,
+            )
+            self.events.sinks.append(self.expectations)
+        self.expectations.add(name, expectation, since, self.settled)
+
     # Decisions
 
     def take_pending(self, row: int) -> tuple[SightEvent, ...]:
@@ -197,10 +216,7 @@ class State:
             self.interventions.take_events(self.sensors.events_of(readings))
         self.recorder.take(first, end, observations, readings)
         if self.expectations is not None:
-            names = self.sensors.names
-            self.expectations.take(
-                Block(first, end, self.bodies, self.home, observations, readings, names)
-            )
+            self.expectations.take(end, observations, readings)
         if self.log is not None:
             self.log.observe(observations)
             self.log.readings += readings

@@ -8,71 +8,23 @@ after(events("calls", "astro"), seen("ana", by="astro"), within="2 min")
 ```
 """
 
-from fleet2d.expectations.expectation import Expectation
-from fleet2d.expectations.parse import parse_expectation
-from fleet2d.expectations.scene import Scene
-from fleet2d.expectations.verdict import Verdict, judge
-from fleet2d.expectations.violation import Violation
-from fleet2d.expectations.vocabulary import (
-    activity,
-    after,
-    always,
-    at_end,
-    at_most,
-    away,
-    battery,
-    count,
-    distance,
-    door,
-    during,
-    events,
-    eventually,
-    holds_for,
-    in_view,
-    metric,
-    moving,
-    never,
-    output,
-    perceived,
-    probability,
-    room,
-    seen,
-    sensor,
-    speed,
-    until,
-)
+from typing import TYPE_CHECKING, Any
 
-__all__ = [
-    "Expectation",
-    "Scene",
-    "Verdict",
-    "Violation",
-    "activity",
-    "after",
-    "always",
-    "at_end",
-    "at_most",
-    "away",
-    "battery",
-    "count",
-    "distance",
-    "door",
-    "during",
-    "events",
-    "eventually",
-    "holds_for",
-    "in_view",
-    "judge",
-    "metric",
-    "moving",
-    "never",
-    "output",
-    "parse_expectation",
-    "perceived",
-    "probability",
-    "room",
-    "seen",
-    "sensor",
-    "speed",
-    "until",
-]
+from fleet2d.expectations.expectation import WORDS, Expectation
+from fleet2d.expectations.parse import parse_expectation
+from fleet2d.expectations.signals import Scene
+from fleet2d.expectations.temporal import Violation
+from fleet2d.expectations.verdict import Verdict, judge
+
+if TYPE_CHECKING:
+    from fleet2d.expectations.temporal import *  # noqa: F403
+    from fleet2d.expectations.vocabulary import *  # noqa: F403
+else:  # every word, whichever module defines it
+    __all__ = sorted(
+        {"Expectation", "Scene", "Verdict", "Violation", "judge", "parse_expectation", *WORDS}
+    )
+
+    def __getattr__(name: str) -> Any:
+        if name not in WORDS:
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        return WORDS[name]

@@ -1,33 +1,328 @@
-"""Signals: what is measured of a run at each step, as numbers, words or truth values."""
+"""Signals: what is measured of a run at each step, as numbers, words or truth values.
 
-from collections.abc import Callable, Iterator
+A signal is one class: its word, the names that it may use (of a `Scene`), and its measurement over
+a block of steps. Those that there are stand in `fleet2d.expectations.vocabulary`.
+"""
+
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, fields
-from typing import Any, ClassVar
+from datetime import timedelta
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 from pydantic_core import PydanticCustomError
 
-from fleet2d.configuration.units import Quantity
-from fleet2d.errors import InputError
-from fleet2d.expectations.expectation import INFINITE, TINY, Expectation, RunSignals, truth
-from fleet2d.expectations.formatting import argument_text, call_text, number_text
-from fleet2d.expectations.scene import Scene
-from fleet2d.expectations.trace import Trace
-from fleet2d.kernels import F64
+from fleet2d.configuration.problems import suggest
+from fleet2d.configuration.units import Quantity, format_duration
+from fleet2d.entities.behavior import Actor
+from fleet2d.entities.body import Pose
+from fleet2d.errors import InputError, ScenarioError
+from fleet2d.expectations.expectation import (
+    INFINITE,
+    TINY,
+    Expectation,
+    RunSignals,
+    Trace,
+    Word,
+    argument_text,
+    constant,
+    joined,
+    number_text,
+    shortest,
+    truth,
+)
+from fleet2d.floorplan.home.home import Home
+from fleet2d.kernels import F64, I64
+from fleet2d.kernels.motion import Window
+from fleet2d.runtime.clock import Clock
+from fleet2d.runtime.events import KINDS, SIGHTS, Event, EventKind
 
-BODY = ("user or robot", "bodies")
+# Names
+
+# Kinds of events that only one type of behavior records.
+_OF_BEHAVIORS = {
+    "dock": {EventKind.DOCKS, EventKind.CHARGED},
+    "explore": {EventKind.EXPLORED},
+    "find": {
+        EventKind.FIND_BEGINS, EventKind.FOUND, EventKind.GAVE_UP, EventKind.NOT_AT_HOME
+    },
+    "follow": {EventKind.FOLLOWS, EventKind.LOST},
+    "hangout": {EventKind.RELOCATES},
+    "opportunistic": {
+        EventKind.APPROACHES, EventKind.INTERACTS, EventKind.INTERACTION_OVER
+    },
+    "retrace": {EventKind.RETRACES, EventKind.RETRACED},
+    "scheduled": {EventKind.VISITS},
+}  # fmt: skip
+_OF_DOORS = {EventKind.OPENED, EventKind.SHUT, EventKind.LOCKED, EventKind.UNLOCKED}
+
+
+@dataclass(frozen=True)
+class Scene:
+    """The names of a run that expectations may use, to check them before the run.
+
+    Attributes:
+        users: Names of users.
+        robots: Names of robots.
+        rooms: Names and types of rooms.
+        things: Names of objects of the home.
+        doors: Names of doors.
+        sensors: Names of sensors.
+        algorithms: Names of algorithms.
+        metrics: Names of metrics.
+        batteries: Names of robots that have a battery.
+        cameras: For each body with cameras, the names of the bodies that they look at.
+        behaviors: The types of behaviors of each body; "own" stands for a user's own classes.
+        records: Kinds of events that a user's own behaviors record.
+        remaining: Time from now to the end of the run.
+    """
+
+    users: Collection[str]
+    robots: Collection[str]
+    rooms: Collection[str]
+    things: Collection[str]
+    doors: Collection[str]
+    sensors: Collection[str]
+    algorithms: Collection[str]
+    metrics: Collection[str]
+    batteries: Collection[str]
+    cameras: Mapping[str, Collection[str]]
+    behaviors: Mapping[str, Collection[str]]
+    records: Collection[str]
+    remaining: timedelta
+
+    @property
+    def bodies(self) -> list[str]:
+        """Names of users and robots."""
+        return [*self.users, *self.robots]
+
+    def check_name(self, noun: str, name: str, known: Iterable[str], of: object) -> None:
+        """Refuse an unknown name.
+
+        Raises:
+            ScenarioError: The name is unknown; the message has the nearest name, and all of them.
+        """
+        names = list(dict.fromkeys(known))
+        if name not in names:
+            raise ScenarioError(f"{of}: there is no {noun} {name!r}{suggest(name, names)}")
+
+    def check_within(self, within: timedelta | None, of: object) -> None:
+        """Refuse a time that is longer than the run.
+
+        Raises:
+            ScenarioError: The time is longer than what remains of the run.
+        """
+        if within is not None and within > self.remaining:
+            raise ScenarioError(
+                f"{of}: {format_duration(within)} is beyond the run, which goes on for"
+                f" {format_duration(self.remaining)}"
+            )
+
+    def check_event(self, kind: str, entity: str | None, detail: str | None, of: object) -> None:
+        """Refuse an event that can never happen.
+
+        Raises:
+            ScenarioError: The kind is unknown, or there is no entity to which it could happen.
+        """
+        if kind == EventKind.SENSOR:
+            raise ScenarioError(f"{of}: sensor readings are not events: write sensor(NAME)")
+        self.check_name("event", kind, sorted({*KINDS, *self.records}), of)
+        candidates = list(self._candidates(kind))
+        if entity is not None:
+            self.check_name("body or object", entity, [*self.bodies, *self.doors], of)
+        is_possible = bool(candidates) and (entity in (None, *candidates) or candidates == [""])
+        if not is_possible:
+            raise ScenarioError(
+                f"{of}: no such event is possible: {kind!r} happens only to {_entities_of(kind)}"
+                f" (here: {', '.join(candidates) or 'none'})"
+            )
+        if kind in SIGHTS and detail is not None:
+            self.check_name("user or robot", detail, self.bodies, of)
+
+    def _candidates(self, kind: str) -> Iterable[str]:
+        """Return the names of the entities an event can happen to; an empty name is the home."""
+        if kind in (EventKind.MOVED, EventKind.ROOM_CHANGED):
+            return [""]
+        if kind in _OF_DOORS:
+            return self.doors
+        if kind in (EventKind.USER_SEEN, EventKind.USER_LOST):
+            return [name for name in self.robots if self.cameras.get(name)]
+        if kind in (EventKind.ROBOT_SEEN, EventKind.ROBOT_LOST):
+            return [name for name in self.users if self.cameras.get(name)]
+        if kind == EventKind.BATTERY:
+            return self.batteries
+        if kind == EventKind.ACTIVITY:
+            return self.users
+        for behavior, kinds in _OF_BEHAVIORS.items():
+            if kind in kinds:
+                return [n for n in self.robots if {behavior, "own"} & set(self.behaviors[n])]
+        return self.bodies
+
+
+def _entities_of(kind: str) -> str:
+    """Describe the entities to which an event can happen."""
+    if kind in _OF_DOORS:
+        return "doors"
+    if kind in SIGHTS:
+        return "robots and users with a camera and somebody to see"
+    if kind == EventKind.BATTERY:
+        return "robots with a battery"
+    if kind == EventKind.ACTIVITY:
+        return "users"
+    behaviors = [name for name, kinds in _OF_BEHAVIORS.items() if kind in kinds]
+    return f"robots with the behavior {' or '.join(behaviors)}" if behaviors else "users and robots"
+
+
+# Measuring
+
+
+class MeasuredBodies(Protocol):
+    """The bodies of a run and their poses, each by its row."""
+
+    def window(self, first: int, end: int) -> Window:
+        """Return the runs of equal pose of all bodies in the steps from `first` to `end` - 1."""
+
+    def runs(self, row: int, first: int, end: int) -> Window:
+        """Return the runs of equal pose of one body in these steps."""
+
+    def pose_at(self, row: int, step: int) -> Pose:
+        """Return the pose of a body at a step."""
+
+
+class MeasuredCameras(Protocol):
+    """The cameras of a body, as signals are measured by them.
+
+    Attributes:
+        index: The number of the owner among the robots, or among the users.
+    """
+
+    index: int
+
+    @property
+    def in_view(self) -> Mapping[str, object]:
+        """The bodies that count as seen at present, by name."""
+
+    def number_of(self, name: str) -> int:
+        """Return the number of a body among those that they look at."""
+
+    def perfect(self) -> "ErrorFreeCameras":
+        """Return cameras that notice all bodies in view at each step, from the present one on."""
+
+
+class ErrorFreeCameras(Protocol):
+    """Cameras that make no errors."""
+
+    def look(self, bodies: MeasuredBodies, end: int) -> Iterable[Event]:
+        """Look in the steps up to `end` - 1; return the events of seeing and losing."""
+
+
+class MeasuredRun(Protocol):
+    """The run in which signals are measured.
+
+    Attributes:
+        actors: Users, then robots; their numbers are the rows of poses.
+        bodies: The bodies and their poses.
+        home: The home.
+        clock: The steps of the run.
+        first: The first step that will be measured.
+        doors: Names of doors in the order of their numbers.
+        sensors_on: Whether each sensor is on at present, by name.
+    """
+
+    actors: Sequence[Actor]
+    bodies: MeasuredBodies
+    home: Home
+    clock: Clock
+    first: int
+    doors: Sequence[str]
+    sensors_on: Mapping[str, bool]
+
+    def row(self, name: str) -> int:
+        """Return the row of a body."""
+
+    def cameras_of(self, name: str) -> MeasuredCameras:
+        """Return the cameras of a body."""
+
+    def activity_of(self, row: int) -> str | None:
+        """Return the present activity of a user; None if none is known."""
+
+
+@dataclass
+class SignalBlock:
+    """The steps from `first` to `end` - 1, in which the home doesn't change.
+
+    Attributes:
+        first: The first step.
+        end: The step after the last one.
+        bodies: The bodies and their poses.
+        home: The home in these steps.
+        observations: The observations of robots, int64 (n, OBSERVATION).
+        readings: The readings of sensors: step, name and whether it is on.
+        events: The events, in order of step.
+    """
+
+    first: int
+    end: int
+    bodies: MeasuredBodies
+    home: Home
+    observations: I64
+    readings: Sequence[tuple[int, str, bool]]
+    events: Sequence[Event] = ()
+
+
+class Gauge:
+    """The measurement of a signal during a run, block by block.
+
+    Attributes:
+        signal: The signal.
+        memory: What its `measure` needs from block to block; see `Measurement.start`.
+        now: The latest value, of signals that only change now and then; NaN: it is missing.
+        words: The words that each value stands for, if the signal consists of words.
+    """
+
+    def __init__(self, signal: "Measurement", run: MeasuredRun) -> None:
+        self.signal = signal
+        self.words: dict[int, Set[str]] = {}
+        self.now = float("nan")
+        self._traces: list[Trace] = []
+        self.memory: Any = signal.start(run, self)
+
+    def take(self, block: SignalBlock) -> None:
+        """Measure the signal over a block of steps, and append it."""
+        self._traces.append(self.signal.measure(block, self))
+
+    def trace(self) -> Trace:
+        """Return the signal at all steps that were measured."""
+        self._traces = [joined(self._traces)]
+        return self._traces[0]
+
+    def replace_last(self, value: float) -> None:
+        """Set the value at the last step that was measured."""
+        trace = joined(self._traces)
+        before = [trace.until(trace.end - 1)] if trace.first < trace.end - 1 else []
+        self._traces = [*before, constant(value, trace.end - 1, trace.end)]
+
+    def switched(self, block: SignalBlock, changes: Iterable[tuple[int, float]]) -> Trace:
+        """Return a value that only changes at some steps, in order; `now` is the last one."""
+        start, value = [block.first], [self.now]
+        for step, now in changes:
+            if step > start[-1]:
+                start.append(step)
+                value.append(now)
+            else:
+                value[-1] = now
+        self.now = value[-1]
+        return shortest(np.array(start, np.int64), np.array(value, np.float64), block.end)
 
 
 @dataclass(frozen=True, eq=False)
-class Measurement:
+class Measurement(Word):
     """Base of what is measured during a run; signals of the same text are the same signal.
 
     Attributes:
-        word: Its word in texts. Its first field is its first argument there.
         of: What the first field names, as a noun for messages, and as an attribute of `Scene`.
     """
 
-    word: ClassVar[str]
     of: ClassVar[tuple[str, str]]
 
     def trace(self, run: RunSignals) -> Trace:
@@ -41,14 +336,28 @@ class Measurement:
             ScenarioError: A name is unknown, or the signal can never be measured.
         """
         noun, known = self.of
-        scene.check_name(noun, self._arguments()[0], getattr(scene, known), self)
+        scene.check_name(noun, getattr(self, fields(self)[0].name), getattr(scene, known), self)
 
-    def _arguments(self) -> tuple[Any, ...]:
-        return tuple(getattr(self, field.name) for field in fields(self))
+    def start(self, run: MeasuredRun, gauge: Gauge) -> Any:
+        """Return what `measure` needs from block to block, before the first one."""
 
-    def __str__(self) -> str:
-        """Return the text that `parse_expectation` reads back."""
-        return call_text(self.word, *self._arguments())
+    def measure(self, block: SignalBlock, gauge: Gauge) -> Trace:
+        """Return the values over a block of steps."""
+        raise NotImplementedError
+
+    def begin_plan(self, actor: Actor, gauge: Gauge) -> None:
+        """Note that a body begins a plan."""
+
+    def learn(
+        self, outputs: Mapping[str, Any], results: Mapping[str, Callable[[], Any]], gauge: Gauge
+    ) -> None:
+        """Note new outputs of algorithms and results of metrics, by name, before the next block."""
+
+    def finish(self, results: Mapping[str, Any], gauge: Gauge) -> None:
+        """Note the results of metrics over the whole run, which count at its last step."""
+
+
+# Kinds of signals
 
 
 @dataclass(frozen=True, eq=False)

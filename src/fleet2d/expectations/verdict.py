@@ -7,10 +7,8 @@ from typing import Any, Protocol
 
 from fleet2d.configuration.units import format_duration
 from fleet2d.errors import InputError
-from fleet2d.expectations.expectation import TINY, And, Expectation, RunSignals
-from fleet2d.expectations.formatting import number_text
-from fleet2d.expectations.temporal import After, Temporal
-from fleet2d.expectations.violation import Violation
+from fleet2d.expectations.expectation import TINY, And, Expectation, RunSignals, number_text
+from fleet2d.expectations.temporal import Temporal, Violation, after
 from fleet2d.runtime.clock import Clock
 
 
@@ -159,7 +157,7 @@ def verdict_of(name: str, expectation: Expectation, run: RunSignals) -> Verdict:
         worst if worst > 0 else best,
         expectation.unit,
         None if slack is None else slack * run.clock.step_us / 1e6,
-        len(expectation.triggered(run)) if isinstance(expectation, After) else None,
+        len(expectation.triggered(run)) if isinstance(expectation, after) else None,
         violations,
         run.first,
         run.end,

@@ -1,205 +1,659 @@
-"""The words that expectations are written in, in Python and in scenarios alike."""
+"""The words for what is measured of a run: one class each, named as it is written.
 
+To add a word, derive a class from `Signal` (a number), `WordSignal` (a name) or `Condition`: its
+fields are its arguments, `check` refuses names that a run doesn't have, and `measure` returns its
+values. It can be written in texts and imported from `fleet2d.expectations` at once.
+"""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
 from datetime import timedelta
+from typing import Any
 
+import numpy as np
 from pydantic_core import PydanticCustomError
 
-from fleet2d.configuration.problems import did_you_mean
-from fleet2d.configuration.units import parse_duration, parse_time_of_day, weekdays_of
-from fleet2d.errors import InputError
-from fleet2d.expectations import counting, quantities, signals, states, temporal
-from fleet2d.expectations.expectation import Expectation
-from fleet2d.expectations.quantities import Place
+from fleet2d.algorithms.algorithm import to_columns
+from fleet2d.algorithms.observations import ROBOT
+from fleet2d.configuration.problems import did_you_mean, suggest
+from fleet2d.configuration.units import LENGTH, SHARE, SPEED, parse_time_of_day, weekdays_of
+from fleet2d.entities.behavior import Actor
+from fleet2d.errors import InputError, ScenarioError
+from fleet2d.expectations.expectation import (
+    RunSignals,
+    Trace,
+    constant,
+    pulses,
+    shortest,
+)
+from fleet2d.expectations.signals import (
+    Condition,
+    Gauge,
+    MeasuredRun,
+    Measurement,
+    Scene,
+    Signal,
+    SignalBlock,
+    WordSignal,
+)
+from fleet2d.floorplan.geometry.lattice import UNITS_PER_CELL
+from fleet2d.floorplan.home.home import Home, lattice_footprint
+from fleet2d.kernels import I64, Bool
+from fleet2d.kernels.motion import distances_between, distances_to_shape, rooms_at, speeds
+from fleet2d.kernels.sight import SightingColumn
+from fleet2d.runtime.clock import midnight_of
+from fleet2d.runtime.events import EventKind
 
-Time = str | float | timedelta
-"""How long: text such as "2 min", seconds, or a timedelta."""
+Place = str | tuple[float, float]
+"""A body, a room, an object, or a point (x, y) [m]."""
 
+BODY = ("user or robot", "bodies")
 
-# When something must hold
-
-
-def always(expectation: Expectation, *, within: Time | None = None) -> Expectation:
-    """Expect a condition at every step, until the end of the run or for `within`."""
-    return temporal.Always(_part(expectation, "always"), _time(within, "within"))
-
-
-def never(expectation: Expectation, *, within: Time | None = None) -> Expectation:
-    """Expect a condition at no step, until the end of the run or for `within`."""
-    return temporal.Never(_part(expectation, "never"), _time(within, "within"))
-
-
-def eventually(expectation: Expectation, *, within: Time | None = None) -> Expectation:
-    """Expect a condition at some step, before the end of the run or `within` some time."""
-    return temporal.Eventually(_part(expectation, "eventually"), _time(within, "within"))
-
-
-def at_end(expectation: Expectation) -> Expectation:
-    """Expect a condition at the last step of the run."""
-    return temporal.AtEnd(_part(expectation, "at_end"))
-
-
-def until(hold: Expectation, goal: Expectation, *, within: Time | None = None) -> Expectation:
-    """Expect `hold` at every step until `goal` holds, and `goal` in time."""
-    parts = _part(hold, "until"), _part(goal, "until")
-    return temporal.Until(*parts, _time(within, "within"))
-
-
-def after(
-    trigger: Expectation, expectation: Expectation, *, within: Time | None = None
-) -> Expectation:
-    """Expect a condition each time that `trigger` begins: at once, or `within` some time.
-
-    Each event counts by itself; conditions that last, such as being in a room, count each time that
-    they begin. Occasions whose time isn't over when the run ends don't count.
-    """
-    parts = _part(trigger, "after"), _part(expectation, "after")
-    return temporal.After(*parts, _time(within, "within"))
-
-
-def holds_for(expectation: Expectation, duration: Time) -> Expectation:
-    """Condition that a condition has held for at least `duration`."""
-    least = _time(duration, "holds_for")
-    assert least is not None
-    return counting.HoldsFor(_part(expectation, "holds_for"), least)
-
-
-def count(expectation: Expectation, *, per: str | None = None) -> signals.Signal:
-    """Return how often a condition has begun: this hour, day or week, or in the run so far."""
-    if per is not None and per not in counting.PERIODS:
-        raise InputError(
-            f"count: per is {per!r}{did_you_mean(per, counting.PERIODS)} There are: hour, day, week"
-        )
-    return counting.Count(_part(expectation, "count"), per)
-
-
-def at_most(times: int, expectation: Expectation, *, per: str | None = None) -> Expectation:
-    """Expect a condition to begin at most `times` times: each hour, day or week, or in the run."""
-    if type(times) is not int or times < 0:
-        raise InputError(
-            f"at_most: the number of times must be a whole number, 0 or more, not {times!r}"
-        )
-    count(expectation, per=per)
-    return counting.AtMost(times, expectation, per)
+# The charge of a battery is rounded down to thousandths; errors of floats must not lower it.
+PARTS = 1000
+ROUNDING = 1e-9
 
 
 # Numbers
 
 
-def distance(body: str, other: Place) -> signals.Signal:
-    """Return how far a body is from another one, a room, an object or a point [m]."""
-    return quantities.DistanceSignal(body, other)
+@dataclass(frozen=True, eq=False)
+class distance(Signal):
+    """The distance of a body from another, a room, an object or a point [m].
+
+    It is measured from the centre of a body to the nearest point of a room or object: 0 inside.
+    Infinite while a body is away from home.
+    """
+
+    body: str
+    other: Place
+
+    unit = "m"
+    quantity = LENGTH
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.other, str):
+            x, y = self.other
+            self._set(other=(float(x), float(y)))
+
+    def check(self, scene: Scene) -> None:
+        """Refuse unknown bodies and places."""
+        places = {*scene.rooms, *scene.things}
+        if self.body in places and self.body not in scene.bodies and self.other in scene.bodies:
+            raise ScenarioError(
+                f"{self}: name the body first: distance({self.other!r}, {self.body!r})"
+            )
+        scene.check_name(BODY[0], self.body, scene.bodies, self)
+        if isinstance(self.other, str):
+            names = [*scene.bodies, *scene.rooms, *scene.things]
+            scene.check_name("body, room or object", self.other, names, self)
+        if self.other == self.body:
+            raise ScenarioError(f"{self}: give two different bodies")
+
+    def start(self, run: MeasuredRun, gauge: Gauge) -> Any:
+        """Return the row of the other body, if it is one, else the outline of the place."""
+        names = [actor.name for actor in run.actors]
+        other = names.index(self.other) if self.other in names else None
+        return run.row(self.body), other, _Outline(self.other)
+
+    def measure(self, block: SignalBlock, gauge: Gauge) -> Trace:
+        """Return the distances over a block of steps."""
+        (row, other, outline), window = gauge.memory, block.bodies.window(block.first, block.end)
+        if other is not None:
+            start, value = distances_between(window, row, other)
+        else:
+            start, value = distances_to_shape(window, row, outline(block.home))
+        return Trace(start, value / block.home.plan.lattice.units_per_m, block.end)
 
 
-def speed(body: str) -> signals.Signal:
-    """Return how fast a body goes [m/s]."""
-    return quantities.SpeedSignal(body)
+class _Outline:
+    """The present outline of a room, an object or a point."""
+
+    def __init__(self, place: Place) -> None:
+        self._place = place
+        self._known: tuple[object, I64] | None = None
+
+    def __call__(self, home: Home) -> I64:
+        """Return its edges from (x, y) to (x, y), int64 (n, 4) [lattice]."""
+        plan, place = home.plan, self._place
+        if not isinstance(place, str):
+            x, y = plan.lattice.to_lattice(place).tolist()
+            return np.array([[x, y, x, y]], np.int64)
+        rooms = [room.index for room in home.rooms if place in (room.name, room.type)]
+        item = None if rooms else home.object(place)
+        if self._known is None or self._known[0] is not item:
+            if item is None:
+                edges = outline(np.isin(plan.room_of_place, rooms), UNITS_PER_CELL)
+            else:
+                ring = np.array(lattice_footprint(plan, item).exterior.coords).round()
+                edges = np.concatenate([ring[:-1], ring[1:]], axis=1).astype(np.int64)
+            self._known = item, edges
+        return self._known[1]
 
 
-def battery(robot: str) -> signals.Signal:
-    """Return the charge of a robot, 0 to 1; compare with a share, such as "10 %"."""
-    return quantities.BatterySignal(robot)
+def outline(mask: Bool, side: int) -> I64:
+    """Return the edges around some cells: int64 (n, 4), from (x, y) to (x, y) [lattice].
+
+    Args:
+        mask: bool (rows, columns), the cells.
+        side: The side of a cell [lattice].
+    """
+    padded = np.pad(mask, 1)
+    horizontal = [(x0, y, x1, y) for y, x0, x1 in _borders(padded[1:] != padded[:-1])]
+    vertical = [(x, y0, x, y1) for x, y0, y1 in _borders((padded[:, 1:] != padded[:, :-1]).T)]
+    edges = np.array(horizontal + vertical, np.int64).reshape(-1, 4)
+    return edges * side
 
 
-def output(path: str) -> signals.Signal:
-    """Return a number of an algorithm's newest output, such as "ltp.kitchen"."""
-    return quantities.OutputSignal(path)
+def _borders(differ: Bool) -> list[tuple[int, int, int]]:
+    """Return the runs of true values of each row: row, first column, one past the last column."""
+    padded = np.pad(differ, ((0, 0), (1, 1)))
+    row, column = np.nonzero(padded[:, 1:] != padded[:, :-1])
+    # Columns are shifted by 1, as the cells themselves were padded.
+    pairs = zip(row[::2].tolist(), column[::2].tolist(), column[1::2].tolist(), strict=True)
+    return [(r, a - 1, b - 1) for r, a, b in pairs]
 
 
-def probability(algorithm: str, room: str, user: str | None = None) -> signals.Signal:
-    """Return an algorithm's probability of a room, for a user if it has one for each."""
-    return quantities.OutputSignal(".".join(part for part in (algorithm, user, room) if part))
+@dataclass(frozen=True, eq=False)
+class _Motion(Measurement):
+    """Base of signals of the way of a body from step to step."""
+
+    body: str
+
+    of = BODY
+
+    def start(self, run: MeasuredRun, gauge: Gauge) -> Any:
+        """Return its row, its pose at the step before, and the steps in a second."""
+        row, pose = run.row(self.body), np.zeros(0, np.int64)
+        if run.first > 0:
+            # The present pose stands for the one before, which may be forgotten.
+            pose = _pose(run.bodies.pose_at(row, run.first))
+        return row, pose, 1e6 / run.clock.step_us
+
+    def measure(self, block: SignalBlock, gauge: Gauge) -> Trace:
+        """Return the speed over a block of steps [m/s]."""
+        row, last_pose, steps_per_s = gauge.memory
+        window = block.bodies.window(block.first, block.end)
+        start, way = speeds(window, row, last_pose)
+        gauge.memory = row, _pose(block.bodies.pose_at(row, block.end - 1)), steps_per_s
+        metres = way / block.home.plan.lattice.units_per_m
+        return Trace(start, metres * steps_per_s, block.end)
 
 
-def metric(path: str) -> signals.Signal:
-    """Return a number of a metric's result so far, by the names in its result."""
-    return quantities.MetricSignal(path)
+def _pose(pose: Any) -> I64:
+    return np.array([pose.x, pose.y, pose.away], np.int64)
 
 
-# Words
+class speed(_Motion, Signal):
+    """The speed of a body: the distance from its position at the step before, per step [m/s]."""
+
+    unit = "m/s"
+    quantity = SPEED
 
 
-def room(body: str) -> signals.WordSignal:
-    """Return the room that a body is in, for `room("ana") == "kitchen"`: a name, or a type."""
-    return states.RoomSignal(body)
+@dataclass(frozen=True, eq=False)
+class battery(Signal):
+    """The charge of a robot, 0 to 1, rounded down to a tenth of a percent.
+
+    Compare it with a share, such as "10 %".
+    """
+
+    robot: str
+
+    of = ("robot with a battery", "batteries")
+    unit = "share"
+    quantity = SHARE
+
+    def start(self, run: MeasuredRun, gauge: Gauge) -> Any:
+        """Return the course of the charge along each plan, so far the present one."""
+        actor = run.actors[run.row(self.robot)]
+        assert actor.charge is not None
+        return [actor.charge.course(actor.motion)], run.clock.step_us
+
+    def begin_plan(self, actor: Actor, gauge: Gauge) -> None:
+        """Add the course of the charge along a new plan."""
+        if actor.name == self.robot and actor.charge is not None:
+            course, (courses, step_us) = actor.charge.course(actor.motion), gauge.memory
+            earlier = [c for c in courses if c.begins[0] < course.begins[0]]
+            gauge.memory = [*earlier, course], step_us
+
+    def measure(self, block: SignalBlock, gauge: Gauge) -> Trace:
+        """Return the charge over a block of steps."""
+        courses, step_us = gauge.memory
+        moments = np.arange(block.first, block.end, dtype=np.int64) * step_us
+        begins = np.array([course.begins[0] for course in courses], np.int64)
+        edges = [0, *np.searchsorted(moments, begins[1:]).tolist(), len(moments)]
+        pieces = [
+            course.levels(np.maximum(moments[a:b], course.begins[0]))
+            for course, a, b in zip(courses, edges, edges[1:], strict=False)
+        ]
+        charge = np.floor(np.concatenate(pieces) * PARTS + ROUNDING) / PARTS
+        gauge.memory = courses[-1:], step_us
+        return shortest(np.arange(block.first, block.end), charge, block.end)
 
 
-def activity(user: str) -> signals.WordSignal:
-    """Return what a user does, for `activity("ana") == "sleep"`."""
-    return states.ActivitySignal(user)
+@dataclass(frozen=True, eq=False)
+class _Value(Signal):
+    """Base of numbers that change when algorithms or metrics are updated; missing before."""
+
+    path: str
+
+    @property
+    def name(self) -> str:
+        """The name of the algorithm or metric."""
+        return self.path.partition(".")[0]
+
+    @property
+    def parts_of_path(self) -> list[str]:
+        """The names after it, which select the number."""
+        return self.path.split(".")[1:]
+
+    def start(self, run: MeasuredRun, gauge: Gauge) -> Any:
+        """Return the home; there is no value before the first update."""
+        return run.home
+
+    def measure(self, block: SignalBlock, gauge: Gauge) -> Trace:
+        """Return the latest value."""
+        return constant(gauge.now, block.first, block.end)
+
+
+class output(_Value):
+    """A number of an algorithm's newest output, which counts from the step after it.
+
+    `ltp.kitchen` is the probability of a room by `ltp`; `rtp.ana.kitchen` that for one user;
+    `mine.sightings` a named number of an output. Missing before the first output.
+    """
+
+    def check(self, scene: Scene) -> None:
+        """Refuse an unknown algorithm."""
+        scene.check_name("algorithm", self.name, scene.algorithms, self)
+        if "." not in self.path:
+            raise ScenarioError(
+                f'{self}: select a number of the output, such as output("{self.path}.kitchen")'
+            )
+
+    def learn(
+        self, outputs: Mapping[str, Any], results: Mapping[str, Callable[[], Any]], gauge: Gauge
+    ) -> None:
+        """Read the number from a new output of the algorithm."""
+        if self.name in outputs:
+            gauge.now = self._read(outputs[self.name], gauge.memory)
+
+    def _read(self, value: Any, home: Home) -> float:
+        """Return the number of an output.
+
+        Raises:
+            ScenarioError: There is no such number in the output, or there are several.
+        """
+        types = [room.type for room in home.rooms]
+        names = {room.type: room.name for room in home.rooms if types.count(room.type) == 1}
+        columns = to_columns(value, [room.name for room in home.rooms], f"algorithms.{self.name}")
+        keep = np.ones(len(next(iter(columns.values()))), np.bool_)
+        words = {n: c for n, c in columns.items() if c.dtype.kind == "O"}
+        number = next((n for n, c in columns.items() if c.dtype.kind in "fiub"), None)
+        for part in self.parts_of_path:
+            if part in columns and part not in words:
+                number = part
+                continue
+            matches = [
+                np.isin(column.astype(str), [part, names.get(part, part)])
+                for column in words.values()
+            ]
+            rows = np.any(matches, axis=0) if matches else np.zeros_like(keep)
+            if not rows.any():
+                known = [*columns, *dict.fromkeys(w for c in words.values() for w in c.tolist())]
+                raise ScenarioError(f"{self}: there is no {part!r} in it{suggest(part, known)}")
+            keep &= rows
+        if keep.sum() != 1 or number is None:
+            how = (
+                f"select one by: {', '.join(words)}" if words else "they have no names to select by"
+            )
+            raise ScenarioError(f"{self} matches {keep.sum()} rows; {how}")
+        return float(columns[number][keep][0])
+
+
+class probability(output):
+    """An algorithm's probability of a room, for a user if it has one for each."""
+
+    word = "output"
+
+    def __init__(self, algorithm: str, room: str, user: str | None = None) -> None:
+        super().__init__(".".join(part for part in (algorithm, user, room) if part))
+
+
+class metric(_Value):
+    """A number of a metric's result so far, by the names in its result.
+
+    It changes when the metric is updated; at the last step it is the result of the whole run.
+    Missing before the first update.
+    """
+
+    def check(self, scene: Scene) -> None:
+        """Refuse an unknown metric."""
+        scene.check_name("metric", self.name, scene.metrics, self)
+
+    def learn(
+        self, outputs: Mapping[str, Any], results: Mapping[str, Callable[[], Any]], gauge: Gauge
+    ) -> None:
+        """Read the number from a new result of the metric."""
+        if self.name in results:
+            gauge.now = self._read(results[self.name]())
+
+    def finish(self, results: Mapping[str, Any], gauge: Gauge) -> None:
+        """Read the number from the result of the whole run."""
+        if self.name in results:
+            gauge.replace_last(self._read(results[self.name]))
+
+    def _read(self, result: Any) -> float:
+        """Return the number of a result; NaN while the result is empty.
+
+        Raises:
+            ScenarioError: The path leads to no number.
+        """
+        for part in self.parts_of_path:
+            if not isinstance(result, Mapping) or part not in result:
+                if isinstance(result, Mapping) and not result:
+                    return float("nan")
+                known = list(result) if isinstance(result, Mapping) else []
+                raise ScenarioError(f"{self}: there is no {part!r} in it{suggest(part, known)}")
+            result = result[part]
+        if isinstance(result, bool | int | float):
+            return float(result)
+        if isinstance(result, Mapping) and not result:
+            return float("nan")
+        keys = ", ".join(result) if isinstance(result, Mapping) else repr(result)
+        raise ScenarioError(f"{self} is not a number: extend it by one of {keys}")
+
+
+# Names
+
+
+@dataclass(frozen=True, eq=False)
+class room(WordSignal):
+    """The room that a body is in, for `room("ana") == "kitchen"`: a name or a type.
+
+    No name between two rooms, or away.
+    """
+
+    body: str
+
+    of = BODY
+
+    def check_word(self, word: str, scene: Scene) -> None:
+        """Refuse an unknown room."""
+        scene.check_name("room", word, scene.rooms, self)
+
+    def start(self, run: MeasuredRun, gauge: Gauge) -> Any:
+        """Return the row of the body; the words are the names and types of rooms."""
+        gauge.words = {room.index: {room.name, room.type} for room in run.home.rooms}
+        return run.row(self.body)
+
+    def measure(self, block: SignalBlock, gauge: Gauge) -> Trace:
+        """Return the index of the room at each step; -1 if the body is in none or away."""
+        runs = block.bodies.runs(gauge.memory, block.first, block.end)
+        index = rooms_at(block.home.plan.room_of_place, runs.x, runs.y)
+        return shortest(runs.step, np.where(runs.away != 0, -1.0, index), block.end)
+
+
+@dataclass(frozen=True, eq=False)
+class activity(WordSignal):
+    """A user's activity, for `activity("ana") == "sleep"`; none before the first such event."""
+
+    user: str
+
+    of = ("user", "users")
+
+    def start(self, run: MeasuredRun, gauge: Gauge) -> Any:
+        """Begin with the code of the present activity; -1 if none is known."""
+        now = run.activity_of(run.row(self.user))
+        gauge.now = -1.0 if now is None else _code(now, gauge)
+
+    def measure(self, block: SignalBlock, gauge: Gauge) -> Trace:
+        """Return the code of the activity at each step."""
+        return gauge.switched(
+            block,
+            [
+                (event.step, _code(event.detail, gauge))
+                for event in block.events
+                if event.event == EventKind.ACTIVITY and event.entity == self.user
+            ],
+        )
+
+
+def _code(word: str, gauge: Gauge) -> float:
+    """Return the value that stands for a word; a new one at its first use."""
+    code = next((code for code, words in gauge.words.items() if word in words), len(gauge.words))
+    gauge.words.setdefault(code, {word})
+    return float(code)
 
 
 # Conditions
 
 
-def moving(body: str) -> Expectation:
-    """Condition that a body moves."""
-    return states.IsMoving(body)
+class moving(_Motion, Condition):
+    """Whether a body's position differs from that at the step before."""
 
 
-def away(body: str) -> Expectation:
-    """Condition that a body is away from home."""
-    return states.IsAway(body)
+@dataclass(frozen=True, eq=False)
+class away(Condition):
+    """Whether a body is away from home."""
+
+    body: str
+
+    of = BODY
+
+    def start(self, run: MeasuredRun, gauge: Gauge) -> Any:
+        """Return the row of the body."""
+        return run.row(self.body)
+
+    def measure(self, block: SignalBlock, gauge: Gauge) -> Trace:
+        """Return 1 while it is away."""
+        runs = block.bodies.runs(gauge.memory, block.first, block.end)
+        return shortest(runs.step, (runs.away != 0).astype(np.float64), block.end)
 
 
-def seen(body: str, by: str) -> Expectation:
-    """Condition that the owner of a camera counts a body as seen, until it has lost it."""
-    return states.IsSeen(body, by)
+@dataclass(frozen=True, eq=False)
+class _CameraCondition(Condition):
+    """Base of conditions about a camera.
+
+    Attributes:
+        body: Name of the body that the camera may see.
+        by: Name of the robot or user that the camera belongs to.
+    """
+
+    body: str
+    by: str = field(metadata={"named": True})
+
+    def check(self, scene: Scene) -> None:
+        """Refuse an owner without a camera, and a body that the camera never looks at."""
+        scene.check_name("robot or user with a camera", self.by, scene.cameras, self)
+        if self.body not in scene.cameras[self.by]:
+            near = did_you_mean(self.body, scene.cameras[self.by])
+            raise ScenarioError(
+                f"{self}: {self.by} doesn't look at {self.body!r}{near} It looks at:"
+                f" {', '.join(scene.cameras[self.by])}"
+            )
 
 
-def in_view(body: str, by: str) -> Expectation:
-    """Condition that a body truly is in view of a camera, noticed or not."""
-    return states.IsInView(body, by)
+SEEN = (EventKind.USER_SEEN, EventKind.ROBOT_SEEN)
+LOST = (EventKind.USER_LOST, EventKind.ROBOT_LOST)
 
 
-def perceived(body: str, by: str) -> Expectation:
-    """Condition that a robot perceives a user at a step, correctly or not."""
-    return states.IsPerceived(body, by)
+class seen(_CameraCondition):
+    """Whether a camera's owner counts a body as seen: from `user_seen` until `user_lost`."""
+
+    def start(self, run: MeasuredRun, gauge: Gauge) -> Any:
+        """Begin with whether it counts as seen at present."""
+        gauge.now = float(self.body in run.cameras_of(self.by).in_view)
+
+    def measure(self, block: SignalBlock, gauge: Gauge) -> Trace:
+        """Return 1 while it counts as seen."""
+        changes = (
+            (event.step, float(event.event in SEEN))
+            for event in block.events
+            if event.entity == self.by
+            and event.detail == self.body
+            and event.event in (*SEEN, *LOST)
+        )
+        return gauge.switched(block, changes)
 
 
-def door(name: str) -> Expectation:
-    """Condition that a door is open."""
-    return states.IsOpen(name)
+class in_view(_CameraCondition):
+    """Whether a body truly is in view of a camera, noticed or not."""
+
+    def start(self, run: MeasuredRun, gauge: Gauge) -> Any:
+        """Return cameras that make no errors; so far they have seen nobody."""
+        gauge.now = 0.0
+        return run.cameras_of(self.by).perfect()
+
+    def measure(self, block: SignalBlock, gauge: Gauge) -> Trace:
+        """Return 1 while it is in view."""
+        looks = gauge.memory.look(block.bodies, block.end)
+        changes = ((e.step, float(e.event in SEEN)) for e in looks if e.detail == self.body)
+        return gauge.switched(block, changes)
 
 
-def sensor(name: str) -> Expectation:
-    """Condition that a sensor is on."""
-    return states.IsOn(name)
+class perceived(_CameraCondition):
+    """Whether a robot has an observation of a user at a step, correct or not."""
+
+    def check(self, scene: Scene) -> None:
+        """Refuse users as owners: their perception isn't recorded."""
+        scene.check_name("robot", self.by, scene.robots, self)
+        super().check(scene)
+
+    def start(self, run: MeasuredRun, gauge: Gauge) -> Any:
+        """Return the numbers of the robot and the user in observations."""
+        cameras = run.cameras_of(self.by)
+        return cameras.index, cameras.number_of(self.body)
+
+    def measure(self, block: SignalBlock, gauge: Gauge) -> Trace:
+        """Return the number of observations at each step at which there is one."""
+        rows, (robot, user) = block.observations, gauge.memory
+        is_it = (rows[:, ROBOT] == robot) & (rows[:, SightingColumn.IDENTITY] == user)
+        return pulses(np.unique(rows[is_it, SightingColumn.STEP]), block.first, block.end)
 
 
-def events(kind: str, entity: str | None = None, *, detail: str | None = None) -> Expectation:
-    """Condition that an event of a kind happens, optionally only to an entity or with a detail."""
-    return states.EventHappens(kind, entity, detail)
+@dataclass(frozen=True, eq=False)
+class door(Condition):
+    """Whether a door is open."""
+
+    name: str
+
+    of = ("door", "doors")
+
+    def start(self, run: MeasuredRun, gauge: Gauge) -> Any:
+        """Return the number of the door."""
+        return list(run.doors).index(self.name)
+
+    def measure(self, block: SignalBlock, gauge: Gauge) -> Trace:
+        """Return 1 while it is open."""
+        return constant(float(gauge.memory not in block.home.shut), block.first, block.end)
 
 
-def during(hours: str, *, days: str | None = None) -> Expectation:
-    """Condition that the time is within some hours, such as "22:00-07:00", on some days.
+@dataclass(frozen=True, eq=False)
+class sensor(Condition):
+    """Whether a sensor is on; for the contact sensor of a door, whether the door is open."""
 
-    Args:
+    name: str
+
+    of = ("sensor", "sensors")
+
+    def start(self, run: MeasuredRun, gauge: Gauge) -> Any:
+        """Begin with whether it is on at present."""
+        gauge.now = float(run.sensors_on[self.name])
+
+    def measure(self, block: SignalBlock, gauge: Gauge) -> Trace:
+        """Return 1 while it is on."""
+        changes = ((step, float(on)) for step, name, on in block.readings if name == self.name)
+        return gauge.switched(block, changes)
+
+
+@dataclass(frozen=True, eq=False)
+class events(Condition):
+    """Whether an event happens at a step, optionally only to an entity or with a detail.
+
+    Attributes:
+        kind: Kind of the event, as in the table of events.
+        entity: Name of the entity to which it happens; None: any.
+        detail: Detail of the event; None: any.
+    """
+
+    kind: str
+    entity: str | None = None
+    detail: str | None = field(default=None, kw_only=True)
+
+    def check(self, scene: Scene) -> None:
+        """Refuse an event that can never happen."""
+        scene.check_event(self.kind, self.entity, self.detail, self)
+
+    def measure(self, block: SignalBlock, gauge: Gauge) -> Trace:
+        """Return the number of events at each step."""
+        steps = [
+            event.step
+            for event in block.events
+            if event.event == self.kind
+            and self.entity in (None, event.entity)
+            and self.detail in (None, event.detail)
+        ]
+        return pulses(np.array(steps, np.int64), block.first, block.end)
+
+    def occasions(self, run: RunSignals) -> I64:
+        """Return the steps at which it happens, repeated for several events at one step."""
+        trace = self.trace(run)
+        end = np.append(trace.start[1:], trace.end)
+        lengths = np.where(trace.value > 0, end - trace.start, 0)
+        offset = np.arange(lengths.sum()) - np.repeat(np.cumsum(lengths) - lengths, lengths)
+        steps = np.repeat(trace.start, lengths) + offset
+        return np.repeat(steps, np.repeat(trace.value.clip(0).astype(np.int64), lengths))
+
+
+@dataclass(frozen=True, eq=False)
+class during(Condition):
+    """Whether the time is within some hours, such as "22:00-07:00", on some days.
+
+    Attributes:
         hours: From when to when; past midnight if the second is the earlier one.
         days: Names of days, "weekdays" or "weekends", separated by commas; None: every day.
     """
-    try:
-        begin, separator, end = hours.partition("-")
-        if not separator:
-            raise InputError(f"during({hours!r}): write from when to when, like '22:00-07:00'")
-        times = parse_time_of_day(begin.strip()), parse_time_of_day(end.strip())
-        names = [name.strip() for name in days.split(",")] if days else "daily"
-        return states.IsDuring(*times, frozenset(weekdays_of(names)), (hours, days))
-    except PydanticCustomError as error:
-        raise InputError(f"during: {error}") from None
 
+    hours: str
+    days: str | None = field(default=None, kw_only=True)
 
-def _time(value: Time | None, name: str) -> timedelta | None:
-    try:
-        return None if value is None else parse_duration(value)
-    except PydanticCustomError as error:
-        raise InputError(f"{name}: {error}") from None
+    def __post_init__(self) -> None:
+        try:
+            begin, separator, end = self.hours.partition("-")
+            if not separator:
+                raise InputError(
+                    f"during({self.hours!r}): write from when to when, like '22:00-07:00'"
+                )
+            first, last = parse_time_of_day(begin.strip()), parse_time_of_day(end.strip())
+            names = [name.strip() for name in self.days.split(",")] if self.days else "daily"
+            length = last - first if last > first else last + timedelta(days=1) - first
+            self._set(_begin=first, _length=length, _weekdays=frozenset(weekdays_of(names)))
+        except PydanticCustomError as error:
+            raise InputError(f"during: {error}") from None
 
+    def measures(self) -> Iterator[Measurement]:
+        """Yield nothing: it follows from the clock."""
+        yield from ()
 
-def _part(expectation: object, word: str) -> Expectation:
-    if isinstance(expectation, Expectation):
-        return expectation
-    raise InputError(
-        f"{word}: {expectation} is not a condition, which holds or doesn't: compare it, as in"
-        ' distance("ana", "astro") > 0.5, or room("ana") == "kitchen"'
-    )
+    def check(self, scene: Scene) -> None:
+        """Accept every run."""
+
+    def trace(self, run: RunSignals) -> Trace:
+        """Return 1 where the time is within these hours, 0 elsewhere."""
+        clock, day = run.clock, timedelta(days=1)
+        begin, length, weekdays = (vars(self)[n] for n in ("_begin", "_length", "_weekdays"))
+        midnight = midnight_of(clock.time(run.first)) - day
+        starts, values = [run.first], [0.0]
+        while midnight < clock.time(run.end):
+            if midnight.weekday() in weekdays:
+                for offset, is_within in ((begin, 1.0), (begin + length, 0.0)):
+                    step = clock.step_at_or_after(clock.elapsed(midnight + offset))
+                    if step <= starts[-1]:
+                        values[-1] = is_within
+                    elif step < run.end:
+                        starts.append(step)
+                        values.append(is_within)
+            midnight += day
+        return Trace(np.array(starts, np.int64), np.array(values), run.end)

@@ -11,7 +11,7 @@ from pydantic_core import CoreSchema
 
 
 def _read(value: Any) -> Any:
-    from fleet2d.expectations.field import read_expectation
+    from fleet2d.expectations.parse import read_expectation
 
     return read_expectation(value)
 
@@ -22,7 +22,7 @@ class _Described:
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> JsonSchemaValue:
-        from fleet2d.expectations.field import JSON_SCHEMA
+        from fleet2d.expectations.parse import JSON_SCHEMA
 
         return dict(JSON_SCHEMA)
 

@@ -1,0 +1,306 @@
+"""Expectations of a run: measured during the run, judged at any time and at its end."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from fleet2d.algorithms.log import SensorRow
+from fleet2d.algorithms.observations import Activities
+from fleet2d.artifacts.store import RunStore
+from fleet2d.artifacts.table import Column, TableSpec
+from fleet2d.configuration.units import MICROSECOND
+from fleet2d.engine.bodies import Bodies
+from fleet2d.engine.cameras import Cameras
+from fleet2d.engine.home_changes import Changes
+from fleet2d.engine.learners import Learners
+from fleet2d.engine.sensors import Sensors
+from fleet2d.engine.trajectories import STEP, TIME
+from fleet2d.entities.decisions import DecidingActor
+from fleet2d.errors import InputError
+from fleet2d.expectations.expectation import Expectation, RunSignals
+from fleet2d.expectations.signals import Gauge, Scene, SignalBlock
+from fleet2d.expectations.verdict import Verdict, check_judged, verdict_of
+from fleet2d.kernels import I64
+from fleet2d.kernels.sight import SightMemory
+from fleet2d.metrics.metric import Metric
+from fleet2d.runtime.events import Event
+from fleet2d.scenario.model import Scenario
+
+TABLE = "violations"
+
+# The chance of a lens that notices all bodies in view.
+CERTAIN = 2**53
+
+
+class ActiveExpectation(NamedTuple):
+    """An expectation and the step from which it holds."""
+
+    expectation: Expectation
+    since: int
+
+
+class RunExpectations:
+    """The expectations of a run, and the gauges that measure their signals.
+
+    It is what signals know of a run, see `fleet2d.expectations.signals.MeasuredRun`.
+
+    Attributes:
+        entries: The expectations by name.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        actors: Sequence[DecidingActor],
+        bodies: Bodies,
+        changes: Changes,
+        sensors: Sensors,
+        cameras: Sequence[Cameras],
+        activities: Activities,
+    ) -> None:
+        self.entries: dict[str, ActiveExpectation] = {}
+        self.actors, self.bodies = actors, bodies
+        self.home, self.clock, self.doors = changes.home, changes.clock, changes.names
+        self.first = 0
+        self._scenario, self._sensors = scenario, sensors
+        self._cameras, self._activities = cameras, activities
+        self._gauges: dict[str, Gauge] = {}
+        self._events: list[Event] = []
+
+    def add(self, name: str, expectation: Expectation, since: int, first: int) -> None:
+        """Add an expectation.
+
+        Args:
+            name: Its name.
+            expectation: The expectation.
+            since: The step from which on it is judged.
+            first: The present step, from which on its signals are measured.
+
+        Raises:
+            ScenarioError: It names something unknown or an impossible event, or lasts too long.
+            InputError: It has no time, or there is another one of that name.
+        """
+        check_judged(expectation)
+        expectation.check(self._scene(since))
+        if name in self.entries:
+            raise InputError(f"{name!r} is expected already: give this another name")
+        self.first = first
+        for signal in expectation.measures():
+            if str(signal) not in self._gauges:
+                self._gauges[str(signal)] = Gauge(signal, self)
+        self.entries[name] = ActiveExpectation(expectation, since)
+
+    def _scene(self, since: int) -> Scene:
+        """Return the names of the run that expectations from a step on may use."""
+        users, plan = self.bodies.users, self.home.plan
+        return Scene(
+            users=[actor.name for actor in self.actors[:users]],
+            robots=[actor.name for actor in self.actors[users:]],
+            rooms=[name for room in self.home.rooms for name in (room.name, room.type)],
+            things=[item.name for item in plan.objects],
+            doors=self.doors,
+            sensors=self._sensors.names,
+            algorithms=list(self._scenario.algorithms),
+            metrics=list(self._scenario.metrics),
+            batteries=[actor.name for actor in self.actors if actor.charge is not None],
+            cameras={c.owner.name: [o.name for o in c.others] for c in self._cameras},
+            behaviors={
+                actor.name: [_type_of(behavior) for behavior in actor.behaviors] or ["own"]
+                for actor in self.actors
+            },
+            records=[kind for a in self.actors for b in a.behaviors for kind in b.records],
+            remaining=(self.clock.steps - since) * self.clock.step_us * MICROSECOND,
+        )
+
+    # What signals know of the run
+
+    @property
+    def sensors_on(self) -> Mapping[str, bool]:
+        """Whether each sensor is on at present, by name."""
+        return self._sensors.on
+
+    def row(self, name: str) -> int:
+        """Return the row of a body."""
+        return next(row for row, actor in enumerate(self.actors) if actor.name == name)
+
+    def activity_of(self, row: int) -> str | None:
+        """Return the present activity of a user; None if none is known."""
+        return self._activities.now(row)
+
+    def cameras_of(self, name: str) -> "CameraView":
+        """Return the cameras of a body."""
+        return CameraView(next(c for c in self._cameras if c.owner.name == name), self)
+
+    # Measuring
+
+    def take_events(self, events: Sequence[Event]) -> None:
+        """Collect events until `take` measures their steps."""
+        self._events += events
+
+    def begin_plan(self, actor: DecidingActor) -> None:
+        """Note that a body begins a plan."""
+        for gauge in self._gauges.values():
+            gauge.signal.begin_plan(actor, gauge)
+
+    def learned(self, step: int, learners: Learners) -> None:
+        """Note the outputs of algorithms and the results of metrics before a step."""
+        results = {
+            learner.name: learner.component.result
+            for learner in learners.all
+            if isinstance(learner.component, Metric) and learner.since == step
+        }
+        for gauge in self._gauges.values():
+            gauge.signal.learn(learners.fresh, results, gauge)
+
+    def take(self, end: int, observations: I64, readings: Sequence[SensorRow]) -> None:
+        """Measure the signals up to step `end` - 1, in which the home doesn't change.
+
+        Args:
+            end: One past the last step.
+            observations: The observations of robots, int64 (n, OBSERVATION).
+            readings: The readings of sensors.
+        """
+        names, rest = self._sensors.names, [e for e in self._events if e.step >= end]
+        events = [event for event in self._events if event.step < end]
+        block = SignalBlock(
+            self.first,
+            end,
+            self.bodies,
+            self.home,
+            observations,
+            [(row.step, names[row.sensor], row.on) for row in readings],
+            sorted(events, key=lambda event: (event.step, event.rank)),
+        )
+        for gauge in self._gauges.values():
+            gauge.take(block)
+        self.first, self._events = end, rest
+
+    # Judging
+
+    def verdicts(self, *, ended: bool) -> dict[str, Verdict]:
+        """Return the present verdicts on what has begun, by name.
+
+        Args:
+            ended: Whether the run is over.
+        """
+        return {
+            name: self._verdict(name, entry, ended)
+            for name, entry in self.entries.items()
+            if self.first > entry.since
+        }
+
+    def _verdict(self, name: str, entry: ActiveExpectation, ended: bool) -> Verdict:
+        gauges = {str(s): self._gauges[str(s)] for s in entry.expectation.measures()}
+        signals = RunSignals(
+            {key: gauge.trace() for key, gauge in gauges.items()},
+            {key: gauge.words for key, gauge in gauges.items()},
+            entry.since,
+            self.first,
+            ended,
+            self.clock,
+        )
+        return verdict_of(name, entry.expectation, signals)
+
+    def finish(self, results: Mapping[str, Any], store: RunStore, *, ended: bool) -> dict[str, Any]:
+        """Store the table of violations; return the content of all verdicts for the manifest.
+
+        Args:
+            results: The results of the metrics over the whole run.
+            store: The store for the table of violations.
+            ended: Whether the run is complete.
+        """
+        for gauge in self._gauges.values():
+            gauge.signal.finish(results, gauge)
+        verdicts = self.verdicts(ended=ended)
+        self._store_violations(store, verdicts)
+        return {name: verdict.content() for name, verdict in verdicts.items()}
+
+    def _store_violations(self, store: RunStore, verdicts: Mapping[str, Verdict]) -> None:
+        """Store a row for each violation, in order of its first step."""
+        names = tuple(sorted(verdicts))  # the keys of a manifest are sorted, too
+        columns = (
+            STEP,
+            TIME,
+            Column("expectation", "category", categories=names),
+            Column("last_step", "int64", description="last step of the violation"),
+            Column("worst_step", "int64", description="the first at which it is worst"),
+            Column("robustness", "float64", nullable=True, description="missing: infinite"),
+        )
+        store.add_table(TableSpec(TABLE, columns, "the violations of expectations"))
+        rows = sorted(
+            (v, names.index(n)) for n, verdict in verdicts.items() for v in verdict.violations
+        )
+        if not rows:
+            return
+        first, last, robustness, worst = zip(*(row[0] for row in rows), strict=True)
+        step, value = np.array(first, np.int64), np.array(robustness)
+        store.append(
+            TABLE,
+            step=step,
+            time=self.clock.times(step),
+            expectation=np.array([code for _, code in rows], np.int32),
+            last_step=np.array(last, np.int64),
+            worst_step=np.array(worst, np.int64),
+            robustness=np.where(np.isfinite(value), value, np.nan),
+        )
+
+
+def _type_of(behavior: Any) -> str:
+    """Return the type of a built-in behavior, "own" of any other."""
+    name = str(behavior.type_name)
+    return "own" if ":" in name or "." in name else name
+
+
+@dataclass(frozen=True)
+class CameraView:
+    """The cameras of a body as `fleet2d.expectations.signals.MeasuredCameras` describes them."""
+
+    cameras: Cameras
+    run: RunExpectations
+
+    @property
+    def index(self) -> int:
+        """The number of the owner among the robots, or among the users."""
+        return self.cameras.index
+
+    @property
+    def in_view(self) -> Mapping[str, object]:
+        """The bodies that count as seen at present, by name."""
+        return self.cameras.in_view
+
+    def number_of(self, name: str) -> int:
+        """Return the number of a body among those that they look at."""
+        return [other.name for other in self.cameras.others].index(name)
+
+    def perfect(self) -> "PerfectCameras":
+        """Return cameras that notice all bodies in view at each step, from the present one on."""
+        cameras, run = self.cameras, self.run
+        perfect = PerfectCameras(
+            cameras.row, run.actors, run.bodies.users, cameras.method, cameras.radii
+        )
+        perfect.next_step = run.first
+        return perfect
+
+
+class PerfectCameras(Cameras):
+    """Cameras that look at every step, and notice all bodies in view at once."""
+
+    def _set_up(self) -> SightMemory:
+        memory = super()._set_up()
+        lenses = self.lenses
+        self.lenses = lenses._replace(
+            chance=np.full_like(lenses.chance, CERTAIN),
+            period=np.ones_like(lenses.period),
+            latency=np.zeros_like(lenses.latency),
+            errs=np.zeros_like(lenses.errs),
+        )
+        self.rule, self.sighting_errors = self.rule._replace(patience=1), None
+        return memory
+
+    def look(self, bodies: Bodies, end: int) -> Sequence[Event]:
+        """Look in the steps up to `end` - 1; return the events of seeing and losing."""
+        events = self.take(bodies, end)
+        self.collect()
+        return events

@@ -1,1 +1,0 @@
-"""Expectations of a simulation: how they are added, and their verdicts."""

@@ -1,1 +1,0 @@
-"""Gauges: they measure the signals of expectations during a run, block by block."""
