@@ -280,12 +280,18 @@ class CameraView:
         perfect = PerfectCameras(
             cameras.row, run.actors, run.bodies.users, cameras.method, cameras.radii
         )
-        perfect.next_step = run.first
+        perfect.bodies, perfect.next_step = run.bodies, run.first
         return perfect
 
 
 class PerfectCameras(Cameras):
-    """Cameras that look at every step, and notice all bodies in view at once."""
+    """Cameras that look at every step, and notice all bodies in view at once.
+
+    Attributes:
+        bodies: The bodies of the run.
+    """
+
+    bodies: Bodies
 
     def _set_up(self) -> SightMemory:
         memory = super()._set_up()
@@ -299,8 +305,8 @@ class PerfectCameras(Cameras):
         self.rule, self.sighting_errors = self.rule._replace(patience=1), None
         return memory
 
-    def look(self, bodies: Bodies, end: int) -> Sequence[Event]:
+    def look(self, end: int) -> Sequence[Event]:
         """Look in the steps up to `end` - 1; return the events of seeing and losing."""
-        events = self.take(bodies, end)
+        events = self.take(self.bodies, end)
         self.collect()
         return events

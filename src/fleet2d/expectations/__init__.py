@@ -10,11 +10,13 @@ after(events("calls", "astro"), seen("ana", by="astro"), within="2 min")
 
 from typing import TYPE_CHECKING, Any
 
-from fleet2d.expectations.expectation import WORDS, Expectation
-from fleet2d.expectations.parse import parse_expectation
-from fleet2d.expectations.signals import Scene
-from fleet2d.expectations.temporal import Violation
-from fleet2d.expectations.verdict import Verdict, judge
+from fleet2d.expectations.expectation import WORDS
+from fleet2d.expectations.expectation import Expectation as Expectation
+from fleet2d.expectations.parse import parse_expectation as parse_expectation
+from fleet2d.expectations.signals import Scene as Scene
+from fleet2d.expectations.temporal import Violation as Violation
+from fleet2d.expectations.verdict import Verdict as Verdict
+from fleet2d.expectations.verdict import judge as judge
 
 if TYPE_CHECKING:
     from fleet2d.expectations.temporal import *  # noqa: F403

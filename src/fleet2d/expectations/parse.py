@@ -254,7 +254,7 @@ def _whole(value: Mapping[str, Any], operator: str) -> Expectation:
                 ("until",), f"'until' can only be combined with 'always', not with {operator!r}"
             )
         return temporal.until(part, _part(value, "until"), within=within)
-    return getattr(temporal, operator)(part, within=within)  # type: ignore[no-any-return]
+    return getattr(temporal, operator)(part, within=within)
 
 
 def _condition(value: Mapping[str, Any], operator: str) -> Expectation:

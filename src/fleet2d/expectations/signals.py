@@ -190,13 +190,11 @@ class MeasuredBodies(Protocol):
 
 
 class MeasuredCameras(Protocol):
-    """The cameras of a body, as signals are measured by them.
+    """The cameras of a body, as signals are measured by them."""
 
-    Attributes:
-        index: The number of the owner among the robots, or among the users.
-    """
-
-    index: int
+    @property
+    def index(self) -> int:
+        """The number of the owner among the robots, or among the users."""
 
     @property
     def in_view(self) -> Mapping[str, object]:
@@ -212,30 +210,40 @@ class MeasuredCameras(Protocol):
 class ErrorFreeCameras(Protocol):
     """Cameras that make no errors."""
 
-    def look(self, bodies: MeasuredBodies, end: int) -> Iterable[Event]:
+    def look(self, end: int) -> Iterable[Event]:
         """Look in the steps up to `end` - 1; return the events of seeing and losing."""
 
 
 class MeasuredRun(Protocol):
-    """The run in which signals are measured.
+    """The run in which signals are measured."""
 
-    Attributes:
-        actors: Users, then robots; their numbers are the rows of poses.
-        bodies: The bodies and their poses.
-        home: The home.
-        clock: The steps of the run.
-        first: The first step that will be measured.
-        doors: Names of doors in the order of their numbers.
-        sensors_on: Whether each sensor is on at present, by name.
-    """
+    @property
+    def actors(self) -> Sequence[Actor]:
+        """Users, then robots; their numbers are the rows of poses."""
 
-    actors: Sequence[Actor]
-    bodies: MeasuredBodies
-    home: Home
-    clock: Clock
-    first: int
-    doors: Sequence[str]
-    sensors_on: Mapping[str, bool]
+    @property
+    def bodies(self) -> MeasuredBodies:
+        """The bodies and their poses."""
+
+    @property
+    def home(self) -> Home:
+        """The home."""
+
+    @property
+    def clock(self) -> Clock:
+        """The steps of the run."""
+
+    @property
+    def first(self) -> int:
+        """The first step that will be measured."""
+
+    @property
+    def doors(self) -> Sequence[str]:
+        """The names of doors in the order of their numbers."""
+
+    @property
+    def sensors_on(self) -> Mapping[str, bool]:
+        """Whether each sensor is on at present, by name."""
 
     def row(self, name: str) -> int:
         """Return the row of a body."""

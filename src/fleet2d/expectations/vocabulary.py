@@ -508,7 +508,7 @@ class in_view(_CameraCondition):
 
     def measure(self, block: SignalBlock, gauge: Gauge) -> Trace:
         """Return 1 while it is in view."""
-        looks = gauge.memory.look(block.bodies, block.end)
+        looks = gauge.memory.look(block.end)
         changes = ((e.step, float(e.event in SEEN)) for e in looks if e.detail == self.body)
         return gauge.switched(block, changes)
 
