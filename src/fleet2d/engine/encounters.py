@@ -365,7 +365,7 @@ class Encounters(Watcher):
     def interruptions(self, events: Sequence[Event]) -> Iterable[tuple[int, SightEvent]]:
         """Yield the encounters of the last step to which the person reacts."""
         for row, user, event in self._last:
-            if user.heeds(event, self.next_step - 1):
+            if user.reacts_to(event, self.next_step - 1):
                 yield row, event
 
 

@@ -304,7 +304,7 @@ class Behavior(Component):
         """Return which actions of robots interrupt any plan of the body; None: none do."""
         return None
 
-    def heeds(self, actor: "Actor", event: SightEvent, step: int) -> bool:
+    def reacts_to(self, actor: "Actor", event: SightEvent, step: int) -> bool:
         """Return whether an event of its `attention` interrupts the plan."""
         return True
 

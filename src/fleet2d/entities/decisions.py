@@ -368,11 +368,11 @@ class DecidingActor(Actor):
             self.decide_anew(step)
         return now
 
-    def heeds(self, event: SightEvent, step: int) -> bool:
+    def reacts_to(self, event: SightEvent, step: int) -> bool:
         """Return whether it reacts to an action of a robot."""
         if self.order is not None:
             return False
-        return self._attentive is not None and self._attentive[0].heeds(self, event, step)
+        return self._attentive is not None and self._attentive[0].reacts_to(self, event, step)
 
     def goes_on(self, now: Situation) -> bool:
         """Return whether its plan goes on at a step at which behaviors want to be asked.

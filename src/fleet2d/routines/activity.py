@@ -59,12 +59,13 @@ def seconds(duration: timedelta) -> int:
 
 
 class DurationDistribution(Settings):
-    """A law of durations: how long something takes.
+    """A distribution of durations: how long something takes.
 
-    Short forms: ``30 min`` is a lognormal law of that mean, ``[20 min, 40 min]`` a uniform law.
+    Short forms: ``30 min`` is a lognormal distribution with that mean, ``[20 min, 40 min]`` a
+    uniform one.
 
     Attributes:
-        law: Its shape.
+        law: The family of the distribution.
         mean: Its mean, before it is cut.
         std: Its standard deviation; left out: 30 % of the mean.
         at_least: Nothing shorter is drawn.
@@ -110,7 +111,7 @@ class DurationDistribution(Settings):
         return self
 
     def table(self) -> Distribution:
-        """Return the law as a table of quantiles [s]."""
+        """Return the distribution as a table of quantiles [s]."""
         mean = seconds(self.mean)
         std = seconds(self.std) if self.std is not None else int(mean * USUAL_SPREAD)
         low = None if self.at_least is None else seconds(self.at_least)
@@ -132,7 +133,7 @@ class DurationDistribution(Settings):
 
 
 AnyDurationDistribution = Annotated[DurationDistribution, SchemaForms("text", "number", "pair")]
-"""A law of durations, in any form."""
+"""A distribution of durations, in any form."""
 
 
 class Activity(Settings):

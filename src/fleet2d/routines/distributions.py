@@ -19,7 +19,7 @@ _BITS = 24
 _ONE = 1 << _BITS
 _LN2 = 0.6931471805599453
 
-# Quantiles of the normal law at (64.5, 65.5, … 127.5) / 128, in 1e-5 standard deviations.
+# Quantiles of the normal distribution at (64.5, 65.5, … 127.5) / 128, in 1e-5 standard deviations.
 _BELL = (
     979, 2938, 4898, 6859, 8824, 10792, 12764, 14740, 16723, 18713, 20709, 22714, 24729, 26753,
     28788, 30835, 32896, 34970, 37060, 39166, 41289, 43431, 45593, 47777, 49984, 52215, 54473,
@@ -29,7 +29,7 @@ _BELL = (
     266007,
 )  # fmt: skip
 NORMAL = tuple(-z / 1e5 for z in reversed(_BELL)) + tuple(z / 1e5 for z in _BELL)
-"""Standard normal quantiles, -2.66 to 2.66: a normal law is cut there."""
+"""Standard normal quantiles, -2.66 to 2.66: a normal distribution is cut there."""
 
 
 class Distribution(NamedTuple):
@@ -44,9 +44,9 @@ class Distribution(NamedTuple):
 
     Example:
         >>> from fleet2d.runtime.determinism import Draws, stream_key
-        >>> law = lognormal(1800, 600)
+        >>> duration = lognormal(1800, 600)
         >>> draws = Draws(stream_key(4, "users.ana", "doc"), 0)
-        >>> [law.draw(draws) for _ in range(4)], law.draw(draws, 0, 900)
+        >>> [duration.draw(draws) for _ in range(4)], duration.draw(draws, 0, 900)
         ([1997, 1522, 2191, 1736], 812)
     """
 
@@ -57,9 +57,9 @@ class Distribution(NamedTuple):
     last: int
 
     def draw(self, draws: Draws, low: int | None = None, high: int | None = None) -> int:
-        """Draw a value from the law, conditional on being from `low` to `high` [s].
+        """Draw a value from the distribution, conditional on being from `low` to `high` [s].
 
-        If the law has no values between them, the result is the bound nearer to the law.
+        If there are no values between them, the result is the bound that is nearer to the values.
         """
         first, last = self.first, self.last
         if low is None or low <= self.shortest:
@@ -81,7 +81,7 @@ class Distribution(NamedTuple):
         return min(max(value, low), high)
 
     def quantiles(self, count: int) -> list[int]:
-        """Return evenly spaced quantiles of the law between its bounds, at (i + 1/2) / count [s].
+        """Return evenly spaced quantiles between the bounds, at (i + 1/2) / count [s].
 
         >>> uniform(0, 80).quantiles(4)
         [10, 30, 50, 70]
@@ -96,12 +96,12 @@ class Distribution(NamedTuple):
         return values
 
     def mean(self) -> float:
-        """Return the mean of the law between its bounds [s]."""
+        """Return the mean of the distribution between its bounds [s]."""
         inside = [min(max(knot, self.shortest), self.longest) for knot in self.knots]
         return sum_in_order((a + b) / 2 for a, b in pairwise(inside)) / (len(inside) - 1)
 
     def within(self, shortest: int | None, longest: int | None) -> "Distribution":
-        """Return the law cut to bounds [s]."""
+        """Return the distribution cut to bounds [s]."""
         return _bounded(
             self.knots,
             self.shortest if shortest is None else shortest,
@@ -120,14 +120,14 @@ def position(knots: Sequence[int], value: int) -> int:
 
 
 def _bounded(knots: tuple[int, ...], shortest: int, longest: int) -> Distribution:
-    """Return the law of knots between two bounds."""
+    """Return the distribution of knots between two bounds."""
     return Distribution(
         knots, shortest, longest, position(knots, shortest), position(knots, longest)
     )
 
 
-def _law(quantile: Callable[[float], float]) -> Distribution:
-    """Return the law whose quantiles are a function of those of the standard normal law."""
+def _from_normal(quantile: Callable[[float], float]) -> Distribution:
+    """Return the distribution whose quantiles are a function of standard normal ones."""
     knots: list[int] = []
     for z in NORMAL:
         value = int(quantile(z) + 0.5)
@@ -137,45 +137,45 @@ def _law(quantile: Callable[[float], float]) -> Distribution:
 
 @lru_cache(None)
 def lognormal(mean_s: float, std_s: float) -> Distribution:
-    """Return the lognormal law of a mean and a standard deviation [s]."""
+    """Return the lognormal distribution of a mean and a standard deviation [s]."""
     ratio = std_s / mean_s
     variance = log(1 + ratio * ratio)
     sigma, middle = math.sqrt(variance), mean_s / math.sqrt(1 + ratio * ratio)
-    return _law(lambda z: middle * exp(sigma * z))
+    return _from_normal(lambda z: middle * exp(sigma * z))
 
 
 @lru_cache(None)
 def gamma(mean_s: float, std_s: float) -> Distribution:
-    """Return the gamma law of a mean and a standard deviation [s], after Wilson and Hilferty."""
+    """Return the gamma distribution of a mean and a standard deviation [s] (Wilson, Hilferty)."""
     ninth = (std_s / mean_s) * (std_s / mean_s) / 9  # 1 / (9 k), k the shape
 
     def quantile(z: float) -> float:
         root = max(1 - ninth + z * math.sqrt(ninth), 0.0)
         return mean_s * root * root * root
 
-    return _law(quantile)
+    return _from_normal(quantile)
 
 
 @lru_cache(None)
 def normal(mean_s: float, std_s: float) -> Distribution:
-    """Return the normal law of a mean and a standard deviation [s], cut at 0."""
-    return _law(lambda z: max(mean_s + std_s * z, 0.0))
+    """Return the normal distribution of a mean and a standard deviation [s], cut at 0."""
+    return _from_normal(lambda z: max(mean_s + std_s * z, 0.0))
 
 
 @lru_cache(None)
 def exponential(mean_s: float) -> Distribution:
-    """Return the exponential law of a mean [s]: the time to the next event of a Poisson process."""
+    """Return the exponential distribution of a mean [s]: times between events at random."""
     knots = [int(-mean_s * log((KNOTS - i - 0.5) / KNOTS) + 0.5) for i in range(KNOTS)]
     return _bounded(tuple(knots), knots[0], knots[-1])
 
 
 def uniform(low_s: int, high_s: int) -> Distribution:
-    """Return the uniform law of whole seconds from `low_s` to `high_s`."""
+    """Return the uniform distribution of whole seconds from `low_s` to `high_s`."""
     return _bounded((low_s, high_s), low_s, high_s)
 
 
 def empirical(quantiles: Sequence[int]) -> Distribution:
-    """Return the law of measured quantiles at evenly spaced probabilities from 0 to 1 [s]."""
+    """Return the distribution with quantiles at evenly spaced probabilities from 0 to 1 [s]."""
     return _bounded(tuple(quantiles), quantiles[0], quantiles[-1])
 
 

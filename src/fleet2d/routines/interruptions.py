@@ -80,8 +80,8 @@ class Need(Settings):
 
     @model_validator(mode="after")
     def _leaves_time(self) -> Self:
-        for key, law in (("every", self.every), ("asleep", self.asleep)):
-            if law is not None and law.table().mean() < seconds(SHORTEST_INTERVAL):
+        for key, waits in (("every", self.every), ("asleep", self.asleep)):
+            if waits is not None and waits.table().mean() < seconds(SHORTEST_INTERVAL):
                 raise problem(f"'{key}' is less than 5 min on average: make it 5 min or longer")
         return self
 

@@ -1,19 +1,19 @@
 """Time use of a survey, and random days whose shares of activities are those of the survey.
 
 The survey has the share of people who do each activity at each hour. A person's day is a Markov
-chain in steps of ten minutes. After a step, an episode ends by its law of durations, or because the
-share of its activity has to shrink; then the next activity is drawn by the shares that have to
-grow. The probabilities of both are computed beforehand, by following the shares of people by
-activity and age of their episode through a week. So every person is drawn independently, and the
+chain in steps of ten minutes. After a step, an episode ends by the distribution of its duration, or
+because the share of its activity has to shrink; then the next activity is drawn by the shares that
+have to grow. The probabilities of both are computed beforehand, by following the shares of people
+by activity and age of their episode through a week. So every person is drawn independently, and the
 expected shares are exactly those of the survey:
 
     stay(a, age)  = (1 - hazard(a, age)) * min(1, target(a) / stayers(a))
     next(b)       ~ target(b) - staying(b)
 
-Here stayers(a) is the share of people in activity a whose episode doesn't end by its law of
-durations, and staying(b) the share of people that remains in activity b after the step. An episode
-whose next activity is the same continues. Durations have the survey's means as far as
-the shares allow.
+Here stayers(a) is the share of people in activity a whose episode doesn't end by the distribution
+of its duration, and staying(b) the share of people that remains in activity b after the step. An
+episode whose next activity is the same continues. Durations have the survey's means as far as the
+shares allow.
 """
 
 import json
@@ -143,13 +143,13 @@ def _targets(facts: dict[str, Any]) -> F64:
 def _survival(facts: dict[str, Any], category: str) -> list[float]:
     """Return the probability that an episode of each age lasts another step."""
     mean_s = facts["minutes"].get(category, 60) * 60
-    law = lognormal(*SLEEP_S) if category == "sleeping" else lognormal(mean_s, SPREAD * mean_s)
-    ended = [_share_below(law, age * STEP_S) for age in range(AGES + 1)]
+    lasts = lognormal(*SLEEP_S) if category == "sleeping" else lognormal(mean_s, SPREAD * mean_s)
+    ended = [_share_below(lasts, age * STEP_S) for age in range(AGES + 1)]
     return [(1 - b) / (1 - a) if a < 1 else 0.5 for a, b in pairwise(ended)]
 
 
-def _share_below(law: Distribution, value: int) -> float:
-    return position(law.knots, value) / ((KNOTS - 1) << 24)
+def _share_below(lasts: Distribution, value: int) -> float:
+    return position(lasts.knots, value) / ((KNOTS - 1) << 24)
 
 
 def _next(now: F64, target: F64, survival: F64) -> tuple[F64, F64, F64]:

@@ -93,13 +93,13 @@ def _in_order(tasks: dict[str, "Task"]) -> list[str]:
 def _job(persona: "Persona", name: str, task: "Task", order: list[str], dawn: int) -> Job:
     activity = persona.activity(task.activity or name)
     place = int(task.before_bed) - int(task.on_waking)
-    law = None if place or (task.after and not _timed(task)) else starts(task, dawn)
+    begin = None if place or (task.after and not _timed(task)) else starts(task, dawn)
     if task.fixed and task.at is not None:
-        law = uniform(of_day(task.at, dawn), of_day(task.at, dawn))
+        begin = uniform(of_day(task.at, dawn), of_day(task.at, dawn))
     return Job(
         task=name,
         activity=task.activity or name,
-        starts=law,
+        starts=begin,
         takes=(task.takes or activity.takes).table(),
         until=NEVER if task.until is None else of_day(task.until, dawn),
         after=tuple(sorted(order.index(other) for other in task.after)),
@@ -144,8 +144,8 @@ def starts(timing: "Timing", dawn: int) -> Distribution:
         at = of_day(timing.at, dawn)
         reach = int(REACH * spread)
         first, last = max(at - reach, 0), at + reach
-    law = normal(at, spread) if spread else uniform(at, at)
-    return law.within(first, last)
+    begin = normal(at, spread) if spread else uniform(at, at)
+    return begin.within(first, last)
 
 
 def window(between: "tuple[timedelta, timedelta]", dawn: int) -> tuple[int, int]:

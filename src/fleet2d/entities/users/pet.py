@@ -25,7 +25,7 @@ NAPS = 10
 class Pet(Behavior):
     """Nap somewhere, roam through a few spots of the home, nap somewhere else.
 
-    The durations of naps and stops are drawn from their laws. The next spot is in the same room
+    The durations of naps and stops are drawn at random. The next spot is in the same room
     with probability `stays_in_room`, else in any room that it may enter.
 
     Attributes:
@@ -58,14 +58,14 @@ class Pet(Behavior):
         rooms = available_rooms(actor, "pet.rooms", self.rooms)
         self.allowed_rooms = rooms or actor.reachable_rooms()
         self.places = Spots(actor)
-        self.laws = self.nap.table(), self.stop.table()
+        self.durations = self.nap.table(), self.stop.table()
         self.naps = 0
         self.room = Draws(actor.stream("first room"), 0).choice(self.allowed_rooms)
 
     def decide(self, now: Situation) -> Plan:
         """Plan the next naps, and the stops between them."""
         plan = now.plan()
-        nap, stop = self.laws
+        nap, stop = self.durations
         least, most = self.spots
         for _ in range(NAPS):
             draws = Draws(now.actor.stream("roam"), self.naps)

@@ -52,7 +52,7 @@ class Reactions(Behavior):
         personas = (getattr(behavior, "resolved_persona", None) for behavior in actor.behaviors)
         persona = next((p for p in personas if p is not None), None)
         self.used_manners = self.manners or getattr(persona, "manners", None) or Manners()
-        self.laws = {
+        self.durations = {
             "looks": self.used_manners.looks.table(),
             "leaves_for": self.used_manners.leaves_for.table(),
             "comes_for": self.used_manners.comes_for.table(),
@@ -67,7 +67,7 @@ class Reactions(Behavior):
             hears=round(used.hears * units),
         )
 
-    def heeds(self, actor: "Actor", event: SightEvent, step: int) -> bool:
+    def reacts_to(self, actor: "Actor", event: SightEvent, step: int) -> bool:
         """Return whether the person reacts to an event at a step; drawn by its probability."""
         if step < self.until and RANKS.index(event.event) >= self.rank:
             return False  # the present reaction is more important
@@ -91,7 +91,7 @@ class Reactions(Behavior):
             self._step_aside(now, plan, event, draws)
         else:
             plan.note("reacts", f"turns to {event.user}")
-            self._look_at(now, plan, event, self.laws["looks"], draws)
+            self._look_at(now, plan, event, self.durations["looks"], draws)
         self.rank = RANKS.index(event.event)
         self.until = now.actor.clock.step_at_or_after(plan.time_us)
         return plan
@@ -104,7 +104,7 @@ class Reactions(Behavior):
         points = [p for p in self._points_around(now, (at_x, at_y), distance_m) if plan.reaches(*p)]
         if points:
             plan.go_to_point(*min(points, key=lambda p: _squared(p[0] - plan.x, p[1] - plan.y)))
-        self._look_at(now, plan, event, self.laws["comes_for"], draws)
+        self._look_at(now, plan, event, self.durations["comes_for"], draws)
 
     def _leave(self, now: Situation, plan: Plan, event: SightEvent, draws: Draws) -> None:
         plan.note("reacts", f"leaves {event.user}")
@@ -112,7 +112,7 @@ class Reactions(Behavior):
         rooms = [room for room in now.actor.reachable_rooms() if room != now.room]
         if rooms:
             plan.go_to((draws.choice(rooms).name,), "retreat")
-        plan.stay(timedelta(seconds=self.laws["leaves_for"].draw(draws)))
+        plan.stay(timedelta(seconds=self.durations["leaves_for"].draw(draws)))
 
     def _step_aside(self, now: Situation, plan: Plan, event: SightEvent, draws: Draws) -> None:
         """Step out of the robot's way, to a random free point beside it."""
@@ -131,10 +131,10 @@ class Reactions(Behavior):
         plan.stay(PASSING)
 
     def _look_at(
-        self, now: Situation, plan: Plan, event: SightEvent, law: Distribution, draws: Draws
+        self, now: Situation, plan: Plan, event: SightEvent, lasts: Distribution, draws: Draws
     ) -> None:
         plan.face(*_robot(now, event))
-        plan.stay(timedelta(seconds=law.draw(draws)))
+        plan.stay(timedelta(seconds=lasts.draw(draws)))
 
     def _points_around(
         self, now: Situation, center: tuple[int, int], distance_m: float

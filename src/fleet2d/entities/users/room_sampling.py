@@ -52,10 +52,10 @@ class RoomSampling(Behavior):
     """Be in each room for a given share of the time, in visits of random length.
 
     A semi-Markov process: the next room is drawn by the shares (if it is the present one, the body
-    goes to another spot of it), the stay there from the law of dwell times. Time spent on ways
-    through a room is taken off the next stays in it, so that the time in each of the given rooms,
-    ways included, tends to its share of the time in all of them. Time on ways through other rooms
-    is not compensated.
+    goes to another spot of it), the stay there from the distribution of dwell times. Time spent
+    walking through a room is taken off the next stays in it, so that the time in each of the given
+    rooms, walks included, tends to its share of the time in all of them. Time spent walking through
+    other rooms is not compensated.
 
     Attributes:
         shares: How much of the time is spent in each room or kind of room, or 'away'; relative to
@@ -99,7 +99,7 @@ class RoomSampling(Behavior):
                 self.rooms[index] = room
                 chances[index] = chances.get(index, 0.0) + share / total / len(rooms)
         self.stops = [Stop(self.rooms[i], round(p * MILLION)) for i, p in chances.items()]
-        self.law = self.dwell.table()
+        self.dwell_time = self.dwell.table()
         self.spots = Spots(actor)
         self.debt_us: dict[int, int] = dict.fromkeys((i for i in chances if i is not None), 0)
         self.visits = 0
@@ -115,7 +115,7 @@ class RoomSampling(Behavior):
 
     def _visit(self, actor: "Actor", plan: Plan, draws: Draws) -> None:
         stop = self.stops[draw_weighted(draws, [stop.chance for stop in self.stops])]
-        dwell_us = self.law.draw(draws) * SECOND_US
+        dwell_us = self.dwell_time.draw(draws) * SECOND_US
         if stop.room is None:
             if not plan.away:
                 self._walk(actor, plan, Spot(*actor.way_out))
