@@ -20,7 +20,7 @@ from tests.thorough import THOROUGH, some
 
 import fleet2d
 from fleet2d import FloorPlan, History, Metric, Present
-from fleet2d.artifacts.settings import ArtifactSettings
+from fleet2d.artifacts.store import ArtifactSettings
 from fleet2d.engine.simulation import Simulation
 from fleet2d.entities.entity import Robot, User
 from fleet2d.entities.meander import Meander

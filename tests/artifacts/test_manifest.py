@@ -1,5 +1,6 @@
-"""The manifest says what was run; a damaged one says so."""
+"""Values become plain JSON data."""
 
+import datetime as dt
 import hashlib
 import json
 import math
@@ -9,9 +10,31 @@ import numpy as np
 import pytest
 from tests.scenes import run, scenario
 
-from fleet2d.artifacts.manifest import InputRecord, Manifest, input_record
-from fleet2d.artifacts.versions import versions
+from fleet2d.artifacts.manifest import InputRecord, Manifest, input_record, plain, versions
 from fleet2d.errors import RunDirectoryError
+
+
+def test_plain_has_words_for_what_models_hold() -> None:
+    given = {
+        "n": np.int32(3),
+        "a": np.array([1.5, np.nan]),
+        "d": dt.date(2026, 1, 5),
+        "t": dt.timedelta(minutes=1),
+        "p": Path("a"),
+        "s": {"b", "a"},
+        1: (True, None),
+    }
+
+    expected = {
+        "n": 3,
+        "a": [1.5, None],
+        "d": "2026-01-05",
+        "t": 60.0,
+        "p": "a",
+        "s": ["a", "b"],
+        "1": [True, None],
+    }
+    assert expected == plain(given)
 
 
 def test_manifest_round_trip(tmp_path: Path) -> None:

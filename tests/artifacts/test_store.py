@@ -1,4 +1,4 @@
-"""The store leaves what it was given, or says why not; what looks whole is whole."""
+"""The `artifacts` section of a scenario."""
 
 import errno
 import os
@@ -6,6 +6,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from datetime import timedelta
 from pathlib import Path
 from typing import Any
 
@@ -13,16 +14,53 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+from pydantic import ValidationError
 from tests.thorough import some
 
 from fleet2d.artifacts import arrow
 from fleet2d.artifacts.manifest import Manifest
-from fleet2d.artifacts.store import RunStore
+from fleet2d.artifacts.store import ArtifactSettings, RunStore
 from fleet2d.artifacts.table import Column, TableSpec
+from fleet2d.configuration.components import descriptions
 from fleet2d.errors import ArtifactError, RunDirectoryError
 from fleet2d.runs.run import open_run, run_of
 
 from .tables import EVERY_KIND, part, rows_of_every_kind, stored
+
+
+@pytest.mark.parametrize(
+    ("value", "expected"),
+    [
+        ("off", "off"),
+        (False, "off"),  # YAML 1.1 reads a bare `off` so
+        ("every step", "every step"),
+        ("10 min", timedelta(minutes=10)),
+        (timedelta(hours=2), timedelta(hours=2)),
+    ],
+)
+def test_trajectories_take_off_every_step_or_a_duration(value: Any, expected: Any) -> None:
+    assert expected == ArtifactSettings(trajectories=value).trajectories
+
+
+def test_default_is_every_simulated_hour_and_all_else() -> None:
+    settings = ArtifactSettings()
+
+    assert timedelta(hours=1) == settings.trajectories
+    assert settings.key_frames
+    assert settings.observations
+    assert settings.events
+    assert settings.outputs
+
+
+@pytest.mark.parametrize("value", ["sometimes", "5 m", True, -1, "0 s"])
+def test_trajectories_refuse_anything_else(value: Any) -> None:
+    with pytest.raises(ValidationError):
+        ArtifactSettings(trajectories=value)
+
+
+def test_every_field_is_described() -> None:
+    assert descriptions(ArtifactSettings).keys() == ArtifactSettings.model_fields.keys()
+
 
 POSES = TableSpec("poses", (Column("step", "step"), Column("x", "float64")))
 NOISE = TableSpec("noise", (Column("x", "float64"),))

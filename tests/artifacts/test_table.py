@@ -1,12 +1,16 @@
 """Columns and tables are refused when they could not be stored."""
 
+from copy import deepcopy
+from typing import Any
+
+import numpy as np
 import pytest
 
 from fleet2d.artifacts.arrow import schema_of, spec_of
-from fleet2d.artifacts.table import Column, TableSpec
+from fleet2d.artifacts.table import Column, TableBuffer, TableSpec
 from fleet2d.errors import ArtifactError
 
-from .tables import EVERY_KIND
+from .tables import EVERY_KIND, rows_of_every_kind
 
 
 @pytest.mark.parametrize(
@@ -51,3 +55,144 @@ def test_schema_carries_the_whole_spec() -> None:
     assert spec_of(schema) == EVERY_KIND
     assert schema.field("x").metadata[b"unit"] == b"m"
     assert schema.field("step").metadata[b"description"] == b"index of the step"
+
+
+POSES = TableSpec("poses", (Column("step", "step"), Column("x", "float64")))
+
+
+def of(*columns: Column) -> TableBuffer:
+    return TableBuffer(TableSpec("t", columns))
+
+
+def test_append_copies_its_arguments() -> None:
+    buffer = TableBuffer(POSES)
+    step = np.arange(3)
+
+    buffer.append(step=step, x=np.zeros(3))
+    step[:] = 9
+
+    assert [0, 1, 2] == buffer.take()["step"].values.tolist()
+
+
+def test_append_repeats_scalars() -> None:
+    buffer = TableBuffer(POSES)
+
+    buffer.append(step=np.arange(3), x=0.5)
+    buffer.append(step=7, x=1.5)
+
+    assert [0.5, 0.5, 0.5, 1.5] == buffer.take()["x"].values.tolist()
+
+
+def test_append_of_all_scalars_to_strings_adds_one_row() -> None:
+    buffer = of(Column("a", "string", nullable=True), Column("b", "category"))
+
+    buffer.append(a=None, b="on")
+
+    chunk = buffer.take()
+    assert [0] == chunk["b"].values.tolist()
+    assert chunk["a"].valid is not None
+    assert [False] == chunk["a"].valid.tolist()
+
+
+def test_many_small_appends_grow_the_buffer() -> None:
+    buffer = TableBuffer(POSES)
+
+    for step in range(1000):
+        buffer.append(step=[step], x=[step / 2])
+
+    chunk = buffer.take()
+    assert list(range(1000)) == chunk["step"].values.tolist()
+    assert [step / 2 for step in range(1000)] == chunk["x"].values.tolist()
+
+
+def test_fill_stops_at_the_limit_and_says_where() -> None:
+    buffer = TableBuffer(POSES, limit=4)
+    batch = buffer.check({"step": np.arange(6), "x": np.zeros(6)})
+
+    assert 4 == buffer.fill(batch, 0)
+    assert buffer.is_full
+    assert [0, 1, 2, 3] == buffer.take(reuse=True)["step"].values.tolist()
+    assert 6 == buffer.fill(batch, 4)
+    assert [4, 5] == buffer.take()["step"].values.tolist()
+
+
+def test_append_beyond_the_limit_is_refused() -> None:
+    with pytest.raises(ArtifactError, match="append less at a time"):
+        TableBuffer(POSES, limit=4).append(step=np.arange(6), x=0.0)
+
+
+def test_deepcopy_shares_nothing() -> None:
+    buffer = TableBuffer(EVERY_KIND)
+    buffer.append(**rows_of_every_kind(20))
+    twin = deepcopy(buffer)
+
+    twin.append(**rows_of_every_kind(300, seed=1))
+    buffer.append(**rows_of_every_kind(10, seed=2))
+
+    assert (30, 320) == (buffer.rows, twin.rows)
+    np.testing.assert_array_equal(
+        rows_of_every_kind(20)["x"], twin.take()["x"].values[:20], strict=True
+    )
+    np.testing.assert_array_equal(
+        rows_of_every_kind(10, seed=2)["x"], buffer.take()["x"].values[20:], strict=True
+    )
+
+
+@pytest.mark.parametrize(
+    ("columns", "message"),
+    [
+        ({"step": np.arange(3)}, "lacks x"),
+        ({"step": np.arange(3), "x": np.zeros(3), "z": 1}, "has no column z"),
+        ({"step": np.arange(3), "x": np.zeros(2)}, "'x' has 2 values where others have 3"),
+        ({"step": np.arange(3.0), "x": np.zeros(3)}, "holds float64, not integers"),
+        ({"step": np.arange(3), "x": np.array(["a"] * 3)}, "not float64"),
+        ({"step": np.zeros((3, 1), int), "x": np.zeros(3)}, "2 dimensions"),
+        ({"step": np.arange(3), "x": np.array([0, np.nan, 0])}, "declare it nullable"),
+    ],
+)
+def test_append_refuses_columns_that_do_not_fit(columns: dict[str, Any], message: str) -> None:
+    buffer = TableBuffer(POSES)
+
+    with pytest.raises(ArtifactError, match=message):
+        buffer.append(**columns)
+    assert 0 == buffer.rows
+
+
+@pytest.mark.parametrize(
+    ("column", "values", "message"),
+    [
+        (Column("c", "int32"), [2**31], "beyond int32"),
+        (Column("c", "int64"), np.array([2**63], np.uint64), "beyond int64"),
+        (Column("c", "bool"), [0, 1], "not bool"),
+        (Column("c", "category", categories=("a",)), [1], "1 categories"),
+        (Column("c", "category", categories=("a",)), [-1], "1 categories"),
+        (Column("c", "category", categories=("a",), nullable=True), [-2], "1 categories"),
+        (Column("c", "category", categories=("a",)), ["a"], "not integers"),
+        (Column("c", "category"), [1], "holds int, not strings"),
+        (Column("c", "category"), ["a", None], "declare it nullable"),
+        (Column("c", "string"), [None], "declare it nullable"),
+        (Column("c", "time"), np.array(["NaT"], "M8[us]"), "declare it nullable"),
+        (Column("c", "int64"), np.ma.masked_array([1, 2], [True, False]), "declare it nullable"),
+    ],
+)
+def test_append_refuses_values_that_do_not_fit(column: Column, values: Any, message: str) -> None:
+    with pytest.raises(ArtifactError, match=f"table 't', column 'c': .*{message}"):
+        of(column).append(c=values)
+
+
+def test_times_may_be_datetimes_or_microseconds() -> None:
+    buffer = of(Column("time", "time"))
+
+    buffer.append(time=np.array(["1970-01-01T00:00:01"], "M8[s]"))
+    buffer.append(time=[2_000_000])
+
+    assert [1_000_000, 2_000_000] == buffer.take()["time"].values.tolist()
+
+
+def test_integers_of_any_width_fit_where_their_values_do() -> None:
+    buffer = of(Column("c", "int32"))
+
+    buffer.append(c=np.array([2**31 - 1], np.int64))
+    buffer.append(c=np.array([200], np.uint8))
+
+    assert [2**31 - 1, 200] == buffer.take()["c"].values.tolist()

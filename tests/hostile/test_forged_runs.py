@@ -18,9 +18,8 @@ from tests.scenes import Cli, everything
 from tests.thorough import some
 
 import fleet2d
-from fleet2d.artifacts.digest import digest_table, run_digest
 from fleet2d.artifacts.manifest import Manifest
-from fleet2d.artifacts.seal import make_seal, verify_run
+from fleet2d.artifacts.seal import digest_table, make_seal, run_digest, verify_run
 from fleet2d.engine.reproduce import reproduce
 from fleet2d.errors import ArtifactError, RunDirectoryError
 from fleet2d.runs.run import open_run

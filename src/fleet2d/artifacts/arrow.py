@@ -13,8 +13,17 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
-from fleet2d.artifacts.chunk import Chunk, ColumnChunk, Dictionary, empty_chunk, encode_strings
-from fleet2d.artifacts.table import DTYPES, Column, Kind, TableSpec
+from fleet2d.artifacts.table import (
+    DTYPES,
+    Chunk,
+    Column,
+    ColumnChunk,
+    Dictionary,
+    Kind,
+    TableSpec,
+    empty_chunk,
+    encode_strings,
+)
 from fleet2d.bounds import TABLE_BYTES, unpacked_bytes
 from fleet2d.errors import ArtifactError
 from fleet2d.kernels import Bool

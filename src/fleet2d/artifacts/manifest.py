@@ -1,28 +1,251 @@
-"""The manifest of a run: what was run, with what, and what came out."""
+"""Plain JSON data: what manifests and other files of a run consist of."""
 
 from __future__ import annotations
 
 import datetime as dt
 import hashlib
-from collections.abc import Iterable, Mapping
+import json
+import math
+import os
+import sys
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
+from datetime import datetime, timedelta
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, Protocol
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NoReturn, Protocol
 
+import numpy as np
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
-from fleet2d.artifacts.manifest_parts import Count, ManifestParts, time_problem
-from fleet2d.artifacts.plain import canonical, plain
-from fleet2d.artifacts.strict_json import read_json
 from fleet2d.artifacts.table import Kind, TableSpec
-from fleet2d.artifacts.versions import versions
 from fleet2d.bounds import FILE_BYTES, read_bytes
 from fleet2d.configuration.problems import did_you_mean
+from fleet2d.configuration.units import parse_duration
 from fleet2d.errors import RunDirectoryError, printable
+from fleet2d.sight.camera import USUAL_ANGLE_DEG, USUAL_RANGE_M
 from fleet2d.storage.files import path_in, write_atomically
 
 if TYPE_CHECKING:
     from fleet2d.runtime.clock import Clock
+
+
+def plain(value: Any) -> Any:
+    """Convert a value to plain JSON data: NaN and infinity become null.
+
+    Example:
+        >>> plain({"mean": float("nan"), "at": dt.timedelta(hours=1), 3: (1, 2)})
+        {'mean': None, 'at': 3600.0, '3': [1, 2]}
+    """
+    if isinstance(value, np.generic | np.ndarray):
+        value = value.tolist()
+    if value is None or isinstance(value, bool | int | str):
+        return value
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, Mapping):
+        return {str(key): plain(entry) for key, entry in value.items()}
+    if isinstance(value, set | frozenset):
+        return sorted(plain(entry) for entry in value)
+    if isinstance(value, Sequence):
+        return [plain(entry) for entry in value]
+    if isinstance(value, dt.timedelta):
+        return value.total_seconds()
+    if isinstance(value, dt.date | dt.time):
+        return value.isoformat()
+    return str(value)
+
+
+def canonical(content: Mapping[str, Any]) -> str:
+    """Return the one text that a manifest of some content has: its keys are sorted.
+
+    Only the keys within sections of the scenario stay in their order, which has an effect: users,
+    for example, decide in the order in which they are listed.
+    """
+    ordered = _sorted({key: value for key, value in content.items() if key != "scenario"})
+    if "scenario" in content:
+        ordered["scenario"] = dict(sorted(content["scenario"].items()))
+    return json.dumps(dict(sorted(ordered.items())), indent=2, allow_nan=False) + "\n"
+
+
+def _sorted(value: Any) -> Any:
+    """Return plain data with all keys sorted."""
+    if isinstance(value, Mapping):
+        return {key: _sorted(value[key]) for key in sorted(value)}
+    return [_sorted(entry) for entry in value] if isinstance(value, list) else value
+
+
+def read_json(text: bytes) -> Any:
+    """Return the content of a JSON text.
+
+    Raises:
+        ValueError: It is not JSON, or is nested too deeply.
+
+    Example:
+        >>> read_json(b'{"steps": 3}')
+        {'steps': 3}
+        >>> read_json(b'{"steps": 3, "steps": 4}')
+        Traceback (most recent call last):
+        ValueError: the key 'steps' is given twice
+    """
+    try:
+        return json.loads(
+            text.decode(),
+            object_pairs_hook=_unique_keys,
+            parse_constant=_refuse_constant,
+            parse_float=_finite_float,
+        )
+    except RecursionError:
+        raise ValueError("it is nested too deeply") from None
+
+
+def _unique_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    content = dict(pairs)
+    if len(content) < len(pairs):
+        keys = [key for key, _ in pairs]
+        repeated_key = next(key for key in keys if keys.count(key) > 1)
+        raise ValueError(f"the key {repeated_key[:60]!r} is given twice")
+    return content
+
+
+def _refuse_constant(word: str) -> NoReturn:
+    raise ValueError(f"{word} is not a number")
+
+
+def _finite_float(text: str) -> float:
+    number = float(text)
+    if not math.isfinite(number):
+        raise ValueError(f"{text[:60]} is too large a number")
+    return number
+
+
+def versions() -> dict[str, str]:
+    """Return the versions of all software that the numbers of a run may depend on."""
+    packages = {name: _version(name) for name in ("fleet2d", "numpy", "pyarrow", "shapely")}
+    machine = os.uname().machine if hasattr(os, "uname") else "unknown"
+    python = ".".join(map(str, sys.version_info[:3]))
+    return {**packages, "python": python, "platform": f"{sys.platform} {machine}"}
+
+
+def _version(package: str) -> str:
+    # Searching the installed packages takes longer than simulating a day.
+    version = getattr(sys.modules.get(package), "__version__", None)
+    if isinstance(version, str):
+        return version
+    from importlib import metadata
+
+    try:
+        return metadata.version(package)
+    except metadata.PackageNotFoundError:
+        return "unknown"
+
+
+# The farthest that a camera sees [m]: far beyond any home.
+_FARTHEST_M = 1000.0
+
+
+def _check_range(distances: list[float]) -> list[float]:
+    near, far = distances
+    if not 0 <= near < far <= _FARTHEST_M:
+        raise ValueError("it should be two distances, the nearest first")
+    return distances
+
+
+def _check_duration(text: str) -> str:
+    parse_duration(text)
+    return text
+
+
+Count = Annotated[int, Field(ge=0, lt=2**62)]
+_Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
+
+
+class _StoredPart(BaseModel):
+    """A part of which some keys are checked, and the others left as they are."""
+
+    model_config = ConfigDict(strict=True, allow_inf_nan=False, defer_build=True)
+
+
+class _StoredTyped(_StoredPart):
+    type: str = ""
+
+
+class _StoredPan(_StoredPart):
+    headings_deg: list[float] = []
+    dwell: Annotated[str, AfterValidator(_check_duration)] = ""
+
+
+class _StoredCamera(_StoredPart):
+    range: Annotated[_Pair, AfterValidator(_check_range)] = list(USUAL_RANGE_M)
+    angle_deg: Annotated[float, Field(gt=0, le=360)] = USUAL_ANGLE_DEG
+    offset: _Pair = [0.0, 0.0]
+    heading_deg: float = 0.0
+    pan: _StoredPan | None = None
+
+
+class _StoredBody(_StoredPart):
+    radius: Annotated[float, Field(gt=0, le=2)] = 0.2
+    camera: _StoredCamera | None = None
+    cameras: dict[str, _StoredCamera] | None = None
+    behaviors: list[_StoredTyped] = []
+
+
+class _StoredScenario(_StoredPart):
+    name: str | None = None
+    simulation: dict[str, Any] = {}
+    floorplan: dict[str, Any] = {}
+    users: dict[str, _StoredBody] = {}
+    robots: dict[str, _StoredBody] = {}
+    objects: dict[str, _StoredTyped] = {}
+    algorithms: dict[str, _StoredTyped] = {}
+    metrics: dict[str, _StoredTyped] = {}
+
+
+class _StoredIntervention(_StoredPart):
+    step: Count = 0
+    by: str = ""
+
+
+class _StoredVerdict(_StoredPart):
+    expectation: str
+    first: Count
+    holds: bool = True
+    decided: bool = True
+
+
+class ManifestParts(_StoredPart):
+    """The parts of a manifest that readers rely on.
+
+    Example:
+        >>> camera = {"range": [2, 1]}
+        >>> ManifestParts.model_validate({"scenario": {"robots": {"astro": {"camera": camera}}}})
+        Traceback (most recent call last):
+        pydantic_core._pydantic_core.ValidationError: 1 validation error for ManifestParts
+        scenario.robots.astro.camera.range
+          Value error, it should be two distances, the nearest first ...
+    """
+
+    scenario: _StoredScenario = _StoredScenario()
+    interventions: list[_StoredIntervention] = []
+    expectations: dict[str, _StoredVerdict] = {}
+
+
+def time_problem(start: str, step_us: int, steps: int) -> str:
+    """Return why the steps of a run have no times; empty if they have.
+
+    Example:
+        >>> time_problem("9999-12-31T00:00:00", 1_000_000, 10**6)
+        '1000000 steps from 9999-12-31T00:00:00 end after the year 9999'
+    """
+    if not step_us:
+        return "step_us is 0"
+    if not start:
+        return "start is empty"
+    try:
+        _ = datetime.fromisoformat(start) + timedelta(microseconds=steps * step_us)
+    except OverflowError:
+        return f"{steps} steps from {start} end after the year 9999"
+    return ""
+
 
 FORMAT = 2
 """Version of the layout of run directories; a reader refuses a later one."""

@@ -1,24 +1,20 @@
-"""The run store: collects the rows of a run and writes its directory, safe against crashes."""
+"""What a run stores: the `artifacts` section of a scenario."""
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field
+from datetime import timedelta
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from fleet2d.artifacts.buffer import FLUSH_ROWS, Batch, TableBuffer
-from fleet2d.artifacts.digest import TableDigest, run_digest
-from fleet2d.artifacts.directory import (
-    cannot_write,
-    check_run_directory,
-    make_directories,
-    remove_directories,
-)
-from fleet2d.artifacts.manifest import FILE_NAME, Manifest, Status
-from fleet2d.artifacts.seal import make_seal
-from fleet2d.artifacts.table import TableSpec
-from fleet2d.artifacts.table_writer import TableWriter
+from pydantic import BeforeValidator
+
+from fleet2d.artifacts.manifest import FILE_NAME, Manifest, Status, TableRecord, table_record
+from fleet2d.artifacts.seal import TableDigest, make_seal, run_digest
+from fleet2d.artifacts.table import FLUSH_ROWS, Batch, Chunk, TableBuffer, TableSpec
 from fleet2d.artifacts.unfinished import (
     LOCK_NAME,
     Commit,
@@ -26,11 +22,173 @@ from fleet2d.artifacts.unfinished import (
     columns_of,
     remove_leftovers,
 )
-from fleet2d.errors import ArtifactError, RunDirectoryError
+from fleet2d.configuration.components import Settings
+from fleet2d.configuration.units import PositiveDuration
+from fleet2d.errors import ArtifactError, Fleet2DError, RunDirectoryError
 from fleet2d.storage.files import PARTIAL, is_disk_full, sync_directory, write_atomically
 
 if TYPE_CHECKING:
     import pyarrow as pa
+
+    from fleet2d.artifacts.arrow import ParquetTable
+
+
+def _off_as_text(value: Any) -> Any:
+    """Undo YAML 1.1, where a bare `off` is the truth value false."""
+    return "off" if value is False else value
+
+
+class ArtifactSettings(Settings):
+    """Which tables a run stores, and how finely.
+
+    Attributes:
+        trajectories: Store every entity's pose this often (a multiple of simulation.step), at
+            `every step`, or not at all (`off`).
+        key_frames: Store the key frames of every movement: few rows, from which the pose at any
+            step can be rebuilt.
+        observations: Store every observation that a robot makes.
+        events: Store events: a user seen or lost, an arrival, a change of activity.
+        outputs: Store the outputs of algorithms and metrics, one table each.
+        learned: Store what each algorithm has learned at the end, learned/NAME.npz: another run can
+            start from it.
+        checkpoint: Write the state of the run this often in simulated time, so that `fleet2d
+            resume` can continue from there, or at the first decision after that; `auto`: after
+            every 10 s or more of computing; or not at all (`off`).
+
+    Example:
+        >>> ArtifactSettings(trajectories="off", events=False).observations
+        True
+    """
+
+    trajectories: Annotated[
+        PositiveDuration | Literal["off", "every step"], BeforeValidator(_off_as_text)
+    ] = timedelta(hours=1)
+    key_frames: bool = True
+    observations: bool = True
+    events: bool = True
+    outputs: bool = True
+    learned: bool = False
+    checkpoint: Annotated[
+        PositiveDuration | Literal["auto", "off"], BeforeValidator(_off_as_text)
+    ] = "auto"
+
+
+def check_run_directory(directory: Path) -> None:
+    """Check, without writing, that a run can be stored in a directory.
+
+    Raises:
+        RunDirectoryError: It exists and isn't empty, is a file, or can't be created.
+    """
+    try:
+        if directory.is_dir():
+            if any(directory.iterdir()):
+                raise RunDirectoryError(
+                    f"{directory} exists and is not empty: choose another --out or remove it"
+                )
+            _check_writable(directory, directory)
+            return
+        nearest = directory
+        while not os.path.lexists(nearest) and nearest != nearest.parent:
+            nearest = nearest.parent
+        if not nearest.is_dir():
+            raise RunDirectoryError(
+                f"{directory} can't be a run directory, because {nearest} is not a directory: "
+                "choose another --out or remove it"
+            )
+        _check_writable(directory, nearest)
+    except OSError as error:
+        raise cannot_write(directory, error) from error
+
+
+def _check_writable(directory: Path, nearest: Path) -> None:
+    if not os.access(nearest, os.W_OK | os.X_OK):
+        raise RunDirectoryError(
+            f"{directory} can't be written: you may not write in {nearest}; choose another --out"
+        )
+
+
+def make_directories(directory: Path) -> list[Path]:
+    """Create a directory and its parents; return those that were missing, outermost first.
+
+    Raises:
+        OSError: One can't be created; those created before it are removed again.
+    """
+    missing = [path for path in (directory, *directory.parents) if not path.is_dir()][::-1]
+    try:
+        for path in missing:
+            path.mkdir(exist_ok=True)
+    except OSError:
+        remove_directories(missing)
+        raise
+    return missing
+
+
+def remove_directories(directories: list[Path]) -> None:
+    """Remove those of some directories, outermost first, that exist and are empty."""
+    for path in reversed(directories):
+        with suppress(OSError):
+            path.rmdir()
+
+
+def cannot_write(directory: Path, error: OSError) -> Fleet2DError:
+    """Return the error to raise when a run directory can't be created."""
+    if is_disk_full(error):
+        return ArtifactError(
+            f"the disk is full: {directory} can't be made; free some space or choose another --out"
+        )
+    reason = error.strerror or str(error)
+    return RunDirectoryError(
+        f"{directory} can't be made or written ({reason}): choose another --out"
+    )
+
+
+@dataclass
+class TableWriter:
+    """A table that is being written.
+
+    Attributes:
+        buffer: The newest rows.
+        digest: Digest of the rows that left the buffer.
+        chunks: Those rows and the number in each chunk, if the run is in memory.
+        file: The file with those rows, if the run is in a directory; None before the first.
+        logged: How many rows of the buffer are in the journal.
+    """
+
+    buffer: TableBuffer
+    digest: TableDigest
+    chunks: list[tuple[Chunk, int]] = field(default_factory=list)
+    file: ParquetTable | None = None
+    logged: int = 0
+
+    def hash_again(self) -> None:
+        """Compute the digest again from the chunks in memory."""
+        self.digest = TableDigest(self.buffer.spec)
+        for chunk, rows in self.chunks:
+            self.digest.update(chunk, rows)
+
+    def log(self, unfinished: UnfinishedRun | None) -> None:
+        """Append the rows of the buffer to the journal that are not in it yet.
+
+        Raises:
+            OSError: They can't be written.
+        """
+        first, buffer = self.logged, self.buffer
+        if unfinished is None or first == buffer.rows:
+            return
+        unfinished.journal.add(buffer.spec, buffer.arrays(first), buffer.rows - first, buffer.words)
+        self.logged = buffer.rows
+
+    def file_in(self, root: Path) -> ParquetTable:
+        """Return the file of the table; create it if there is none yet."""
+        from fleet2d.artifacts.arrow import ParquetTable
+
+        if self.file is None:
+            self.file = ParquetTable(root, self.buffer.spec)
+        return self.file
+
+    def record(self, digest: str) -> TableRecord:
+        """Return the entry of the manifest about the table."""
+        return table_record(self.buffer.spec, self.digest.rows, digest)
 
 
 class RunStore:

@@ -1,14 +1,18 @@
-"""Tables of a run: their names, and the kinds and units of their columns."""
+"""Tables of a run: their columns, the one form of rows that is hashed and stored, and a buffer."""
 
 from __future__ import annotations
 
 import re
+import sys
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, get_args
+from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fleet2d.errors import ArtifactError
+from fleet2d.kernels import I64, Bool
 
 Kind = Literal["step", "time", "int32", "int64", "float64", "bool", "category", "string"]
 
@@ -102,3 +106,375 @@ class TableSpec:
     def names(self) -> tuple[str, ...]:
         """Names of the columns, in order."""
         return tuple(column.name for column in self.columns)
+
+
+class ColumnChunk(NamedTuple):
+    """Consecutive values of one column, in the one form that is both hashed and stored.
+
+    Attributes:
+        values: Numbers or category codes, (n,), 0 where missing; for strings their UTF-8 bytes.
+        valid: Which values are not missing, (n,) bool; None if the column isn't nullable.
+        lengths: Bytes of each string, (n,) int64; None for every other kind.
+    """
+
+    values: NDArray[Any]
+    valid: Bool | None = None
+    lengths: I64 | None = None
+
+
+Chunk = dict[str, ColumnChunk]
+
+
+class Dictionary(dict[str | None, int]):
+    """A growing dictionary: looking up a new word gives it the next code.
+
+    Example:
+        >>> words = Dictionary()
+        >>> words["on"], words["off"], words["on"], words.in_order()
+        (0, 1, 0, ['on', 'off'])
+    """
+
+    def __missing__(self, word: str | None) -> int:
+        """Enter a new word."""
+        if not isinstance(word, str):
+            raise ArtifactError(f"expected text, got {word!r}")
+        self[word] = code = len(self) - (None in self)
+        return code
+
+    def enter(self, words: Iterable[str]) -> None:
+        """Enter words in the order of their codes."""
+        for word in words:
+            self[word]  # looking a new word up enters it
+
+    def in_order(self) -> list[str]:
+        """Return all words in the order of their codes."""
+        return [word for word in self if word is not None]
+
+
+def new_dictionaries(spec: TableSpec) -> dict[str, Dictionary]:
+    """Return an empty dictionary for each column of a table whose dictionary grows."""
+    return {column.name: Dictionary() for column in spec.columns if column.is_growing}
+
+
+def empty_chunk(column: Column) -> ColumnChunk:
+    """Return no values of a column."""
+    valid = np.empty(0, np.bool_) if column.nullable else None
+    if column.kind == "string":
+        return ColumnChunk(np.empty(0, np.uint8), valid, np.empty(0, np.int64))
+    return ColumnChunk(np.empty(0, DTYPES[column.kind]), valid)
+
+
+def encode_strings(strings: Sequence[str | None], nullable: bool) -> ColumnChunk:
+    """Turn strings into their UTF-8 bytes and the length of each."""
+    encoded = [string.encode() if string else b"" for string in strings]
+    lengths = np.fromiter(map(len, encoded), np.int64, len(encoded))
+    values = np.frombuffer(b"".join(encoded), np.uint8)
+    return ColumnChunk(values, _valid(strings) if nullable else None, lengths)
+
+
+def encode_words(strings: Sequence[str | None], words: Dictionary, nullable: bool) -> ColumnChunk:
+    """Turn strings into codes, entering new ones into `words`."""
+    if nullable:
+        words[None] = 0  # a missing value is stored as code 0 and marked by `valid`
+    codes = np.fromiter(map(words.__getitem__, strings), np.int32, len(strings))
+    return ColumnChunk(codes, _valid(strings) if nullable else None)
+
+
+def _valid(strings: Sequence[str | None]) -> Bool:
+    return np.fromiter((string is not None for string in strings), np.bool_, len(strings))
+
+
+FLUSH_ROWS = 2**16
+"""Rows that a table holds back at most, and rows of a Parquet row group at most."""
+
+_FIRST_CAPACITY = 256
+_NOT_A_TIME = np.iinfo(np.int64).min
+# NumPy's kinds of values that a kind of column takes; integers by default.
+_ACCEPTED = {"float64": "fiu", "bool": "b", "time": "iuM"}
+
+
+class Batch(NamedTuple):
+    """Rows that fit the table, before they are copied into it.
+
+    Attributes:
+        rows: Number of rows.
+        values: Of each column an array or a list, (rows,), or a scalar that stands for all rows.
+        valid: Of each column which values are not missing, bool (rows,), or True for all.
+    """
+
+    rows: int
+    values: dict[str, Any]
+    valid: dict[str, Any]
+
+
+class TableBuffer:
+    """Collects rows of one table, at most `limit` of them, in arrays that grow as needed."""
+
+    def __init__(self, spec: TableSpec, limit: int = FLUSH_ROWS) -> None:
+        """Create an empty buffer; memory is allocated with the first rows."""
+        self.spec = spec
+        self.limit = limit
+        self.rows = 0
+        self.words = new_dictionaries(spec)
+        self._capacity = 0
+        self._first_capacity = _FIRST_CAPACITY
+        self._values: dict[str, NDArray[Any]] = {}
+        self._strings: dict[str, list[str | None]] = {
+            column.name: [] for column in spec.columns if column.takes_strings
+        }
+        self._coded = 0  # rows whose words have codes in `_values`
+        self._valid: dict[str, Bool] = {}
+        self._names = frozenset(spec.names)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Leave out the memory that is reserved for more rows."""
+        values = {name: column[: self.rows] for name, column in self._values.items()}
+        valid = {name: column[: self.rows] for name, column in self._valid.items()}
+        return {**self.__dict__, "_capacity": self.rows, "_values": values, "_valid": valid}
+
+    @property
+    def is_full(self) -> bool:
+        """Whether no further row fits."""
+        return self.rows >= self.limit
+
+    def append(self, **columns: Any) -> None:
+        """Add rows, as many as fit under `limit`.
+
+        Args:
+            columns: One array per column, all of one length; a scalar stands for all rows.
+
+        Raises:
+            ArtifactError: The columns don't fit the table, or the rows don't fit the limit.
+        """
+        batch = self.check(columns)
+        if self.rows + batch.rows > self.limit:
+            raise ArtifactError(
+                f"table {self.spec.name!r}: {batch.rows} rows are more than the "
+                f"{self.limit - self.rows} that still fit: append less at a time"
+            )
+        self.fill(batch, 0)
+
+    def check(self, columns: Mapping[str, Any]) -> Batch:
+        """Convert columns to the table's types; the buffer is not changed yet.
+
+        Raises:
+            ArtifactError: A column is missing, unknown, of another length or type, out of range,
+                or has missing values without being nullable.
+        """
+        if columns.keys() != self._names:
+            raise ArtifactError(self._wrong_names(columns))
+        values: dict[str, Any] = {}
+        valid: dict[str, Any] = {}
+        rows = -1
+        for column in self.spec.columns:
+            try:
+                values[column.name], valid[column.name] = _convert(column, columns[column.name])
+            except ArtifactError as error:
+                raise ArtifactError(
+                    f"table {self.spec.name!r}, column {column.name!r}: {error}"
+                ) from error
+            length = _length(values[column.name])
+            if length >= 0 and rows >= 0 and length != rows:
+                raise ArtifactError(
+                    f"table {self.spec.name!r}: column {column.name!r} has {length} values where "
+                    f"others have {rows}: give all columns one length"
+                )
+            rows = max(rows, length)
+        return Batch(1 if rows < 0 else rows, values, valid)
+
+    def fill(self, batch: Batch, start: int) -> int:
+        """Copy the rows of a batch from `start` on; return the first one that doesn't fit."""
+        stop = min(batch.rows, start + self.limit - self.rows)
+        a, b = self.rows, self.rows + stop - start
+        self._make_room(b)
+        for column in self.spec.columns:
+            name, values = column.name, batch.values[column.name]
+            if column.takes_strings:
+                strings = self._strings[name]
+                # An interrupted call may have added some.
+                del strings[a:]
+                is_list = isinstance(values, list)
+                strings.extend(values[start:stop] if is_list else [values] * (b - a))
+                continue
+            self._values[name][a:b] = values if np.ndim(values) == 0 else values[start:stop]
+            if column.nullable:
+                valid = batch.valid[name]
+                valid = valid if np.ndim(valid) == 0 else valid[start:stop]
+                self._valid[name][a:b] = valid
+                if valid is not True:
+                    np.copyto(self._values[name][a:b], 0, where=~valid)
+        self.rows = b
+        return stop
+
+    def take(self, *, reuse: bool = False) -> Chunk:
+        """Return the rows and empty the buffer.
+
+        Args:
+            reuse: Whether the next rows may overwrite the arrays that are returned: the caller no
+                longer needs them by then.
+        """
+        chunk = self.peek()
+        self.rows = self._coded = 0
+        if not reuse:
+            # The next rows are likely to be as many.
+            self._first_capacity = max(self._first_capacity, self._capacity)
+            self._capacity, self._values, self._valid = 0, {}, {}
+        for strings in self._strings.values():
+            strings.clear()
+        return chunk
+
+    def peek(self) -> Chunk:
+        """Return the rows without removing them; arrays are not copied."""
+        if not self.rows:
+            return {column.name: empty_chunk(column) for column in self.spec.columns}
+        self.code_words()
+        return {column.name: self._rows_of(column, 0) for column in self.spec.columns}
+
+    def arrays(self, start: int) -> list[NDArray[Any]]:
+        """Return the rows from `start` on, at least one, as the journal takes them.
+
+        Returns:
+            Of each column which values are not missing, if it is nullable, and its values; of texts
+            the lengths, which of them are not missing, and their bytes.
+        """
+        self.code_words()
+        rows = slice(start, self.rows)
+        arrays: list[NDArray[Any]] = []
+        for column in self.spec.columns:
+            if column.kind == "string":
+                text, valid, lengths = self._rows_of(column, start)
+                arrays += [a for a in (lengths, valid, text) if a is not None]
+                continue
+            if column.nullable:
+                arrays.append(self._valid[column.name][rows])
+            arrays.append(self._values[column.name][rows])
+        return arrays
+
+    def _rows_of(self, column: Column, start: int) -> ColumnChunk:
+        """Return what one column holds from row `start` on."""
+        name, rows = column.name, slice(start, self.rows)
+        if column.kind == "string":
+            return encode_strings(self._strings[name][rows], column.nullable)
+        valid = self._valid[name][rows] if column.nullable else None
+        return ColumnChunk(self._values[name][rows], valid)
+
+    def code_words(self) -> None:
+        """Turn the words of columns whose dictionary grows into codes."""
+        if self._coded == self.rows:
+            return
+        rows = slice(self._coded, self.rows)
+        for column in self.spec.columns:
+            name = column.name
+            if column.is_growing:
+                words = encode_words(self._strings[name][rows], self.words[name], column.nullable)
+                self._values[name][rows] = words.values
+                if column.nullable:
+                    self._valid[name][rows] = words.valid
+        self._coded = self.rows
+
+    def _make_room(self, rows: int) -> None:
+        """Allocate memory for `rows` rows or more; it doubles, so that small appends are cheap."""
+        if rows <= self._capacity:
+            return
+        capacity = min(self.limit, max(rows, 2 * self._capacity, self._first_capacity))
+        for column in self.spec.columns:
+            if column.kind == "string":
+                continue
+            _grow(self._values, column.name, capacity, self.rows, DTYPES[column.kind])
+            if column.nullable:
+                _grow(self._valid, column.name, capacity, self.rows, np.dtype(np.bool_))
+        self._capacity = capacity
+
+    def _wrong_names(self, columns: Mapping[str, Any]) -> str:
+        missing = [name for name in self.spec.names if name not in columns]
+        unknown = [name for name in columns if name not in self._names]
+        parts = [f"lacks {', '.join(missing)}"] if missing else []
+        parts += [f"has no column {', '.join(unknown)}"] if unknown else []
+        return (
+            f"table {self.spec.name!r} {' and '.join(parts)}: "
+            f"give exactly {', '.join(self.spec.names)}"
+        )
+
+
+def _grow(
+    arrays: dict[str, Any], name: str, capacity: int, rows: int, dtype: np.dtype[Any]
+) -> None:
+    """Replace an array by a longer one with the same first rows."""
+    longer = np.empty(capacity, dtype)
+    if rows:
+        longer[:rows] = arrays[name][:rows]
+    arrays[name] = longer
+
+
+def _convert(column: Column, values: Any) -> tuple[Any, Any]:
+    """Return values as array, list or scalar, and which of them are not missing (True: all)."""
+    if column.takes_strings:
+        return _as_strings(column, values), True
+    valid = None
+    # There is no masked array before `numpy.ma` is imported, which takes time.
+    if "numpy.ma" in sys.modules and isinstance(values, np.ma.MaskedArray):
+        valid = ~np.ma.getmaskarray(values)
+        values = np.ma.getdata(values)
+    values = np.asarray(values)
+    if values.ndim > 1:
+        raise ArtifactError(f"has {values.ndim} dimensions: give one value per row")
+    if not values.size:
+        return np.empty(0, DTYPES[column.kind]), True
+    kind = values.dtype.kind
+    if kind not in _ACCEPTED.get(column.kind, "iu"):
+        noun = column.kind if column.kind in ("float64", "bool") else "integers"
+        raise ArtifactError(f"holds {values.dtype}, not {noun}: convert it first")
+    if kind == "f":
+        present = ~np.isnan(values)
+    elif kind == "M":
+        values = values.astype("datetime64[us]", copy=False).view(np.int64)
+        present = values != _NOT_A_TIME
+    else:
+        present = _check_integers(column, values, values if valid is None else values[valid])
+    if present is not None:
+        valid = present if valid is None else valid & present
+    if not column.nullable and valid is not None and not valid.all():
+        raise ArtifactError("has missing values (NaN, NaT, -1 or masked): declare it nullable")
+    return values, True if valid is None else valid
+
+
+def _check_integers(column: Column, values: Any, unmasked: Any) -> Any:
+    """Check the range of numbers or codes; return which codes are not -1 if that means missing."""
+    dtype = DTYPES[column.kind]
+    if column.kind != "category":
+        if values.dtype != dtype and not np.can_cast(values.dtype, dtype) and unmasked.size:
+            bounds = np.iinfo(dtype)
+            if int(unmasked.min()) < bounds.min or int(unmasked.max()) > bounds.max:
+                raise ArtifactError(f"holds numbers beyond {dtype}: declare it int64")
+        return None
+    lowest = -1 if column.nullable else 0
+    count = len(column.categories)
+    if unmasked.size and not (lowest <= unmasked.min() and unmasked.max() < count):
+        raise ArtifactError(
+            f"has codes from {int(unmasked.min())} to {int(unmasked.max())}, expected {lowest} to"
+            f" {count - 1}: there are {count} categories"
+        )
+    return values >= 0 if column.nullable else None
+
+
+def _as_strings(column: Column, strings: Any) -> Any:
+    """Return one string (or None), or a list of them."""
+    if isinstance(strings, np.ndarray):
+        strings = strings.tolist()  # a scalar if it has no dimension
+    if strings is not None and not isinstance(strings, str):
+        strings = list(strings)
+    types = set(map(type, strings if isinstance(strings, list) else [strings])) - {str}
+    if not types:
+        return strings
+    if types == {type(None)} and not column.nullable:
+        raise ArtifactError("has missing values (None): declare it nullable")
+    if strange := types - {type(None)}:
+        raise ArtifactError(f"holds {strange.pop().__name__}, not strings: convert it first")
+    return strings
+
+
+def _length(values: Any) -> int:
+    """Return the number of values, or -1 for a scalar."""
+    if isinstance(values, np.ndarray):
+        return -1 if values.ndim == 0 else len(values)
+    return len(values) if isinstance(values, list) else -1

@@ -20,8 +20,15 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fleet2d.artifacts.chunk import Chunk, ColumnChunk, Dictionary, new_dictionaries
-from fleet2d.artifacts.table import DTYPES, Column, TableSpec
+from fleet2d.artifacts.table import (
+    DTYPES,
+    Chunk,
+    Column,
+    ColumnChunk,
+    Dictionary,
+    TableSpec,
+    new_dictionaries,
+)
 from fleet2d.errors import ArtifactError
 from fleet2d.kernels import I64
 from fleet2d.kernels.numbers import encode_arrays

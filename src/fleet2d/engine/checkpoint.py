@@ -9,8 +9,7 @@ from pathlib import Path
 from typing import Any, BinaryIO, Self
 
 from fleet2d.artifacts.manifest import Manifest
-from fleet2d.artifacts.settings import ArtifactSettings
-from fleet2d.artifacts.store import RunStore
+from fleet2d.artifacts.store import ArtifactSettings, RunStore
 from fleet2d.artifacts.unfinished import Commit
 from fleet2d.configuration.units import micros
 from fleet2d.engine.snapshot import (

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from fleet2d.algorithms.algorithm import Algorithm
 from fleet2d.algorithms.evidence import Patches, patches_of, steps_of_bin, whole_rooms
 from fleet2d.algorithms.log import Log
-from fleet2d.artifacts.layers import layer_rows, layer_table
 from fleet2d.configuration.components import Component
 from fleet2d.configuration.problems import suggest
 from fleet2d.configuration.units import whole_steps
@@ -34,6 +33,7 @@ from fleet2d.kernels.sight import (
 )
 from fleet2d.kernels.space import Mesh
 from fleet2d.metrics.metric import Metric
+from fleet2d.runs.layers import layer_rows, layer_table
 from fleet2d.runtime.events import Event
 from fleet2d.scenario.model import Scenario
 from fleet2d.sight.camera import TableContext, stack_lenses

@@ -11,9 +11,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from fleet2d.artifacts.directory import cannot_write
 from fleet2d.artifacts.manifest import FLOORPLAN_NAME
-from fleet2d.artifacts.store import RunStore
+from fleet2d.artifacts.store import RunStore, cannot_write
 from fleet2d.engine.inputs import input_files
 from fleet2d.engine.pace import Pace
 from fleet2d.engine.state import State

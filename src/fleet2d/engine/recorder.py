@@ -26,7 +26,7 @@ from fleet2d.engine.trajectories import (
 )
 from fleet2d.floorplan.objects import POSTURES
 from fleet2d.kernels import I8, I32, I64
-from fleet2d.runs.key_kinds import KEY_KINDS
+from fleet2d.runs.run import KEY_KINDS
 from fleet2d.runtime.events import HOME, RANKS, Event, EventKind
 
 

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
-from fleet2d.artifacts.directory import cannot_write
 from fleet2d.artifacts.manifest import FILE_NAME, LEARNED_NAME, Manifest
-from fleet2d.artifacts.store import RunStore
+from fleet2d.artifacts.store import RunStore, cannot_write
 from fleet2d.artifacts.unfinished import (
     FOLDER,
     JOURNAL_NAME,

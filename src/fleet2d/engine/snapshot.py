@@ -23,8 +23,8 @@ from typing import Any, BinaryIO, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from fleet2d.artifacts.chunk import ColumnChunk
-from fleet2d.artifacts.plain import plain
+from fleet2d.artifacts.manifest import plain
+from fleet2d.artifacts.table import ColumnChunk
 from fleet2d.configuration.trust import is_scenario_module, public_name
 from fleet2d.engine.inputs import components_of
 from fleet2d.engine.state import State
@@ -192,7 +192,7 @@ _NO_STATE = (
 )
 
 # Packages of tables that are written: the state of a run in a directory names its store only.
-_STORES = frozenset({"fleet2d.artifacts.store", "fleet2d.artifacts.table_writer"})
+_STORES = frozenset({"fleet2d.artifacts.store"})
 
 # Objects that are written as a module and a name.
 _REFERENCES = (type, FunctionType, BuiltinFunctionType)

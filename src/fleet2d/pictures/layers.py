@@ -10,12 +10,11 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import ListedColormap, Normalize
 from numpy.typing import NDArray
 
-from fleet2d.artifacts.layers import PREFIX
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.palette import TEXT_COLOR
 from fleet2d.pictures.floorplan import check_picture, figure_size, floorplan_axes, picture
 from fleet2d.pictures.theme import SCALE
-from fleet2d.runs.layers import layer_steps, read_layer
+from fleet2d.runs.layers import PREFIX, layer_steps, read_layer
 from fleet2d.runs.run import Run
 
 # The brighter part of viridis: names of rooms are written over it.

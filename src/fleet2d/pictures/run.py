@@ -35,8 +35,7 @@ from fleet2d.pictures.life import (
 )
 from fleet2d.pictures.overlay import LINE_IN, QUIET_COLOR, Chip, Overlay
 from fleet2d.pictures.traces import BodyTrace, trace_of
-from fleet2d.runs.categories import categories
-from fleet2d.runs.run import Run
+from fleet2d.runs.run import Run, categories
 
 MOST_BODIES = 4  # users with an actogram, and robots
 

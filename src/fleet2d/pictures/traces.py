@@ -13,8 +13,7 @@ from fleet2d.errors import ArtifactError
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.kernels import F64, I16, I64, Bool
 from fleet2d.palette import body_color
-from fleet2d.runs.categories import categories
-from fleet2d.runs.run import Run
+from fleet2d.runs.run import Run, categories
 from fleet2d.runs.trajectory import rebuild_path
 
 SAMPLES = 40_000  # of short runs; longer runs have a sample a minute

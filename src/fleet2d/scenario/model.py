@@ -8,7 +8,7 @@ from typing import Annotated, Any, Self
 from pydantic import BeforeValidator, Field, PrivateAttr, ValidationError, model_validator
 
 from fleet2d.algorithms.algorithm import Algorithm
-from fleet2d.artifacts.settings import ArtifactSettings
+from fleet2d.artifacts.store import ArtifactSettings
 from fleet2d.configuration.components import CheckNames, NameAsType, OneOf, Settings, ShortForm
 from fleet2d.configuration.documents import Document
 from fleet2d.configuration.problems import problem, problem_at, suggest

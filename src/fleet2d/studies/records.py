@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fleet2d.artifacts.plain import plain
+from fleet2d.artifacts.manifest import plain
 from fleet2d.studies.executors import WorkerTask
 from fleet2d.studies.simulator import VariantOutcome
 from fleet2d.studies.storage import write_error

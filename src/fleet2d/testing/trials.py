@@ -10,7 +10,7 @@ from datetime import timedelta
 from pathlib import Path
 from typing import Any
 
-from fleet2d.artifacts.settings import ArtifactSettings
+from fleet2d.artifacts.store import ArtifactSettings
 from fleet2d.engine.simulation import Simulation
 from fleet2d.errors import Fleet2DError, InputError
 from fleet2d.expectations.verdict import Verdict

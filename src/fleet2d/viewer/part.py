@@ -9,8 +9,7 @@ import numpy as np
 from fleet2d.artifacts.manifest import Manifest
 from fleet2d.errors import ArtifactError
 from fleet2d.kernels import I64
-from fleet2d.runs.categories import categories
-from fleet2d.runs.run import Run
+from fleet2d.runs.run import Run, categories
 from fleet2d.viewer.moments import clock_of
 
 KEY_FRAMES = "key_frames"

@@ -1,6 +1,6 @@
 """The facts of a running simulation that the page receives before the first frame."""
 
-from fleet2d.artifacts.plain import plain
+from fleet2d.artifacts.manifest import plain
 from fleet2d.engine.simulation import Simulation
 from fleet2d.entities.objects.door import Door
 from fleet2d.version import __version__

@@ -5,10 +5,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Literal
 
-from fleet2d.artifacts.layers import PREFIX
 from fleet2d.configuration.units import parse_duration
 from fleet2d.errors import ArtifactError
 from fleet2d.palette import body_color
+from fleet2d.runs.layers import PREFIX
 from fleet2d.runs.run import Run
 from fleet2d.sight.camera import USUAL_ANGLE_DEG, USUAL_RANGE_M
 from fleet2d.storage.files import path_in

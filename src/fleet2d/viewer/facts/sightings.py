@@ -5,8 +5,7 @@ from typing import Any
 import numpy as np
 
 from fleet2d.kernels import I64, Bool
-from fleet2d.runs.categories import categories
-from fleet2d.runs.run import Run
+from fleet2d.runs.run import Run, categories
 from fleet2d.viewer.facts.contract import SightingFacts
 
 JOIN_S = 6.0  # shorter gaps between sightings are no gaps in a lane
