@@ -22,7 +22,7 @@ using u64 = std::uint64_t;
 using f64 = double;
 
 // A view of N dimensions. The last one is contiguous; the others may have any stride.
-// Debug builds (FLEET2D_CHECKS) check every index.
+// Debug builds (FLEET2D_CHECKS) check every index and slice.
 template <class T, std::size_t N = 1>
 struct View {
     T* data = nullptr;
@@ -87,6 +87,9 @@ struct View {
     constexpr View<T, 1> slice(i64 first, i64 last) const
         requires(N == 1)
     {
+#ifdef FLEET2D_CHECKS
+        if (first < 0 || last < first || last > shape[0]) std::abort();
+#endif
         return View<T, 1>(data + first, {last - first});
     }
 

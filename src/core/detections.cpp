@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <bit>
-#include <cstring>
 
 #include "occlusion.hpp"
 
@@ -30,11 +29,13 @@ struct Interval {
 
 Sighting read(View<const i64> row) {
     Sighting sighting;
-    std::memcpy(&sighting, row.data, sizeof sighting);
+    for (i64 i = 0; i < SIGHTING; ++i) sighting.*SIGHTING_COLUMNS[static_cast<std::size_t>(i)].second = row[i];
     return sighting;
 }
 
-void write(View<i64> row, const Sighting& sighting) { std::memcpy(row.data, &sighting, sizeof sighting); }
+void write(View<i64> row, const Sighting& sighting) {
+    for (i64 i = 0; i < SIGHTING; ++i) row[i] = sighting.*SIGHTING_COLUMNS[static_cast<std::size_t>(i)].second;
+}
 
 // Finds the intervals in which a user is in view.
 class IntervalFinder {

@@ -1,6 +1,8 @@
 // What the cameras of one body see and perceive of other bodies over a span of steps.
 #pragma once
 
+#include <array>
+#include <utility>
 #include <vector>
 
 #include "lens.hpp"
@@ -23,7 +25,23 @@ struct Sighting {
     i64 true_heading;
     i64 true_posture;
 };
-inline constexpr i64 SIGHTING = sizeof(Sighting) / sizeof(i64);  // columns of a row
+
+// The columns of a row of sightings, by name.
+inline constexpr std::array SIGHTING_COLUMNS = std::to_array<std::pair<const char*, i64 Sighting::*>>({
+    {"STEP", &Sighting::step},
+    {"CAMERA", &Sighting::camera},
+    {"USER", &Sighting::user},
+    {"IDENTITY", &Sighting::identity},
+    {"X", &Sighting::x},
+    {"Y", &Sighting::y},
+    {"HEADING", &Sighting::heading},
+    {"POSTURE", &Sighting::posture},
+    {"TRUE_X", &Sighting::true_x},
+    {"TRUE_Y", &Sighting::true_y},
+    {"TRUE_HEADING", &Sighting::true_heading},
+    {"TRUE_POSTURE", &Sighting::true_posture},
+});
+inline constexpr i64 SIGHTING = SIGHTING_COLUMNS.size();
 
 // The state of a robot's perception between spans. Identities are users, and last an unknown person.
 struct SightMemory {

@@ -1,5 +1,6 @@
 #include "encoding.hpp"
 
+#include <bit>
 #include <cstring>
 #include <limits>
 #include <vector>
@@ -78,6 +79,13 @@ struct Runs {
     }
 };
 
+// Whether two values have the same bits: of two floating-point numbers, equal isn't enough.
+template <class T>
+bool is_same(T one, T other) {
+    return one == other;
+}
+bool is_same(f64 one, f64 other) { return std::bit_cast<u64>(one) == std::bit_cast<u64>(other); }
+
 // The runs of equal values; none if they would take `size` bytes or more.
 template <class T>
 Runs runs_of(View<const T> values, i64 size) {
@@ -91,7 +99,7 @@ Runs runs_of(View<const T> values, i64 size) {
         const T* block = values.data + first;  // most have no change, which memcmp tells quickly
         if (std::memcmp(block, block - 1, static_cast<std::size_t>(last - first) * sizeof(T)) == 0) continue;
         for (i64 i = first; i < last; ++i) {
-            if (values[i] == values[i - 1]) continue;
+            if (is_same(values[i], values[i - 1])) continue;
             end_run(i);
             runs.begin.push_back(i);
         }
@@ -126,8 +134,7 @@ void put_flags(View<const u8> values, Writer& writer) {
     if (!put_runs(values, values.size(), writer)) put_raw(values, writer);
 }
 
-// Floating-point numbers: equal are those with the same bits.
-void put_floats(View<const u64> values, Writer& writer) {
+void put_floats(View<const f64> values, Writer& writer) {
     if (!put_runs(values, values.size() * 8, writer)) put_raw(values, writer);
 }
 
@@ -237,7 +244,7 @@ i64 encode_arrays(std::span<const Values> arrays, u8* bytes) {
                 put_codes(as<u32>(values), writer);
                 break;
             case Values::Type::FLOAT64:
-                put_floats(as<u64>(values), writer);
+                put_floats(as<f64>(values), writer);
                 break;
             case Values::Type::INT64:
                 put_integers(as<u64>(values), integers, writer);

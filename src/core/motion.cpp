@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
-#include "random.hpp"
 #include "line_of_sight.hpp"
+#include "random.hpp"
 
 namespace fleet2d {
 namespace {

@@ -13,7 +13,7 @@ namespace fleet2d {
 inline constexpr i64 BITS = 31;
 inline constexpr i64 ONE = i64{1} << BITS;  // probability 1
 inline constexpr i64 POSTURES = 3;          // stand, sit, lie
-inline constexpr i64 MINUTES = 1440;        // of a day
+inline constexpr i64 MINUTES = 24 * 60;     // of a day
 inline constexpr i64 DOUBLINGS = 62;
 inline constexpr i64 MOST_GHOSTS = 20;  // in one look; more are too unlikely to have a probability
 inline constexpr i64 NOBODY = -1;       // the user behind a false positive; the identity of an unknown person

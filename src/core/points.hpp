@@ -4,6 +4,8 @@
 // consecutive duplicates.
 #pragma once
 
+#include <array>
+#include <utility>
 #include <vector>
 
 #include "lens.hpp"
@@ -25,6 +27,17 @@ struct ViewQuery {
 
     bool operator==(const ViewQuery&) const = default;
 };
+
+// The columns of a row of queries, by name.
+inline constexpr std::array VIEW_QUERY_COLUMNS = std::to_array<std::pair<const char*, i64 ViewQuery::*>>({
+    {"CAMERA", &ViewQuery::camera},
+    {"BODY", &ViewQuery::body},
+    {"EYE_X", &ViewQuery::eye_x},
+    {"EYE_Y", &ViewQuery::eye_y},
+    {"EYE_HEADING", &ViewQuery::eye_heading},
+    {"BODY_X", &ViewQuery::body_x},
+    {"BODY_Y", &ViewQuery::body_y},
+});
 
 // The positions of the bodies that may be in view, all arrays (bodies, n).
 struct Places {

@@ -7,8 +7,8 @@
 #include <utility>
 #include <vector>
 
-#include "random.hpp"
 #include "line_of_sight.hpp"
+#include "random.hpp"
 
 namespace fleet2d {
 namespace {

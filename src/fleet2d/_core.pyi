@@ -674,6 +674,25 @@ def sum_moves(poses: tuple[Any, ...]) -> float:
     Return the summed length of the moves from pose to pose [lattice units].
     """
 
+class ViewQueryColumn(enum.IntEnum):
+    """
+    The columns of a query of `view_queries`: the pose of the camera, the centre of the body.
+    """
+
+    CAMERA = 0
+
+    BODY = 1
+
+    EYE_X = 2
+
+    EYE_Y = 3
+
+    EYE_HEADING = 4
+
+    BODY_X = 5
+
+    BODY_Y = 6
+
 def points_in_sight(mesh: Mesh, x: int, y: int, points: numpy.typing.NDArray[numpy.int64]) -> numpy.typing.NDArray[numpy.bool_]:
     """
     Return which of the points, int64 (n, 2), a line of sight leads to from (x, y): bool (n,).
@@ -728,39 +747,58 @@ NOBODY: int = -1
 
 BINS: int = 512
 
-AT_DISTANCE: int = 0
-
-AT_BEARING: int = 512
-
-AT_FACING: int = 4608
-
-AT_POSTURE: int = 6657
-
-AT_SHOWN: int = 6660
-
-AT_LIGHT: int = 6694
-
-AT_STAY: int = 8134
-
-AT_RIGHT: int = 8196
-
-AT_MISTAKEN: int = 8708
-
-AT_SEEMS: int = 9220
-
-SHIFT: int = 9229
-
-KEEPS: int = 9230
-
-RANGE_NOISE: int = 9231
-
-RANGE_SHARE: int = 9232
-
-BEARING_NOISE: int = 9233
-
-HEADING_NOISE: int = 9234
-
 TABLE: int = 9235
+
+class TablePart(enum.IntEnum):
+    """The first entry of each part of a camera's table."""
+
+    DISTANCE = 0
+    """Factor to notice a user, by bin of the distance [2**-31]."""
+
+    BEARING = 512
+    """By 1/4096 turn left of the optical axis, + HALF_TURN."""
+
+    FACING = 4608
+    """By how far the user is turned away from the camera."""
+
+    POSTURE = 6657
+    """By the user's posture."""
+
+    SHOWN = 6660
+    """By the number of the body's points in view."""
+
+    LIGHT = 6694
+    """By the minute of the day."""
+
+    STAY = 8134
+    """That attention outlasts 2**i steps."""
+
+    RIGHT = 8196
+    """That a user is recognized, by bin of the distance."""
+
+    MISTAKEN = 8708
+    """That a user is mistaken for another one, likewise."""
+
+    SEEMS = 9220
+    """The perceived posture by the true one, cumulative."""
+
+    SHIFT = 9229
+    """A distance of d lattice units is in bin d >> SHIFT."""
+
+    KEEPS = 9230
+    """1 if an identity lasts as long as the user is tracked."""
+
+    RANGE_NOISE = 9231
+    """2**-16 lattice units per unit of random_bell."""
+
+    RANGE_SHARE = 9232
+    """The same per lattice unit of distance, times 2**16."""
+
+    BEARING_NOISE = 9233
+    """2**-16 / 8192 of a turn per unit of random_bell."""
+
+    HEADING_NOISE = 9234
+    """2**-16 headings per unit of random_bell."""
 
 class UserDraw(enum.IntEnum):
     """
@@ -904,12 +942,12 @@ class SightingColumn(enum.IntEnum):
     """
     The columns of a row of sightings.
 
-    Where a camera was wrong about a person, USER is NOBODY; where it didn't recognize one, IDENTITY
-    is. X to POSTURE are as perceived.
+    STEP is when it becomes known. Where a camera was wrong about a person, USER is NOBODY; where it
+    didn't recognize one, IDENTITY is. X to POSTURE are as perceived: lattice units, 1/4096 turn, and 0
+    for standing, 1 sitting, 2 lying.
     """
 
     STEP = 0
-    """When it becomes known."""
 
     CAMERA = 1
 
@@ -918,15 +956,12 @@ class SightingColumn(enum.IntEnum):
     IDENTITY = 3
 
     X = 4
-    """Lattice units."""
 
     Y = 5
 
     HEADING = 6
-    """1/4096 turn."""
 
     POSTURE = 7
-    """0 stands, 1 sits, 2 lies."""
 
     TRUE_X = 8
 

@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 from tests.reference import headings as slow
 from tests.strategies import quick
 
+from fleet2d._core import SINES
 from fleet2d.kernels.numbers import (
     HALF_TURN,
     QUARTER,
-    SINES,
     TURN,
     UNIT,
     cosine,

@@ -9,15 +9,14 @@ from hypothesis import strategies as st
 from tests.reference import random as slow
 from tests.strategies import quick
 
+from fleet2d._core import BELL_MEAN, random_bits
 from fleet2d.kernels.numbers import (
-    BELL_MEAN,
     BELL_STD,
     Bits,
     StepDraws,
     random_bell,
     random_bells,
     random_below,
-    random_bits,
     random_uniform,
 )
 

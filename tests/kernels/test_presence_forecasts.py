@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from fleet2d.kernels.numbers import random_below, random_bits
+from fleet2d._core import random_bits
+from fleet2d.kernels.numbers import random_below
 from fleet2d.kernels.presence import advance, list_sightings, resampled
 
 

@@ -15,6 +15,7 @@ from tests.reference import detections as slow
 from tests.reference.random import key_of_word
 from tests.strategies import homes, quick, seeds
 
+from fleet2d._core import in_wedge
 from fleet2d.floorplan.geometry.lattice import Lattice
 from fleet2d.kernels import I64, U64
 from fleet2d.kernels.motion import Window
@@ -29,7 +30,6 @@ from fleet2d.kernels.sight import (
     SightMemory,
     UserDraw,
     detect,
-    in_wedge,
     new_memory,
 )
 from fleet2d.sight.camera import Camera, Lens, TableContext, error_tables, stack_lenses

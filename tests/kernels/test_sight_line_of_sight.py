@@ -21,13 +21,9 @@ from tests.homes import (
 from tests.reference.line_of_sight import vertices_seen, visible, visible_exactly
 from tests.strategies import homes, quick, seeds
 
+from fleet2d._core import build_fans, vertices_seen_from_point, vertices_seen_from_vertex
 from fleet2d.kernels import I64, Bool
-from fleet2d.kernels.sight import (
-    build_fans,
-    line_of_sight,
-    vertices_seen_from_point,
-    vertices_seen_from_vertex,
-)
+from fleet2d.kernels.sight import line_of_sight
 from fleet2d.kernels.space import Mesh, locate, pairs_in_sight
 
 EYES, POINTS = 2, 24

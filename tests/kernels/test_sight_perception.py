@@ -10,6 +10,7 @@ from tests.sight.watching import scene
 from tests.strategies import quick
 
 import fleet2d.kernels.sight as k
+from fleet2d import _core
 from fleet2d.kernels import I64
 from fleet2d.kernels.numbers import heading_of
 from fleet2d.sight.camera import Camera, error_tables
@@ -29,13 +30,13 @@ def table_of(**perception: object) -> I64:
 @given(st.lists(st.integers(0, k.ONE), max_size=6).map(sorted), st.integers(0, k.ONE - 1))
 def test_pick_is_the_first_outcome_above_the_draw(sums: list[int], draw: int) -> None:
     expected = next((i for i, end in enumerate(sums) if draw < end), len(sums))
-    assert expected == k.pick(np.array(sums, np.int64), draw)
+    assert expected == _core.pick(np.array(sums, np.int64), draw)
 
 
 def test_random_shares_equal_single_draws_and_uniform() -> None:
     counters = np.arange(20_000)
     shares = k.random_shares(KEY, counters)
-    assert [k.random_share(KEY, i) for i in range(50)] == shares[:50].tolist()
+    assert [_core.random_share(KEY, i) for i in range(50)] == shares[:50].tolist()
     assert ((shares >= 0) & (shares < k.ONE)).all()
     counts = np.bincount(shares * 16 // k.ONE, minlength=16)
     assert ((counts - 1250) ** 2 / 1250).sum() < 44  # 15 degrees of freedom: 1 in 10,000
@@ -48,7 +49,7 @@ MEMORY = table_of(detection={"memory": "30 s"})
 @given(st.integers(0, 10_000))
 def test_lasting_is_the_exponential_of_the_steps(steps: int) -> None:
     assert math.exp(-steps / 30) == pytest.approx(
-        k.persistence_chance(MEMORY, 0, steps) / k.ONE, abs=1e-7
+        _core.persistence_chance(MEMORY, 0, steps) / k.ONE, abs=1e-7
     )
 
 
@@ -84,24 +85,24 @@ def test_steady_chance_is_the_product_of_its_factors(
         * np.interp(away, [0, 180], [1, 0.5])
         * (1, 0.8, 0.3)[posture]
     )
-    chance = k.steady_chance(BY_ALL, 0, heading, dx, dy, faces, posture, 1)
+    chance = _core.steady_chance(BY_ALL, 0, heading, dx, dy, faces, posture, 1)
     if abs(bearing) < 179.8:  # else the sides of the seam differ
         assert expected == pytest.approx(chance / k.ONE, abs=3e-3)
 
 
 def test_notice_chance_is_the_product_in_its_unit_and_1_is_sure() -> None:
-    sure = k.notice_chance(k.ONE, k.ONE, 2**53)
+    sure = _core.notice_chance(k.ONE, k.ONE, 2**53)
     assert 2**53 == sure
-    assert 2**53 * 3 // 16 == k.notice_chance(k.ONE * 3 // 4, k.ONE // 2, 2**52)
-    assert 0 == k.notice_chance(0, k.ONE, 2**53)
+    assert 2**53 * 3 // 16 == _core.notice_chance(k.ONE * 3 // 4, k.ONE // 2, 2**52)
+    assert 0 == _core.notice_chance(0, k.ONE, 2**53)
 
 
 @quick
 @given(VECTOR)
 def test_the_farthest_distances_share_the_last_bin(vector: tuple[int, int]) -> None:
     table = BY_ALL
-    assert 0 <= k.distance_bin(table, 0, *vector) < k.BINS
-    assert k.BINS - 1 == k.distance_bin(table, 0, 10**6, 10**6)
+    assert 0 <= _core.distance_bin(table, 0, *vector) < k.BINS
+    assert k.BINS - 1 == _core.distance_bin(table, 0, 10**6, 10**6)
 
 
 @quick
@@ -110,10 +111,10 @@ def test_turn_and_stretch_equals_trigonometry(
     vector: tuple[int, int], turn: int, target_length: int
 ) -> None:
     dx, dy = vector
-    distance = k.length(dx, dy)
+    distance = _core.length(dx, dy)
     if distance >= 100:
         angle = math.atan2(dy, dx) + 2 * math.pi * turn / 8192
-        x, y = k.turn_and_stretch(dx, dy, turn, distance, target_length)
+        x, y = _core.turn_and_stretch(dx, dy, turn, distance, target_length)
         scale = math.hypot(dx, dy) / distance * target_length
         assert (scale * math.cos(angle), scale * math.sin(angle)) == pytest.approx((x, y), abs=1.6)
 
@@ -121,14 +122,14 @@ def test_turn_and_stretch_equals_trigonometry(
 def test_a_user_at_the_camera_and_one_without_noise_stay_where_they_are() -> None:
     keys = np.zeros((1, 3, len(k.UserDraw)), np.uint64)
     noisy = table_of(attributes={"range_noise": 0.5, "bearing_noise_deg": 20})
-    assert (0, 0) == k.perceived_offset(noisy, keys, 0, 0, 7, 0, 0)
-    assert (300, -40) == k.perceived_offset(table_of(), keys, 0, 0, 7, 300, -40)
+    assert (0, 0) == _core.perceived_offset(noisy, keys, 0, 0, 7, 0, 0)
+    assert (300, -40) == _core.perceived_offset(table_of(), keys, 0, 0, 7, 300, -40)
 
 
 def test_range_noise_never_puts_somebody_behind_the_camera() -> None:
     keys = np.full((1, 3, len(k.UserDraw)), 5, np.uint64)
     table = table_of(attributes={"range_noise": 3})
-    places = [k.perceived_offset(table, keys, 0, 0, step, 400, 0) for step in range(2000)]
+    places = [_core.perceived_offset(table, keys, 0, 0, step, 400, 0) for step in range(2000)]
     assert 0 == min(x for x, _ in places)
     assert {0} == {y for _, y in places}
 
@@ -137,8 +138,8 @@ def test_the_perceived_posture_follows_from_the_draw() -> None:
     table = table_of(attributes={"posture": {"sit": {"stand": 0.25, "lie": 0.25}}})
     quarter = k.ONE // 4
     draws = (0, quarter - 1, quarter, 3 * quarter - 1, 3 * quarter, k.ONE - 1)
-    assert [0, 0, 1, 1, 2, 2] == [k.perceived_posture(table, 0, 1, draw) for draw in draws]
-    assert [2, 2] == [k.perceived_posture(table, 0, 2, draw) for draw in (0, k.ONE - 1)]
+    assert [0, 0, 1, 1, 2, 2] == [_core.perceived_posture(table, 0, 1, draw) for draw in draws]
+    assert [2, 2] == [_core.perceived_posture(table, 0, 2, draw) for draw in (0, k.ONE - 1)]
 
 
 @pytest.mark.parametrize("far", [2**30 + 1, 2**31, 2**62, -(2**63)])
@@ -147,11 +148,11 @@ def test_places_farther_away_than_any_home_is_wide_are_refused(far: int) -> None
     keys = np.zeros((1, 3, len(k.UserDraw)), np.uint64)
     for dx, dy in ((far, 0), (0, far), (far, far)):
         for ask in (
-            lambda dx=dx, dy=dy: k.length(dx, dy),
-            lambda dx=dx, dy=dy: k.distance_bin(BY_ALL, 0, dx, dy),
-            lambda dx=dx, dy=dy: k.steady_chance(BY_ALL, 0, 0, dx, dy, 0, 0, 1),
-            lambda dx=dx, dy=dy: k.perceived_offset(BY_ALL, keys, 0, 0, 7, dx, dy),
-            lambda dx=dx, dy=dy: k.turn_and_stretch(dx, dy, 5, 100, 100),
+            lambda dx=dx, dy=dy: _core.length(dx, dy),
+            lambda dx=dx, dy=dy: _core.distance_bin(BY_ALL, 0, dx, dy),
+            lambda dx=dx, dy=dy: _core.steady_chance(BY_ALL, 0, 0, dx, dy, 0, 0, 1),
+            lambda dx=dx, dy=dy: _core.perceived_offset(BY_ALL, keys, 0, 0, 7, dx, dy),
+            lambda dx=dx, dy=dy: _core.turn_and_stretch(dx, dy, 5, 100, 100),
         ):
             with pytest.raises(ValueError, match=r"within 2\*\*30"):
                 ask()
@@ -160,4 +161,4 @@ def test_places_farther_away_than_any_home_is_wide_are_refused(far: int) -> None
 @pytest.mark.parametrize("distance", [0, -5, 2**40, 2**62])
 def test_lengths_that_nothing_can_be_stretched_from_are_refused(distance: int) -> None:
     with pytest.raises(ValueError, match="distance must be"):
-        k.turn_and_stretch(300, 40, 5, distance, 400)
+        _core.turn_and_stretch(300, 40, 5, distance, 400)

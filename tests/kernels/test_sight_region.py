@@ -20,10 +20,10 @@ from tests.homes import (
 from tests.reference.line_of_sight import visible_area
 from tests.strategies import homes, quick, seeds
 
+from fleet2d._core import region_contains
 from fleet2d.kernels import F64, I32
 from fleet2d.kernels.sight import (
     points_in_sight,
-    region_contains,
     region_contains_points,
     region_outline,
     regions_of_cells,

@@ -13,8 +13,9 @@ from tests.homes import Home, home_of, shuffled
 from tests.reference.routes import graph_of, length_of, region_of, shortest, straight_ways
 from tests.strategies import homes, quick, seeds
 
+from fleet2d._core import distance
 from fleet2d.kernels import I64
-from fleet2d.kernels.space import Corners, Routes, distance
+from fleet2d.kernels.space import Corners, Routes
 
 
 def corners_of(home: Home) -> Corners:

@@ -8,14 +8,8 @@ import shapely
 from tests.homes import home_of
 from tests.reference.costs import cost_distance as slow_cost_distance
 
-from fleet2d.kernels.space import (
-    cost_distance,
-    descend,
-    leg_cost,
-    pull_taut,
-    step_cost,
-    walking_distance,
-)
+from fleet2d._core import leg_cost, step_cost
+from fleet2d.kernels.space import cost_distance, descend, pull_taut, walking_distance
 
 HALL = home_of([shapely.box(0, 0, 64 * 20, 64 * 12)])
 

@@ -14,6 +14,7 @@ from tests.reference.motion import half_up
 from tests.reference.random import random_bell, random_below, random_bits
 
 import fleet2d.kernels.sight as k
+from fleet2d import _core
 from fleet2d.kernels import I64
 
 Point = tuple[int, int]
@@ -150,28 +151,31 @@ class Errors:
         """Return whether a user who is `away` from the camera is noticed."""
         last, value = self.draws[u], 0
         lasts = False
-        if last is not None and self.row[k.AT_STAY] != 0:
+        if last is not None and self.row[k.TablePart.STAY] != 0:
             share = self._share(u, k.UserDraw.ATTEND, now)
-            lasts = share < k.persistence_chance(self.tables.table, self.camera, now - last[0])
+            lasts = share < _core.persistence_chance(self.tables.table, self.camera, now - last[0])
         if last is not None and lasts:
             value = last[1]
         else:
             value = random_bits(self.keys[u][k.UserDraw.DETECT], now) // 2**11
         self.draws[u] = now, value
         minute = (self.start_us + now * step_us) // 60_000_000 % 1440
-        steady = k.steady_chance(
+        steady = _core.steady_chance(
             self.tables.table, self.camera, heading, *away, user.heading, user.posture, shown
         )
-        return value < k.notice_chance(steady, self.row[k.AT_LIGHT + minute], chance)
+        return value < _core.notice_chance(steady, self.row[k.TablePart.LIGHT + minute], chance)
 
     def taken_for(self, u: int, now: int, away: tuple[int, int], patience: int) -> int:
         """Return for whom a noticed user is taken; -1 for nobody known."""
         before = self.tracks[u]
-        if before is not None and self.row[k.KEEPS] == 1 and now - before[0] < patience:
+        if before is not None and self.row[k.TablePart.KEEPS] == 1 and now - before[0] < patience:
             identity = before[1]
         else:
-            bin_ = k.distance_bin(self.tables.table, self.camera, *away)
-            right, mistaken = self.row[k.AT_RIGHT + bin_], self.row[k.AT_MISTAKEN + bin_]
+            bin_ = _core.distance_bin(self.tables.table, self.camera, *away)
+            right, mistaken = (
+                self.row[k.TablePart.RIGHT + bin_],
+                self.row[k.TablePart.MISTAKEN + bin_],
+            )
             draw, identity = self._share(u, k.UserDraw.IDENTIFY, now), -1
             if draw < right:
                 identity = u
@@ -185,9 +189,11 @@ class Errors:
     def perceived(self, u: int, now: int, away: tuple[int, int], user: Body) -> tuple[int, ...]:
         """Return x and y beside where the user is, heading and posture, as perceived."""
         table, c = self.tables.table, self.camera
-        dx, dy = k.perceived_offset(table, self.tables.keys, c, u, now, *away)
-        turn = self._noise(self.keys[u][k.UserDraw.HEADING], now, self.row[k.HEADING_NOISE])
-        posture = k.perceived_posture(
+        dx, dy = _core.perceived_offset(table, self.tables.keys, c, u, now, *away)
+        turn = self._noise(
+            self.keys[u][k.UserDraw.HEADING], now, self.row[k.TablePart.HEADING_NOISE]
+        )
+        posture = _core.perceived_posture(
             table, c, user.posture, self._share(u, k.UserDraw.POSTURE, now)
         )
         return dx - away[0], dy - away[1], (user.heading + turn) % 4096, posture

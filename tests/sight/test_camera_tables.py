@@ -31,7 +31,7 @@ def test_distances_up_to_the_farthest_body_have_an_entry(farthest: float) -> Non
     """The entry of a distance in lattice units holds the curve within an entry's width of there."""
     curve = {"midpoint": farthest / 2, "width": farthest / 10}
     error_tables = tables({"detection": {"distance": curve}}, range=[0, farthest], body_points=4)
-    shift = int(error_tables.table[0, k.SHIFT])
+    shift = int(error_tables.table[0, k.TablePart.SHIFT])
     reach = round(farthest * UNITS_PER_M) + 257
     assert reach >> shift < k.BINS
     assert farthest < 0.5 or reach >> shift >= k.BINS // 2 - 1  # none is wasted
@@ -44,14 +44,14 @@ def test_distances_up_to_the_farthest_body_have_an_entry(farthest: float) -> Non
 
 def test_bearings_left_are_behind_the_middle_of_their_table() -> None:
     error_tables = tables({"detection": {"bearing": [[-90, 0], [90, 1]]}})
-    at = shares(error_tables, k.AT_BEARING, 4096)
+    at = shares(error_tables, k.TablePart.BEARING, 4096)
     assert [0, 0.25, 0.5, 0.75, 1] == pytest.approx(
         at[[0, 1536, 2048, 2560, 4095]].tolist(), abs=1e-9
     )
 
 
 def test_bearings_without_a_sign_equal_both_sides() -> None:
-    at = shares(tables({"detection": {"bearing": [[0, 1], [180, 0]]}}), k.AT_BEARING, 4096)
+    at = shares(tables({"detection": {"bearing": [[0, 1], [180, 0]]}}), k.TablePart.BEARING, 4096)
     assert at[1:2048].tolist() == at[2049:][::-1].tolist()
 
 
@@ -59,14 +59,14 @@ def test_light_is_by_minute_and_orientation_by_the_turn() -> None:
     error_tables = tables(
         {"detection": {"light": [[0, 0], [24, 1]], "orientation": [[0, 1], [180, 0]]}}
     )
-    facing = shares(error_tables, k.AT_FACING, 2049)
+    facing = shares(error_tables, k.TablePart.FACING, 2049)
     assert [1, 0.5, 0] == pytest.approx(facing[[0, 1024, 2048]].tolist(), abs=1e-9)
-    assert 0.5 == pytest.approx(shares(error_tables, k.AT_LIGHT, 1440)[720], abs=1e-3)
+    assert 0.5 == pytest.approx(shares(error_tables, k.TablePart.LIGHT, 1440)[720], abs=1e-3)
 
 
 def test_shares_of_a_body_are_by_the_number_of_points_in_view() -> None:
     curve = {"detection": {"visible_share": [[0, 0], [1, 1]]}}
-    by_points = shares(tables(curve, body_points=3), k.AT_SHOWN, 5)
+    by_points = shares(tables(curve, body_points=3), k.TablePart.SHOWN, 5)
     assert [0, 0.25, 0.5, 0.75, 1] == pytest.approx(by_points.tolist(), abs=1e-9)
 
 
@@ -83,7 +83,7 @@ def test_confusions_are_cumulative_and_end_at_1() -> None:
 
 
 def test_memory_outlasts_twice_the_steps_with_the_square_of_the_probability() -> None:
-    stay = shares(tables({"detection": {"memory": "10 s"}}), k.AT_STAY, k.DOUBLINGS)
+    stay = shares(tables({"detection": {"memory": "10 s"}}), k.TablePart.STAY, k.DOUBLINGS)
     assert np.exp(-0.1) == pytest.approx(stay[0], abs=1e-9)
     assert stay[:4] ** 2 == pytest.approx(stay[1:5], abs=1e-8)
     assert 0 == stay[-1]

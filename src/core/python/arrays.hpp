@@ -55,71 +55,42 @@ bool all_in_range(View<const T, N> numbers, i64 first, i64 last) {
 
 namespace border {
 
+// The number that NumPy has for the type of an array's elements.
 template <class T>
-struct DataType;  // kind and number as NumPy has them, and the name of the array in signatures
+inline constexpr int type_number = NPY_VOID;
 template <>
-struct DataType<bool> {
-    static constexpr char kind = 'b';
-    static constexpr int number = NPY_BOOL;
-    static constexpr auto name = nb::detail::const_name("numpy.typing.NDArray[numpy.bool_]");
-};
+inline constexpr int type_number<bool> = NPY_BOOL;
 template <>
-struct DataType<i8> {
-    static constexpr char kind = 'i';
-    static constexpr int number = NPY_INT8;
-    static constexpr auto name = nb::detail::const_name("numpy.typing.NDArray[numpy.int8]");
-};
+inline constexpr int type_number<i8> = NPY_INT8;
 template <>
-struct DataType<i16> {
-    static constexpr char kind = 'i';
-    static constexpr int number = NPY_INT16;
-    static constexpr auto name = nb::detail::const_name("numpy.typing.NDArray[numpy.int16]");
-};
+inline constexpr int type_number<i16> = NPY_INT16;
 template <>
-struct DataType<i32> {
-    static constexpr char kind = 'i';
-    static constexpr int number = NPY_INT32;
-    static constexpr auto name = nb::detail::const_name("numpy.typing.NDArray[numpy.int32]");
-};
+inline constexpr int type_number<i32> = NPY_INT32;
 template <>
-struct DataType<i64> {
-    static constexpr char kind = 'i';
-    static constexpr int number = NPY_INT64;
-    static constexpr auto name = nb::detail::const_name("numpy.typing.NDArray[numpy.int64]");
-};
+inline constexpr int type_number<i64> = NPY_INT64;
 template <>
-struct DataType<u8> {
-    static constexpr char kind = 'u';
-    static constexpr int number = NPY_UINT8;
-    static constexpr auto name = nb::detail::const_name("numpy.typing.NDArray[numpy.uint8]");
-};
+inline constexpr int type_number<u8> = NPY_UINT8;
 template <>
-struct DataType<u16> {
-    static constexpr char kind = 'u';
-    static constexpr int number = NPY_UINT16;
-    static constexpr auto name = nb::detail::const_name("numpy.typing.NDArray[numpy.uint16]");
-};
+inline constexpr int type_number<u16> = NPY_UINT16;
 template <>
-struct DataType<u64> {
-    static constexpr char kind = 'u';
-    static constexpr int number = NPY_UINT64;
-    static constexpr auto name = nb::detail::const_name("numpy.typing.NDArray[numpy.uint64]");
-};
+inline constexpr int type_number<u64> = NPY_UINT64;
 template <>
-struct DataType<f64> {
-    static constexpr char kind = 'f';
-    static constexpr int number = NPY_FLOAT64;
-    static constexpr auto name = nb::detail::const_name("numpy.typing.NDArray[numpy.float64]");
-};
+inline constexpr int type_number<f64> = NPY_FLOAT64;
+
+// NumPy's letter for it: the number differs between types of the same size and kind.
+template <class T>
+inline constexpr char type_kind = std::is_same_v<T, bool>       ? 'b'
+                                  : std::is_floating_point_v<T> ? 'f'
+                                  : std::is_signed_v<T>         ? 'i'
+                                                                : 'u';
 
 // Read `source` into a view. `copy` owns the memory afterwards if it had to be copied.
 template <class T, std::size_t N>
 bool view_of(nb::handle source, View<T, N>& view, nb::object& copy) noexcept {
-    using Type = DataType<std::remove_const_t<T>>;
     if (!PyArray_Check(source.ptr())) return false;
     auto* array = reinterpret_cast<PyArrayObject*>(source.ptr());
     constexpr npy_intp size = sizeof(T);
-    if (PyArray_NDIM(array) != static_cast<int>(N) || PyArray_DESCR(array)->kind != Type::kind ||
+    if (PyArray_NDIM(array) != static_cast<int>(N) || PyArray_DESCR(array)->kind != type_kind<std::remove_const_t<T>> ||
         PyArray_ITEMSIZE(array) != size || !PyArray_ISNOTSWAPPED(array)) {
         return false;
     }
@@ -150,17 +121,22 @@ bool view_of(nb::handle source, View<T, N>& view, nb::object& copy) noexcept {
     return true;
 }
 
-// A read-only NumPy array of memory that belongs to `owner`.
+// A read-only NumPy array of memory that belongs to an object of Python.
 template <class T, std::size_t N>
-nb::object borrowed(View<const T, N> view, nb::handle owner) {
+struct ReadOnly {
+    nb::object array;
+};
+
+template <class T, std::size_t N>
+ReadOnly<T, N> borrowed(View<const T, N> view, nb::handle owner) {
     npy_intp shape[N];
     for (std::size_t k = 0; k < N; ++k) shape[k] = view.shape[k];
-    PyObject* array = PyArray_New(&PyArray_Type, static_cast<int>(N), shape, DataType<T>::number, nullptr,
+    PyObject* array = PyArray_New(&PyArray_Type, static_cast<int>(N), shape, type_number<T>, nullptr,
                                   const_cast<T*>(view.data), 0, NPY_ARRAY_C_CONTIGUOUS | NPY_ARRAY_ALIGNED, nullptr);
     if (array == nullptr) throw nb::python_error();
     Py_INCREF(owner.ptr());
     if (PyArray_SetBaseObject(reinterpret_cast<PyArrayObject*>(array), owner.ptr()) < 0) throw nb::python_error();
-    return nb::steal(array);
+    return {nb::steal(array)};
 }
 
 // A NumPy array that owns what a kernel returned.
@@ -169,7 +145,7 @@ nb::handle handed_over(Array<T, N>&& values) noexcept {
     npy_intp shape[N];
     for (std::size_t k = 0; k < N; ++k) shape[k] = values.shape()[k];
     T* data = values.release();
-    PyObject* array = PyArray_New(&PyArray_Type, static_cast<int>(N), shape, DataType<T>::number, nullptr, data, 0,
+    PyObject* array = PyArray_New(&PyArray_Type, static_cast<int>(N), shape, type_number<T>, nullptr, data, 0,
                                   NPY_ARRAY_CARRAY, nullptr);
     PyObject* owner = array == nullptr ? nullptr : PyCapsule_New(data, nullptr, [](PyObject* capsule) {
         delete[] static_cast<T*>(PyCapsule_GetPointer(capsule, nullptr));
@@ -186,13 +162,12 @@ nb::handle handed_over(Array<T, N>&& values) noexcept {
     return array;
 }
 
-// Structs that come from Python as named tuples: specialised with `name`, and with `members`, a
-// std::tuple of pointers to the members in the tuple's order.
+// The members of a struct that comes from Python as a named tuple, in the tuple's order: a std::tuple of pointers.
 template <class S>
-struct Fields;
+inline constexpr auto members_of = nullptr;
 
 template <class S>
-concept ComesAsNamedTuple = requires { Fields<S>::members; };
+concept ComesAsNamedTuple = !std::is_null_pointer_v<std::remove_const_t<decltype(members_of<S>)>>;
 
 template <class M>
 struct Member;
@@ -204,12 +179,23 @@ struct Member<T S::*> {
 }  // namespace border
 }  // namespace fleet2d
 
+// nanobind's extension point for types of one's own.
 namespace nanobind::detail {
+
+// The array in signatures.
+template <class T>
+constexpr auto array_name =
+    const_name("numpy.typing.NDArray[numpy.") +
+    const_name<std::is_same_v<T, bool>>(
+        const_name("bool_"),
+        const_name<std::is_floating_point_v<T>>(const_name("float"), const_name<std::is_signed_v<T>>("int", "uint")) +
+            const_name<8 * sizeof(T)>()) +
+    const_name("]");
 
 template <class T, std::size_t N>
 struct type_caster<fleet2d::View<T, N>> {
     using V = fleet2d::View<T, N>;
-    NB_TYPE_CASTER(V, fleet2d::border::DataType<std::remove_const_t<T>>::name)
+    NB_TYPE_CASTER(V, array_name<std::remove_const_t<T>>)
     object copy;
 
     bool from_python(handle source, uint32_t, cleanup_list*) noexcept {
@@ -239,19 +225,27 @@ struct type_caster<std::optional<fleet2d::View<T, N>>> {
 template <class T, std::size_t N>
 struct type_caster<fleet2d::Array<T, N>> {
     using A = fleet2d::Array<T, N>;
-    NB_TYPE_CASTER(A, fleet2d::border::DataType<T>::name)
+    NB_TYPE_CASTER(A, array_name<T>)
 
     static handle from_cpp(A&& values, rv_policy, cleanup_list*) noexcept {
         return fleet2d::border::handed_over(std::move(values));
     }
 };
 
+template <class T, std::size_t N>
+struct type_caster<fleet2d::border::ReadOnly<T, N>> {
+    using R = fleet2d::border::ReadOnly<T, N>;
+    NB_TYPE_CASTER(R, array_name<T>)
+
+    static handle from_cpp(R&& borrowed, rv_policy, cleanup_list*) noexcept { return borrowed.array.release(); }
+};
+
 template <class S>
     requires fleet2d::border::ComesAsNamedTuple<S>
 struct type_caster<S> {
-    NB_TYPE_CASTER(S, fleet2d::border::Fields<S>::name)
+    NB_TYPE_CASTER(S, const_name("tuple[typing.Any, ...]"))
 
-    static constexpr auto members = fleet2d::border::Fields<S>::members;
+    static constexpr auto members = fleet2d::border::members_of<S>;
     static constexpr std::size_t count = std::tuple_size_v<decltype(members)>;
     template <class... M>
     static std::tuple<make_caster<typename fleet2d::border::Member<M>::Type>...> casters_of(std::tuple<M...>);

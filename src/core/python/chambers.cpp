@@ -1,8 +1,8 @@
 #include "../chambers.hpp"
 
 #include "arrays.hpp"
-#include "mesh.hpp"
 #include "line_of_sight.hpp"
+#include "mesh.hpp"
 #include "subjects.hpp"
 
 namespace fleet2d {

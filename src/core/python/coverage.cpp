@@ -9,27 +9,18 @@
 namespace fleet2d {
 
 template <>
-struct border::Fields<PoseCache> {
-    static constexpr auto name = nb::detail::const_name("tuple[typing.Any, ...]");
-    static constexpr auto members =
-        std::tuple(&PoseCache::pose, &PoseCache::last, &PoseCache::settled, &PoseCache::cells, &PoseCache::used);
-};
+inline constexpr auto border::members_of<PoseCache> =
+    std::tuple(&PoseCache::pose, &PoseCache::last, &PoseCache::settled, &PoseCache::cells, &PoseCache::used);
 
 template <>
-struct border::Fields<CoverageRecord> {
-    static constexpr auto name = nb::detail::const_name("tuple[typing.Any, ...]");
-    static constexpr auto members =
-        std::tuple(&CoverageRecord::first, &CoverageRecord::last, &CoverageRecord::exposure, &CoverageRecord::counted,
-                   &CoverageRecord::binned, &CoverageRecord::most);
-};
+inline constexpr auto border::members_of<CoverageRecord> =
+    std::tuple(&CoverageRecord::first, &CoverageRecord::last, &CoverageRecord::exposure, &CoverageRecord::counted,
+               &CoverageRecord::binned, &CoverageRecord::most);
 
 template <>
-struct border::Fields<CoverageSetup> {
-    static constexpr auto name = nb::detail::const_name("tuple[typing.Any, ...]");
-    static constexpr auto members =
-        std::tuple(&CoverageSetup::walls, &CoverageSetup::lenses, &CoverageSetup::patch_of_cell,
-                   &CoverageSetup::step_us, &CoverageSetup::every, &CoverageSetup::bin_steps);
-};
+inline constexpr auto border::members_of<CoverageSetup> =
+    std::tuple(&CoverageSetup::walls, &CoverageSetup::lenses, &CoverageSetup::patch_of_cell, &CoverageSetup::step_us,
+               &CoverageSetup::every, &CoverageSetup::bin_steps);
 
 namespace {
 

@@ -4,8 +4,6 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
-#include <cstddef>
 
 #include "lens.hpp"
 #include "mesh.hpp"
@@ -16,22 +14,18 @@
 namespace fleet2d {
 
 template <>
-struct border::Fields<SightMemory> {
-    static constexpr auto name = nb::detail::const_name("tuple[typing.Any, ...]");
-    static constexpr auto members = std::tuple(&SightMemory::noticed, &SightMemory::seen, &SightMemory::about,
-                                               &SightMemory::backlog, &SightMemory::waiting);
-};
+inline constexpr auto border::members_of<SightMemory> = std::tuple(
+    &SightMemory::noticed, &SightMemory::seen, &SightMemory::about, &SightMemory::backlog, &SightMemory::waiting);
 template <>
-struct border::Fields<DetectionRule> {
-    static constexpr auto name = nb::detail::const_name("tuple[typing.Any, ...]");
-    static constexpr auto members =
-        std::tuple(&DetectionRule::patience, &DetectionRule::step_us, &DetectionRule::start_us, &DetectionRule::burst,
-                   &DetectionRule::stop_lost, &DetectionRule::stop_seen);
-};
+inline constexpr auto border::members_of<DetectionRule> =
+    std::tuple(&DetectionRule::patience, &DetectionRule::step_us, &DetectionRule::start_us, &DetectionRule::burst,
+               &DetectionRule::stop_lost, &DetectionRule::stop_seen);
 
 namespace {
 
 enum class SightingColumn : i64 {};
+constexpr i64 IDENTITY_COLUMN = 3;
+static_assert(SIGHTING_COLUMNS[IDENTITY_COLUMN].second == &Sighting::identity);
 
 constexpr i64 FARTHEST = 1 << 29;  // squares of distances stay inside 64 bits
 
@@ -69,11 +63,9 @@ void check_shown(View<const u64, 3> shown, const Lenses& lenses, const Window& w
 // Column by column, as they are read.
 Array<i64, 2> columns_of(const std::vector<Sighting>& sightings) {
     auto columns = Array<i64, 2>::empty({SIGHTING, static_cast<i64>(sightings.size())});
-    for (std::size_t row = 0; row < sightings.size(); ++row) {
-        const auto numbers = std::bit_cast<std::array<i64, SIGHTING>>(sightings[row]);
-        for (std::size_t column = 0; column < SIGHTING; ++column) {
-            columns(static_cast<i64>(column), static_cast<i64>(row)) = numbers[column];
-        }
+    i64 column = 0;
+    for (const auto& [_, member] : SIGHTING_COLUMNS) {
+        std::ranges::transform(sightings, columns[column++].begin(), member);
     }
     return columns;
 }
@@ -102,7 +94,7 @@ void check_memory(const SightMemory& memory, const Lenses& lenses, const ErrorTa
         require(0 <= begin && begin < std::max(rows, i64{1}) && 0 <= length && length <= rows,
                 "waiting must lie in the backlog");
         for (i64 i = 0; i < length; ++i) {
-            const i64 identity = memory.backlog(c, (begin + i) % rows, offsetof(Sighting, identity) / sizeof(i64));
+            const i64 identity = memory.backlog(c, (begin + i) % rows, IDENTITY_COLUMN);
             require(NOBODY <= identity && identity < users, "backlog must hold numbers of users, or NOBODY");
         }
     }
@@ -111,23 +103,15 @@ void check_memory(const SightMemory& memory, const Lenses& lenses, const ErrorTa
 }  // namespace
 
 void bind_detections(nb::module_& m) {
-    const auto column = [](std::size_t offset) { return static_cast<SightingColumn>(offset / sizeof(i64)); };
-    nb::enum_<SightingColumn>(m, "SightingColumn", nb::is_arithmetic(), R"(The columns of a row of sightings.
+    auto columns =
+        nb::enum_<SightingColumn>(m, "SightingColumn", nb::is_arithmetic(), R"(The columns of a row of sightings.
 
-Where a camera was wrong about a person, USER is NOBODY; where it didn't recognize one, IDENTITY
-is. X to POSTURE are as perceived.)")
-        .value("STEP", column(offsetof(Sighting, step)), "When it becomes known.")
-        .value("CAMERA", column(offsetof(Sighting, camera)))
-        .value("USER", column(offsetof(Sighting, user)))
-        .value("IDENTITY", column(offsetof(Sighting, identity)))
-        .value("X", column(offsetof(Sighting, x)), "Lattice units.")
-        .value("Y", column(offsetof(Sighting, y)))
-        .value("HEADING", column(offsetof(Sighting, heading)), "1/4096 turn.")
-        .value("POSTURE", column(offsetof(Sighting, posture)), "0 stands, 1 sits, 2 lies.")
-        .value("TRUE_X", column(offsetof(Sighting, true_x)))
-        .value("TRUE_Y", column(offsetof(Sighting, true_y)))
-        .value("TRUE_HEADING", column(offsetof(Sighting, true_heading)))
-        .value("TRUE_POSTURE", column(offsetof(Sighting, true_posture)));
+STEP is when it becomes known. Where a camera was wrong about a person, USER is NOBODY; where it
+didn't recognize one, IDENTITY is. X to POSTURE are as perceived: lattice units, 1/4096 turn, and 0
+for standing, 1 sitting, 2 lying.)");
+    for (std::size_t i = 0; i < SIGHTING_COLUMNS.size(); ++i) {
+        columns.value(SIGHTING_COLUMNS[i].first, static_cast<SightingColumn>(i));
+    }
     m.attr("USER_LOST") = static_cast<i64>(SightEvent::LOST);
     m.attr("USER_SEEN") = static_cast<i64>(SightEvent::SEEN);
 

@@ -13,10 +13,7 @@ struct Chains {
 };
 
 template <>
-struct border::Fields<Chains> {
-    static constexpr auto name = nb::detail::const_name("tuple[typing.Any, ...]");
-    static constexpr auto members = std::tuple(&Chains::places, &Chains::bins, &Chains::begin);
-};
+inline constexpr auto border::members_of<Chains> = std::tuple(&Chains::places, &Chains::bins, &Chains::begin);
 
 namespace {
 

@@ -11,7 +11,7 @@ void bind_headings(nb::module_& m) {
     m.attr("QUARTER") = QUARTER;
     m.attr("UNIT") = UNIT;
     // UNIT * sine of i / 8192 of a turn, for a quarter turn: int64 (2049,).
-    m.attr("SINES") = border::borrowed(View<const i64>(SINES.data(), {2 * QUARTER + 1}), nb::none());
+    m.attr("SINES") = border::borrowed(View<const i64>(SINES.data(), {2 * QUARTER + 1}), nb::none()).array;
 
     m.def("half_sine", &half_sine, "half"_a, "Return UNIT * sine of `half` / 8192 of a turn.");
     m.def("sine", &sine, "heading"_a, "Return UNIT * sine of a heading (any integer).");

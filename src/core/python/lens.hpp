@@ -7,14 +7,10 @@
 namespace fleet2d {
 
 template <>
-struct border::Fields<Lenses> {
-    static constexpr auto name = nb::detail::const_name("tuple[typing.Any, ...]");
-    static constexpr auto members =
-        std::tuple(&Lenses::near_squared, &Lenses::far_squared, &Lenses::half_angle, &Lenses::chance, &Lenses::moves,
-                   &Lenses::forward, &Lenses::left, &Lenses::heading, &Lenses::pans, &Lenses::pan_count,
-                   &Lenses::pan_us, &Lenses::period, &Lenses::latency, &Lenses::errs, &Lenses::points, &Lenses::bodies,
-                   &Lenses::reach, &Lenses::widest);
-};
+inline constexpr auto border::members_of<Lenses> = std::tuple(
+    &Lenses::near_squared, &Lenses::far_squared, &Lenses::half_angle, &Lenses::chance, &Lenses::moves, &Lenses::forward,
+    &Lenses::left, &Lenses::heading, &Lenses::pans, &Lenses::pan_count, &Lenses::pan_us, &Lenses::period,
+    &Lenses::latency, &Lenses::errs, &Lenses::points, &Lenses::bodies, &Lenses::reach, &Lenses::widest);
 
 // All arrays must be of one set of cameras (and users).
 inline void check_lenses(const Lenses& lenses) {

@@ -74,20 +74,14 @@ Args:
 Raises:
     ValueError: An array has another shape, or a number in it is none of a vertex or triangle.)")
         .def(nb::init<Vertices, Triangles, Triangles>(), "vertices"_a, "triangles"_a, "neighbors"_a)
-        .def_prop_ro("vertices", read_only<&Mesh::vertices>(),
-                     nb::sig("def vertices(self) -> numpy.typing.NDArray[numpy.int64]"),
-                     "int64 (n, 2), lattice units, sorted by (x, y).")
+        .def_prop_ro("vertices", read_only<&Mesh::vertices>(), "int64 (n, 2), lattice units, sorted by (x, y).")
         .def_prop_ro("triangles", read_only<&Mesh::triangles>(),
-                     nb::sig("def triangles(self) -> numpy.typing.NDArray[numpy.int32]"),
                      "int32 (t, 3), numbers of vertices, counter-clockwise.")
         .def_prop_ro("neighbors", read_only<&Mesh::neighbors>(),
-                     nb::sig("def neighbors(self) -> numpy.typing.NDArray[numpy.int32]"),
                      "int32 (t, 3), the triangle across edge k (vertex k to vertex k + 1), -1 for a wall.")
         .def_prop_ro("bucket_start", read_only<&Mesh::bucket_start>(),
-                     nb::sig("def bucket_start(self) -> numpy.typing.NDArray[numpy.int32]"),
                      "int32 (rows * columns + 1,), where each square bucket begins in `bucket_triangles`.")
         .def_prop_ro("bucket_triangles", read_only<&Mesh::bucket_triangles>(),
-                     nb::sig("def bucket_triangles(self) -> numpy.typing.NDArray[numpy.int32]"),
                      "int32, the triangles that overlap each square bucket, ascending.")
         .def_prop_ro(
             "bucket_columns", [](const OwnedMesh& self) { return self.mesh().bucket_columns; },

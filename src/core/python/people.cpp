@@ -6,26 +6,19 @@
 namespace fleet2d {
 
 template <>
-struct border::Fields<PeopleModel> {
-    static constexpr auto name = nb::detail::const_name("tuple[typing.Any, ...]");
-    static constexpr auto members = std::tuple(&PeopleModel::stay, &PeopleModel::follow, &PeopleModel::spread,
-                                               &PeopleModel::restless, &PeopleModel::first, &PeopleModel::detection);
-};
+inline constexpr auto border::members_of<PeopleModel> =
+    std::tuple(&PeopleModel::stay, &PeopleModel::follow, &PeopleModel::spread, &PeopleModel::restless,
+               &PeopleModel::first, &PeopleModel::detection);
 
 template <>
-struct border::Fields<DayEvidence> {
-    static constexpr auto name = nb::detail::const_name("tuple[typing.Any, ...]");
-    static constexpr auto members =
-        std::tuple(&DayEvidence::minute, &DayEvidence::view, &DayEvidence::views, &DayEvidence::begin,
-                   &DayEvidence::bin, &DayEvidence::patch, &DayEvidence::steps);
-};
+inline constexpr auto border::members_of<DayEvidence> =
+    std::tuple(&DayEvidence::minute, &DayEvidence::view, &DayEvidence::views, &DayEvidence::begin, &DayEvidence::bin,
+               &DayEvidence::patch, &DayEvidence::steps);
 
 template <>
-struct border::Fields<PeopleMoments> {
-    static constexpr auto name = nb::detail::const_name("tuple[typing.Any, ...]");
-    static constexpr auto members = std::tuple(&PeopleMoments::time, &PeopleMoments::exits, &PeopleMoments::arrivals,
-                                               &PeopleMoments::moves, &PeopleMoments::rests);
-};
+inline constexpr auto border::members_of<PeopleMoments> =
+    std::tuple(&PeopleMoments::time, &PeopleMoments::exits, &PeopleMoments::arrivals, &PeopleMoments::moves,
+               &PeopleMoments::rests);
 
 namespace {
 

@@ -5,6 +5,8 @@
 namespace fleet2d {
 namespace {
 
+enum class TablePart : i64 {};
+
 // The table of one of the cameras.
 View<const i64> table_of(View<const i64, 2> tables, i64 camera) {
     require(0 <= camera && camera < tables.size(), "there is no such camera");
@@ -28,23 +30,24 @@ void bind_perception(nb::module_& m) {
     m.attr("MOST_GHOSTS") = MOST_GHOSTS;
     m.attr("NOBODY") = NOBODY;
     m.attr("BINS") = BINS;
-    m.attr("AT_DISTANCE") = AT_DISTANCE;
-    m.attr("AT_BEARING") = AT_BEARING;
-    m.attr("AT_FACING") = AT_FACING;
-    m.attr("AT_POSTURE") = AT_POSTURE;
-    m.attr("AT_SHOWN") = AT_SHOWN;
-    m.attr("AT_LIGHT") = AT_LIGHT;
-    m.attr("AT_STAY") = AT_STAY;
-    m.attr("AT_RIGHT") = AT_RIGHT;
-    m.attr("AT_MISTAKEN") = AT_MISTAKEN;
-    m.attr("AT_SEEMS") = AT_SEEMS;
-    m.attr("SHIFT") = SHIFT;
-    m.attr("KEEPS") = KEEPS;
-    m.attr("RANGE_NOISE") = RANGE_NOISE;
-    m.attr("RANGE_SHARE") = RANGE_SHARE;
-    m.attr("BEARING_NOISE") = BEARING_NOISE;
-    m.attr("HEADING_NOISE") = HEADING_NOISE;
     m.attr("TABLE") = TABLE;
+    nb::enum_<TablePart>(m, "TablePart", nb::is_arithmetic(), "The first entry of each part of a camera's table.")
+        .value("DISTANCE", TablePart{AT_DISTANCE}, "Factor to notice a user, by bin of the distance [2**-31].")
+        .value("BEARING", TablePart{AT_BEARING}, "By 1/4096 turn left of the optical axis, + HALF_TURN.")
+        .value("FACING", TablePart{AT_FACING}, "By how far the user is turned away from the camera.")
+        .value("POSTURE", TablePart{AT_POSTURE}, "By the user's posture.")
+        .value("SHOWN", TablePart{AT_SHOWN}, "By the number of the body's points in view.")
+        .value("LIGHT", TablePart{AT_LIGHT}, "By the minute of the day.")
+        .value("STAY", TablePart{AT_STAY}, "That attention outlasts 2**i steps.")
+        .value("RIGHT", TablePart{AT_RIGHT}, "That a user is recognized, by bin of the distance.")
+        .value("MISTAKEN", TablePart{AT_MISTAKEN}, "That a user is mistaken for another one, likewise.")
+        .value("SEEMS", TablePart{AT_SEEMS}, "The perceived posture by the true one, cumulative.")
+        .value("SHIFT", TablePart{SHIFT}, "A distance of d lattice units is in bin d >> SHIFT.")
+        .value("KEEPS", TablePart{KEEPS}, "1 if an identity lasts as long as the user is tracked.")
+        .value("RANGE_NOISE", TablePart{RANGE_NOISE}, "2**-16 lattice units per unit of random_bell.")
+        .value("RANGE_SHARE", TablePart{RANGE_SHARE}, "The same per lattice unit of distance, times 2**16.")
+        .value("BEARING_NOISE", TablePart{BEARING_NOISE}, "2**-16 / 8192 of a turn per unit of random_bell.")
+        .value("HEADING_NOISE", TablePart{HEADING_NOISE}, "2**-16 headings per unit of random_bell.");
 
     nb::enum_<UserDraw>(m, "UserDraw", nb::is_arithmetic(),
                         "What each draw about one user decides: the last axis of `ErrorTables.keys`.")

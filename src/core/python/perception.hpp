@@ -7,13 +7,9 @@
 namespace fleet2d {
 
 template <>
-struct border::Fields<ErrorTables> {
-    static constexpr auto name = nb::detail::const_name("tuple[typing.Any, ...]");
-    static constexpr auto members =
-        std::tuple(&ErrorTables::table, &ErrorTables::confusion, &ErrorTables::has_ghosts, &ErrorTables::ghosts,
-                   &ErrorTables::source, &ErrorTables::spot, &ErrorTables::looks_like, &ErrorTables::keys,
-                   &ErrorTables::ghost_keys, &ErrorTables::injected);
-};
+inline constexpr auto border::members_of<ErrorTables> = std::tuple(
+    &ErrorTables::table, &ErrorTables::confusion, &ErrorTables::has_ghosts, &ErrorTables::ghosts, &ErrorTables::source,
+    &ErrorTables::spot, &ErrorTables::looks_like, &ErrorTables::keys, &ErrorTables::ghost_keys, &ErrorTables::injected);
 
 // A camera's table as far as it decides where another entry is read.
 inline void check_table(View<const i64> table) {

@@ -1,21 +1,23 @@
 #include "../points.hpp"
 
 #include "lens.hpp"
+#include "line_of_sight.hpp"
 #include "mesh.hpp"
 #include "poses.hpp"
-#include "line_of_sight.hpp"
 #include "subjects.hpp"
 
 namespace fleet2d {
 namespace {
 
-// One query a row, in the order of its members.
-Array<i64, 2> rows_of(const std::vector<ViewQuery>& view_queries) {
-    auto rows = Array<i64, 2>::empty({static_cast<i64>(view_queries.size()), 7});
-    i64 count = 0;
-    for (const ViewQuery& q : view_queries) {
-        const i64 row[] = {q.camera, q.body, q.eye_x, q.eye_y, q.eye_heading, q.body_x, q.body_y};
-        std::copy_n(row, 7, rows[count++].begin());
+enum class ViewQueryColumn : i64 {};
+
+Array<i64, 2> rows_of(const std::vector<ViewQuery>& queries) {
+    auto rows = Array<i64, 2>::empty({static_cast<i64>(queries.size()), VIEW_QUERY_COLUMNS.size()});
+    for (i64 row = 0; row < rows.size(); ++row) {
+        i64 column = 0;
+        for (const auto& [_, member] : VIEW_QUERY_COLUMNS) {
+            rows(row, column++) = queries[static_cast<std::size_t>(row)].*member;
+        }
     }
     return rows;
 }
@@ -23,6 +25,12 @@ Array<i64, 2> rows_of(const std::vector<ViewQuery>& view_queries) {
 }  // namespace
 
 void bind_points(nb::module_& m) {
+    auto columns = nb::enum_<ViewQueryColumn>(m, "ViewQueryColumn", nb::is_arithmetic(),
+                                              "The columns of a query of `view_queries`: the pose of the camera, the "
+                                              "centre of the body.");
+    for (std::size_t i = 0; i < VIEW_QUERY_COLUMNS.size(); ++i) {
+        columns.value(VIEW_QUERY_COLUMNS[i].first, static_cast<ViewQueryColumn>(i));
+    }
     m.def(
         "points_in_sight",
         [](const Mesh& mesh, i64 x, i64 y, View<const i64, 2> points) {

@@ -7,10 +7,7 @@
 namespace fleet2d {
 
 template <>
-struct border::Fields<Poses> {
-    static constexpr auto name = nb::detail::const_name("tuple[typing.Any, ...]");
-    static constexpr auto members = std::tuple(&Poses::x, &Poses::y, &Poses::heading, &Poses::away);
-};
+inline constexpr auto border::members_of<Poses> = std::tuple(&Poses::x, &Poses::y, &Poses::heading, &Poses::away);
 
 inline void check_poses(const Poses& poses) {
     const i64 steps = poses.x.size();

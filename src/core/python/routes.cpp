@@ -7,10 +7,8 @@
 namespace fleet2d {
 
 template <>
-struct border::Fields<Corners> {
-    static constexpr auto name = nb::detail::const_name("tuple[typing.Any, ...]");
-    static constexpr auto members = std::tuple(&Corners::vertex, &Corners::before, &Corners::after, &Corners::simple);
-};
+inline constexpr auto border::members_of<Corners> =
+    std::tuple(&Corners::vertex, &Corners::before, &Corners::after, &Corners::simple);
 
 Routes::Routes(nb::handle_t<OwnedMesh> mesh, const Corners& corners)
     : owner_(nb::borrow(mesh)), mesh_(nb::cast<const OwnedMesh&>(mesh).mesh()) {
@@ -71,14 +69,9 @@ Ties go to the corner that is lower by (x, y), so the path depends on the walls 
 Returns:
     None where there is no way, or an end isn't strictly inside the space.)")
         .def_prop_ro("leg_start", read_only<&RouteGraph::leg_start>(),
-                     nb::sig("def leg_start(self) -> numpy.typing.NDArray[numpy.int32]"),
                      "int32 (corners + 1,), where the legs from each corner begin in `leg_end`.")
-        .def_prop_ro("leg_end", read_only<&RouteGraph::leg_end>(),
-                     nb::sig("def leg_end(self) -> numpy.typing.NDArray[numpy.int32]"),
-                     "int32 (legs,), the corner that each leads to.")
-        .def_prop_ro("leg_length", read_only<&RouteGraph::leg_length>(),
-                     nb::sig("def leg_length(self) -> numpy.typing.NDArray[numpy.float64]"),
-                     "float64 (legs,) [lattice units].")
+        .def_prop_ro("leg_end", read_only<&RouteGraph::leg_end>(), "int32 (legs,), the corner that each leads to.")
+        .def_prop_ro("leg_length", read_only<&RouteGraph::leg_length>(), "float64 (legs,) [lattice units].")
         .def("__getstate__", &state_of, nb::sig("def __getstate__(self) -> tuple[typing.Any, ...]"))
         .def("__setstate__", [](Routes& self, std::tuple<nb::handle_t<OwnedMesh>, Corners> state) {
             new (&self) Routes(std::get<0>(state), std::get<1>(state));

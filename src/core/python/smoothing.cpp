@@ -6,11 +6,8 @@
 namespace fleet2d {
 
 template <>
-struct border::Fields<Moments> {
-    static constexpr auto name = nb::detail::const_name("tuple[typing.Any, ...]");
-    static constexpr auto members =
-        std::tuple(&Moments::time, &Moments::exits, &Moments::arrivals, &Moments::moves, &Moments::rests);
-};
+inline constexpr auto border::members_of<Moments> =
+    std::tuple(&Moments::time, &Moments::exits, &Moments::arrivals, &Moments::moves, &Moments::rests);
 
 void bind_smoothing(nb::module_& m) {
     m.def(

@@ -7,18 +7,13 @@
 namespace fleet2d {
 
 template <>
-struct border::Fields<Stretches> {
-    static constexpr auto name = nb::detail::const_name("tuple[typing.Any, ...]");
-    static constexpr auto members = std::tuple(&Stretches::bins, &Stretches::view, &Stretches::views, &Stretches::begin,
-                                               &Stretches::patch, &Stretches::share);
-};
+inline constexpr auto border::members_of<Stretches> = std::tuple(
+    &Stretches::bins, &Stretches::view, &Stretches::views, &Stretches::begin, &Stretches::patch, &Stretches::share);
 
 template <>
-struct border::Fields<StayModel> {
-    static constexpr auto name = nb::detail::const_name("tuple[typing.Any, ...]");
-    static constexpr auto members = std::tuple(&StayModel::stay, &StayModel::follow, &StayModel::spread,
-                                               &StayModel::restless, &StayModel::first, &StayModel::detection);
-};
+inline constexpr auto border::members_of<StayModel> =
+    std::tuple(&StayModel::stay, &StayModel::follow, &StayModel::spread, &StayModel::restless, &StayModel::first,
+               &StayModel::detection);
 
 // All arrays must be of one person.
 inline void check_model(const StayModel& model) {

@@ -20,15 +20,24 @@ Array<T> array_of(const std::vector<T>& values) {
 constexpr i64 FAR = i64{1} << 29;  // where a random walk is, and its headings, are nearer to 0
 constexpr const char* NO_STATE = "this is no state of timelines";
 
-// A part of a state, and what had to be copied of it.
+// A part of a state that isn't an array.
 template <class T>
-class Part {
+T part(nb::handle source) {
+    T value{};
+    require(nb::try_cast(source, value), NO_STATE);
+    return value;
+}
+
+// A part that is an array, and what had to be copied of it.
+template <class T>
+class ArrayPart {
 public:
-    explicit Part(nb::handle source) { require(caster_.from_python(source, 0, nullptr), NO_STATE); }
-    T value() const { return caster_.value; }
+    explicit ArrayPart(nb::handle source) { require(border::view_of(source, view_, copy_), NO_STATE); }
+    operator View<const T>() const { return view_; }
 
 private:
-    nb::detail::make_caster<T> caster_;
+    View<const T> view_;
+    nb::object copy_;
 };
 
 // Timelines, and the meshes that their random walks need.
@@ -199,28 +208,31 @@ private:
     void restore_piece(i64 body, nb::tuple state) {
         const bool is_track = state.size() == 4;
         require(is_track || state.size() == 8, NO_STATE);
-        const Part<i64> first(state[0]);
+        const i64 first = part<i64>(state[0]);
         if (is_track) {
-            const Part<Breakpoints> track(state[1]);
-            const Part<View<const i64>> posture_us(state[2]);
-            const Part<View<const i8>> postures(state[3]);
-            follow(body, first.value(), track.value(), posture_us.value(), postures.value());
+            const auto track = part<nb::tuple>(state[1]);
+            require(track.size() == 5, NO_STATE);
+            const ArrayPart<i64> time(track[0]), x(track[1]), y(track[2]), heading(track[3]), posture_us(state[2]);
+            const ArrayPart<u8> away(track[4]);
+            const ArrayPart<i8> postures(state[3]);
+            follow(body, first, {time, x, y, heading, away}, posture_us, postures);
             return;
         }
-        const Part<WalkRule> rule(state[3]);
-        const Part<i64> drawn_from(state[4]);
-        const Part<View<const i32>> xs(state[5]), ys(state[6]), headings(state[7]);
-        const View<const i32> x = xs.value(), y = ys.value(), heading = headings.value();
+        const auto [key, stride, sway, turn_limit, stays] = part<std::tuple<u64, i64, i64, i64, i64>>(state[3]);
+        const i64 drawn_from = part<i64>(state[4]);
+        const ArrayPart<i32> xs(state[5]), ys(state[6]), headings(state[7]);
+        const View<const i32> x = xs, y = ys, heading = headings;
         require(x.size() > 0 && x.size() == y.size() && x.size() == heading.size(),
                 "a walk's poses must have one length");
         for (const View<const i32> values : {x, y, heading}) require(all_in_range(values, -FAR + 1, FAR), NO_STATE);
         // Only of the first piece that a body has may the beginning be forgotten.
         const bool is_first = timelines_.pieces(body).empty();
-        require(is_first ? first.value() <= drawn_from.value() : first.value() == drawn_from.value(), NO_STATE);
-        check(body, drawn_from.value());
-        walk(body, first.value(), nb::borrow(state[1]), nb::borrow(state[2]), rule.value(), {x[0], y[0], heading[0]});
+        require(is_first ? first <= drawn_from : first == drawn_from, NO_STATE);
+        check(body, drawn_from);
+        walk(body, first, nb::borrow(state[1]), nb::borrow(state[2]), {key, stride, sway, turn_limit, stays},
+             {x[0], y[0], heading[0]});
         WalkPiece& walk = *timelines_.pieces(body).back().walk;
-        walk.drawn_from = drawn_from.value();
+        walk.drawn_from = drawn_from;
         walk.x = copied(x), walk.y = copied(y), walk.heading = copied(heading);
     }
 
@@ -332,21 +344,13 @@ Args:
             "first"_a, "x"_a, "y"_a, "heading"_a, "away"_a, "posture"_a)
         .def_ro("first", &OwnedWindow::first, "The first step.")
         .def_ro("end", &OwnedWindow::end, "One past the last step.")
-        .def_prop_ro("start", column<&Window::start>(), nb::sig("def start(self) -> numpy.typing.NDArray[numpy.int64]"),
-                     "int64 (bodies + 1,), the first run of each body.")
-        .def_prop_ro("step", column<&Window::step>(), nb::sig("def step(self) -> numpy.typing.NDArray[numpy.int64]"),
-                     "int64 (runs,), the step at which each begins.")
-        .def_prop_ro("x", column<&Window::x>(), nb::sig("def x(self) -> numpy.typing.NDArray[numpy.int64]"),
-                     "int64 (runs,), lattice units.")
-        .def_prop_ro("y", column<&Window::y>(), nb::sig("def y(self) -> numpy.typing.NDArray[numpy.int64]"),
-                     "int64 (runs,), lattice units.")
-        .def_prop_ro("heading", column<&Window::heading>(),
-                     nb::sig("def heading(self) -> numpy.typing.NDArray[numpy.int64]"), "int64 (runs,), 1/4096 turn.")
-        .def_prop_ro("away", column<&Window::away>(), nb::sig("def away(self) -> numpy.typing.NDArray[numpy.uint8]"),
-                     "uint8 (runs,), not 0 while the body isn't at home.")
-        .def_prop_ro("posture", column<&Window::posture>(),
-                     nb::sig("def posture(self) -> numpy.typing.NDArray[numpy.int8]"),
-                     "int8 (runs,), number of the posture.")
+        .def_prop_ro("start", column<&Window::start>(), "int64 (bodies + 1,), the first run of each body.")
+        .def_prop_ro("step", column<&Window::step>(), "int64 (runs,), the step at which each begins.")
+        .def_prop_ro("x", column<&Window::x>(), "int64 (runs,), lattice units.")
+        .def_prop_ro("y", column<&Window::y>(), "int64 (runs,), lattice units.")
+        .def_prop_ro("heading", column<&Window::heading>(), "int64 (runs,), 1/4096 turn.")
+        .def_prop_ro("away", column<&Window::away>(), "uint8 (runs,), not 0 while the body isn't at home.")
+        .def_prop_ro("posture", column<&Window::posture>(), "int8 (runs,), number of the posture.")
         .def(
             "dense",
             [](const OwnedWindow& self, i64 body, i64 first, i64 end) { return dense(self.view(), body, first, end); },
@@ -403,11 +407,11 @@ Args:
             "__setstate__",
             [](OwnedTimelines& self, nb::tuple state) {
                 require(state.size() == 3, NO_STATE);
-                const i64 bodies = Part<i64>{state[0]}.value();
+                const i64 bodies = part<i64>(state[0]);
                 // Checked before so many are made room for.
                 require(nb::isinstance<nb::list>(state[2]) && static_cast<i64>(nb::len(nb::handle(state[2]))) == bodies,
                         NO_STATE);
-                OwnedTimelines result(bodies, Part<i64>{state[1]}.value());
+                OwnedTimelines result(bodies, part<i64>(state[1]));
                 result.restore(nb::borrow<nb::list>(state[2]));
                 new (&self) OwnedTimelines(std::move(result));
             },

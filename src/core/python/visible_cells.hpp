@@ -7,10 +7,8 @@
 namespace fleet2d {
 
 template <>
-struct border::Fields<Reach> {
-    static constexpr auto name = nb::detail::const_name("tuple[typing.Any, ...]");
-    static constexpr auto members = std::tuple(&Reach::near_squared, &Reach::far_squared, &Reach::half_angle);
-};
+inline constexpr auto border::members_of<Reach> =
+    std::tuple(&Reach::near_squared, &Reach::far_squared, &Reach::half_angle);
 
 inline void check_reach(const Reach& reach) {
     constexpr i64 limit = i64{1} << 52;

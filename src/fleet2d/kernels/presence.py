@@ -9,41 +9,23 @@ from typing import NamedTuple
 
 import numpy as np
 
+# Names that are imported as themselves are part of this module.
+# isort: off
 from fleet2d._core import (
-    WHOLE_PATCH,
-    advance,
-    earth_mover,
-    follow,
-    follow_people,
-    gather_views,
-    list_sightings,
-    resampled,
-    smooth,
-    smooth_people,
-    sum_places,
+    advance as advance,
+    earth_mover as earth_mover,
+    follow as follow,
+    follow_people as follow_people,
+    gather_views as gather_views,
+    list_sightings as list_sightings,
+    resampled as resampled,
+    smooth_people as smooth_people,
+    sum_places as sum_places,
 )
+# isort: on
+
 from fleet2d._core import merge_bins as merge_bin_arrays
 from fleet2d.kernels import F64, I64, U8
-
-__all__ = [
-    "WHOLE_PATCH",
-    "Moments",
-    "PeopleEvidence",
-    "PeoplePlaces",
-    "StayModel",
-    "Stretches",
-    "advance",
-    "earth_mover",
-    "follow",
-    "follow_people",
-    "gather_views",
-    "list_sightings",
-    "merge_bins",
-    "resampled",
-    "smooth",
-    "smooth_people",
-    "sum_places",
-]
 
 
 class Stretches(NamedTuple):

@@ -20,177 +20,52 @@ pose is cached: the number of cells of each room, and the last step at which the
 The cells themselves are computed again when the last steps are needed.
 """
 
-from enum import IntEnum
 from typing import NamedTuple
 
 import numpy as np
 
+# Names that are imported as themselves are part of this module.
+# isort: off
 from fleet2d._core import (
-    AT_BEARING,
-    AT_DISTANCE,
-    AT_FACING,
-    AT_LIGHT,
-    AT_MISTAKEN,
-    AT_POSTURE,
-    AT_RIGHT,
-    AT_SEEMS,
-    AT_SHOWN,
-    AT_STAY,
-    BEARING_NOISE,
-    BINS,
-    DOUBLINGS,
-    FORCED_IDENTITY,
-    FORCED_MISS,
-    HEADING_NOISE,
-    KEEPS,
-    MINUTES,
-    MOST_GHOSTS,
-    NEVER,
-    NOBODY,
-    ONE,
-    POSTURES,
-    RANGE_NOISE,
-    RANGE_SHARE,
-    SHIFT,
-    TABLE,
-    USER_LOST,
-    USER_SEEN,
-    About,
-    GhostDraw,
-    Mesh,
-    SightingColumn,
-    UserDraw,
-    build_fans,
-    camera_pose,
-    cells_in_view,
-    detect,
-    distance_bin,
-    hides,
-    in_wedge,
-    length,
-    line_of_sight,
-    mark_spans,
-    near_wedge,
-    notice_chance,
-    perceived_offset,
-    perceived_posture,
-    persistence_chance,
-    pick,
-    points_in_reach,
-    points_in_sight,
-    points_in_view,
-    random_share,
-    random_shares,
-    record_coverage,
-    region_contains,
-    region_contains_points,
-    region_outline,
-    regions_of_cells,
-    settle_coverage,
-    steady_chance,
-    turn_and_stretch,
-    vertices_seen_from_point,
-    vertices_seen_from_vertex,
-    view_queries,
-    visible_region,
+    About as About,
+    BINS as BINS,
+    camera_pose as camera_pose,
+    cells_in_view as cells_in_view,
+    detect as detect,
+    DOUBLINGS as DOUBLINGS,
+    FORCED_IDENTITY as FORCED_IDENTITY,
+    FORCED_MISS as FORCED_MISS,
+    GhostDraw as GhostDraw,
+    line_of_sight as line_of_sight,
+    mark_spans as mark_spans,
+    MINUTES as MINUTES,
+    MOST_GHOSTS as MOST_GHOSTS,
+    NEVER as NEVER,
+    NOBODY as NOBODY,
+    ONE as ONE,
+    points_in_reach as points_in_reach,
+    points_in_sight as points_in_sight,
+    random_shares as random_shares,
+    record_coverage as record_coverage,
+    region_contains_points as region_contains_points,
+    region_outline as region_outline,
+    regions_of_cells as regions_of_cells,
+    settle_coverage as settle_coverage,
+    SightingColumn as SightingColumn,
+    TABLE as TABLE,
+    TablePart as TablePart,
+    USER_LOST as USER_LOST,
+    USER_SEEN as USER_SEEN,
+    UserDraw as UserDraw,
+    view_queries as view_queries,
+    ViewQueryColumn as ViewQueryColumn,
+    visible_region as visible_region,
 )
+# isort: on
+
+from fleet2d._core import Mesh
 from fleet2d.kernels import I8, I16, I32, I64, U8, U64
 from fleet2d.kernels.numbers import TURN, turned
-
-__all__ = [
-    "AT_BEARING",
-    "AT_DISTANCE",
-    "AT_FACING",
-    "AT_LIGHT",
-    "AT_MISTAKEN",
-    "AT_POSTURE",
-    "AT_RIGHT",
-    "AT_SEEMS",
-    "AT_SHOWN",
-    "AT_STAY",
-    "BEARING_NOISE",
-    "BINS",
-    "DOUBLINGS",
-    "FORCED_IDENTITY",
-    "FORCED_MISS",
-    "HEADING_NOISE",
-    "KEEPS",
-    "MINUTES",
-    "MOST_GHOSTS",
-    "NEVER",
-    "NOBODY",
-    "ONE",
-    "POSTURES",
-    "RANGE_NOISE",
-    "RANGE_SHARE",
-    "SHIFT",
-    "TABLE",
-    "USER_LOST",
-    "USER_SEEN",
-    "About",
-    "CoverageRecord",
-    "CoverageSetup",
-    "DetectionRule",
-    "ErrorTables",
-    "GhostDraw",
-    "Lenses",
-    "PoseCache",
-    "Reach",
-    "SightEvents",
-    "SightMemory",
-    "SightingColumn",
-    "UserDraw",
-    "UserPoses",
-    "ViewQueryColumn",
-    "build_fans",
-    "camera_pose",
-    "camera_poses",
-    "cells_in_view",
-    "detect",
-    "distance_bin",
-    "empty_pose_cache",
-    "hides",
-    "in_wedge",
-    "length",
-    "line_of_sight",
-    "mark_spans",
-    "near_wedge",
-    "new_memory",
-    "notice_chance",
-    "perceived_offset",
-    "perceived_posture",
-    "persistence_chance",
-    "pick",
-    "points_in_reach",
-    "points_in_sight",
-    "points_in_view",
-    "random_share",
-    "random_shares",
-    "record_coverage",
-    "region_contains",
-    "region_contains_points",
-    "region_outline",
-    "regions_of_cells",
-    "settle_coverage",
-    "steady_chance",
-    "turn_and_stretch",
-    "vertices_seen_from_point",
-    "vertices_seen_from_vertex",
-    "view_queries",
-    "visible_region",
-]
-
-
-class ViewQueryColumn(IntEnum):
-    """The columns of a query of `view_queries`: the pose of the camera, the centre of the body."""
-
-    CAMERA = 0
-    BODY = 1
-    EYE_X = 2
-    EYE_Y = 3
-    EYE_HEADING = 4
-    BODY_X = 5
-    BODY_Y = 6
 
 
 class Lenses(NamedTuple):
@@ -252,7 +127,7 @@ class ErrorTables(NamedTuple):
     "Cumulative" tables hold in entry i the probability of all outcomes up to i.
     """
 
-    table: I64  # (cameras, TABLE): the parts AT_DISTANCE to HEADING_NOISE, one after the other
+    table: I64  # (cameras, TABLE): the parts of TablePart, one after the other
     confusion: I64  # (cameras, users, users): which user one is mistaken for, cumulative
     has_ghosts: I64  # (cameras,): 1 if there are false positives
     ghosts: I64  # (cameras, MOST_GHOSTS): number in one look, of all sources, cumulative

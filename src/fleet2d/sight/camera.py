@@ -27,31 +27,16 @@ from fleet2d.floorplan.objects import POSTURES
 from fleet2d.kernels import I64
 from fleet2d.kernels.numbers import BELL_STD, HALF_TURN, TURN, UNIT, cosine, sine
 from fleet2d.kernels.sight import (
-    AT_BEARING,
-    AT_DISTANCE,
-    AT_FACING,
-    AT_LIGHT,
-    AT_MISTAKEN,
-    AT_POSTURE,
-    AT_RIGHT,
-    AT_SEEMS,
-    AT_SHOWN,
-    AT_STAY,
-    BEARING_NOISE,
     BINS,
     DOUBLINGS,
-    HEADING_NOISE,
-    KEEPS,
     MINUTES,
     MOST_GHOSTS,
     ONE,
-    RANGE_NOISE,
-    RANGE_SHARE,
-    SHIFT,
     TABLE,
     ErrorTables,
     GhostDraw,
     Lenses,
+    TablePart,
     UserDraw,
 )
 from fleet2d.runtime.determinism import sum_in_order
@@ -313,7 +298,7 @@ def error_tables(
         if perception is not None:
             reach = lens.far + max((round(radius) + 2 for radius in context.radii), default=0)
             table = tables.table[c]
-            table[SHIFT] = max(0, reach.bit_length() - (BINS - 1).bit_length())
+            table[TablePart.SHIFT] = max(0, reach.bit_length() - (BINS - 1).bit_length())
             _fill_detection(table, lens, perception.detection, context)
             _fill_identity(table, tables.confusion[c], perception.identity, context)
             _fill_attributes(table, perception.attributes, context)
@@ -323,7 +308,7 @@ def error_tables(
 
 def _distances(table: I64, context: TableContext) -> list[float]:
     """Return the distance at the middle of each entry of the tables by distance [m]."""
-    width = 1 << int(table[SHIFT])
+    width = 1 << int(table[TablePart.SHIFT])
     return [(i + 0.5) * width / context.lattice.units_per_m for i in range(BINS)]
 
 
@@ -333,22 +318,22 @@ def _put(table: I64, at: int, values: Sequence[int] | I64) -> None:
 
 
 def _fill_detection(table: I64, lens: Lens, model: Detection, context: TableContext) -> None:
-    _put(table, AT_DISTANCE, model.distance.chances(_distances(table, context)))
+    _put(table, TablePart.DISTANCE, model.distance.chances(_distances(table, context)))
     angles = [360 * i / TURN for i in range(-HALF_TURN, HALF_TURN)]
     if not model.bearing.reaches_below_zero:
         angles = [abs(angle) for angle in angles]
-    _put(table, AT_BEARING, model.bearing.chances(angles))
+    _put(table, TablePart.BEARING, model.bearing.chances(angles))
     turns = [360 * i / TURN for i in range(HALF_TURN + 1)]
-    _put(table, AT_FACING, model.orientation.chances(turns))
-    _put(table, AT_POSTURE, [chance(model.posture.get(name, 1.0)) for name in POSTURES])
+    _put(table, TablePart.FACING, model.orientation.chances(turns))
+    _put(table, TablePart.POSTURE, [chance(model.posture.get(name, 1.0)) for name in POSTURES])
     count = lens.points + 1
     shares = [i / count for i in range(count + 1)]
-    _put(table, AT_SHOWN, model.visible_share.chances(shares))
+    _put(table, TablePart.SHOWN, model.visible_share.chances(shares))
     hours = [(minute + 0.5) / 60 for minute in range(MINUTES)]
-    _put(table, AT_LIGHT, model.light.around_the_clock().chances(hours))
+    _put(table, TablePart.LIGHT, model.light.around_the_clock().chances(hours))
     if model.memory:
         steps = Decimal(context.step_us) / micros(model.memory)
-        _put(table, AT_STAY, [chance(decay(steps * 2**i)) for i in range(DOUBLINGS)])
+        _put(table, TablePart.STAY, [chance(decay(steps * 2**i)) for i in range(DOUBLINGS)])
 
 
 def _fill_identity(table: I64, confusion: I64, model: Identity, context: TableContext) -> None:
@@ -362,9 +347,9 @@ def _fill_identity(table: I64, confusion: I64, model: Identity, context: TableCo
             f"{context.path}: perception.identity: at {distances[i]:.2f} m, right"
             f" ({right[i] / ONE:.3g}) and mistaken ({mistaken[i] / ONE:.3g}) add up to more than 1"
         )
-    _put(table, AT_RIGHT, right)
-    _put(table, AT_MISTAKEN, mistaken)
-    table[KEEPS] = model.per_track
+    _put(table, TablePart.RIGHT, right)
+    _put(table, TablePart.MISTAKEN, mistaken)
+    table[TablePart.KEEPS] = model.per_track
     _check_users(model.confusion, "confusion", context)
     for u, user in enumerate(context.users):
         others = model.confusion.get(user)
@@ -392,15 +377,15 @@ def _check_users(names: Mapping[str, object], key: str, context: TableContext) -
 
 def _fill_attributes(table: I64, model: Attributes, context: TableContext) -> None:
     per_bell = 65536 / BELL_STD
-    table[RANGE_NOISE] = round(model.range_noise * context.lattice.units_per_m * per_bell)
-    table[RANGE_SHARE] = round(model.range_noise_share * per_bell * 65536)
-    table[BEARING_NOISE] = round(model.bearing_noise_deg / 360 * 2 * TURN * per_bell)
-    table[HEADING_NOISE] = round(model.heading_noise_deg / 360 * TURN * per_bell)
+    table[TablePart.RANGE_NOISE] = round(model.range_noise * context.lattice.units_per_m * per_bell)
+    table[TablePart.RANGE_SHARE] = round(model.range_noise_share * per_bell * 65536)
+    table[TablePart.BEARING_NOISE] = round(model.bearing_noise_deg / 360 * 2 * TURN * per_bell)
+    table[TablePart.HEADING_NOISE] = round(model.heading_noise_deg / 360 * TURN * per_bell)
     for i, posture in enumerate(POSTURES):
         others: dict[str, float] = dict(model.posture.get(posture, {}).items())
         others[posture] = 1 - sum_in_order(others.values())
         sums = _whole(cumulative(others, POSTURES), others, POSTURES)
-        _put(table, AT_SEEMS + len(POSTURES) * i, sums)
+        _put(table, TablePart.SEEMS + len(POSTURES) * i, sums)
 
 
 def _fill_false_positives(

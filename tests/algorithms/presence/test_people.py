@@ -8,6 +8,7 @@ import pytest
 from tests.algorithms.presence.worlds import MONDAY, evidence_of, patch_evidence
 from tests.kernels.test_presence_stays import PATCHES, PLACES, ROOM, by_state, case, twin
 
+from fleet2d._core import smooth
 from fleet2d.algorithms.evidence import Evidence, SightingCounts
 from fleet2d.algorithms.presence.people import (
     STAY,
@@ -18,7 +19,7 @@ from fleet2d.algorithms.presence.people import (
     distinct,
     model_of,
 )
-from fleet2d.kernels.presence import Moments, Stretches, merge_bins, smooth
+from fleet2d.kernels.presence import Moments, Stretches, merge_bins
 
 PRIOR = Prior(0.9, 0.05)
 

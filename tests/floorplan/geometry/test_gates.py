@@ -11,13 +11,14 @@ from tests.reference.line_of_sight import is_inside, touches_any_wall
 from tests.strategies import homes, seeds
 from tests.thorough import examples
 
+from fleet2d._core import region_contains
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.geometry.gates import Gates, Segment
 from fleet2d.floorplan.geometry.lattice import Lattice
 from fleet2d.floorplan.geometry.mesh import build_mesh
 from fleet2d.floorplan.rooms.doorways import DoorLine, fit_lines
 from fleet2d.kernels import I64, Bool
-from fleet2d.kernels.sight import line_of_sight, region_contains, visible_region
+from fleet2d.kernels.sight import line_of_sight, visible_region
 from fleet2d.kernels.space import Mesh, locate
 
 ROOM = [shapely.box(0, 0, 640, 640)]

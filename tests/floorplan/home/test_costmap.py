@@ -8,6 +8,7 @@ import shapely
 from tests.scenes import flat_path
 
 import fleet2d
+from fleet2d._core import leg_cost
 from fleet2d.errors import InputError
 from fleet2d.floorplan.home.costmap import (
     CostedSpace,
@@ -21,7 +22,7 @@ from fleet2d.floorplan.home.layers import LayerSettings
 from fleet2d.floorplan.home.space import Space
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.kernels.sight import line_of_sight
-from fleet2d.kernels.space import leg_cost, locate
+from fleet2d.kernels.space import locate
 
 HALL = FloorPlan.build(
     "hall", shapely.box(0, 0, 6, 4), no_go=[shapely.box(2, 1, 4, 3), shapely.box(5, 3.5, 5.5, 4)]
