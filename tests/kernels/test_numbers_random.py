@@ -9,10 +9,9 @@ from hypothesis import strategies as st
 from tests.reference import random as slow
 from tests.strategies import quick
 
-from fleet2d._core import BELL_MEAN, random_bits
+from fleet2d._core import BELL_MEAN, Bits, random_bits
 from fleet2d.kernels.numbers import (
     BELL_STD,
-    Bits,
     StepDraws,
     random_bell,
     random_bells,

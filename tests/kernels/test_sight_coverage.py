@@ -11,6 +11,7 @@ from tests.homes import Home, home_of
 from tests.reference import visible_cells as slow
 from tests.strategies import quick, seeds
 
+from fleet2d._core import camera_pose
 from fleet2d.floorplan.geometry.lattice import Lattice
 from fleet2d.kernels import I16, I64
 from fleet2d.kernels.motion import Poses, Window
@@ -20,7 +21,6 @@ from fleet2d.kernels.sight import (
     CoverageRecord,
     CoverageSetup,
     Lenses,
-    camera_pose,
     empty_pose_cache,
     record_coverage,
     settle_coverage,

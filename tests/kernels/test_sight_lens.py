@@ -10,8 +10,8 @@ from tests.reference import detections as slow
 from tests.sight.watching import HALL, PILLAR, SIDE_M, UNITS_PER_M, hall, scene
 from tests.strategies import quick
 
-from fleet2d._core import hides, in_wedge, near_wedge, points_in_view
-from fleet2d.kernels.sight import Lenses, camera_pose, camera_poses
+from fleet2d._core import camera_pose, hides, in_wedge, near_wedge, points_in_view
+from fleet2d.kernels.sight import Lenses, camera_poses
 from fleet2d.sight.camera import Camera, stack_lenses
 
 MIDDLE = round(SIDE_M / 2 * UNITS_PER_M)

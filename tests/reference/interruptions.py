@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 from tests.reference.planner import RoomTimes
 
-from fleet2d.kernels.numbers import Bits
+from fleet2d._core import Bits
 from fleet2d.runtime.determinism import Draws
 
 DAY_S = 86_400

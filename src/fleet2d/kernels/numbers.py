@@ -25,7 +25,6 @@ import numpy as np
 # isort: off
 from fleet2d._core import (
     BELL_STD as BELL_STD,
-    Bits as Bits,
     cosine as cosine,
     encode_arrays as encode_arrays,
     half_sine as half_sine,

@@ -29,7 +29,6 @@ import numpy as np
 from fleet2d._core import (
     About as About,
     BINS as BINS,
-    camera_pose as camera_pose,
     cells_in_view as cells_in_view,
     detect as detect,
     DOUBLINGS as DOUBLINGS,
