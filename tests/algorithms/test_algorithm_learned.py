@@ -13,7 +13,7 @@ from fleet2d import Algorithm, History, Home, Present
 from fleet2d.algorithms.algorithm import load_learned, save_learned
 from fleet2d.errors import ComponentError, InputError
 
-HERE = f"{TESTS.as_posix()}/algorithms/test_learned"
+HERE = f"{TESTS.as_posix()}/algorithms/test_algorithm_learned"
 
 
 class Counts(Algorithm):

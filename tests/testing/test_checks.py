@@ -147,8 +147,8 @@ def test_the_built_in_errors_pass() -> None:
 @pytest.mark.parametrize(
     ("cls", "message"),
     [
-        (Counting, "Counting: two runs with one seed differ"),
-        (Joint, "Joint: a run in spans of 7 steps differs: treat each sighting by itself"),
+        (Counting, "Counting:\n- two runs with one seed differ"),
+        (Joint, "Joint:\n- a run in spans of 7 steps differs: treat each sighting by itself"),
         (Undefined, "errors.checked failed at step .*: x is nan"),
     ],
 )

@@ -23,6 +23,12 @@ from fleet2d.runtime.determinism import Draws, stream_key
 
 # Joins the names of nested mappings in the names of the file's arrays.
 SEPARATOR = "/"
+WITHHELD = "withheld"
+"""Stands for an output that nobody may read."""
+FROZEN = "frozen"
+"""Stands for the newest output at the moment at which an intervention freezes it."""
+# The columns of every table.
+RESERVED = frozenset({"step", "time"})
 
 
 def save_learned(state: Mapping[str, Any], path: Path, where: str) -> None:
@@ -165,15 +171,6 @@ def _flat(state: Mapping[str, Any], above: str, where: str) -> Iterator[tuple[st
                 " numbers and texts can be stored; write remember() and recall() that convert it"
             )
         yield path, array
-
-
-WITHHELD = "withheld"
-"""Stands for an output that nobody may read."""
-FROZEN = "frozen"
-"""Stands for the newest output at the moment at which an intervention freezes it."""
-
-# The columns of every table.
-RESERVED = frozenset({"step", "time"})
 
 
 @runtime_checkable

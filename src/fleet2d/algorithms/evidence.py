@@ -26,6 +26,8 @@ MOST_PATCHES = 12
 
 # Length of a bin [us]; one step where a step is longer.
 BIN_US = 60_000_000
+# Length of a bin [us]; one step where a step is longer.
+BIN_US = 60_000_000
 
 
 @dataclass(frozen=True)
@@ -141,10 +143,6 @@ def _divide(place: I64, room: I64, side: F64, count: int) -> tuple[I64, I64]:
     parts = np.maximum(1, np.rint(extent / side)).astype(np.int64)
     part: I64 = (place - low[room]) * parts[room] // extent[room]
     return part, parts
-
-
-# Length of a bin [us]; one step where a step is longer.
-BIN_US = 60_000_000
 
 
 class SightingCounts(NamedTuple):

@@ -20,7 +20,7 @@ from fleet2d.algorithms.observations import (
 from fleet2d.errors import ComponentError
 from fleet2d.floorplan.cache import read_only
 from fleet2d.floorplan.home.home import Home
-from fleet2d.kernels import F64, I16, I64, U8, Bool
+from fleet2d.kernels import F64, I16, I64, Bool
 from fleet2d.kernels.motion import Poses, Window, count_together, rooms_at, sum_moves
 from fleet2d.kernels.numbers import in_radians
 from fleet2d.kernels.sight import SightingColumn as Column
@@ -76,42 +76,10 @@ class Blocks:
         del self._begins[past], self._ends[past], self._rows[past]
 
 
-class Path(Protocol):
-    """Protocol of runs of equal pose of one body, such as `fleet2d.kernels.motion.Window`."""
-
-    @property
-    def first(self) -> int:
-        """The first step."""
-
-    @property
-    def end(self) -> int:
-        """One past the last step."""
-
-    @property
-    def step(self) -> I64:
-        """First step of each run."""
-
-    @property
-    def x(self) -> I64:
-        """Position along x of each run [lattice units]."""
-
-    @property
-    def y(self) -> I64:
-        """Position along y of each run [lattice units]."""
-
-    @property
-    def heading(self) -> I64:
-        """Heading of each run [1/4096 turn]."""
-
-    @property
-    def away(self) -> U8:
-        """Not 0 for runs away from home."""
-
-
 class BodyPoses:
     """Poses of one body, one entry per step; columns are computed on demand."""
 
-    def __init__(self, home: Home, runs: Path) -> None:
+    def __init__(self, home: Home, runs: Window) -> None:
         self._home, self._runs = home, runs
 
     def __len__(self) -> int:
@@ -261,7 +229,7 @@ class Log:
         self._rooms = NearestRooms(home.plan)
         self._nearest_patches: NearestRooms | None = None
         # For robots with `localization`: the believed poses from the true ones.
-        self.beliefs: dict[str, Callable[[Window], Path]] = {}
+        self.beliefs: dict[str, Callable[[Window], Window]] = {}
         self._poses: dict[tuple[str, int, int, bool], BodyPoses] = {}
 
     def forget(self, before: int) -> None:

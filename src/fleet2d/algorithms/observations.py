@@ -22,6 +22,8 @@ Names = NDArray[np.object_]  # str, or None where no activity is known
 # A row of observations is a row of the sight kernel, followed by the robot's index.
 ROBOT = len(Column)
 NOTHING = 0  # the code for no known activity
+NOWHERE = -1  # the room of a body that is away
+OBSERVATION = ROBOT + 1  # number of columns of a row of observations
 
 
 @dataclass(frozen=True)
@@ -121,10 +123,6 @@ class Activities:
             index = np.flatnonzero(true == self._code(activity))
             perceived[index] = outcomes[np.searchsorted(ends, draws[index], side="right")]
         return perceived
-
-
-NOWHERE = -1  # the room of a body that is away
-OBSERVATION = ROBOT + 1  # number of columns of a row of observations
 
 
 def frozen(value: Any) -> Any:

@@ -12,7 +12,7 @@ from fleet2d.configuration.units import AngleDeg, Length, PositiveDuration, Shar
 from fleet2d.entities.body import Body, Motion, Track
 from fleet2d.entities.place import Place, stop_at
 from fleet2d.entities.plan import Note, Plan
-from fleet2d.kernels import F64, I64, U8
+from fleet2d.kernels import F64, I64
 from fleet2d.kernels.motion import Window
 from fleet2d.kernels.numbers import (
     BELL_STD,
@@ -215,18 +215,6 @@ class Offsets(NamedTuple):
     turn: I64
 
 
-class Runs(NamedTuple):
-    """The poses of a body at each step of a window, in the form of a `Window` of runs."""
-
-    first: int
-    end: int
-    step: I64
-    x: I64
-    y: I64
-    heading: I64
-    away: U8
-
-
 class Drift:
     """The error of one robot in a run: a function of the step alone.
 
@@ -296,15 +284,20 @@ class Drift:
         dx, dy = turned(x - robot_x, y - robot_y, 2 * off.turn)
         return robot_x + off.x + dx, robot_y + off.y + dy
 
-    def believed(self, runs: Window) -> Runs:
+    def believed(self, runs: Window) -> Window:
         """Return the poses that the robot believes it has."""
         lengths = np.diff(runs.step, append=runs.end)
         steps = np.arange(runs.first, runs.end, dtype=np.int64)
         off = self.at(steps)
         x, y, heading = (np.repeat(column, lengths) for column in (runs.x, runs.y, runs.heading))
-        away = np.repeat(runs.away, lengths)
-        turned = (heading + off.turn) % TURN
-        return Runs(runs.first, runs.end, steps, x + off.x, y + off.y, turned, away)
+        return Window(
+            runs.first,
+            (x + off.x)[np.newaxis],
+            (y + off.y)[np.newaxis],
+            ((heading + off.turn) % TURN)[np.newaxis],
+            np.repeat(runs.away, lengths)[np.newaxis],
+            np.zeros((1, len(steps)), np.int8),
+        )
 
     def _draw(self, purpose: str, interval: int) -> int:
         return int(random_bell(self._keys[purpose], interval))

@@ -14,6 +14,7 @@ fitting = typer.Typer(help="Learn from a real log.", no_args_is_help=True)
 
 # A callback, as typer would otherwise drop the name of the only subcommand.
 fitting.callback()(lambda: None)
+UNITS = {"distance": " m", "bearing": " deg"}
 
 
 @fitting.command()
@@ -118,8 +119,6 @@ calibrating = typer.Typer(help="Fit a model to a log of a real device.", no_args
 
 # A callback, as typer would otherwise drop the name of the only subcommand.
 calibrating.callback()(lambda: None)
-
-UNITS = {"distance": " m", "bearing": " deg"}
 
 
 @calibrating.command()

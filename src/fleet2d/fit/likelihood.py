@@ -10,7 +10,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
-from typing import Protocol
 
 import numpy as np
 
@@ -26,32 +25,31 @@ CHI_SQUARE_95 = 3.8414588206941236  # one degree of freedom
 NEVER = 1e-12  # the least distance of probabilities from 0 and 1
 ENOUGH = 1e-10  # the search ends when a round gains less log-likelihood than this
 MOST_ROUNDS = 200
+SURE = 12.0  # logits from here on count as a share of 1
 
 
-class Factor(Protocol):
-    """A factor of a probability, with parameters of its own."""
+class Factor:
+    """Base of the factors of a probability, each with parameters of its own.
 
-    @property
-    def names(self) -> tuple[str, ...]:
-        """The names of its parameters."""
+    Attributes:
+        names: The names of its parameters.
+        least: The least value of each parameter.
+        most: The largest value of each parameter.
+        starts: Values of the parameters from which the search for the maximum starts.
+    """
 
-    @property
-    def least(self) -> tuple[float, ...]:
-        """The least value of each parameter."""
-
-    @property
-    def most(self) -> tuple[float, ...]:
-        """The largest value of each parameter."""
-
-    @property
-    def starts(self) -> tuple[tuple[float, ...], ...]:
-        """Values of the parameters from which the search for the maximum starts."""
+    names: tuple[str, ...]
+    least: tuple[float, ...]
+    most: tuple[float, ...]
+    starts: tuple[tuple[float, ...], ...]
 
     def shares(self, theta: F64) -> tuple[F64, F64]:
         """Return the factor of each row (n,), and its derivatives (n, parameters)."""
+        raise NotImplementedError
 
     def natural(self, index: int, value: float) -> float:
-        """Return the value of a parameter in the unit of a scenario."""
+        """Return a parameter in the unit of a scenario; by default the share of a logit."""
+        return share_of(value)
 
 
 @dataclass(frozen=True)
@@ -211,9 +209,6 @@ def wilson(hits: int, total: int) -> ParameterEstimate:
     return ParameterEstimate(hits / total, float(interval.low), float(interval.high))
 
 
-SURE = 12.0  # logits from here on count as a share of 1
-
-
 def share_of(logit: float) -> float:
     """Return the probability that a logit stands for, exactly 1 from SURE on.
 
@@ -223,14 +218,14 @@ def share_of(logit: float) -> float:
     return 1.0 if logit >= SURE else 1 / (1 + math.exp(-logit))
 
 
-class Constant:
+class Constant(Factor):
     """The same factor for every row."""
 
     least, most = (-SURE,), (SURE,)
     starts = ((2.0,),)
 
     def __init__(self, name: str, rows: int) -> None:
-        self.names: tuple[str, ...] = (name,)
+        self.names = (name,)
         self._rows = rows
 
     def shares(self, theta: F64) -> tuple[F64, F64]:
@@ -239,12 +234,8 @@ class Constant:
         slope = np.full((self._rows, 1), max(share * (1 - share), 1e-9))
         return np.full(self._rows, share), slope
 
-    def natural(self, index: int, value: float) -> float:
-        """Return the probability that a parameter, a logit, stands for."""
-        return share_of(value)
 
-
-class Falling:
+class Falling(Factor):
     """A factor that decreases logistically with x: 1 / (1 + exp((x - midpoint) / width))."""
 
     def __init__(self, name: str, values: F64) -> None:
@@ -268,7 +259,7 @@ class Falling:
         return math.exp(value) if index else value
 
 
-class Orientation:
+class Orientation(Factor):
     """A factor that decreases with the angle by which a person is turned away, piecewise linear.
 
     It is 1 for a person who faces the camera, `side` at 90 degrees and `back` at 180 degrees.
@@ -292,7 +283,3 @@ class Orientation:
             self._back * max(back * (1 - back), 1e-9),
         ]
         return share, np.stack(slopes, axis=1)
-
-    def natural(self, index: int, value: float) -> float:
-        """Return the probability that a parameter, a logit, stands for."""
-        return share_of(value)

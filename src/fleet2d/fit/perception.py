@@ -42,6 +42,10 @@ ANGLES = (
 )
 COLUMNS = frozenset({"distance", "detected", *ANGLES, "identity", "true_identity"})
 UNKNOWN = frozenset({"", "unknown", "none", "null"})
+GROUPS = 10
+SIGNIFICANCE = 0.05  # the largest p value of a likelihood ratio test with which a factor is used
+LEAST_KNOWN = 20  # the fewest detections with an identity to fit recognition to
+MOST_ROWS = 60  # of a curve by distance
 
 
 @dataclass(frozen=True)
@@ -241,12 +245,6 @@ def _flag(text: str) -> float:
     if text.lower() not in TRUE | FALSE:
         raise ValueError("0 or 1")
     return float(text.lower() in TRUE)
-
-
-GROUPS = 10
-SIGNIFICANCE = 0.05  # the largest p value of a likelihood ratio test with which a factor is used
-LEAST_KNOWN = 20  # the fewest detections with an identity to fit recognition to
-MOST_ROWS = 60  # of a curve by distance
 
 
 @dataclass(frozen=True)

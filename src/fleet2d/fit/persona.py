@@ -44,6 +44,17 @@ LONG = 10  # the least mean duration of a task [min]
 FEWEST = 4  # the fewest days of a kind from which a template is fitted
 WORKDAYS = 5
 Model = Literal["recorded", "laws"]
+# The date of the first sampled day, a Monday.
+MONDAY = date(2017, 1, 2).toordinal()
+MODELS = (
+    "the persona", "copies of whole days", "a first-order Markov chain",
+    "the days they were fitted on",
+)  # fmt: skip
+# Two distances that differ by less than this count as equal.
+EQUAL = 0.0005
+FOLDS = 3
+SAMPLED = 700  # the number of days drawn from a persona, whole weeks
+CHAIN_DAYS = 140  # the number of days drawn from the chain
 
 
 @dataclass
@@ -396,10 +407,6 @@ def _flow(fields: Mapping[str, Any]) -> str:
     ).strip()
 
 
-# The date of the first sampled day, a Monday.
-MONDAY = date(2017, 1, 2).toordinal()
-
-
 def sample_persona(
     fitted: FittedPersona, timeline: Timeline, days: int, seed: int = 0
 ) -> tuple[I16, I16]:
@@ -470,17 +477,6 @@ def sample_markov(labels: I16, count: int, days: int, seed: int = 0) -> I16:
         out[minute] = at
         at = bisect_right(limits[at], draws.below(limits[at][-1]))
     return out.reshape(-1, MINUTES)
-
-
-MODELS = (
-    "the persona", "copies of whole days", "a first-order Markov chain",
-    "the days they were fitted on",
-)  # fmt: skip
-# Two distances that differ by less than this count as equal.
-EQUAL = 0.0005
-FOLDS = 3
-SAMPLED = 700  # the number of days drawn from a persona, whole weeks
-CHAIN_DAYS = 140  # the number of days drawn from the chain
 
 
 class Validation(NamedTuple):

@@ -2,13 +2,11 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from fleet2d.errors import extra
-from fleet2d.fit.likelihood import wilson
-from fleet2d.fit.perception import Calibration, ProbabilityGroup, recognized
 from fleet2d.fit.persona import FittedPersona, sample_markov, sample_persona
 from fleet2d.fit.timeline import LivedDay, Timeline, by_hour, dwell_times, shares
 from fleet2d.kernels import F64, Bool
@@ -16,9 +14,15 @@ from fleet2d.logs.log import AWAY
 from fleet2d.palette import OTHER_COLOR, ROOM_COLORS
 from fleet2d.pictures.floorplan import check_picture, drawing_style, save_figure
 
+if TYPE_CHECKING:  # they need scipy, which the picture of a persona doesn't
+    from fleet2d.fit.perception import Calibration, ProbabilityGroup
+
 SAMPLED = 140
 LABELS = ("log", "persona", "Markov chain")
 LINES = ("#222222", "#c2410c", "#9aa5b1")
+BINS = 12
+LEAST = 10  # the least mean number of rows per bin
+FIT_COLOR, OBSERVED_COLOR = "#2b6cb0", "#3d4148"
 
 
 def draw_persona(
@@ -84,12 +88,7 @@ with extra("viz", "drawing needs matplotlib"):
     from matplotlib.figure import Figure
 
 
-BINS = 12
-LEAST = 10  # the least mean number of rows per bin
-FIT_COLOR, OBSERVED_COLOR = "#2b6cb0", "#3d4148"
-
-
-def draw_calibration(calibration: Calibration, target: Path) -> None:
+def draw_calibration(calibration: "Calibration", target: Path) -> None:
     """Draw a fit to a file.
 
     Raises:
@@ -101,8 +100,10 @@ def draw_calibration(calibration: Calibration, target: Path) -> None:
         save_figure(figure, target)
 
 
-def _figure(calibration: Calibration) -> Figure:
+def _figure(calibration: "Calibration") -> Figure:
     """Return a figure with a panel for each quantity, and one of predicted against observed."""
+    from fleet2d.fit.perception import recognized
+
     log, shares = calibration.log, calibration.detection.fit.shares
     panels: list[tuple[str, str, F64, Bool, F64]] = []
     for label, values in (
@@ -131,6 +132,8 @@ def _figure(calibration: Calibration) -> Figure:
 
 def _draw_shares(axes: Axes, values: F64, detected: Bool, shares: F64) -> None:
     """Draw observed shares with their intervals, and the mean fitted share of the same rows."""
+    from fleet2d.fit.likelihood import wilson
+
     bins = min(BINS, max(1, len(values) // LEAST))
     edges = np.quantile(values, np.linspace(0, 1, bins + 1))
     index = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, bins - 1)
@@ -148,7 +151,7 @@ def _draw_shares(axes: Axes, values: F64, detected: Bool, shares: F64) -> None:
     )
 
 
-def _draw_groups(axes: Axes, groups: list[ProbabilityGroup]) -> None:
+def _draw_groups(axes: Axes, groups: "list[ProbabilityGroup]") -> None:
     """Draw observed against predicted probabilities, with intervals."""
     axes.plot([0, 1], [0, 1], color="#b0b5bd", lw=1)
     for group in groups:

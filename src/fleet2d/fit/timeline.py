@@ -12,6 +12,7 @@ from fleet2d.floorplan.rooms.vocabulary import room_type
 from fleet2d.kernels import F64, I16, Bool
 from fleet2d.logs.log import AWAY, ActivityLog, LogError
 from fleet2d.logs.placement import DOOR, UNKNOWN, USUAL, LoggedVisit, VisitRule, visits_of
+from fleet2d.metrics.ltp_error import total_variation
 from fleet2d.runtime.clock import DAY_S
 from fleet2d.runtime.determinism import sum_in_order
 
@@ -23,6 +24,12 @@ STILL = timedelta(hours=12)
 OUT = timedelta(minutes=10)  # a longer silence at the front door counts as being out
 # An activity in a room with less time and fewer runs than this loses its name.
 RARE_MINUTES, RARE_RUNS = 30, 4
+# Being up for up to this long in the night doesn't end the night [min].
+UP_AT_NIGHT = 60
+SHORTEST_NIGHT = 120  # min
+NOON = MINUTES // 2
+HOURS = 24
+FEWEST_STAYS = 5  # the fewest stays at a place whose durations are compared
 
 
 class ActivityPlace(NamedTuple):
@@ -173,12 +180,6 @@ def runs(labels: I16) -> list[tuple[int, int, int]]:
     )
 
 
-# Being up for up to this long in the night doesn't end the night [min].
-UP_AT_NIGHT = 60
-SHORTEST_NIGHT = 120  # min
-NOON = MINUTES // 2
-
-
 class Stretch(NamedTuple):
     """A time without a change of state: the state, its first minute and number of minutes."""
 
@@ -261,10 +262,6 @@ def _runs(flat: I16, begin: int, end: int, midnight: int) -> tuple[Stretch, ...]
     )
 
 
-HOURS = 24
-FEWEST_STAYS = 5  # the fewest stays at a place whose durations are compared
-
-
 class Distances(NamedTuple):
     """Distances between sets of days, 0 where they are alike.
 
@@ -295,10 +292,9 @@ def distances(real: I16, other: I16, count: int) -> Distances:
         if len(times) >= FEWEST_STAYS
     ]
     total = max(sum(len(times) for times, _ in pairs), 1)
-    hours = zip(by_hour(real, count), by_hour(other, count), strict=True)
     return Distances(
-        share=_variation(shares(real, count), shares(other, count)),
-        hours=float(np.mean([_variation(a, b) for a, b in hours])),
+        share=float(total_variation(shares(real, count), shares(other, count))),
+        hours=float(np.mean(total_variation(by_hour(real, count), by_hour(other, count)))),
         ks=sum_in_order(len(a) * ks_distance(a, b) for a, b in pairs) / total,
         stay_min=sum_in_order(len(a) * wasserstein(a, b) for a, b in pairs) / total,
     )
@@ -353,8 +349,3 @@ def wasserstein(a: F64, b: F64) -> float:
     below_a = np.searchsorted(a, points[:-1], side="right") / len(a)
     below_b = np.searchsorted(b, points[:-1], side="right") / len(b)
     return float((np.abs(below_a - below_b) * np.diff(points)).sum())
-
-
-def _variation(a: F64, b: F64) -> float:
-    """Return the total variation between two distributions."""
-    return float(np.abs(a - b).sum() / 2)

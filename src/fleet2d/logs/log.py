@@ -4,12 +4,13 @@ import re
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
-from datetime import date, datetime, timedelta
+from datetime import date, datetime
 from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
 
 from fleet2d.bounds import LOG_BYTES, LOG_DAYS, LOG_ROWS, check_file, one_line
+from fleet2d.configuration.units import micros
 from fleet2d.errors import InputError
 from fleet2d.kernels import F64, I64
 from fleet2d.runtime.clock import DAY_US
@@ -20,6 +21,7 @@ _MOST_NAMED = 20
 _LONGEST = 10_000
 AWAY = "away"
 """The room label for being out of the home."""
+_TIME = re.compile(r"(\d{4})-(\d{1,2})-(\d{1,2})[ T](\d{1,2}):(\d{2})(?::(\d{2})(?:\.(\d{1,9}))?)?")
 
 
 def log_lines(path: Path) -> Iterator[tuple[int, str]]:
@@ -166,10 +168,6 @@ def _counted(count: int, noun: str) -> str:
     return f"{count} {noun}{'' if count == 1 else 's'}"
 
 
-_TIME = re.compile(r"(\d{4})-(\d{1,2})-(\d{1,2})[ T](\d{1,2}):(\d{2})(?::(\d{2})(?:\.(\d{1,9}))?)?")
-MICROSECOND = timedelta(microseconds=1)
-
-
 def parse_time(text: str, path: Path, line: int) -> datetime:
     """Read a local time like '2011-06-15 01:03:39.14962', exact to the microsecond.
 
@@ -196,4 +194,4 @@ def parse_time(text: str, path: Path, line: int) -> datetime:
 
 def since(first_day: date, moment: datetime) -> int:
     """Return the microseconds from the midnight that begins a day to a moment."""
-    return (moment - datetime.combine(first_day, datetime.min.time())) // MICROSECOND
+    return micros(moment - datetime.combine(first_day, datetime.min.time()))

@@ -16,6 +16,45 @@ from fleet2d.logs.log import AWAY, ActivityLog, LogError, Reading
 from fleet2d.runtime.determinism import sum_in_order
 
 Pair = tuple[float, float]
+RoomChoice = tuple[str, ...]
+
+DOOR = "door"
+"""The front door: after a long silence there, the person is out."""
+USUAL: dict[str, RoomChoice] = {
+    "away": (AWAY,),
+    "outsidedoor": (DOOR,),
+    "outside_door": (DOOR,),
+    "maindoor": (DOOR,),
+    "frontdoor": (DOOR,),
+    "front_door": (DOOR,),
+    "entrance": (DOOR,),
+    "livingroom": ("living_room",),
+    "living": ("living_room",),
+    "lounge": ("living_room",),
+    "loungechair": ("living_room",),
+    "diningroom": ("dining_room", "kitchen"),
+    "dining_room": ("dining_room", "kitchen"),
+    "dining": ("dining_room", "kitchen"),
+    "workarea": ("office", "living_room"),
+    "home_office": ("office", "living_room"),
+    "office": ("office", "living_room"),
+    "toilet": ("toilet", "bathroom"),
+    "bathroom": ("bathroom", "toilet"),
+    "hallway": ("hallway", "hall"),
+    "hall": ("hall", "hallway"),
+    # activities of a log that tells no rooms
+    "sleeping": ("bedroom",),
+    "toileting": ("bathroom", "toilet"),
+    "showering": ("bathroom",),
+    "grooming": ("bathroom",),
+    "breakfast": ("kitchen",),
+    "lunch": ("kitchen",),
+    "dinner": ("kitchen",),
+    "snack": ("kitchen",),
+    "spare_time_tv": ("living_room",),
+}
+"""Meanings of the labels of known data sets: rooms or kinds of rooms to be tried in turn."""
+UNKNOWN = "unknown"
 
 
 class Match(Settings):
@@ -129,47 +168,6 @@ def _direction(degrees: float) -> Pair:
     return cosine, sine
 
 
-RoomChoice = tuple[str, ...]
-
-DOOR = "door"
-"""The front door: after a long silence there, the person is out."""
-
-USUAL: dict[str, RoomChoice] = {
-    "away": (AWAY,),
-    "outsidedoor": (DOOR,),
-    "outside_door": (DOOR,),
-    "maindoor": (DOOR,),
-    "frontdoor": (DOOR,),
-    "front_door": (DOOR,),
-    "entrance": (DOOR,),
-    "livingroom": ("living_room",),
-    "living": ("living_room",),
-    "lounge": ("living_room",),
-    "loungechair": ("living_room",),
-    "diningroom": ("dining_room", "kitchen"),
-    "dining_room": ("dining_room", "kitchen"),
-    "dining": ("dining_room", "kitchen"),
-    "workarea": ("office", "living_room"),
-    "home_office": ("office", "living_room"),
-    "office": ("office", "living_room"),
-    "toilet": ("toilet", "bathroom"),
-    "bathroom": ("bathroom", "toilet"),
-    "hallway": ("hallway", "hall"),
-    "hall": ("hall", "hallway"),
-    # activities of a log that tells no rooms
-    "sleeping": ("bedroom",),
-    "toileting": ("bathroom", "toilet"),
-    "showering": ("bathroom",),
-    "grooming": ("bathroom",),
-    "breakfast": ("kitchen",),
-    "lunch": ("kitchen",),
-    "dinner": ("kitchen",),
-    "snack": ("kitchen",),
-    "spare_time_tv": ("living_room",),
-}
-"""Meanings of the labels of known data sets: rooms or kinds of rooms to be tried in turn."""
-
-
 def map_rooms(
     labels: Mapping[str, int], overrides: Mapping[str, RoomChoice | None], rooms: Sequence[Room]
 ) -> dict[str, RoomChoice | None]:
@@ -232,9 +230,6 @@ def _first_fit(choice: RoomChoice, rooms: Sequence[Room]) -> RoomChoice | None:
 
 def _names(rooms: Collection[Room]) -> list[str]:
     return [room.name for room in rooms] + sorted({room.type for room in rooms})
-
-
-UNKNOWN = "unknown"
 
 
 class VisitRule(NamedTuple):

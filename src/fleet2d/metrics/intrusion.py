@@ -1,6 +1,5 @@
 """Time that robots spend in people's personal space."""
 
-from collections.abc import Mapping
 from itertools import pairwise
 from typing import Any, ClassVar
 
@@ -26,6 +25,7 @@ class Intrusion(Metric):
     how people feel about a robot depends on much else.
     """
 
+    hidden: ClassVar[frozenset[str]] = frozenset({"social"})
     unit: ClassVar[str] = "min a day"
 
     def start(self, home: Home) -> None:
@@ -61,13 +61,3 @@ class Intrusion(Metric):
                 zone: m / self.days for zone, m in zip(ZONES, minutes, strict=True)
             }
         return minutes_by_robot
-
-    @classmethod
-    def summary(cls, result: Mapping[str, Any]) -> Mapping[str, Any]:
-        """Return the intrusion time per zone, leaving out the social zone."""
-        return {
-            robot: {
-                user: {k: v for k, v in n.items() if k != "social"} for user, n in users.items()
-            }
-            for robot, users in result.items()
-        }

@@ -25,6 +25,12 @@ from fleet2d.metrics.belief_reader import presence_of
 from fleet2d.metrics.metric import Metric
 from fleet2d.runtime.clock import DAY_S, HOUR_US, midnight_of
 
+# Clearance that a person needs to walk from room to room [m].
+RADIUS = 0.2
+MEAN = "mean"
+SHOWN = ("tv", "earth_mover_m", "inside", "burn_in_day")  # in the closing table
+COLUMNS = ("tv", "js", "kl", "max_gap", "mean_gap", "tau")
+
 
 def total_variation(truth: F64, estimate: F64) -> F64:
     """Return 1/2 sum |p - q|: the largest difference in probability of any set of rooms, 0 to 1.
@@ -115,10 +121,6 @@ def rank_correlation(truth: F64, estimate: F64) -> F64:
     signs = true * np.sign(estimate[..., :, None] - estimate[..., None, :])
     pairs, balance = np.abs(true).sum(axis=(-2, -1)), signs.sum(axis=(-2, -1))
     return np.where(pairs > 0, balance / np.maximum(pairs, 1), 1.0)
-
-
-# Clearance that a person needs to walk from room to room [m].
-RADIUS = 0.2
 
 
 def steps_in_places(history: History, state: Present) -> I64:
@@ -228,11 +230,6 @@ def _distances(home: Home, space: Space) -> F64:
     metres = np.where(is_reachable, metres, 2 * longest)
     np.fill_diagonal(metres, 0)
     return metres
-
-
-MEAN = "mean"
-SHOWN = ("tv", "earth_mover_m", "inside", "burn_in_day")  # in the closing table
-COLUMNS = ("tv", "js", "kl", "max_gap", "mean_gap", "tau")
 
 
 class LongTermMetric(Metric):

@@ -36,6 +36,7 @@ class Metric(Component):
     needs: ClassVar[Set[str]] = frozenset()
     unit: ClassVar[str] = ""  # unit of its result, for readers
     units: ClassVar[Mapping[str, str]] = {}  # units of single numbers, by name, where they differ
+    hidden: ClassVar[Set[str]] = frozenset()  # numbers that the closing table leaves out
 
     period: PositiveDuration = timedelta(days=1)
 
@@ -58,8 +59,12 @@ class Metric(Component):
 
     @classmethod
     def summary(cls, result: Mapping[str, Any]) -> Mapping[str, Any]:
-        """Return the part of a result that the closing table shows; all of it by default."""
-        return result
+        """Return the part of a result that the closing table shows: by default all but `hidden`."""
+        return {
+            name: cls.summary(value) if isinstance(value, Mapping) else value
+            for name, value in result.items()
+            if isinstance(value, Mapping) or name not in cls.hidden
+        }
 
 
 class RobotUserPair(NamedTuple):

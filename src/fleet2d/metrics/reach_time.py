@@ -31,6 +31,7 @@ class ReachTime(Metric):
         radius: The robot's radius [m].
     """
 
+    hidden: ClassVar[frozenset[str]] = frozenset({"calls"})
     units: ClassVar[Mapping[str, str]] = {
         "mean": "s",
         "p90": "s",
@@ -92,12 +93,3 @@ class ReachTime(Metric):
                 numbers["unreached"] = self.unreached[robot, user]
             results.setdefault(robot, {})[user] = numbers
         return results
-
-    @classmethod
-    def summary(cls, result: Mapping[str, Any]) -> Mapping[str, Any]:
-        """Return how long it takes, and how often there is no route."""
-        shown = ("mean", "p90", "unreached")
-        return {
-            robot: {user: {k: v for k, v in n.items() if k in shown} for user, n in users.items()}
-            for robot, users in result.items()
-        }

@@ -22,6 +22,13 @@ from fleet2d.runtime.determinism import sum_in_order
 
 LEAST = 1e-6  # smaller probabilities are raised to this before taking logarithms
 MASSES = 15  # number of groups of about equal size, by forecast probability
+# Upper ends of the classes of the gap since a user was last seen [min], and their names.
+GAP_ENDS = (1, 5, 15, 60, 240)
+GAPS = ("0-1 min", "1-5 min", "5-15 min", "15-60 min", "1-4 h", "over 4 h", "never seen")
+UNSEEN = len(GAPS) - 1
+ALL = "all"
+SHOWN = ("log_loss", "top_1", "ece", "skill", "reference_skill")  # in the closing table
+NEVER = -1
 
 
 def log_loss(probability: F64, truth: I64, least: float = LEAST) -> F64:
@@ -215,15 +222,6 @@ def skill(score: float, reference: float) -> float:
 
 def _of(values: NDArray[Any], truth: I64) -> NDArray[Any]:
     return values[np.arange(len(truth)), truth]
-
-
-# Upper ends of the classes of the gap since a user was last seen [min], and their names.
-GAP_ENDS = (1, 5, 15, 60, 240)
-GAPS = ("0-1 min", "1-5 min", "5-15 min", "15-60 min", "1-4 h", "over 4 h", "never seen")
-UNSEEN = len(GAPS) - 1
-ALL = "all"
-SHOWN = ("log_loss", "top_1", "ece", "skill", "reference_skill")  # in the closing table
-NEVER = -1
 
 
 class ScoredBins(NamedTuple):

@@ -77,6 +77,7 @@ class TimeToFind(Metric):
         radius: The robot's radius [m].
     """
 
+    hidden: ClassVar[frozenset[str]] = frozenset({"p90", "spl", "out_mean"})
     units: ClassVar[Mapping[str, str]] = {
         "searches": "in all",
         **dict.fromkeys(("success", "spl", "out_told"), "share of searches"),
@@ -172,15 +173,6 @@ class TimeToFind(Metric):
             cut = search._replace(seconds=seconds, end="open")
             searches.setdefault(robot, []).append(cut)
         return {robot: self._numbers(records) for robot, records in searches.items()}
-
-    @classmethod
-    def summary(cls, result: Mapping[str, Any]) -> Mapping[str, Any]:
-        """Return whether and how soon people are found, and the length of the paths."""
-        hidden = ("p90", "spl", "out_mean")
-        return {
-            robot: {key: value for key, value in numbers.items() if key not in hidden}
-            for robot, numbers in result.items()
-        }
 
     def _numbers(self, searches: list[SearchRecord]) -> dict[str, Any]:
         until = self.deadline.total_seconds()

@@ -51,12 +51,13 @@ def check_algorithm(cls: type[Algorithm], **settings: Any) -> None:
         ...         return {"sightings": len(history.observations.step)}
         >>> check_algorithm(Sightings)
     """
-    problems = list(_problems(cls, settings))
+    _refuse(f"algorithm {cls.__name__}", list(_problems(cls, settings)))
+
+
+def _refuse(what: str, problems: list[str]) -> None:
     if problems:
-        raise AssertionError(
-            f"the engine can't rely on the algorithm {cls.__name__}:\n"
-            + "\n".join(f"- {problem}" for problem in problems)
-        )
+        listed = "\n".join(f"- {problem}" for problem in problems)
+        raise AssertionError(f"the engine can't rely on the {what}:\n{listed}")
 
 
 def _problems(cls: type[Algorithm], settings: Mapping[str, Any]) -> Iterator[str]:
@@ -157,12 +158,7 @@ def check_perception_error(cls: type[PerceptionError], **settings: Any) -> None:
         ...         return sightings.replace(posture=2)
         >>> check_perception_error(Lying)
     """
-    problems = list(_error_problems(cls, settings))
-    if problems:
-        raise AssertionError(
-            f"the engine can't rely on the error of perception {cls.__name__}: "
-            + "; ".join(problems)
-        )
+    _refuse(f"error of perception {cls.__name__}", list(_error_problems(cls, settings)))
 
 
 def _error_problems(cls: type[PerceptionError], settings: dict[str, Any]) -> Iterator[str]:

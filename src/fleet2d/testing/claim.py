@@ -23,6 +23,9 @@ from fleet2d.scenario.model import Scenario, load_scenario
 
 MOST_SEEDS = 10_000
 BISECTIONS = 14
+ATTRIBUTE = "fleet2d_claim"
+"""The attribute of a test function that holds its claim."""
+HOME, HOUSEHOLD = "home", "household"
 
 
 @dataclass(frozen=True)
@@ -170,9 +173,6 @@ def _ending(accept: I64, refuse: I64, rate: float) -> tuple[float, F64]:
 
 
 Test = TypeVar("Test", bound=Callable[..., Any])
-ATTRIBUTE = "fleet2d_claim"
-"""The attribute of a test function that holds its claim."""
-HOME, HOUSEHOLD = "home", "household"
 
 
 class SetUpError(InputError):

@@ -34,6 +34,9 @@ Settings = Mapping[str, Any]
 """A point of the space: for each dimension a number, or the index of a choice."""
 
 _AXIS: TypeAdapter[Any] = TypeAdapter(AnyAxis)
+RANDOM_SHARE = 0.25  # of the budget, before the search is guided
+LEAST_RANDOM = 10
+CANDIDATES = 64
 
 
 @dataclass(frozen=True)
@@ -158,11 +161,6 @@ def parse_over(texts: list[str]) -> dict[str, Any]:
         data = read_document(Path(text)).data
         content |= data.get("axes", data)
     return content
-
-
-RANDOM_SHARE = 0.25  # of the budget, before the search is guided
-LEAST_RANDOM = 10
-CANDIDATES = 64
 
 
 @dataclass(frozen=True)

@@ -25,6 +25,24 @@ from fleet2d.testing.claim import Claim, SetUpError, Variant
 ASSERT = "assert"
 """The name of a failed `assert` of a test among its expectations."""
 SMALLEST_MARGIN = 1e-9
+SCALES = {"m": 1.0, "m/s": 0.5, "share": 0.1, "s": 60.0, "times": 1.0}
+"""Margins that count as neither narrow nor wide, by unit; 1 for others."""
+LASTING = ("always(", "never(", "at_most(")
+"""Expectations that fail at the first step of a violation; others fail at their deadline."""
+MOST_HOMES = 32  # in memory
+NOTHING = ArtifactSettings(
+    trajectories="off",
+    key_frames=False,
+    observations=False,
+    events=False,
+    outputs=False,
+    checkpoint="off",
+)
+SECTIONS = ("users", "robots", "objects", "algorithms", "metrics")
+"""The sections of the scenario whose entries are left out one by one."""
+LEADS = tuple(timedelta(minutes=minutes) for minutes in (0, 1, 5, 15, 60, 240, 1440, 10_080))
+"""Times from the start of a shorter run to the failure, tried in this order."""
+MOST_SEEDS_SHOWN = 8
 
 
 class Trial(Simulation):
@@ -97,12 +115,6 @@ class ExpectationResult:
     holds: bool
     margin: float
     step: int | None = None
-
-
-SCALES = {"m": 1.0, "m/s": 0.5, "share": 0.1, "s": 60.0, "times": 1.0}
-"""Margins that count as neither narrow nor wide, by unit; 1 for others."""
-LASTING = ("always(", "never(", "at_most(")
-"""Expectations that fail at the first step of a violation; others fail at their deadline."""
 
 
 def result_of(verdict: Verdict) -> ExpectationResult:
@@ -178,16 +190,6 @@ class TrialResult:
 
 Body = Callable[[Trial], Any]
 """A test function with all arguments bound except the trial."""
-
-MOST_HOMES = 32  # in memory
-NOTHING = ArtifactSettings(
-    trajectories="off",
-    key_frames=False,
-    observations=False,
-    events=False,
-    outputs=False,
-    checkpoint="off",
-)
 
 
 @dataclass(frozen=True)
@@ -307,12 +309,6 @@ def percent(share: float) -> str:
     ('95 %', '84.6 %')
     """
     return f"{round(100 * share, 1):g} %"
-
-
-SECTIONS = ("users", "robots", "objects", "algorithms", "metrics")
-"""The sections of the scenario whose entries are left out one by one."""
-LEADS = tuple(timedelta(minutes=minutes) for minutes in (0, 1, 5, 15, 60, 240, 1440, 10_080))
-"""Times from the start of a shorter run to the failure, tried in this order."""
 
 
 @dataclass(frozen=True)
@@ -448,9 +444,6 @@ def _edited(variant: Variant, **sections: Any) -> Variant | None:
         return replace(variant, scenario=load_scenario(content))
     except Fleet2DError:
         return None
-
-
-MOST_SEEDS_SHOWN = 8
 
 
 @dataclass(frozen=True)

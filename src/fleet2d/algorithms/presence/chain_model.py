@@ -24,6 +24,7 @@ FEWEST_BINS = 1440  # with fewer bins of evidence, hours aren't distinguished
 MAX_RATIO = 20.0  # largest ratio, and inverse of the smallest, of an hour's share to the mean share
 LEAST = 1e-9
 MAX_LEAVE = 0.5  # largest probability per bin to leave, unless it was larger before
+FARTHEST = 10_080  # bins ahead; later forecasts equal the one at this horizon
 
 
 class Habits(NamedTuple):
@@ -70,9 +71,6 @@ class Habits(NamedTuple):
         follow = leave / np.maximum(chance, LEAST)[:, np.newaxis]
         most = np.maximum(1 - model.stay, MAX_LEAVE)
         return model._replace(stay=1 - np.minimum(chance, most), follow=follow)
-
-
-FARTHEST = 10_080  # bins ahead; later forecasts equal the one at this horizon
 
 
 class PersonForecast(NamedTuple):

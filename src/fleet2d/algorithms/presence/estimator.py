@@ -17,6 +17,11 @@ from fleet2d.kernels import F64, I64
 from fleet2d.kernels.presence import resampled
 
 EXACT = 1 << 40
+REPLICATES = 200  # of the bootstrap
+FEWEST_DAYS = 2  # fewest days that say anything about how much days differ
+LN_2 = 0.6931471805599453
+ROOT_HALF = 0.7071067811865476
+TERMS = 11  # of the series: the first left out is below 1e-17 of the sum
 
 
 class DayCounts:
@@ -171,10 +176,6 @@ class DayCounts:
             self.begin_day(today)
 
 
-REPLICATES = 200  # of the bootstrap
-FEWEST_DAYS = 2  # fewest days that say anything about how much days differ
-
-
 class Estimator(Component):
     """Base of estimators of presence from evidence; a subclass writes `sums` and `shares`.
 
@@ -315,11 +316,6 @@ def normalized(weights: F64) -> F64:
     """
     total = weights.sum(axis=-1, keepdims=True)
     return np.where(total > 0, weights / np.where(total > 0, total, 1), 1 / weights.shape[-1])
-
-
-LN_2 = 0.6931471805599453
-ROOT_HALF = 0.7071067811865476
-TERMS = 11  # of the series: the first left out is below 1e-17 of the sum
 
 
 def natural_log(values: ArrayLike) -> F64:

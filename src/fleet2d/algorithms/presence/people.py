@@ -19,6 +19,11 @@ from fleet2d.kernels.presence import (
     smooth_people,
 )
 
+# Mean length of a stay before anything was learned, and of the first and last of several stages.
+# All in bins.
+STAY = 120.0
+SHORT, LONG = 5.0, 240.0
+
 
 class DayEvidence(NamedTuple):
     """Evidence of one day, or of a part of it.
@@ -110,12 +115,6 @@ def distinct(rows: U8) -> tuple[I64, U8]:
     is_new = np.ones(len(rows), bool)
     is_new[1:] = (rows[1:] != rows[:-1]).any(axis=1)
     return np.cumsum(is_new) - 1, rows[is_new]
-
-
-# Mean length of a stay before anything was learned, and of the first and last of several stages.
-# All in bins.
-STAY = 120.0
-SHORT, LONG = 5.0, 240.0
 
 
 class StateLayout(NamedTuple):

@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING, Literal, Protocol, cast
 
 from fleet2d.logs.log import ActivityLog, LogError, PositionLog, log_lines
 
+FIRST_LINES = 20
+
 
 class LogLayout(Protocol):
     """What a module of a layout has."""
@@ -44,7 +46,6 @@ if TYPE_CHECKING:
     Layout = str
 else:
     Layout = Literal[("auto", *layout_names(), "positions")]
-FIRST_LINES = 20
 
 
 def read_log(
