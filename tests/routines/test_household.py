@@ -9,8 +9,9 @@ from pydantic import ValidationError
 from tests.routines.days import DAY_S, MONDAY, violations
 
 from fleet2d.routines.activity import catalogue
-from fleet2d.routines.household import LONG_GONE_S, WELCOME, Household, Lives
+from fleet2d.routines.household import Household
 from fleet2d.routines.interruptions import without_interruptions
+from fleet2d.routines.life import LONG_GONE_S, WELCOME, Lives
 from fleet2d.routines.planner import Doing
 
 CROWD = {

@@ -6,8 +6,8 @@ import pytest
 from pydantic import ValidationError
 from tests.routines.days import MONDAY
 
-from fleet2d.routines.household import Household, Lives
-from fleet2d.routines.life import Life
+from fleet2d.routines.household import Household
+from fleet2d.routines.life import Life, Lives
 from fleet2d.routines.persona import Persona
 from fleet2d.routines.planner import parse_day, write_day
 

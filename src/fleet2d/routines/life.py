@@ -1,14 +1,28 @@
-"""The days of a person: each is drawn as a function of its date alone."""
+"""Lives: the days of one person, and those of all members of a household."""
 
-from collections.abc import Sequence
-from datetime import date
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from datetime import date, datetime
+from itertools import pairwise
 
+from fleet2d.configuration.units import weekdays_of
+from fleet2d.kernels.motion import ANY_ROOM, NO_GAP_S, RoomUse
+from fleet2d.routines.activity import find_activity
+from fleet2d.routines.distributions import uniform
+from fleet2d.routines.household import Household, with_absences
 from fleet2d.routines.interruptions import interrupt
-from fleet2d.routines.persona import Persona
+from fleet2d.routines.persona import Persona, holds_on
 from fleet2d.routines.planner import (
     DAY_S,
+    INTERRUPTS,
+    MILLION,
+    NEVER,
+    PLANNED,
+    RESUMES,
+    SLEEP,
     DayPlan,
     Doing,
+    Job,
     PrivateRooms,
     draw_recorded,
     draw_source,
@@ -16,10 +30,17 @@ from fleet2d.routines.planner import (
     plan_day,
     with_jobs,
 )
+from fleet2d.routines.templates import starts
 from fleet2d.runtime.determinism import Draws, stream_key
 
-# The number of days that are kept after they were drawn.
-CACHED_DAYS = 3
+# The number of days that are kept after they were drawn, of a person and of a household.
+CACHED_DAYS, CACHED_HOUSEHOLD_DAYS = 3, 8
+# The least absence after which a member is welcomed [s].
+LONG_GONE_S = 1800
+WELCOME = "welcome"
+WELCOME_S = 90
+
+MemberRooms = Mapping[str, Mapping[str, Sequence[int]]]
 
 
 class Life:
@@ -96,3 +117,188 @@ class Life:
             exclusive = self.persona.interruptions.exclusive
             return in_free_rooms(with_jobs(day, plan.jobs), exclusive, private)
         return plan_day(plan, self.draws(ordinal), self.wake(ordinal), next_wake, private)
+
+
+class Lives:
+    """The days of all members of a household, from the day before a run begins.
+
+    Days are drawn in the order of the members, with joint activities as appointments. A member
+    keeps out of private rooms while they are used by earlier members, and by all members whose
+    previous day isn't over yet: a day depends on the one before.
+
+    Attributes:
+        household: The household.
+        first: The ordinal of the first day.
+    """
+
+    def __init__(
+        self, household: Household, seed: int, first: int, rooms: MemberRooms | None = None
+    ) -> None:
+        """Prepare to draw days.
+
+        Args:
+            household: The household.
+            seed: The seed of the run.
+            first: The ordinal of the first day.
+            rooms: The rooms of each member's exclusive activities: indices by activity, by member;
+                None: one unknown room for all.
+        """
+        self.household = household
+        self._seed = seed
+        self._path = f"household.{household.name}"
+        self._lives = {
+            name: Life(persona, seed, f"{self._path}.{name}")
+            for name, persona in household.members.items()
+        }
+        self._rooms = {
+            name: self._by_preference(name, (rooms or {}).get(name, {}))
+            for name in household.members
+        }
+        self._cache: dict[int, Mapping[str, Sequence[Doing]]] = {}
+        self.first = self._next = first
+
+    def day(self, ordinal: int) -> Mapping[str, Sequence[Doing]]:
+        """Return the doings of each member on the day of a date's ordinal.
+
+        Raises:
+            ValueError: It is before the first day.
+        """
+        if ordinal < self.first:
+            raise ValueError(
+                f"day {ordinal} is before the first day of the household, {self.first}"
+            )
+        if ordinal < self._next and ordinal not in self._cache:  # draw all days again
+            self._cache.clear()
+            self._next = self.first
+        while self._next <= ordinal:
+            self._cache.pop(self._next - CACHED_HOUSEHOLD_DAYS, None)
+            self._cache[self._next] = self._draw(self._next)
+            self._next += 1
+        return self._cache[ordinal]
+
+    def _by_preference(
+        self, name: str, rooms: Mapping[str, Sequence[int]]
+    ) -> dict[str, Sequence[int]]:
+        """Order the rooms of each activity, beginning at one randomly chosen for this member."""
+        draws = Draws(stream_key(self._seed, f"{self._path}.{name}", "own room"), 0)
+        shift = draws.below(1 << 20)
+        return {
+            activity: [*indices[shift % len(indices) :], *indices[: shift % len(indices)]]
+            for activity, indices in rooms.items()
+            if indices
+        }
+
+    def in_use(self, ordinal: int, member: str, room: int) -> list[tuple[int, int]]:
+        """Return when others use a private room [s since the midnight of a date]."""
+        return [
+            (doing.begin + shift, doing.end + shift)
+            for day, shift in ((ordinal - 1, -DAY_S), (ordinal, 0), (ordinal + 1, DAY_S))
+            if day >= self.first
+            for name, doings in self.day(day).items()
+            for doing in doings
+            if name != member and doing.room in (ANY_ROOM, room) and self._is_exclusive(name, doing)
+        ]
+
+    def _is_exclusive(self, name: str, doing: Doing) -> bool:
+        own = self.household.members[name].activities
+        return doing.activity in self._rooms[name] or find_activity(doing.activity, own).exclusive
+
+    def is_out(self, name: str, doing: Doing) -> bool:
+        """Return whether a member is out of the home for a doing."""
+        return find_activity(doing.activity, self.household.members[name].activities).away
+
+    def _draw(self, ordinal: int) -> Mapping[str, Sequence[Doing]]:
+        """Draw the days of all members for a date."""
+        joint_jobs = self._joint_jobs(ordinal)
+        yesterday = self._cache.get(ordinal - 1, {})
+        use = RoomUse()
+        for name, doings in yesterday.items():
+            self._add_use(use, name, doings, -DAY_S)
+        days: dict[str, Sequence[Doing]] = {}
+        for name, life in self._lives.items():
+            plan = life.template(ordinal)
+            for job, members in joint_jobs:
+                if not members or name in members:
+                    plan = _with_job(plan, job)
+            day = life.draw_day(ordinal, plan, PrivateRooms(self._rooms[name], use))
+            days[name] = self._with_absences(name, day, ordinal)
+            self._add_use(use, name, days[name])
+        return self._with_welcomes(ordinal, days) if self.household.welcome else days
+
+    def _add_use(self, use: RoomUse, name: str, doings: Sequence[Doing], shift: int = 0) -> None:
+        """Add the times at which a member uses private rooms, shifted by some seconds."""
+        for doing in doings:
+            if doing.end + shift > 0 and self._is_exclusive(name, doing):
+                use.add(doing.room, doing.begin + shift, doing.end + shift)
+
+    def _with_absences(self, name: str, day: Sequence[Doing], ordinal: int) -> Sequence[Doing]:
+        """Return a member's day, away from home on trips and, for visitors, between visits."""
+        household = self.household
+        away = (*household.away, *household.trips.get(name, ()))
+        visits = household.visits.get(name, ())
+        if not away and not visits:
+            return day
+        return with_absences(day, datetime.fromordinal(ordinal), away, visits)
+
+    def _with_welcomes(
+        self, ordinal: int, days: Mapping[str, Sequence[Doing]]
+    ) -> Mapping[str, Sequence[Doing]]:
+        """Return days in which members at leisure come to the door when one comes home."""
+        key = stream_key(self._seed, self._path, "welcome")
+        draws = Draws(key, ordinal)
+        result = dict(days)
+        for member, doings in days.items():
+            for absence, return_home in pairwise(doings):
+                comes_home = self.is_out(member, absence) and not self.is_out(member, return_home)
+                if not comes_home or absence.end - absence.begin < LONG_GONE_S:
+                    continue
+                for name in result:
+                    comes = draws.below(MILLION) < self.household.welcome * MILLION
+                    if name == member or comes:
+                        result[name] = self._with_welcome(name, result[name], return_home.begin)
+        return result
+
+    def _with_welcome(self, name: str, day: Sequence[Doing], at: int) -> Sequence[Doing]:
+        """Return a day in which a member comes to the door, if they are free at that time."""
+        for i, doing in enumerate(day):
+            end = at + WELCOME_S
+            if doing.begin <= at < doing.end:
+                is_busy = doing.task or doing.activity == SLEEP or self.is_out(name, doing)
+                is_busy = is_busy or self._is_exclusive(name, doing)
+                if is_busy or doing.end - end < NO_GAP_S:
+                    return day
+                before = [doing._replace(end=at)] if doing.begin < at else []
+                welcome = Doing(WELCOME, at, end, role=INTERRUPTS)
+                role = RESUMES if doing.begin < at and doing.role == PLANNED else doing.role
+                after = doing._replace(begin=end, role=role)
+                return [*day[:i], *before, welcome, after, *day[i + 1 :]]
+        return day
+
+    def _joint_jobs(self, ordinal: int) -> list[tuple[Job, tuple[str, ...]]]:
+        """Draw the joint activities of a day: each a job and its members, () for all."""
+        day = date.fromordinal(ordinal)
+        jobs = []
+        for name, joint in self.household.together.items():
+            if day.weekday() not in weekdays_of(joint.on) and not holds_on(joint.dates, day):
+                continue
+            draws = Draws(stream_key(self._seed, self._path, f"together {name}"), ordinal)
+            if draws.below(MILLION) >= joint.probability * MILLION:
+                continue
+            activity = joint.activity or name
+            begin = starts(joint, 0).draw(draws)
+            takes = (joint.takes or find_activity(activity, {}).takes).table().draw(draws)
+            at, duration = uniform(begin, begin), uniform(takes, takes)
+            job = Job(name, activity, at, duration, until=NEVER, needed=False)
+            jobs.append((job, joint.who))
+        return jobs
+
+
+def _with_job(plan: DayPlan, job: Job) -> DayPlan:
+    """Return a plan with a job, which replaces one of the same task."""
+    jobs = list(plan.jobs)
+    index = next((i for i, own in enumerate(jobs) if own.task == job.task), None)
+    if index is None:
+        jobs.append(job)
+    else:
+        jobs[index] = job._replace(after=jobs[index].after)
+    return replace(plan, jobs=tuple(jobs))

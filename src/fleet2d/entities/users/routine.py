@@ -24,17 +24,8 @@ from fleet2d.entities.users.resident import (
 from fleet2d.errors import PlacementError
 from fleet2d.kernels.motion import ANY_ROOM, NO_GAP_S
 from fleet2d.routines.activity import Activity, catalogue
-from fleet2d.routines.household import (
-    AWAY,
-    WELCOME,
-    AnyHousehold,
-    AnyPeriod,
-    Household,
-    Lives,
-    MemberRooms,
-    with_absences,
-)
-from fleet2d.routines.life import Life
+from fleet2d.routines.household import AWAY, AnyHousehold, AnyPeriod, Household, with_absences
+from fleet2d.routines.life import WELCOME, Life, Lives, MemberRooms
 from fleet2d.routines.persona import AnyPersona, Persona, bundled_persona
 from fleet2d.routines.planner import DAY_S, PLANNED, REST, RESUMES, SLEEP, Doing
 from fleet2d.runtime.determinism import Draws, stream_key
@@ -364,8 +355,8 @@ class Routine(ResidentBehavior):
     def _join_household(self, actor: "Actor") -> None:
         """Share the days and places of the members, or prepare them if it is the first of them."""
         assert self.household is not None
-        bodies = (body for body in actor.people.values() if body is not None)
-        behaviors = (each for body in bodies for each in getattr(body, "behaviors", ()))
+        others = (actor.people.get(name) for name in self.household.members)
+        behaviors = (each for body in others for each in getattr(body, "behaviors", ()))
         for other in behaviors:
             if isinstance(other, Routine) and other.household == self.household:
                 self.lives: Lives = other.lives
