@@ -20,7 +20,6 @@ from fleet2d.cli.app import app
 
 SOURCE = Path(fleet2d.__file__).parent
 LEAVES = {
-    "calibrate": "calibrate",
     "fit": "fit",
     "floorplan/synthetic": "",
     "paper": "reproduce-paper",

@@ -1,10 +1,40 @@
-"""The names of the package: each is where the package looks for it."""
+"""The public names: those of `fleet2d` and `fleet2d.testing`, each imported when it is first used."""
 
+import re
 from importlib import import_module
+from pathlib import Path
+
+import pytest
 
 import fleet2d
 
+ROOT = Path(fleet2d.__file__).parents[2]
 
-def test_every_public_name_is_in_its_module() -> None:
-    for name, module in fleet2d._HOME_OF.items():
-        assert hasattr(import_module(f"fleet2d.{module}"), name), (name, module)
+
+@pytest.mark.parametrize("name", fleet2d.__all__)
+def test_every_public_name_can_be_imported(name: str) -> None:
+    assert getattr(fleet2d, name) is not None
+    assert name in dir(fleet2d)
+
+
+def test_unknown_name_is_an_attribute_error() -> None:
+    with pytest.raises(AttributeError, match="no attribute 'Roomba'"):
+        fleet2d.Roomba  # type: ignore[attr-defined]  # noqa: B018
+
+
+def test_documented_modules_are_named_as_public() -> None:
+    """What the documentation imports is public, and the page of the interface lists it."""
+    page = (ROOT / "docs" / "api.md").read_text(encoding="utf-8")
+    documented = set()
+    for file in [
+        ROOT / "README.md",
+        *(ROOT / "docs").glob("*.md"),
+        *(ROOT / "examples").glob("*.py"),
+    ]:
+        text = file.read_text(encoding="utf-8")
+        documented |= set(re.findall(r"^(?:from|import) (fleet2d[\w.]*)", text, re.MULTILINE))
+
+    assert documented - {"fleet2d"}
+    for module in documented:
+        import_module(module)
+        assert f"`{module}`" in page, f"{module} is documented, and docs/api.md doesn't list it"

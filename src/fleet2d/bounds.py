@@ -86,8 +86,13 @@ LOG_BYTES = Bound("LOG_BYTES", 1 << 30, "bytes")
 """Size of a log."""
 DEPTH = Bound("DEPTH", 64, "lists in lists")
 """Depth of YAML."""
-VALUES = Bound("VALUES", 500_000, "values")
-"""Values in a YAML text; those of an anchor count again for each alias."""
+VALUES = Bound("VALUES", 200_000, "values")
+"""Values in a YAML text, or in a scenario and all that it extends; those of an anchor count again
+for each alias."""
+EXTENDED_FILES = Bound("EXTENDED_FILES", 100, "files")
+"""Files of a scenario: its own and those that they extend."""
+ENTRIES = Bound("ENTRIES", 5_000, "entries")
+"""Entries of a section of a scenario, such as its users, and of a list of mappings or texts."""
 JSON_VALUES = Bound("JSON_VALUES", 5_000_000, "values")
 """Values in a JSON text."""
 PIXELS = Bound("PIXELS", 1 << 25, "pixels")
@@ -111,10 +116,7 @@ TABLE_BYTES = Bound("TABLE_BYTES", 2 << 30, "bytes when unpacked")
 VARIANTS = Bound("VARIANTS", 1_000_000, "values")
 """Values of one axis of a study, and replicates."""
 
-BOUNDS = (
-    FILE_BYTES, PICTURE_BYTES, LOG_BYTES, DEPTH, VALUES, JSON_VALUES, PIXELS, POLYGONS, CORNERS,
-    CROSSINGS, LOG_ROWS, FIXES, LOG_DAYS, LEARNED_BYTES, TABLE_BYTES, VARIANTS,
-)  # fmt: skip
+BOUNDS = tuple(bound for bound in list(globals().values()) if isinstance(bound, Bound))
 """All bounds."""
 
 

@@ -25,7 +25,7 @@ def about(
 ) -> None:
     """Simulate weeks of a home in a fraction of a second, exactly reproducible."""
     if version:
-        from fleet2d.version import __version__
+        from fleet2d import __version__
 
         typer.echo(f"fleet2d {__version__}")
         raise typer.Exit

@@ -18,9 +18,9 @@ import inspect
 import json
 import pkgutil
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sized
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache, lru_cache
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
 
@@ -40,8 +40,9 @@ from pydantic import (
 from pydantic.fields import FieldInfo
 from pydantic_core import CoreSchema, InitErrorDetails, core_schema
 
-from fleet2d.bounds import one_line
+from fleet2d.bounds import ENTRIES, one_line
 from fleet2d.configuration.problems import (
+    Location,
     did_you_mean,
     problem,
     problem_at,
@@ -50,7 +51,7 @@ from fleet2d.configuration.problems import (
     unknown_key,
 )
 from fleet2d.configuration.trust import BrokenModule, class_path, import_class
-from fleet2d.errors import Fleet2DError, ScenarioError, may_be_ctrl_c, text_of
+from fleet2d.errors import Fleet2DError, InputError, ScenarioError, may_be_ctrl_c, text_of
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
@@ -162,6 +163,7 @@ _FORM = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,99}")
 def _check_names(entries: Any) -> Any:
     """Refuse names that can't be part of a key path, a file name or a table name."""
     if isinstance(entries, Mapping):
+        _check_count((), entries)
         for name in entries:
             if not _FORM.fullmatch(str(name)):
                 raise problem_at(
@@ -272,7 +274,7 @@ class Settings(DescribedModel):
     @classmethod
     def _name_known_keys(cls, data: Any, handler: ModelWrapValidatorHandler[Self]) -> Self:
         if isinstance(data, Mapping):
-            _refuse_booleans(data, cls.model_fields)
+            _refuse_early(data, cls.model_fields)
         try:
             return handler(data)
         except ValidationError as error:
@@ -304,16 +306,25 @@ class Settings(DescribedModel):
 _NUMBERS = (int, float, int | None, float | None)
 
 
-def _refuse_booleans(data: Mapping[Any, Any], fields: Mapping[str, FieldInfo]) -> None:
-    """Refuse true and false as values of numbers, which Pydantic would read as 1 and 0.
+def _refuse_early(data: Mapping[Any, Any], fields: Mapping[str, FieldInfo]) -> None:
+    """Refuse what Pydantic would accept, or would take very long to refuse.
 
     Raises:
-        ValidationError: There is such a value.
+        ValidationError: True or false stands for a number, or a list has too many entries.
     """
     for key, value in data.items():
         if isinstance(value, bool) and key in fields and fields[key].annotation in _NUMBERS:
             text = str(value).lower()
             raise problem_at((key,), f"expected a number, got {text}", value)
+        if isinstance(value, list | tuple) and value and isinstance(value[0], str | Mapping):
+            _check_count((key,), value)
+
+
+def _check_count(location: Location, entries: Sized) -> None:
+    try:
+        ENTRIES.check(len(entries), "it")
+    except InputError as error:
+        raise problem_at(location, str(error)) from None
 
 
 def _example(cls: type[Settings], key: str) -> str:
@@ -440,6 +451,7 @@ def components(kind: str) -> dict[str, type[Component]]:
     return dict(sorted((plugins | _REGISTRY.get(kind, {})).items()))
 
 
+@cache
 def _plugins(kind: str) -> "Iterable[EntryPoint]":
     """Return the components of a kind that installed packages declare."""
     from importlib.metadata import entry_points  # slow to import, and seldom used

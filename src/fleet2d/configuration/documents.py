@@ -194,6 +194,8 @@ class TreeWalk:
         """
         if node.tag not in _PLAIN:
             raise NodeError(node, f"the tag {one_line(node.tag)!r} can't be used here")
+        if node.tag == f"{TAG}str":
+            return node.value
         try:
             return self._scalars.construct_object(node)
         except (ValueError, LookupError, TypeError, AttributeError, OverflowError):

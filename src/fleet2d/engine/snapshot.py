@@ -23,6 +23,7 @@ from typing import Any, BinaryIO, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from fleet2d import __version__
 from fleet2d.artifacts.manifest import plain
 from fleet2d.artifacts.table import ColumnChunk
 from fleet2d.configuration.trust import is_scenario_module, public_name
@@ -36,7 +37,6 @@ from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.kernels.space import Mesh
 from fleet2d.routines.persona import Persona
 from fleet2d.scenario.model import Scenario
-from fleet2d.version import __version__
 
 # Booleans, numbers, times and text of a fixed length.
 _PLAIN = frozenset("biufcmMSU")
@@ -178,7 +178,6 @@ _NO_STATE = (
     "fleet2d.engine.simulation",
     "fleet2d.engine.snapshot",
     "fleet2d.fit",
-    "fleet2d.leaves",
     "fleet2d.configuration.trust",
     "fleet2d.paper",
     "fleet2d.published",

@@ -5,6 +5,7 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from importlib import import_module
 from typing import Any, Self
 
 import numpy as np
@@ -33,10 +34,12 @@ from fleet2d.floorplan.rooms.room import NO_ROOM, Room
 from fleet2d.floorplan.rooms.vocabulary import room_type
 from fleet2d.kernels import I16, Bool
 from fleet2d.kernels.space import Mesh, fill_from_neighbors, rasterize_cells, strictly_inside
-from fleet2d.leaves import views
 from fleet2d.runtime.determinism import sum_in_order
 
 __all__ = ["FloorPlan", "LabelledRegion", "Room"]
+
+# What shows plans builds upon them, so it is imported by its name, and only when it is used.
+_NOTEBOOK = "fleet2d.viewer.notebook"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -340,11 +343,11 @@ class FloorPlan:
         Returns:
             A matplotlib figure, or `ax`.
         """
-        return views().draw_plan(self, ax, theme)
+        return import_module(_NOTEBOOK).draw_plan(self, ax, theme)
 
     def _repr_png_(self) -> bytes | None:
         """Show the plan in a notebook, where matplotlib is installed."""
-        return views().plan_png(self)
+        return import_module(_NOTEBOOK).plan_png(self)
 
     def _check_entrance(self) -> None:
         if self.entrance is None:

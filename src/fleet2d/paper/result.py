@@ -50,7 +50,7 @@ class Result:
         Raises:
             InputError: The file can't be written.
         """
-        from fleet2d.version import __version__
+        from fleet2d import __version__
 
         path = directory / f"{self.name}.json"
         content = {"result": self.title, "fleet2d": __version__, **self.numbers}

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from datetime import timedelta
 from functools import partial
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +17,6 @@ from fleet2d.artifacts.unfinished import Prefix
 from fleet2d.configuration.problems import suggest
 from fleet2d.errors import ArtifactError, RunDirectoryError, printable
 from fleet2d.kernels import I64
-from fleet2d.leaves import judges, views
 from fleet2d.storage.files import PARTIAL, path_in
 
 if TYPE_CHECKING:
@@ -29,6 +29,10 @@ if TYPE_CHECKING:
     from fleet2d.expectations.verdict import Verdict
     from fleet2d.floorplan.plan import FloorPlan
     from fleet2d.runs.trajectory import Trajectory
+
+# What shows and judges runs builds upon them, so it is imported by its name when it is used.
+_NOTEBOOK = "fleet2d.viewer.notebook"
+_REPRODUCE = "fleet2d.engine.reproduce"
 
 
 TRACK, PLANNED, WALK = 0, 1, 2
@@ -208,7 +212,7 @@ class Run:
                 isn't complete.
             ArtifactError: The run can't be reproduced: its tables differ from the stored ones.
         """
-        return judges().judge_again(self, expectation, name)
+        return import_module(_REPRODUCE).judge_again(self, expectation, name)
 
     def draw(self, at: str | int | None = None, ax: Any = None, theme: str = "light") -> Any:
         """Draw the run, or one moment of it; needs the extra `viz`.
@@ -225,7 +229,7 @@ class Run:
             InputError: `at` names no moment, there is no such theme, or matplotlib is missing.
             ArtifactError: The run stored no floor plan or no key frames.
         """
-        return views().draw_run(self, at, ax, theme)
+        return import_module(_NOTEBOOK).draw_run(self, at, ax, theme)
 
     def view(self, height: int = 720) -> Any:
         """Return the page of the run as a widget, for Jupyter and marimo; needs the extra `view`.
@@ -237,11 +241,11 @@ class Run:
             InputError: anywidget is not installed.
             ArtifactError: The run stored no floor plan.
         """
-        return views().run_widget(self, height)
+        return import_module(_NOTEBOOK).run_widget(self, height)
 
     def _repr_html_(self) -> str:
         """Show the run in a notebook."""
-        return views().run_html(self)
+        return import_module(_NOTEBOOK).run_html(self)
 
     def arrow(self, name: str) -> pa.Table:
         """Return a table as an Arrow table.

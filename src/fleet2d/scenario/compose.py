@@ -2,12 +2,12 @@
 
 import os.path
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import reduce
 from pathlib import Path
 from typing import Any
 
-from fleet2d.bounds import one_line
+from fleet2d.bounds import EXTENDED_FILES, VALUES, one_line
 from fleet2d.configuration.components import base_of, lookup
 from fleet2d.configuration.documents import Document, Keys, parse_yaml, read_document
 from fleet2d.configuration.problems import suggest
@@ -49,7 +49,7 @@ def compose(
     Raises:
         ScenarioError: a file or an override can't be read.
     """
-    document = _load("bundled:base" if source is None else source, Path(), ())
+    document = _load("bundled:base" if source is None else source, Path(), (), [])
     changes = [_read_override(text) for text in overrides]
     for keys, value in (settings or {}).items():
         changes.append(assignment(keys, value, f"argument {keys[-1]}={value!r}"))
@@ -104,9 +104,13 @@ def bundled_path(name: str) -> Path:
 
 
 def _load(
-    source: str | Path | Mapping[str, Any], folder: Path, chain: tuple[Path, ...]
+    source: str | Path | Mapping[str, Any], folder: Path, chain: tuple[Path, ...], sizes: list[int]
 ) -> Document:
-    """Read a source and everything that it extends."""
+    """Read a source and everything that it extends; `sizes` collects the number of values of each.
+
+    Raises:
+        ScenarioError: A file can't be read, or there are too many, or too many values in all.
+    """
     if isinstance(source, Mapping):
         document = Document(dict(source))
     else:
@@ -115,7 +119,10 @@ def _load(
         title = os.path.normpath(path) if bundled == str(source) else str(source)
         if path.resolve() in chain:
             raise ScenarioError(f"{title} extends itself: {_chain(chain, path)}")
+        EXTENDED_FILES.check(len(sizes) + 1, "the scenario", ScenarioError, least="at least ")
         document = read_document(path, title)
+        sizes.append(len(document.places))
+        VALUES.check(sum(sizes), "the scenario", ScenarioError, least="more than ")
         folder, chain = path.parent, (*chain, path.resolve())
     extended = document.data.pop("extends", None) or []
     parents = extended if isinstance(extended, list) else [extended]
@@ -124,7 +131,7 @@ def _load(
         for parent in parents:
             if not isinstance(parent, str):
                 raise ScenarioError(f"expected the path of a YAML file, got {parent}")
-            result = merge(result, _load(str(parent), folder, chain))
+            result = merge(result, _load(str(parent), folder, chain, sizes))
     except ScenarioError as error:
         place = document.place(("extends",))
         raise ScenarioError(f"{place}{': ' * bool(place)}extends: {error}") from error
@@ -179,11 +186,11 @@ class _Merger:
         if kind:
             base, change = _unfold(base, change), _unfold(change, base)
         if not isinstance(change, Mapping):
-            return self.replace(change, keys)
+            return self.replace(change, keys, base)
         if isinstance(base, list) and change and all(key.isdigit() for key in change):
             return self.merge_entries(base, change, keys)
         if not isinstance(base, Mapping):
-            return self.replace(change, keys)
+            return self.replace(change, keys, base)
         if kind:
             base = self.without_old_fields(kind, base, change, keys)
         result = dict(base)
@@ -208,18 +215,20 @@ class _Merger:
             result[int(key)] = self.merge(result[int(key)], value, inner)
         return result
 
-    def replace(self, value: Any, keys: Keys) -> Any:
-        self.forget(keys)
+    def replace(self, value: Any, keys: Keys, old: Any = None) -> Any:
+        self.forget(old, keys)
         depth = len(keys)
         # The place of the key or the nearest key around it; none: a value from Python.
         nearest = (self.new_places.get(keys[:n]) for n in range(depth, -1, -1))
         self.places[keys] = next((place for place in nearest if place is not None), "")
-        self.places.update({k: place for k, place in self.new_places.items() if k[:depth] == keys})
+        for inner in _paths_in(value, keys):
+            if inner in self.new_places:
+                self.places[inner] = self.new_places[inner]
         return value
 
-    def forget(self, keys: Keys) -> None:
-        for inner in [k for k in self.places if k[: len(keys)] == keys]:
-            del self.places[inner]
+    def forget(self, value: Any, keys: Keys) -> None:
+        for path in _paths_in(value, keys):
+            self.places.pop(path, None)
 
     def without_old_fields(
         self, kind: str, base: Mapping[str, Any], change: Mapping[str, Any], keys: Keys
@@ -234,8 +243,19 @@ class _Merger:
             if not _same_type(kind, old, change["type"]):
                 old_fields = {"behaviors", *_type_fields(kind, old)}
         for key in old_fields & base.keys():
-            self.forget((*keys, key))
+            self.forget(base[key], (*keys, key))
         return {key: value for key, value in base.items() if key not in old_fields}
+
+
+def _paths_in(value: Any, keys: Keys) -> Iterator[Keys]:
+    """Yield the paths of a value, which has the path `keys`, and of all values within it."""
+    yield keys
+    if isinstance(value, Mapping):
+        for key, inner in value.items():
+            yield from _paths_in(inner, (*keys, str(key)))
+    elif isinstance(value, list):
+        for index, inner in enumerate(value):
+            yield from _paths_in(inner, (*keys, str(index)))
 
 
 def _unfold(value: Any, other: Any) -> Any:

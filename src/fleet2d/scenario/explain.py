@@ -10,7 +10,7 @@ from pydantic_core import ErrorDetails
 from fleet2d.bounds import one_line
 from fleet2d.configuration.components import components
 from fleet2d.configuration.documents import Document
-from fleet2d.configuration.problems import Location, did_you_mean, shown
+from fleet2d.configuration.problems import MOST_LINES, Location, did_you_mean, shown
 from fleet2d.errors import ScenarioError
 from fleet2d.scenario.compose import slot_kind
 
@@ -57,11 +57,12 @@ def explain(error: ValidationError, document: Document) -> ScenarioError:
     problems: dict[tuple[str, str], list[ErrorDetails]] = {}
     groups: set[str] = set()
     lines = error.errors(include_url=False)
-    for line in lines:
+    for line in lines[:MOST_LINES]:
         # A list is also called too short when all of its entries are wrong.
         depth = len(line["loc"])
-        entries = [entry for entry in lines if entry["loc"][:depth] == line["loc"]]
-        if line["type"] == "too_short" and len(entries) > 1:
+        if line["type"] == "too_short" and any(
+            entry["loc"][:depth] == line["loc"] for entry in lines if entry is not line
+        ):
             continue
         location = _location_in(line, document.data)
         group = line.get("ctx", {}).get("group")
@@ -71,12 +72,13 @@ def explain(error: ValidationError, document: Document) -> ScenarioError:
         line["msg"] += _type_with_key(line, location, document.data)
         key = (document.place(location), one_line(".".join(map(str, location)), 200))
         problems.setdefault(key, []).append(line)
-    return ScenarioError(
-        "\n".join(
-            ": ".join(part for part in (place, key, describe(*details)) if part)
-            for (place, key), details in problems.items()
-        )
-    )
+    texts = [
+        ": ".join(part for part in (place, key, describe(*details)) if part)
+        for (place, key), details in problems.items()
+    ]
+    if len(lines) >= MOST_LINES:
+        texts.append("... and more: these are the first")
+    return ScenarioError("\n".join(texts))
 
 
 def describe(*lines: ErrorDetails) -> str:

@@ -10,7 +10,7 @@ from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
 
-from fleet2d import version
+from fleet2d import __version__
 from fleet2d.configuration.documents import Document
 from fleet2d.configuration.problems import suggest
 from fleet2d.errors import InputError, ScenarioError
@@ -33,7 +33,7 @@ def code_version() -> str:
 
     It is constant for a release; in a checkout it changes with every edit of such a file.
     """
-    root = Path(version.__file__).parent
+    root = Path(__file__).parents[1]
     digest = hashlib.sha256()
     for path in sorted(root.rglob("*")):
         name = path.relative_to(root)
@@ -41,7 +41,7 @@ def code_version() -> str:
             digest.update(name.as_posix().encode() + b"\0")
             digest.update(hashlib.sha256(path.read_bytes()).digest())
     python = ".".join(platform.python_version_tuple()[:2])
-    return f"fleet2d {version.__version__}, python {python}, files {digest.hexdigest()[:DIGITS]}"
+    return f"fleet2d {__version__}, python {python}, files {digest.hexdigest()[:DIGITS]}"
 
 
 class FileHashes:

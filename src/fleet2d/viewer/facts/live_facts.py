@@ -1,9 +1,9 @@
 """The facts of a running simulation that the page receives before the first frame."""
 
+from fleet2d import __version__
 from fleet2d.artifacts.manifest import plain
 from fleet2d.engine.simulation import Simulation
 from fleet2d.entities.objects.door import Door
-from fleet2d.version import __version__
 from fleet2d.viewer.facts.contract import DoorFacts, RunFacts, WallsChange
 from fleet2d.viewer.facts.home_facts import home_facts
 from fleet2d.viewer.facts.run_facts import bodies_of

@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Literal
 
+from fleet2d import __version__
 from fleet2d.configuration.units import parse_duration
 from fleet2d.errors import ArtifactError
 from fleet2d.palette import body_color
@@ -12,7 +13,6 @@ from fleet2d.runs.layers import PREFIX
 from fleet2d.runs.run import Run
 from fleet2d.sight.camera import USUAL_ANGLE_DEG, USUAL_RANGE_M
 from fleet2d.storage.files import path_in
-from fleet2d.version import __version__
 from fleet2d.viewer.facts.contract import BodyFacts, CameraFacts, ColumnFacts, RunFacts, TableFacts
 from fleet2d.viewer.facts.home_facts import home_facts
 from fleet2d.viewer.facts.marks import marks_of

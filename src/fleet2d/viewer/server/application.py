@@ -12,9 +12,9 @@ from starlette.responses import FileResponse, Response
 from starlette.routing import Route
 from starlette.types import ASGIApp
 
+from fleet2d import __version__
 from fleet2d.errors import ArtifactError, Fleet2DError
 from fleet2d.runs.run import open_run
-from fleet2d.version import __version__
 from fleet2d.viewer.facts.contract import SessionFacts
 from fleet2d.viewer.facts.page_data import PageData, compact_json
 from fleet2d.viewer.server.guard import Guard

@@ -1,0 +1,106 @@
+"""Scenarios that are as long as a file may be: each is refused, or read, within seconds.
+
+The figures of the thorough run are in docs/security.md.
+"""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from tests.thorough import THOROUGH
+
+SECONDS = 10
+MEGABYTES = 1000
+READ = """
+import resource, sys
+resource.setrlimit(resource.RLIMIT_CPU, (30, 30))
+import fleet2d
+try:
+    fleet2d.Simulation(sys.argv[1], seed=1).advance(1)
+    print("began")
+except fleet2d.InputError as error:
+    print(error)
+usage = resource.getrusage(resource.RUSAGE_SELF)
+print(usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024)
+"""
+BASE = "extends: bundled:base\n"
+
+
+def bombs(n: int) -> dict[str, tuple[str, str]]:
+    """Scenarios of `n` values or entries and more, and a part of the message each."""
+    return {
+        "extends": (f"extends: [{', '.join(['bundled:base'] * n)}]", "at most 100 are read"),
+        "extends itself in pairs": ("extends: [pairs0.yaml, pairs0.yaml]", "at most 100 are read"),
+        "users": (
+            f"{BASE}users:\n" + "".join(f"  u{i}: {{type: meander}}\n" for i in range(n)),
+            "users: it has",
+        ),
+        "wrong users": (
+            f"{BASE}users:\n" + "".join(f"  u{i}: {{type: meandr}}\n" for i in range(4900 if THOROUGH else 1500)),
+            "no behavior 'meandr'",
+        ),
+        "unknown modules": (
+            f"{BASE}users:\n" + "".join(f"  u{i}: 'nothing{i}:X'\n" for i in range(4900)),
+            "no module named 'nothing0'",
+        ),
+        "behaviors": (
+            f"{BASE}users: {{ana: {{behaviors: [{'meander, ' * n}meander]}}}}",
+            "users.ana.behaviors: it has",
+        ),
+        "script": (
+            f"{BASE}script:\n" + "- {put: ana, at: 19:00, place: kitchen}\n" * n,
+            "script: it has",
+        ),
+        "anchors": ("a:\n" + "".join(f"- &a{i} x\n" for i in range(8 * n)), "at most 200000"),
+        "fewer anchors": (
+            "a:\n" + "".join(f"- &a{i} x{i}\n" for i in range(190_000)),
+            "unknown key 'a'",
+        ),
+        "unknown keys": (
+            BASE + "".join(f"u{i}: 1\n" for i in range(95_000)),
+            "... and more: these are the first",
+        ),
+        "numbers": (f"a: [{'1.5, ' * 190_000}1]", "unknown key 'a'"),
+    }  # fmt: skip
+
+
+QUICK = ["extends", "extends itself in pairs", "users", "behaviors", "anchors", "wrong users"]
+
+
+@pytest.mark.parametrize("name", list(bombs(1)) if THOROUGH else QUICK)
+def test_scenario_is_refused_within_seconds(tmp_path: Path, name: str) -> None:
+    """`extends` of 20,000 names, 30,000 users or 200,000 anchors took 7 to 25 s and more."""
+    text, message = bombs(25_000)[name]
+    (tmp_path / "home.yaml").write_text(text)
+    for i in range(20):
+        (tmp_path / f"pairs{i}.yaml").write_text(f"extends: [pairs{i + 1}.yaml, pairs{i + 1}.yaml]")
+    (tmp_path / "pairs20.yaml").write_text(BASE)
+
+    done = subprocess.run(
+        [sys.executable, "-c", READ, "home.yaml"], cwd=tmp_path, capture_output=True, text=True,
+        timeout=300, check=False,
+    )  # fmt: skip
+
+    assert done.returncode == 0, done.stderr
+    *lines, figures = done.stdout.splitlines()
+    seconds, megabytes = map(float, figures.split())
+    assert message in "\n".join(lines)
+    assert seconds < SECONDS
+    assert megabytes < MEGABYTES
+
+
+def test_places_of_replaced_values_are_forgotten(tmp_path: Path) -> None:
+    """Messages name where a value is written now, not where one that it replaced was."""
+    from fleet2d.scenario.compose import compose
+
+    (tmp_path / "a.yaml").write_text(
+        "users:\n  ana:\n    type: meander\n    away:\n    - {from: 8:00}\n"
+    )
+    (tmp_path / "b.yaml").write_text("extends: a.yaml\nusers:\n  ana:\n    away: []\n")
+
+    document = compose(tmp_path / "b.yaml")
+
+    assert document.places[("users", "ana", "away")] == f"{tmp_path}/b.yaml:4"
+    assert not [path for path in document.places if path[:3] == ("users", "ana", "away")][1:]
+    assert document.places[("users", "ana", "type")] == f"{tmp_path}/a.yaml:3"
