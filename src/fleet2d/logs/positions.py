@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from datetime import UTC, date, datetime, timedelta
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 from zoneinfo import ZoneInfo, available_timezones
 
 import numpy as np
@@ -80,6 +80,66 @@ def read_positions(
         if named["heading"].endswith("_deg"):
             heading = heading / 180 * np.pi
     time_us, has_date, has_zone = _times(table[named["time"]], path, line)
+    fixes = RawFixes(time_us, x, y, heading, line, notes)
+    return localize(
+        path,
+        "positions",
+        fixes,
+        has_date=has_date,
+        has_zone=has_zone,
+        time_zone=time_zone,
+        sort=sort,
+    )
+
+
+class RawFixes(NamedTuple):
+    """Fixes as a file has them.
+
+    Attributes:
+        time_us: Times [us since 1970], or since the beginning of the log, int64 (n,).
+        x: float64 (n,), NaN where there is none.
+        y: float64 (n,), NaN where there is none.
+        heading: float64 (n,) [rad], NaN where there is none.
+        line: The number of its line or message in the file, int64 (n,).
+        notes: What was odd in the file.
+    """
+
+    time_us: I64
+    x: F64
+    y: F64
+    heading: F64
+    line: I64
+    notes: list[str]
+
+
+def localize(
+    path: Path,
+    layout: str,
+    fixes: RawFixes,
+    *,
+    has_date: bool,
+    has_zone: bool,
+    time_zone: str | None,
+    sort: bool,
+) -> PositionLog:
+    """Return fixes as a log in the local time of the home.
+
+    Args:
+        path: The file that they are from.
+        layout: The layout of the file.
+        fixes: The fixes.
+        has_date: Whether times count from 1970; else from the beginning of the log.
+        has_zone: Whether times are UTC, and become times of `time_zone`.
+        time_zone: The time zone of the home.
+        sort: Put fixes in order of time instead of refusing times that run backwards.
+
+    Raises:
+        LogError: There is no fix, times run backwards or are out of range, or a time zone is
+            missing or unknown.
+    """
+    time_us, x, y, heading, line, notes = fixes
+    if not len(time_us):
+        raise LogError(f"{path} holds no position")
     _check_times(time_us, path, line, has_date=has_date)
     repeated = np.zeros(len(time_us), bool)
     if has_zone:
@@ -98,14 +158,12 @@ def read_positions(
             " were left out: a simulated day has 24 hours"
         )
     usable &= ~repeated
-    fixes = [column[usable] for column in (time_us, x, y, heading, line)]
-    time_us, x, y, heading, _ = _in_order(fixes, path, notes, sort=sort)
+    kept = [column[usable] for column in (time_us, x, y, heading, line)]
+    time_us, x, y, heading, _ = _in_order(kept, path, notes, sort=sort)
     first_day = date(1970, 1, 1) + timedelta(days=int(time_us[0] // DAY_US)) if has_date else None
     if first_day:
         time_us = time_us - time_us[0] // DAY_US * DAY_US
-    return PositionLog(
-        path, "positions", first_day, time_us, np.stack([x, y], 1), heading, tuple(notes)
-    )
+    return PositionLog(path, layout, first_day, time_us, np.stack([x, y], 1), heading, tuple(notes))
 
 
 def _table(path: Path) -> pa.Table:

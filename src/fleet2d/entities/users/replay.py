@@ -532,7 +532,10 @@ class Replay(Behavior):
 
     def files(self) -> tuple[Path, ...]:
         """Return the files that it reads."""
-        return tuple(sorted(self.path.glob("*.txt"))) if self.path.is_dir() else (self.path,)
+        if not self.path.is_dir():
+            return (self.path,)
+        pattern = "*" if (self.path / "metadata.yaml").is_file() else "*.txt"  # a bag, or logs
+        return tuple(sorted(path for path in self.path.glob(pattern) if path.is_file()))
 
     def start(self, actor: "Actor") -> None:
         """Read the log, plan the way through it, and report on it in `notes`."""

@@ -45,7 +45,8 @@ def layout_of(name: str) -> LogLayout:
 if TYPE_CHECKING:
     Layout = str
 else:
-    Layout = Literal[("auto", *layout_names(), "positions")]
+    Layout = Literal[("auto", *layout_names(), "bag", "positions")]
+_BAGS = (".bag", ".mcap", ".db3")
 
 
 def read_log(
@@ -62,9 +63,9 @@ def read_log(
     Args:
         path: The file; or the folder, for a home that has several.
         layout: The layout; "auto" recognizes it by its content.
-        id: The tag to read, of positions; see `read_positions`.
+        id: The tag to read, of positions; the topic or frame, of a bag; see `read_bag`.
         columns: The names of the columns of positions; see `read_positions`.
-        time_zone: The time zone of the home, for positions; see `read_positions`.
+        time_zone: The time zone of the home, for positions and bags; see `read_positions`.
         sort: Sort lines whose time runs backwards instead of refusing them.
 
     Raises:
@@ -79,11 +80,25 @@ def read_log(
         from fleet2d.logs.positions import read_positions
 
         return read_positions(path, id=id, columns=columns, time_zone=time_zone, sort=sort)
+    if layout == "bag":
+        if columns:
+            raise LogError(f"{path} is a bag: columns are for tables of positions")
+        from fleet2d.logs.bags import read_bag
+
+        return read_bag(path, id=id, time_zone=time_zone, sort=sort)
     if id is not None or columns or time_zone is not None:
         raise LogError(
             f"{path} is of the layout {layout}: id, columns and time_zone are for positions"
+            " and bags"
         )
     return layout_of(layout).read(path, sort=sort)
+
+
+def _is_bag(path: Path) -> bool:
+    """Return whether a file or folder is a bag of ROS, by its name."""
+    if path.is_dir():
+        return (path / "metadata.yaml").is_file()
+    return path.suffix.lower() in _BAGS
 
 
 def _recognize(path: Path) -> str:
@@ -92,6 +107,8 @@ def _recognize(path: Path) -> str:
     Raises:
         LogError: It is of no known layout.
     """
+    if _is_bag(path):
+        return "bag"
     if path.is_dir():
         layouts = map(_recognize_lines, sorted(path.glob("*.txt")))
         layout = next((name for name in layouts if name and layout_of(name).FOLDERS), None)

@@ -85,5 +85,16 @@ def _metadata(topic: Topic) -> dict[str, str]:
     """Return the quality of service of a topic, as rosbag2 stores it."""
     if not topic.latched:
         return {}
-    durability = "- history: 1\n  depth: 1\n  reliability: 1\n  durability: 1\n"
-    return {"offered_qos_profiles": durability}
+    no_limit = {"sec": 0, "nsec": 0}
+    latched = {
+        "history": 1,  # keep the last
+        "depth": 1,
+        "reliability": 1,  # reliable
+        "durability": 1,  # transient local: for those who subscribe later, too
+        "deadline": no_limit,
+        "lifespan": no_limit,
+        "liveliness": 1,
+        "liveliness_lease_duration": no_limit,
+        "avoid_ros_namespace_conventions": False,
+    }
+    return {"offered_qos_profiles": json.dumps([latched])}  # JSON is YAML
