@@ -18,11 +18,11 @@ from pathlib import Path
 from typing import Any
 
 from fleet2d.studies.driver import RunOptions, StudyJob, check_study, run_study
-from fleet2d.studies.execution.local import LocalExecutor
 from fleet2d.studies.executors import (
     Event,
     Executor,
     Finished,
+    LocalExecutor,
     SerialExecutor,
     TaskSchedule,
     WorkerJob,

@@ -13,7 +13,7 @@ import fleet2d
 from fleet2d.errors import ComponentError, InputError
 from fleet2d.runs.run import Run
 from fleet2d.studies.api import default_location, make_executor, map_runs
-from fleet2d.studies.execution.local import LocalExecutor
+from fleet2d.studies.executors import LocalExecutor
 
 SEEDED = [base("1 min", simulation={"seed": seed}) for seed in range(4)]
 

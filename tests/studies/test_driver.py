@@ -13,8 +13,7 @@ from tests.thorough import some
 
 from fleet2d.errors import ArtifactError, RunDirectoryError, ScenarioError
 from fleet2d.studies import design, driver
-from fleet2d.studies.execution.local import LocalExecutor
-from fleet2d.studies.executors import Event, SerialExecutor, TaskSchedule, WorkerJob
+from fleet2d.studies.executors import Event, LocalExecutor, SerialExecutor, TaskSchedule, WorkerJob
 from fleet2d.studies.plan import Changed
 from fleet2d.studies.reader import open_study
 
@@ -76,7 +75,7 @@ def test_a_study_is_one_data_set_and_few_files(undisturbed_dir: Path) -> None:
         p.relative_to(undisturbed_dir).as_posix() for p in undisturbed_dir.rglob("*") if p.is_file()
     )
     assert [
-        "lock", "parts/000001.json", "plan.parquet", "results/000001.parquet", "scenarios.parquet",
+        "parts/000001.json", "plan.parquet", "results/000001.parquet", "scenarios.parquet",
         "study.json", "tables/room_share/000001.parquet", "variants.parquet",
     ] == files  # fmt: skip
 
@@ -131,12 +130,24 @@ def test_what_is_damaged_is_run_again(
     assert digests(open_study(undisturbed_dir)) == digests(study)
 
 
-@pytest.mark.parametrize("file", ["variants.parquet", "lock"])
-def test_what_can_be_made_again_is_made_again(copied: Path, file: str) -> None:
-    (copied / file).unlink()
+@pytest.mark.parametrize("file", ["variants.parquet", "scenarios.parquet", "study.json"])
+@pytest.mark.parametrize("harm", ["gone", "cut"])
+def test_what_can_be_made_again_is_made_again(copied: Path, file: str, harm: str) -> None:
+    content = (copied / file).read_bytes()
+    if harm == "cut":
+        os.truncate(copied / file, len(content) // 2)
+    elif file != "study.json":  # without which it is no study
+        (copied / file).unlink()
     executor = CountingExecutor()
     run(small(**ROWS), copied, executor)
-    assert ([], True) == (executor.ran, (copied / file).exists())
+    assert ([], content) == (executor.ran, (copied / file).read_bytes())
+
+
+def test_a_plan_that_is_gone_is_refused_as_results_would_be_of_other_variants(copied: Path) -> None:
+    """Results are stored by number: renumbered variants would silently get those of others."""
+    (copied / "plan.parquet").unlink()
+    with pytest.raises(RunDirectoryError, match=r"plan.parquet is missing.*another --out"):
+        run(small(axes={SPEED: [0.1, 0.3, 0.6]}, **ROWS), copied)
 
 
 def test_a_crash_between_commit_and_removal_of_the_journal_counts_nothing_twice(
@@ -166,15 +177,18 @@ def test_a_journal_that_grows_large_becomes_a_part(
 def test_a_full_disk_ends_it_and_the_same_command_goes_on(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, undisturbed_dir: Path
 ) -> None:
-    write = os.pwrite
+    written, write = [0], os.write
 
-    def full(file: int, data: bytes, offset: int) -> int:
-        if offset > 4000:
+    def full(file: int, data: bytes) -> int:
+        if str(tmp_path / "study/journal") not in str(Path(f"/proc/self/fd/{file}").readlink()):
+            return write(file, data)
+        written[0] += len(data)
+        if written[0] > 4000:
             raise OSError(28, "No space left on device")
-        return write(file, data, offset)
+        return write(file, data)
 
     with monkeypatch.context() as patched:
-        patched.setattr(os, "pwrite", full)
+        patched.setattr(os, "write", full)
         with pytest.raises(ArtifactError, match="the disk is full"):
             run(small(**ROWS), tmp_path / "study")
     executor = CountingExecutor()
@@ -228,7 +242,8 @@ def test_a_study_that_was_killed_while_it_began_is_run(
     """One of a thousand kills left the plan without `study.json`, and the folder was refused."""
     written = ["lock", "scenarios.parquet", "plan.parquet", "study.json"]
     number = written.index(last) + 1
-    for name in written[:number]:
+    (tmp_path / "lock").touch()
+    for name in written[1:number]:
         shutil.copy(undisturbed_dir / name, tmp_path)
     (tmp_path / f"{written[number]}.partial").write_bytes(b"half")
     counts, _ = run(small(**ROWS), tmp_path)
@@ -253,7 +268,7 @@ def test_wrong_input_leaves_nothing_behind(tmp_path: Path) -> None:
 def test_two_processes_can_not_run_the_same_study(tmp_path: Path) -> None:
     class Nested(SerialExecutor):
         def run(self, job: WorkerJob, tasks: TaskSchedule) -> Generator[Event]:
-            with pytest.raises(RunDirectoryError, match="another process is running"):
+            with pytest.raises(RunDirectoryError, match="is being written by process"):
                 run(small(), tmp_path / "study")
             yield from super().run(job, tasks)
 

@@ -14,7 +14,7 @@ import yaml
 from tests.studies.scenes import SPEED, base, digests, run, small
 from tests.thorough import THOROUGH, some
 
-from fleet2d.studies.directory import StudyDirectory, count
+from fleet2d.studies.directory import StudyDirectory
 from fleet2d.studies.driver import Observer
 from fleet2d.studies.executors import cores
 from fleet2d.studies.reader import open_study
@@ -70,7 +70,7 @@ def test_a_study_killed_many_times_ends_as_an_undisturbed_one(tmp_path: Path) ->
     for _ in range(KILLS):  # while it begins, runs or writes
         run_in_a_child_and_kill(folder, chance.uniform(0.0, 0.12), chance.randint(1, MOST))
         if (folder / "study.json").exists():
-            complete = count(StudyDirectory(folder)).complete
+            complete = StudyDirectory(folder).counts().complete
             assert complete >= complete_before
             complete_before = complete
     _, study = run(LARGE, folder)
@@ -94,8 +94,9 @@ def start(folder: Path, *arguments: str) -> "subprocess.Popen[bytes]":
 
 
 def workers_of(process: "subprocess.Popen[bytes]") -> list[int]:
-    children = Path(f"/proc/{process.pid}/task/{process.pid}/children")
-    return [int(pid) for pid in children.read_text().split()]
+    pids = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
+    commands = {int(pid): Path(f"/proc/{pid}/cmdline").read_bytes() for pid in pids}
+    return [pid for pid, command in commands.items() if b"spawn_main" in command]
 
 
 def is_running(pid: int) -> bool:

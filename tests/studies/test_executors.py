@@ -1,6 +1,17 @@
-"""Schedules: variants of tasks home go to tasks worker, and everybody is busy to the end."""
+"""Executors: a home has one worker, all are busy to the end, and dead ones are replaced."""
 
-from fleet2d.studies.executors import TaskSchedule, WorkerTask
+import os
+import signal
+import subprocess
+import sys
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from fleet2d.errors import InputError
+from fleet2d.studies.executors import FinishedTask, LocalExecutor, TaskSchedule, WorkerTask
 
 
 def schedule(homes: str) -> TaskSchedule:
@@ -38,3 +49,72 @@ def test_an_empty_schedule_is_false() -> None:
     assert tasks
     homes_of(tasks, "x")
     assert not tasks
+
+
+# --- Worker processes ------------------------------------------------------------------------------
+
+
+class DiesWhileSending:
+    """A job whose first call ends its process in the middle of its results."""
+
+    def __init__(self, mark: Path) -> None:
+        self.mark = mark
+
+    def __call__(self, task: WorkerTask) -> bytes:
+        if not self.mark.exists():
+            self.mark.touch()
+            Connection._send = _send_some_and_die  # type: ignore[attr-defined]
+        return bytes(1_000_000)
+
+
+def _send_some_and_die(connection: Any, content: bytes, write: Any = None) -> None:
+    os.write(connection.fileno(), content[:1000])
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+class CannotBeLoaded:
+    """A job that raises an error where it is loaded."""
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return int, ("no job",)
+
+
+def test_a_worker_killed_while_it_sends_its_results_is_replaced(tmp_path: Path) -> None:
+    """A `concurrent.futures.ProcessPoolExecutor` waits for ever for such a worker."""
+    job = DiesWhileSending(tmp_path / "mark")
+    events = list(LocalExecutor(1).run(job, schedule("aa")))
+    assert [2, 1] == [event.attempts for event in events]
+    assert all(isinstance(event, FinishedTask) for event in events)
+
+
+def test_a_job_that_no_worker_can_load_is_an_error_with_its_traceback() -> None:
+    job: Any = CannotBeLoaded()
+    with pytest.raises(InputError, match=r"can't be set up(.|\n)*'no job'"):
+        list(LocalExecutor(1).run(job, schedule("a")))
+
+
+def test_a_worker_with_much_memory_is_replaced_between_two_tasks() -> None:
+    events = list(LocalExecutor(1, memory_mb=1.0).run(pid_of, schedule("aaa")))
+    pids = [event.payload for event in events if isinstance(event, FinishedTask)]
+    assert 3 > len(set(pids)) > 1  # each had two tasks at once
+    assert 3 == len(pids)
+
+
+def pid_of(task: WorkerTask) -> int:
+    return os.getpid()
+
+
+def test_a_script_needs_no_guard(tmp_path: Path) -> None:
+    """Workers don't run the script again that starts the study, as `spawn` does by itself."""
+    script = tmp_path / "script.py"
+    script.write_text(
+        "import operator, fleet2d\n"
+        "scenario = fleet2d.load_scenario('simulation.duration=1 min', seed=1)\n"
+        "digest = operator.attrgetter('digest')\n"
+        "print(len(fleet2d.map_runs(digest, [scenario], workers=1)))\n"
+    )
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+    done = subprocess.run(
+        [sys.executable, script], capture_output=True, text=True, check=False, env=environment
+    )
+    assert (0, "1\n", "") == (done.returncode, done.stdout, done.stderr)

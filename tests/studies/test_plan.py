@@ -5,11 +5,12 @@ from typing import Any
 
 import pytest
 from tests.scenes import OWN
-from tests.studies.scenes import SPEED, base, small
+from tests.studies.scenes import SPEED, base, run, small
 
 from fleet2d.errors import ScenarioError
 from fleet2d.scenario.model import load_scenario
 from fleet2d.studies.design import FileHashes, build_design, code_version, input_hash
+from fleet2d.studies.driver import Observer, check_study
 from fleet2d.studies.executors import SerialExecutor
 from fleet2d.studies.plan import StudyPlan, check_setups, make_plan, setups_to_check
 from fleet2d.studies.specification import read_specification
@@ -19,7 +20,7 @@ ATTIC = {"key": "users.ana.start", "values": ["kitchen", "attic", "kitchn"]}
 
 def plan(**keys: Any) -> StudyPlan:
     specification = read_specification(small(**keys))
-    return make_plan(build_design(specification), specification.file.keep.tables)
+    return make_plan(build_design(specification))
 
 
 def identities(**keys: Any) -> list[str]:
@@ -105,12 +106,12 @@ def test_two_variants_with_the_same_scenario_are_refused() -> None:
 
 @pytest.mark.parametrize("table", ["room_share", "observations", "explored.astro"])
 def test_tables_that_variants_have_can_be_kept(table: str) -> None:
-    assert plan(keep={"tables": [table]})
+    assert check_study(small(keep={"tables": [table]}))
 
 
 def test_a_table_that_no_variant_has_is_refused() -> None:
     with pytest.raises(ScenarioError, match="did you mean 'room_share'"):
-        plan(keep={"tables": ["rom_share"]})
+        check_study(small(keep={"tables": ["rom_share"]}))
 
 
 def test_variants_that_share_a_home_have_its_key() -> None:
@@ -123,4 +124,76 @@ def test_variants_that_share_a_home_have_its_key() -> None:
 
 def test_own_components_run_in_a_study() -> None:
     own = {"share": {"type": f"{OWN}:Share", "period": "1 min"}}
-    assert plan(base=base(algorithms=own), keep={"tables": ["share"]})
+    assert check_study(small(base=base(algorithms=own), keep={"tables": ["share"]}))
+
+
+# --- Names ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("keys", "message"),
+    [
+        ({"keep": {"metrics": ["sigthings.*"]}}, r"keep.metrics.*'sigthings': did you mean 'sight"),
+        ({"keep": {"metrics": ["sightings"]}}, r"is no number: write sightings\.\*"),
+        ({"keep": {"metrics": ["sightings.anna"]}}, "'anna', which no variant has.*'ana'"),
+        ({"keep": {"metrics": ["sigthin*"]}}, "no variant has a metric 'sigthin'"),
+        (
+            {"compare": [{"metric": "sightigns.ana", "against": {SPEED: 0.3}}]},
+            "compare: no variant has a metric 'sightigns': did you mean 'sightings'",
+        ),
+        (
+            {
+                "compare": [{"metric": "sightings.ana", "against": {SPEED: 0.3}}],
+                "keep": {"metrics": ["distance.*"]},
+            },
+            "'sightings.ana' isn't kept",
+        ),
+        ({"keep": {"tables": ["rooms_share"]}}, "keep.tables.*did you mean 'room_share'"),
+    ],
+)
+def test_what_no_variant_has_is_refused_before_the_first_run(
+    keys: dict[str, Any], message: str
+) -> None:
+    """`keep: {metrics: [sigthings.*]}` kept nothing, and the study ended without a word."""
+    with pytest.raises(ScenarioError, match=message):
+        check_study(small(**keys))
+
+
+@pytest.mark.parametrize("pattern", ["*", "sight*", "*.ana", "sightings.a*", "[sd]*.ana", "d*.as*"])
+def test_patterns_that_fit_are_kept(pattern: str) -> None:
+    assert check_study(small(keep={"metrics": [pattern]})) is not None
+
+
+@pytest.mark.parametrize(
+    "axis",
+    [
+        {"key": "simulation.seed", "values": [1, 2]},
+        {"options": {"one": {"simulation.seed": 1}, "two": {}}},
+        {"key": "simulation", "values": [{"seed": 1}, {}]},
+    ],
+)
+def test_a_seed_of_an_axis_is_refused_as_replicates_would_replace_it(axis: dict[str, Any]) -> None:
+    with pytest.raises(ScenarioError, match=r"simulation.seed.*replicates: \[1\]"):
+        check_study(small(axes={"life": axis}))
+
+
+def test_a_seed_of_a_rule_is_refused() -> None:
+    with pytest.raises(ScenarioError, match=r"rules\.0: sets simulation\.seed"):
+        check_study(small(rules=[{"set": {"simulation.seed": 3}}]))
+
+
+def test_variants_without_a_metric_are_noted(tmp_path: Path) -> None:
+    notes: list[str] = []
+
+    class Notes(Observer):
+        def on_note(self, text: str) -> None:
+            notes.append(text)
+
+    rules = [{"when": {SPEED: 0.6}, "set": {"metrics.sightings": None}}]
+    keep = {"metrics": ["sightings.*", "distance.*", "room_share.ana.kitchen_0"]}
+    compare = [{"metric": "distance.astroo", "against": {SPEED: 0.3}}]
+    with pytest.raises(ScenarioError, match="'astroo', which no variant has"):
+        check_study(small(rules=rules, keep=keep, compare=compare))
+    run(small(rules=rules, keep=keep), tmp_path, observer=Notes())
+    assert "3 of 6 complete variants have no metric sightings.*" in notes
+    assert not any("distance" in note for note in notes)

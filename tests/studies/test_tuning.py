@@ -7,13 +7,13 @@ from typing import Any
 import pytest
 from tests.studies.scenes import SPEED, base, small
 
-from fleet2d.errors import InputError, ScenarioError
+from fleet2d.errors import InputError, RunDirectoryError, ScenarioError
 from fleet2d.studies.axes import Parameter
 from fleet2d.studies.driver import check_study
-from fleet2d.studies.execution.local import LocalExecutor
-from fleet2d.studies.executors import Event, SerialExecutor, TaskSchedule, WorkerJob
+from fleet2d.studies.executors import Event, LocalExecutor, SerialExecutor, TaskSchedule, WorkerJob
 from fleet2d.studies.simulator import StagedRun
-from fleet2d.studies.tuning import TrialJob, TrialSchedule, TrialTask, TuneResult, tune
+from fleet2d.studies.specification import TuneSettings
+from fleet2d.studies.tuning import TRIALS, TrialJob, TrialSchedule, TrialTask, TuneResult, tune
 
 pytest.importorskip("optuna")
 pytestmark = pytest.mark.filterwarnings("ignore::optuna.exceptions.ExperimentalWarning")
@@ -26,6 +26,8 @@ class Spy(SerialExecutor):
         self.most, self.tasks = most, list[Any]()
 
     def run(self, job: WorkerJob, tasks: TaskSchedule) -> Generator[Event]:
+        if isinstance(job, TrialJob):
+            self.design = job.design
         for event in super().run(job, tasks):
             if len(self.tasks) == self.most:
                 raise KeyboardInterrupt
@@ -37,6 +39,10 @@ class Spy(SerialExecutor):
         return [task for task in self.tasks if isinstance(task, TrialTask)]
 
 
+RADIUS = "robots.astro.radius"
+PATROL = {"astro": {"type": "patrol", "dwell": 0, "speed": 0.2}}
+
+
 def search(**keys: Any) -> dict[str, Any]:
     settings = {
         "search": {"speed": {"key": SPEED, "low": 0.2, "high": 1.0}},
@@ -45,9 +51,9 @@ def search(**keys: Any) -> dict[str, Any]:
         "held_out": {"radius": [0.15]},
         **keys,
     }
-    axes = {"radius": {"key": "robots.astro.radius", "values": [0.1, 0.15]}}
+    axes = {"radius": {"key": RADIUS, "values": [0.1, 0.15]}}
     return small(
-        base=base("4 min", robots={"astro": {"type": "patrol", "dwell": 0, "speed": 0.2}}),
+        base=base("4 min", robots=PATROL),
         axes=axes,
         replicates=2,
         tune=settings,
@@ -55,7 +61,8 @@ def search(**keys: Any) -> dict[str, Any]:
 
 
 def tuned(tmp_path: Path, executor: Any = None, **keys: Any) -> TuneResult:
-    return tune(search(**keys), tmp_path / "tune", executor or SerialExecutor())
+    options = {name: keys.pop(name) for name in ("changed", "storage") if name in keys}
+    return tune(search(**keys), tmp_path / "tune", executor or SerialExecutor(), **options)
 
 
 def test_it_finds_what_is_better_on_homes_it_has_not_seen(tmp_path: Path) -> None:
@@ -113,7 +120,7 @@ def test_a_run_that_goes_on_comes_to_what_one_from_the_start_does() -> None:
     parameters = {"speed": Parameter(key=SPEED, low=0.2, high=1.0)}
     objectives = ("distance.astro", "sightings.ana")
 
-    def answers(*stages: float | None) -> list[bytes]:
+    def answers(*stages: float | None) -> list[Any]:
         job = TrialJob(checked.plan.design, parameters, objectives)
         return [job(TrialTask(0, 0, "", "", 0, {"speed": 0.5}, stage)) for stage in stages]
 
@@ -126,9 +133,8 @@ def test_a_run_that_goes_on_comes_to_what_one_from_the_start_does() -> None:
 def test_a_variant_goes_on_with_the_worker_that_keeps_it() -> None:
     optuna = pytest.importorskip("optuna")
     study = optuna.create_study(pruner=optuna.pruners.NopPruner())
-    variants = [(0, "home"), (1, "home")]
-    parameters = {"speed": Parameter(key=SPEED, low=0.2, high=1.0)}
-    schedule = TrialSchedule(study, parameters, variants, (60.0, None), 1)
+    settings = TuneSettings.model_validate(search(trials=1, prune_at=["1 min"])["tune"])
+    schedule = TrialSchedule(study, settings, [(0, "home"), (1, "home")])
     task_a, task_b = schedule.take("one"), schedule.take("two")
     assert isinstance(task_a, TrialTask)
     assert isinstance(task_b, TrialTask)
@@ -155,6 +161,124 @@ def test_it_runs_in_worker_processes(tmp_path: Path) -> None:
     assert 3 == tuned(tmp_path, LocalExecutor(1), trials=3).trials["complete"]
 
 
+def parameters(tmp_path: Path) -> list[tuple[Any, ...]]:
+    """State, settings and values of all trials of a search, in the order of their suggestion."""
+    from optuna.storages import JournalStorage
+    from optuna.storages.journal import JournalFileBackend
+
+    storage = JournalStorage(JournalFileBackend(str(tmp_path / "tune" / TRIALS)))
+    (study,) = storage.get_all_studies()
+    trials = storage.get_all_trials(study._study_id)
+    return [(trial.state.name, trial.params, trial.values) for trial in trials]
+
+
+def test_trials_are_the_same_with_any_number_of_workers(tmp_path: Path) -> None:
+    """Each worker that became free asked for a trial, so that their number decided on it."""
+    keys = {"trials": 6, "batch": 3, "prune_at": ["1 min", "2 min"]}
+    for workers in (1, 3):
+        tuned(tmp_path / str(workers), LocalExecutor(workers), **keys)
+    assert parameters(tmp_path / "1") == parameters(tmp_path / "3")
+
+
+CHANGES: dict[str, tuple[dict[str, Any], dict[str, Any], str]] = {
+    "held_out": ({"held_out": {"radius": [0.1]}}, {}, "of the training, what is held out changed"),
+    "homes": ({}, {"axes": {"radius": {"key": RADIUS, "values": [0.1, 0.12, 0.15]}}}, "homes"),
+    "base": ({}, {"base": base("3 min", robots=PATROL)}, "base scenario"),
+    "replicates": ({}, {"replicates": 1}, "seeds of the training"),
+    "search": ({"search": {"speed": {"key": SPEED, "low": 0.2, "high": 0.9}}}, {}, "parameters"),
+    "objectives": ({"objectives": {"distance.ana": "maximize"}}, {}, "the objectives changed"),
+    "direction": ({"objectives": {"distance.astro": "minimize"}}, {}, "the objectives changed"),
+    "prune_at": ({"prune_at": ["1 min"]}, {}, "prune_at changed"),
+    "seed": ({"seed": 1}, {}, "the seed of the search changed"),
+    "batch": ({"batch": 2}, {}, "the batch changed"),
+    "sampler": ({"sampler": "RandomSampler"}, {}, "the sampler changed"),
+}
+
+
+@pytest.mark.parametrize("change", CHANGES)
+def test_another_search_never_gets_the_trials_of_this_one(tmp_path: Path, change: str) -> None:
+    """Trials on a home that was held out afterwards counted, and were reported for homes unseen.
+
+    So did values of another objective. Now such a folder is refused; redone, it starts anew.
+    """
+    settings, keys, message = CHANGES[change]
+    first = Spy()
+    tuned(tmp_path, first, trials=2)
+    other = {**search(trials=2, **settings), **keys}
+    with pytest.raises(RunDirectoryError, match=f"{message}.*--changed redo"):
+        tune(other, tmp_path / "tune", SerialExecutor())
+    spy = Spy()
+    result = tune(other, tmp_path / "tune", spy, changed="redo")
+    assert 2 == result.trials["complete"] + result.trials["pruned"]
+    assert 2 == len({task.trial for task in spy.trials})
+    trained = {spy.design.parameters(task.index)["radius"] for task in spy.trials}
+    assert not trained & set(result.held_out.variants["radius"])
+    # The old trials are still there, under a name of their own.
+    again = Spy()
+    tuned(tmp_path, again, trials=2, changed="redo")
+    assert [] == again.trials
+
+
+def test_more_trials_continue_a_search_and_judge_the_new_best(tmp_path: Path) -> None:
+    """If more trials found better settings, their study was refused as one of other scenarios."""
+    tuned(tmp_path, trials=1)
+    spy = Spy()
+    result = tuned(tmp_path, spy, trials=8)
+    assert 7 == len({task.trial for task in spy.trials})
+    assert (8, 4) == (result.trials["complete"], result.held_out.counts.complete)
+
+
+def test_trials_of_unknown_origin_are_refused(tmp_path: Path) -> None:
+    """Earlier versions stored trials without what they are of."""
+    tuned(tmp_path, trials=1)
+    (tmp_path / "tune" / "search.json").unlink()
+    with pytest.raises(RunDirectoryError, match="holds another search"):
+        tuned(tmp_path, trials=1)
+
+
+def test_an_axis_that_applies_to_some_variants_only_is_not_held_out(tmp_path: Path) -> None:
+    """Variants without the axis were trained on, and were shown as held out."""
+    study = search(held_out={"dwell": [2]})
+    study["axes"]["dwell"] = {
+        "key": "robots.astro.dwell", "values": [1, 2], "when": {"radius": 0.1},
+    }  # fmt: skip
+    with pytest.raises(ScenarioError, match="doesn't apply to all variants"):
+        tune(study, tmp_path / "tune", SerialExecutor())
+
+
+def test_trials_can_be_stored_in_a_database(tmp_path: Path) -> None:
+    url = f"sqlite:///{tmp_path / 'trials.db'}"
+    first = tuned(tmp_path, trials=3, storage=url)
+    spy = Spy()
+    assert first.settings == tuned(tmp_path, spy, trials=3, storage=url).settings
+    assert [] == spy.trials
+    assert not (tmp_path / "tune" / TRIALS).exists()
+    with pytest.raises(RunDirectoryError, match="the storage changed"):
+        tuned(tmp_path, trials=3)
+
+
+@pytest.mark.parametrize("url", ["nowhere", "nowhere://db", "sqlite:////nowhere/at/all.db"])
+def test_a_database_that_cannot_be_used_is_refused(tmp_path: Path, url: str) -> None:
+    with pytest.raises(InputError, match="give the URL of a database"):
+        tuned(tmp_path, storage=url)
+    assert not (tmp_path / "tune").exists()
+
+
+def test_the_sampler_can_be_chosen(tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text(
+        "import optuna\n"
+        "class Middle(optuna.samplers.BaseSampler):\n"
+        "    def infer_relative_search_space(self, *_): return {}\n"
+        "    def sample_relative(self, *_): return {}\n"
+        "    def sample_independent(self, study, trial, name, distribution):\n"
+        "        return (distribution.low + distribution.high) / 2\n"
+    )
+    own = tuned(tmp_path / "own", trials=2, sampler=f"{tmp_path}/mine:Middle")
+    assert {SPEED: 0.6} == own.settings["tuned"]
+    sampler = {"type": "QMCSampler", "qmc_type": "halton"}
+    assert 5 == tuned(tmp_path / "halton", trials=5, sampler=sampler).trials["complete"]
+
+
 @pytest.mark.parametrize(
     ("keys", "message"),
     [
@@ -162,6 +286,9 @@ def test_it_runs_in_worker_processes(tmp_path: Path) -> None:
         ({"search": {"speed": {"key": SPEED, "low": -3, "high": 2}}}, "tune.search.speed"),
         ({"held_out": {"radius": [0.1, 0.15]}}, "none to run on"),
         ({"held_out": {"radius": [0.3]}}, "no variant has 0.3"),
+        ({"sampler": "TPSampler"}, "did you mean 'TPESampler'"),
+        ({"sampler": {"seed": 1}}, "name the type of the sampler"),
+        ({"sampler": {"type": "TPESampler", "speed": 1}}, "can't be used.*speed"),
         ({"prune_at": ["2 min", "1 min"]}, "ascending"),
         (
             {"prune_at": ["1 min"], "objectives": {"a": "minimize", "b": "minimize"}},

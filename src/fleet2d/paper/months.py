@@ -10,7 +10,7 @@ from fleet2d.errors import ComponentError
 from fleet2d.studies import driver
 from fleet2d.studies.answers import estimate
 from fleet2d.studies.directory import Counts
-from fleet2d.studies.execution.local import LocalExecutor
+from fleet2d.studies.executors import LocalExecutor
 from fleet2d.studies.reader import Study, open_study
 from fleet2d.studies.records import VariantRecord
 

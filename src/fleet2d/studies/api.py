@@ -11,9 +11,9 @@ from fleet2d.errors import ComponentError, InputError
 from fleet2d.runs.run import Run
 from fleet2d.scenario.model import Scenario
 from fleet2d.studies.driver import RunOptions, check_study, run_study
-from fleet2d.studies.execution.local import LocalExecutor
 from fleet2d.studies.executors import (
     Executor,
+    LocalExecutor,
     LostTask,
     SerialExecutor,
     TaskSchedule,

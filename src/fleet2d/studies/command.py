@@ -13,6 +13,7 @@ import typer
 
 from fleet2d.errors import InputError, end_by_signal
 from fleet2d.options import TrustFiles, TrustFolders, restrict_to
+from fleet2d.studies.storage import printable
 
 if TYPE_CHECKING:
     from fleet2d.studies.driver import CheckedStudy
@@ -29,6 +30,11 @@ Where = Annotated[str, typer.Argument(metavar="DIR", help="The folder or store o
 MOST_LINES = 10  # of a list that is printed
 IDENTITY_START = 6
 """The fewest characters of an identity that name a variant."""
+
+
+def _print(text: object, *, err: bool = False) -> None:
+    """Print text, which may come from a folder of somebody else, without control characters."""
+    typer.echo("\n".join(map(printable, str(text).split("\n"))), err=err)
 
 
 @studying.command()
@@ -74,9 +80,9 @@ def run(  # noqa: PLR0913 - options of the command line
         options = RunOptions(fail_fast, changed, observer)
         counts = run_study(checked, location, make_executor(executor, workers), options)
     if as_json:
-        typer.echo(json.dumps({"study": location, **vars(counts), "missing": counts.missing}))
+        _print(json.dumps({"study": location, **vars(counts), "missing": counts.missing}))
     elif not quiet:
-        typer.echo(f"{counts.complete} of {counts.total} variants complete in {location}")
+        _print(f"{counts.complete} of {counts.total} variants complete in {location}")
     if counts.failed:
         _print_failures(location)
     if counts.failed or counts.missing:
@@ -89,15 +95,15 @@ def status(
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
     """Print the progress of a study, even while it is being run."""
-    from fleet2d.studies.directory import StudyDirectory, count
+    from fleet2d.studies.directory import StudyDirectory
 
     directory = StudyDirectory(location)
     meta = directory.read_meta()
-    counts = count(directory)
+    counts = directory.counts()
     if as_json:
-        typer.echo(json.dumps({"study": location, **vars(counts), "missing": counts.missing}))
+        _print(json.dumps({"study": location, **vars(counts), "missing": counts.missing}))
         return
-    typer.echo(
+    _print(
         f"{meta.name}: {counts.complete} of {counts.total} variants complete,"
         f" {counts.failed} failed, {counts.missing} to run"
     )
@@ -123,17 +129,17 @@ def rerun(
     rows = study.arrow_variants.select(["variant", "digest", *study.columns]).to_pylist()
     row = next(row for row in rows if row["variant"] == number)
     labels = ", ".join(f"{c} = {row[c]}" for c in study.columns if row[c] is not None)
-    typer.echo(f"variant {number}: {labels}")
+    _print(f"variant {number}: {labels}")
     with restrict_to(trust, trust_dir):
         repeated = study.rerun(number, out)
     if out is not None:
-        typer.echo(f"stored in {out}")
+        _print(f"stored in {out}")
     if row["digest"] is None:
-        typer.echo(f"digest {repeated.digest}; the study has no digest of this variant")
+        _print(f"digest {repeated.digest}; the study has no digest of this variant")
     elif repeated.digest == row["digest"]:
-        typer.echo(f"reproduced: digest {repeated.digest}")
+        _print(f"reproduced: digest {repeated.digest}")
     else:
-        typer.echo(f"not reproduced: {repeated.digest} instead of {row['digest']}", err=True)
+        _print(f"not reproduced: {repeated.digest} instead of {row['digest']}", err=True)
         raise typer.Exit(1)
 
 
@@ -152,13 +158,12 @@ def report(
         raise InputError(
             "give --out, a local folder for the report: the study is in a remote store"
         )
-    typer.echo(write_report(open_study(location), out or Path(location) / "report"))
+    _print(write_report(open_study(location), out or Path(location) / "report"))
 
 
 def _print_plan(checked: "CheckedStudy", workers: int | None) -> None:
     """Print the axes, the first variants, and the time that all will take."""
-    from fleet2d.studies.execution.local import LocalExecutor
-    from fleet2d.studies.executors import cores
+    from fleet2d.studies.executors import LocalExecutor, cores
     from fleet2d.studies.plan import check_setups, forecast
     from fleet2d.studies.progress import in_words
 
@@ -168,14 +173,14 @@ def _print_plan(checked: "CheckedStudy", workers: int | None) -> None:
     for column, labels in plan.design.labels.items():
         values = ", ".join(map(str, labels[:MOST_LINES]))
         more = f", … {len(labels)} in all" if len(labels) > MOST_LINES else ""
-        typer.echo(f"{column}: {values}{more}")
-    typer.echo("")
+        _print(f"{column}: {values}{more}")
+    _print("")
     for variant in plan.variants[:MOST_LINES]:
-        typer.echo(f"  {plan.design.describe(variant.index)}")
+        _print(f"  {plan.design.describe(variant.index)}")
     if len(plan.variants) > MOST_LINES:
-        typer.echo(f"  … {len(plan.variants) - MOST_LINES} more")
+        _print(f"  … {len(plan.variants) - MOST_LINES} more")
     expected = forecast(plan)
-    typer.echo(
+    _print(
         f"\n{len(plan.variants)} variants, {len({v.home_key for v in plan.variants})} homes,"
         f" {in_words(expected.simulated)} of simulated time: about"
         f" {in_words(expected.by(count))} by {count} workers here"
@@ -188,9 +193,9 @@ def _print_failures(location: str) -> None:
     table = open_study(location).arrow_variants.select(["variant", "status", "error"])
     failed = [row for row in table.to_pylist() if row["status"] == "failed"]
     for row in failed[:MOST_LINES]:
-        typer.echo(f"variant {row['variant']} failed: {row['error']}", err=True)
+        _print(f"variant {row['variant']} failed: {row['error']}", err=True)
     if len(failed) > MOST_LINES:
-        typer.echo(f"… {len(failed) - MOST_LINES} more", err=True)
+        _print(f"… {len(failed) - MOST_LINES} more", err=True)
 
 
 def _number_of(study: "Study", variant: str) -> int:
@@ -221,19 +226,26 @@ def _interruptible(location: str | Path) -> Iterator[None]:
         yield
     except KeyboardInterrupt:
         text = f"interrupted; what is finished is in {location}: the same command goes on"
-        typer.echo(text, err=True)
+        _print(text, err=True)
         raise typer.Exit(130) from None
     finally:
         signal.signal(signal.SIGTERM, handler)
 
 
-def tune(
+def tune(  # noqa: PLR0913 - options of the command line
     source: Annotated[Path, typer.Argument(metavar="STUDY.yaml", help="A study that tunes.")],
     out: Annotated[Path | None, typer.Option(help="A folder; left out: studies/NAME-tune.")] = None,
     workers: Workers = None,
     executor: Annotated[
         Literal["local", "ray", "serial"], typer.Option(help="Where the workers are.")
     ] = "local",
+    changed: Annotated[
+        Literal["redo"] | None,
+        typer.Option(help="redo: start anew if the folder holds another search."),
+    ] = None,
+    storage: Annotated[
+        str | None, typer.Option(help="A database for the trials: sqlite:///trials.db.")
+    ] = None,
     quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")] = False,
     trust: TrustFiles = None,
     trust_dir: TrustFolders = None,
@@ -248,23 +260,24 @@ def tune(
         specification = read_specification(source)
     folder = out or Path(default_location(f"{specification.name}-tune"))
     show = sys.stderr.isatty() and not quiet
+    runner = make_executor(executor, workers)
     with _interruptible(folder), restrict_to(trust, trust_dir), observing_trials(show=show) as bar:
-        result = search(specification, folder, make_executor(executor, workers), bar)
+        result = search(specification, folder, runner, bar, changed=changed, storage=storage)
     if quiet:
         return
     counts = ", ".join(f"{n} {state}" for state, n in result.trials.items())
-    typer.echo(f"trials: {counts}; in {folder}")
+    _print(f"trials: {counts}; in {folder}")
     for name, settings in result.settings.items():
         values = ", ".join(f"{value:.4g}" for value in result.values[name])
-        typer.echo(f"{name}: {values} on the training homes")
+        _print(f"{name}: {values} on the training homes")
         for key, value in settings.items():
-            typer.echo(f"  {key}={value}")
+            _print(f"  {key}={value}")
     assert specification.file.tune is not None
     for metric in specification.file.tune.objectives:
-        typer.echo(f"{metric} on the homes held out:")
+        _print(f"{metric} on the homes held out:")
         for row in result.held_out.paired(metric, {"setting": "as it was"}).to_dicts():
             interval = f"({row['low']:.4g} to {row['high']:.4g})"
-            typer.echo(
+            _print(
                 f"  {row['setting']}: {row['mean']:.4g} instead of {row['reference']:.4g},"
                 f" difference {row['difference']:.4g} {interval}: {row['verdict']}"
             )

@@ -22,7 +22,7 @@ from fleet2d.studies.specification import SEED, Specification
 
 DIGITS = 32  # hexadecimal digits of a hash
 # Packages that run, show or evaluate simulations without changing their results.
-_LEAVES = ("studies", "cli", "pictures", "viewer", "paper", "fit", "published")
+_LEAVES = ("studies", "cli", "pictures", "viewer", "paper", "fit", "calibrate", "published")
 _SUFFIXES = (".py", ".so", ".yaml", ".json")
 _NO_EFFECT = ("max_span", "speedup")  # keys of `simulation` that change no result
 
@@ -327,6 +327,12 @@ def _change(changes: Any, place: str) -> Document:
     result = Document()
     for path, value in changes:
         result = merge(result, assignment(key_path(path), value, place))
+    simulation = result.data.get("simulation")
+    if isinstance(simulation, Mapping) and SEED in simulation:
+        raise ScenarioError(
+            f"{place}: sets simulation.seed, which the key `replicates` of the study sets: write"
+            f" replicates: [{simulation[SEED]}] there, or a list of seeds"
+        )
     return result
 
 

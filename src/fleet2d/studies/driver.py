@@ -5,10 +5,14 @@ from collections.abc import Mapping
 from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from fleet2d.configuration.problems import did_you_mean
 from fleet2d.configuration.trust import Trust, current_trust, restrict
-from fleet2d.errors import ArtifactError, Fleet2DError
+from fleet2d.errors import Fleet2DError
+from fleet2d.scenario.model import Scenario
 from fleet2d.studies.design import (
     Design,
     FileHashes,
@@ -23,13 +27,12 @@ from fleet2d.studies.directory import (
     Counts,
     Meta,
     StudyDirectory,
-    statuses,
-    write_variants,
 )
 from fleet2d.studies.executors import Event, Executor, LostTask, TaskSchedule, WorkerTask
-from fleet2d.studies.parts import Part, drop_part
+from fleet2d.studies.parts import RESULT_COLUMNS, Part, results_table
 from fleet2d.studies.plan import (
     Changed,
+    KnownNames,
     ReconciledPlan,
     ScenarioFile,
     StudyPlan,
@@ -39,8 +42,11 @@ from fleet2d.studies.plan import (
     write_catalogue,
 )
 from fleet2d.studies.records import Journal, VariantRecord, record_of
-from fleet2d.studies.simulator import VariantOutcome, describe_error, execute
+from fleet2d.studies.simulator import VariantOutcome, describe_error, execute, is_kept
 from fleet2d.studies.specification import Specification, read_specification
+
+if TYPE_CHECKING:
+    import pyarrow as pa
 
 PART_BYTES = 64_000_000  # size at which a journal becomes a part
 PART_S_REMOTE = 60.0  # the longest time that results for a store are on this machine only
@@ -66,10 +72,10 @@ class StudyJob:
     tables: tuple[str, ...]
     trust: Trust | None = field(default_factory=current_trust)
 
-    def __call__(self, task: WorkerTask) -> bytes:
+    def __call__(self, task: WorkerTask) -> VariantRecord:
         """Run a variant; return its record, with the error if it fails."""
         with restrict(self.trust):
-            return record_of(task, self._outcome(task)).encode()
+            return record_of(task, self._outcome(task))
 
     def _outcome(self, task: WorkerTask) -> VariantOutcome:
         try:
@@ -131,8 +137,14 @@ def check_study(source: str | Path | Mapping[str, Any] | Specification) -> Check
         InputError: The study is wrong; the message names file and line, or axis and value.
     """
     specification = read_specification(source)
-    scenarios = ScenarioFile()
-    plan = make_plan(build_design(specification), specification.file.keep.tables, scenarios.add)
+    scenarios, names = ScenarioFile(), KnownNames()
+
+    def on_scenario(template: str, scenario: Scenario) -> None:
+        scenarios.add(template, scenario)
+        names.add(scenario)
+
+    plan = make_plan(build_design(specification), on_scenario)
+    names.check(specification.file)
     return CheckedStudy(specification, plan, scenarios)
 
 
@@ -167,8 +179,8 @@ def run_study(
     if not directory.exists():
         check_setups(checked.plan, executor, options.observer.on_check)
     with directory.locked():
-        parts = _intact_parts(directory, options.observer)
-        status_of = statuses(directory, parts)
+        parts = directory.intact_parts(options.observer.on_note)
+        status_of = directory.statuses(parts)
         reconciled = reconcile(checked.plan, directory, status_of, options.changed)
         variants = reconciled.plan.variants
         _write_plan(directory, checked, reconciled.plan)
@@ -182,7 +194,7 @@ def run_study(
         keeper = _ResultKeeper(directory, parts, journal)
         counts = Counts(len(variants), len(variants) - len(tasks), 0)
         options.observer.on_start(counts, executor.workers)
-        failed = 0
+        failed, is_checked = 0, False
         try:
             with closing(executor.run(checked.job, TaskSchedule(tasks))) as events:
                 for event in events:
@@ -190,20 +202,43 @@ def run_study(
                     keeper.add(record)
                     options.observer.on_result(record)
                     failed += not record.is_complete
+                    if record.is_complete and not is_checked:
+                        _note_missing(checked, results_table([record.header]), options.observer)
+                        is_checked = True
                     if failed and options.fail_fast:
                         break
         finally:
             keeper.pause()
         keeper.finish()
-        write_variants(directory)
-    final = statuses(directory, directory.parts())
-    return Counts.of([final.get(v.number) for v in variants])
+        table = directory.write_variants()
+    _note_missing(checked, table, options.observer)
+    return Counts.of(table.column("status").to_pylist())
+
+
+def _note_missing(checked: CheckedStudy, variants: "pa.Table", observer: Observer) -> None:
+    """Note which of the metrics that the study names are missing in complete variants."""
+    import pyarrow.compute as pc
+
+    file = checked.specification.file
+    complete = variants.filter(pc.field("status") == "complete")
+    others = {*RESULT_COLUMNS, *checked.plan.design.columns, "simulated_s"}
+    metrics = [name for name in complete.column_names if name not in others]
+    for pattern in dict.fromkeys([*(c.metric for c in file.compare), *file.keep.metrics]):
+        lacks = np.ones(len(complete), bool)
+        for name in metrics:
+            if is_kept(name, [pattern]):
+                lacks &= complete[name].is_null().to_numpy()
+        if pattern != "*" and lacks.any():
+            hint = did_you_mean(pattern, metrics) if lacks.all() else ""
+            observer.on_note(
+                f"{lacks.sum()} of {len(lacks)} complete variants have no metric {pattern}{hint}"
+            )
 
 
 def _record(event: Event) -> VariantRecord:
     if isinstance(event, LostTask):
         return record_of(event.task, VariantOutcome("failed", error=event.reason), event.attempts)
-    record = VariantRecord.decode(event.payload)
+    record: VariantRecord = event.payload
     return VariantRecord({**record.header, "attempts": event.attempts}, record.body)
 
 
@@ -246,19 +281,6 @@ class _ResultKeeper:
         self._is_open, self._commit_time = False, time.monotonic()
 
 
-def _intact_parts(directory: StudyDirectory, observer: Observer) -> list[Part]:
-    """Return the undamaged parts; drop the others, so that their variants are run again."""
-    intact = []
-    for part in directory.parts():
-        problem = part.problem(directory.storage, checksums=directory.storage.is_local)
-        if problem is None:
-            intact.append(part)
-            continue
-        observer.on_note(f"{problem}: the {part.variants} variants of that part are run again")
-        drop_part(directory.storage, part)
-    return intact
-
-
 def _write_plan(directory: StudyDirectory, checked: CheckedStudy, plan: StudyPlan) -> None:
     """Write the description of the study; its `study.json` last, which makes the folder a study."""
     file = checked.specification.file
@@ -272,13 +294,10 @@ def _write_plan(directory: StudyDirectory, checked: CheckedStudy, plan: StudyPla
         checked.plan.design.columns,
         file.populations,
         file.keep.tables,
-        tuple(comparison.model_dump(mode="json") for comparison in file.compare),
+        file.compare,
         source.read_text(encoding="utf-8") if source else "",
     )
-    try:
-        directory.write_meta(meta)
-    except TypeError as error:  # a Python value that JSON can't hold
-        raise ArtifactError(f"the study can't be described: {error}") from error
+    directory.write_meta(meta)
 
 
 def _describe(reconciled: ReconciledPlan, directory: StudyDirectory, observer: Observer) -> None:

@@ -6,11 +6,14 @@ commit record is written: the names of its files with their sizes and checksums.
 
 import hashlib
 import json
+import re
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
+
+from pydantic import TypeAdapter
 
 from fleet2d.studies.records import VariantRecord
 from fleet2d.studies.storage import Storage, write_error
@@ -49,6 +52,33 @@ class Part:
     variants: int
     files: tuple[PartFile, ...]
 
+    @classmethod
+    def read(cls, storage: Storage, record: str) -> Self:
+        """Return the part that a commit record describes.
+
+        Raises:
+            RunDirectoryError: The record is damaged, or names files that aren't of this part.
+        """
+        with storage.reading(record):
+            part = TypeAdapter(cls).validate_json(storage.read(record), strict=True)
+            stem = part_name(part.number)
+            files = re.compile(rf"({RESULTS}|{TABLES}/[^/]+)/{stem}\.parquet")
+            unknown = [file.name for file in part.files if not files.fullmatch(file.name)]
+            if unknown or record != f"{RECORDS}/{stem}.json":
+                raise ValueError(f"it is not the record of {', '.join(unknown) or stem}")
+        return part
+
+    @property
+    def results(self) -> str:
+        """The name of the file with its results."""
+        return f"{RESULTS}/{part_name(self.number)}.parquet"
+
+    @property
+    def tables(self) -> dict[str, str]:
+        """The names of the files with its tables, by table."""
+        names = (file.name.split("/") for file in self.files)
+        return {name[1]: "/".join(name) for name in names if name[0] == TABLES}
+
     def problem(self, storage: Storage, *, checksums: bool) -> str | None:
         """Return the first problem of its files in words, None if there is none.
 
@@ -77,22 +107,18 @@ def next_number(parts: Iterable[Part]) -> int:
     return max((part.number for part in parts), default=0) + 1
 
 
+def record_names(storage: Storage) -> list[str]:
+    """Return the names of the commit records, in order."""
+    return [name for name in storage.names(RECORDS) if name.endswith(".json")]
+
+
 def read_parts(storage: Storage) -> list[Part]:
-    """Return the committed parts, in order."""
-    parts = []
-    for name in storage.names(RECORDS):
-        if name.endswith(".json"):
-            content = json.loads(storage.read(name))
-            files = tuple(PartFile(**file) for file in content["files"])
-            parts.append(Part(content["number"], content["variants"], files))
-    return sorted(parts, key=lambda part: part.number)
+    """Return the committed parts, in order.
 
-
-def drop_part(storage: Storage, part: Part) -> None:
-    """Delete a part: its commit record first, so that it never counts without its files."""
-    storage.delete(f"{RECORDS}/{part_name(part.number)}.json")
-    for file in part.files:
-        storage.delete(file.name)
+    Raises:
+        RunDirectoryError: A commit record is damaged.
+    """
+    return [Part.read(storage, name) for name in record_names(storage)]
 
 
 def write_part(storage: Storage, scratch: Path, number: int, journal: "Journal") -> Part:
@@ -121,12 +147,7 @@ def write_part(storage: Storage, scratch: Path, number: int, journal: "Journal")
         files.append(PartFile(target, local.stat().st_size, digest))
         storage.publish(local, target)
     part = Part(number, len(journal), tuple(files))
-    content = {
-        "number": number,
-        "variants": part.variants,
-        "files": [vars(file) for file in part.files],
-    }
-    storage.write(f"{RECORDS}/{name}.json", json.dumps(content, indent=1).encode())
+    storage.write(f"{RECORDS}/{name}.json", json.dumps(asdict(part), indent=1).encode())
     return part
 
 
@@ -150,8 +171,8 @@ def _write_files(scratch: Path, name: str, journal: "Journal") -> dict[str, Path
             files[f"{TABLES}/{table}/{name}.parquet"] = local
             writers[table] = stack.enter_context(_PartFileWriter(local, schema))
         for number in numbers:
-            for table, rows in tables_of(journal.read(number)).items():
-                writers[table].write(number, rows)
+            for table, rows in journal.read(number).tables().items():
+                writers[table].write(number, rows.read_all())
     return files
 
 
@@ -188,15 +209,6 @@ class _PartFileWriter:
             self._buffer = []
 
 
-def tables_of(record: VariantRecord) -> "dict[str, pa.Table]":
-    """Return the tables of a record."""
-    import pyarrow as pa
-
-    return {
-        name: pa.ipc.open_stream(buffer).read_all() for name, buffer in record.streams().items()
-    }
-
-
 def with_variant(rows: "pa.Table", number: int, schema: "pa.Schema") -> "pa.Table":
     """Return the rows of a variant in the schema of the data set, with a column of its number."""
     import pyarrow as pa
@@ -231,8 +243,8 @@ def _table_schemas(records: Iterable[VariantRecord]) -> "dict[str, pa.Schema]":
 
     schemas: dict[str, pa.Schema] = {}
     for record in records:
-        for name, buffer in record.streams().items():
-            schema = plain_schema(pa.ipc.open_stream(buffer).schema)
+        for name, rows in record.tables().items():
+            schema = plain_schema(rows.schema)
             common = schemas.setdefault(name, schema)
             if common != schema:
                 schemas[name] = pa.unify_schemas([common, schema], promote_options="permissive")
@@ -267,9 +279,18 @@ def results_table(headers: Iterable[Mapping[str, Any]]) -> "pa.Table":
 
 
 def read_results(storage: Storage, parts: Iterable[Part]) -> "Iterator[pa.Table]":
-    """Yield the results of each part."""
-    import pyarrow.parquet as pq
+    """Yield the results of each part.
 
+    Raises:
+        RunDirectoryError: They are missing or damaged.
+    """
+    import pyarrow as pa
+
+    types = {field.name: field.type for field in results_table(()).schema}
     for part in parts:
-        name = f"{RESULTS}/{part_name(part.number)}.parquet"
-        yield pq.read_table(storage.path(name), filesystem=storage.filesystem)
+        table = storage.read_table(part.results)
+        with storage.reading(part.results):
+            if not types.keys() <= set(table.column_names):
+                raise ValueError("it has no results of variants")
+            fields = [(name, types.get(name, pa.float64())) for name in table.column_names]
+            yield table.cast(pa.schema(fields))

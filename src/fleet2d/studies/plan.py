@@ -1,13 +1,14 @@
 """The plan of a study: its variants, checked and stored, and the time that they will take."""
 
 import json
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+import re
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from datetime import timedelta
 from typing import TYPE_CHECKING, Any, Literal
 
-from fleet2d.configuration.problems import suggest
+from fleet2d.configuration.problems import did_you_mean, suggest
 from fleet2d.configuration.trust import Trust, current_trust, restrict
 from fleet2d.configuration.units import parse_duration
 from fleet2d.errors import (
@@ -33,13 +34,15 @@ from fleet2d.studies.design import (
 from fleet2d.studies.directory import PLAN, SCENARIOS, StudyDirectory
 from fleet2d.studies.executors import Executor, LostTask, SerialExecutor, TaskSchedule, WorkerTask
 from fleet2d.studies.parts import VARIANT
-from fleet2d.studies.simulator import check_setup, measure
+from fleet2d.studies.simulator import check_setup, is_kept, measure
+from fleet2d.studies.specification import StudyFile
 
 if TYPE_CHECKING:
     import pyarrow as pa
 
 
 MOST_PROBLEMS = 10  # in one report
+LAYERS = ("explored", "first_seen", "last_seen", "time_since_seen")  # tables of robots' maps
 FEW_SETUPS = 8  # up to here starting workers costs more than it saves
 
 
@@ -83,22 +86,90 @@ class StudyPlan:
         return self.design.parameters(variant.index)
 
 
+class KnownNames:
+    """The names of tables, metrics and bodies in the variants of a study.
+
+    A study that keeps or compares what no variant has would end without it, silently.
+    """
+
+    def __init__(self) -> None:
+        """Start without names."""
+        self._tables = {"trajectories", *SWITCHES}
+        self._metrics: dict[str, bool] = {}  # by name, whether it comes with Fleet2D
+        self._bodies = {"anyone"}
+
+    def add(self, scenario: Scenario) -> None:
+        """Add the names of a scenario."""
+        self._tables |= {*scenario.algorithms, *scenario.metrics}
+        self._tables |= {"sensors"} if scenario.objects else set()
+        self._bodies |= {*scenario.users, *scenario.robots}
+        for name, metric in scenario.metrics.items():
+            self._metrics[name] = type(metric).__module__.startswith("fleet2d.")
+
+    def check(self, file: StudyFile) -> None:
+        """Check the names in a study file.
+
+        Raises:
+            ScenarioError: No variant has a table or a metric, or a metric isn't kept.
+        """
+        for name in file.keep.tables:
+            if name not in self._tables and not name.startswith(LAYERS):
+                raise ScenarioError(
+                    f"keep.tables: no variant has a table {name!r}"
+                    f"{suggest(name, sorted(self._tables))}"
+                )
+        for pattern in file.keep.metrics:
+            self._check_metric("keep.metrics", pattern)
+        for comparison in file.compare:
+            self._check_metric("compare", comparison.metric)
+            if not is_kept(comparison.metric, file.keep.metrics):
+                raise ScenarioError(
+                    f"compare: the metric {comparison.metric!r} isn't kept: add it to keep.metrics"
+                )
+        for name in file.tune.objectives if file.tune else ():
+            self._check_metric("tune.objectives", name)
+
+    def _check_metric(self, key: str, name: str) -> None:
+        """Refuse a metric, or the pattern of some, of which no variant can have one."""
+        prefix = re.split(r"[*?[]", name)[0]  # the part that has to be there as it is
+        entry, dot, rest = prefix.partition(".")
+        if not dot and prefix != name:
+            if any(known.startswith(entry) for known in self._metrics):
+                return
+        elif dot and entry in self._metrics:
+            body, dot, _ = rest.partition(".")
+            is_whole = dot or prefix == name
+            typo = did_you_mean(body, sorted(self._bodies))
+            # Metrics of users' own may have numbers of any name.
+            if not (is_whole and self._metrics[entry]) or body in self._bodies or typo == ".":
+                return
+            raise ScenarioError(
+                f"{key}: {name!r} is of a body {body!r}, which no variant has{typo}"
+            )
+        elif entry in self._metrics:
+            raise ScenarioError(
+                f"{key}: {name!r} is no number: write {name}.* for all of its numbers"
+            )
+        raise ScenarioError(
+            f"{key}: no variant has a metric {entry!r}{suggest(entry, sorted(self._metrics))}"
+        )
+
+
 def make_plan(
-    design: Design, tables: Sequence[str] = (), keep: Callable[[str, Any], None] | None = None
+    design: Design, on_scenario: Callable[[str, Scenario], None] = lambda *_: None
 ) -> StudyPlan:
     """Build and check the scenario of every variant of a design.
 
     Args:
         design: The design.
-        tables: The tables to keep, each of which some variant must have.
-        keep: Called with the template (a hash) and the content of each combination's scenario.
+        on_scenario: Called with the template (a hash) and the scenario of each combination.
 
     Raises:
         ScenarioError: Variants are wrong; a line per problem, with axis and value.
     """
     variants: list[PlannedVariant] = []
     problems: list[str] = []
-    files, known_tables = FileHashes(), set[str]()
+    files = FileHashes()
     for number in range(len(design.combinations)):
         first = number * len(design.seeds)
         try:
@@ -110,11 +181,8 @@ def make_plan(
             if len(problems) == MOST_PROBLEMS:
                 break
             continue
-        if keep is not None:
-            keep(variants[-1].template, scenario.resolved())
-        known_tables |= {*scenario.algorithms, *scenario.metrics, *_sensor_tables(scenario)}
+        on_scenario(variants[-1].template, scenario)
     _raise_problems(problems)
-    _check_tables(tables, known_tables)
     _check_identities(design, variants)
     return StudyPlan(design, tuple(variants))
 
@@ -163,14 +231,14 @@ class SetupJob:
     design: Design
     trust: Trust | None = field(default_factory=current_trust)
 
-    def __call__(self, task: WorkerTask) -> bytes:
-        """Return the error of a variant's set-up as text; empty if there is none."""
+    def __call__(self, task: WorkerTask) -> str:
+        """Return the error of a variant's set-up; empty if there is none."""
         try:
             with restrict(self.trust):
                 check_setup(self.design.scenario(task.index))
         except Fleet2DError as error:
-            return str(error).encode()
-        return b""
+            return str(error)
+        return ""
 
 
 def check_setups(
@@ -189,7 +257,7 @@ def check_setups(
         for done, event in enumerate(events):
             if on_progress is not None:
                 on_progress(done + 1, len(tasks))
-            text = event.reason if isinstance(event, LostTask) else event.payload.decode()
+            text = event.reason if isinstance(event, LostTask) else event.payload
             if text:
                 problems[event.task.index] = f"{plan.design.describe(event.task.index)}: {text}"
             if len(problems) == MOST_PROBLEMS:
@@ -220,20 +288,6 @@ def _planned(
         yield PlannedVariant(
             first + i, first + i, variant_identity, scenario, template, home, simulated_s
         )
-
-
-def _sensor_tables(scenario: Scenario) -> list[str]:
-    return ["sensors"] if scenario.objects else []
-
-
-def _check_tables(tables: Sequence[str], known: set[str]) -> None:
-    names = sorted({"trajectories", *SWITCHES, *known})
-    layers = ("explored", "first_seen", "last_seen", "time_since_seen")
-    for name in tables:
-        if name not in names and not name.startswith(layers):
-            raise ScenarioError(
-                f"keep.tables: no variant has a table {name!r}{suggest(name, names)}"
-            )
 
 
 def _check_identities(design: Design, variants: Sequence[PlannedVariant]) -> None:
@@ -275,9 +329,10 @@ class ScenarioFile:
         self._writer = pq.ParquetWriter(self._sink, self._schema, compression="zstd")
         self._rows: list[dict[str, str]] = []
 
-    def add(self, template: str, content: Mapping[str, Any]) -> None:
+    def add(self, template: str, scenario: Scenario) -> None:
         """Add the scenario of a combination, with any of its seeds."""
-        self._rows.append({"template": template, "scenario": json.dumps(content)})
+        content = json.dumps(scenario.resolved())
+        self._rows.append({"template": template, "scenario": content})
         if len(self._rows) == BATCH:
             self._flush()
 
@@ -323,13 +378,17 @@ def reconcile(
     Raises:
         RunDirectoryError: There are such results, and `changed` is None.
     """
-    try:
-        stored_rows = directory.read_table(PLAN, PLAN_COLUMNS[:3]).to_pylist()
-    except FileNotFoundError:
+    with_results = set(finished)
+    if not directory.storage.exists(PLAN):
+        if with_results:
+            raise RunDirectoryError(
+                f"{directory.location}/{PLAN} is missing, and with it the variants of the results:"
+                " choose another --out"
+            )
         return ReconciledPlan(plan, len(plan.variants), 0)
+    stored_rows = directory.plan(PLAN_COLUMNS[:3]).to_pylist()
     numbers = {row["identity"]: row[VARIANT] for row in stored_rows}
     present = {variant.identity for variant in plan.variants}
-    with_results = set(finished)
     stale = {
         row["scenario"]: row
         for row in stored_rows
@@ -407,7 +466,7 @@ def write_catalogue(
 ) -> None:
     """Write the plan and the scenarios of a study."""
     directory.storage.write(SCENARIOS, scenarios())
-    directory.write_table(PLAN, plan_table(plan))
+    directory.storage.write_table(PLAN, plan_table(plan))
 
 
 def stored_scenario(directory: StudyDirectory, number: int) -> dict[str, Any]:
@@ -416,20 +475,15 @@ def stored_scenario(directory: StudyDirectory, number: int) -> dict[str, Any]:
     Raises:
         RunDirectoryError: The study has no such variant.
     """
-    import pyarrow.parquet as pq
-
-    filesystem, path = directory.storage.filesystem, directory.storage.path
-    rows = pq.read_table(
-        path(PLAN), filesystem=filesystem, filters=[(VARIANT, "=", number)],
-        columns=["template", "seed"],
-    ).to_pylist()  # fmt: skip
+    row_filter = [(VARIANT, "=", number)]
+    rows = directory.storage.read_table(PLAN, ["template", "seed"], row_filter).to_pylist()
     if not rows:
         raise RunDirectoryError(f"{directory.location} has no variant {number}")
-    texts = pq.read_table(
-        path(SCENARIOS), filesystem=filesystem, filters=[("template", "=", rows[0]["template"])]
-    ).to_pylist()
-    content: dict[str, Any] = json.loads(texts[0]["scenario"])
-    content["simulation"]["seed"] = rows[0]["seed"]
+    template_filter = [("template", "=", rows[0]["template"])]
+    with directory.storage.reading(SCENARIOS):
+        texts = directory.storage.read_table(SCENARIOS, filters=template_filter).to_pylist()
+        content: dict[str, Any] = json.loads(texts[0]["scenario"])
+        content["simulation"]["seed"] = rows[0]["seed"]
     return content
 
 

@@ -9,19 +9,19 @@ from fleet2d.configuration.problems import did_you_mean, suggest
 from fleet2d.configuration.trust import Trust, restrict_stored
 from fleet2d.errors import ArtifactError, InputError, extra
 from fleet2d.studies import answers
-from fleet2d.studies.directory import Counts, StudyDirectory, variants_table
+from fleet2d.studies.directory import Counts, StudyDirectory
 from fleet2d.studies.parts import (
     RESULT_COLUMNS,
     TABLES,
     VARIANT,
-    part_name,
+    Part,
     plain_schema,
-    tables_of,
     with_variant,
 )
 from fleet2d.studies.plan import stored_scenario
-from fleet2d.studies.records import read_journal
+from fleet2d.studies.records import VariantRecord, read_journal
 from fleet2d.studies.simulator import run_scenario
+from fleet2d.studies.storage import damaged
 
 if TYPE_CHECKING:
     import duckdb
@@ -58,8 +58,17 @@ class Study:
 
     @cached_property
     def arrow_variants(self) -> "pa.Table":
-        """The variants, a row each: parameters, status, time, digest and metrics."""
-        return variants_table(self._directory)
+        """The variants, a row each: parameters, status, time, digest and metrics.
+
+        Raises:
+            RunDirectoryError: Files of the study are missing or damaged.
+        """
+        table = self._directory.variants()
+        missing = {*self.columns, *self.meta.populations, *RESULT_COLUMNS, "simulated_s"}
+        missing -= set(table.column_names)
+        if missing:
+            raise damaged(self.location, f"its variants have no {', '.join(sorted(missing))}")
+        return table
 
     @cached_property
     def variants(self) -> "pl.DataFrame":
@@ -95,8 +104,7 @@ class Study:
     @cached_property
     def tables(self) -> tuple[str, ...]:
         """The names of the tables that the study keeps and that have rows."""
-        paths = (name.split("/") for name in self._directory.storage.names(TABLES))
-        names = {path[-2] for path in paths if len(path) >= 2}
+        names = {name for part in self._parts for name in part.tables}
         for record in self._journal_records():
             names |= {name for name, _ in record.header["tables"]}
         return tuple(sorted(names))
@@ -116,26 +124,26 @@ class Study:
                 " keep.tables in the study file names them"
             )
         storage = self._directory.storage
-        files = [
-            storage.path(name)
-            for name in (f"{TABLES}/{table}/{part_name(p.number)}.parquet" for p in self._parts)
-            if storage.exists(name)
-        ]
-        schemas = [pads.dataset(file, filesystem=storage.filesystem).schema for file in files]
-        recent = [
-            (record.number, rows)
-            for record in self._journal_records()
-            if record.is_complete and (rows := tables_of(record).get(table)) is not None
-        ]
-        field = pa.field(VARIANT, pa.int32(), nullable=False)
-        schemas += [plain_schema(rows.schema).insert(0, field) for _, rows in recent]
-        schema = pa.unify_schemas(schemas, promote_options="permissive")
-        stored = pads.dataset(files, schema, filesystem=storage.filesystem, format="parquet")
-        if not recent:
-            return stored
-        tables = [with_variant(rows, number, schema) for number, rows in recent]
-        journal = pads.dataset(pa.concat_tables(tables))
-        return pads.dataset([stored, journal]) if files else journal
+        files = [part.tables[table] for part in self._parts if table in part.tables]
+        with storage.reading(f"{TABLES}/{table}"):
+            paths = [storage.path(name) for name in files]
+            schemas = [pads.dataset(path, filesystem=storage.filesystem).schema for path in paths]
+            recent = {
+                record.number: record.tables()[table].read_all()
+                for record in self._journal_records()
+                if record.is_complete and table in dict(record.header["tables"])
+            }
+            if any((s.names[:1], s.types[:1]) != ([VARIANT], [pa.int32()]) for s in schemas):
+                raise ValueError("it has no numbers of variants")
+            field = pa.field(VARIANT, pa.int32(), nullable=False)
+            schemas += [plain_schema(rows.schema).insert(0, field) for rows in recent.values()]
+            schema = pa.unify_schemas(schemas, promote_options="permissive")
+            stored = pads.dataset(paths, schema, filesystem=storage.filesystem, format="parquet")
+            if not recent:
+                return stored
+            tables = [with_variant(rows, number, schema) for number, rows in recent.items()]
+            journal = pads.dataset(pa.concat_tables(tables))
+            return pads.dataset([stored, journal]) if files else journal
 
     def polars(self, table: str) -> "pl.LazyFrame":
         """Return a table of all variants with their parameters as a lazy frame.
@@ -312,10 +320,10 @@ class Study:
         return self.complete.filter(pl.col(metric).is_not_null() & pl.col(metric).is_finite())
 
     @cached_property
-    def _parts(self) -> Any:
+    def _parts(self) -> list[Part]:
         return self._directory.parts()
 
-    def _journal_records(self) -> Any:
+    def _journal_records(self) -> Iterator[VariantRecord]:
         return read_journal(self._directory.journal_path(self._parts))
 
 

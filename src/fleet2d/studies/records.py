@@ -1,30 +1,28 @@
-"""The results of one variant as bytes, as workers send them and the journal stores them."""
+"""The results of single variants, and the journal that stores each as soon as it is finished."""
 
 import json
-import os
-import struct
 import time
-import zlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fleet2d.artifacts.manifest import plain
+from fleet2d.storage.journal import Frame, FrameWriter, JournalFormat, read_frames
 from fleet2d.studies.executors import WorkerTask
 from fleet2d.studies.simulator import VariantOutcome
-from fleet2d.studies.storage import write_error
+from fleet2d.studies.storage import DAMAGE, damaged, write_error
 
 if TYPE_CHECKING:
     import pyarrow as pa
 
-
-_LENGTH = struct.Struct("<I")
+FORMAT = JournalFormat(b"fleet2d study journal 2\n", ("variant",))
+SYNC_EVERY_S = 2.0  # the most that a power cut loses; a killed process loses nothing
 
 
 @dataclass(frozen=True)
 class VariantRecord:
-    """The results of one variant.
+    """The results of one variant, as workers send them and the journal stores them.
 
     Attributes:
         header: All but the tables: `number`, `identity`, `status`, `digest`, `metrics`, `wall_s`,
@@ -45,27 +43,15 @@ class VariantRecord:
         """Whether the run succeeded."""
         return bool(self.header["status"] == "complete")
 
-    def encode(self) -> bytes:
-        """Return the record as bytes."""
-        text = json.dumps(self.header, separators=(",", ":")).encode()
-        return _LENGTH.pack(len(text)) + text + self.body
-
-    @classmethod
-    def decode(cls, data: bytes) -> "VariantRecord":
-        """Return the record that `encode` returned as bytes."""
-        (length,) = _LENGTH.unpack_from(data)
-        end = _LENGTH.size + length
-        return cls(json.loads(data[_LENGTH.size : end]), bytes(data[end:]))
-
-    def streams(self) -> dict[str, "pa.Buffer"]:
-        """Return the Arrow stream of each table."""
+    def tables(self) -> "dict[str, pa.RecordBatchReader]":
+        """Return the tables by name, not yet read."""
         import pyarrow as pa
 
-        body, start, streams = pa.py_buffer(self.body), 0, {}
+        body, start, readers = pa.py_buffer(self.body), 0, {}
         for name, size in self.header["tables"]:
-            streams[name] = body.slice(start, size)
+            readers[name] = pa.ipc.open_stream(body.slice(start, size))
             start += size
-        return streams
+        return readers
 
 
 def record_of(task: WorkerTask, outcome: VariantOutcome, attempts: int = 1) -> VariantRecord:
@@ -94,18 +80,12 @@ def _stream(table: "pa.Table") -> bytes:
     return bytes(sink.getvalue())
 
 
-_FRAME = struct.Struct("<4sQI")
-_MARK = b"F2DV"
-SYNC_EVERY_S = 2.0  # the most that a power cut loses; a killed process loses nothing
-
-
 class Journal:
-    """A file of records that only grows.
+    """The records of variants that are not yet in a part of the data set; it only grows.
 
     Attributes:
         path: The file.
         offsets: The offset of the newest frame of each variant, by its number [bytes].
-        size: The size of all complete frames [bytes].
     """
 
     def __init__(self, path: Path) -> None:
@@ -113,18 +93,23 @@ class Journal:
 
         Raises:
             ArtifactError: It can't be written.
+            RunDirectoryError: It is damaged.
         """
         self.path = path
         self.offsets: dict[int, int] = {}
-        self.size = 0
+        end = 0
+        for frame in read_frames(path, FORMAT):
+            self.offsets[_record(frame, path).number], end = frame.start, frame.end
         try:
-            self._file = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
-            for offset, end, record in _frames(self._file):
-                self.offsets[record.number], self.size = offset, end
-            os.ftruncate(self._file, self.size)
+            self._writer = FrameWriter(path, FORMAT, end)
         except OSError as error:
             raise write_error(path.parent, error) from error
         self._sync_time = time.monotonic()
+
+    @property
+    def size(self) -> int:
+        """The size of all complete frames [bytes]."""
+        return self._writer.end
 
     def __len__(self) -> int:
         """Return the number of variants in it."""
@@ -136,59 +121,56 @@ class Journal:
         Raises:
             ArtifactError: The disk is full, or the file can't be written; nothing is added.
         """
-        data = record.encode()
-        frame = _FRAME.pack(_MARK, len(data), zlib.crc32(data)) + data
+        start = self.size
         try:
-            count = 0
-            while count < len(frame):
-                count += os.pwrite(self._file, frame[count:], self.size + count)
+            header = json.dumps(record.header, separators=(",", ":"))
+            self._writer.add("variant", header, record.body)
+            self._writer.commit()
             if time.monotonic() - self._sync_time > SYNC_EVERY_S:
-                os.fsync(self._file)
+                self._writer.sync()
                 self._sync_time = time.monotonic()
         except OSError as error:
-            os.ftruncate(self._file, self.size)
+            self._writer.undo()
             raise write_error(self.path.parent, error) from error
-        self.offsets[record.number] = self.size
-        self.size += len(frame)
+        self.offsets[record.number] = start
 
     def read(self, number: int) -> VariantRecord:
         """Return the newest record of a variant."""
-        offset = self.offsets[number]
-        _, length, _ = _FRAME.unpack(os.pread(self._file, _FRAME.size, offset))
-        return VariantRecord.decode(os.pread(self._file, length, offset + _FRAME.size))
+        frame = next(read_frames(self.path, FORMAT, self.offsets[number]))
+        return _record(frame, self.path)
 
     def close(self) -> None:
-        """Flush everything to the disk, and close the file."""
-        os.fsync(self._file)
-        os.close(self._file)
+        """Flush everything to the disk, and close the file.
+
+        Raises:
+            ArtifactError: The disk failed.
+        """
+        try:
+            self._writer.sync()
+        except OSError as error:
+            raise write_error(self.path.parent, error) from error
+        finally:
+            self._writer.close()
 
 
 def read_journal(path: Path) -> Iterator[VariantRecord]:
-    """Yield the complete records of a journal; another process may be writing it."""
-    try:
-        file = os.open(path, os.O_RDONLY)
-    except FileNotFoundError:
-        return
-    try:
-        for _, _, record in _frames(file):
-            yield record
-    finally:
-        os.close(file)
+    """Yield the complete records of a journal; another process may be writing it.
+
+    Raises:
+        RunDirectoryError: It is damaged.
+    """
+    for frame in read_frames(path, FORMAT):
+        yield _record(frame, path)
 
 
-def _frames(file: int) -> Iterator[tuple[int, int, VariantRecord]]:
-    """Yield (start, end, record) of each complete frame, up to the first incomplete one [bytes]."""
-    offset = 0
-    while True:
-        head = os.pread(file, _FRAME.size, offset)
-        if len(head) < _FRAME.size:
-            return
-        mark, length, checksum = _FRAME.unpack(head)
-        if mark != _MARK:
-            return
-        data = os.pread(file, length, offset + _FRAME.size)
-        if len(data) < length or zlib.crc32(data) != checksum:
-            return
-        end = offset + _FRAME.size + length
-        yield offset, end, VariantRecord.decode(data)
-        offset = end
+def _record(frame: Frame, path: Path) -> VariantRecord:
+    """Return the record in a frame, with the types that readers rely on."""
+    try:
+        header = frame.description
+        sizes = [(str(name), int(size)) for name, size in header["tables"]]
+        header = {**header, "tables": sizes, "metrics": dict(header["metrics"])}
+        if header["status"] not in ("complete", "failed") or not 0 <= int(header["number"]) < 2**31:
+            raise ValueError("no result of a variant")
+    except DAMAGE as error:
+        raise damaged(path, error) from error
+    return VariantRecord(header, frame.content)

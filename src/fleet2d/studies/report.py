@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from fleet2d.errors import ArtifactError, InputError
 from fleet2d.studies.answers import FEW_UNITS
 from fleet2d.studies.figures import over_time
+from fleet2d.studies.specification import PairedComparison
 
 if TYPE_CHECKING:
     import polars as pl
@@ -121,19 +122,19 @@ class _Page:
             if column not in self.units:
                 yield _warning(f"There is only one {column}: answers hold for that one only.")
 
-    def _comparison(self, number: int, comparison: Any) -> Iterator[str]:
+    def _comparison(self, number: int, comparison: PairedComparison) -> Iterator[str]:
         from fleet2d.studies.figures import draw_comparison
 
-        metric, against = comparison["metric"], comparison["against"]
+        metric, against = comparison.metric, comparison.against
         ((axis, reference),) = against.items()
-        yield f"<h2>{html.escape(metric)} by {html.escape(axis)}, against {_text(reference)}</h2>"
+        yield f"<h2>{html.escape(f'{metric} by {axis}, against {_text(reference)}')}</h2>"
         try:
-            table = self.study.paired(metric, against, comparison["by"], comparison["within"])
+            table = self.study.paired(metric, against, comparison.by, comparison.within)
         except InputError as error:
             yield _warning(str(error))
             return
         yield self._figure(draw_comparison(table, axis, reference, metric), f"compare-{number + 1}")
-        yield _frame(table.drop("variance_ratio"), text=(axis, "verdict", *comparison["within"]))
+        yield _frame(table.drop("variance_ratio"), text=(axis, "verdict", *comparison.within))
         ratios = [r for r in table["variance_ratio"].to_list() if r and math.isfinite(r)]
         if ratios:
             yield (
@@ -144,7 +145,7 @@ class _Page:
 
     def _metrics(self) -> list[str]:
         """Return the metrics of the report, those of comparisons first."""
-        compared = [comparison["metric"] for comparison in self.study.meta.compare]
+        compared = [comparison.metric for comparison in self.study.meta.compare]
         ordered = dict.fromkeys([*compared, *self.study.metrics])
         return [name for name in ordered if name in self.study.metrics][:MOST_METRICS]
 
@@ -156,6 +157,8 @@ class _Page:
         if not len(frame):
             return
         yield f"<h2>{html.escape(metric)}</h2>"
+        if lacking := study.counts.complete - len(frame):
+            yield _warning(f"{lacking} complete variants have no such number.")
         axes = self.axes or self.units[:1]
         tables = {axis: study.summary(metric, [axis], self.units) for axis in axes}
         if tables:

@@ -143,11 +143,16 @@ def execute(scenario: Scenario, metrics: Iterable[str], tables: Iterable[str]) -
     return VariantOutcome(
         "complete",
         run.digest,
-        {n: v for n, v in numbers.items() if any(fnmatchcase(n, p) for p in patterns)},
+        {name: value for name, value in numbers.items() if is_kept(name, patterns)},
         {name: run.tables[name] for name in tables if name in run.tables},
         wall_s,
         peak_rss_mb(),
     )
+
+
+def is_kept(metric: str, patterns: Iterable[str]) -> bool:
+    """Return whether a metric fits one of some patterns, such as `ltp_error.*.tv`."""
+    return any(fnmatchcase(metric, pattern) for pattern in patterns)
 
 
 def describe_error(error: BaseException) -> str:

@@ -21,6 +21,15 @@ from fleet2d.scenario.model import Scenario
 from fleet2d.studies.axes import AnyAxis, Parameter, check_count
 
 
+def _with_type(value: Any) -> Any:
+    """Expand `TPESampler` to `{type: TPESampler}`."""
+    if isinstance(value, str):
+        return {"type": value}
+    if isinstance(value, Mapping) and value and not isinstance(value.get("type"), str):
+        raise problem("name the type of the sampler, as in {type: CmaEsSampler}")
+    return value
+
+
 class TuneSettings(Settings):
     """The searched parameters, the objectives, and the homes on which the results are judged.
 
@@ -31,6 +40,9 @@ class TuneSettings(Settings):
         held_out: {axis: [values]}: unknown to the search, used only by the report.
         prune_at: Simulated times at which poor trials end early; with one objective only.
         seed: The seed of the search.
+        batch: The number of settings that are suggested together, before any of them is judged.
+        sampler: A class of optuna.samplers or mine:Sampler, by its name, or {type: NAME, …} with
+            its arguments; left out: TPESampler, or NSGAIISampler for several objectives.
     """
 
     search: dict[str, Parameter] = Field(min_length=1)
@@ -39,6 +51,8 @@ class TuneSettings(Settings):
     held_out: dict[str, tuple[Any, ...]] = Field(min_length=1, max_length=1)
     prune_at: tuple[PositiveDuration, ...] = ()
     seed: int = Field(default=0, ge=0)
+    batch: int = Field(default=4, ge=1)
+    sampler: Annotated[dict[str, Any], BeforeValidator(_with_type)] = Field(default={})
 
     @model_validator(mode="after")
     def _prunes_by_one_objective(self) -> Self:

@@ -2,31 +2,58 @@
 
 import os
 import re
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any
 
-from fleet2d.errors import ArtifactError, RunDirectoryError
-from fleet2d.storage.files import PARTIAL, is_disk_full
+from fleet2d.bounds import one_line
+from fleet2d.errors import ArtifactError, Fleet2DError, RunDirectoryError
+from fleet2d.storage.files import is_disk_full, path_in, plain_name, write_atomically
 
 if TYPE_CHECKING:
-    pass
-
+    import pyarrow as pa
 
 COPY_BYTES = 1 << 22
+# What libraries raise on damaged files; pyarrow's errors are subclasses of these.
+DAMAGE = (
+    ArithmeticError, AttributeError, LookupError, MemoryError, NotImplementedError, OSError,
+    RecursionError, TypeError, ValueError,
+)  # fmt: skip
 
 
 def write_error(location: str | Path, error: OSError) -> ArtifactError:
     """Return the error of a failed write, with its reason and remedy."""
     reason = "the disk is full" if is_disk_full(error) else (error.strerror or str(error))
-    remedy = "free some space" if is_disk_full(error) else "see that it can be written"
+    remedy = "free some space" if is_disk_full(error) else "make it writable"
     return ArtifactError(
-        f"{location} can't be written: {reason}; what is finished is kept: {remedy}, and the same"
-        " command goes on"
+        f"{location} can't be written: {reason}; finished results are kept: {remedy}, and the same"
+        " command continues"
     )
+
+
+def damaged(path: str | Path, reason: object) -> RunDirectoryError:
+    """Return the error of a damaged file, with its remedy."""
+    return RunDirectoryError(
+        f"{path} is damaged ({printable(one_line(reason, 120))}): run the study again, which"
+        " restores what it can"
+    )
+
+
+def printable(text: str) -> str:
+    r"""Return text from a file without control characters, which would steer the terminal.
+
+    Example:
+        >>> printable("speeds\x1b[2J")
+        'speeds?[2J'
+    """
+    return "".join(c if c.isprintable() else "?" for c in text)
 
 
 class Storage:
     """Files by name. A file is complete, or it doesn't exist.
+
+    Names are checked to stay inside the folder, and links in it are refused.
 
     Attributes:
         location: The folder or store as the user wrote it, without secrets.
@@ -44,20 +71,20 @@ class Storage:
         import pyarrow as pa
         import pyarrow.fs as pafs
 
-        self._source = str(location)
-        self.location = re.sub(r"//[^/@]*@", "//", self._source)
+        source = str(location)
+        self.location = re.sub(r"//[^/@]*@", "//", source)
         self.folder: Path | None = None
         self.filesystem: pafs.FileSystem
-        if "://" in self._source:
+        if "://" in source:
             try:
-                self.filesystem, self.root = pafs.FileSystem.from_uri(self._source)
+                self.filesystem, self.root = pafs.FileSystem.from_uri(source)
             except (pa.ArrowException, OSError, ValueError) as error:
                 raise RunDirectoryError(
                     f"{self.location} can't be used as a store: {error}; write a folder, or a"
                     " location like s3://bucket/study"
                 ) from error
         else:
-            self.folder = Path(self._source).absolute()
+            self.folder = Path(source).absolute()
             self.filesystem, self.root = pafs.LocalFileSystem(), str(self.folder)
 
     @property
@@ -66,25 +93,31 @@ class Storage:
         return self.folder is not None
 
     def path(self, name: str) -> str:
-        """Return the path of a file in the file system."""
-        return str(PurePosixPath(self.root) / name)
+        """Return the path of a file in the file system.
 
-    def names(self, folder: str = "") -> list[str]:
-        """Return the names of the files below a folder, sorted; none if there is no such folder.
+        Raises:
+            RunDirectoryError: The name leads out of the folder, or to a link or device.
+        """
+        if self.folder is not None:
+            return str(path_in(self.folder, name))
+        return str(PurePosixPath(self.root) / plain_name(name, self.location))
+
+    def names(self, folder: str) -> list[str]:
+        """Return the names of the files in a folder, sorted; none if there is no such folder.
 
         Raises:
             ArtifactError: The store can't be reached.
         """
         import pyarrow.fs as pafs
 
-        start = self.path(folder)
-        selector = pafs.FileSelector(start, recursive=True, allow_not_found=True)
+        selector = pafs.FileSelector(self.path(folder), allow_not_found=True)
         try:
             infos = self.filesystem.get_file_info(selector)
         except OSError as error:
             raise self._unreachable(error) from error
-        paths = (info.path for info in infos if info.type == pafs.FileType.File)
-        return sorted(str(PurePosixPath(path).relative_to(self.root)) for path in paths)
+        return sorted(
+            f"{folder}/{info.base_name}" for info in infos if info.type == pafs.FileType.File
+        )
 
     def exists(self, name: str) -> bool:
         """Return whether there is such a file."""
@@ -98,69 +131,112 @@ class Storage:
             raise self._unreachable(error) from error
         return info.size
 
+    @contextmanager
+    def reading(self, name: str) -> Iterator[None]:
+        """Within the context, errors about the content of a file name it and the remedy.
+
+        Raises:
+            RunDirectoryError: The file is missing, damaged, or can't be read.
+        """
+        try:
+            yield
+        except Fleet2DError:
+            raise
+        except DAMAGE as error:
+            raise damaged(f"{self.location}/{name}", error) from error
+
     def read(self, name: str) -> bytes:
         """Return the content of a file.
 
         Raises:
-            FileNotFoundError: There is none.
+            RunDirectoryError: There is none, or it can't be read.
         """
-        with self.filesystem.open_input_file(self.path(name)) as file:
+        with self.reading(name), self.filesystem.open_input_file(self.path(name)) as file:
             return bytes(file.read())
+
+    def read_table(
+        self, name: str, columns: Sequence[str] | None = None, filters: Any = None
+    ) -> "pa.Table":
+        """Return the table of a Parquet file.
+
+        Raises:
+            RunDirectoryError: There is none, it is damaged, or it lacks a column.
+        """
+        import pyarrow.parquet as pq
+
+        with self.reading(name):
+            names = None if columns is None else list(columns)
+            table = pq.read_table(
+                self.path(name), columns=names, filters=filters, filesystem=self.filesystem
+            )
+            if names and set(names) != set(table.column_names):
+                raise ValueError(f"it has no columns {', '.join(names)}")
+            return table
 
     def write(self, name: str, content: bytes) -> None:
         """Write a file; readers see all of it, or none.
 
         Raises:
             ArtifactError: It can't be written.
+            RunDirectoryError: It is a link, or in one.
         """
+        path = self.path(name)
         try:
             if self.folder is None:
-                with self.filesystem.open_output_stream(self.path(name)) as stream:
+                with self.filesystem.open_output_stream(path) as stream:
                     stream.write(content)
-                return
-            path = self.folder / name
-            path.parent.mkdir(parents=True, exist_ok=True)
-            partial = path.with_name(f"{path.name}{PARTIAL}")
-            with partial.open("wb") as file:
-                file.write(content)
-                file.flush()
-                os.fsync(file.fileno())
-            partial.replace(path)
+            else:
+                Path(path).parent.mkdir(parents=True, exist_ok=True)
+                write_atomically(Path(path), content)
         except OSError as error:
             raise write_error(self.location, error) from error
+
+    def write_table(self, name: str, table: "pa.Table") -> None:
+        """Write a Parquet file; readers see all of it, or none.
+
+        Raises:
+            ArtifactError: It can't be written.
+        """
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
+        sink = pa.BufferOutputStream()
+        pq.write_table(table, sink, compression="zstd", row_group_size=50_000)
+        self.write(name, bytes(sink.getvalue()))
 
     def publish(self, local: Path, name: str) -> None:
         """Move a finished local file into the storage: by renaming if it is local, else by a copy.
 
         Raises:
             ArtifactError: It can't be written.
+            RunDirectoryError: Its place is a link, or in one.
         """
+        path = self.path(name)
         try:
-            if self.folder is not None:
-                target = self.folder / name
-                target.parent.mkdir(parents=True, exist_ok=True)
-                with local.open("rb") as file:
+            with local.open("rb") as file:
+                if self.folder is not None:
                     os.fsync(file.fileno())
-                local.replace(target)
-                return
-            with (
-                local.open("rb") as file,
-                self.filesystem.open_output_stream(self.path(name)) as out,
-            ):
-                while block := file.read(COPY_BYTES):
-                    out.write(block)
+                    Path(path).parent.mkdir(parents=True, exist_ok=True)
+                    local.replace(path)
+                    return
+                with self.filesystem.open_output_stream(path) as out:
+                    while block := file.read(COPY_BYTES):
+                        out.write(block)
             local.unlink()
         except OSError as error:
             raise write_error(self.location, error) from error
 
     def delete(self, name: str) -> None:
-        """Delete a file, if there is one."""
-        if self.exists(name):
-            self.filesystem.delete_file(self.path(name))
+        """Delete a file, if there is one.
+
+        Raises:
+            ArtifactError: It can't be deleted.
+        """
+        try:
+            if self.exists(name):
+                self.filesystem.delete_file(self.path(name))
+        except OSError as error:
+            raise write_error(self.location, error) from error
 
     def _unreachable(self, error: OSError) -> ArtifactError:
         return ArtifactError(f"{self.location} can't be reached: {error}")
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        """Pickle the location alone."""
-        return Storage, (self._source,)

@@ -1,22 +1,36 @@
 """Tuning: a search for settings on training homes with Optuna, judged on other homes."""
 
-import pickle
+import inspect
+import json
 from collections import deque
 from collections.abc import Hashable, Mapping, Sequence
-from dataclasses import dataclass, field
+from contextlib import closing
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, Literal, Protocol, Self
 
-from fleet2d.configuration.trust import Trust, current_trust, restrict
-from fleet2d.errors import ComponentError, Fleet2DError, InputError, ScenarioError, extra
+from pydantic import TypeAdapter
+
+from fleet2d.bounds import one_line
+from fleet2d.configuration.problems import did_you_mean, suggest
+from fleet2d.configuration.trust import Trust, current_trust, import_class, restrict
+from fleet2d.errors import (
+    ComponentError,
+    Fleet2DError,
+    InputError,
+    RunDirectoryError,
+    ScenarioError,
+    extra,
+)
 from fleet2d.runtime.determinism import sum_in_order
 from fleet2d.scenario.compose import apply_changes, assignment
 from fleet2d.scenario.model import Scenario, scenario_of
 from fleet2d.studies.axes import OptionsAxis, Parameter, key_path, rounded
-from fleet2d.studies.design import Design, matches
+from fleet2d.studies.design import Design, code_version, content_hash, matches
 from fleet2d.studies.directory import StudyDirectory
 from fleet2d.studies.driver import CheckedStudy, RunOptions, check_study, run_study
 from fleet2d.studies.executors import Executor, LostTask, TaskSchedule, WorkerTask
+from fleet2d.studies.plan import StudyPlan
 from fleet2d.studies.reader import Study, open_study
 from fleet2d.studies.simulator import StagedRun, describe_error, flat_numbers
 from fleet2d.studies.specification import (
@@ -25,7 +39,7 @@ from fleet2d.studies.specification import (
     TuneSettings,
     read_specification,
 )
-from fleet2d.studies.storage import write_error
+from fleet2d.studies.storage import Storage
 
 if TYPE_CHECKING:
     import optuna
@@ -85,8 +99,8 @@ class TrialJob:
         document = apply_changes(scenario._document, changes)
         return scenario_of(document, scenario.folder)
 
-    def __call__(self, task: WorkerTask) -> bytes:
-        """Return (objectives, error), pickled; one of them is None."""
+    def __call__(self, task: WorkerTask) -> tuple[list[float] | None, str | None]:
+        """Return the objectives and the error; one of them is None."""
         assert isinstance(task, TrialTask)
         try:
             with restrict(self.trust):
@@ -94,10 +108,11 @@ class TrialJob:
             numbers = dict(flat_numbers(metrics))
             missing = [name for name in self.objectives if name not in numbers]
             if missing:
-                raise ComponentError(f"the run has no metric {missing[0]!r}")
-            return pickle.dumps(([numbers[name] for name in self.objectives], None))
+                hint = did_you_mean(missing[0], numbers)
+                raise ComponentError(f"the run has no metric {missing[0]!r}{hint}")
+            return [numbers[name] for name in self.objectives], None
         except Exception as error:  # noqa: BLE001 - a component may raise anything; it is reported
-            return pickle.dumps((None, describe_error(error)))
+            return None, describe_error(error)
 
     def _metrics(self, task: TrialTask) -> Mapping[str, Any]:
         """Return the metrics at the end of a stage; the run of earlier stages is continued."""
@@ -119,7 +134,7 @@ class _RunningTrial:
         trial: The trial of Optuna.
         settings: The values of the searched parameters.
         stage: The index of the current stage.
-        objectives: The objectives of each variant that has finished the stage.
+        objectives: The objectives of each variant that has finished the stage, by index.
         unfinished: The number of variants that haven't finished the stage.
         error: The first error of a variant.
     """
@@ -127,40 +142,39 @@ class _RunningTrial:
     trial: "optuna.Trial"
     settings: dict[str, Any]
     stage: int = 0
-    objectives: list[list[float]] = field(default_factory=list)
+    objectives: dict[int, list[float]] = field(default_factory=dict)
     unfinished: int = 0
     error: str | None = None
 
 
 class TrialSchedule(TaskSchedule):
-    """The tasks of a search: a new trial starts when workers have nothing else to do.
+    """The tasks of a search, in batches of trials that are suggested and judged together.
 
-    A trial runs all variants up to one time of `prune_at` before the next; between them Optuna
-    decides whether the trial continues. The worker that holds the run of a variant continues it;
+    So neither the number of workers nor their speed has an effect on what Optuna suggests. All
+    trials of a batch run all variants up to one time of `prune_at` before the next; between them
+    Optuna decides which trials continue. The worker that holds the run of a variant continues it;
     another worker takes it only if there is nothing else, and runs it from the start.
     """
 
     def __init__(
         self,
         study: "optuna.Study",
-        search: Mapping[str, Parameter],
+        settings: TuneSettings,
         variants: Sequence[tuple[int, str]],
-        stages: Sequence[float | None],
-        trials: int,
+        finished: int = 0,
     ) -> None:
         """Create the schedule without a trial.
 
         Args:
             study: The study of Optuna.
-            search: The searched parameters.
+            settings: The `tune` section of the study file.
             variants: The index in the design and the home of each variant that a trial runs.
-            stages: The simulated times of the stages [s]; the last is None.
-            trials: The number of trials to start.
+            finished: The number of trials that are over.
         """
         super().__init__(())
-        self._study, self._search = study, search
-        self._variants, self._stages = variants, stages
-        self._new_trials = trials
+        self._study, self._settings, self._variants = study, settings, variants
+        self._stages = (*(time.total_seconds() for time in settings.prune_at), None)
+        self._started = finished
         self._running: dict[int, _RunningTrial] = {}
         self._tasks: deque[TrialTask] = deque()
         self._holders: dict[tuple[int, int], Hashable] = {}
@@ -168,34 +182,23 @@ class TrialSchedule(TaskSchedule):
 
     def __len__(self) -> int:
         """Return the largest number of tasks that workers can take now."""
-        return len(self._tasks) + self._new_trials * len(self._variants)
+        return len(self._tasks) or self._next_batch() * len(self._variants)
 
     def __bool__(self) -> bool:
         """Return whether there are more tasks or trials."""
-        return bool(self._tasks or self._new_trials)
+        return bool(self._tasks) or self._started < self._settings.trials
 
     def take(self, worker: Hashable) -> WorkerTask | None:
-        """Return the next task: of a run that the worker holds, a new run or trial, or any task."""
-        task = self._waiting_for(worker)
-        if task is None and self._new_trials:
-            self._new_trials -= 1
-            trial = self._study.ask()
-            settings = {name: suggested(trial, name, p) for name, p in self._search.items()}
-            self._running[trial.number] = running = _RunningTrial(trial, settings)
-            self._start_stage(running)
-            task = self._waiting_for(worker)
-        task = task or (self._tasks[0] if self._tasks else None)
-        if task is not None:
-            self._tasks.remove(task)
-            self._holders[task.trial, task.index] = worker
-        return task
-
-    def _waiting_for(self, worker: Hashable) -> TrialTask | None:
-        """Return the first task of a run that the worker holds, else of one that nobody holds."""
+        """Return the next task: of a run that the worker holds, a new run, or any task."""
+        if not self._tasks and self._next_batch():
+            self._start_batch()
         holders = [self._holders.get((task.trial, task.index)) for task in self._tasks]
-        for holder in (worker, None):
+        for holder in (worker, None, *holders):
             if holder in holders:
-                return self._tasks[holders.index(holder)]
+                task = self._tasks[holders.index(holder)]
+                self._tasks.remove(task)
+                self._holders[task.trial, task.index] = worker
+                return task
         return None
 
     def leave(self, worker: Hashable) -> None:
@@ -207,58 +210,98 @@ class TrialSchedule(TaskSchedule):
         assert isinstance(task, TrialTask)
         self._tasks.appendleft(task)
 
-    def finish(self, task: TrialTask, objectives: list[float] | None, error: str | None) -> bool:
-        """Record the result of a task; return whether its trial is over."""
+    def finish(self, task: TrialTask, objectives: list[float] | None, error: str | None) -> int:
+        """Record the result of a task; return the number of trials that are over with it."""
         running = self._running[task.trial]
         running.unfinished -= 1
         running.error = running.error or error
         if objectives is not None:
-            running.objectives.append(objectives)
-        if running.unfinished:
-            return False
-        if running.error is not None:
-            running.trial.set_user_attr(FAILURE, running.error)
-            self._study.tell(running.trial, state=_state("FAIL"))
-        elif self._continue(running):
-            return False
-        del self._running[task.trial]
-        for index, _ in self._variants:
-            self._holders.pop((task.trial, index), None)
-        return True
+            running.objectives[task.index] = objectives
+        if not running.unfinished and (running.error or self._stages[running.stage] is None):
+            return self._end(running)
+        if any(each.unfinished for each in self._running.values()):
+            return 0
+        return sum(self._judge(each) for each in list(self._running.values()))
+
+    def _next_batch(self) -> int:
+        """Return the number of trials that can start now; an interrupted batch is filled."""
+        if self._running:
+            return 0
+        batch = self._settings.batch
+        return min(batch - self._started % batch, self._settings.trials - self._started)
+
+    def _start_batch(self) -> None:
+        # Optuna's samplers have random states, which aren't stored: each batch has its own.
+        self._study.sampler = _sampler(self._settings, self._started)
+        for _ in range(self._next_batch()):
+            trial = self._study.ask()
+            search = self._settings.search
+            values = {name: suggested(trial, name, search[name]) for name in search}
+            self._running[trial.number] = _RunningTrial(trial, values)
+        self._started += len(self._running)
+        for running in self._running.values():
+            self._start_stage(running)
 
     def _start_stage(self, running: _RunningTrial) -> None:
-        until_s = self._stages[running.stage]
-        running.objectives, running.unfinished = [], len(self._variants)
+        until_s, number = self._stages[running.stage], running.trial.number
+        running.objectives, running.unfinished = {}, len(self._variants)
         for index, home in self._variants:
             self._task_count += 1
             self._tasks.append(
-                TrialTask(
-                    self._task_count,
-                    index,
-                    "",
-                    home,
-                    running.trial.number,
-                    running.settings,
-                    until_s,
-                )
+                TrialTask(self._task_count, index, "", home, number, running.settings, until_s)
             )
 
-    def _continue(self, running: _RunningTrial) -> bool:
-        """Report the means of a stage to Optuna; start the next stage, if there is to be one."""
-        means = [
-            sum_in_order(values) / len(values) for values in zip(*running.objectives, strict=True)
-        ]
-        until_s = self._stages[running.stage]
-        if until_s is None:
-            self._study.tell(running.trial, means)
-            return False
-        running.trial.report(means[0], int(until_s))
+    def _judge(self, running: _RunningTrial) -> int:
+        """Start the next stage of a trial unless Optuna ends it; return whether it does."""
+        running.trial.report(self._means(running)[0], int(self._stages[running.stage] or 0))
         if running.trial.should_prune():
-            self._study.tell(running.trial, state=_state("PRUNED"))
-            return False
+            return self._end(running, "PRUNED")
         running.stage += 1
         self._start_stage(running)
-        return True
+        return 0
+
+    def _end(self, running: _RunningTrial, state: str = "COMPLETE") -> int:
+        """Tell Optuna that a trial is over; return 1."""
+        from optuna.trial import TrialState
+
+        if running.error is not None:
+            running.trial.set_user_attr(FAILURE, running.error)
+            state = "FAIL"
+        values = self._means(running) if state == "COMPLETE" else None
+        self._study.tell(running.trial, values, TrialState[state])
+        del self._running[running.trial.number]
+        self._holders = {key: of for key, of in self._holders.items() if key[0] in self._running}
+        return 1
+
+    def _means(self, running: _RunningTrial) -> list[float]:
+        values = [running.objectives[index] for index, _ in self._variants]
+        return [sum_in_order(of_all) / len(of_all) for of_all in zip(*values, strict=True)]
+
+
+def _sampler(settings: TuneSettings, finished: int) -> "optuna.samplers.BaseSampler":
+    """Return the sampler of the trials after the finished ones.
+
+    Raises:
+        ScenarioError: There is no such sampler, or it can't have those arguments.
+    """
+    from optuna import samplers
+
+    usual = "TPESampler" if len(settings.objectives) == 1 else "NSGAIISampler"
+    options = {"type": usual, **settings.sampler}
+    name = options.pop("type")
+    known = [known for known in samplers.__all__ if known.endswith("Sampler")]
+    if ":" not in name and name not in known:
+        raise ScenarioError(f"tune.sampler: Optuna has no {name!r}{suggest(name, known)}")
+    kind: Any = import_class(name) if ":" in name else getattr(samplers, name)
+    try:
+        if "seed" in inspect.signature(kind).parameters:
+            options.setdefault("seed", settings.seed + finished)
+        sampler = kind(**options)
+        if not isinstance(sampler, samplers.BaseSampler):
+            raise TypeError("it is no sampler of Optuna")
+    except (ImportError, TypeError, ValueError) as error:
+        raise ScenarioError(f"tune.sampler: {name} can't be used: {error}") from error
+    return sampler
 
 
 def suggested(trial: "optuna.Trial", name: str, parameter: Parameter) -> Any:
@@ -271,12 +314,6 @@ def suggested(trial: "optuna.Trial", name: str, parameter: Parameter) -> Any:
         low, high = int(parameter.low), int(parameter.high)
         return trial.suggest_int(name, low, high, log=parameter.log)
     return rounded(trial.suggest_float(name, parameter.low, parameter.high, log=parameter.log))
-
-
-def _state(name: str) -> Any:
-    from optuna.trial import TrialState
-
-    return TrialState[name]
 
 
 def check_settings(job: TrialJob, index: int) -> None:
@@ -293,7 +330,7 @@ def check_settings(job: TrialJob, index: int) -> None:
                 raise type(error)(f"tune.search.{name}: {error}") from None
 
 
-TRIALS, HELD_OUT = "trials.log", "held_out"
+SEARCH, TRIALS, HELD_OUT = "search.json", "trials.log", "held_out"
 SETTING, BEFORE, TUNED = "setting", "as it was", "tuned"
 MOST_TUNED = 5  # settings to judge after a search for several objectives
 
@@ -323,19 +360,106 @@ class TuneResult:
     held_out: Study
 
 
+@dataclass(frozen=True)
+class SearchIdentity:
+    """What the trials of a search depend on, as hashes or as text.
+
+    Trials of another search may have seen the homes that are now held out, or have been judged by
+    another objective; so they never count for this one.
+
+    Attributes:
+        training: The scenarios that trials run.
+        held_out: The scenarios that the best settings are judged on.
+        search: The searched parameters.
+        objectives: The objectives.
+        prune_at: The times at which poor trials end early.
+        seed: The seed of the search.
+        batch: The number of settings that are suggested together.
+        sampler: The sampler.
+        storage: Where the trials are stored, without secrets.
+        files: The input files of all scenarios, with the code.
+        code: The version of Fleet2D.
+    """
+
+    training: str
+    held_out: str
+    search: str
+    objectives: str
+    prune_at: str
+    seed: str
+    batch: str
+    sampler: str
+    storage: str
+    files: str
+    code: str
+
+    @classmethod
+    def of(cls, plan: StudyPlan, settings: TuneSettings, storage: str) -> Self:
+        """Return the identity of a search on the variants of a plan."""
+        scenarios: dict[bool, list[str]] = {False: [], True: []}
+        for variant in plan.variants:
+            is_held_out = matches(settings.held_out, plan.parameters(variant))
+            scenarios[is_held_out].append(variant.scenario)
+        content = settings.model_dump(mode="json")
+        names = ("search", "objectives", "prune_at", "seed", "batch", "sampler")
+        return cls(
+            training=content_hash(sorted(scenarios[False])),
+            held_out=content_hash(sorted(scenarios[True])),
+            **{name: content_hash(content[name]) for name in names},
+            storage=storage,
+            files=content_hash(sorted(variant.identity for variant in plan.variants)),
+            code=code_version(),
+        )
+
+    def changes(self, stored: Self) -> list[str]:
+        """Return in words how another search differs from this one."""
+        words = {
+            "training": "the homes, base scenario or seeds of the training",
+            "held_out": "what is held out",
+            "search": "the searched parameters",
+            "objectives": "the objectives",
+            "prune_at": "prune_at",
+            "seed": "the seed of the search",
+            "batch": "the batch",
+            "sampler": "the sampler",
+            "storage": "the storage",
+            "code": "the version of Fleet2D",
+        }
+        names = [name for name in words if getattr(self, name) != getattr(stored, name)]
+        return [words[name] for name in names] or ["input files"] * (self.files != stored.files)
+
+    @property
+    def digest(self) -> str:
+        """A hash of all of it."""
+        return content_hash(asdict(self))
+
+
 def tune(
     source: str | Path | Mapping[str, Any] | Specification,
     folder: str | Path,
     executor: Executor,
     observer: TuneObserver | None = None,
-    options: RunOptions | None = None,
+    *,
+    changed: Literal["redo"] | None = None,
+    storage: str | None = None,
 ) -> TuneResult:
     """Search the parameters that a study's `tune` section names, and judge the best settings.
 
     A search that was interrupted continues.
 
+    Args:
+        source: The study.
+        folder: The folder of the search.
+        executor: Where trials run.
+        observer: Follows the progress.
+        changed: `redo` starts anew if the folder holds another search, whose trials stay in the
+            storage under a name of their own; None: such a folder is refused.
+        storage: The URL of a database for the trials, such as sqlite:///trials.db; None: a file in
+            the folder.
+
     Raises:
-        InputError: The study has no such section, the section is wrong, or Optuna is missing.
+        InputError: The study has no such section, the section is wrong, the folder holds another
+            search, or Optuna is missing.
     """
     specification = read_specification(source)
     settings = specification.file.tune
@@ -344,24 +468,29 @@ def tune(
             f"{specification.name} has no section `tune`, which names the parameters to search"
         )
     checked = check_study(specification)
-    job = TrialJob(checked.plan.design, settings.search, tuple(settings.objectives))
-    training = [
-        (variant.index, variant.home_key)
-        for variant in checked.plan.variants
-        if not matches(settings.held_out, checked.plan.parameters(variant))
-    ]
-    if not training:
-        raise ScenarioError("tune.held_out names all values: the search would have none to run on")
+    plan = checked.plan
+    training = _training(plan, settings)
+    job = TrialJob(plan.design, settings.search, tuple(settings.objectives))
     check_settings(job, training[0][0])
     directory = StudyDirectory(folder)
     if directory.storage.folder is None:
-        raise InputError(f"{folder} is not a local folder, which the storage of Optuna needs")
+        raise InputError(f"{folder} is not a local folder, which a search needs")
+    with extra("tune", "this needs Optuna"):
+        import optuna
+    optuna.logging.set_verbosity(optuna.logging.ERROR)
+    database, storage_name = _open_database(storage) if storage else (None, TRIALS)
+    identity = SearchIdentity.of(plan, settings, storage_name)
+    _sampler(settings, 0)  # its errors come before anything is written
     with directory.locked():
-        study = _open_optuna(directory.storage.folder / TRIALS, specification.name, settings)
+        _check_identity(directory.storage, identity, changed)
+        name = f"{specification.name} {identity.digest}"
+        with directory.storage.reading(TRIALS):
+            study = _open_trials(database or _open_journal(directory.storage), name, settings)
         _search(study, job, training, settings, executor, observer)
     best = _best(study, settings)
-    held_out = _check_held_out(specification, best, settings)
-    run_study(held_out, directory.storage.folder / HELD_OUT, executor, options or RunOptions())
+    held_out = _check_held_out(specification, plan.design, best, settings)
+    # After more trials, the best settings may be others.
+    run_study(held_out, directory.storage.folder / HELD_OUT, executor, RunOptions(changed="redo"))
     states = [trial.state.name.lower() for trial in study.trials]
     return TuneResult(
         {name: _overrides(trial, settings) for name, trial in best.items()},
@@ -369,6 +498,53 @@ def tune(
         {state: states.count(state) for state in ("complete", "pruned", "fail")},
         open_study(directory.storage.folder / HELD_OUT),
     )
+
+
+def _training(plan: StudyPlan, settings: TuneSettings) -> list[tuple[int, str]]:
+    """Return the index in the design and the home of each variant that trials run.
+
+    Raises:
+        ScenarioError: There is none, or it isn't clear whether one is held out.
+    """
+    (axis,) = settings.held_out
+    labels = [plan.parameters(variant) for variant in plan.variants]
+    if any(label[axis] is None for label in labels):
+        raise ScenarioError(
+            f"tune.held_out: the axis {axis!r} doesn't apply to all variants, some of which would"
+            " be neither trained on nor held out: hold out values of another axis"
+        )
+    training = [
+        (variant.index, variant.home_key)
+        for variant, label in zip(plan.variants, labels, strict=True)
+        if not matches(settings.held_out, label)
+    ]
+    if not training:
+        raise ScenarioError("tune.held_out names all values: the search would have none to run on")
+    return training
+
+
+def _check_identity(
+    storage: Storage, identity: SearchIdentity, changed: Literal["redo"] | None
+) -> None:
+    """Refuse a folder with another search, unless it is to be redone; store the identity.
+
+    Raises:
+        RunDirectoryError: The folder holds another search.
+    """
+    changes = []
+    if storage.exists(SEARCH):
+        with storage.reading(SEARCH):
+            stored = TypeAdapter(SearchIdentity).validate_json(storage.read(SEARCH))
+        changes = identity.changes(stored)
+    elif storage.exists(TRIALS):
+        changes = ["the version of Fleet2D"]
+    if changes and changed is None:
+        raise RunDirectoryError(
+            f"{storage.location} holds another search: {', '.join(changes)} changed, and what it"
+            " found can't be judged as a result of this one. --changed redo starts anew and keeps"
+            " the old trials in the storage under a name of their own; or choose another --out"
+        )
+    storage.write(SEARCH, json.dumps(asdict(identity), indent=1).encode())
 
 
 def _search(
@@ -380,65 +556,60 @@ def _search(
     observer: TuneObserver | None,
 ) -> None:
     """Run trials up to the number of the settings."""
-    from optuna.trial import TrialState
-
-    states = (TrialState.COMPLETE, TrialState.PRUNED)
-    finished = len(study.get_trials(deepcopy=False, states=states))
-    stages = (*(time.total_seconds() for time in settings.prune_at), None)
-    if finished >= settings.trials:
-        return
-    schedule = TrialSchedule(study, settings.search, training, stages, settings.trials - finished)
-    events = executor.run(job, schedule)
-    try:
+    trials = study.get_trials(deepcopy=False)
+    finished = sum(trial.state.name in ("COMPLETE", "PRUNED") for trial in trials)
+    schedule = TrialSchedule(study, settings, training, finished)
+    with closing(executor.run(job, schedule)) as events:
         for event in events:
             task = event.task
             assert isinstance(task, TrialTask)
             if isinstance(event, LostTask):
-                objectives, error = None, event.reason
+                over = schedule.finish(task, None, event.reason)
             else:
-                objectives, error = pickle.loads(event.payload)  # noqa: S301 - from our own workers
-            if not schedule.finish(task, objectives, error):
-                continue
-            finished += 1
-            if observer is not None:
-                observer(finished, settings.trials, _best_values(study))
-    finally:
-        events.close()
+                over = schedule.finish(task, *event.payload)
+            finished += over
+            if over and observer is not None:
+                best = study.best_trials
+                observer(finished, settings.trials, list(best[0].values) if best else None)
 
 
-def _best_values(study: "optuna.Study") -> list[float] | None:
-    trials = study.best_trials
-    return list(trials[0].values) if trials else None
+def _open_journal(folder: Storage) -> "optuna.storages.BaseStorage":
+    """Return the storage of the trials in the folder of the search."""
+    from optuna.storages import JournalStorage
+    from optuna.storages.journal import JournalFileBackend
+
+    return JournalStorage(JournalFileBackend(folder.path(TRIALS)))
 
 
-def _open_optuna(path: Path, name: str, settings: TuneSettings) -> "optuna.Study":
-    """Open Optuna's storage; unfinished trials of a killed process are started again.
+def _open_database(url: str) -> tuple["optuna.storages.BaseStorage", str]:
+    """Return the storage of the trials in a database, and its URL without secrets.
 
     Raises:
-        InputError: Optuna is not installed, or the storage belongs to another search.
+        InputError: The database can't be used.
     """
-    with extra("tune", "this needs Optuna"):
-        import optuna
-        from optuna.storages import JournalStorage
-        from optuna.storages.journal import JournalFileBackend
-    optuna.logging.set_verbosity(optuna.logging.ERROR)
+    from optuna.storages import RDBStorage
+    from sqlalchemy.engine import make_url
+    from sqlalchemy.exc import SQLAlchemyError
+
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        storage = JournalStorage(JournalFileBackend(str(path)))
-    except OSError as error:
-        raise write_error(path.parent, error) from error
-    directions = list(settings.objectives.values())
+        return RDBStorage(url), make_url(url).render_as_string(hide_password=True)
+    except (SQLAlchemyError, ImportError, ValueError) as error:
+        raise InputError(
+            f"the storage can't be used ({one_line(error, 200)}): give the URL of a database, such"
+            " as sqlite:///trials.db"
+        ) from error
+
+
+def _open_trials(
+    storage: "optuna.storages.BaseStorage", name: str, settings: TuneSettings
+) -> "optuna.Study":
+    """Open the trials of a search; unfinished ones of a killed process are started again."""
+    import optuna
+
     study = optuna.create_study(
-        study_name=name, storage=storage, directions=directions, load_if_exists=True,
-        pruner=optuna.pruners.MedianPruner(n_startup_trials=5),
+        study_name=name, storage=storage, directions=list(settings.objectives.values()),
+        load_if_exists=True, pruner=optuna.pruners.MedianPruner(n_startup_trials=5),
     )  # fmt: skip
-    if [direction.name.lower() for direction in study.directions] != directions:
-        raise InputError(f"{path} belongs to a search for other objectives: choose another --out")
-    finished = len(study.trials)
-    if len(directions) == 1:
-        study.sampler = optuna.samplers.TPESampler(seed=settings.seed + finished)
-    else:
-        study.sampler = optuna.samplers.NSGAIISampler(seed=settings.seed + finished)
     for trial in study.get_trials(states=(optuna.trial.TrialState.RUNNING,)):
         study.tell(trial.number, state=optuna.trial.TrialState.FAIL)
         if trial.params:
@@ -476,12 +647,12 @@ def _overrides(trial: "optuna.trial.FrozenTrial", settings: TuneSettings) -> dic
 
 def _check_held_out(
     specification: Specification,
+    design: Design,
     best: "dict[str, optuna.trial.FrozenTrial]",
     settings: TuneSettings,
 ) -> CheckedStudy:
     """Return the study that compares the best settings on the homes held out of the search."""
     ((axis, values),) = settings.held_out.items()
-    design = check_study(specification).plan.design
     training = tuple(
         label for label in design.labels[axis] if not matches({axis: list(values)}, {axis: label})
     )

@@ -1,1 +1,0 @@
-"""Executors: they run the variants of a study in this process, in others, or on Ray."""

@@ -1,0 +1,242 @@
+"""Damaged and forged folders of studies: one line says what is wrong, where, and what to do.
+
+In a trial, 56 of 135 calls of `status`, `report` and `rerun` on damaged folders ended in errors of
+libraries (`ArrowInvalid`, `JSONDecodeError`, `TypeError`), names with escapes steered the terminal,
+and a forged record of a part deleted files elsewhere.
+"""
+
+import json
+import random
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+import yaml
+from tests.scenes import Cli
+from tests.studies.scenes import SPEED, run, small
+from tests.thorough import THOROUGH, some
+
+pytestmark = pytest.mark.filterwarnings("ignore::ResourceWarning")
+
+RECORD, RESULTS, TABLE = (
+    "parts/000001.json", "results/000001.parquet", "tables/room_share/000001.parquet",
+)  # fmt: skip
+JSON = ("study.json", RECORD)
+PARQUET = ("plan.parquet", "scenarios.parquet", "variants.parquet", RESULTS, TABLE)
+COMPARE = [{"metric": "sightings.ana", "against": {SPEED: 0.3}}]
+STUDY = small(replicates=2, keep={"tables": ["room_share"]}, compare=COMPARE)
+
+Damage = Callable[[Path], None]
+
+
+def _cut(path: Path) -> None:
+    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+
+
+def _flip(path: Path, seed: int = 1) -> None:
+    content = bytearray(path.read_bytes())
+    chance = random.Random(seed)
+    for _ in range(8):
+        content[chance.randrange(len(content))] ^= 1 << chance.randrange(8)
+    path.write_bytes(content)
+
+
+def _as_folder(path: Path) -> None:
+    path.unlink()
+    path.mkdir()
+
+
+def _as_link(path: Path) -> None:
+    path.unlink()
+    path.symlink_to("/nowhere/at/all")
+
+
+BYTES: dict[str, Damage] = {
+    "empty": lambda path: path.write_bytes(b"") and None,
+    "cut": _cut,
+    "flipped": _flip,
+    "noise": lambda path: path.write_bytes(random.Random(2).randbytes(500)) and None,
+    "zeros": lambda path: path.write_bytes(bytes(path.stat().st_size)) and None,
+    "gone": Path.unlink,
+    "folder": _as_folder,
+    "link": _as_link,
+}
+VALUES: tuple[Any, ...] = (None, [], {}, 7, "text", "\x1b[2J", [[1]], {"a": 1}, -(2**70))
+
+
+def _set_value(path: Path, key: str, value: Any) -> None:
+    content = json.loads(path.read_text())
+    content[key] = value
+    path.write_text(json.dumps(content))
+
+
+def _change_table(path: Path, change: Callable[[pa.Table], pa.Table]) -> None:
+    pq.write_table(change(pq.read_table(path)), path)
+
+
+TABLES: dict[str, Callable[[pa.Table], pa.Table]] = {
+    "no columns": lambda table: table.select([]),
+    "first column only": lambda table: table.select([0]),
+    "last column only": lambda table: table.select([table.num_columns - 1]),
+    "no rows": lambda table: table.slice(0, 0),
+    "all text": lambda table: pa.table(
+        {name: ["\x1b[2J"] * table.num_rows for name in table.column_names}
+    ).replace_schema_metadata(table.schema.metadata),
+    "all lists": lambda table: pa.table(
+        {name: [[1]] * table.num_rows for name in table.column_names}
+    ).replace_schema_metadata(table.schema.metadata),
+    "all null": lambda table: pa.table(
+        {name: pa.nulls(table.num_rows) for name in table.column_names}
+    ).replace_schema_metadata(table.schema.metadata),
+}
+CASES: list[tuple[str, str, Damage]] = [
+    *((file, name, damage) for file in (*JSON, *PARQUET) for name, damage in BYTES.items()),
+    *(
+        ("study.json", f"{key}={value!r}", lambda p, k=key, v=value: _set_value(p, k, v))
+        for key in ("format", "name", "columns", "populations", "tables", "compare", "source")
+        for value in VALUES
+    ),
+    *(
+        (RECORD, f"{key}={value!r}", lambda p, k=key, v=value: _set_value(p, k, v))
+        for key in ("number", "variants", "files")
+        for value in VALUES
+    ),
+    *(
+        (file, name, lambda p, c=change: _change_table(p, c))
+        for file in PARQUET
+        for name, change in TABLES.items()
+    ),
+]  # type: ignore[misc]
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A study that ran to its end."""
+    folder = tmp_path_factory.mktemp("studies") / "study"
+    run(STUDY, folder)
+    return folder
+
+
+@pytest.fixture
+def study(whole: Path, tmp_path: Path) -> Path:
+    """The same, to be damaged."""
+    return shutil.copytree(whole, tmp_path / "study")
+
+
+COMMANDS = (("status",), ("rerun", "1"), ("report",))
+
+
+@pytest.mark.parametrize(
+    "number", some(range(len(CASES)), 3), ids=lambda n: f"{CASES[n][0]} {CASES[n][1]}"
+)
+def test_commands_say_in_one_line_what_is_damaged(
+    study: Path, tmp_path: Path, fleet2d: Cli, number: int
+) -> None:
+    file, _, damage = CASES[number]
+    damage(study / file)
+    # A report takes a second: of alike cases only some are reported.
+    commands = COMMANDS if THOROUGH or number % 12 == 0 else COMMANDS[:2]
+    for command, *arguments in commands:
+        code, out, err = fleet2d("study", command, str(study), *arguments)
+        assert "\x1b" not in out + err, (command, out, err)
+        assert "Traceback" not in err, err
+        if code:
+            assert code in (1, 2), (command, code, err)
+            lines = err.strip().splitlines()
+            assert len(lines) == 1, err
+            assert lines[0].startswith(("error: ", "not reproduced")), err
+
+
+@pytest.mark.parametrize("number", some(range(1, len(CASES)), 11))
+def test_the_study_runs_again_or_says_why_not(study: Path, fleet2d: Cli, number: int) -> None:
+    file, _, damage = CASES[number]
+    damage(study / file)
+    Path("study.yaml").write_text(yaml.safe_dump(STUDY, sort_keys=False))
+    code, out, err = fleet2d(
+        "study", "run", "study.yaml", "--executor", "serial", "--quiet", "--out", str(study)
+    )
+    assert "Traceback" not in err, err
+    assert "\x1b" not in out + err
+    assert code == 0 or err.startswith("error: "), (code, err)
+
+
+# --- Names and links ------------------------------------------------------------------------------
+
+
+def _forge(study: Path, name: str) -> None:
+    record = json.loads((study / RECORD).read_text())
+    record["files"][0]["name"] = name
+    (study / RECORD).write_text(json.dumps(record))
+
+
+@pytest.mark.parametrize(
+    "name", ["../precious", "/precious", "study.json", "results/../../precious"]
+)
+def test_a_forged_record_deletes_nothing(study: Path, fleet2d: Cli, name: str) -> None:
+    """A record that named `../x` or an absolute path had that file deleted by `study run`."""
+    precious = study.parent / "precious"
+    precious.write_text("keep")
+    _forge(study, str(precious) if name.startswith("/") else name)
+    Path("study.yaml").write_text(yaml.safe_dump(STUDY, sort_keys=False))
+    arguments = ("--executor", "serial", "--quiet", "--out", str(study))
+    code, _, err = fleet2d("study", "run", "study.yaml", *arguments)
+    assert (0, "") == (code, err)  # the part is run again
+    assert precious.read_text() == "keep"
+    assert (study / "study.json").exists()
+
+
+@pytest.mark.parametrize("link", ["partial", "study.json.partial", "parts", "lock"])
+def test_nothing_is_written_through_a_link(study: Path, fleet2d: Cli, link: str) -> None:
+    """`partial` as a link to a folder had its files deleted, `study.json.partial` its target."""
+    outside = study.parent / "outside"
+    outside.mkdir()
+    (outside / "precious").write_text("keep")
+    if (study / link).is_dir():
+        shutil.rmtree(study / link)
+    (study / link).symlink_to(outside / "precious" if "." in link or link == "lock" else outside)
+    Path("study.yaml").write_text(yaml.safe_dump({**STUDY, "replicates": 3}, sort_keys=False))
+    arguments = ("--executor", "serial", "--quiet", "--out", str(study))
+    code, _, err = fleet2d("study", "run", "study.yaml", *arguments)
+    assert ["precious"] == [path.name for path in outside.iterdir()]
+    assert (outside / "precious").read_text() == "keep"
+    assert code == 0 or "is a link" in err
+
+
+def test_names_with_escapes_are_printed_without(study: Path, fleet2d: Cli) -> None:
+    _set_value(study / "study.json", "name", "speeds\x1b[2J")
+    code, out, _ = fleet2d("study", "status", str(study))
+    assert (0, "speeds?[2J: 4 of 4 variants complete, 0 failed, 0 to run\n") == (code, out)
+
+
+# --- Searches -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("file", ["search.json", "trials.log"])
+@pytest.mark.parametrize("damage", ["empty", "cut", "noise", "folder", "link"])
+def test_a_damaged_search_is_refused_in_one_line(
+    tmp_path: Path, fleet2d: Cli, file: str, damage: str
+) -> None:
+    """Damaged trials ended in errors of Optuna and of json."""
+    pytest.importorskip("optuna")
+    settings = {
+        "search": {"speed": {"key": SPEED, "low": 0.2, "high": 1.0}},
+        "objectives": {"distance.astro": "maximize"},
+        "trials": 1,
+        "held_out": {"radius": [0.15]},
+    }
+    axes = {"radius": {"key": "robots.astro.radius", "values": [0.1, 0.15]}}
+    study = small(axes=axes, replicates=1, tune=settings)
+    Path("study.yaml").write_text(yaml.safe_dump(study, sort_keys=False))
+    arguments = ("tune", "study.yaml", "--executor", "serial", "--quiet", "--out", "search")
+    assert fleet2d(*arguments)[0] == 0
+    BYTES[damage](Path("search") / file)
+    code, _, err = fleet2d(*arguments)
+    assert "Traceback" not in err, err
+    if code:
+        assert (2, 1) == (code, len(err.strip().splitlines())), err
+        assert err.startswith("error: ")
+        assert "search" in err
