@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import fleet2d
-from fleet2d.engine import phases, simulation
+from fleet2d.engine import loop
 from fleet2d.engine.bodies import Bodies
 from fleet2d.engine.cameras import Cameras
 from fleet2d.engine.collisions import Clearance
@@ -106,9 +106,9 @@ def main() -> None:
         for owner, method, part in PARTS:
             named = part if callable(part) else functools.partial(lambda p, *_: p, part)
             setattr(owner, method, timed(named, getattr(owner, method)))
-        simulation.PHASES = tuple(
+        loop.PHASES = tuple(
             timed(functools.partial(lambda p, *_: p, f"phase: {phase.__name__}"), phase)
-            for phase in phases.PHASES
+            for phase in loop.PHASES
         )
         found = []
         for _ in range(arguments.runs):

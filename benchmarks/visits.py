@@ -57,7 +57,7 @@ def trace_of_log(path: Path) -> RoomTrace:
 
 def trace_of_persona(persona: str, days: int, seed: int) -> RoomTrace:
     """Return the trace of a persona that lives alone in the bundled home, with furniture."""
-    from fleet2d.engine.run import run
+    from fleet2d.engine.simulation import run
 
     stored = run(
         {

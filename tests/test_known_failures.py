@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 import shapely
-from tests.engine.test_pace import Wall
+from tests.engine.test_loop_pace import Wall
 from tests.scenes import TESTS, digests, everything, flat_document, path, run, scenario, table
 from tests.thorough import THOROUGH, some
 
@@ -339,7 +339,7 @@ ELSEWHERE = {
         SightSettings,
         "seen_every",
     ): "tests/engine/test_layers: nobody asks for the seen area here",
-    (SimulationSettings, "speedup"): "test_pace: wall time",
+    (SimulationSettings, "speedup"): "test_loop_pace: wall time",
 }
 CASES = [
     (cls, where, key, value)
@@ -627,7 +627,7 @@ def test_known_failure_11_a_start_in_a_wall_is_an_error_that_says_where_free_spa
 def test_known_failure_12_the_speedup_is_held(monkeypatch: pytest.MonkeyPatch) -> None:
     """`speedup: 1000` reaches 146 there: it sleeps a full step on top of computing."""
     wall = Wall(look_s=0.005)  # what computing costs, each time that the pace looks at the clock
-    monkeypatch.setattr("fleet2d.engine.pace.time", wall)
+    monkeypatch.setattr("fleet2d.engine.loop.time", wall)
     Simulation(everything("20 min"), speedup=1000).advance(1200)
     assert 1000 == pytest.approx(1200 / wall.now, rel=0.02)
 

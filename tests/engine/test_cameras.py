@@ -8,9 +8,9 @@ import pytest
 from tests.scenes import OWN, everything, scenario
 
 import fleet2d
-from fleet2d.engine import phases
+from fleet2d.engine import loop
 from fleet2d.engine.cameras import Cameras
-from fleet2d.engine.phases import PHASES, Span
+from fleet2d.engine.loop import PHASES, Span
 from fleet2d.kernels.sight import new_memory
 
 
@@ -59,7 +59,7 @@ def test_those_who_wait_have_looked_at_the_same_steps(stops: list[int]) -> None:
     glances, idle = [Glance(stop) for stop in stops], Idle(1)
     state.watchers = [*glances, idle]
     span = Span(0, 9)
-    phases.watch(state, span)
+    loop.watch(state, span)
     assert min(stops) == span.end == state.bodies.step
     assert [span.end] * len(stops) == [glance.looked for glance in glances]
     assert 0 == idle.looked
@@ -103,7 +103,7 @@ def test_a_span_ends_at_the_earliest_event_and_all_cameras_have_looked_up_to_it(
     state, beyond, ended = simulation._state, 0, 0
     while simulation.step < 600:
         span = Span(simulation.step, 600)
-        for phase in PHASES[: PHASES.index(phases.watch)]:
+        for phase in PHASES[: PHASES.index(loop.watch)]:
             phase(state, span)
         ahead, whole = (copy.deepcopy(simulation)._state for _ in range(2))
         limits, end = [span.end], span.end
@@ -111,7 +111,7 @@ def test_a_span_ends_at_the_earliest_event_and_all_cameras_have_looked_up_to_it(
             if cameras.waits:
                 ahead.take(cameras, span.first)
                 limits.append(cameras.limit(ahead.bodies, end))
-        phases.watch(state, span)
+        loop.watch(state, span)
         assert min(limits) == span.end == state.bodies.step
         ended += span.end < end
         beyond += max(limits[1:], default=0) > span.end
@@ -119,7 +119,7 @@ def test_a_span_ends_at_the_earliest_event_and_all_cameras_have_looked_up_to_it(
             if cameras.waits:
                 whole.take(twin, span.end)
                 assert observed(twin) == observed(cameras)
-        for phase in PHASES[PHASES.index(phases.watch) + 1 :]:
+        for phase in PHASES[PHASES.index(loop.watch) + 1 :]:
             phase(state, span)
     assert ended > 20
     assert beyond > 5

@@ -249,7 +249,7 @@ def test_a_component_that_can_not_be_kept_is_named_and_the_run_begins_anew(tmp_p
 @pytest.fixture(scope="module")
 def forks() -> Any:
     context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload(["fleet2d.engine.run", "fleet2d.artifacts.arrow"])
+    context.set_forkserver_preload(["fleet2d.engine.simulation", "fleet2d.artifacts.arrow"])
     return context
 
 

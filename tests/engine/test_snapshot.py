@@ -467,7 +467,7 @@ def named(module: str, name: str) -> bytes:
         ("fleet2d.engine.snapshot", "Path"),
         ("fleet2d.engine.snapshot", "json.loads"),
         ("fleet2d.engine.snapshot", "_Reader"),
-        ("fleet2d.engine.run", "run"),
+        ("fleet2d.engine.simulation", "run"),
         ("fleet2d.engine.simulation", "Simulation"),
         ("fleet2d.artifacts.arrow", "ParquetTable"),
         ("fleet2d.configuration.trust", "import_class"),

@@ -1,29 +1,30 @@
 """The simulation: a run in progress, which can be stepped, changed, read and copied."""
 
+import copy
 import io
+import json
+import operator
 import secrets
 import time
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import ExitStack, nullcontext, suppress
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import nullcontext, suppress
+from dataclasses import dataclass
+from datetime import datetime, timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO, Self
 
-from fleet2d.artifacts.manifest import LEARNED_NAME, Status
+from fleet2d.algorithms.algorithm import Algorithm
+from fleet2d.artifacts.directory import cannot_write
+from fleet2d.artifacts.manifest import FLOORPLAN_NAME, LEARNED_NAME, Status
 from fleet2d.artifacts.store import RunStore
 from fleet2d.artifacts.unfinished import UnfinishedRun
-from fleet2d.configuration.trust import current_trust, restrict
+from fleet2d.configuration.problems import suggest
+from fleet2d.configuration.units import micros, parse_duration
 from fleet2d.engine.checkpoint import Checkpoint, CheckpointWriter
-from fleet2d.engine.control.steering import Steering
+from fleet2d.engine.inputs import input_files
 from fleet2d.engine.interventions import is_from_outside
-from fleet2d.engine.lifecycle import (
-    EngineFacts,
-    deferred_interrupt,
-    open_store,
-    store_plan,
-)
-from fleet2d.engine.pace import Pace
-from fleet2d.engine.phases import PHASES, Span
-from fleet2d.engine.script import repeat
+from fleet2d.engine.loop import Loop, Pace
+from fleet2d.engine.script import repeat, request
 from fleet2d.engine.setup import set_up
 from fleet2d.engine.snapshot import (
     Constants,
@@ -33,21 +34,26 @@ from fleet2d.engine.snapshot import (
     save_snapshot,
 )
 from fleet2d.engine.state import State
-from fleet2d.errors import ArtifactError, InputError
-from fleet2d.memory import rare_collections
+from fleet2d.entities.decisions import DecidingActor
+from fleet2d.entities.plan import Plan, data_of
+from fleet2d.errors import ArtifactError, InputError, ScenarioError
+from fleet2d.floorplan.formats.native import native_document
+from fleet2d.floorplan.home.home import Home
+from fleet2d.interventions.intervention import Intervention
+from fleet2d.interventions.methods import InterventionMethods
+from fleet2d.kernels.numbers import in_radians
+from fleet2d.memory import free_bodies, rare_collections
 from fleet2d.runs.run import Run, run_of
-from fleet2d.runtime.clock import Clock
+from fleet2d.runtime.clock import Clock, next_time
+from fleet2d.runtime.events import Event, EventKind, Listener
 from fleet2d.scenario.model import Scenario, load_scenario
 
 if TYPE_CHECKING:
     from fleet2d.expectations.expectation import Expectation
     from fleet2d.expectations.verdict import Verdict
 
-# Fewer steps are simulated without a handler for Ctrl-C.
-SHORT = 100
 
-
-class Simulation(Steering):
+class Simulation(InterventionMethods):
     """A run in progress: step it, run it until a time or event, read its state, copy it.
 
     Attributes:
@@ -93,7 +99,7 @@ class Simulation(Steering):
             store = RunStore(out)
             store.check()
             self._prepare(checked_scenario, store, interventions)
-        open_store(self._store, self.home)
+        self._open_store()
         self._setup_s = time.perf_counter() - began
 
     def _prepare(
@@ -103,23 +109,45 @@ class Simulation(Steering):
         self.scenario, simulation = scenario, scenario.simulation
         self.seed = secrets.randbelow(2**53) if simulation.seed is None else simulation.seed
         self.clock = Clock(simulation.start, simulation.step_us, simulation.steps)
-        self._trust = current_trust()  # a plan may name code that is imported only when it begins
         self._store = store
         self._state = set_up(self.scenario, self.clock, self.seed, self._store)
         # The scenario's own script repeats its interventions itself.
         outside = [dict(record) for record in interventions if is_from_outside(record)]
         repeat(self._state, outside)
-        self._pace: Pace | None = None
-        self._is_stopping = self._has_failed = False
         self._run: Run | None = None  # set when it is finished
         self._keeper: CheckpointWriter | None = None
         if store.directory is not None:
             settings = scenario.artifacts
             self._keeper = CheckpointWriter(store, settings, self.clock, self._checkpoint_header)
-        self._setup_s = self._simulate_s = self._save_s = 0.0
+        self._loop = Loop(self.clock, simulation.speedup, self._keeper)
+        self._setup_s = 0.0
         store.manifest.describe_start(self._facts())
         store.manifest.interventions = outside
-        self._began: float | None = None  # set while it simulates
+
+    def _open_store(self) -> None:
+        """Create the run directory, and store the floor plan in it.
+
+        Raises:
+            RunDirectoryError: The directory can't be used; no new file remains.
+            ArtifactError: The disk is full; no new file remains.
+        """
+        store = self._store
+        store.open()
+        if store.directory is None:
+            return
+        try:
+            self._store_plan()
+        except ArtifactError as error:
+            store.discard()
+            reason = error.__cause__
+            raise (
+                cannot_write(store.directory, reason) if isinstance(reason, OSError) else error
+            ) from reason
+
+    def _store_plan(self) -> None:
+        plan = self.home.plan
+        document = self.home.cached("document", lambda: json.dumps(native_document(plan)))
+        self._store.keep(FLOORPLAN_NAME, document)
 
     @classmethod
     def reopened(
@@ -146,7 +174,7 @@ class Simulation(Steering):
         run._prepare(scenario, store)
         if checkpoint is None:
             store.reopen(unfinished, None)
-            store_plan(store, run.home)
+            run._store_plan()
             run._setup_s = time.perf_counter() - began
             return run
         state = checkpoint.read(run._constants)
@@ -154,7 +182,7 @@ class Simulation(Steering):
         store.manifest.resumed.append(checkpoint.commit.step)
         store.reopen(unfinished, checkpoint.commit)
         run._take(state)
-        run._setup_s, run._simulate_s, run._save_s = checkpoint.wall_s
+        run._setup_s, run._loop.simulate_s, run._loop.save_s = checkpoint.wall_s
         assert run._keeper is not None
         run._keeper.resume(run.step)
         return run
@@ -164,107 +192,98 @@ class Simulation(Steering):
         outside = [record for record in interventions if is_from_outside(record)]
         repeat(self._state, outside[len(self._state.interventions.requests) :])
 
-    def _keep_requests(self) -> None:
-        if self._keeper is not None:
-            self._keeper.update_manifest(self._state)
-
-    def __deepcopy__(self, memo: dict[int, object]) -> Self:
-        """Return an independent copy of the simulation.
-
-        Raises:
-            ArtifactError: The run is stored in a directory, which can't be in two states.
-        """
-        if self.directory is not None:
-            raise ArtifactError(
-                f"a simulation that stores in {self.directory} can't be copied, because both would"
-                " write there: copy a simulation that stores in memory"
-            )
-        twin = self.__class__.__new__(self.__class__)
-        twin.__dict__.update(self.__dict__)
-        memo[id(self)] = twin
-        twin._take(copy_state(self._state, self._constants))
-        return twin
-
-    def __getstate__(self) -> dict[str, Any]:
-        """Return the content of a file that `load` reads."""
-        file = io.BytesIO()
-        self.save(file)
-        return {"saved": file.getvalue()}
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        """Restore the simulation of another process."""
-        self.__dict__.update(self.load(io.BytesIO(state["saved"])).__dict__)
-
-    def save(self, path: str | Path | BinaryIO) -> None:
-        """Write the simulation to a file that `load` reads.
-
-        Raises:
-            ArtifactError: The run is stored in a directory, or a component holds something that
-                can't be written, such as an open file.
-            InputError: The run is finished or has failed.
-
-        Example:
-            >>> import io
-            >>> simulation = Simulation(None, "simulation.duration=2 h", seed=4)
-            >>> simulation.advance(3600)
-            >>> file = io.BytesIO()
-            >>> simulation.save(file)
-            >>> _ = file.seek(0)
-            >>> Simulation.load(file).run().digest == simulation.run().digest
-            True
-        """
-        if self.directory is not None:
-            raise ArtifactError(
-                f"a simulation that stores in {self.directory} can't be saved as a file, too: it"
-                " keeps checkpoints there if artifacts.checkpoint is set; continue it by"
-                " `fleet2d resume`"
-            )
-        self._check_not_over()
-        save_snapshot(path, self._state, self._constants, self._header())
-
-    @classmethod
-    def load(cls, path: str | Path | BinaryIO) -> Self:
-        """Return the simulation that `save` wrote, at its step.
-
-        Raises:
-            ArtifactError: The file is damaged, or of another version of Fleet2D.
-        """
-        header, body = open_snapshot(path)
-        simulation = cls(header["scenario"], seed=header["seed"])
-        simulation._take(read_state(body, simulation._constants))
-        simulation._store.hash_again()
-        simulation._setup_s, simulation._simulate_s, simulation._save_s = header["wall_s"]
-        return simulation
-
-    def _take(self, state: State) -> None:
-        self._state, self._store = state, state.store
-
-    def _header(self) -> dict[str, Any]:
-        running_s = 0.0 if self._began is None else time.perf_counter() - self._began
-        return {
-            "scenario": self.scenario.resolved(),
-            "seed": self.seed,
-            "wall_s": [self._setup_s, self._simulate_s + running_s, self._save_s],
-        }
-
-    def _checkpoint_header(self) -> tuple[Constants, dict[str, Any]]:
-        return self._constants, {**self._header(), "manifest": self._store.manifest.content()}
+    # State
 
     @property
-    def _constants(self) -> dict[str, object]:
-        """Objects that never change during the run, by name."""
-        entities = {**self.scenario.users, **self.scenario.robots}
-        constants: dict[str, object] = {f"entity {name}": e for name, e in entities.items()}
-        constants |= {"clock": self.clock, "scenario": self.scenario, **self.home.constants}
-        constants |= {f"sight of {c.owner.name}": c.method for c in self._state.cameras if c.method}
-        if self.directory is not None:
-            constants["store"] = self._store
-        return constants
+    def step(self) -> int:
+        """The next step to simulate; 0 at the start."""
+        return self._state.bodies.step
+
+    @property
+    def home(self) -> Home:
+        """The home, as it is at present."""
+        return self._state.home
+
+    @property
+    def time(self) -> datetime:
+        """The local time of the next step."""
+        return self.clock.time(self.step)
+
+    @property
+    def done(self) -> bool:
+        """Whether all steps are simulated."""
+        return self.step >= self.clock.steps
 
     @property
     def directory(self) -> Path | None:
         """The run directory; None: the run is in memory."""
         return self._store.directory
+
+    @property
+    def state(self) -> dict[str, dict[str, Any]]:
+        """The state at the next step by name, of bodies: x, y [m], heading [rad], room, away.
+
+        Of doors it is whether they are open and locked, of sensors whether they are on.
+        """
+        bodies = {actor.name: self._state_of(actor) for actor in self._state.actors}
+        doors = {
+            name: {"open": i not in self.home.shut, "locked": i in self.home.locked}
+            for i, name in enumerate(self._state.changes.names)
+        }
+        if self._state.sensors.names:
+            self._state.settle(self.step)
+        return bodies | doors | {name: {"on": on} for name, on in self._state.sensors.on.items()}
+
+    @property
+    def actors(self) -> dict[str, DecidingActor]:
+        """All people and robots, by name: configuration, behaviors and plan."""
+        return {actor.name: actor for actor in self._state.actors}
+
+    @property
+    def outputs(self) -> dict[str, Any]:
+        """The latest output of each algorithm, by name, as behaviors read it."""
+        return dict(self._state.learners.readable_outputs)
+
+    @property
+    def algorithms(self) -> dict[str, Algorithm]:
+        """The algorithms in the run, by name: configuration, and what they have learned."""
+        return {
+            learner.name: learner.component
+            for learner in self._state.learners.all
+            if isinstance(learner.component, Algorithm)
+        }
+
+    def events(self, since: int = 0) -> list[Event]:
+        """Return the events from a step on, up to the present one, in order.
+
+        Raises:
+            InputError: Too many events have happened since: read the table `events`.
+        """
+        self._state.settle(self.step)
+        return self._state.events.since(since)
+
+    def listen(self, function: Callable[[Sequence[Event]], None]) -> None:
+        """Call a function with new events as they become known: not always in order of step."""
+        self._state.events.sinks.append(Listener(function))
+
+    @property
+    def interventions(self) -> list[dict[str, Any]]:
+        """The interventions so far, of the script and from outside, as in a manifest."""
+        return list(self._state.interventions.done)
+
+    def _state_of(self, actor: DecidingActor) -> dict[str, Any]:
+        state = actor.state
+        x, y = self.home.plan.lattice.to_metres([state.x, state.y]).tolist()
+        room = None if state.away else self.home.plan.room_at(x, y)
+        return {
+            "x": x,
+            "y": y,
+            "heading": in_radians(state.heading),
+            "room": room.name if room else None,
+            "away": bool(state.away),
+        }
+
+    # Running
 
     def run(self, on_progress: Callable[[Self], None] | None = None) -> Run:
         """Simulate to the end, store, and return the run.
@@ -278,132 +297,224 @@ class Simulation(Steering):
         try:
             self._run_to(self.clock.steps, on_progress)
         except BaseException as error:
-            if isinstance(error, KeyboardInterrupt) and not self._has_failed:
+            if isinstance(error, KeyboardInterrupt) and not self._loop.has_failed:
                 self.finish("interrupted")
             else:
                 self._fail(error)
             raise
         return self.finish()
 
-    def finish(self, status: Status = "complete") -> Run:
-        """Close the run at the present step and return it for reading."""
-        if self._run is not None:
-            return self._run
-        if status == "complete" and (self._has_failed or not self.done):
-            status = "failed" if self._has_failed else "interrupted"
-        began = time.perf_counter()
-        if status == "interrupted" and self._keeper is not None:
-            self._keeper.checkpoint(self._state)
-        # After a failure the metrics are not computed: they could fail, too, and lose the tables.
-        results: dict[str, Any] = {}
-        state = self._state
-        with suppress(Exception) if status == "failed" else nullcontext():
-            state.settle(self.step)
-        if state.log and status != "failed":
-            state.count_looks()
-            try:
-                results = state.learners.finish(self.step, state.log)
-                self._store.manifest.notes += self._state.learners.idle_notes()
-            except BaseException as error:
-                self._fail(error)
-                raise
-        self._store_verdicts(results, status)
-        self._simulate_s += time.perf_counter() - began
-        began = time.perf_counter()
-        state.recorder.end(self.step, len(state.actors))
-        if status != "failed":
-            self._state.layers.finish(self.step)
-            self._store_learned()
-        self._store.close_tables()
-        self._save_s += time.perf_counter() - began
-        self._store.manifest.describe_end(self._facts(results))
-        self._store.close(status)
-        self._run = run_of(self._store)
-        self._run.plan = self.home.plan
-        return self._run
+    def advance(self, steps: int | Mapping[str, Plan] = 1) -> None:
+        """Simulate a number of steps, up to the end of the run; or apply decisions from outside.
 
-    def _facts(self, results: Mapping[str, Any] | None = None) -> EngineFacts:
-        wall_s = {"setup": self._setup_s, "simulate": self._simulate_s, "save": self._save_s}
-        results = results or {}
-        return EngineFacts(
-            self.scenario, self.seed, self.clock, self._state, wall_s, self._pace, results
-        )
+        Args:
+            steps: The number; or a plan from `plan` for each body that is `pending`: then the run
+                continues up to the next step at which a driven body has to decide.
 
-    def _store_learned(self) -> None:
-        """Store what algorithms have learned; failures are noted in the manifest."""
-        root = self._store.root
-        if root is not None and self.scenario.artifacts.learned:
-            notes = self._state.learners.remember(root / LEARNED_NAME)
-            self._store.manifest.notes += notes
+        Raises:
+            InputError: The number is negative, the run is finished, or a driven body has no plan.
+            KeyboardInterrupt: Ctrl-C, after the present span; the simulation can be continued.
+
+        Example:
+            >>> import fleet2d
+            >>> simulation = fleet2d.Simulation(None, "simulation.duration=1 h", seed=4)
+            >>> simulation.drive("astro")
+            >>> while simulation.pending():
+            ...     plan = simulation.plan("astro").go_to("kitchen").stay(timedelta(minutes=20))
+            ...     simulation.advance({"astro": plan})
+            >>> simulation.done
+            True
+        """
+        if isinstance(steps, Mapping):
+            self._take_decisions(steps)
+            return
+        steps = operator.index(steps)
+        if steps < 0:
+            raise InputError(
+                f"advance({steps}): the number of steps must be 0 or more; to go back, keep a copy"
+                " of an earlier step"
+            )
+        self._run_to(min(self.clock.steps, self.step + steps))
+
+    def run_until(
+        self,
+        when: int | str | datetime | timedelta | None = None,
+        *,
+        event: str | None = None,
+        entity: str | None = None,
+        timeout: str | timedelta | None = None,
+    ) -> Event | None:
+        """Simulate up to a step, a local time or an event.
+
+        Args:
+            when: A step, a local time, a time since the start, or the next time of day ("19:00").
+            event: A kind of event instead, as in the table of events; the next step is the one
+                after it.
+            entity: The body or object that it has to happen to; None: any.
+            timeout: The longest time to wait for the event; None: up to the end of the run.
+
+        Returns:
+            The event; None if it didn't happen, or `when` is given.
+
+        Raises:
+            InputError: The time is past, the run is finished, or there is no such event or body.
+            KeyboardInterrupt: Ctrl-C, after the present span; the simulation can be continued.
+
+        Example:
+            >>> import fleet2d
+            >>> simulation = fleet2d.Simulation(None, "simulation.duration=1 d", seed=4)
+            >>> simulation.run_until("19:00")
+            >>> simulation.time.hour
+            19
+            >>> simulation.run_until(event="user_seen", entity="astro", timeout="12 h").detail
+            'ana'
+        """
+        if event is None:
+            step = self._step_of(when)
+            if step < self.step:
+                raise InputError(
+                    f"run_until(step {step}): it is step {self.step} already, {self.time}; branch a"
+                    " copy before that"
+                )
+            self._run_to(min(self.clock.steps, step))
+            return None
+        return self._run_until_event(event, entity, timeout)
+
+    def _step_of(self, when: int | str | datetime | timedelta | None) -> int:
+        if when is None:
+            raise InputError("run_until(): give a time, or event=…")
+        if isinstance(when, str):
+            when = next_time(when, self.time)
+        if isinstance(when, datetime):
+            when = when - self.clock.start
+        if isinstance(when, timedelta):
+            return self.clock.step_at_or_after(micros(when))
+        return operator.index(when)
+
+    def _run_until_event(
+        self, event: str, entity: str | None, timeout: str | timedelta | None
+    ) -> Event | None:
+        state, end = self._state, self.clock.steps
+        kinds = {*EventKind, *(n for a in state.actors for b in a.behaviors for n in b.records)}
+        _check_name("event", event, kinds)
+        if entity is not None:
+            _check_name("entity", entity, [*self.actors, *self.scenario.objects])
+        if timeout is not None:
+            wait = parse_duration(timeout) if isinstance(timeout, str) else timeout
+            end = min(end, self.step + self.clock.step_at_or_after(micros(wait)))
+        state.wait_for(frozenset({event}))
+        try:
+            while self.step < end:
+                start = self.step
+                self._run_to(end, spans=1)
+                for candidate in state.events.since(start):
+                    if candidate.event == event and entity in (None, candidate.entity):
+                        return candidate
+        finally:
+            state.wait_for(frozenset())
+        return None
 
     def _run_to(
         self, end: int, on_progress: Callable[[Self], None] | None = None, spans: int | None = None
     ) -> None:
+        """Simulate up to a step, or a number of spans."""
         self._check_not_over()
-        began, save_s = time.perf_counter(), self._state.recorder.wall_s
-        self._began = began
-        self._set_pace()
-        with ExitStack() as stack:
-            stack.enter_context(restrict(self._trust))
-            if end - self.step >= SHORT:  # fewer end before a user could press Ctrl-C
-                stack.enter_context(rare_collections())
-                stack.enter_context(deferred_interrupt(self._stop))
-            try:
-                self._spans(end, on_progress, spans)
-            except BaseException:
-                self._has_failed = True
-                raise
-            finally:
-                save_s = self._state.recorder.wall_s - save_s
-                self._simulate_s += time.perf_counter() - began - save_s
-                self._save_s += save_s
-                self._began = None
-        if self._is_stopping:
-            self._is_stopping = False
-            raise KeyboardInterrupt
+        report = None if on_progress is None else lambda: on_progress(self)
+        self._loop.run(self._state, end, report, spans)
 
     def _check_not_over(self) -> None:
         if self._run is not None:
             raise InputError("the run is finished: set up a new Simulation")
-        if self._has_failed:
+        if self._loop.has_failed:
             raise InputError("the run failed in the middle of a span and can't be continued")
 
-    def _spans(
-        self, end: int, on_progress: Callable[[Self], None] | None, spans: int | None
-    ) -> None:
-        reported, state = time.perf_counter(), self._state
-        while self.step < end and not self._is_stopping and spans != 0:
-            most = self._pace.steps(self.clock.step_us) if self._pace else end
-            span = Span(self.step, min(end, self.step + most))
-            for phase in PHASES:
-                phase(state, span)
-            if self._keeper is not None:
-                self._keeper.after_span(state)
-            if self._pace:
-                self._pace.hold(self.step * self.clock.step_us / 1e6, lambda: self._is_stopping)
-            if on_progress and time.perf_counter() - reported > 0.1:
-                on_progress(self)
-                reported = time.perf_counter()
-            spans = None if spans is None else spans - 1
+    # Interventions: each is recorded in the manifest, and repeated by `reproduce`.
 
-    def _set_pace(self) -> None:
-        speedup = self.scenario.simulation.speedup
-        if speedup:
-            self._pace = self._pace or Pace(speedup)
-            self._pace.resume(self.step * self.clock.step_us / 1e6)
+    def intervene(self, act: Intervention | Mapping[str, Any]) -> None:
+        """Apply an intervention at the present step, or later.
 
-    def _stop(self) -> None:
-        """End the run after the present span, so that all tables end at the same step."""
-        self._is_stopping = True
+        Args:
+            act: The intervention, or a mapping as in a scenario's `script`, which may say when by
+                `at` or `on`.
 
-    def _fail(self, error: BaseException) -> None:
-        """Close the run as failed, so that it can be read up to the failure."""
-        reason = str(error) or type(error).__name__
-        self._store.manifest.notes.append(f"failed at step {self.step}: {reason}")
-        with suppress(Exception):
-            self.finish("failed")
-        if self.directory is not None and self._run is not None:
-            error.add_note(f"the run until then, {self.time}, is in {self.directory}")
+        Raises:
+            ScenarioError: It is not valid, names something unknown, or can never happen.
+            PlacementError: There is no such place, or it can't be reached.
+            InputError: The run is finished.
+
+        Example:
+            >>> import fleet2d
+            >>> simulation = fleet2d.Simulation(None, "simulation.duration=1 d", seed=4)
+            >>> simulation.intervene({"put": "ana", "to": "kitchen"})
+            >>> simulation.run().manifest["interventions"]
+            [{'do': 'put', 'step': 0, 'entity': 'ana', 'to': 'kitchen'}]
+
+            >>> simulation = fleet2d.Simulation(None, "simulation.duration=1 d", seed=4)
+            >>> simulation.intervene({"on": ["activity", "ana", "dinner"], "hold": "astro"})
+            >>> [act["do"] for act in simulation.run().manifest["interventions"]]
+            ['hold']
+        """
+        if self._run is not None:
+            raise InputError("the run is finished: nothing can be done to it any more")
+        if request(self._state, act, self.step) and self._keeper is not None:
+            self._keeper.update_manifest(self._state)
+
+    def drive(self, name: str) -> None:
+        """Take over the decisions of a body: see `pending` and `advance`.
+
+        Raises:
+            ScenarioError: There is no such body.
+        """
+        row = list(self.actors).index(self._body(name).name)
+        self._do("drive", entity=name)
+        self._state.driven.add(row)
+        self._state.bodies.ask_at[row] = self.step
+
+    def pending(self) -> list[str]:
+        """Return the driven bodies that have to decide at the present step."""
+        state = self._state
+        if self.done:
+            return []
+        due = set(state.bodies.due(self.step))
+        return [state.actors[row].name for row in sorted(due & state.driven)]
+
+    def plan(self, name: str) -> Plan:
+        """Return an empty plan from the body's present pose, to be filled and passed to `advance`.
+
+        Raises:
+            ScenarioError: There is no such body.
+        """
+        return Plan(self._body(name), self.step)
+
+    def decide(self, name: str, plan: Plan) -> None:
+        """Let a driven body follow a plan from the present step on, without simulating a step.
+
+        Raises:
+            ScenarioError: There is no such body.
+            InputError: The body isn't driven.
+        """
+        row = list(self.actors).index(self._body(name).name)
+        if row not in self._state.driven:
+            raise InputError(f"{name} isn't driven, it decides itself: call drive({name!r}) first")
+        self._do("decide", entity=name, plan=data_of(plan))
+
+    def _take_decisions(self, plans: Mapping[str, Plan]) -> None:
+        """Follow plans from outside up to the next step at which a driven body has to decide."""
+        for name in self.pending():
+            if name not in plans:
+                raise InputError(f"advance(): {name} has to decide now, and has no plan")
+        for name, plan in plans.items():
+            self.decide(name, plan)
+        while not self.done:
+            self._run_to(self.clock.steps, spans=1)
+            if self.pending():
+                return
+
+    def _body(self, name: str) -> DecidingActor:
+        actors = self.actors
+        if name not in actors:
+            raise ScenarioError(f"there is nobody named {name!r}{suggest(name, actors)}")
+        return actors[name]
 
     # Expectations
 
@@ -470,6 +581,173 @@ class Simulation(Steering):
             )
         return verdict
 
+    def _expect_again(self, expectations: Mapping[str, Mapping[str, Any]]) -> None:
+        """Add the expectations of a stored run that are not in its scenario."""
+        for name, content in expectations.items():
+            if name not in self.scenario.expect:
+                expectation = _parsed(content["expectation"])
+                self._state.expect(self.scenario, name, expectation, content["first"])
+
+    # Copies
+
+    def __deepcopy__(self, memo: dict[int, object]) -> Self:
+        """Return an independent copy of the simulation.
+
+        Raises:
+            ArtifactError: The run is stored in a directory, which can't be in two states.
+        """
+        if self.directory is not None:
+            raise ArtifactError(
+                f"a simulation that stores in {self.directory} can't be copied, because both would"
+                " write there: copy a simulation that stores in memory"
+            )
+        twin = self.__class__.__new__(self.__class__)
+        twin.__dict__.update(self.__dict__)
+        memo[id(self)] = twin
+        twin._loop = copy.copy(self._loop)
+        twin._take(copy_state(self._state, self._constants))
+        return twin
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return the content of a file that `load` reads."""
+        file = io.BytesIO()
+        self.save(file)
+        return {"saved": file.getvalue()}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Restore the simulation of another process."""
+        self.__dict__.update(self.load(io.BytesIO(state["saved"])).__dict__)
+
+    def save(self, path: str | Path | BinaryIO) -> None:
+        """Write the simulation to a file that `load` reads.
+
+        Raises:
+            ArtifactError: The run is stored in a directory, or a component holds something that
+                can't be written, such as an open file.
+            InputError: The run is finished or has failed.
+
+        Example:
+            >>> import io
+            >>> simulation = Simulation(None, "simulation.duration=2 h", seed=4)
+            >>> simulation.advance(3600)
+            >>> file = io.BytesIO()
+            >>> simulation.save(file)
+            >>> _ = file.seek(0)
+            >>> Simulation.load(file).run().digest == simulation.run().digest
+            True
+        """
+        if self.directory is not None:
+            raise ArtifactError(
+                f"a simulation that stores in {self.directory} can't be saved as a file, too: it"
+                " keeps checkpoints there if artifacts.checkpoint is set; continue it by"
+                " `fleet2d resume`"
+            )
+        self._check_not_over()
+        save_snapshot(path, self._state, self._constants, self._header())
+
+    @classmethod
+    def load(cls, path: str | Path | BinaryIO) -> Self:
+        """Return the simulation that `save` wrote, at its step.
+
+        Raises:
+            ArtifactError: The file is damaged, or of another version of Fleet2D.
+        """
+        header, body = open_snapshot(path)
+        simulation = cls(header["scenario"], seed=header["seed"])
+        simulation._take(read_state(body, simulation._constants))
+        simulation._store.hash_again()
+        loop = simulation._loop
+        simulation._setup_s, loop.simulate_s, loop.save_s = header["wall_s"]
+        return simulation
+
+    def _take(self, state: State) -> None:
+        self._state, self._store = state, state.store
+
+    def _header(self) -> dict[str, Any]:
+        wall_s = self._wall_s
+        return {
+            "scenario": self.scenario.resolved(),
+            "seed": self.seed,
+            "wall_s": [wall_s["setup"], wall_s["simulate"] + self._loop.running_s, wall_s["save"]],
+        }
+
+    @property
+    def _wall_s(self) -> dict[str, float]:
+        """The wall time by phase so far [s]."""
+        loop = self._loop
+        return {"setup": self._setup_s, "simulate": loop.simulate_s, "save": loop.save_s}
+
+    def _checkpoint_header(self) -> tuple[Constants, dict[str, Any]]:
+        return self._constants, {**self._header(), "manifest": self._store.manifest.content()}
+
+    @property
+    def _constants(self) -> dict[str, object]:
+        """Objects that never change during the run, by name."""
+        entities = {**self.scenario.users, **self.scenario.robots}
+        constants: dict[str, object] = {f"entity {name}": e for name, e in entities.items()}
+        constants |= {"clock": self.clock, "scenario": self.scenario, **self.home.constants}
+        constants |= {f"sight of {c.owner.name}": c.method for c in self._state.cameras if c.method}
+        if self.directory is not None:
+            constants["store"] = self._store
+        return constants
+
+    # The end
+
+    def finish(self, status: Status = "complete") -> Run:
+        """Close the run at the present step and return it for reading."""
+        if self._run is not None:
+            return self._run
+        if status == "complete" and (self._loop.has_failed or not self.done):
+            status = "failed" if self._loop.has_failed else "interrupted"
+        began = time.perf_counter()
+        if status == "interrupted" and self._keeper is not None:
+            self._keeper.checkpoint(self._state)
+        # After a failure the metrics are not computed: they could fail, too, and lose the tables.
+        results: dict[str, Any] = {}
+        state = self._state
+        with suppress(Exception) if status == "failed" else nullcontext():
+            state.settle(self.step)
+        if state.log and status != "failed":
+            state.count_looks()
+            try:
+                results = state.learners.finish(self.step, state.log)
+                self._store.manifest.notes += self._state.learners.idle_notes()
+            except BaseException as error:
+                self._fail(error)
+                raise
+        self._store_verdicts(results, status)
+        self._loop.simulate_s += time.perf_counter() - began
+        began = time.perf_counter()
+        state.recorder.end(self.step, len(state.actors))
+        if status != "failed":
+            self._state.layers.finish(self.step)
+            self._store_learned()
+        self._store.close_tables()
+        self._loop.save_s += time.perf_counter() - began
+        self._store.manifest.describe_end(self._facts(results))
+        self._store.close(status)
+        self._run = run_of(self._store)
+        self._run.plan = self.home.plan
+        return self._run
+
+    def _facts(self, results: Mapping[str, Any] | None = None) -> "EngineFacts":
+        return EngineFacts(
+            self.scenario,
+            self.seed,
+            self.clock,
+            self._state,
+            self._wall_s,
+            self._loop.pace,
+            results or {},
+        )
+
+    def _store_learned(self) -> None:
+        """Store what algorithms have learned; failures are noted in the manifest."""
+        root = self._store.root
+        if root is not None and self.scenario.artifacts.learned:
+            notes = self._state.learners.remember(root / LEARNED_NAME)
+            self._store.manifest.notes += notes
+
     def _store_verdicts(self, results: Mapping[str, Any], status: Status) -> None:
         """Store the verdicts on all expectations."""
         expectations = self._state.expectations
@@ -478,12 +756,70 @@ class Simulation(Steering):
             ended = status == "complete"
             store.manifest.expectations = expectations.finish(results, store, ended=ended)
 
-    def _expect_again(self, expectations: Mapping[str, Mapping[str, Any]]) -> None:
-        """Add the expectations of a stored run that are not in its scenario."""
-        for name, content in expectations.items():
-            if name not in self.scenario.expect:
-                expectation = _parsed(content["expectation"])
-                self._state.expect(self.scenario, name, expectation, content["first"])
+    def _fail(self, error: BaseException) -> None:
+        """Close the run as failed, so that it can be read up to the failure."""
+        reason = str(error) or type(error).__name__
+        self._store.manifest.notes.append(f"failed at step {self.step}: {reason}")
+        with suppress(Exception):
+            self.finish("failed")
+        if self.directory is not None and self._run is not None:
+            error.add_note(f"the run until then, {self.time}, is in {self.directory}")
+
+
+@dataclass
+class EngineFacts:
+    """All that the engine knows of a run: what `ManifestFacts` has."""
+
+    scenario: Scenario
+    seed: int
+    clock: Clock
+    state: State
+    wall_s: Mapping[str, float]
+    pace: Pace | None
+    results: Mapping[str, Any]
+
+    @property
+    def input_files(self) -> list[Path]:
+        """The files that the run reads."""
+        return input_files(self.scenario)
+
+
+def run(
+    scenario: str | Path | Mapping[str, Any] | Scenario | None = None,
+    *overrides: str,
+    out: str | Path | None = None,
+    **settings: Any,
+) -> Run:
+    """Run a scenario to its end.
+
+    Args:
+        scenario: A YAML file, 'bundled:NAME', a mapping or a Scenario; None: the bundled base
+            scenario.
+        overrides: Texts like 'simulation.duration.days=60'.
+        out: Directory to store the run in; None keeps it in memory.
+        settings: Keys of `simulation` or of the scenario, such as seed=4.
+
+    Raises:
+        InputError: An argument or the scenario is wrong; nothing is written then.
+        ComponentError: A component failed; the run up to that step can be read.
+
+    Example:
+        >>> import fleet2d
+        >>> run = fleet2d.run(None, "simulation.duration=2 h", seed=4)
+        >>> run.manifest["steps"], run.tables["trajectories"].num_rows
+        (7200, 4)
+    """
+    simulation = Simulation(scenario, *overrides, out=out, **settings)
+    finished = simulation.run()
+    free_bodies(simulation._state.actors)
+    return finished
+
+
+def _check_name(noun: str, name: str, known: Iterable[str]) -> None:
+    """Refuse an unknown name."""
+    names = list(known)
+    if name not in names:
+        raise InputError(f"there is no {noun} {name!r}{suggest(name, names)}")
 
 
 def _parsed(expectation: "Expectation | str") -> "Expectation":

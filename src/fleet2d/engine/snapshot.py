@@ -174,7 +174,7 @@ _NO_STATE = (
     "fleet2d.configuration.documents",
     "fleet2d.engine.checkpoint",
     "fleet2d.engine.resume",
-    "fleet2d.engine.run",
+    "fleet2d.engine.simulation",
     "fleet2d.engine.simulation",
     "fleet2d.engine.snapshot",
     "fleet2d.fit",

@@ -7,7 +7,7 @@ import pytest
 from tests.scenes import OWN, digests, run, scenario
 
 import fleet2d
-from fleet2d.engine.pace import Pace
+from fleet2d.engine.loop import Pace
 
 
 def content(duration: str, speedup: float | None, **sections: Any) -> dict[str, Any]:
@@ -37,7 +37,7 @@ class Wall:
 @pytest.fixture
 def wall(monkeypatch: pytest.MonkeyPatch) -> Wall:
     clock = Wall()
-    monkeypatch.setattr("fleet2d.engine.pace.time", clock)
+    monkeypatch.setattr("fleet2d.engine.loop.time", clock)
     return clock
 
 

@@ -1,19 +1,41 @@
-"""The phases of a span, in the order that every step has (Fig. 5 of the paper).
+"""The loop of a run: the phases of a span, in the order that every step has (Fig. 5 of the paper).
 
 In each step: floor plan, users, robots, objects, algorithms, metrics. Between two steps with
 decisions the poses follow from the plans, so a run is simulated in spans from decision to decision.
 Spans never change a result: draws are addressed by step, and plans by time.
 """
 
-from collections.abc import Callable
+import os
+import signal
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
+from typing import Any
 
 from fleet2d.algorithms.log import Log
+from fleet2d.configuration.trust import current_trust, restrict
+from fleet2d.engine.checkpoint import CheckpointWriter
 from fleet2d.engine.script import EngineWorld
 from fleet2d.engine.state import State
 from fleet2d.entities.behavior import Situation
 from fleet2d.errors import InputError, blame
 from fleet2d.floorplan.home.change import HomeChanges
+from fleet2d.memory import rare_collections
+from fleet2d.runtime.clock import Clock
+
+# Fewer steps are simulated without a handler for Ctrl-C: they end before a user could press it.
+SHORT = 100
+# Wall time between two reports of progress [s].
+REPORT_S = 0.1
+
+# The messages of Ctrl-C, and of the signal that systemd, Docker and Slurm send before they kill.
+_MESSAGES = {
+    signal.SIGINT: b"interrupted: storing what was simulated; Ctrl-C again stops at once\n",
+    signal.SIGTERM: b"terminated: storing what was simulated\n",
+}
 
 
 @dataclass
@@ -196,3 +218,169 @@ Phase = Callable[[State, Span], None]
 
 PHASES: tuple[Phase, ...] = (intervene, change_home, decide, move, watch, record, learn)
 """The phases of a span, in order."""
+
+
+# The loop
+
+
+class Loop:
+    """Takes a run from span to span.
+
+    Attributes:
+        pace: Slows the run down; None: it runs as fast as it can.
+        has_failed: Whether a span failed in the middle, so that the run can't be continued.
+        simulate_s: Wall time of simulating so far [s].
+        save_s: Wall time of storing so far [s].
+    """
+
+    def __init__(
+        self, clock: Clock, speedup: float | None, keeper: CheckpointWriter | None
+    ) -> None:
+        self.pace = Pace(speedup) if speedup else None
+        self.has_failed = self._is_stopping = False
+        self.simulate_s = self.save_s = 0.0
+        self._step_us, self._keeper = clock.step_us, keeper
+        self._trust = current_trust()  # a plan may name code that is imported only when it begins
+        self._began: float | None = None  # set while it simulates
+
+    @property
+    def running_s(self) -> float:
+        """Wall time since `run` was called [s]; 0 if it isn't running."""
+        return 0.0 if self._began is None else time.perf_counter() - self._began
+
+    def run(
+        self,
+        state: State,
+        end: int,
+        on_progress: Callable[[], None] | None = None,
+        spans: int | None = None,
+    ) -> None:
+        """Simulate up to a step, or a number of spans.
+
+        Args:
+            state: The run.
+            end: The step.
+            on_progress: Called about every 0.1 s.
+            spans: The most spans; None: as many as there are.
+
+        Raises:
+            KeyboardInterrupt: Ctrl-C, after the present span.
+        """
+        stored_s, self._began = state.recorder.wall_s, time.perf_counter()
+        if self.pace is not None:
+            self.pace.resume(self._simulated_s(state))
+        with ExitStack() as stack:
+            stack.enter_context(restrict(self._trust))
+            if end - state.bodies.step >= SHORT:
+                stack.enter_context(rare_collections())
+                stack.enter_context(deferred_interrupt(self._stop))
+            try:
+                self._simulate(state, end, on_progress, spans)
+            except BaseException:
+                self.has_failed = True
+                raise
+            finally:
+                stored_s = state.recorder.wall_s - stored_s
+                self.simulate_s += self.running_s - stored_s
+                self.save_s += stored_s
+                self._began = None
+        if self._is_stopping:
+            self._is_stopping = False
+            raise KeyboardInterrupt
+
+    def _simulate(
+        self, state: State, end: int, on_progress: Callable[[], None] | None, spans: int | None
+    ) -> None:
+        reported, bodies = time.perf_counter(), state.bodies
+        while bodies.step < end and not self._is_stopping and spans != 0:
+            most = self.pace.steps(self._step_us) if self.pace else end
+            span = Span(bodies.step, min(end, bodies.step + most))
+            for phase in PHASES:
+                phase(state, span)
+            if self._keeper is not None:
+                self._keeper.after_span(state)
+            if self.pace is not None:
+                self.pace.hold(self._simulated_s(state), lambda: self._is_stopping)
+            if on_progress is not None and time.perf_counter() - reported > REPORT_S:
+                on_progress()
+                reported = time.perf_counter()
+            spans = None if spans is None else spans - 1
+
+    def _simulated_s(self, state: State) -> float:
+        return state.bodies.step * self._step_us / 1e6
+
+    def _stop(self) -> None:
+        """End the run after the present span, so that all tables end at the same step."""
+        self._is_stopping = True
+
+
+class Pace:
+    """Slows a run down to `speedup` times real time, by sleeping when it is ahead.
+
+    Example:
+        >>> pace = Pace(speedup=1000.0)
+        >>> pace.slice_s  # simulated seconds between two looks at the clock
+        50.0
+    """
+
+    # Wall time between two looks at the clock: short for a viewer, long enough to cost nothing [s].
+    LOOK_S = 0.05
+    # The longest single sleep: Ctrl-C takes effect after it [s].
+    NAP_S = 0.1
+
+    def __init__(self, speedup: float) -> None:
+        self.speedup = speedup
+        self.slice_s = speedup * self.LOOK_S
+        self._began = time.perf_counter()
+
+    def steps(self, step_us: int) -> int:
+        """Return how many steps may be simulated between two looks at the clock."""
+        return max(1, int(self.slice_s * 1e6 / step_us))
+
+    def resume(self, simulated_s: float) -> None:
+        """Continue after a pause, as if no time had passed since `simulated_s`."""
+        self._began = max(self._began, time.perf_counter() - simulated_s / self.speedup)
+
+    def hold(self, simulated_s: float, stop: Callable[[], bool] = lambda: False) -> None:
+        """Sleep until `simulated_s` of simulated time are due, or until `stop` returns True."""
+        due = self._began + simulated_s / self.speedup
+        while (ahead := due - time.perf_counter()) > 0 and not stop():
+            time.sleep(min(ahead, self.NAP_S))
+
+    def speedup_until(self, simulated_s: float) -> float:
+        """Return the real speedup of the run so far."""
+        return simulated_s / max(1e-9, time.perf_counter() - self._began)
+
+
+@contextmanager
+def deferred_interrupt(stop: Callable[[], None]) -> Iterator[None]:
+    """Call `stop` on the first Ctrl-C or SIGTERM, so that no row is stored partially.
+
+    A message on stderr confirms the signal; a second signal has its usual effect.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    handlers = {number: signal.getsignal(number) for number in _MESSAGES}
+
+    def restore() -> None:
+        blame.interrupts = True
+        for number, handler in handlers.items():
+            signal.signal(number, handler)
+
+    def on_signal(number: int, _: Any) -> None:
+        stop()
+        restore()
+        # Not by sys.stderr, whose methods the signal may have interrupted. If stderr was closed,
+        # its number may be that of another file.
+        if sys.__stderr__ is not None:
+            with suppress(OSError):
+                os.write(2, _MESSAGES[signal.Signals(number)])
+
+    for number in _MESSAGES:
+        signal.signal(number, on_signal)
+    blame.interrupts = False
+    try:
+        yield
+    finally:
+        restore()

@@ -9,8 +9,8 @@ from tests.scenes import digests, everything, run, scenario
 
 import fleet2d
 from fleet2d import Algorithm, Behavior, Metric, Plan, Situation
-from fleet2d.engine import phases
-from fleet2d.engine.phases import PHASES, Span
+from fleet2d.engine import loop
+from fleet2d.engine.loop import PHASES, Span
 from fleet2d.entities.body import NEVER
 
 STORY: list[tuple[int, str]] = []
@@ -105,10 +105,10 @@ def spans_of(simulation: fleet2d.Simulation, end: int) -> Iterator[tuple[Span, i
     state = simulation._state
     while simulation.step < end:
         span = Span(simulation.step, end)
-        for phase in PHASES[: PHASES.index(phases.watch)]:
+        for phase in PHASES[: PHASES.index(loop.watch)]:
             phase(state, span)
         moved = span.end
-        for phase in PHASES[PHASES.index(phases.watch) :]:
+        for phase in PHASES[PHASES.index(loop.watch) :]:
             phase(state, span)
         yield span, moved, state
 

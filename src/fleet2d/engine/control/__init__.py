@@ -1,1 +1,0 @@
-"""Control of a simulation: scripts, interventions, and what a program does with it."""
