@@ -14,9 +14,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO, Self
 
 from fleet2d.algorithms.algorithm import Algorithm
-from fleet2d.artifacts.directory import cannot_write
 from fleet2d.artifacts.manifest import FLOORPLAN_NAME, LEARNED_NAME, Status
-from fleet2d.artifacts.store import RunStore
+from fleet2d.artifacts.store import RunStore, cannot_write
 from fleet2d.artifacts.unfinished import UnfinishedRun
 from fleet2d.configuration.problems import suggest
 from fleet2d.configuration.units import micros, parse_duration
