@@ -101,7 +101,7 @@ def patches_of(plan: FloorPlan) -> Patches:
 
 
 def islands(plan: FloorPlan) -> I64 | None:
-    """Return the part of the free space that holds each room: int64 (rooms,).
+    """Return the island of the free space that holds each room: int64 (rooms,).
 
     Rooms with floor in the same part, and parts with floor in the same room, count as one. None if
     the free space is in one part.
@@ -262,7 +262,7 @@ class PatchEvidence(NamedTuple):
 
     @property
     def seen(self) -> I64:
-        """As in Evidence, by patches: int64 (bins, users + 1, patches), made anew."""
+        """As in Evidence, by patches: int64 (bins, users + 1, patches), computed on each access."""
         return self.sightings.dense
 
 
@@ -275,7 +275,7 @@ class Evidence:
 
     Attributes:
         day: int64 (bins,), the day of each bin, as `date.toordinal` counts.
-        minute: int64 (bins,), begin of each bin [minutes since midnight].
+        minute: int64 (bins,), start of each bin [minutes since midnight].
         bin_steps: Steps of a bin; bins begin at step 0, and last a minute, or a step if that is
             longer.
         watched: float64 (bins, rooms), share of each room's cells in view, averaged over the steps
@@ -295,7 +295,7 @@ class Evidence:
 
     @property
     def seen(self) -> I64:
-        """Steps of each bin at which each user was perceived in each room, made anew.
+        """Steps of each bin at which each user was perceived in each room, computed on each access.
 
         int64 (bins, users + 1, rooms); the last row counts anybody, recognized or not.
         """
@@ -381,7 +381,7 @@ def gather(
 
 
 def times_of_bins(clock: Clock, begin: int, bin_steps: int, bins: int) -> tuple[I64, I64]:
-    """Return the day of each bin, as `date.toordinal` counts, and its begin [minutes]."""
+    """Return the day of each bin, as `date.toordinal` counts, and its first minute of the day."""
     since_midnight = (clock.start - midnight_of(clock.start)) // MICROSECOND
     steps = begin + np.arange(bins, dtype=np.int64) * bin_steps
     day, time_us = np.divmod(since_midnight + steps * clock.step_us, DAY_US)

@@ -170,7 +170,7 @@ class BodyPoses:
 
     @cached_property
     def distance(self) -> float:
-        """Length of the way from the first to the last step [m]."""
+        """Distance travelled from the first to the last step [m]."""
         runs = self._runs
         moved = sum_moves(Poses(runs.x, runs.y, runs.heading, runs.away))
         return moved / self._home.plan.lattice.units_per_m

@@ -63,16 +63,16 @@ class Activities:
         self._senses = dict(senses)
         self.are_perceived = any(sense.confusion is not None for sense in senses.values())
         self._codes: dict[str | None, int] = {None: NOTHING}
-        self._begun: list[tuple[list[int], list[int]]] = [([], [NOTHING]) for _ in range(users)]
+        self._starts: list[tuple[list[int], list[int]]] = [([], [NOTHING]) for _ in range(users)]
 
     @property
     def users(self) -> int:
         """Number of users."""
-        return len(self._begun)
+        return len(self._starts)
 
     def begin(self, user: int, step: int, activity: str) -> None:
         """Record the activity of a user from a step on; steps must not decrease."""
-        steps, codes = self._begun[user]
+        steps, codes = self._starts[user]
         if not self.are_perceived:  # then only the present one is asked for
             steps.clear()
             codes.clear()
@@ -81,7 +81,7 @@ class Activities:
 
     def now(self, user: int) -> str | None:
         """Return the activity that a user began last; None if none is known."""
-        return list(self._codes)[self._begun[user][1][-1]]
+        return list(self._codes)[self._starts[user][1][-1]]
 
     def true(self, rows: I64) -> Names:
         """Return the true activity of the user of each row at its look: object (n,)."""
@@ -104,7 +104,7 @@ class Activities:
             return true, perceived
         for (robot, camera), sense in self._senses.items():
             is_camera = (rows[:, ROBOT] == robot) & (rows[:, Column.CAMERA] == camera)
-            for user, (steps, codes) in enumerate(self._begun):
+            for user, (steps, codes) in enumerate(self._starts):
                 index = np.flatnonzero(is_camera & (rows[:, Column.USER] == user))
                 looks = rows[index, Column.STEP] - sense.latency
                 position = np.searchsorted(np.array(steps, np.int64), looks, side="right")

@@ -77,7 +77,7 @@ class ActivityLog:
         layout: The layout it is written in, such as casas.
         first_day: The date of its first day; None where the log has no dates.
         readings: The readings.
-        notes: Oddities in the log, and how they were resolved.
+        notes: Anomalies in the log, and how they were resolved.
     """
 
     path: Path
@@ -108,7 +108,7 @@ class PositionLog:
         time_us: Local time since the midnight that begins the first day, int64 (n,) [us].
         xy: Positions in the log's own frame, float64 (n, 2).
         heading: Headings in the log's own frame, float64 (n,) [rad]; NaN where it has none.
-        notes: Oddities in the log, and how they were resolved.
+        notes: Anomalies in the log, and how they were resolved.
     """
 
     path: Path
@@ -126,7 +126,7 @@ class PositionLog:
 
 
 def in_order(readings: list[Reading], path: Path, *, sort: bool) -> tuple[list[Reading], list[str]]:
-    """Return readings in the order in which they begin, and notes about oddities.
+    """Return readings in the order in which they begin, and notes about anomalies.
 
     A reading that ends before it begins counts as an instant.
 

@@ -185,7 +185,10 @@ def hours_of_week(history: History, state: Present) -> I64:
 
 
 def _anybody(history: History, state: Present) -> Bool:
-    """Return whether each room had somebody in it, last nobody at home: bool (steps, rooms + 1)."""
+    """Return whether each room was occupied, and last whether nobody was at home.
+
+    bool (steps, rooms + 1).
+    """
     change = np.zeros((len(history) + 1, len(state.home.rooms) + 1), np.int32)
     for user in state.users:
         begin, end, room = history.poses(user).visits

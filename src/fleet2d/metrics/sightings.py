@@ -1,4 +1,4 @@
-"""How much the robots see of the users."""
+"""How much of the time robots perceive the users."""
 
 from typing import Any, ClassVar
 

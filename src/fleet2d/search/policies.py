@@ -40,7 +40,7 @@ def likeliest_first(problem: SearchProblem) -> list[int]:
 
 
 def greedy(problem: SearchProblem) -> list[int]:
-    """Return the order that each time maximizes probability per second of way and look."""
+    """Return the order that each time maximizes probability per second of travel and look."""
     return _step_by_step(problem, lambda way, gain: gain / max(way, 1e-9))
 
 

@@ -1,11 +1,4 @@
-"""Sequential tests of rates: decide whether a test holds in, say, 95 % of trials, with few trials.
-
-This is Wald's sequential probability ratio test, truncated at a number of seeds. Its boundaries are
-numbers of failures, so that its error rates are exact sums over binomial paths, not approximations;
-the largest rate that it can distinguish from the claimed one follows from the number of seeds.
-
-Wald, A. (1945). Sequential tests of statistical hypotheses. Ann. Math. Statist. 16(2), 117–186.
-"""
+"""Claims of tests with trials: scenarios, seeds, and the sequential test of a claimed rate."""
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -30,7 +23,12 @@ HOME, HOUSEHOLD = "home", "household"
 
 @dataclass(frozen=True)
 class RateTest:
-    """A sequential test of a claimed rate.
+    """A sequential test of a claimed rate, such as that a test holds in 95 % of trials.
+
+    This is Wald's sequential probability ratio test (Ann. Math. Statist. 16(2), 1945, 117-186),
+    truncated at a number of seeds. Its boundaries are numbers of failures, so that its error rates
+    are exact sums over binomial paths; the largest rate that it can distinguish from the claimed
+    one follows from the number of seeds.
 
     Attributes:
         seeds: Largest number of seeds.
@@ -328,7 +326,7 @@ def trial(
         seeds: Number of seeds, from 0 on, or the seeds; None: that of the scenario, or 0. With
             homes, households or axes each trial takes the next of these and the next seed.
         holds: The share of trials in which it must hold. 1: in each, and the first failure decides;
-            less: a sequential test decides, see `fleet2d.testing.claim`.
+            less: a sequential test decides, see `RateTest`.
         error: Largest probability of a wrong decision.
         homes: Number of synthetic homes, or files, folders and patterns of floor plans.
         households: The users by name of household: `{"couple": {"ana": …, "ben": …}}`.

@@ -1,4 +1,4 @@
-"""The space of a search for failures: homes, households, timings, and any key of a scenario."""
+"""The search for a run that fails: over homes, households, timings, and any key of a scenario."""
 
 import importlib.util
 import pickle

@@ -303,7 +303,7 @@ def plural(word: str, number: int) -> str:
 
 
 def percent(share: float) -> str:
-    """Return a share as messages write it.
+    """Return a share in percent, with at most one decimal.
 
     >>> percent(0.95), percent(0.8464)
     ('95 %', '84.6 %')
@@ -368,7 +368,7 @@ class Shrinker:
         return self._try(case, _shorter(case), case.without) or case
 
     def _later(self, case: FailingCase) -> FailingCase:
-        """Let the run begin as shortly before the failure as it still fails."""
+        """Move the start of the run as close to the failure as possible."""
         for variant in _later_starts(case):
             smaller = self._try(case, variant, case.without)
             if smaller is not None:

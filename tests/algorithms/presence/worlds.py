@@ -111,7 +111,7 @@ def shares_at_home(where: I64, rooms: int) -> F64:
 def any_evidence(
     seed: int, bins: int = 40, users: int = 2, rooms: int = 3, steps: int = 6
 ) -> Evidence:
-    """Evidence without rhyme or reason, from Sunday 23:40 on, so that it has two days."""
+    """Random evidence, from Sunday 23:40 on, so that it has two days."""
     random = np.random.default_rng(seed)
     watched = random.choice([0.0, 0.3, 0.3, 0.7, 1.0], (bins, rooms))
     hit = (random.random((bins, users + 1, rooms)) < 0.15) & (watched[:, None] > 0)

@@ -118,7 +118,9 @@ class Presence:
         """
         row = self._rows.get(user)
         if row is None:
-            raise ComponentError(f"there is no presence of {user!r}{suggest(user, self.names)}")
+            raise ComponentError(
+                f"no presence estimate for user {user!r}{suggest(user, self.names)}"
+            )
         return row
 
     def share(self, user: str = ANYONE) -> F64:

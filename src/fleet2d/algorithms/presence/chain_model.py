@@ -1,4 +1,4 @@
-"""Habits: transition probabilities that depend on the hour of the day."""
+"""Models of real-time presence that follow each person through a Markov chain over rooms."""
 
 from collections.abc import Mapping, Sequence
 from datetime import datetime, timedelta

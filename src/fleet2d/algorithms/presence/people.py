@@ -49,7 +49,7 @@ class DayEvidence(NamedTuple):
     def of(cls, evidence: Evidence) -> Self:
         """Return the evidence of bins of one day."""
         sightings = evidence.by_patch.sightings
-        # Where somebody unknown was perceived, who may be any user, nothing is watched in vain.
+        # Where somebody unknown was perceived, who may be any user, the patch counts as unwatched.
         watched = np.where(sightings.unknown, np.uint8(0), evidence.by_patch.shown_255)
         watched = np.pad(watched, ((0, 0), (0, 1)))  # away, the last patch, is never watched
         return cls(
@@ -151,10 +151,6 @@ class StateLayout(NamedTuple):
         """
         spread = self.spread * self.possible[self.room]
         return np.tile(spread / (self.possible.sum() * self.stages), (self.stages, 1))
-
-    def unknown_view(self) -> I64:
-        """Return -1, for unknown, as the part of each patch in view: int64 (patches + 1,)."""
-        return np.full(len(self.room), -1, np.int64)
 
     def no_moments(self, *people: int) -> Moments:
         """Return moments of some people that are all zero, with people as the first dimension."""
