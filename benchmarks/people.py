@@ -318,10 +318,10 @@ def show_hours(days: int, seed: int) -> None:
         for ordinal in range(MONDAY, MONDAY + days):
             if date.fromordinal(ordinal).weekday() > 4:
                 continue
-            for doing in without_interruptions(life.day(ordinal)):
-                first = -(-(doing.begin - 1800) // 3600)
-                for hour in range(first, (doing.end - 1 - 1800) // 3600 + 1):
-                    counts[hour % 24][CATEGORY_OF.get(doing.activity, "other")] += 1
+            for episode in without_interruptions(life.day(ordinal)):
+                first = -(-(episode.begin - 1800) // 3600)
+                for hour in range(first, (episode.end - 1 - 1800) // 3600 + 1):
+                    counts[hour % 24][CATEGORY_OF.get(episode.activity, "other")] += 1
         tvs = []
         for hour, count in enumerate(counts):
             wanted, total = survey.shares(group, "weekday")[hour], sum(count.values())

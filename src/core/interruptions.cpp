@@ -14,26 +14,26 @@ constexpr std::size_t MOST = 480;  // parts of a day
 
 class InterruptedDay {
 public:
-    InterruptedDay(const InterruptionRules& rules, StepDraws& draws, const std::vector<PlannedDoing>& day,
+    InterruptedDay(const InterruptionRules& rules, StepDraws& draws, const std::vector<PlannedEpisode>& day,
                    const PrivateRooms* rooms)
         : rules_(rules), draws_(draws), rooms_(rooms), waited_(rules.needs.size(), false) {
         for (const Need& need : rules.needs) due_.push_back(day.front().begin + draw_part(need.every));
         for (std::size_t k = 0; k < day.size(); ++k) {
             number_ = static_cast<i64>(k);
-            doing_ = day[k];
-            now_ = doing_.begin;
+            episode_ = day[k];
+            now_ = episode_.begin;
             fresh_ = true;
             const i64 before = k > 0 ? day[k - 1].activity : rules.sleep;
             const i64 after = k + 1 < day.size() ? day[k + 1].activity : rules.sleep;
-            if (is_away(doing_.activity)) {
+            if (is_away(episode_.activity)) {
                 skip_needs();
-            } else if (doing_.activity == rules.sleep) {
+            } else if (episode_.activity == rules.sleep) {
                 interrupt_sleep(before);
             } else {
                 interrupt_activity(before, after);
             }
-            if (now_ == doing_.begin || now_ < doing_.end) {
-                go_on(doing_.end);
+            if (now_ == episode_.begin || now_ < episode_.end) {
+                go_on(episode_.end);
             } else {
                 mark_finishing();
             }
@@ -64,7 +64,7 @@ private:
     // Needs that occur out of the home are met there.
     void skip_needs() {
         for (std::size_t i = 0; i < due_.size(); ++i) {
-            if (due_[i] < doing_.end) due_[i] = doing_.end + draw_part(rules_.needs[i].every);
+            if (due_[i] < episode_.end) due_[i] = episode_.end + draw_part(rules_.needs[i].every);
         }
     }
 
@@ -77,29 +77,29 @@ private:
         }
         for (std::size_t i = 0; i < due_.size(); ++i) {
             const Need& need = rules_.needs[i];
-            due_[i] = std::max(due_[i], doing_.end);
+            due_[i] = std::max(due_[i], episode_.end);
             if (!need.asleep) continue;
             i64 time = now_ + draw_time(*need.asleep);
-            while (time < doing_.end - LAST_SLEEP) {
+            while (time < episode_.end - LAST_SLEEP) {
                 meet(i, time);
                 time = std::max(time, now_) + draw_time(*need.asleep);
             }
-            due_[i] = doing_.end + draw_part(need.every);
+            due_[i] = episode_.end + draw_part(need.every);
         }
     }
 
     void interrupt_activity(i64 before, i64 after) {
-        if (before != doing_.activity && before != rules_.sleep) do_errands(before);
+        if (before != episode_.activity && before != rules_.sleep) do_errands(before);
         const bool wakes = before == rules_.sleep, begins_anew = wakes || is_away(before);
         for (std::size_t i = 0; i < due_.size(); ++i) {
             const Need& need = rules_.needs[i];
             if (begins_anew && happens(wakes ? need.on_waking : need.on_return)) meet(i, now_);
-            if (need.met_by[at(doing_.activity)]) due_[i] = doing_.end + draw_time(need.every);
+            if (need.met_by[at(episode_.activity)]) due_[i] = episode_.end + draw_time(need.every);
         }
         meet_due_needs(after);
         if (!is_away(after)) return;
         for (std::size_t i = 0; i < due_.size(); ++i) {
-            if (happens(rules_.needs[i].before_leaving)) meet(i, doing_.end);
+            if (happens(rules_.needs[i].before_leaving)) meet(i, episode_.end);
         }
     }
 
@@ -109,14 +109,14 @@ private:
             const auto first = std::min_element(due_.begin(), due_.end());
             const auto i = static_cast<std::size_t>(first - due_.begin());
             const i64 time = std::max(*first, now_);
-            if (time >= doing_.end) return;
-            const bool waits = rules_.uninterruptible[at(doing_.activity)] ||
-                               (!waited_[i] && doing_.end - time <= rules_.needs[i].patience);
+            if (time >= episode_.end) return;
+            const bool waits = rules_.uninterruptible[at(episode_.activity)] ||
+                               (!waited_[i] && episode_.end - time <= rules_.needs[i].patience);
             if (waits && !is_away(after)) {
-                due_[i] = doing_.end;
+                due_[i] = episode_.end;
                 waited_[i] = true;
             } else {
-                meet(i, waits ? doing_.end : time);
+                meet(i, waits ? episode_.end : time);
             }
         }
     }
@@ -124,7 +124,7 @@ private:
     void do_errands(i64 before) {
         for (const Errand& errand : rules_.errands) {
             const bool fits = (!errand.after || (*errand.after)[at(before)]) &&
-                              (!errand.before || (*errand.before)[at(doing_.activity)]);
+                              (!errand.before || (*errand.before)[at(episode_.activity)]);
             if (!fits || !happens(errand.step.chance)) continue;
             insert({{&errand.step, draw_time(errand.step.takes)}}, now_);
         }
@@ -138,10 +138,10 @@ private:
         if (need.hours && floor_mod(time - need.hours->begin, DAY) > need.hours->length) return;
         std::vector<Timed> steps;
         for (const InterruptionStep& step : need.steps) {
-            if (step.activity == doing_.activity || !happens(step.chance)) continue;
+            if (step.activity == episode_.activity || !happens(step.chance)) continue;
             steps.push_back({&step, draw_time(step.takes)});
         }
-        if (!steps.empty() && !insert(steps, time)) due_[number] = doing_.end;
+        if (!steps.empty() && !insert(steps, time)) due_[number] = episode_.end;
     }
 
     struct Timed {
@@ -151,16 +151,16 @@ private:
 
     // Put steps into the activity at about a time; returns whether there is room for them.
     bool insert(const std::vector<Timed>& steps, i64 time) {
-        i64 latest = doing_.end;
+        i64 latest = episode_.end;
         for (const Timed& step : steps) latest -= step.takes;
-        if (latest < doing_.end && latest >= time && time > latest - SHORTEST_REST) time = latest;
+        if (latest < episode_.end && latest >= time && time > latest - SHORTEST_REST) time = latest;
         time = std::min(time, latest);
         if (latest < now_ + (fresh_ ? SHORTEST_REST : 0) || result.size() + 2 * steps.size() > MOST) return false;
         i64 room = ANY_ROOM;
         const auto is_private = [&](const Timed& step) { return !private_rooms(step.step->activity).empty(); };
         if (const auto first = std::find_if(steps.begin(), steps.end(), is_private); first != steps.end()) {
             const std::optional<FreeSlot> slot =
-                free_slot(private_rooms(first->step->activity), time, latest, doing_.end - latest);
+                free_slot(private_rooms(first->step->activity), time, latest, episode_.end - latest);
             if (!slot) return false;
             time = slot->begin;
             room = slot->room;
@@ -182,16 +182,17 @@ private:
 
     // When one of the rooms is free: at once, if the person is already alone in it.
     std::optional<FreeSlot> free_slot(const std::vector<i64>& rooms, i64 time, i64 latest, i64 takes) const {
-        const bool is_alone = !private_rooms(doing_.activity).empty();
-        if (is_alone && std::find(rooms.begin(), rooms.end(), doing_.room) != rooms.end()) {
-            return FreeSlot{time, doing_.end, doing_.room};
+        const bool is_alone = !private_rooms(episode_.activity).empty();
+        if (is_alone && std::find(rooms.begin(), rooms.end(), episode_.room) != rooms.end()) {
+            return FreeSlot{time, episode_.end, episode_.room};
         }
-        return rooms_->use.free(rooms, time, latest, takes, doing_.end);
+        return rooms_->use.free(rooms, time, latest, takes, episode_.end);
     }
 
-    // Add the planned doing up to a time.
+    // Add the planned episode up to a time.
     void go_on(i64 until) {
-        result.push_back({number_, doing_.activity, now_, until, fresh_ ? Role::PLANNED : Role::RESUMES, doing_.room});
+        result.push_back(
+            {number_, episode_.activity, now_, until, fresh_ ? Role::PLANNED : Role::RESUMES, episode_.room});
         now_ = until;
         fresh_ = false;
     }
@@ -202,7 +203,7 @@ private:
     Bits bits_;
     std::vector<i64> due_;      // when each need occurs next
     std::vector<bool> waited_;  // whether each need has waited for the end of an activity since it was due
-    PlannedDoing doing_{};      // to which interruptions are added
+    PlannedEpisode episode_{};  // to which interruptions are added
     i64 number_ = 0;            // its number
     i64 now_ = 0;               // the end of its last part so far
     bool fresh_ = true;         // whether no interruption was added to it so far
@@ -210,7 +211,7 @@ private:
 
 }  // namespace
 
-std::vector<DayPart> interrupt(const InterruptionRules& rules, StepDraws& draws, const std::vector<PlannedDoing>& day,
+std::vector<DayPart> interrupt(const InterruptionRules& rules, StepDraws& draws, const std::vector<PlannedEpisode>& day,
                                const PrivateRooms* rooms) {
     return std::move(InterruptedDay(rules, draws, day, rooms).result);
 }

@@ -52,13 +52,13 @@ struct InterruptionRules {
     i64 sleep;                                // the activity
 };
 
-struct PlannedDoing {
+struct PlannedEpisode {
     i64 activity, begin, end;
     i64 room;
 };
 
 struct DayPart {
-    i64 planned;  // number of the planned doing that it is a part of, -1 for an interruption
+    i64 planned;  // number of the planned episode that it is a part of, -1 for an interruption
     i64 activity, begin, end;
     Role role;
     i64 room;
@@ -66,7 +66,7 @@ struct DayPart {
 
 // A day with interruptions, which has no gap if the planned one has none. Interruptions for which a room has to be free
 // are put off or left out while others use it.
-std::vector<DayPart> interrupt(const InterruptionRules& rules, StepDraws& draws, const std::vector<PlannedDoing>& day,
+std::vector<DayPart> interrupt(const InterruptionRules& rules, StepDraws& draws, const std::vector<PlannedEpisode>& day,
                                const PrivateRooms* rooms = nullptr);
 
 }  // namespace fleet2d

@@ -16,7 +16,7 @@ public:
     Planner(const DayPlan& plan, StepDraws& draws, std::vector<bool> chosen, i64 wake, i64 next_wake)
         : plan_(plan), draws_(draws), chosen_(std::move(chosen)), wake_(wake), next_wake_(next_wake) {}
 
-    std::vector<Doing> day;
+    std::vector<Episode> day;
 
     // Draw jobs and their order until they fit; returns whether they do.
     bool run(const PrivateRooms* rooms) {
@@ -208,11 +208,12 @@ JobOrder draw_order(const DayPlan& plan, StepDraws& draws, const std::vector<boo
     return Planner(plan, draws, chosen, wake, next_wake).draw_order(by_deadline);
 }
 
-std::vector<Doing> plan_day(const DayPlan& plan, StepDraws& draws, i64 wake, i64 next_wake, const PrivateRooms* rooms) {
+std::vector<Episode> plan_day(const DayPlan& plan, StepDraws& draws, i64 wake, i64 next_wake,
+                              const PrivateRooms* rooms) {
     std::vector<bool> chosen;
     for (const Job& job : plan.jobs) chosen.push_back(draws.below(MILLION) < job.chance);
     Planner planner(plan, draws, std::move(chosen), wake, next_wake);
-    return planner.run(rooms) ? std::move(planner.day) : std::vector<Doing>{};
+    return planner.run(rooms) ? std::move(planner.day) : std::vector<Episode>{};
 }
 
 }  // namespace fleet2d

@@ -11,7 +11,7 @@
 
 namespace fleet2d {
 
-inline constexpr i64 NO_GAP_S = 300;  // a shorter gap is not filled: the next doing begins at once
+inline constexpr i64 NO_GAP_S = 300;  // a shorter gap is not filled: the next episode begins at once
 
 // A distribution over whole seconds: quantiles at evenly spaced probabilities, between bounds.
 struct Distribution {
@@ -57,7 +57,7 @@ struct DayPlan {
     i64 rest, asleep;  // activities
 };
 
-struct Doing {
+struct Episode {
     i64 activity, begin, end;
     i64 job;  // its number, -1: none
     i64 room = ANY_ROOM;
@@ -75,9 +75,9 @@ struct JobOrder {
 JobOrder draw_order(const DayPlan& plan, StepDraws& draws, const std::vector<bool>& chosen, i64 wake, i64 next_wake,
                     bool by_deadline);
 
-// The doings from `wake` to `next_wake`, without a gap; none if the jobs that are needed don't fit. A job whose rooms
+// The episodes from `wake` to `next_wake`, without a gap; none if the jobs that are needed don't fit. A job whose rooms
 // others use all the time is left out.
-std::vector<Doing> plan_day(const DayPlan& plan, StepDraws& draws, i64 wake, i64 next_wake,
-                            const PrivateRooms* rooms = nullptr);
+std::vector<Episode> plan_day(const DayPlan& plan, StepDraws& draws, i64 wake, i64 next_wake,
+                              const PrivateRooms* rooms = nullptr);
 
 }  // namespace fleet2d

@@ -1519,12 +1519,12 @@ class Interruptions:
 
         Args:
             draws: The draws of the day's interruptions.
-            day: Activity, begin, end, and room, or -1, of each planned doing, without a gap.
+            day: Activity, begin, end, and room, or -1, of each planned episode, without a gap.
             use: When others use private rooms; None: never.
             rooms: The rooms where each activity is done alone, the preferred one first; none: it isn't.
 
         Returns:
-            The number of the planned doing, -1 for an interruption; activity, begin, end, role and room of each part.
+            The number of the planned episode, -1 for an interruption; activity, begin, end, role and room of each part.
         """
 
     def __getstate__(self) -> tuple[list[tuple[list[tuple[int, int, list[int]]], list[int], list[int] | None, tuple[int, int, int, int], int, tuple[int, int] | None, list[int]]], list[tuple[tuple[int, int, list[int]], list[int] | None, list[int] | None]], list[int], list[int], int, int]: ...
@@ -1590,7 +1590,7 @@ class DayPlanner:
             rooms: The rooms where each job is done alone, the preferred one first; none: it isn't.
 
         Returns:
-            Activity, begin, end, number of the job, or -1, and room, or -1, of each doing; none if the jobs fit in no order.
+            Activity, begin, end, number of the job, or -1, and room, or -1, of each episode; none if the jobs fit in no order.
         """
 
     def draw_order(self, draws: StepDraws, chosen: Sequence[bool], wake: int, next_wake: int, by_deadline: bool) -> tuple[list[int], list[int], bool]:

@@ -167,9 +167,9 @@ def test_hours_hold_when_they_say(
 ) -> None:
     span = parse_span(text)
     for hour in holding:
-        assert span.holds_at(MONDAY + timedelta(hours=hour)) is not None, hour
+        assert span.end_at(MONDAY + timedelta(hours=hour)) is not None, hour
     for hour in not_holding:
-        assert span.holds_at(MONDAY + timedelta(hours=hour)) is None, hour
+        assert span.end_at(MONDAY + timedelta(hours=hour)) is None, hour
 
 
 def test_the_next_begin_is_after_the_moment() -> None:

@@ -46,7 +46,7 @@ def test_wrong_rules_are_refused(part: str, value: Any, message: str) -> None:
 @pytest.mark.parametrize(
     ("day", "message"),
     [
-        ([], "must have a doing"),
+        ([], "must have an episode"),
         ([(3, 0, 9, -1)], "no such activity"),
         ([(1, 9, 8, -1)], "end after they begin"),
         ([(1, 0, 2**20, -1)], "within 2"),

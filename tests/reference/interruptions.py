@@ -45,7 +45,7 @@ class CoreErrand(NamedTuple):
 
 
 class PlannedRow(NamedTuple):
-    """A planned doing."""
+    """A planned episode."""
 
     activity: int
     begin: int
@@ -54,7 +54,7 @@ class PlannedRow(NamedTuple):
 
 
 class PartRow(NamedTuple):
-    """A part of the interrupted day; `planned` is the number of the doing, -1 of none."""
+    """A part of the interrupted day; `planned` is the number of the episode, -1 of none."""
 
     planned: int
     activity: int
@@ -92,13 +92,13 @@ class SlowInterruptions:
 
 
 class _InterruptedDay:
-    """A day to which interruptions are added, doing by doing.
+    """A day to which interruptions are added, episode by episode.
 
     Attributes:
         result: The parts so far.
         due: When each need occurs next [s].
         has_waited: Whether each need has waited for the end of an activity since it was due.
-        doing: The planned doing to which interruptions are added.
+        episode: The planned episode to which interruptions are added.
         now: The end of its last part so far [s].
         end: Its end [s].
         is_fresh: Whether no interruption was added to it so far.
@@ -117,18 +117,23 @@ class _InterruptedDay:
         begin = day[0].begin
         self.due = [begin + self._draw_part(need.every) for need in rules.needs]
         self.has_waited = [False] * len(rules.needs)
-        for k, doing in enumerate(day):
-            self.now, self.end, self.doing, self.is_fresh = doing.begin, doing.end, doing, True
+        for k, episode in enumerate(day):
+            self.now, self.end, self.episode, self.is_fresh = (
+                episode.begin,
+                episode.end,
+                episode,
+                True,
+            )
             self.number = k
             before = day[k - 1].activity if k else rules.sleep
             after = day[k + 1].activity if k + 1 < len(day) else rules.sleep
-            if doing.activity in rules.away:
+            if episode.activity in rules.away:
                 self._skip_needs()
-            elif doing.activity == rules.sleep:
+            elif episode.activity == rules.sleep:
                 self._interrupt_sleep(before)
             else:
                 self._interrupt_activity(before, after)
-            if self.now == doing.begin or self.now < self.end:
+            if self.now == episode.begin or self.now < self.end:
                 self._continue(self.end)
             else:
                 self._mark_finishing()
@@ -165,7 +170,7 @@ class _InterruptedDay:
 
     def _interrupt_activity(self, before: int, after: int) -> None:
         """Add errands and needs to an activity at home, in order of time."""
-        needs, away, activity = self.rules.needs, self.rules.away, self.doing.activity
+        needs, away, activity = self.rules.needs, self.rules.away, self.episode.activity
         if before != activity and before != self.rules.sleep:
             self._do_errands(before)
         wakes, begins_anew = (
@@ -186,7 +191,7 @@ class _InterruptedDay:
     def _meet_due_needs(self, after: int) -> None:
         """Meet the needs that are due before the activity ends, or put them off until its end."""
         needs = self.rules.needs
-        is_uninterruptible = self.doing.activity in self.rules.uninterruptible
+        is_uninterruptible = self.episode.activity in self.rules.uninterruptible
         while needs:
             first = min(self.due)
             i, at = self.due.index(first), max(first, self.now)
@@ -216,7 +221,7 @@ class _InterruptedDay:
         """Add the errands between the activity before and the present one."""
         for errand in self.rules.errands:
             fits = (errand.after is None or before in errand.after) and (
-                errand.before is None or self.doing.activity in errand.before
+                errand.before is None or self.episode.activity in errand.before
             )
             activity, chance, takes = errand.step
             if fits and self._happens(chance):
@@ -229,7 +234,7 @@ class _InterruptedDay:
         self.has_waited[number] = False
         if need.hours and (at - need.hours[0]) % DAY_S > need.hours[1]:
             return
-        activity = self.doing.activity
+        activity = self.episode.activity
         steps = [
             (step, self._draw_time(takes))
             for step, chance, takes in need.steps
@@ -270,15 +275,15 @@ class _InterruptedDay:
         self, rooms: Sequence[int], at: int, latest: int, duration: int
     ) -> tuple[int, int] | None:
         """Return the first time at which one of the rooms is free for long enough, and the room."""
-        if self._private_rooms(self.doing.activity) and self.doing.room in rooms:
-            return at, self.doing.room  # the person is already alone in it
+        if self._private_rooms(self.episode.activity) and self.episode.room in rooms:
+            return at, self.episode.room  # the person is already alone in it
         assert self.use is not None
         slot = self.use.free(rooms, at, latest, duration, self.end)
         return None if slot is None else (slot[0], slot[2])
 
     def _continue(self, until: int) -> None:
-        """Add the planned doing up to a time."""
-        activity, _, _, room = self.doing
+        """Add the planned episode up to a time."""
+        activity, _, _, room = self.episode
         role = PLANNED if self.is_fresh else RESUMES
         self.result.append(PartRow(self.number, activity, self.now, until, role, room))
         self.now, self.is_fresh = until, False

@@ -1,4 +1,4 @@
-"""The planner of days in plain Python: what `src/core/planner.hpp` says, one doing at a time."""
+"""The planner of days in plain Python: what `src/core/planner.hpp` says, one episode at a time."""
 
 from collections.abc import Sequence
 from typing import Any, NamedTuple

@@ -6,7 +6,7 @@ from itertools import pairwise
 
 from fleet2d.routines.interruptions import without_interruptions
 from fleet2d.routines.persona import DayTemplate, Persona
-from fleet2d.routines.planner import Doing
+from fleet2d.routines.planner import Episode
 from fleet2d.routines.templates import REACH
 
 DAY_S = 86_400
@@ -14,13 +14,13 @@ MONDAY = date(2026, 1, 5).toordinal()
 
 
 def violations(
-    persona: Persona, ordinal: int, day: Sequence[Doing], next_day: Sequence[Doing]
+    persona: Persona, ordinal: int, day: Sequence[Episode], next_day: Sequence[Episode]
 ) -> list[str]:
     """Say in words what a day breaks, needs and errands left out."""
     day = without_interruptions(day)
     template = persona.days[persona.day(date.fromordinal(ordinal))]
     faults = [f"gap or overlap before {b}" for a, b in pairwise(day) if a.end != b.begin]
-    faults += [f"{doing} takes no time" for doing in day if doing.end <= doing.begin]
+    faults += [f"{episode} takes no time" for episode in day if episode.end <= episode.begin]
     if day[-1].end != next_day[0].begin + DAY_S:
         faults.append("the next day doesn't follow")
     if "sleep" != day[-1].activity:
@@ -32,29 +32,31 @@ def violations(
     return faults + _broken_tasks(persona, template, day)
 
 
-def _broken_tasks(persona: Persona, template: DayTemplate, day: Sequence[Doing]) -> list[str]:
+def _broken_tasks(persona: Persona, template: DayTemplate, day: Sequence[Episode]) -> list[str]:
     faults = []
-    at = {doing.task: doing for doing in day if doing.task}
-    if len(at) != sum(1 for doing in day if doing.task):
+    at = {episode.task: episode for episode in day if episode.task}
+    if len(at) != sum(1 for episode in day if episode.task):
         faults.append("a task is done twice")
     for name, task in template.do.items():
         if name not in at:
             if task.fixed or (task.probability == 1 and not task.after):
                 faults.append(f"{name} is left out")
             continue
-        doing = at[name]
-        faults += _outside(name, task, doing.begin)
+        episode = at[name]
+        faults += _outside(name, task, episode.begin)
         takes = task.takes or persona.activity(task.activity or name).takes
-        lasts = doing.end - doing.begin
+        lasts = episode.end - episode.begin
         if takes.at_least is not None and lasts < takes.at_least.total_seconds():
             faults.append(f"{name} is too short")
         if takes.at_most is not None and lasts > takes.at_most.total_seconds():
             faults.append(f"{name} is too long")
         if task.until is not None:
             until = task.until.total_seconds()
-            if doing.end > until + DAY_S * (until < day[0].begin - 3600):
+            if episode.end > until + DAY_S * (until < day[0].begin - 3600):
                 faults.append(f"{name} ends after {task.until}")
-        faults += [f"{name} before {o}" for o in task.after if o in at and at[o].end > doing.begin]
+        faults += [
+            f"{name} before {o}" for o in task.after if o in at and at[o].end > episode.begin
+        ]
     return faults
 
 

@@ -12,7 +12,7 @@ from fleet2d.routines.activity import catalogue
 from fleet2d.routines.household import Household, Period, with_absences
 from fleet2d.routines.interruptions import without_interruptions
 from fleet2d.routines.life import LONG_GONE_S, WELCOME, Lives
-from fleet2d.routines.planner import Doing
+from fleet2d.routines.planner import Episode
 
 CROWD = {
     "ana": "works_outside",
@@ -30,8 +30,8 @@ def lives(seed: int = 4, members: dict[str, Any] = CROWD, **more: Any) -> Lives:
     return Lives(household, seed, MONDAY - 1)
 
 
-def at_home(doing: Doing) -> bool:
-    return not catalogue()[doing.activity].away
+def at_home(episode: Episode) -> bool:
+    return not catalogue()[episode.activity].away
 
 
 def test_days_do_not_depend_on_the_order_in_which_they_are_asked_for() -> None:
@@ -56,11 +56,11 @@ def test_no_day_of_a_crowded_household_breaks_a_constraint() -> None:
 def test_the_bathroom_is_planned_for_one_at_a_time_even_by_those_who_are_up_at_night() -> None:
     home = lives()
     used = sorted(
-        (doing.begin + i * DAY_S, doing.end + i * DAY_S, name)
+        (episode.begin + i * DAY_S, episode.end + i * DAY_S, name)
         for i in range(-1, 60)
         for name, day in home.day(MONDAY + i).items()
-        for doing in day
-        if catalogue()[doing.activity].exclusive
+        for episode in day
+        if catalogue()[episode.activity].exclusive
     )
     assert {name for _, _, name in used} == set(CROWD)
     assert [] == [(a, b) for a, b in pairwise(used) if a[1] > b[0]]
@@ -71,7 +71,7 @@ def test_what_is_done_together_begins_and_ends_at_one_time() -> None:
     times = []
     for i in range(100):
         day = home.day(MONDAY + i)
-        planned = [doing for name in day for doing in without_interruptions(day[name])]
+        planned = [episode for name in day for episode in without_interruptions(day[name])]
         dinners = {(d.begin, d.end) for d in planned if d.task == "dinner"}
         assert len(dinners) == 1
         times += dinners
@@ -85,22 +85,22 @@ def test_some_of_those_at_leisure_come_to_the_door_and_so_does_who_comes_home() 
         day = home.day(MONDAY + i)
         comings = {
             after.begin: name
-            for name, doings in day.items()
-            for gone, after in pairwise(doings)
+            for name, episodes in day.items()
+            for gone, after in pairwise(episodes)
             if at_home(after) and not at_home(gone) and gone.end - gone.begin >= LONG_GONE_S
         }
         came += len(comings)
-        for doings in day.values():
-            assert all(a.end == b.begin for a, b in pairwise(doings))
-            welcomes = [doing for doing in doings if doing.activity == WELCOME]
-            assert all(doing.begin in comings for doing in welcomes)
+        for episodes in day.values():
+            assert all(a.end == b.begin for a, b in pairwise(episodes))
+            welcomes = [episode for episode in episodes if episode.activity == WELCOME]
+            assert all(episode.begin in comings for episode in welcomes)
             welcomed += len(welcomes)
     assert came / 2 < welcomed  # who comes home goes to the bathroom first at times
 
 
 def test_nobody_comes_to_the_door_unless_asked_for() -> None:
     day = lives().day(MONDAY)
-    assert all(doing.activity != WELCOME for doings in day.values() for doing in doings)
+    assert all(episode.activity != WELCOME for episodes in day.values() for episode in episodes)
 
 
 def test_members_are_away_on_trips_and_visitors_outside_their_visits() -> None:
@@ -113,10 +113,10 @@ def test_members_are_away_on_trips_and_visitors_outside_their_visits() -> None:
     def here(name: str, day: str, hour: float) -> bool:
         ordinal = date.fromisoformat(day).toordinal()
         for start in (ordinal - 1, ordinal):
-            for doing in home.day(start)[name]:
+            for episode in home.day(start)[name]:
                 at = hour * 3600 + (ordinal - start) * DAY_S
-                if doing.begin <= at < doing.end:
-                    return at_home(doing)
+                if episode.begin <= at < episode.end:
+                    return at_home(episode)
         raise AssertionError
 
     assert [False, False, True] == [here("ana", f"2026-01-{d}", h) for d, h in (("06", 3), ("07", 23), ("08", 23))]  # fmt: skip
@@ -152,15 +152,15 @@ def test_days_before_the_first_are_not_made_up() -> None:
 
 MIDNIGHT = datetime(2026, 1, 5)
 HOUR = 3600
-DAY = [Doing("read", 7 * HOUR, 12 * HOUR), Doing("cook", 12 * HOUR, 13 * HOUR, "lunch")]
+DAY = [Episode("read", 7 * HOUR, 12 * HOUR), Episode("cook", 12 * HOUR, 13 * HOUR, "lunch")]
 
 
 def period(begins: str, ends: str) -> Period:
     return Period.model_validate([f"2026-01-05T{begins}", f"2026-01-05T{ends}"])
 
 
-def hours(day: list[Doing]) -> list[tuple[str, float, float]]:
-    return [(doing.activity, doing.begin / HOUR, doing.end / HOUR) for doing in day]
+def hours(day: list[Episode]) -> list[tuple[str, float, float]]:
+    return [(episode.activity, episode.begin / HOUR, episode.end / HOUR) for episode in day]
 
 
 def test_a_day_without_periods_stays_as_it_is() -> None:

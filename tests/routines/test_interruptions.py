@@ -18,7 +18,7 @@ from fleet2d.kernels.motion import Interruptions, RoomUse
 from fleet2d.routines.interruptions import interrupt, without_interruptions
 from fleet2d.routines.life import Life
 from fleet2d.routines.persona import Persona, bundled_names, bundled_persona
-from fleet2d.routines.planner import INTERRUPTS, RESUMES, SLEEP, Doing
+from fleet2d.routines.planner import INTERRUPTS, RESUMES, SLEEP, Episode
 from fleet2d.runtime.determinism import Draws
 
 HOUR = 3600
@@ -33,7 +33,7 @@ def of(needs: Any = None, errands: Any = None, **more: Any) -> Life:
     return life(Persona.model_validate({**IDLE, "needs": needs, "errands": errands, **more}))
 
 
-def days(lived: Life, count: int = 100) -> list[list[Doing]]:
+def days(lived: Life, count: int = 100) -> list[list[Episode]]:
     return [list(lived.day(MONDAY + i)) for i in range(count)]
 
 
@@ -110,13 +110,13 @@ def test_a_day_without_its_interruptions_is_the_planned_day(name: str) -> None:
 def test_an_interrupted_day_has_no_gap_and_nothing_that_takes_no_time(name: str) -> None:
     for day in days(life(bundled_persona(name))):
         assert all(a.end == b.begin for a, b in pairwise(day))
-        assert all(doing.begin < doing.end for doing in day)
+        assert all(episode.begin < episode.end for episode in day)
 
 
 @pytest.mark.parametrize("name", bundled_names())
 def test_every_persona_uses_the_toilet_as_often_as_people_do(name: str) -> None:
     lived = days(life(bundled_persona(name)), 140)
-    visits = [sum(doing.activity == "toilet" for doing in day) for day in lived]
+    visits = [sum(episode.activity == "toilet" for episode in day) for day in lived]
     assert 4 <= statistics.mean(visits) <= 10  # Wyman et al. 2020: 2 to 10 by day, 0 to 4 at night
     assert min(visits) >= 1
 
@@ -124,12 +124,14 @@ def test_every_persona_uses_the_toilet_as_often_as_people_do(name: str) -> None:
 def test_without_needs_and_errands_a_day_is_its_plan() -> None:
     lived = of()
     assert all(day == without_interruptions(day) for day in days(lived, 20))
-    assert {0} == {doing.role for day in days(lived, 20) for doing in day}
+    assert {0} == {episode.role for day in days(lived, 20) for episode in day}
 
 
 def test_a_need_comes_up_at_its_rate_while_one_is_awake() -> None:
     lived = of({"drink": {"every": {"law": "gamma", "mean": "2 h", "std": "40 min"}}})
-    times = [doing.begin for day in days(lived, 300) for doing in day if doing.activity == "drink"]
+    times = [
+        episode.begin for day in days(lived, 300) for episode in day if episode.activity == "drink"
+    ]
     assert 8 == pytest.approx(len(times) / 300, abs=0.5)  # of 16 hours
     assert all(6 * HOUR <= time <= 24 * HOUR for time in times)
 
@@ -138,10 +140,10 @@ def test_a_need_in_the_night_wakes_one_who_sleeps_on_afterwards() -> None:
     lived = of({"toilet": {"every": "3 h", "asleep": {"law": "gamma", "mean": "4 h"}}})
     up = 0
     for day in days(lived):
-        night = [doing for doing in day if doing.begin >= 23 * HOUR + HOUR]
-        up += sum(doing.activity == "toilet" for doing in night)
+        night = [episode for episode in day if episode.begin >= 23 * HOUR + HOUR]
+        up += sum(episode.activity == "toilet" for episode in night)
         assert SLEEP == day[-1].activity
-        assert {SLEEP, "toilet"} >= {doing.activity for doing in night}
+        assert {SLEEP, "toilet"} >= {episode.activity for episode in night}
     assert 1 < up / 100 < 2.5
 
 
@@ -158,7 +160,7 @@ def test_a_need_waits_for_the_end_of_what_is_not_interruptible() -> None:
     day = {**IDLE["days"]["any_day"], "do": {"shower": shower}}
     lived = of({"drink": "20 min"}, days={"any_day": day})
     for one in days(lived):
-        washes = [doing for doing in one if doing.task == "shower"]
+        washes = [episode for episode in one if episode.task == "shower"]
         assert 1 == len(washes)
 
 
@@ -176,7 +178,7 @@ def test_errands_are_done_between_the_activities_that_they_name() -> None:
     for one in days(lived):
         pairs = [(a.activity, b.activity) for a, b in pairwise(one)]
         assert ("shopping", "put_away") in pairs
-        assert 1 == sum(doing.activity == "put_away" for doing in one)
+        assert 1 == sum(episode.activity == "put_away" for episode in one)
 
 
 def test_what_was_interrupted_is_gone_on_with() -> None:

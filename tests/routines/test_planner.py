@@ -17,7 +17,7 @@ from fleet2d.kernels.motion import RoomUse
 from fleet2d.routines.interruptions import without_interruptions
 from fleet2d.routines.life import Life
 from fleet2d.routines.persona import Persona, bundled_names, bundled_persona
-from fleet2d.routines.planner import Doing
+from fleet2d.routines.planner import Episode
 
 HOUR = 3600
 
@@ -31,8 +31,8 @@ def of(do: dict[str, Any], **day: Any) -> Persona:
     return Persona.model_validate({"days": {"any_day": {"on": "daily", "do": do, **day}}})
 
 
-def tasks(day: list[Doing]) -> list[str]:
-    return [doing.task for doing in day if doing.task]
+def tasks(day: list[Episode]) -> list[str]:
+    return [episode.task for episode in day if episode.task]
 
 
 @pytest.mark.parametrize("name", bundled_names())
@@ -173,9 +173,9 @@ def test_waiting_is_filled_with_what_the_hour_allows() -> None:
     )
     lived = life(persona)
     for i in range(50):
-        for doing in without_interruptions(lived.day(MONDAY + i)):
-            if doing.activity == "tv":
-                assert 18 * HOUR <= doing.begin % DAY_S <= 21 * HOUR
+        for episode in without_interruptions(lived.day(MONDAY + i)):
+            if episode.activity == "tv":
+                assert 18 * HOUR <= episode.begin % DAY_S <= 21 * HOUR
 
 
 @pytest.mark.parametrize(
@@ -309,6 +309,8 @@ def test_pastimes_that_always_take_no_time_are_refused() -> None:
 def test_sleep_over_midnight_belongs_to_the_day_before() -> None:
     lived = life(bundled_persona("student"))
     late = [without_interruptions(lived.day(MONDAY + i))[-1] for i in range(60)]
-    assert any(doing.begin > DAY_S for doing in late)
-    assert all(doing.end > DAY_S for doing in late)
-    assert all(timedelta(seconds=doing.end - doing.begin) >= timedelta(hours=4) for doing in late)
+    assert any(episode.begin > DAY_S for episode in late)
+    assert all(episode.end > DAY_S for episode in late)
+    assert all(
+        timedelta(seconds=episode.end - episode.begin) >= timedelta(hours=4) for episode in late
+    )

@@ -33,7 +33,7 @@ def test_days_have_no_gap_and_end_asleep_when_the_next_begins() -> None:
     for i in range(200):
         day, after = life.day(MONDAY + i), life.day(MONDAY + i + 1)
         assert all(a.end == b.begin for a, b in pairwise(day))
-        assert all(doing.begin < doing.end for doing in day)
+        assert all(episode.begin < episode.end for episode in day)
         assert "sleep" == day[-1].activity
         assert day[-1].end == after[0].begin + 86_400
 
@@ -51,7 +51,7 @@ def test_members_of_a_household_keep_out_of_each_others_bathroom() -> None:
     lives = Lives(Household(members=members), 4, MONDAY)
     for i in range(60):
         day = lives.day(MONDAY + i)
-        busy = sorted((d.begin, d.end) for doings in day.values() for d in doings
+        busy = sorted((d.begin, d.end) for episodes in day.values() for d in episodes
                       if d.activity == "wash")  # fmt: skip
         assert all(a[1] <= b[0] for a, b in pairwise(busy))
 
@@ -60,7 +60,9 @@ def test_what_a_household_does_together_takes_the_place_of_what_would_be_done() 
     joint = {"dinner": {"at": "19:00", "spread": "0 s", "on": "daily", "takes": "40 min"}}
     members = {"ana": persona(), "ben": persona()}
     day = Lives(Household(members=members, together=joint), 4, MONDAY).day(MONDAY + 3)
-    dinners = {(d.begin, d.end) for doings in day.values() for d in doings if d.task == "dinner"}
+    dinners = {
+        (d.begin, d.end) for episodes in day.values() for d in episodes if d.task == "dinner"
+    }
     assert 1 == len(dinners)
 
 

@@ -18,7 +18,7 @@ using Chances = std::tuple<i64, i64, i64, i64>;
 using NeedRow = std::tuple<std::vector<StepRow>, Numbers, std::optional<Numbers>, Chances, i64,
                            std::optional<std::pair<i64, i64>>, Numbers>;
 using ErrandRow = std::tuple<StepRow, std::optional<Numbers>, std::optional<Numbers>>;
-using DoingRow = std::tuple<i64, i64, i64, i64>;
+using EpisodeRow = std::tuple<i64, i64, i64, i64>;
 using PartRow = std::tuple<i64, i64, i64, i64, i64, i64>;
 
 // Rules as the core has them, and what they were made of.
@@ -94,15 +94,15 @@ OwnedRules rules_of(std::vector<NeedRow> needs, std::vector<ErrandRow> errands, 
             {std::move(needs), std::move(errands), std::move(away), std::move(uninterruptible), sleep, activities}};
 }
 
-std::vector<PartRow> interrupted(const OwnedRules& self, StepDraws& draws, const std::vector<DoingRow>& day,
+std::vector<PartRow> interrupted(const OwnedRules& self, StepDraws& draws, const std::vector<EpisodeRow>& day,
                                  const RoomUse* use, const std::vector<Numbers>& rooms) {
-    require(!day.empty(), "a day must have a doing");
+    require(!day.empty(), "a day must have an episode");
     require(!use || rooms.size() == self.rules.away.size(), "rooms must be those of each activity");
-    std::vector<PlannedDoing> planned;
+    std::vector<PlannedEpisode> planned;
     for (const auto& [activity, begin, end, room] : day) {
         require(0 <= activity && activity < static_cast<i64>(self.rules.away.size()), "there is no such activity");
         require(-LATEST < begin && begin <= end && end < LATEST,
-                "doings must be within 2**20 s of midnight, and end after they begin");
+                "episodes must be within 2**20 s of midnight, and end after they begin");
         planned.push_back({activity, begin, end, room});
     }
     const auto access = use ? std::optional<PrivateRooms>({*use, rooms}) : std::nullopt;
@@ -151,12 +151,12 @@ Args:
 
 Args:
     draws: The draws of the day's interruptions.
-    day: Activity, begin, end, and room, or -1, of each planned doing, without a gap.
+    day: Activity, begin, end, and room, or -1, of each planned episode, without a gap.
     use: When others use private rooms; None: never.
     rooms: The rooms where each activity is done alone, the preferred one first; none: it isn't.
 
 Returns:
-    The number of the planned doing, -1 for an interruption; activity, begin, end, role and room of each part.)")
+    The number of the planned episode, -1 for an interruption; activity, begin, end, role and room of each part.)")
         .def("__getstate__", [](const OwnedRules& self) { return self.made_of; })
         .def("__setstate__", [](OwnedRules& self, decltype(OwnedRules::made_of) state) {
             new (&self) OwnedRules(std::apply(rules_of, std::move(state)));

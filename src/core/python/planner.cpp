@@ -15,7 +15,7 @@ constexpr i64 LATEST = i64{1} << 20;  // s since midnight
 using Numbers = std::vector<i64>;
 using JobRow = std::tuple<i64, std::optional<DistributionRow>, DistributionRow, i64, Numbers, i64, bool, i64>;
 using PastimeRow = std::tuple<i64, i64, DistributionRow, i64, i64>;
-using DoingRow = std::tuple<i64, i64, i64, i64, i64>;
+using EpisodeRow = std::tuple<i64, i64, i64, i64, i64>;
 using RoomLists = std::vector<Numbers>;
 
 // A plan as the core has it, and what it was made of.
@@ -130,8 +130,8 @@ Args:
                 check_day(wake, next_wake);
                 require(!use || rooms.size() == self.plan.jobs.size(), "rooms must be those of each job");
                 const auto access = use ? std::optional<PrivateRooms>({*use, rooms}) : std::nullopt;
-                std::vector<DoingRow> rows;
-                for (const Doing& each : plan_day(self.plan, draws, wake, next_wake, access ? &*access : nullptr)) {
+                std::vector<EpisodeRow> rows;
+                for (const Episode& each : plan_day(self.plan, draws, wake, next_wake, access ? &*access : nullptr)) {
                     rows.emplace_back(each.activity, each.begin, each.end, each.job, each.room);
                 }
                 return rows;
@@ -147,7 +147,7 @@ Args:
     rooms: The rooms where each job is done alone, the preferred one first; none: it isn't.
 
 Returns:
-    Activity, begin, end, number of the job, or -1, and room, or -1, of each doing; none if the jobs fit in no order.)")
+    Activity, begin, end, number of the job, or -1, and room, or -1, of each episode; none if the jobs fit in no order.)")
         .def(
             "draw_order",
             [](const OwnedPlan& self, StepDraws& draws, const std::vector<bool>& chosen, i64 wake, i64 next_wake,

@@ -17,7 +17,7 @@ from fleet2d.engine.bodies import Basis, Bodies, Watcher, poses_of
 from fleet2d.entities.behavior import Situation
 from fleet2d.entities.decisions import DecidingActor
 from fleet2d.entities.entity import Robot
-from fleet2d.entities.giving_way import TOUCHING, Surroundings, plan_after_a_step, plan_around
+from fleet2d.entities.giving_way import TOUCHING, Surroundings, plan_after_step, plan_around
 from fleet2d.entities.plan import Note, Plan
 from fleet2d.kernels import I64, U8, Bool
 from fleet2d.kernels.motion import Poses
@@ -125,7 +125,7 @@ class BlockedWays(Watcher):
         if (step - since) * step_us < patience_us:
             first = since == step
             notes = [Note(step * step_us, "gives_way", self._actors[other].name)] if first else []
-            plan: Plan | None = plan_after_a_step(now, actor.plan, notes)
+            plan: Plan | None = plan_after_step(now, actor.plan, notes)
             self._waits[row] = Wait(since, step + 1, other)
         else:
             plan = plan_around(now, actor.plan, clear)
@@ -250,7 +250,7 @@ class Clearance(Watcher):
         waiting = self.robots[row].waiting if row in self.robots else None
         if waiting is None or waiting.look_from(step) != step:
             return False
-        return not waiting.surroundings.is_as(self.surroundings(self.robots[row]))
+        return not waiting.surroundings.is_unchanged_since(self.surroundings(self.robots[row]))
 
     def in_way(self, bodies: Bodies, row: int) -> DecidingActor | None:
         """Return the person at whom a robot would drive next, if people stay where they are."""

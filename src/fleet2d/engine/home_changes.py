@@ -14,7 +14,7 @@ from fleet2d.configuration.units import micros
 from fleet2d.engine.bodies import Basis
 from fleet2d.entities.behavior import Actor
 from fleet2d.entities.body import Track
-from fleet2d.entities.objects.door import Door, how_to_hang_a_door
+from fleet2d.entities.objects.door import Door, door_hint
 from fleet2d.errors import ComponentError, PlacementError, ScenarioError
 from fleet2d.floorplan.arrangement import move_object
 from fleet2d.floorplan.geometry.gates import Segment
@@ -356,7 +356,7 @@ class Changes:
         elif change.verb == "move":
             noun, names = "object in the floor plan", [item.name for item in self.home.objects]
         if change.target not in names:
-            hint = how_to_hang_a_door(self.home.plan, change.target) if noun == "door" else ""
+            hint = door_hint(self.home.plan, change.target) if noun == "door" else ""
             raise ScenarioError(
                 f"there is no {noun} {change.target!r}{suggest(change.target, names)}{hint}"
             )

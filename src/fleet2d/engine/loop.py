@@ -99,7 +99,7 @@ def decide(state: State, span: Span) -> None:
             situation = Situation(
                 actor, step, state.take_pending(row), state.learners.readable_outputs
             )
-            due = not actor.goes_on(situation)
+            due = not actor.keeps_plan(situation)
             state.interruptions.expect(row)  # for other events, if other behaviors listen now
         if due:
             state.end_plan(row, step)

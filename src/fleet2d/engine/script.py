@@ -125,7 +125,7 @@ class EngineWorld:
         """Let a body follow only plans from outside from now on, not its behaviors."""
         actor.behaviors, actor.arbiter, actor.order = [], Arbiter([]), None
         self._state.driven.add(actor.row)
-        actor.decide_anew(self.step)
+        actor.decide_again(self.step)
 
     def check_change(self, change: HomeChange) -> None:
         """Refuse an impossible change of the home.

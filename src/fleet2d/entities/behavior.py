@@ -46,7 +46,7 @@ class HoursSpan(NamedTuple):
     end: timedelta
     text: str
 
-    def holds_at(self, time: datetime) -> datetime | None:
+    def end_at(self, time: datetime) -> datetime | None:
         """Return the end of the hours that a moment lies in; None if it lies outside."""
         midnight = midnight_of(time)
         for day in (midnight - DAY, midnight):
@@ -67,7 +67,7 @@ def parse_span(value: object) -> HoursSpan:
 
     Example:
         >>> span = parse_span("weekend 22:00-06:00")
-        >>> span.holds_at(datetime(2026, 1, 12, 5)), span.holds_at(datetime(2026, 1, 10, 5))
+        >>> span.end_at(datetime(2026, 1, 12, 5)), span.end_at(datetime(2026, 1, 10, 5))
         (datetime.datetime(2026, 1, 12, 6, 0), None)
     """
     if isinstance(value, HoursSpan):
@@ -112,7 +112,7 @@ Hours = Annotated[
 
 def holds(hours: Sequence[HoursSpan], time: datetime) -> datetime | None:
     """Return the end of the hours that a moment lies in; None if it lies outside."""
-    ends = [end for span in hours if (end := span.holds_at(time))]
+    ends = [end for span in hours if (end := span.end_at(time))]
     return max(ends, default=None)
 
 

@@ -57,7 +57,7 @@ class Arbiter:
         # Events at which only behaviors before the active one are asked.
         self._preempting_events: frozenset[str] = frozenset()
 
-    def goes_on(self, now: Situation, plan: Plan, ask: Ask) -> bool | Plan:
+    def keeps_plan(self, now: Situation, plan: Plan, ask: Ask) -> bool | Plan:
         """Ask the behaviors before the active one, if only they have to be asked.
 
         Args:
@@ -328,7 +328,7 @@ class DecidingActor(Actor):
         self.order: Order | None = None
         self.is_stuck = self.is_displaced = False
         self.passes_until = 0
-        self._chosen: Plan | None = None  # by `choose` or `goes_on`, for the next `decide`
+        self._chosen: Plan | None = None  # by `choose` or `keeps_plan`, for the next `decide`
         self._waiting: WaitForPeople | None = None
         self._waited = (0, -1)  # since when it last waited, and up to which step that counts
         self._no_way_round: object = None  # where no way round people was found, and for what
@@ -338,24 +338,24 @@ class DecidingActor(Actor):
         """Set the plan that its next decision, which is due now, results in."""
         self._chosen, self._waiting, self.order = plan, None, None
 
-    def obey(self, order: Order | None, step: int) -> None:
+    def follow_order(self, order: Order | None, step: int) -> None:
         """Follow an order from a step on, in place of its behaviors; None: follow them again."""
         self.order, self._waiting, self.arbiter.own = order, None, frozenset()
         self._chosen = None
-        self.decide_anew(step)
+        self.decide_again(step)
 
     def put(self, pose: Pose, step: int) -> None:
         """Be at a pose from a step on, and decide anew there: a plan from elsewhere is void."""
         self.state, self._chosen, self._waiting = pose, None, None
         self.is_displaced, self.part = True, self._present_part()
-        self.decide_anew(step)
+        self.decide_again(step)
 
-    def decide_anew(self, step: int) -> None:
+    def decide_again(self, step: int) -> None:
         """Ask all its behaviors at a step, even if its plan isn't over."""
         self.ask(step)
         self.arbiter.wake_step = None
 
-    def hear(self, command: Command, step: int) -> bool:
+    def receive(self, command: Command, step: int) -> bool:
         """Keep a command until a behavior takes it up; return whether one is asked at once.
 
         A behavior that comes after the active one has to wait for its turn.
@@ -365,7 +365,7 @@ class DecidingActor(Actor):
         first, active = next(takers, None), self.arbiter.active
         now = self.order is None and first is not None and (active is None or first <= active)
         if now:
-            self.decide_anew(step)
+            self.decide_again(step)
         return now
 
     def reacts_to(self, event: SightEvent, step: int) -> bool:
@@ -374,7 +374,7 @@ class DecidingActor(Actor):
             return False
         return self._attentive is not None and self._attentive[0].reacts_to(self, event, step)
 
-    def goes_on(self, now: Situation) -> bool:
+    def keeps_plan(self, now: Situation) -> bool:
         """Return whether its plan goes on at a step at which behaviors want to be asked.
 
         If one of them returns another plan, `decide` takes that.
@@ -386,7 +386,7 @@ class DecidingActor(Actor):
         if self._chosen is not None or self.order is not None or self.is_stuck:
             return False
         with blame(self.path, now.step):
-            answer = self.arbiter.goes_on(now, self.plan, self._ask_behavior)
+            answer = self.arbiter.keeps_plan(now, self.plan, self._ask_behavior)
             if answer is True:
                 self._set_next_decision(now, fresh=False)
                 return True
@@ -453,11 +453,11 @@ class DecidingActor(Actor):
         waited, plan = (step - since) * self.clock.step_us, None
         where = self.state, self.plan.root, people.tobytes()
         if waited >= micros(gives_way.patience) and where != self._no_way_round:
-            plan = wait.go_round(now, people, gives_way.distance)
+            plan = wait.go_around(now, people, gives_way.distance)
             self.passes_until = step + just if plan is not None else step
             self._no_way_round = where
         if plan is None and waited >= micros(max(gives_way.patience, gives_way.gives_up)):
-            plan, self._waited = wait.leave_out(now, person), (0, -1)
+            plan, self._waited = wait.skip_stop(now, person), (0, -1)
             if plan is None:
                 plan = wait.give_up(now, person)
                 if self.order is None:

@@ -46,7 +46,7 @@ class Battery(Settings):
     charge: Share = 1.0
 
 
-class Course(NamedTuple):
+class ChargeCurve(NamedTuple):
     """The charge over time while a motion is followed.
 
     Attributes:
@@ -109,9 +109,9 @@ class Charge:
         self.level = float(self.course(motion).levels(np.array([until_us]))[0])
         self._since_us = until_us
 
-    def course(self, motion: Motion) -> Course:
+    def course(self, motion: Motion) -> ChargeCurve:
         """Return the charge from the last decision on, if a motion is followed."""
-        return Course(self.level, *self._rates(motion, self._since_us))
+        return ChargeCurve(self.level, *self._rates(motion, self._since_us))
 
     def falls_to(self, level: float, motion: Motion) -> int | None:
         """Return when the charge falls to a level [us], if a motion is followed; None: never."""
@@ -128,7 +128,7 @@ class Charge:
                 charge = min(1.0, charge + rate * (end - begin))
         return None
 
-    def full_in_us(self, level: float) -> int:
+    def time_to_charge(self, level: float) -> int:
         """Return how long it takes to charge to a level [us]."""
         return max(0, int((level - self.level) / self._gain) + 1)
 

@@ -165,7 +165,7 @@ class Surroundings(NamedTuple):
     everybody: I64
     arrangement: tuple[int, int]
 
-    def is_as(self, other: "Surroundings") -> bool:
+    def is_unchanged_since(self, other: "Surroundings") -> bool:
         """Return whether no person and no object has moved."""
         same = np.array_equal(self.everybody, other.everybody)
         return same and self.arrangement == other.arrangement
@@ -242,7 +242,7 @@ class WaitForPeople:
         """Return the rest of the plan; None if nothing is left."""
         return self._with_interrupts(resumed(now.actor, now.plan(), self.interrupted, self.step))
 
-    def go_round(self, now: Situation, people: I64, distance: float) -> Plan | None:
+    def go_around(self, now: Situation, people: I64, distance: float) -> Plan | None:
         """Return the rest of the plan by a way that keeps clear of people; None without such a way.
 
         Args:
@@ -259,7 +259,7 @@ class WaitForPeople:
                 return self._with_interrupts(rest)
         return None
 
-    def leave_out(self, now: Situation, person: str) -> Plan | None:
+    def skip_stop(self, now: Situation, person: str) -> Plan | None:
         """Return the plan without the stop that it can't get to; None if that was the last."""
         plan = self._stand_for_a_step(now).note("gives_up", person)
         return self._with_interrupts(
@@ -304,7 +304,7 @@ class RoutesAround:
         return route_by_cost(self._space, self.cost, start, goal)
 
 
-def plan_after_a_step(now: Situation, interrupted: Plan, notes: Sequence[Note] = ()) -> Plan:
+def plan_after_step(now: Situation, interrupted: Plan, notes: Sequence[Note] = ()) -> Plan:
     """Return a plan that stands for a step, and then continues the present one.
 
     A random walk isn't continued: the behavior is asked again.

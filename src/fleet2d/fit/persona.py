@@ -29,7 +29,7 @@ from fleet2d.routines.activity import Activity, seconds
 from fleet2d.routines.distributions import KNOTS, exponential
 from fleet2d.routines.life import Life
 from fleet2d.routines.persona import Persona
-from fleet2d.routines.planner import Doing, RecordedDay, write_day
+from fleet2d.routines.planner import Episode, RecordedDay, write_day
 from fleet2d.runtime.clock import DAY_S
 from fleet2d.runtime.determinism import Draws, stream_key
 
@@ -423,28 +423,28 @@ def sample_persona(
     rooms = np.zeros((days + 2) * DAY_S, np.int16)
     for day in range(days + 1):  # the first night is of the day before the first
         ordinal = MONDAY - 1 + day
-        for i, doing in enumerate(life.day(ordinal)):
-            begin, end = day * DAY_S + doing.begin, day * DAY_S + doing.end
-            states[begin:end] = fitted.states[doing.activity]
-            rooms[begin:end] = place_of[doing.activity]
-            activity = fitted.persona.activity(doing.activity)
+        for i, episode in enumerate(life.day(ordinal)):
+            begin, end = day * DAY_S + episode.begin, day * DAY_S + episode.end
+            states[begin:end] = fitted.states[episode.activity]
+            rooms[begin:end] = place_of[episode.activity]
+            activity = fitted.persona.activity(episode.activity)
             if activity.fetches is not None and activity.fetches_from[0] in places:
                 place = places.index(activity.fetches_from[0])
-                for first, last in _fetches(activity, doing, Draws(key, ordinal * 1024 + i)):
+                for first, last in _fetches(activity, episode, Draws(key, ordinal * 1024 + i)):
                     rooms[day * DAY_S + first : day * DAY_S + last] = place
     sample = slice(DAY_S + 30, (days + 1) * DAY_S + 30, 60)  # the middles of the minutes
     return states[sample].reshape(-1, MINUTES), rooms[sample].reshape(-1, MINUTES)
 
 
-def _fetches(activity: Activity, doing: Doing, draws: Draws) -> list[tuple[int, int]]:
+def _fetches(activity: Activity, episode: Episode, draws: Draws) -> list[tuple[int, int]]:
     """Return begin and end [s] of each short trip during an activity, drawn as for residents."""
     assert activity.fetches is not None
     wait, takes = exponential(seconds(activity.fetches)), activity.fetch_takes.table()
     times = []
-    now = doing.begin + wait.knots[draws.below(KNOTS)]
-    while now < doing.end:
+    now = episode.begin + wait.knots[draws.below(KNOTS)]
+    while now < episode.end:
         end = now + takes.draw(draws)
-        if end < doing.end:
+        if end < episode.end:
             times.append((now, end))
         now = end + wait.knots[draws.below(KNOTS)]
     return times

@@ -97,7 +97,7 @@ class Send(BodyIntervention):
     def begin(self, world: World) -> None:
         """Give the order."""
         order = GoTo(self.to, heading_of(self.heading_deg), self.duration)
-        body(world, self.entity).obey(order, world.step)
+        body(world, self.entity).follow_order(order, world.step)
 
 
 @register("intervention", "hold")
@@ -112,7 +112,7 @@ class HoldStill(BodyIntervention):
 
     def begin(self, world: World) -> None:
         """Give the order."""
-        body(world, self.entity).obey(StandStill(self.duration), world.step)
+        body(world, self.entity).follow_order(StandStill(self.duration), world.step)
 
 
 @register("intervention", "release")
@@ -121,7 +121,7 @@ class Release(BodyIntervention):
 
     def begin(self, world: World) -> None:
         """Cancel its order."""
-        body(world, self.entity).obey(None, world.step)
+        body(world, self.entity).follow_order(None, world.step)
 
 
 @register("intervention", "replan")
@@ -130,7 +130,7 @@ class Replan(BodyIntervention):
 
     def begin(self, world: World) -> None:
         """Let its behaviors decide at the present step."""
-        body(world, self.entity).decide_anew(world.step)
+        body(world, self.entity).decide_again(world.step)
 
 
 @register("intervention", "drive")
@@ -170,7 +170,7 @@ class Decide(BodyIntervention):
                 world.move(actor, begin)
                 plan = plan_of(actor, world.step, self.plan)
         actor.choose(plan)
-        actor.decide_anew(world.step)
+        actor.decide_again(world.step)
 
 
 def heading_of(heading_deg: float | None) -> int | None:

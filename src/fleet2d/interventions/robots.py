@@ -86,7 +86,7 @@ class Call(RobotIntervention):
         """Pass the command to its behaviors."""
         command = self.order
         world.emit(self.entity, EventKind.CALLED, command.text)
-        robot(world, self.entity).hear(command, world.step)
+        robot(world, self.entity).receive(command, world.step)
 
 
 @register("intervention", "battery")
@@ -109,7 +109,7 @@ class SetBattery(RobotIntervention):
         actor = robot(world, self.entity)
         assert actor.charge is not None
         actor.charge.set(self.charge, actor.motion, world.step * world.clock.step_us)
-        actor.decide_anew(world.step)
+        actor.decide_again(world.step)
 
 
 class Switch(Lasting):
@@ -173,7 +173,7 @@ class SwitchOff(Switch):
         }
         numbers = [i for i, behavior in enumerate(actor.behaviors) if behavior.type_name in off]
         actor.arbiter.off = frozenset(numbers)
-        actor.decide_anew(world.step)
+        actor.decide_again(world.step)
 
 
 @register("intervention", "switch_on")
@@ -254,7 +254,7 @@ class Fault(Lasting):
                 isinstance(act, Fault) and act.wheels and act.entity == self.entity
                 for act in world.lasting
             )
-            actor.decide_anew(world.step)
+            actor.decide_again(world.step)
 
     def end(self, world: World) -> None:
         """Repair it."""

@@ -14,7 +14,7 @@ from fleet2d.pictures.theme import apply_theme
 from fleet2d.routines.interruptions import without_interruptions
 from fleet2d.routines.life import Life
 from fleet2d.routines.persona import Persona
-from fleet2d.routines.planner import FINISHES, INTERRUPTS, RESUMES, Doing
+from fleet2d.routines.planner import FINISHES, INTERRUPTS, RESUMES, Episode
 
 MONDAY = date(2026, 1, 5)
 DAY_S, HOUR_S = 86_400, 3_600
@@ -24,7 +24,7 @@ HOURS = 34
 SLEEP_COLOR, AWAY_COLOR, NEED_COLOR = "#3b4a63", "#e3e3e3", "#111111"
 GREYS = (14, 15)  # indices of the palette: grey is for activities away from home
 
-Days = Sequence[tuple[date, Sequence[Doing]]]
+Days = Sequence[tuple[date, Sequence[Episode]]]
 
 
 def diary_days(persona: Persona, count: int, seed: int) -> Days:
@@ -37,19 +37,21 @@ def diary_days(persona: Persona, count: int, seed: int) -> Days:
 def diary_lines(name: str, persona: Persona, days: Days) -> list[str]:
     """Return a diary as lines of text; interruptions are indented."""
     lines = [f"{name}: {persona.about or 'a persona'}"]
-    for day, doings in days:
+    for day, episodes in days:
         lines.append(f"{WEEKDAYS[day.weekday()]}, {day}")
-        for doing in doings:
-            indent = "    " if doing.role in INTERRUPTING else ""
-            again = " (goes on)" if doing.role == RESUMES else ""
-            away = " (out)" if persona.activity(doing.activity).away else ""
-            text = f"{indent}{doing.activity.replace('_', ' ')}{away}{again}"
-            lines.append(f"  {_clock(doing.begin)}  {_length(doing.end - doing.begin):>10}  {text}")
+        for episode in episodes:
+            indent = "    " if episode.role in INTERRUPTING else ""
+            again = " (goes on)" if episode.role == RESUMES else ""
+            away = " (out)" if persona.activity(episode.activity).away else ""
+            text = f"{indent}{episode.activity.replace('_', ' ')}{away}{again}"
+            lines.append(
+                f"  {_clock(episode.begin)}  {_length(episode.end - episode.begin):>10}  {text}"
+            )
     return [*lines, *_summary(days)]
 
 
 def _summary(days: Days) -> list[str]:
-    counts = Counter(d.activity for _, doings in days for d in doings if d.role in INTERRUPTING)
+    counts = Counter(d.activity for _, episodes in days for d in episodes if d.role in INTERRUPTING)
     rates = ", ".join(
         f"{name.replace('_', ' ')} {count / len(days):.1f}" for name, count in counts.most_common()
     )
@@ -72,14 +74,14 @@ def draw_diary(persona: Persona, name: str, days: Days, target: Path) -> None:
     colors = _colors(persona, days)
     figure = Figure(figsize=(13, 1.2 + 0.55 * len(days)), layout="constrained")
     axes = figure.subplots()
-    for row, (_, doings) in enumerate(days):
-        for doing in without_interruptions(doings):
-            span = (doing.begin / HOUR_S, (doing.end - doing.begin) / HOUR_S)
-            axes.broken_barh([span], (row, 0.62), facecolors=colors[doing.activity])
+    for row, (_, episodes) in enumerate(days):
+        for episode in without_interruptions(episodes):
+            span = (episode.begin / HOUR_S, (episode.end - episode.begin) / HOUR_S)
+            axes.broken_barh([span], (row, 0.62), facecolors=colors[episode.activity])
         marks = [
-            (doing.begin / HOUR_S, max(doing.end - doing.begin, 120) / HOUR_S)
-            for doing in doings
-            if doing.role in INTERRUPTING
+            (episode.begin / HOUR_S, max(episode.end - episode.begin, 120) / HOUR_S)
+            for episode in episodes
+            if episode.role in INTERRUPTING
         ]
         axes.broken_barh(marks, (row + 0.66, 0.22), facecolors=NEED_COLOR)
     axes.set_yticks(
@@ -96,7 +98,9 @@ def draw_diary(persona: Persona, name: str, days: Days, target: Path) -> None:
 
 
 def _colors(persona: Persona, days: Days) -> dict[str, str | tuple[float, ...]]:
-    names = {doing.activity for _, doings in days for doing in without_interruptions(doings)}
+    names = {
+        episode.activity for _, episodes in days for episode in without_interruptions(episodes)
+    }
     all_colors = mpl.colormaps["tab20"].colors  # type: ignore[attr-defined]
     palette = [color for i, color in enumerate(all_colors) if i not in GREYS]
     home = [n for n in sorted(names) if n != "sleep" and not persona.activity(n).away]

@@ -15,7 +15,7 @@ from fleet2d.errors import ScenarioError
 from fleet2d.routines.activity import AnyDurationDistribution, SchemaForms, find_activity
 from fleet2d.routines.persona import AnyPersona, Dates, Timing
 from fleet2d.routines.planner import (
-    Doing,
+    Episode,
 )
 
 SECOND = timedelta(seconds=1)
@@ -72,12 +72,12 @@ AnyPeriod = Annotated[Period, SchemaForms("pair")]
 
 
 def with_absences(
-    day: Sequence[Doing], midnight: datetime, away: Sequence[Period], visits: Sequence[Period]
-) -> list[Doing]:
+    day: Sequence[Episode], midnight: datetime, away: Sequence[Period], visits: Sequence[Period]
+) -> list[Episode]:
     """Return a day with a person's absences from home in place of what is planned then.
 
     Args:
-        day: The doings of the day, without a gap.
+        day: The episodes of the day, without a gap.
         midnight: The midnight that begins the day's date.
         away: The periods in which the person is away.
         visits: If any, the only periods in which the person is at home.
@@ -93,13 +93,17 @@ def with_absences(
     return list(day)
 
 
-def _cut(day: Sequence[Doing], first: int, last: int) -> list[Doing]:
+def _cut(day: Sequence[Episode], first: int, last: int) -> list[Episode]:
     """Return a day with an absence from `first` to `last` [s]."""
     if first >= last:
         return list(day)
-    before = [doing._replace(end=min(doing.end, first)) for doing in day if doing.begin < first]
-    after = [doing._replace(begin=max(doing.begin, last)) for doing in day if doing.end > last]
-    return [*before, Doing(AWAY, first, last), *after]
+    before = [
+        episode._replace(end=min(episode.end, first)) for episode in day if episode.begin < first
+    ]
+    after = [
+        episode._replace(begin=max(episode.begin, last)) for episode in day if episode.end > last
+    ]
+    return [*before, Episode(AWAY, first, last), *after]
 
 
 class JointActivity(Timing):

@@ -27,9 +27,9 @@ from fleet2d.routines.planner import (
     PLANNED,
     RESUMES,
     SLEEP,
-    Doing,
+    Episode,
     PrivateRooms,
-    new_doing,
+    new_episode,
 )
 from fleet2d.runtime.determinism import Draws
 
@@ -249,9 +249,9 @@ def _quantiles(distribution: DurationDistribution) -> Quantiles:
 def interrupt(
     rules: InterruptionRules,
     draws: Draws,
-    day: Sequence[Doing],
+    day: Sequence[Episode],
     private: PrivateRooms | None = None,
-) -> list[Doing]:
+) -> list[Episode]:
     """Return a day with interruptions.
 
     Each lies within one activity, which is resumed afterwards: all activities of the plan begin and
@@ -269,7 +269,7 @@ def interrupt(
         use = private.use
         rooms = [private.of(name) if name in rules.exclusive else () for name in rules.names]
     return [
-        new_doing((rules.names[activity], begin, end, "", room, role))
+        new_episode((rules.names[activity], begin, end, "", room, role))
         if planned < 0
         else _part(day[planned], begin, end, role)
         for planned, activity, begin, end, role, room in rules.core.interrupt(
@@ -278,25 +278,25 @@ def interrupt(
     ]
 
 
-def _part(doing: Doing, begin: int, end: int, role: int) -> Doing:
-    """Return a part of a planned doing."""
-    if begin == doing.begin and end == doing.end:
-        return doing
-    role = doing.role if role == PLANNED else role
-    return new_doing((doing.activity, begin, end, doing.task, doing.room, role))
+def _part(episode: Episode, begin: int, end: int, role: int) -> Episode:
+    """Return a part of a planned episode."""
+    if begin == episode.begin and end == episode.end:
+        return episode
+    role = episode.role if role == PLANNED else role
+    return new_episode((episode.activity, begin, end, episode.task, episode.room, role))
 
 
-def without_interruptions(day: Sequence[Doing]) -> list[Doing]:
+def without_interruptions(day: Sequence[Episode]) -> list[Episode]:
     """Return a day as it was planned, without its interruptions."""
-    planned: list[Doing] = []
+    planned: list[Episode] = []
     begin = day[0].begin
-    for doing in day:
-        if doing.role == INTERRUPTS:
+    for episode in day:
+        if episode.role == INTERRUPTS:
             continue
-        resumes = doing.role == RESUMES and planned and planned[-1].activity == doing.activity
-        if doing.role == FINISHES or resumes:
-            planned[-1] = planned[-1]._replace(end=doing.end)
+        resumes = episode.role == RESUMES and planned and planned[-1].activity == episode.activity
+        if episode.role == FINISHES or resumes:
+            planned[-1] = planned[-1]._replace(end=episode.end)
         else:
-            planned.append(doing._replace(begin=begin))
-        begin = doing.end
+            planned.append(episode._replace(begin=begin))
+        begin = episode.end
     return planned

@@ -21,7 +21,7 @@ from fleet2d.routines.planner import (
     RESUMES,
     SLEEP,
     DayPlan,
-    Doing,
+    Episode,
     Job,
     PrivateRooms,
     draw_recorded,
@@ -53,7 +53,7 @@ class Life:
         >>> from fleet2d.routines.persona import bundled_persona
         >>> life = Life(bundled_persona("retired"), seed=4, path="users.ana")
         >>> day = life.day(date(2026, 1, 5).toordinal())
-        >>> [doing.activity for doing in day[:3]], day[-1].activity
+        >>> [episode.activity for episode in day[:3]], day[-1].activity
         (['toilet', 'wash_hands', 'wash'], 'sleep')
     """
 
@@ -62,7 +62,7 @@ class Life:
         self._wake = stream_key(seed, path, "wake")
         self._day = stream_key(seed, path, "day")
         self._needs = stream_key(seed, path, "needs")
-        self._cache: dict[int, Sequence[Doing]] = {}
+        self._cache: dict[int, Sequence[Episode]] = {}
         self._templates: dict[int, DayPlan] = {}
 
     def __getstate__(self) -> dict[str, object]:
@@ -89,8 +89,8 @@ class Life:
         """Return the random draws of a day."""
         return Draws(self._day, ordinal)
 
-    def day(self, ordinal: int) -> Sequence[Doing]:
-        """Return the doings of a day, from waking to the next waking [s since its midnight]."""
+    def day(self, ordinal: int) -> Sequence[Episode]:
+        """Return the episodes of a day, from waking to the next waking [s since its midnight]."""
         if ordinal not in self._cache:
             if len(self._cache) >= CACHED_DAYS:
                 del self._cache[next(iter(self._cache))]
@@ -99,7 +99,7 @@ class Life:
 
     def draw_day(
         self, ordinal: int, plan: DayPlan, private: PrivateRooms | None = None
-    ) -> Sequence[Doing]:
+    ) -> Sequence[Episode]:
         """Draw a day from a plan, which may differ from its template's, with interruptions."""
         day = self.draw_uninterrupted(ordinal, plan, private)
         if not (self.persona.needs or self.persona.errands):
@@ -108,7 +108,7 @@ class Life:
 
     def draw_uninterrupted(
         self, ordinal: int, plan: DayPlan, private: PrivateRooms | None = None
-    ) -> Sequence[Doing]:
+    ) -> Sequence[Episode]:
         """Draw a day from a plan, without interruptions."""
         next_wake = self.wake(ordinal + 1) + DAY_S
         if plan.recorded is not None:
@@ -154,11 +154,11 @@ class Lives:
             name: self._by_preference(name, (rooms or {}).get(name, {}))
             for name in household.members
         }
-        self._cache: dict[int, Mapping[str, Sequence[Doing]]] = {}
+        self._cache: dict[int, Mapping[str, Sequence[Episode]]] = {}
         self.first = self._next = first
 
-    def day(self, ordinal: int) -> Mapping[str, Sequence[Doing]]:
-        """Return the doings of each member on the day of a date's ordinal.
+    def day(self, ordinal: int) -> Mapping[str, Sequence[Episode]]:
+        """Return the episodes of each member on the day of a date's ordinal.
 
         Raises:
             ValueError: It is before the first day.
@@ -191,30 +191,34 @@ class Lives:
     def in_use(self, ordinal: int, member: str, room: int) -> list[tuple[int, int]]:
         """Return when others use a private room [s since the midnight of a date]."""
         return [
-            (doing.begin + shift, doing.end + shift)
+            (episode.begin + shift, episode.end + shift)
             for day, shift in ((ordinal - 1, -DAY_S), (ordinal, 0), (ordinal + 1, DAY_S))
             if day >= self.first
-            for name, doings in self.day(day).items()
-            for doing in doings
-            if name != member and doing.room in (ANY_ROOM, room) and self._is_exclusive(name, doing)
+            for name, episodes in self.day(day).items()
+            for episode in episodes
+            if name != member
+            and episode.room in (ANY_ROOM, room)
+            and self._is_exclusive(name, episode)
         ]
 
-    def _is_exclusive(self, name: str, doing: Doing) -> bool:
+    def _is_exclusive(self, name: str, episode: Episode) -> bool:
         own = self.household.members[name].activities
-        return doing.activity in self._rooms[name] or find_activity(doing.activity, own).exclusive
+        return (
+            episode.activity in self._rooms[name] or find_activity(episode.activity, own).exclusive
+        )
 
-    def is_out(self, name: str, doing: Doing) -> bool:
-        """Return whether a member is out of the home for a doing."""
-        return find_activity(doing.activity, self.household.members[name].activities).away
+    def is_out(self, name: str, episode: Episode) -> bool:
+        """Return whether a member is out of the home for an episode."""
+        return find_activity(episode.activity, self.household.members[name].activities).away
 
-    def _draw(self, ordinal: int) -> Mapping[str, Sequence[Doing]]:
+    def _draw(self, ordinal: int) -> Mapping[str, Sequence[Episode]]:
         """Draw the days of all members for a date."""
         joint_jobs = self._joint_jobs(ordinal)
         yesterday = self._cache.get(ordinal - 1, {})
         use = RoomUse()
-        for name, doings in yesterday.items():
-            self._add_use(use, name, doings, -DAY_S)
-        days: dict[str, Sequence[Doing]] = {}
+        for name, episodes in yesterday.items():
+            self._add_use(use, name, episodes, -DAY_S)
+        days: dict[str, Sequence[Episode]] = {}
         for name, life in self._lives.items():
             plan = life.template(ordinal)
             for job, members in joint_jobs:
@@ -225,13 +229,15 @@ class Lives:
             self._add_use(use, name, days[name])
         return self._with_welcomes(ordinal, days) if self.household.welcome else days
 
-    def _add_use(self, use: RoomUse, name: str, doings: Sequence[Doing], shift: int = 0) -> None:
+    def _add_use(
+        self, use: RoomUse, name: str, episodes: Sequence[Episode], shift: int = 0
+    ) -> None:
         """Add the times at which a member uses private rooms, shifted by some seconds."""
-        for doing in doings:
-            if doing.end + shift > 0 and self._is_exclusive(name, doing):
-                use.add(doing.room, doing.begin + shift, doing.end + shift)
+        for episode in episodes:
+            if episode.end + shift > 0 and self._is_exclusive(name, episode):
+                use.add(episode.room, episode.begin + shift, episode.end + shift)
 
-    def _with_absences(self, name: str, day: Sequence[Doing], ordinal: int) -> Sequence[Doing]:
+    def _with_absences(self, name: str, day: Sequence[Episode], ordinal: int) -> Sequence[Episode]:
         """Return a member's day, away from home on trips and, for visitors, between visits."""
         household = self.household
         away = (*household.away, *household.trips.get(name, ()))
@@ -241,14 +247,14 @@ class Lives:
         return with_absences(day, datetime.fromordinal(ordinal), away, visits)
 
     def _with_welcomes(
-        self, ordinal: int, days: Mapping[str, Sequence[Doing]]
-    ) -> Mapping[str, Sequence[Doing]]:
+        self, ordinal: int, days: Mapping[str, Sequence[Episode]]
+    ) -> Mapping[str, Sequence[Episode]]:
         """Return days in which members at leisure come to the door when one comes home."""
         key = stream_key(self._seed, self._path, "welcome")
         draws = Draws(key, ordinal)
         result = dict(days)
-        for member, doings in days.items():
-            for absence, return_home in pairwise(doings):
+        for member, episodes in days.items():
+            for absence, return_home in pairwise(episodes):
                 comes_home = self.is_out(member, absence) and not self.is_out(member, return_home)
                 if not comes_home or absence.end - absence.begin < LONG_GONE_S:
                     continue
@@ -258,19 +264,19 @@ class Lives:
                         result[name] = self._with_welcome(name, result[name], return_home.begin)
         return result
 
-    def _with_welcome(self, name: str, day: Sequence[Doing], at: int) -> Sequence[Doing]:
+    def _with_welcome(self, name: str, day: Sequence[Episode], at: int) -> Sequence[Episode]:
         """Return a day in which a member comes to the door, if they are free at that time."""
-        for i, doing in enumerate(day):
+        for i, episode in enumerate(day):
             end = at + WELCOME_S
-            if doing.begin <= at < doing.end:
-                is_busy = doing.task or doing.activity == SLEEP or self.is_out(name, doing)
-                is_busy = is_busy or self._is_exclusive(name, doing)
-                if is_busy or doing.end - end < NO_GAP_S:
+            if episode.begin <= at < episode.end:
+                is_busy = episode.task or episode.activity == SLEEP or self.is_out(name, episode)
+                is_busy = is_busy or self._is_exclusive(name, episode)
+                if is_busy or episode.end - end < NO_GAP_S:
                     return day
-                before = [doing._replace(end=at)] if doing.begin < at else []
-                welcome = Doing(WELCOME, at, end, role=INTERRUPTS)
-                role = RESUMES if doing.begin < at and doing.role == PLANNED else doing.role
-                after = doing._replace(begin=end, role=role)
+                before = [episode._replace(end=at)] if episode.begin < at else []
+                welcome = Episode(WELCOME, at, end, role=INTERRUPTS)
+                role = RESUMES if episode.begin < at and episode.role == PLANNED else episode.role
+                after = episode._replace(begin=end, role=role)
                 return [*day[:i], *before, welcome, after, *day[i + 1 :]]
         return day
 

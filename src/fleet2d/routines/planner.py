@@ -1,4 +1,4 @@
-"""Days of people: the doings of a day, and how random ones are drawn that satisfy a template.
+"""Days of people: the episodes of a day, and how random ones are drawn that satisfy a template.
 
 A day lasts from waking to the next waking. It is a chain of jobs in a drawn order. With windows for
 their begins and bounds on their durations, it is a simple temporal network, which two passes solve:
@@ -41,17 +41,17 @@ REST = "rest"
 SLEEP = "sleep"
 
 
-class Doing(NamedTuple):
+class Episode(NamedTuple):
     """A part of a day in which one activity is done.
 
     Attributes:
         activity: The activity.
         begin: Its beginning [s since the midnight of the day's date].
-        end: Its end, which is the beginning of the next doing.
+        end: Its end, which is the beginning of the next episode.
         task: The template's task; empty for pastimes and sleep.
         room: The index of its room, if its household has chosen one; else ANY_ROOM.
-        role: PLANNED, or of an interruption: INTERRUPTS a planned doing, RESUMES it afterwards, or
-            FINISHES it, so that it isn't resumed.
+        role: PLANNED, or of an interruption: it INTERRUPTS a planned episode, RESUMES it
+            afterwards, or FINISHES it, so that it isn't resumed.
     """
 
     activity: str
@@ -62,8 +62,10 @@ class Doing(NamedTuple):
     role: int = PLANNED
 
 
-# Makes a doing from a tuple of its fields without calling Python code, as days have many.
-new_doing: Callable[[tuple[str, int, int, str, int, int]], Doing] = partial(tuple.__new__, Doing)
+# Makes an episode from a tuple of its fields without calling Python code, as days have many.
+new_episode: Callable[[tuple[str, int, int, str, int, int]], Episode] = partial(
+    tuple.__new__, Episode
+)
 
 
 class PrivateRooms(NamedTuple):
@@ -167,7 +169,7 @@ class DayPlan:
 
 def plan_day(
     plan: DayPlan, draws: Draws, wake: int, next_wake: int, private: PrivateRooms | None = None
-) -> list[Doing]:
+) -> list[Episode]:
     """Draw a day; a task whose private rooms are in use all the time is left out.
 
     Args:
@@ -178,7 +180,7 @@ def plan_day(
         private: The rooms that others may use; None: nobody does.
 
     Returns:
-        The doings from `wake` to `next_wake`, without a gap.
+        The episodes from `wake` to `next_wake`, without a gap.
 
     Raises:
         RuntimeError: The tasks fit in no order.
@@ -198,7 +200,7 @@ def plan_day(
         )
     names, tasks = plan.activities, [*(job.task for job in plan.jobs), ""]  # the last is job -1
     return [
-        new_doing((names[activity], begin, end, tasks[job], room, PLANNED))
+        new_episode((names[activity], begin, end, tasks[job], room, PLANNED))
         for activity, begin, end, job, room in rows
     ]
 
@@ -206,9 +208,9 @@ def plan_day(
 # Probability of a switch to another day where one is possible [in 16ths], and the largest distance
 # between the times of both days [s].
 CROSSING, REACH_S = 6, 1200
-# A doing that lasts at least this many times the shift ends at its recorded time.
+# An episode that lasts at least this many times the shift ends at its recorded time.
 TAKES_UP = 4
-LEAST_S = 30  # the least duration of a doing
+LEAST_S = 30  # the least duration of an episode
 END = "end"
 
 
@@ -311,7 +313,7 @@ def draw_source(recording: Recording, draws: Draws) -> int:
     return draws.below(len(recording.days))
 
 
-def draw_recorded(recording: Recording, first: int, draws: Draws, next_wake: int) -> list[Doing]:
+def draw_recorded(recording: Recording, first: int, draws: Draws, next_wake: int) -> list[Episode]:
     """Draw a day that begins like a recorded one.
 
     Args:
@@ -321,18 +323,18 @@ def draw_recorded(recording: Recording, first: int, draws: Draws, next_wake: int
         next_wake: When the next day begins [s].
 
     Returns:
-        The doings until `next_wake`, without a gap; the last one is sleep.
+        The episodes until `next_wake`, without a gap; the last one is sleep.
     """
     d, i = first, 0
     day = recording.days[d]
     now, shift = day.begins[0], 0
-    result: list[Doing] = []
+    result: list[Episode] = []
     while i < len(day.activities) - 1 and now < next_wake - LEAST_S:
         over = day.begins[i + 1]
         if shift and over - day.begins[i] >= TAKES_UP * abs(shift):
             shift = 0
         end = min(max(over + shift, now + LEAST_S), next_wake)
-        result.append(Doing(day.activities[i], now, end))
+        result.append(Episode(day.activities[i], now, end))
         now = end
         if draws.below(16) < CROSSING:
             d, i = _draw_ending(recording, day.activities[i], now, draws) or (d, i)
@@ -340,7 +342,7 @@ def draw_recorded(recording: Recording, first: int, draws: Draws, next_wake: int
             shift = now - day.begins[i + 1]
         i += 1
     if now < next_wake:
-        result.append(Doing(SLEEP, now, next_wake))
+        result.append(Episode(SLEEP, now, next_wake))
     elif result[-1].activity != SLEEP:
         result[-1] = result[-1]._replace(activity=SLEEP)
     return _merge_repeats(result)
@@ -355,48 +357,48 @@ def _draw_ending(
     return positions[low + draws.below(high - low)] if high > low else None
 
 
-def _merge_repeats(day: Sequence[Doing]) -> list[Doing]:
-    """Merge successive doings of the same activity."""
-    result: list[Doing] = []
-    for doing in day:
-        if result and result[-1].activity == doing.activity:
-            result[-1] = result[-1]._replace(end=doing.end)
+def _merge_repeats(day: Sequence[Episode]) -> list[Episode]:
+    """Merge successive episodes of the same activity."""
+    result: list[Episode] = []
+    for episode in day:
+        if result and result[-1].activity == episode.activity:
+            result[-1] = result[-1]._replace(end=episode.end)
         else:
-            result.append(doing)
+            result.append(episode)
     return result
 
 
 def in_free_rooms(
-    day: Sequence[Doing], exclusive: Iterable[str], private: PrivateRooms | None
-) -> list[Doing]:
-    """Return a day without doings whose private rooms others use; the doing before lasts longer.
+    day: Sequence[Episode], exclusive: Iterable[str], private: PrivateRooms | None
+) -> list[Episode]:
+    """Return a day without episodes whose rooms others use; the episode before lasts longer.
 
     Args:
-        day: The doings of the day.
+        day: The episodes of the day.
         exclusive: The activities that need a room which nobody else uses.
         private: The rooms that others may use; None: nobody does.
     """
     if private is None:
         return list(day)
-    alone, result = {*exclusive, *private.rooms}, list[Doing]()
+    alone, result = {*exclusive, *private.rooms}, list[Episode]()
     begin = day[0].begin
-    for doing in day:
+    for episode in day:
         room = ANY_ROOM
-        if doing.activity in alone:
-            rooms, duration = private.of(doing.activity), doing.end - doing.begin
-            slot = private.use.free(rooms, doing.begin, doing.begin, duration, doing.end)
-            if slot is None or slot[1] < doing.end:
-                continue  # the doing before lasts longer, or the next one begins earlier
+        if episode.activity in alone:
+            rooms, duration = private.of(episode.activity), episode.end - episode.begin
+            slot = private.use.free(rooms, episode.begin, episode.begin, duration, episode.end)
+            if slot is None or slot[1] < episode.end:
+                continue  # the episode before lasts longer, or the next one begins earlier
             room = slot[2]
         if result:
-            result[-1] = result[-1]._replace(end=doing.begin)
-        result.append(doing._replace(begin=doing.begin if result else begin, room=room))
+            result[-1] = result[-1]._replace(end=episode.begin)
+        result.append(episode._replace(begin=episode.begin if result else begin, room=room))
     if result:
         result[-1] = result[-1]._replace(end=day[-1].end)
     return result or list(day)
 
 
-def with_jobs(day: Sequence[Doing], jobs: Iterable[Job]) -> list[Doing]:
+def with_jobs(day: Sequence[Episode], jobs: Iterable[Job]) -> list[Episode]:
     """Return a day with joint jobs in place of what is planned then, unless the person sleeps."""
     for job in jobs:
         assert job.starts is not None
@@ -407,5 +409,5 @@ def with_jobs(day: Sequence[Doing], jobs: Iterable[Job]) -> list[Doing]:
             continue
         before = [d._replace(end=min(d.end, begin)) for d in day if d.begin < begin]
         after = [d._replace(begin=max(d.begin, end)) for d in day if d.end > end]
-        day = [*before, Doing(job.activity, begin, end, job.task), *after]
+        day = [*before, Episode(job.activity, begin, end, job.task), *after]
     return list(day)

@@ -29,7 +29,7 @@ import numpy as np
 from fleet2d.kernels import F64, I32
 from fleet2d.kernels.motion import NO_GAP_S
 from fleet2d.routines.distributions import KNOTS, Distribution, draw_weighted, lognormal, position
-from fleet2d.routines.planner import Doing
+from fleet2d.routines.planner import Episode
 from fleet2d.runtime.determinism import Draws
 
 TABLE = Path(__file__).parent / "survey.json"
@@ -47,7 +47,7 @@ SLEEP_S = (8 * 3600, 3600)  # mean and deviation; the survey's mean is of nights
 SPREAD = 0.6  # standard deviation of an episode's duration, relative to its mean
 
 
-class Episode(NamedTuple):
+class SurveyEpisode(NamedTuple):
     """A time spent in one category; times in seconds since the midnight of the day's date."""
 
     category: str
@@ -192,7 +192,7 @@ def first_state(group: SurveyGroup, draws: Draws, ordinal: int) -> EpisodeState:
 
 def draw_episodes(
     group: SurveyGroup, draws: Draws, ordinal: int, state: EpisodeState
-) -> tuple[Sequence[Episode], EpisodeState]:
+) -> tuple[Sequence[SurveyEpisode], EpisodeState]:
     """Draw a day, from 04:00 to the next 04:00.
 
     Args:
@@ -216,9 +216,9 @@ def draw_episodes(
         if goal == now:
             continue
         end = DAWN_S + k * STEP_S + 1 + draws.below(STEP_S)
-        blocks.append(Episode(CATEGORIES[now], begin, end))
+        blocks.append(SurveyEpisode(CATEGORIES[now], begin, end))
         now, age, begin = goal, 0, end
-    blocks.append(Episode(CATEGORIES[now], begin, DAWN_S + DAY_STEPS * STEP_S))
+    blocks.append(SurveyEpisode(CATEGORIES[now], begin, DAWN_S + DAY_STEPS * STEP_S))
     if blocks[-1].begin == blocks[-1].end:
         blocks.pop()
     return blocks, EpisodeState(now, age)
@@ -243,10 +243,10 @@ def draw_works_at_home(group: SurveyGroup, draws: Draws) -> bool:
     return draws.below(WHOLE) < int(group.facts["work_at_home"])
 
 
-def to_doings(
-    group: SurveyGroup, episodes: Iterable[Episode], works_at_home: bool, draws: Draws
-) -> Sequence[Doing]:
-    """Return the doings of episodes; a doing's task is the survey's category.
+def to_activities(
+    group: SurveyGroup, episodes: Iterable[SurveyEpisode], works_at_home: bool, draws: Draws
+) -> Sequence[Episode]:
+    """Return a day of activities from one of categories, which become the tasks.
 
     Args:
         group: The person's group.
@@ -254,7 +254,7 @@ def to_doings(
         works_at_home: Whether work is done at home.
         draws: The day's random draws.
     """
-    day: list[Doing] = []
+    day: list[Episode] = []
     for category, begin, end in episodes:
         if category == "other":
             _add_pastimes(group, day, begin, end, draws)
@@ -269,7 +269,7 @@ def to_doings(
             name = "exercise" if exercises_at_home else "sport"
         else:
             name = PLAIN[category]
-        day.append(Doing(name, begin, end, category))
+        day.append(Episode(name, begin, end, category))
     return day
 
 
@@ -277,7 +277,9 @@ def _meal(hour: int) -> str:
     return next((meal for until, meal in MEALS if hour < until), "dinner")
 
 
-def _add_pastimes(group: SurveyGroup, day: list[Doing], begin: int, end: int, draws: Draws) -> None:
+def _add_pastimes(
+    group: SurveyGroup, day: list[Episode], begin: int, end: int, draws: Draws
+) -> None:
     """Fill an episode of 'other' with pastimes, by their shares in the survey."""
     pastimes = group.facts["other"]
     names, shares = list(pastimes), [share for share, _ in pastimes.values()]
@@ -286,5 +288,5 @@ def _add_pastimes(group: SurveyGroup, day: list[Doing], begin: int, end: int, dr
         mean_s = pastimes[name][1] * 60
         over = begin + max(NO_GAP_S, lognormal(mean_s, SPREAD * mean_s).draw(draws))
         over = end if over + NO_GAP_S > end else over
-        day.append(Doing(name, begin, over, "other"))
+        day.append(Episode(name, begin, over, "other"))
         begin = over

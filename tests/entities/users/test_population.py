@@ -40,11 +40,11 @@ def test_shares_of_many_people_follow_the_survey_hour_by_hour() -> None:
         for ordinal in range(MONDAY, MONDAY + 7):
             kind = "weekend" if date.fromordinal(ordinal).weekday() > 4 else "weekday"
             day = iter(without_interruptions(actor.behaviors[0].day(ordinal)))
-            doing = next(day)
+            episode = next(day)
             for hour in range(4, 28):
-                while doing.end <= hour * HOUR + HOUR // 2:
-                    doing = next(day)
-                counts.setdefault((kind, hour % 24), Counter())[doing.task] += 1
+                while episode.end <= hour * HOUR + HOUR // 2:
+                    episode = next(day)
+                counts.setdefault((kind, hour % 24), Counter())[episode.task] += 1
     distances = [
         apart(count, survey.shares("workers", kind)[hour]) for (kind, hour), count in counts.items()
     ]
@@ -58,7 +58,7 @@ def test_days_follow_each_other_without_a_gap() -> None:
     days = [actor.behaviors[0].day(MONDAY + i) for i in range(20)]
     for day, after in pairwise(days):
         assert all(one.end == other.begin for one, other in pairwise(day))
-        assert all(doing.begin < doing.end for doing in day)
+        assert all(episode.begin < episode.end for episode in day)
         assert (4 * HOUR, 28 * HOUR) == (day[0].begin, day[-1].end)
         assert 4 * HOUR == after[0].begin
 

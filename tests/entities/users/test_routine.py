@@ -199,10 +199,10 @@ def test_each_bathroom_is_used_by_one_at_a_time() -> None:
     waited: dict[int, int] = {}
     for ordinal in range(MONDAY, MONDAY + 60):
         busy = sorted(
-            (doing.room, doing.begin, doing.end, actor.name)
+            (episode.room, episode.begin, episode.end, actor.name)
             for actor in actors
-            for doing in actor.behaviors[0].day(ordinal)
-            if doing.activity in ("wash", "shower", "toilet", "wash_hands")
+            for episode in actor.behaviors[0].day(ordinal)
+            if episode.activity in ("wash", "shower", "toilet", "wash_hands")
         )
         for (room, _, end, name), (other_room, begin, _, other) in itertools.pairwise(busy):
             if room == other_room:

@@ -12,7 +12,7 @@ from tests.scenes import digests, run, scenario, table
 
 from fleet2d.engine.simulation import Simulation
 from fleet2d.entities.users.routine import _stays
-from fleet2d.routines.planner import FINISHES, INTERRUPTS, PLANNED, REST, RESUMES, Doing
+from fleet2d.routines.planner import FINISHES, INTERRUPTS, PLANNED, REST, RESUMES, Episode
 from fleet2d.runs.run import Run
 
 FAMILY = Path(__file__).parents[3] / "examples" / "family.yaml"
@@ -98,12 +98,12 @@ def test_branches_and_stored_states_have_the_same_places(tmp_path: Path) -> None
     assert end == stored.run().digest
 
 
-def at(begin: int, end: int, role: int = PLANNED, activity: str = "tv") -> Doing:
-    return Doing(activity, begin, end, role=role)
+def at(begin: int, end: int, role: int = PLANNED, activity: str = "tv") -> Episode:
+    return Episode(activity, begin, end, role=role)
 
 
 @pytest.mark.parametrize(
-    ("doings", "groups"),
+    ("episodes", "groups"),
     [
         ([at(0, 9)], [[0]]),
         ([at(0, 900), at(900, 960, INTERRUPTS, "drink"), at(960, 2000, RESUMES)], [[0, 2], [1]]),
@@ -114,5 +114,5 @@ def at(begin: int, end: int, role: int = PLANNED, activity: str = "tv") -> Doing
     ],
     ids=["one", "resumed", "finished", "short gap", "resumed after being out", "gap resumed"],
 )  # fmt: skip
-def test_what_is_done_in_one_place(doings: list[Doing], groups: list[list[int]]) -> None:
-    assert groups == _stays(doings, lambda doing: doing.activity == "work")
+def test_what_is_done_in_one_place(episodes: list[Episode], groups: list[list[int]]) -> None:
+    assert groups == _stays(episodes, lambda episode: episode.activity == "work")

@@ -106,7 +106,7 @@ def doorways_named(plan: FloorPlan, name: str) -> list[Doorway]:
     return [d for d in plan.doorways if tuple(sorted(d.rooms)) in pairs]
 
 
-def how_to_hang_a_door(plan: FloorPlan, name: str) -> str:
+def door_hint(plan: FloorPlan, name: str) -> str:
     """Return how to add a door to a doorway of a plan in a scenario, for messages."""
     names = [doorway.name for doorway in plan.doorways]
     if not names:

@@ -82,7 +82,7 @@ class Dock(Behavior):
             if not self.charging or (plan.x, plan.y) != charger:
                 plan.go_to_point(*charger).note("docks", charge.percent)
             self.charging = True
-            return plan.stay(timedelta(microseconds=charge.full_in_us(self.until)))
+            return plan.stay(timedelta(microseconds=charge.time_to_charge(self.until)))
         if self.charging:
             self.charging = False
             plan.note("charged", charge.percent)

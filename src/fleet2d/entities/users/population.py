@@ -16,8 +16,8 @@ from fleet2d.routines.interruptions import (
     usual_errands,
     usual_needs,
 )
-from fleet2d.routines.planner import REST, Doing
-from fleet2d.routines.survey import activities, draw_works_at_home, to_doings
+from fleet2d.routines.planner import REST, Episode
+from fleet2d.routines.survey import activities, draw_works_at_home, to_activities
 from fleet2d.runtime.determinism import Draws, stream_key
 
 if TYPE_CHECKING:
@@ -52,7 +52,7 @@ class Population(ResidentBehavior):
         self.works_at_home = draw_works_at_home(self.people, draws)
         self.first = actor.clock.start.toordinal() - 1
         self.states = [survey.first_state(self.people, draws, self.first)]
-        self.cache: dict[int, Sequence[Doing]] = {}
+        self.cache: dict[int, Sequence[Episode]] = {}
         known = catalogue()
         names = {*activities(self.people), REST}
         self.rules, self.interruptions = None, actor.stream("needs")
@@ -69,9 +69,9 @@ class Population(ResidentBehavior):
         state = survey.first_state(people, draws, ordinal)
         episodes, _ = survey.draw_episodes(people, draws, ordinal, state)
         time_s = (time - datetime.fromordinal(ordinal)) // timedelta(seconds=1)
-        return rooms_at(to_doings(people, episodes, False, draws), time_s, known)
+        return rooms_at(to_activities(people, episodes, False, draws), time_s, known)
 
-    def day(self, ordinal: int) -> Sequence[Doing]:
+    def day(self, ordinal: int) -> Sequence[Episode]:
         """Return what is done from 04:00 on the day of a date's ordinal to 04:00 on the next."""
         if ordinal not in self.cache:
             while len(self.states) <= ordinal - self.first:
@@ -79,14 +79,14 @@ class Population(ResidentBehavior):
             self.cache = {ordinal: self._live(ordinal)}
         return self.cache[ordinal]
 
-    def _live(self, ordinal: int) -> Sequence[Doing]:
+    def _live(self, ordinal: int) -> Sequence[Episode]:
         state = self.states[ordinal - self.first]
         episodes, after = survey.draw_episodes(
             self.people, Draws(self.days, ordinal), ordinal, state
         )
         if len(self.states) == ordinal - self.first + 1:
             self.states.append(after)
-        day = to_doings(self.people, episodes, self.works_at_home, Draws(self.details, ordinal))
+        day = to_activities(self.people, episodes, self.works_at_home, Draws(self.details, ordinal))
         if self.rules is None:
             return day
         return interrupt(self.rules, Draws(self.interruptions, ordinal), day)

@@ -28,7 +28,7 @@ from fleet2d.kernels.motion import (
 )
 from fleet2d.routines.activity import Activity, seconds
 from fleet2d.routines.distributions import Distribution, exponential
-from fleet2d.routines.planner import REST, SLEEP, Doing
+from fleet2d.routines.planner import REST, SLEEP, Episode
 from fleet2d.runtime.determinism import Draws
 
 if TYPE_CHECKING:
@@ -444,16 +444,16 @@ def _end_of(plan: Plan) -> tuple[PlanEnd, int]:
     return now, POSTURES.index(plan.posture)
 
 
-# Draws of a doing are addressed by the day's ordinal times this, plus the doing's number. A day has
-# fewer doings than half of it: the core adds the other half for the part of one after midnight.
-DOINGS_A_DAY = 1024
+# Draws of an episode are addressed by the day's ordinal times this, plus its number. A day has
+# fewer episodes than half of it: the core adds the other half for the part of one after midnight.
+EPISODES_A_DAY = 1024
 END = attrgetter("end")
 # How far ahead people plan who may be interrupted by robots at any time.
 AHEAD_US = 1800 * SECOND_US
 
 
 class ResidentBehavior(Behavior):
-    """Base of behaviors that do activities: a subclass implements `day`, the doings of a day.
+    """Base of behaviors that do activities: a subclass implements `day`, the episodes of a day.
 
     Attributes:
         small_moves: Whether it turns, gets up and fetches things within an activity.
@@ -461,7 +461,7 @@ class ResidentBehavior(Behavior):
 
     small_moves: bool = True
 
-    def day(self, ordinal: int) -> Sequence[Doing]:
+    def day(self, ordinal: int) -> Sequence[Episode]:
         """Return what the resident does on a day, given by its ordinal, until the next begins."""
         raise NotImplementedError
 
@@ -495,7 +495,7 @@ class ResidentBehavior(Behavior):
         self.spots = spots
         self.known_home = KnownHome(self, actor)
         self.planned_until = -1  # the step up to which the last plan goes
-        self.given_up: tuple[int, int] | None = None  # the doing that is not to be continued
+        self.given_up: tuple[int, int] | None = None  # the episode that is not to be continued
         self.reachable_rooms = actor.reachable_rooms()
         self.venues = {name: self._venue(actor, a) for name, a in activities.items()}
         self._leave_out(actor)
@@ -540,11 +540,11 @@ class ResidentBehavior(Behavior):
         last_us = min(plan.time_us + AHEAD_US, midnight_us) if now.actor.attention else midnight_us
         self.known_home.update()
         stints = []
-        for which, day_us, doing in self._doings(now.time):
-            if day_us + doing.begin * SECOND_US >= last_us:
+        for which, day_us, episode in self._episodes(now.time):
+            if day_us + episode.begin * SECOND_US >= last_us:
                 break
-            end_us = min(day_us + doing.end * SECOND_US, midnight_us)
-            stints.append(self._stint(doing, which, end_us))
+            end_us = min(day_us + episode.end * SECOND_US, midnight_us)
+            stints.append(self._stint(episode, which, end_us))
         self.known_home.live(plan, stints, last_us, continues=now.step == self.planned_until)
         self.planned_until = clock.step_at_or_after(plan.time_us)
         return plan
@@ -559,15 +559,15 @@ class ResidentBehavior(Behavior):
         return None
 
     def give_up(self, now: Situation) -> None:
-        """Rest for the remaining time of the present doing, from the next plan on."""
-        self.given_up = next(self._doings(now.time))[0]
+        """Rest for the remaining time of the present episode, from the next plan on."""
+        self.given_up = next(self._episodes(now.time))[0]
 
-    def _doings(self, time: datetime) -> Iterator[tuple[tuple[int, int], int, Doing]]:
-        """Yield the doings that are not over at a time.
+    def _episodes(self, time: datetime) -> Iterator[tuple[tuple[int, int], int, Episode]]:
+        """Yield the episodes that are not over at a time.
 
         Yields:
             The day's ordinal and the number in it, the midnight of that day [us since the start],
-            and the doing.
+            and the episode.
         """
         ordinal, now_us = time.toordinal(), self.clock.elapsed(time)
         if time < datetime.fromordinal(ordinal) + timedelta(seconds=self.day(ordinal)[0].begin):
@@ -579,20 +579,20 @@ class ResidentBehavior(Behavior):
                 yield (ordinal, i), day_us, day[i]
             ordinal += 1
 
-    def _stint(self, doing: Doing, which: tuple[int, int], end_us: int) -> Stint:
-        """Return a doing as the core needs it; `which` is the address of its random draws."""
+    def _stint(self, episode: Episode, which: tuple[int, int], end_us: int) -> Stint:
+        """Return an episode as the core needs it; `which` is the address of its random draws."""
         if which == self.given_up:
-            doing = doing._replace(activity=REST)
-        activity, begin, end, _, room, role = doing
+            episode = episode._replace(activity=REST)
+        activity, begin, end, _, room, role = episode
         venue = self.venues[activity]
         if room != ANY_ROOM or self.is_hindered:
             venue = self._in_room(venue, room)
         core_venue = self.known_home.in_core(activity, self.seated(venue, which))
         stays = activity == REST and end - begin < NO_GAP_S
-        return core_venue, which[0] * DOINGS_A_DAY + which[1], end_us, role, stays
+        return core_venue, which[0] * EPISODES_A_DAY + which[1], end_us, role, stays
 
     def seated(self, venue: Venue, which: tuple[int, int]) -> Venue:
-        """Return the venue with only the places at furniture that it has for the doing."""
+        """Return the venue with only the places at furniture that it has for the episode."""
         return venue
 
     def _at_present(self, venue: Venue) -> Venue:
@@ -670,10 +670,12 @@ def _match(actor: "Actor", names: "RoomChoice") -> tuple[str, list["Room"]]:
         raise PlacementError(f"{actor.path}: {error}") from None
 
 
-def rooms_at(doings: Iterable[Doing], time_s: int, activities: dict[str, Activity]) -> "RoomChoice":
-    """Return the rooms of the doing at a time; () if that is out of the home."""
-    for doing in doings:
-        if doing.begin <= time_s < doing.end:
-            activity = activities[doing.activity]
+def rooms_at(
+    episodes: Iterable[Episode], time_s: int, activities: dict[str, Activity]
+) -> "RoomChoice":
+    """Return the rooms of the episode at a time; () if that is out of the home."""
+    for episode in episodes:
+        if episode.begin <= time_s < episode.end:
+            activity = activities[episode.activity]
             return () if activity.away else activity.rooms
     return ("any",)

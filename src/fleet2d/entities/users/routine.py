@@ -27,7 +27,7 @@ from fleet2d.routines.activity import Activity, catalogue
 from fleet2d.routines.household import AWAY, AnyHousehold, AnyPeriod, Household, with_absences
 from fleet2d.routines.life import WELCOME, Life, Lives, MemberRooms
 from fleet2d.routines.persona import AnyPersona, Persona, bundled_persona
-from fleet2d.routines.planner import DAY_S, PLANNED, REST, RESUMES, SLEEP, Doing
+from fleet2d.routines.planner import DAY_S, PLANNED, REST, RESUMES, SLEEP, Episode
 from fleet2d.runtime.determinism import Draws, stream_key
 
 if TYPE_CHECKING:
@@ -94,11 +94,11 @@ def _rooms_of(activity: "Activity", reachable: "list[Room]") -> "list[Room]":
 
 # Bodies of the usual radius that are nearer to each other touch [m].
 TOUCHING_M = 2 * USUAL_RADIUS
-# The number of days whose places are kept, and of doings of a day that have draws of their own.
-CACHED_DAYS, DOINGS_A_DAY = 3, 1024
+# The number of days whose places are kept, and of episodes of a day that have draws of their own.
+CACHED_DAYS, EPISODES_A_DAY = 3, 1024
 
 Places = Mapping[tuple[int, int], Seat | None]
-"""The place of each member's doing, by the numbers of both; None: others have all places."""
+"""The place of each member's episode, by the numbers of both; None: others have all places."""
 
 
 class SeatClaim(NamedTuple):
@@ -109,7 +109,7 @@ class SeatClaim(NamedTuple):
         begin: Its beginning [s since the midnight of ordinal 0].
         rank: The number of the member.
         end: Its end.
-        doings: The numbers of the doings of the day that it is for.
+        episodes: The numbers of the episodes of the day that it is for.
         seats: The places that the member may have, those of its own first.
         own: The number of its own places, one of which it prefers.
     """
@@ -118,7 +118,7 @@ class SeatClaim(NamedTuple):
     begin: int
     rank: int
     end: int
-    doings: tuple[int, ...]
+    episodes: tuple[int, ...]
     seats: Sequence[Seat]
     own: int
 
@@ -152,11 +152,11 @@ class Seating:
         self._spot = _spots(self._home.objects)
 
     def places(self, ordinal: int, number: int, rank: int) -> Sequence[Seat] | None:
-        """Return the place that a member has for a doing of a day.
+        """Return the place that a member has for an episode of a day.
 
         Args:
             ordinal: The ordinal of the day's date.
-            number: The number of the doing in the day.
+            number: The number of the episode in the day.
             rank: The number of the member.
 
         Returns:
@@ -189,7 +189,7 @@ class Seating:
             time = claim.begin, claim.end
             free = (s for s in self._by_preference(claim, ordinal) if self._is_free(s, time))
             seat = next(free, None)
-            places |= {(claim.rank, number): seat for number in claim.doings}
+            places |= {(claim.rank, number): seat for number in claim.episodes}
             if seat is not None:
                 self._taken.setdefault(self._spot[seat], []).append(time)
         return places
@@ -199,7 +199,7 @@ class Seating:
         return all(end <= time[0] or begin >= time[1] for begin, end in taken)
 
     def _by_preference(self, claim: SeatClaim, ordinal: int) -> Sequence[Seat]:
-        address = ordinal * DOINGS_A_DAY + claim.doings[0]
+        address = ordinal * EPISODES_A_DAY + claim.episodes[0]
         first = Draws(self._keys[claim.rank], address).below(claim.own)
         return (claim.seats[first], *claim.seats[:first], *claim.seats[first + 1 :])
 
@@ -207,23 +207,25 @@ class Seating:
         """Yield the claims of all members on a day."""
         midnight, days = ordinal * DAY_S, self._lives.day(ordinal)
         for rank, name in self._members.items():
-            doings = days[name]
-            for numbers in _stays(doings, partial(self._lives.is_out, name)):
-                first = doings[numbers[0]]
+            episodes = days[name]
+            for numbers in _stays(episodes, partial(self._lives.is_out, name)):
+                first = episodes[numbers[0]]
                 seats, own = self._wanted_by(rank, first)
                 if seats:
-                    begin, end = midnight + first.begin, midnight + doings[numbers[-1]].end
+                    begin, end = midnight + first.begin, midnight + episodes[numbers[-1]].end
                     is_asleep = first.activity == SLEEP
                     yield SeatClaim(is_asleep, begin, rank, end, tuple(numbers), seats, own)
 
-    def _wanted_by(self, rank: int, doing: Doing) -> tuple[Sequence[Seat], int]:
-        """Return the places that a member may have for a doing, and how many are its own."""
-        if doing.room != ANY_ROOM:
+    def _wanted_by(self, rank: int, episode: Episode) -> tuple[Sequence[Seat], int]:
+        """Return the places that a member may have for an episode, and how many are its own."""
+        if episode.room != ANY_ROOM:
             return (), 0
-        key = rank, doing.activity
+        key = rank, episode.activity
         if key not in self._wanted:
             persona = self._lives.household.members[self._members[rank]]
-            self._wanted[key] = self._find(rank, persona.activity(doing.activity), doing.activity)
+            self._wanted[key] = self._find(
+                rank, persona.activity(episode.activity), episode.activity
+            )
         return self._wanted[key]
 
     def _find(self, rank: int, activity: "Activity", name: str) -> tuple[Sequence[Seat], int]:
@@ -272,19 +274,19 @@ def _spots(objects: Sequence["PlacedObject"]) -> dict[Seat, Seat]:
     return spots
 
 
-def _stays(doings: Sequence[Doing], is_out: Callable[[Doing], bool]) -> list[list[int]]:
-    """Return the numbers of the doings of a day that are done in one place, in groups."""
+def _stays(episodes: Sequence[Episode], is_out: Callable[[Episode], bool]) -> list[list[int]]:
+    """Return the numbers of the episodes of a day that are done in one place, in groups."""
     groups: list[list[int]] = []
     planned, latest = None, list[int]()
-    for i, doing in enumerate(doings):
-        stays = doing.activity == REST and doing.end - doing.begin < NO_GAP_S
-        if doing.role == RESUMES and planned is not None and not stays:
+    for i, episode in enumerate(episodes):
+        stays = episode.activity == REST and episode.end - episode.begin < NO_GAP_S
+        if episode.role == RESUMES and planned is not None and not stays:
             latest = planned
         elif not stays:
             latest = []
             groups.append(latest)
-        if doing.role == PLANNED:
-            planned = None if stays or is_out(doing) else latest
+        if episode.role == PLANNED:
+            planned = None if stays or is_out(episode) else latest
         latest.append(i)
     return groups
 
@@ -391,7 +393,7 @@ class Routine(ResidentBehavior):
             today, time_s = today - 1, time_s + DAY_S
         return rooms_at(self._with_absences(likely_day(today), today), time_s, self._activities())
 
-    def day(self, ordinal: int) -> Sequence[Doing]:
+    def day(self, ordinal: int) -> Sequence[Episode]:
         """Return what is done on the day of a date's ordinal."""
         if self.household is None:
             return self._with_absences(self.life.day(ordinal), ordinal)
@@ -424,7 +426,7 @@ class Routine(ResidentBehavior):
         return begins_us - begin_us
 
     def seated(self, venue: Venue, which: tuple[int, int]) -> Venue:
-        """Return the venue with the place that the member of a household has for the doing."""
+        """Return the venue with the place that the member of a household has for the episode."""
         if self.household is None or not venue.seats:
             return venue
         places = self.seating.places(*which, self.spots.rank)
@@ -432,7 +434,7 @@ class Routine(ResidentBehavior):
             return venue
         return venue._replace(seats=list(places))
 
-    def _with_absences(self, day: Sequence[Doing], ordinal: int) -> Sequence[Doing]:
+    def _with_absences(self, day: Sequence[Episode], ordinal: int) -> Sequence[Episode]:
         if not self.away and not self.visits:
             return day
         return with_absences(day, datetime.fromordinal(ordinal), self.away, self.visits)
