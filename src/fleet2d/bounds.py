@@ -95,11 +95,11 @@ ENTRIES = Bound("ENTRIES", 5_000, "entries")
 """Entries of a section of a scenario, such as its users, and of a list of mappings or texts."""
 JSON_VALUES = Bound("JSON_VALUES", 5_000_000, "values")
 """Values in a JSON text."""
-PIXELS = Bound("PIXELS", 1 << 25, "pixels")
+PIXELS = Bound("PIXELS", 1 << 24, "pixels")
 """Pixels of a picture of a floor plan."""
 POLYGONS = Bound("POLYGONS", 5_000, "polygons and lines")
 """Polygons of a floor plan: rooms, furniture, features, doorways."""
-CORNERS = Bound("CORNERS", 200_000, "corners")
+CORNERS = Bound("CORNERS", 25_000, "corners")
 """Corners of all polygons of a floor plan."""
 CROSSINGS = Bound("CROSSINGS", 100_000, "places where it crosses itself")
 """Crossings of the outline of one room, wall or home with itself, which are repaired."""

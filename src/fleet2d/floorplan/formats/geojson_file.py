@@ -16,7 +16,7 @@ import shapely.geometry
 from shapely import Point
 from shapely.geometry.base import BaseGeometry
 
-from fleet2d.bounds import POLYGONS
+from fleet2d.bounds import CORNERS, POLYGONS
 from fleet2d.configuration.problems import suggest
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.formats.fields import MAX_COORDINATE_M, clean_coordinate, shown_value
@@ -104,7 +104,7 @@ def read_features(content: dict[str, Any], level: str | None, notes: list[str]) 
     features: list[Feature] = []
     floors: list[dict[str, Any]] = []
     ignored: Counter[str] = Counter()
-    parts = 0
+    parts = corners = 0
     for number, item in enumerate(items):
         where = f"features[{number}]"
         if not isinstance(item, dict):
@@ -121,6 +121,8 @@ def read_features(content: dict[str, Any], level: str | None, notes: list[str]) 
             shape = _shape(item.get("geometry"), kind, where, notes)
             parts += int(shapely.get_num_geometries(shape))
             POLYGONS.check(parts, "it", FloorPlanError, least="at least ")
+            corners += int(shapely.get_num_coordinates(shape))
+            CORNERS.check(corners, "it", FloorPlanError, least="at least ")
             features.append(Feature(kind, where, shape, properties, _level(properties)))
     if ignored:
         names = ", ".join(f"{name} ({count})" for name, count in ignored.items())

@@ -16,6 +16,9 @@ from fleet2d.bounds import PICTURE_BYTES, PIXELS, read_bytes
 from fleet2d.errors import FloorPlanError
 from fleet2d.kernels import Bool
 
+MAX_SIDE = 2**15
+"""Pixels along a side of a picture: each step in cleaning it needs further rows round it."""
+
 _PNG = b"\x89PNG\r\n\x1a\n"
 _CHANNELS = {2: 3, 4: 2, 6: 4}  # by colour type; 1 for the others
 # Three numbers, each after white space and comments; then one white space.
@@ -132,6 +135,8 @@ def _check_size(columns: int, rows: int) -> None:
     if columns * rows == 0:
         raise FloorPlanError(f"is {columns} x {rows} pixels: it is empty")
     PIXELS.check(columns * rows, f"is {columns} x {rows}: it", FloorPlanError)
+    if max(columns, rows) > MAX_SIDE:
+        raise FloorPlanError(f"is {columns} x {rows} pixels: at most {MAX_SIDE} a side are read")
 
 
 # --- PNG ---------------------------------------------------------------------------------------

@@ -20,8 +20,8 @@ MAX_CELL_M = 1.0
 # Products of three coordinates must stay inside int64: the sight kernels rely on this bound.
 COORDINATE_LIMIT = 2**20
 
-# Most cells of a plan: finding its rooms takes 30 bytes a cell, 2 GB in all.
-MAX_CELLS = 2**26
+# Most cells of a plan: finding its rooms takes 30 bytes a cell, half a gigabyte in all.
+MAX_CELLS = 2**24
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ class Lattice:
             millions, most = self.columns * self.rows / 1e6, MAX_CELLS / 1e6
             raise FloorPlanError(
                 f"the floor plan is {width:.0f} m x {height:.0f} m: {millions:.0f} million cells of"
-                f" {self.cell:g} m, more than fit in 2 GB of memory (at most {most:.0f} million):"
+                f" {self.cell:g} m, and at most {most:.0f} million fit into 1 GB of memory:"
                 f" set floorplan.cell to {fits:g} or more, and check that the file is in metres"
             )
 
