@@ -26,10 +26,10 @@ from pathlib import Path
 import numpy as np
 import shapely
 
-from fleet2d.floorplan.furniture.furnish import furnish
+from fleet2d.floorplan.furnish import furnish
 from fleet2d.floorplan.load import load_floorplan
 from fleet2d.floorplan.plan import FloorPlan
-from fleet2d.floorplan.rooms.vocabulary import room_type, usual_type
+from fleet2d.floorplan.rooms.room import room_type, usual_type
 from fleet2d.floorplan.synthetic.source import Synthetic
 from fleet2d.kernels.sight import regions_of_cells
 from fleet2d.kernels.space import rasterize_cells

@@ -51,7 +51,7 @@ def month(repeats: int = REPEATS) -> dict[str, float]:
 
 def fleet2d_layer() -> Any:
     """Return the settings of a layer that is stored at the end."""
-    from fleet2d.floorplan.home.layers import LayerSettings
+    from fleet2d.floorplan.layers import LayerSettings
 
     return LayerSettings()
 

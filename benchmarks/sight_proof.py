@@ -21,9 +21,8 @@ import numpy as np
 import shapely
 
 from fleet2d.errors import FloorPlanError
-from fleet2d.floorplan.geometry.gates import Gates
-from fleet2d.floorplan.geometry.mesh import build_mesh
 from fleet2d.floorplan.load import load_floorplan
+from fleet2d.floorplan.mesh import Gates, build_mesh
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.kernels import I64, Bool
 from fleet2d.kernels.sight import (

@@ -21,8 +21,8 @@ from typing import Any
 import numpy as np
 import shapely
 
+from fleet2d.floorplan.checkup import checkup
 from fleet2d.floorplan.formats.houseexpo import read_houseexpo
-from fleet2d.floorplan.home.checkup import checkup
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.synthetic.source import Synthetic
 

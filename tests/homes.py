@@ -11,7 +11,7 @@ import shapely
 from shapely.geometry import Polygon
 from tests.thorough import some
 
-from fleet2d.floorplan.geometry.mesh import build_mesh, snap_polygon
+from fleet2d.floorplan.mesh import build_mesh, snap_polygon
 from fleet2d.kernels import F64, I64
 from fleet2d.kernels.space import Mesh, rasterize_cells
 

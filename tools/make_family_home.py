@@ -12,7 +12,7 @@ from pathlib import Path
 import shapely
 
 from fleet2d.floorplan.formats.native import native_document, read_native
-from fleet2d.floorplan.furniture.furnish import furnish
+from fleet2d.floorplan.furnish import furnish
 
 HOME = Path("src/fleet2d/floorplan/formats/homes/family_home.json")
 WALL = 0.15

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 import fleet2d
-from fleet2d.floorplan.home.home import Home
+from fleet2d.floorplan.home import Home
 from fleet2d.pictures.life import SightWalls
 from fleet2d.sight.fov import VisibleRegion
 from fleet2d.viewer.export import embedded_run

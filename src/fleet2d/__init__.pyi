@@ -24,9 +24,9 @@ from fleet2d.entities.plan import Plan as Plan
 from fleet2d.errors import ComponentError as ComponentError
 from fleet2d.errors import Fleet2DError as Fleet2DError
 from fleet2d.errors import InputError as InputError
-from fleet2d.floorplan.home.change import HomeChange as HomeChange
-from fleet2d.floorplan.home.change import HomeChanges as HomeChanges
-from fleet2d.floorplan.home.home import Home as Home
+from fleet2d.floorplan.home import Home as Home
+from fleet2d.floorplan.home import HomeChange as HomeChange
+from fleet2d.floorplan.home import HomeChanges as HomeChanges
 from fleet2d.floorplan.load import load_floorplan as load_floorplan
 from fleet2d.floorplan.plan import FloorPlan as FloorPlan
 from fleet2d.floorplan.plan import LabelledRegion as LabelledRegion

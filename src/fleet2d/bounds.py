@@ -93,7 +93,7 @@ EXTENDED_FILES = Bound("EXTENDED_FILES", 100, "files")
 """Files of a scenario: its own and those that they extend."""
 ENTRIES = Bound("ENTRIES", 5_000, "entries")
 """Entries of a section of a scenario, such as its users, and of a list of mappings or texts."""
-JSON_VALUES = Bound("JSON_VALUES", 5_000_000, "values")
+JSON_VALUES = Bound("JSON_VALUES", 3_000_000, "values")
 """Values in a JSON text."""
 PIXELS = Bound("PIXELS", 1 << 24, "pixels")
 """Pixels of a picture of a floor plan."""

@@ -7,8 +7,8 @@ import shapely
 from tests.reference.fields import squared_distance
 
 from fleet2d.errors import FloorPlanError
-from fleet2d.floorplan.home.space import Space
 from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
+from fleet2d.floorplan.space import Space
 
 
 @pytest.fixture
@@ -124,8 +124,8 @@ def test_plan_without_area_is_refused(free: shapely.Polygon) -> None:
 def test_rounding_that_would_change_the_area_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     """Known failure 7: an area that doesn't survive rounding is an error, not a surprise."""
     # No known outline snaps so badly, so snapping is replaced.
-    import fleet2d.floorplan.geometry.free_space as module
-    from fleet2d.floorplan.geometry.mesh import SnappedPolygon
+    import fleet2d.floorplan.mesh as module
+    from fleet2d.floorplan.mesh import SnappedPolygon
 
     half = SnappedPolygon([shapely.box(0, 0, 2560, 6400)], -(2560.0 * 6400), 46080.0)
     monkeypatch.setattr(module, "snap_polygon", lambda _: half)

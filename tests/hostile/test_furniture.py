@@ -17,12 +17,11 @@ from tests.homes import plan_files
 from tests.thorough import THOROUGH, some
 
 from fleet2d.errors import FloorPlanError
-from fleet2d.floorplan.furniture.furnish import RULES, furnish
-from fleet2d.floorplan.home.home import Home
-from fleet2d.floorplan.home.space import Space
-from fleet2d.floorplan.home.standing import BODY_RADIUS
+from fleet2d.floorplan.furnish import RULES, furnish
+from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.load import load_floorplan
 from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
+from fleet2d.floorplan.space import BODY_RADIUS, Space
 
 RADII = (0.25, 0.225, 0.2, 0.175, 0.15, 0.125, 0.1)
 # Less than this may be cut off: the corner behind a bed, in which only a thin body would fit.

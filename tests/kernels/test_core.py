@@ -17,7 +17,7 @@ from tests.homes import home_of
 
 import fleet2d
 from fleet2d import _core
-from fleet2d.floorplan.geometry.lattice import Lattice
+from fleet2d.floorplan.lattice import Lattice
 from fleet2d.kernels.motion import Breakpoints, WalkRule, empty_poses
 from fleet2d.kernels.presence import Moments, PeopleEvidence, StayModel, Stretches
 from fleet2d.kernels.sight import (

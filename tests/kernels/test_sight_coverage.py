@@ -12,7 +12,7 @@ from tests.reference import visible_cells as slow
 from tests.strategies import quick, seeds
 
 from fleet2d._core import camera_pose
-from fleet2d.floorplan.geometry.lattice import Lattice
+from fleet2d.floorplan.lattice import Lattice
 from fleet2d.kernels import I16, I64
 from fleet2d.kernels.motion import Poses, Window
 from fleet2d.kernels.numbers import half_sine

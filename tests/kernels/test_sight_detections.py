@@ -16,7 +16,7 @@ from tests.reference.random import key_of_word
 from tests.strategies import homes, quick, seeds
 
 from fleet2d._core import in_wedge
-from fleet2d.floorplan.geometry.lattice import Lattice
+from fleet2d.floorplan.lattice import Lattice
 from fleet2d.kernels import I64, U64
 from fleet2d.kernels.motion import Window
 from fleet2d.kernels.sight import (

@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tests.reference.chambers import nearest_labels
 
-from fleet2d.floorplan.geometry.mesh import build_mesh
+from fleet2d.floorplan.mesh import build_mesh
 from fleet2d.kernels import I32, Bool
 from fleet2d.kernels.sight import line_of_sight
 from fleet2d.kernels.space import (

@@ -13,7 +13,7 @@ from tests.scenes import digests, run, scenario, table
 import fleet2d
 from fleet2d.algorithms.presence.belief import Presence
 from fleet2d.errors import Fleet2DError
-from fleet2d.floorplan.home.home import Home
+from fleet2d.floorplan.home import Home
 from fleet2d.metrics.ltp_error import walking_distances
 
 ROOMS = [

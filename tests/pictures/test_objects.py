@@ -9,8 +9,8 @@ import shapely
 from matplotlib.colors import to_rgb
 from tests.pictures.test_floorplan import pixels, words
 
-from fleet2d.floorplan.furniture.catalogue import FURNITURE, stand_furniture
-from fleet2d.floorplan.home.checkup import checkup
+from fleet2d.floorplan.checkup import checkup
+from fleet2d.floorplan.furniture import FURNITURE, stand_furniture
 from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
 from fleet2d.floorplan.rooms.doorways import DoorLine
 from fleet2d.pictures.checkup import draw_checkup

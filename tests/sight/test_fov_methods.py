@@ -13,7 +13,7 @@ from tests.scenes import flat_path
 import fleet2d
 from fleet2d.configuration.components import components
 from fleet2d.errors import InputError
-from fleet2d.floorplan.home.home import Home
+from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.rooms.doorways import DoorLine
 from fleet2d.kernels import Bool

@@ -14,7 +14,7 @@ import pytest
 from shapely.geometry import Polygon
 from tests.homes import SUB, Home, home_of
 
-from fleet2d.floorplan.geometry.mesh import snap_polygon
+from fleet2d.floorplan.mesh import snap_polygon
 from fleet2d.kernels.sight import line_of_sight, region_outline, visible_region
 from fleet2d.kernels.space import locate
 

@@ -10,7 +10,7 @@ import numpy.typing as npt
 import shapely
 from tests.homes import home_of
 
-from fleet2d.floorplan.geometry.lattice import Lattice
+from fleet2d.floorplan.lattice import Lattice
 from fleet2d.kernels import F64, I8, I64
 from fleet2d.kernels.motion import Window
 from fleet2d.kernels.sight import MOST_GHOSTS, DetectionRule, SightMemory, detect, new_memory

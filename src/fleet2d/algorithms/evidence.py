@@ -13,8 +13,7 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from fleet2d.algorithms.observations import NOWHERE, frozen
-from fleet2d.floorplan.cache import read_only
-from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.floorplan.plan import FloorPlan, read_only
 from fleet2d.kernels import F64, I16, I64, U8, Bool
 from fleet2d.kernels.presence import gather_views, list_sightings
 from fleet2d.kernels.space import label_triangles, rasterize_cells

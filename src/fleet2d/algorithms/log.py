@@ -18,8 +18,8 @@ from fleet2d.algorithms.observations import (
     frozen,
 )
 from fleet2d.errors import ComponentError
-from fleet2d.floorplan.cache import read_only
-from fleet2d.floorplan.home.home import Home
+from fleet2d.floorplan.home import Home
+from fleet2d.floorplan.plan import read_only
 from fleet2d.kernels import F64, I16, I64, Bool
 from fleet2d.kernels.motion import Poses, Window, count_together, rooms_at, sum_moves
 from fleet2d.kernels.numbers import in_radians

@@ -8,8 +8,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from fleet2d.floorplan.cache import read_only
-from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.floorplan.plan import FloorPlan, read_only
 from fleet2d.kernels import F64, I8, I16, I32, I64, U64
 from fleet2d.kernels.motion import rooms_at
 from fleet2d.kernels.numbers import in_radians

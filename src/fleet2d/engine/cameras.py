@@ -14,7 +14,7 @@ from fleet2d.engine.sighting_errors import sight_events
 from fleet2d.entities.behavior import Actor, SightEvent
 from fleet2d.entities.equipment import Drift, Localization
 from fleet2d.errors import ComponentError, ScenarioError, blame
-from fleet2d.floorplan.home.home import Home
+from fleet2d.floorplan.home import Home
 from fleet2d.kernels import I64, U64
 from fleet2d.kernels.motion import Poses
 from fleet2d.kernels.sight import (

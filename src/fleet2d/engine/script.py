@@ -19,8 +19,7 @@ from fleet2d.entities.body import Pose
 from fleet2d.entities.decisions import Arbiter, DecidingActor
 from fleet2d.entities.objects.home_object import SensorFault
 from fleet2d.errors import ScenarioError
-from fleet2d.floorplan.home.change import HomeChange
-from fleet2d.floorplan.home.home import Home
+from fleet2d.floorplan.home import Home, HomeChange
 from fleet2d.interventions.intervention import Intervention, parse_intervention
 from fleet2d.interventions.possible_events import check_trigger
 from fleet2d.interventions.script import WHEN, Entry, parse_entry

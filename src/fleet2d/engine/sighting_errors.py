@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from fleet2d.errors import ComponentError, blame
-from fleet2d.floorplan.geometry.lattice import Lattice
+from fleet2d.floorplan.lattice import Lattice
 from fleet2d.kernels import I64
 from fleet2d.kernels.motion import Window
 from fleet2d.kernels.numbers import TURN, in_radians

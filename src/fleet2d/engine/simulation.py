@@ -37,7 +37,7 @@ from fleet2d.entities.decisions import DecidingActor
 from fleet2d.entities.plan import Plan, data_of
 from fleet2d.errors import ArtifactError, InputError, ScenarioError
 from fleet2d.floorplan.formats.native import native_document
-from fleet2d.floorplan.home.home import Home
+from fleet2d.floorplan.home import Home
 from fleet2d.interventions.intervention import Intervention
 from fleet2d.interventions.methods import InterventionMethods
 from fleet2d.kernels.numbers import in_radians

@@ -22,7 +22,7 @@ from fleet2d.runtime.determinism import Draws
 
 if TYPE_CHECKING:
     from fleet2d.entities.place import RoomChoice
-    from fleet2d.floorplan.home.home import Home
+    from fleet2d.floorplan.home import Home
     from fleet2d.floorplan.plan import Room
 
 

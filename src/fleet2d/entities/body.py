@@ -25,10 +25,10 @@ from fleet2d.entities.place import (
     room_of_furniture,
 )
 from fleet2d.errors import ComponentError, PlacementError, ScenarioError, blame
-from fleet2d.floorplan.home.home import Home
-from fleet2d.floorplan.home.space import Space
+from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.objects import PlacedObject, Posture
 from fleet2d.floorplan.plan import Room
+from fleet2d.floorplan.space import Space
 from fleet2d.kernels import F64, I64
 from fleet2d.kernels.motion import Breakpoints, WalkRule
 from fleet2d.kernels.numbers import TURN

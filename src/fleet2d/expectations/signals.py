@@ -31,7 +31,7 @@ from fleet2d.expectations.expectation import (
     shortest,
     truth,
 )
-from fleet2d.floorplan.home.home import Home
+from fleet2d.floorplan.home import Home
 from fleet2d.kernels import F64, I64
 from fleet2d.kernels.motion import Window
 from fleet2d.runtime.clock import Clock

@@ -36,8 +36,8 @@ from fleet2d.expectations.signals import (
     SignalBlock,
     WordSignal,
 )
-from fleet2d.floorplan.geometry.lattice import UNITS_PER_CELL
-from fleet2d.floorplan.home.home import Home, lattice_footprint
+from fleet2d.floorplan.home import Home, lattice_footprint
+from fleet2d.floorplan.lattice import UNITS_PER_CELL
 from fleet2d.kernels import I64, Bool
 from fleet2d.kernels.motion import distances_between, distances_to_shape, rooms_at, speeds
 from fleet2d.kernels.sight import SightingColumn

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fleet2d.configuration.units import micros
-from fleet2d.floorplan.rooms.vocabulary import room_type
+from fleet2d.floorplan.rooms.room import room_type
 from fleet2d.kernels import F64, I16, Bool
 from fleet2d.logs.log import AWAY, ActivityLog, LogError
 from fleet2d.logs.placement import DOOR, UNKNOWN, USUAL, LoggedVisit, VisitRule, visits_of

@@ -1,9 +1,92 @@
-"""Objects in a home: furniture and devices, their footprints, and where to use them from."""
+"""Objects of a home, furniture and devices: how they are named, described and moved."""
 
-from dataclasses import dataclass
-from typing import Literal
+from collections import Counter, defaultdict
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import count
+from typing import Any, Literal, Protocol, TypeVar
 
+import numpy as np
+import shapely
 from shapely import Polygon
+
+from fleet2d.configuration.problems import suggest
+from fleet2d.errors import FloorPlanError, InputError
+from fleet2d.floorplan.lattice import Lattice
+from fleet2d.kernels import F64
+from fleet2d.kernels.numbers import TURN, UNIT, cosine, in_radians, sine
+
+
+class Named(Protocol):
+    """Something with a name."""
+
+    @property
+    def name(self) -> str:
+        """Its name."""
+
+
+N = TypeVar("N", bound=Named)
+
+
+def find_named(
+    things: Sequence[N],
+    name: object,
+    owner: str,
+    noun: str,
+    error: type[InputError] = FloorPlanError,
+) -> N:
+    """Return the thing of a name; `owner` and `noun` are for the message.
+
+    Raises:
+        InputError: None has that name; of the type `error`.
+    """
+    names = [thing.name for thing in things]
+    if name in names:
+        return things[names.index(str(name))]
+    raise error(f"{owner} has no {noun} {name!r}{suggest(name, names, f'Its {noun}s are')}")
+
+
+def number_names(names: Sequence[str | None], types: Sequence[str], noun: str) -> list[str]:
+    """Return a name for each thing: its own if it isn't empty, or its type and a number.
+
+    Raises:
+        FloorPlanError: Two have the same name.
+
+    Example:
+        >>> number_names(["den", None, "room_0"], ["office", "room", "room"], "room")
+        ['den', 'room_1', 'room_0']
+    """
+    own = Counter(name for name in names if name)
+    twice = [name for name, uses in own.items() if uses > 1]
+    if twice:
+        raise FloorPlanError(f"two {noun}s are named {twice[0]!r}: give each {noun} its own name")
+    numbers: defaultdict[str, count[int]] = defaultdict(count)
+    return [
+        name or next(new for k in numbers[kind] if (new := f"{kind}_{k}") not in own)
+        for name, kind in zip(names, types, strict=True)
+    ]
+
+
+def distinct_names(names: Sequence[str | None], plural: str, notes: list[str]) -> list[str | None]:
+    """Return names with a number added to those that occur before, and add a note for each.
+
+    Example:
+        >>> distinct_names(["Bath", "Bath", None, "Bath 2"], "rooms", [])
+        ['Bath', 'Bath 3', None, 'Bath 2']
+    """
+    numbers: defaultdict[str, count[int]] = defaultdict(lambda: count(2))
+    used = set[str]()
+    distinct: list[str | None] = []
+    for name in names:
+        unique = name
+        if name is not None and name in used:
+            candidates = (f"{name} {k}" for k in numbers[name])
+            unique = next(new for new in candidates if new not in used and new not in names)
+            notes.append(f"several {plural} are called {name}: one of them is {unique} here")
+        used |= {unique} if unique is not None else set()
+        distinct.append(unique)
+    return distinct
+
 
 Blocks = Literal["nothing", "path", "sight"]
 Posture = Literal["stand", "sit", "lie"]
@@ -52,3 +135,60 @@ class PlacedObject:
     blocks: Blocks = "path"
     uses: tuple[UsePlace, ...] = ()
     heading: float = 0.0
+
+
+def number_objects(objects: Sequence[PlacedObject]) -> tuple[PlacedObject, ...]:
+    """Return the objects, those without a name numbered by type (`bed_0`).
+
+    Raises:
+        FloorPlanError: Two have the same name.
+    """
+    names = number_names([o.name for o in objects], [o.type for o in objects], "object")
+    return tuple(replace(o, name=name) for o, name in zip(objects, names, strict=True))
+
+
+def describe_object(thing: PlacedObject) -> list[Any]:
+    """Return all that defines an object as plain JSON data, for the digest of a plan."""
+    corners = shapely.get_coordinates(thing.footprint).tolist()
+    uses = [[use.x, use.y, use.heading, use.posture, use.approach] for use in thing.uses]
+    return [thing.name, thing.type, corners, thing.blocks, thing.heading, uses]
+
+
+def move_object(
+    thing: PlacedObject, lattice: Lattice, to: Point, turn_deg: float = 0.0
+) -> PlacedObject:
+    """Return an object turned about the middle of its box and moved.
+
+    Computed in whole lattice units and headings of 1/4096 turn, so that the result is the same on
+    every machine.
+
+    Args:
+        thing: The object.
+        lattice: The plan's lattice.
+        to: New place of the middle (x, y) [m].
+        turn_deg: Angle by which it is turned, counter-clockwise.
+    """
+    turn = round(turn_deg / 360 * TURN) % TURN
+    x0, y0, x1, y1 = thing.footprint.bounds
+    pivot = lattice.to_lattice(((x0 + x1) / 2, (y0 + y1) / 2))
+    goal = lattice.to_lattice(to)
+
+    def transform(xy: F64) -> F64:
+        dx, dy = (lattice.to_lattice(xy) - pivot).T
+        c, s = cosine(turn), sine(turn)
+        half = UNIT // 2
+        turned = np.stack([(c * dx - s * dy + half) // UNIT, (s * dx + c * dy + half) // UNIT], -1)
+        return lattice.to_metres(goal + turned)
+
+    uses = tuple(
+        replace(
+            use,
+            **dict(zip("xy", transform(np.array([[use.x, use.y]]))[0].tolist(), strict=True)),
+            heading=(use.heading + in_radians(turn)) % in_radians(TURN),
+            approach=None,
+        )
+        for use in thing.uses
+    )
+    footprint = Polygon(transform(np.asarray(thing.footprint.exterior.coords)[:-1]))
+    heading = (thing.heading + in_radians(turn)) % in_radians(TURN)
+    return replace(thing, footprint=footprint, uses=uses, heading=heading)

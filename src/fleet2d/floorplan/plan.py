@@ -2,25 +2,24 @@
 
 import hashlib
 import json
-from collections.abc import Sequence
+from collections import OrderedDict
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from importlib import import_module
-from typing import Any, Self
+from threading import Lock
+from typing import Any, Self, TypeVar
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 from shapely import MultiPolygon, Polygon
 
 from fleet2d.bounds import CORNERS, POLYGONS
 from fleet2d.errors import FloorPlanError
-from fleet2d.floorplan.arrangement import describe_object, number_objects
-from fleet2d.floorplan.geometry.free_space import canonical_order, free_on_lattice, part_notes
-from fleet2d.floorplan.geometry.lattice import Lattice
-from fleet2d.floorplan.geometry.mesh import build_mesh
-from fleet2d.floorplan.names import find_named
-from fleet2d.floorplan.objects import PlacedObject
-from fleet2d.floorplan.rooms.adjacency import RoomLink, room_links
+from fleet2d.floorplan.lattice import Lattice
+from fleet2d.floorplan.mesh import build_mesh, canonical_order, free_on_lattice, part_notes
+from fleet2d.floorplan.objects import PlacedObject, describe_object, find_named, number_objects
 from fleet2d.floorplan.rooms.division import (
     Passages,
     RegionKind,
@@ -28,13 +27,76 @@ from fleet2d.floorplan.rooms.division import (
     search_passages,
     select_doorways,
 )
-from fleet2d.floorplan.rooms.doorways import DoorLine, Doorway, fit_lines, name_doorways
-from fleet2d.floorplan.rooms.regions import LabelledRegion
-from fleet2d.floorplan.rooms.room import NO_ROOM, Room
-from fleet2d.floorplan.rooms.vocabulary import room_type
+from fleet2d.floorplan.rooms.doorways import (
+    DoorLine,
+    Doorway,
+    RoomLink,
+    fit_lines,
+    name_doorways,
+    room_links,
+)
+from fleet2d.floorplan.rooms.room import NO_ROOM, LabelledRegion, Room, room_type
 from fleet2d.kernels import I16, Bool
 from fleet2d.kernels.space import Mesh, fill_from_neighbors, rasterize_cells, strictly_inside
 from fleet2d.runtime.determinism import sum_in_order
+
+T = TypeVar("T")
+
+
+class Cache:
+    """The most recently used values by key, each made at its first use.
+
+    Threads may share a cache: if two make the same value at a time, both get the first.
+
+    Example:
+        >>> cache = Cache(size=2)
+        >>> [cache.get(key, lambda: [key]) for key in "aba"]
+        [['a'], ['b'], ['a']]
+        >>> cache.get("a", list) is cache.get("a", list), len(cache)
+        (True, 2)
+    """
+
+    def __init__(self, size: int) -> None:
+        """Make an empty cache that holds at most `size` values."""
+        self._size = size
+        self._values: OrderedDict[Hashable, Any] = OrderedDict()
+        self._lock = Lock()
+
+    def __len__(self) -> int:
+        """Return the number of values."""
+        return len(self._values)
+
+    def get(self, key: Hashable, make: Callable[[], T]) -> T:
+        """Return the value of a key; if `make` raises, nothing is stored."""
+        with self._lock:
+            if key in self._values:
+                self._values.move_to_end(key)
+                return self._values[key]
+        new = make()
+        with self._lock:
+            value = self._values.setdefault(key, new)
+            while len(self._values) > self._size:
+                self._values.popitem(last=False)
+        return value
+
+    def grow(self, size: int) -> None:
+        """Hold at least `size` values from now on."""
+        self._size = max(self._size, size)
+
+    def clear(self) -> None:
+        """Drop all values."""
+        with self._lock:
+            self._values.clear()
+
+
+A = TypeVar("A", bound=NDArray[Any])
+
+
+def read_only(array: A) -> A:
+    """Return the same array, made read-only, as is due where several runs share it."""
+    array.setflags(write=False)
+    return array
+
 
 __all__ = ["FloorPlan", "LabelledRegion", "Room"]
 

@@ -1,27 +1,281 @@
-"""Sources of floor plans: the base of their components, and helpers that readers of files share."""
+"""Sources of floor plans: the base of their components, with what a scenario adds to each."""
 
 import hashlib
-import json
 from abc import abstractmethod
-from collections.abc import Hashable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Hashable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar, Self
 
+import numpy as np
+import shapely
 from pydantic import AfterValidator, Field, TypeAdapter, ValidationError, model_validator
+from shapely import MultiPolygon, Polygon
 
-from fleet2d.bounds import FILE_BYTES, JSON_VALUES, one_line, read_bytes
-from fleet2d.configuration.components import Component
-from fleet2d.configuration.units import InputPath, Length
-from fleet2d.errors import FloorPlanError, InputError
-from fleet2d.floorplan.cache import Cache
-from fleet2d.floorplan.corrections import RoomCorrection, correct_rooms
-from fleet2d.floorplan.furniture.furnishing import Furnishing, FurniturePiece, place_furniture
-from fleet2d.floorplan.home.costmap import CostmapSettings
-from fleet2d.floorplan.home.layers import LayerSettings, check_layers
-from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.configuration.components import Component, Settings
+from fleet2d.configuration.problems import problem, problem_at, suggest
+from fleet2d.configuration.units import AngleDeg, InputPath, Length, PositiveLength
+from fleet2d.errors import FloorPlanError
+from fleet2d.floorplan.furniture import FURNITURE, stand_furniture
+from fleet2d.floorplan.layers import CostmapSettings, LayerSettings, check_layers
+from fleet2d.floorplan.objects import Blocks, PlacedObject, number_objects
+from fleet2d.floorplan.plan import Cache, FloorPlan
+from fleet2d.floorplan.rooms.doorways import DoorLine, doorway_segments, name_doorways
+from fleet2d.floorplan.rooms.room import (
+    LabelledRegion,
+    Region,
+    Room,
+    cells_in,
+    make_rooms,
+    snap_regions,
+    usual_type,
+)
+from fleet2d.floorplan.space import BODY_RADIUS, standing_cells, with_approaches
+from fleet2d.kernels import I64
+from fleet2d.kernels.numbers import TURN
+from fleet2d.kernels.space import fill_from_neighbors
 
-YAML = (".yaml", ".yml")
+
+class RoomCorrection(Settings):
+    """A room to name or retype, given by a place in it, or to draw anew, given by its corners.
+
+    Attributes:
+        at: A place in the room [x, y] [m].
+        polygon: Corners of a room that takes this space from others.
+        name: Its name; left out: unchanged, or numbered by its type.
+        type: Its type, such as bedroom; left out: unchanged, or room.
+
+    Example:
+        >>> RoomCorrection(at=(2, 1), type="Kitchen").type
+        'Kitchen'
+    """
+
+    at: tuple[Length, Length] | None = Field(default=None, examples=[[2.5, 1.0]])
+    polygon: tuple[tuple[Length, Length], ...] | None = Field(
+        default=None, examples=[[[0, 0], [4, 0], [4, 3]]]
+    )
+    name: str | None = Field(default=None, min_length=1)
+    type: str | None = Field(default=None, min_length=1)
+
+    @model_validator(mode="after")
+    def _says_where_and_what(self) -> Self:
+        if (self.at is None) == (self.polygon is None):
+            raise problem("a room needs either 'at' (a point in it) or 'polygon' (its corners)")
+        if self.at is not None and self.name is None and self.type is None:
+            raise problem("a room at a place needs a name or a type to give it")
+        if self.polygon is not None and not _shape(self.polygon).is_valid:
+            raise problem(
+                "polygon is not a valid outline: at least 3 corners, and no crossing sides"
+            )
+        return self
+
+
+def correct_rooms(plan: FloorPlan, corrections: Sequence[RoomCorrection]) -> FloorPlan:
+    """Return a plan with rooms renamed, retyped and drawn anew.
+
+    Each correction applies to the rooms that those before it left. A room that loses all its cells
+    is dropped.
+
+    Args:
+        plan: The plan.
+        corrections: In the order of the scenario.
+
+    Raises:
+        FloorPlanError: A place is in no room, a polygon holds no free cell, or two rooms would
+            have one name.
+    """
+    if not corrections:
+        return plan
+    regions = [_as_region(room) for room in plan.rooms]
+    painted = plan.room_of_cell.astype(np.int64)
+    for number, correction in enumerate(corrections):
+        where = f"floorplan.rooms[{number}]"
+        if correction.polygon is not None:
+            painted = _draw(plan, painted, correction, len(regions), where)
+            types = (usual_type(correction.type),) if correction.type else ()
+            regions.append(Region(types, Polygon(), correction.name, None if types else "room"))
+        else:
+            index = _region_at(plan, painted, correction, where)
+            regions[index] = _rename(regions[index], correction)
+    room_of_cell, rooms = make_rooms(plan.lattice, painted, regions)
+    room_of_cell.setflags(write=False)
+    segments = doorway_segments(plan.lattice, plan.doorways)
+    return replace(
+        plan,
+        room_of_cell=room_of_cell,
+        rooms=rooms,
+        doorways=name_doorways(
+            plan.lattice,
+            fill_from_neighbors(room_of_cell),
+            [room.name for room in rooms],
+            [(line, segments[k]) for k, line in enumerate(_door_lines(plan))],
+        ),
+    )
+
+
+def _shape(corners: Sequence[tuple[float, float]]) -> Polygon:
+    return Polygon(corners) if len(corners) >= 3 else Polygon([(0, 0), (1, 1), (0, 0)])
+
+
+def _make_valid(shape: Polygon | MultiPolygon) -> MultiPolygon:
+    """Return the polygons of a shape, which may cross itself since it was rounded."""
+    parts = shapely.get_parts(shapely.make_valid(shape))
+    return MultiPolygon([part for part in parts if part.geom_type == "Polygon"])
+
+
+def _as_region(room: Room) -> Region:
+    return Region(room.labels, Polygon(), room.name, room.type)
+
+
+def _rename(region: Region, correction: RoomCorrection) -> Region:
+    """Return a region with another name or type; a name of type and number follows the type."""
+    if correction.type is None:
+        return replace(region, name=correction.name)
+    kind = usual_type(correction.type)
+    is_numbered = region.name is not None and region.name.rpartition("_")[0] == region.type
+    name = correction.name or (None if is_numbered and kind != region.type else region.name)
+    return Region((kind,), region.shape, name, kind)
+
+
+def _region_at(plan: FloorPlan, painted: I64, correction: RoomCorrection, where: str) -> int:
+    """Return the index of the region that holds the place of a correction."""
+    x, y = correction.at or (0.0, 0.0)
+    row, column = plan.lattice.cell_of(*plan.lattice.point_at((x, y)))
+    if 0 <= row < plan.lattice.rows and 0 <= column < plan.lattice.columns:
+        index = int(fill_from_neighbors(painted.astype(np.int16))[row, column])
+        if index >= 0:
+            return index
+    near_x, near_y = plan.nearest_free(x, y)
+    raise FloorPlanError(
+        f"{where}: ({x:g}, {y:g}) m is in no room of {plan.name}: the nearest free place is"
+        f" ({near_x:.2f}, {near_y:.2f}) m"
+    )
+
+
+def _draw(plan: FloorPlan, painted: I64, correction: RoomCorrection, index: int, where: str) -> I64:
+    """Return the regions of the cells, with those inside the polygon set to `index`."""
+    shape = _shape(correction.polygon or ())
+    (region,) = snap_regions(plan.lattice, [LabelledRegion((), shape)])
+    patch = cells_in(plan.free, _make_valid(region.shape))
+    if patch.cells == 0:
+        x0, y0, x1, y1 = shape.bounds
+        raise FloorPlanError(
+            f"{where}: no free cell of {plan.name} is inside the polygon from ({x0:g}, {y0:g}) to"
+            f" ({x1:g}, {y1:g}) m"
+        )
+    changed = painted.copy()
+    changed[patch.window][patch.mask] = index
+    return changed
+
+
+def _door_lines(plan: FloorPlan) -> list[DoorLine]:
+    """Return the doorways as lines; those named after their rooms get new names later."""
+    lines = []
+    for doorway in plan.doorways:
+        joined = "-".join(plan.rooms[room].name for room in doorway.rooms)
+        own = None if doorway.name.startswith(joined) else doorway.name
+        lines.append(DoorLine(doorway.start, doorway.end, own, doorway.leaf))
+    return lines
+
+
+# How far a piece may reach into a wall [m]: tape measures and traced walls differ by as much.
+WALL_TOLERANCE_M = 0.02
+
+
+class Furnishing(Settings):
+    """How a home is furnished by rule, see `fleet2d.floorplan.furnish.furnish`.
+
+    Attributes:
+        seed: The seed of the choice and the places of pieces.
+        density: Factor of the probability of optional pieces; 0: none of them.
+    """
+
+    seed: int = Field(default=0, ge=0)
+    density: float = Field(default=1.0, ge=0, le=10)
+
+
+class FurniturePiece(Settings):
+    """A piece of furniture at a place in the home.
+
+    Attributes:
+        type: The type of furniture, such as 'bed'.
+        at: Its middle [x, y] [m].
+        heading_deg: The direction of its front, counter-clockwise from +x.
+        size: Its width and depth [m]; left out: the middle of what is usual.
+        name: Its name; left out: its type and a number.
+        blocks: Whether it blocks nothing, bodies (`path`), or bodies and sight (`sight`); left out:
+            what is usual for its type.
+    """
+
+    type: str = Field(examples=["sofa"])
+    at: tuple[Length, Length] = Field(examples=[[2.5, 1.0]])
+    heading_deg: AngleDeg = 90.0
+    size: tuple[PositiveLength, PositiveLength] | None = Field(default=None, examples=[[1.6, 2.0]])
+    name: str | None = Field(default=None, min_length=1)
+    blocks: Blocks | None = None
+
+    @model_validator(mode="after")
+    def _check_type(self) -> Self:
+        if self.type not in FURNITURE:
+            raise problem_at(
+                ("type",),
+                f"there is no furniture of type {self.type!r}"
+                f"{suggest(self.type, sorted(FURNITURE))}",
+                self.type,
+            )
+        return self
+
+    def stand(self) -> PlacedObject:
+        """Return the piece as an object, with unchecked places to use it from."""
+        heading = round(self.heading_deg / 360 * TURN) % TURN
+        size, blocks = self.size, self.blocks
+        return stand_furniture(
+            self.type, self.at, heading, size, name=self.name or "", blocks=blocks
+        )
+
+
+def place_furniture(
+    plan: FloorPlan, pieces: tuple[FurniturePiece, ...], rules: Furnishing | None
+) -> FloorPlan:
+    """Return a plan with the pieces of a scenario, and more by `rules`, if any.
+
+    Raises:
+        FloorPlanError: A piece stands outside the home or in a wall, or two have the same name.
+    """
+    if pieces:
+        things = [piece.stand() for piece in pieces]
+        for number, thing in enumerate(things):
+            _check_stands(plan, thing, f"floorplan.furniture[{number}]")
+        everything = [*plan.objects, *things]
+        standing = standing_cells(plan, BODY_RADIUS, everything)
+        reachable = [with_approaches(plan, thing, standing, everything) for thing in things]
+        plan = replace(plan, objects=number_objects([*plan.objects, *reachable]))
+    if rules is None:
+        return plan
+    from fleet2d.floorplan.furnish import furnish  # few homes need the rules
+
+    return furnish(plan, rules.seed, rules.density)
+
+
+def _check_stands(plan: FloorPlan, thing: PlacedObject, where: str) -> None:
+    """Raise FloorPlanError unless an object stands in free space."""
+    middle = thing.footprint.centroid
+    at = f"the {thing.type} at ({middle.x:g}, {middle.y:g}) m"
+    x0, y0, x1, y1 = plan.bounds
+    if not plan.free_space.intersects(middle):
+        raise FloorPlanError(
+            f"{where}: {at} is not inside {plan.name}, whose free space lies from"
+            f" ({x0:.2f}, {y0:.2f}) to ({x1:.2f}, {y1:.2f}) m"
+        )
+    lost = shapely.difference(thing.footprint.buffer(-WALL_TOLERANCE_M), plan.free_space).area
+    if lost > 0:
+        x0, y0, x1, y1 = thing.footprint.bounds
+        raise FloorPlanError(
+            f"{where}: {at} overlaps a wall of {plan.name}: its box is {x1 - x0:.2f} m x"
+            f" {y1 - y0:.2f} m; move it, turn it (heading_deg), or give it another size"
+        )
+
+
 # Homes that a process caches, read and furnished.
 CACHED_PLANS = 8
 
@@ -141,95 +395,3 @@ class PixelSource(FloorPlanSource):
             return {**data, "cell": cls.usual_cell({**data, "path": path})}
         except (ValidationError, FloorPlanError):
             return data
-
-
-# --- Files -------------------------------------------------------------------------------------
-
-
-@contextmanager
-def in_file(path: Path) -> Iterator[None]:
-    """Put the path of a file before the errors that are raised in the block."""
-    try:
-        yield
-    except FloorPlanError as error:
-        raise FloorPlanError(f"{path}: {error}") from error
-
-
-def read_document(path: Path) -> dict[str, Any]:
-    """Return the mapping in a YAML file (.yaml, .yml), else the object in a JSON file.
-
-    Raises:
-        FloorPlanError: There is no such file, or it holds neither.
-    """
-    return read_yaml(path) if path.suffix.lower() in YAML else read_json(path)
-
-
-def read_json(path: Path) -> dict[str, Any]:
-    """Return the JSON object in a file.
-
-    Raises:
-        FloorPlanError: There is no such file, or it doesn't hold a JSON object.
-    """
-    text = _read_text(path, "JSON")
-    values = text.count(",") + text.count("[") + text.count("{")
-    JSON_VALUES.check(values, path, FloorPlanError, least="about ")
-    try:
-        content = json.loads(text)
-    except json.JSONDecodeError as error:
-        raise FloorPlanError(
-            f"{path} is not JSON: {error.msg} in line {error.lineno}, column {error.colno}"
-        ) from None
-    except RecursionError:
-        raise FloorPlanError(
-            f"{path} is not a floor plan: it has lists in lists without end"
-        ) from None
-    except ValueError as error:  # a number of more digits than Python converts
-        raise FloorPlanError(f"{path} is not a floor plan: {error}") from None
-    return _mapping(content, path, "a JSON object {…}")
-
-
-def read_yaml(path: Path) -> dict[str, Any]:
-    """Return the mapping in a YAML file.
-
-    Raises:
-        FloorPlanError: There is no such file, or it doesn't hold a YAML mapping.
-    """
-    # A home in a JSON file is set up without them.
-    import yaml
-
-    from fleet2d.configuration.documents import NodeError, parse
-
-    text = _read_text(path, "YAML")
-    try:
-        content = parse(text)
-    except (yaml.YAMLError, RecursionError) as error:
-        raise FloorPlanError(f"{path} is not YAML: {one_line(error, 200)}") from None
-    except NodeError as error:
-        line = error.node.start_mark.line + 1
-        raise FloorPlanError(f"{path}, line {line}: {error}") from None
-    except InputError as error:
-        raise FloorPlanError(f"{path}: {error}") from None
-    return _mapping(content, path, "a YAML mapping of keys and values")
-
-
-def _read_text(path: Path, language: str) -> str:
-    if path.is_dir():
-        raise FloorPlanError(f"{path} is a folder: name the floor plan's {language} file in it")
-    try:
-        return read_bytes(path, FILE_BYTES, FloorPlanError).decode("utf-8-sig")
-    except FileNotFoundError:
-        raise FloorPlanError(f"there is no file {path}: check floorplan.path") from None
-    except OSError as error:
-        raise FloorPlanError(f"{path} can't be read: {error.strerror}") from None
-    except UnicodeDecodeError:
-        raise FloorPlanError(
-            f"{path} is not a {language} text file: check floorplan.path"
-        ) from None
-
-
-def _mapping(content: object, path: Path, expected: str) -> dict[str, Any]:
-    if isinstance(content, dict):
-        return content
-    kinds = {list: "a list", str: "a text", type(None): "nothing"}
-    kind = kinds.get(type(content), "a single value")
-    raise FloorPlanError(f"{path} holds {kind}: a floor plan is {expected}")

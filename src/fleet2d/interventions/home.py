@@ -6,7 +6,7 @@ from pydantic import Field
 
 from fleet2d.configuration.components import register
 from fleet2d.entities.place import Point
-from fleet2d.floorplan.home.change import HomeChange
+from fleet2d.floorplan.home import HomeChange
 from fleet2d.interventions.intervention import Intervention
 from fleet2d.interventions.world import World
 

@@ -9,7 +9,7 @@ from pydantic import BeforeValidator, Field, PlainSerializer, WithJsonSchema
 from fleet2d.configuration.components import Settings
 from fleet2d.configuration.problems import problem, shown
 from fleet2d.configuration.units import format_time_of_day, parse_time_of_day, weekdays_of
-from fleet2d.floorplan.home.change import format_moment, parse_moment
+from fleet2d.floorplan.home import format_moment, parse_moment
 from fleet2d.runtime.clock import Clock, midnight_of
 from fleet2d.runtime.events import Event
 

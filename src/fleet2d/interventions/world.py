@@ -7,8 +7,7 @@ from typing import Protocol
 from fleet2d.entities.body import Pose
 from fleet2d.entities.decisions import DecidingActor
 from fleet2d.entities.objects.home_object import SensorFault
-from fleet2d.floorplan.home.change import HomeChange
-from fleet2d.floorplan.home.home import Home
+from fleet2d.floorplan.home import Home, HomeChange
 from fleet2d.runtime.clock import Clock
 from fleet2d.runtime.events import EventKind
 from fleet2d.sight.camera import Disturbance

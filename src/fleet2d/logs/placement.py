@@ -10,7 +10,7 @@ from fleet2d.configuration.components import Settings
 from fleet2d.configuration.problems import problem, suggest
 from fleet2d.configuration.units import AngleDeg, Length
 from fleet2d.floorplan.plan import Room
-from fleet2d.floorplan.rooms.vocabulary import room_type
+from fleet2d.floorplan.rooms.room import room_type
 from fleet2d.kernels import F64
 from fleet2d.logs.log import AWAY, ActivityLog, LogError, Reading
 from fleet2d.runtime.determinism import sum_in_order

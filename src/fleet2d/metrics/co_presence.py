@@ -5,7 +5,7 @@ from typing import Any, ClassVar
 from fleet2d.algorithms.algorithm import Present
 from fleet2d.algorithms.history import History
 from fleet2d.configuration.components import register
-from fleet2d.floorplan.home.home import Home
+from fleet2d.floorplan.home import Home
 from fleet2d.metrics.metric import Metric, pairs_of
 
 

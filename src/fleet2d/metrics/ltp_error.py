@@ -15,9 +15,9 @@ from fleet2d.algorithms.presence.belief import ANYONE, HOURS, Presence
 from fleet2d.algorithms.presence.estimator import LN_2, natural_log
 from fleet2d.configuration.components import register
 from fleet2d.configuration.units import PositiveDuration, Share, micros
-from fleet2d.floorplan.cache import read_only
-from fleet2d.floorplan.home.home import Home
-from fleet2d.floorplan.home.space import Space
+from fleet2d.floorplan.home import Home
+from fleet2d.floorplan.plan import read_only
+from fleet2d.floorplan.space import Space
 from fleet2d.kernels import F64, I64, Bool
 from fleet2d.kernels.presence import earth_mover as minimal_cost
 from fleet2d.kernels.space import SUB

@@ -11,7 +11,7 @@ from fleet2d.algorithms.history import History
 from fleet2d.algorithms.log import BodyPoses
 from fleet2d.configuration.components import Component
 from fleet2d.configuration.units import PositiveDuration
-from fleet2d.floorplan.home.home import Home
+from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.kernels import F64, I64, Bool
 from fleet2d.kernels.sight import points_in_sight

@@ -11,7 +11,7 @@ from fleet2d.algorithms.algorithm import Present
 from fleet2d.algorithms.history import History
 from fleet2d.configuration.components import register
 from fleet2d.configuration.units import Length, PositiveDuration, Speed, micros
-from fleet2d.floorplan.home.home import Home
+from fleet2d.floorplan.home import Home
 from fleet2d.metrics.metric import Metric, pairs_of
 from fleet2d.runtime.determinism import sum_in_order
 

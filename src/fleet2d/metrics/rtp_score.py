@@ -14,7 +14,7 @@ from fleet2d.algorithms.observations import NOWHERE
 from fleet2d.algorithms.presence.estimator import natural_log
 from fleet2d.configuration.components import register
 from fleet2d.configuration.units import PositiveDuration
-from fleet2d.floorplan.home.home import Home
+from fleet2d.floorplan.home import Home
 from fleet2d.kernels import F64, I64, Bool
 from fleet2d.metrics.belief_reader import BeliefReader
 from fleet2d.metrics.metric import Metric

@@ -11,7 +11,7 @@ from fleet2d.algorithms.algorithm import Present
 from fleet2d.algorithms.history import History
 from fleet2d.configuration.components import register
 from fleet2d.configuration.units import Length, PositiveDuration
-from fleet2d.floorplan.home.home import Home
+from fleet2d.floorplan.home import Home
 from fleet2d.kernels import F64
 from fleet2d.kernels.sight import points_in_sight
 from fleet2d.metrics.metric import Metric, kaplan_meier, quantile, restricted_mean

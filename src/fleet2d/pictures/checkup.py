@@ -9,7 +9,7 @@ import shapely
 from matplotlib.axes import Axes
 from shapely.geometry.base import BaseGeometry
 
-from fleet2d.floorplan.home.checkup import Finding
+from fleet2d.floorplan.checkup import Finding
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.kernels import F64
 from fleet2d.palette import TEXT_COLOR

@@ -20,10 +20,10 @@ from matplotlib.patches import PathPatch, Rectangle
 from matplotlib.path import Path as Outline
 
 from fleet2d.errors import InputError
-from fleet2d.floorplan.geometry.lattice import UNITS_PER_CELL
-from fleet2d.floorplan.home.standing import grown_cells
+from fleet2d.floorplan.lattice import UNITS_PER_CELL
 from fleet2d.floorplan.plan import FloorPlan, Room, rings
 from fleet2d.floorplan.rooms.room import NO_ROOM
+from fleet2d.floorplan.space import grown_cells
 from fleet2d.kernels import I16, Bool
 from fleet2d.kernels.space import squared_distance
 from fleet2d.palette import (

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Circle, Polygon, Wedge
 
 from fleet2d.errors import InputError
-from fleet2d.floorplan.home.home import Home
+from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.kernels.numbers import TURN
 from fleet2d.kernels.sight import Reach

@@ -14,8 +14,8 @@ from matplotlib.patches import Circle, Polygon
 from matplotlib.patheffects import withStroke
 
 from fleet2d.errors import PlacementError
-from fleet2d.floorplan.geometry.lattice import Lattice
-from fleet2d.floorplan.home.home import Home
+from fleet2d.floorplan.home import Home
+from fleet2d.floorplan.lattice import Lattice
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.kernels import F64, Bool
 from fleet2d.kernels.space import Mesh

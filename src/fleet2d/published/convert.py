@@ -12,7 +12,7 @@ import yaml
 from fleet2d.configuration.documents import Document, Keys, read_document
 from fleet2d.errors import ArtifactError, Fleet2DError, InputError, ScenarioError
 from fleet2d.floorplan.formats.houseexpo import read_houseexpo
-from fleet2d.floorplan.home.home import Home
+from fleet2d.floorplan.home import Home
 from fleet2d.published.entities import body_keys, convert_robot, convert_users, free_name
 from fleet2d.published.reader import ConfigReader
 from fleet2d.published.sections import (

@@ -11,7 +11,7 @@ from pydantic_core import PydanticCustomError
 from fleet2d.configuration.documents import Keys
 from fleet2d.configuration.problems import shown
 from fleet2d.configuration.units import format_duration, parse_duration
-from fleet2d.floorplan.geometry.lattice import MAX_CELL_M, MIN_CELL_M
+from fleet2d.floorplan.lattice import MAX_CELL_M, MIN_CELL_M
 from fleet2d.published.reader import ConfigReader, tidy
 
 _NOTHING_STORED = {

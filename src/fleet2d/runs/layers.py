@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from fleet2d.artifacts.table import Column, Kind, TableSpec
 from fleet2d.configuration.problems import suggest
 from fleet2d.errors import ArtifactError
-from fleet2d.floorplan.home.layers import Layer
+from fleet2d.floorplan.layers import Layer
 from fleet2d.runs.run import Run
 
 PREFIX = "layer."

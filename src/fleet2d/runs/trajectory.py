@@ -17,7 +17,7 @@ from fleet2d.entities.behavior import Actor
 from fleet2d.entities.body import Pose
 from fleet2d.entities.meander import Meander
 from fleet2d.errors import ArtifactError
-from fleet2d.floorplan.home.home import Home
+from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.kernels import F64, I16, I64, Bool
 from fleet2d.kernels.motion import (

@@ -22,7 +22,7 @@ from fleet2d.configuration.units import (
     whole_steps,
 )
 from fleet2d.errors import ScenarioError
-from fleet2d.floorplan.geometry.lattice import Lattice
+from fleet2d.floorplan.lattice import Lattice
 from fleet2d.floorplan.objects import POSTURES
 from fleet2d.kernels import I64
 from fleet2d.kernels.numbers import BELL_STD, HALF_TURN, TURN, UNIT, cosine, sine

@@ -7,7 +7,7 @@ import numpy as np
 from pydantic import Field
 
 from fleet2d.configuration.components import register
-from fleet2d.floorplan.home.home import Home
+from fleet2d.floorplan.home import Home
 from fleet2d.kernels import I64, U8, Bool
 from fleet2d.kernels.numbers import TURN
 from fleet2d.kernels.space import SUB, Mesh

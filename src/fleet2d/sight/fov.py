@@ -9,8 +9,8 @@ import numpy.typing as npt
 
 from fleet2d.configuration.components import Component
 from fleet2d.errors import PlacementError
-from fleet2d.floorplan.geometry.lattice import Lattice
-from fleet2d.floorplan.home.home import Home
+from fleet2d.floorplan.home import Home
+from fleet2d.floorplan.lattice import Lattice
 from fleet2d.kernels import F64, I64, Bool
 from fleet2d.kernels.sight import Reach, points_in_reach, region_contains_points, region_outline
 from fleet2d.kernels.sight import visible_region as visible_region_fast

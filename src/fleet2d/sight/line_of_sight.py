@@ -1,7 +1,7 @@
 """Lines of sight: every point is tested by itself, without a cache."""
 
 from fleet2d.configuration.components import register
-from fleet2d.floorplan.home.home import Home
+from fleet2d.floorplan.home import Home
 from fleet2d.kernels import I64, Bool
 from fleet2d.kernels.sight import points_in_sight
 from fleet2d.sight.fov import FieldOfView

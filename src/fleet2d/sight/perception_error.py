@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from fleet2d.configuration.components import Component
 from fleet2d.configuration.units import micros
 from fleet2d.errors import ComponentError
-from fleet2d.floorplan.home.home import Home
+from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.objects import POSTURES
 from fleet2d.kernels import F64, I16, I64, Bool
 from fleet2d.kernels.motion import rooms_at

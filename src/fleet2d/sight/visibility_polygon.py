@@ -13,7 +13,7 @@ from pydantic import Field, model_validator
 from fleet2d.configuration.components import register
 from fleet2d.configuration.problems import problem_at
 from fleet2d.errors import ScenarioError
-from fleet2d.floorplan.home.home import Home
+from fleet2d.floorplan.home import Home
 from fleet2d.kernels import I32, I64, Bool
 from fleet2d.kernels.sight import (
     cells_in_view,

@@ -14,7 +14,7 @@ from fleet2d.artifacts.store import ArtifactSettings
 from fleet2d.engine.simulation import Simulation
 from fleet2d.errors import Fleet2DError, InputError
 from fleet2d.expectations.verdict import Verdict
-from fleet2d.floorplan.home.home import keep_homes
+from fleet2d.floorplan.home import keep_homes
 from fleet2d.floorplan.source import keep_plans
 from fleet2d.interventions.bodies import Decide, TakeControl
 from fleet2d.interventions.intervention import Intervention

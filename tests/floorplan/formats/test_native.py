@@ -9,12 +9,17 @@ from tests.homes import plan_files
 
 from fleet2d.configuration.components import lookup
 from fleet2d.errors import FloorPlanError
-from fleet2d.floorplan.formats.bundled import Bundled, bundled_names
 from fleet2d.floorplan.formats.houseexpo import read_houseexpo
-from fleet2d.floorplan.formats.native import Native, native_document, read_native
-from fleet2d.floorplan.home.space import Space
+from fleet2d.floorplan.formats.native import (
+    Bundled,
+    Native,
+    bundled_names,
+    native_document,
+    read_native,
+)
 from fleet2d.floorplan.load import load_floorplan
 from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
+from fleet2d.floorplan.space import Space
 
 OUTLINE = [[0, 0], [5, 0], [5, 3], [0, 3]]
 PLAN = {"format": "fleet2d-floorplan", "version": 1, "name": "flat", "free": [{"outline": OUTLINE}]}

@@ -11,9 +11,9 @@ import fleet2d
 from fleet2d.configuration.components import lookup
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.formats.ros import Ros, read_ros
-from fleet2d.floorplan.home.space import Space
 from fleet2d.floorplan.load import load_floorplan
 from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.floorplan.space import Space
 from fleet2d.kernels import U8
 
 FREE, UNKNOWN, OCCUPIED = 254, 205, 0

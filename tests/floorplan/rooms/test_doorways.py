@@ -11,7 +11,7 @@ from tests.strategies import homes, seeds
 from tests.thorough import examples
 
 from fleet2d.errors import FloorPlanError
-from fleet2d.floorplan.geometry.lattice import Lattice
+from fleet2d.floorplan.lattice import Lattice
 from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
 from fleet2d.floorplan.rooms.doorways import DoorLine, fit_lines
 

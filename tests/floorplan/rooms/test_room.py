@@ -3,9 +3,8 @@ import pytest
 import shapely
 
 from fleet2d.errors import FloorPlanError
-from fleet2d.floorplan.geometry.lattice import Lattice
-from fleet2d.floorplan.rooms.regions import LabelledRegion
-from fleet2d.floorplan.rooms.room import Room, assign_rooms
+from fleet2d.floorplan.lattice import Lattice
+from fleet2d.floorplan.rooms.room import LabelledRegion, Room, assign_rooms
 
 LATTICE = Lattice(0.1, (0.0, 0.0), columns=40, rows=30)
 FREE = np.zeros((30, 40), np.bool_)

@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from fleet2d.floorplan.rooms.chambers import Chambers, Link
-from fleet2d.floorplan.rooms.segmentation import segment_rooms
+from fleet2d.floorplan.rooms.segmentation import Chambers, Link, segment_rooms
 
 CELL = 0.1
 

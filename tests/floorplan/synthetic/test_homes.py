@@ -10,12 +10,18 @@ import pytest
 import shapely
 
 from fleet2d.errors import FloorPlanError
-from fleet2d.floorplan.home.home import Home
+from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.plan import FloorPlan
-from fleet2d.floorplan.synthetic.generator import House, Style, generate
-from fleet2d.floorplan.synthetic.geometry import Box, boxes_overlap, inner_walls
-from fleet2d.floorplan.synthetic.judge import MAX_CORRIDOR_SHARE, outline_corners, outline_kind
+from fleet2d.floorplan.synthetic.generator import (
+    MAX_CORRIDOR_SHARE,
+    House,
+    Style,
+    generate,
+    outline_corners,
+    outline_kind,
+)
 from fleet2d.floorplan.synthetic.program import SIZES, Wishes
+from fleet2d.floorplan.synthetic.slicing import Box, boxes_overlap, inner_walls
 from fleet2d.floorplan.synthetic.source import Synthetic
 
 SEEDS = range(60)
@@ -199,8 +205,7 @@ def test_walls_between_boxes_are_where_they_touch() -> None:
 
 
 def test_areas_spread_as_those_of_real_homes_do() -> None:
-    from fleet2d.floorplan.synthetic.draws import Choices
-    from fleet2d.floorplan.synthetic.program import settle_wishes
+    from fleet2d.floorplan.synthetic.program import Choices, settle_wishes
 
     areas = sorted(settle_wishes(Wishes(), Choices(seed, "wishes")).area_m2 for seed in range(800))
     quartiles = np.percentile(areas, [25, 50, 75]).tolist()

@@ -14,7 +14,7 @@ from fleet2d.algorithms.presence.estimator import Estimator
 from fleet2d.configuration.components import OneOf, register
 from fleet2d.configuration.problems import problem
 from fleet2d.configuration.units import PositiveDuration, Share
-from fleet2d.floorplan.home.home import Home
+from fleet2d.floorplan.home import Home
 from fleet2d.kernels import F64
 from fleet2d.runtime.determinism import stream_key
 

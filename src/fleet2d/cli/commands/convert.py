@@ -29,7 +29,7 @@ def convert(
     from fleet2d.floorplan.load import is_floorplan, load_floorplan
 
     if is_floorplan(source):
-        from fleet2d.floorplan.save import save_floorplan
+        from fleet2d.floorplan.load import save_floorplan
 
         plan = load_floorplan(source, resolution=resolution)
         save_floorplan(plan, target)

@@ -13,7 +13,7 @@ def schema(
 ) -> None:
     """Print the JSON Schema of a scenario, for completion in an editor."""
     if floorplan:
-        from fleet2d.floorplan.formats.native_file import native_schema
+        from fleet2d.floorplan.formats.native import native_schema
 
         typer.echo(json.dumps(native_schema(), indent=2))
         return

@@ -62,7 +62,7 @@ def _check_floorplan(
     source: str, out: Path | None, radius: float, resolution: float | None
 ) -> None:
     """Print the findings of a floor plan and draw them; exit with 2 if it is unlivable."""
-    from fleet2d.floorplan.home.checkup import checkup
+    from fleet2d.floorplan.checkup import checkup
     from fleet2d.floorplan.load import load_floorplan
     from fleet2d.pictures.checkup import draw_checkup
 

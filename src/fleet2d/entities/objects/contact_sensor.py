@@ -6,7 +6,7 @@ import numpy as np
 
 from fleet2d.configuration.components import register
 from fleet2d.entities.objects.home_object import Sensor, SensorView
-from fleet2d.floorplan.home.home import Home
+from fleet2d.floorplan.home import Home
 from fleet2d.kernels import I64
 
 

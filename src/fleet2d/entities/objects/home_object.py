@@ -10,7 +10,7 @@ from pydantic import Field
 
 from fleet2d.configuration.components import Component
 from fleet2d.configuration.units import Duration, micros
-from fleet2d.floorplan.home.home import Home
+from fleet2d.floorplan.home import Home
 from fleet2d.kernels import I64, Bool
 
 

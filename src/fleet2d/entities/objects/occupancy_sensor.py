@@ -5,7 +5,7 @@ import shapely
 
 from fleet2d.configuration.components import register
 from fleet2d.entities.objects.home_object import FurnitureSensor, SensorView, first_cause
-from fleet2d.floorplan.home.home import Home
+from fleet2d.floorplan.home import Home
 from fleet2d.kernels import I64
 
 

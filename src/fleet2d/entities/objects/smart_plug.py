@@ -9,7 +9,7 @@ from fleet2d.configuration.components import register
 from fleet2d.configuration.units import Duration, Length
 from fleet2d.entities.objects.home_object import FurnitureSensor, SensorView, first_cause
 from fleet2d.errors import PlacementError
-from fleet2d.floorplan.home.home import Home
+from fleet2d.floorplan.home import Home
 from fleet2d.kernels import I64
 
 

@@ -19,9 +19,8 @@ from fleet2d.entities.robots.approach import (
     viewpoints_of,
 )
 from fleet2d.errors import PlacementError
-from fleet2d.floorplan.cache import read_only
-from fleet2d.floorplan.home.space import Space
-from fleet2d.floorplan.plan import Room
+from fleet2d.floorplan.plan import Room, read_only
+from fleet2d.floorplan.space import Space
 from fleet2d.kernels import F64, I64
 from fleet2d.kernels.sight import points_in_sight
 from fleet2d.kernels.space import CELL_CENTRE, SUB

@@ -21,7 +21,7 @@ from fleet2d.configuration.units import (
 from fleet2d.entities.behavior import Behavior, Situation
 from fleet2d.entities.place import Nearest
 from fleet2d.entities.plan import Note, Plan
-from fleet2d.floorplan.home.space import straight_way
+from fleet2d.floorplan.space import straight_way
 from fleet2d.kernels import F64, I64
 from fleet2d.kernels.motion import time_route
 from fleet2d.kernels.numbers import TURN, heading_of

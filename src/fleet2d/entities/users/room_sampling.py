@@ -14,7 +14,7 @@ from fleet2d.entities.place import available_places
 from fleet2d.entities.plan import Plan
 from fleet2d.entities.users.resident import Spot, Spots
 from fleet2d.errors import PlacementError
-from fleet2d.floorplan.geometry.lattice import UNITS_PER_CELL
+from fleet2d.floorplan.lattice import UNITS_PER_CELL
 from fleet2d.kernels import I64
 from fleet2d.routines.activity import AnyDurationDistribution, DurationDistribution
 from fleet2d.routines.distributions import draw_weighted

@@ -10,17 +10,18 @@ from pydantic import Field, TypeAdapter
 from fleet2d.configuration.components import register
 from fleet2d.configuration.units import InputPath, PositiveLength, Share
 from fleet2d.errors import FloorPlanError
+from fleet2d.floorplan.formats.files import in_file
 from fleet2d.floorplan.formats.occupancy import (
     RAY_WIDTH_M,
     SPECK_AREA_M2,
+    GreyPicture,
     OccupancyMap,
     OccupancySource,
     free_space,
+    read_grey,
 )
-from fleet2d.floorplan.formats.raster import GreyPicture, read_grey
-from fleet2d.floorplan.geometry.lattice import MAX_CELL_M, MIN_CELL_M
+from fleet2d.floorplan.lattice import MAX_CELL_M, MIN_CELL_M
 from fleet2d.floorplan.plan import FloorPlan
-from fleet2d.floorplan.source import in_file
 from fleet2d.kernels import Bool
 from fleet2d.kernels.space import label_parts
 

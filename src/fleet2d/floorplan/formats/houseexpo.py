@@ -11,10 +11,19 @@ from shapely.geometry import MultiPolygon
 from fleet2d.configuration.components import register
 from fleet2d.configuration.units import InputPath
 from fleet2d.errors import FloorPlanError
-from fleet2d.floorplan.formats.fields import BoxSides, Listed, Point, Ring, list_of, validate
-from fleet2d.floorplan.geometry.repair import repair
+from fleet2d.floorplan.formats.files import (
+    BoxSides,
+    Listed,
+    Point,
+    Ring,
+    in_file,
+    list_of,
+    read_json,
+    validate,
+)
+from fleet2d.floorplan.mesh import repair
 from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
-from fleet2d.floorplan.source import FloorPlanSource, in_file, read_json
+from fleet2d.floorplan.source import FloorPlanSource
 
 
 class _HouseFile(BaseModel):

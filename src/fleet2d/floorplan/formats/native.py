@@ -1,32 +1,293 @@
-"""This project's own floor plan format: outlines, rooms, doors and objects, as JSON or YAML.
+"""The content of a file in Fleet2D's own floor plan format, and its JSON Schema."""
 
-A plan that is written by `native_document` and read again at the same cell size is equal to it::
-
-    {"format": "fleet2d-floorplan", "version": 1, "name": "flat",
-     "free": [{"outline": [[0, 0], [5, 0], [5, 3], [0, 3]], "holes": []}],
-     "rooms": [{"type": "kitchen", "polygon": [[0, 0], [2, 0], [2, 3], [0, 3]]}],
-     "entrance": [4.5, 0.5]}
-
-`native_file.PlanFile` has all keys.
-"""
-
+from functools import cached_property
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 import shapely
-from shapely import Polygon
+from pydantic import (
+    AfterValidator,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    GetJsonSchemaHandler,
+    TypeAdapter,
+    model_validator,
+)
+from pydantic_core import core_schema
+from shapely import MultiPolygon, Polygon
 
 from fleet2d.configuration.components import register
+from fleet2d.configuration.problems import problem
 from fleet2d.configuration.units import InputPath
 from fleet2d.errors import FloorPlanError
-from fleet2d.floorplan.formats.fields import shown_value, validate
-from fleet2d.floorplan.formats.native_file import FORMAT, PLAN_FILE, VERSION, PlanFile, space_of
-from fleet2d.floorplan.geometry.lattice import UNITS_PER_CELL, Lattice
-from fleet2d.floorplan.objects import PlacedObject, UsePlace
-from fleet2d.floorplan.plan import FloorPlan
-from fleet2d.floorplan.source import FloorPlanSource, in_file, read_document
+from fleet2d.floorplan.formats.files import (
+    RING_SCHEMA,
+    Coordinate,
+    FileModel,
+    Listed,
+    Point,
+    Ring,
+    Text,
+    in_file,
+    read_document,
+    read_json,
+    shown_value,
+    validate,
+)
+from fleet2d.floorplan.lattice import UNITS_PER_CELL, Lattice
+from fleet2d.floorplan.objects import Blocks, PlacedObject, Posture, UsePlace
+from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
+from fleet2d.floorplan.rooms.doorways import DoorLine
+from fleet2d.floorplan.rooms.room import UNKNOWN, room_type
+from fleet2d.floorplan.source import FloorPlanSource
 from fleet2d.kernels import Bool
+
+FORMAT = "fleet2d-floorplan"
+VERSION = 1
+
+
+class AreaEntry(FileModel):
+    """An area: an outline and its holes.
+
+    Attributes:
+        outline: Corners, the first not repeated at the end.
+        holes: Outlines of its holes.
+    """
+
+    outline: Ring
+    holes: Listed[Ring] = Field(default_factory=list)
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        _check_valid(self.polygon)
+        return self
+
+    @cached_property
+    def polygon(self) -> Polygon:
+        """The area [m]."""
+        return Polygon(self.outline, self.holes)
+
+
+class _CornersAlone:
+    """Adds to the JSON Schema that an area without holes may be written as its corners alone."""
+
+    def __get_pydantic_json_schema__(
+        self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        return {"anyOf": [RING_SCHEMA, handler(schema)]}
+
+
+Area = Annotated[
+    AreaEntry,
+    BeforeValidator(lambda value: value if isinstance(value, dict) else {"outline": value}),
+    _CornersAlone(),
+]
+
+
+def _check_valid(shape: Polygon | MultiPolygon) -> None:
+    """Refuse a shape that crosses itself, as only the traced outlines of other formats may."""
+    if not shape.is_valid:
+        reason, _, at = shapely.is_valid_reason(shape).partition("[")
+        place = f" at ({at.rstrip(']').replace(' ', ', ')}) m" if at else ""
+        raise problem(f"is not a valid outline: {reason.lower()}{place}")
+
+
+def space_of(parts: list[AreaEntry]) -> Polygon | MultiPolygon:
+    """Return the union of parts [m]."""
+    return parts[0].polygon if len(parts) == 1 else MultiPolygon([part.polygon for part in parts])
+
+
+def _check_space(parts: list[AreaEntry]) -> list[AreaEntry]:
+    if len(parts) > 1:
+        _check_valid(space_of(parts))
+    return parts
+
+
+Space = Annotated[Listed[AreaEntry], AfterValidator(_check_space)]
+
+
+class RoomEntry(FileModel):
+    """A room: its type, and where it is, by either `polygon` or `region`.
+
+    Attributes:
+        type: Its type, such as bedroom.
+        name: Its name; left out: its type and a number.
+        labels: Every type that it has.
+        polygon: Its outline.
+        region: Its parts, if it has several or holes.
+    """
+
+    model_config = ConfigDict(
+        json_schema_extra={"oneOf": [{"required": ["polygon"]}, {"required": ["region"]}]}
+    )
+
+    type: Text
+    name: Text | None = None
+    labels: Listed[Text] | None = None
+    polygon: Area | None = None
+    region: Space | None = None
+
+    @model_validator(mode="after")
+    def _check_place(self) -> Self:
+        if (self.polygon is None) == (self.region is None):
+            raise problem("needs either polygon (its corners) or region (outlines with holes)")
+        return self
+
+    def to_region(self) -> LabelledRegion:
+        """Return the room as a region of the plan."""
+        kind, labels = room_type(self.type), self.labels
+        if labels is None:
+            labels = [self.type] if kind != UNKNOWN else []
+        parts = [self.polygon] if self.polygon is not None else self.region or []
+        return LabelledRegion(tuple(labels), space_of(parts), self.name, kind)
+
+
+class DoorwayEntry(FileModel):
+    """A passage between two rooms, as a line across it.
+
+    Attributes:
+        name: Its name; left out: those of its rooms.
+        leaf: Whether a door hangs in it.
+    """
+
+    start: Point
+    end: Point
+    name: Text | None = None
+    leaf: bool = True
+
+    def to_line(self) -> DoorLine:
+        """Return the doorway as a line of the plan."""
+        return DoorLine(self.start, self.end, self.name, self.leaf)
+
+
+class UseEntry(FileModel):
+    """A place to use an object from.
+
+    Attributes:
+        heading: Direction that the person faces.
+        approach: Place from which one steps there.
+    """
+
+    x: Coordinate
+    y: Coordinate
+    heading: Coordinate
+    posture: Posture = "stand"
+    approach: Point | None = None
+
+
+class ObjectUse(FileModel):
+    """How an object is used.
+
+    Attributes:
+        blocks: Whether it blocks nothing, bodies, or bodies and sight.
+        heading: Direction of its front.
+        uses: Places to use it from.
+    """
+
+    blocks: Blocks = "path"
+    heading: Coordinate = 0.0
+    uses: Listed[UseEntry] = Field(default_factory=list)
+
+    def use_places(self) -> tuple[UsePlace, ...]:
+        """Return the places to use it from."""
+        return tuple(UsePlace(**dict(use)) for use in self.uses)
+
+
+class ObjectEntry(ObjectUse):
+    """A piece of furniture or a device, stored separately from the walls.
+
+    Attributes:
+        type: Its type, such as bed.
+        name: Its name; left out: its type and a number.
+    """
+
+    type: Text
+    footprint: Area
+    name: Text | None = None
+
+    def to_object(self) -> PlacedObject:
+        """Return the object as one of the plan."""
+        return PlacedObject(
+            name=self.name or "",
+            type=self.type,
+            footprint=self.footprint.polygon,
+            blocks=self.blocks,
+            uses=self.use_places(),
+            heading=self.heading,
+        )
+
+
+class PlanFile(FileModel):
+    """A home. Lengths are in metres, angles in radians counter-clockwise from +x.
+
+    Attributes:
+        name: Name of the plan; left out: of its file.
+        free: The parts of the free space between the walls.
+        rooms: Its rooms; space of none is the room unknown_0.
+        doorways: Passages between rooms; left out: the walls are searched.
+        objects: Furniture and devices, which are separate from the walls.
+        no_go: Areas that robots keep out of.
+        entrance: A place just inside the front door.
+    """
+
+    model_config = ConfigDict(title="Fleet2D floor plan")
+
+    format: Literal["fleet2d-floorplan"]
+    version: Literal[1]
+    name: Text | None = None
+    free: Space = Field(json_schema_extra={"minItems": 1})
+    rooms: Listed[RoomEntry] | None = None
+    doorways: Listed[DoorwayEntry] | None = None
+    objects: Listed[ObjectEntry] = Field(default_factory=list)
+    no_go: Listed[Area] = Field(default_factory=list)
+    entrance: Point | None = None
+
+
+PLAN_FILE = TypeAdapter(PlanFile)
+
+
+_LISTS: dict[str, type[FileModel]] = {
+    "free": AreaEntry,
+    "rooms": RoomEntry,
+    "region": AreaEntry,
+    "doorways": DoorwayEntry,
+    "objects": ObjectEntry,
+    "uses": UseEntry,
+    "no_go": AreaEntry,
+}
+_AREAS = ("polygon", "footprint")
+_POINTS = ("start", "end", "approach", "entrance")
+
+
+def unchecked(model: type[FileModel], content: Any) -> Any:
+    """Return the content of a file as a model, without checking it.
+
+    To check takes most of the time of reading a home, and loads modules that nothing else needs.
+    """
+    fields: dict[str, Any] = {"outline": content} if isinstance(content, list) else dict(content)
+    for key, value in fields.items():
+        if key in _LISTS:
+            fields[key] = [unchecked(_LISTS[key], item) for item in value]
+        elif key in _AREAS:
+            fields[key] = unchecked(AreaEntry, value)
+        elif key in _POINTS:
+            fields[key] = tuple(value)
+    return model.model_construct(**fields)
+
+
+def native_schema() -> dict[str, Any]:
+    """Return the JSON Schema of a floor plan file.
+
+    It describes what a file may contain. Whether outlines cross, doorways lie in passages and names
+    differ is checked only when the plan is read.
+
+    >>> sorted(native_schema()["required"])
+    ['format', 'free', 'version']
+    """
+    dialect = {"$schema": "https://json-schema.org/draft/2020-12/schema"}
+    return dialect | PlanFile.model_json_schema()
 
 
 @register("floorplan", "native")
@@ -172,3 +433,41 @@ def cell_polygons(mask: Bool) -> list[Polygon]:
     _, end = np.nonzero(edges == -1)
     corners = np.stack([first, row, end, row + 1]).astype(np.float64) * UNITS_PER_CELL
     return shapely.get_parts(shapely.union_all(shapely.box(*corners))).tolist()
+
+
+HOMES = Path(__file__).with_name("homes")
+
+
+@register("floorplan", "bundled")
+class Bundled(FloorPlanSource):
+    """A home that comes with Fleet2D.
+
+    Attributes:
+        name: The name of the home.
+    """
+
+    name: Literal["family_home"] = "family_home"
+
+    def load(self) -> FloorPlan:
+        """Read the plan."""
+        return read_bundled(self.name, self.cell)
+
+
+def read_bundled(name: str, cell: float = 0.05) -> FloorPlan:
+    """Read a home that comes with Fleet2D, whose file the tests check.
+
+    Args:
+        name: The name of the home.
+        cell: Side of a grid cell [m].
+
+    Example:
+        >>> len(read_bundled("family_home").rooms)
+        14
+    """
+    path = HOMES / f"{name}.json"
+    return plan_of(unchecked(PlanFile, read_json(path)), path, cell)
+
+
+def bundled_names() -> list[str]:
+    """Return the names of the homes that come with Fleet2D."""
+    return sorted(path.stem for path in HOMES.glob("*.json"))

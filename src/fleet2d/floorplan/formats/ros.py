@@ -14,18 +14,18 @@ from shapely import Polygon
 from fleet2d.configuration.components import register
 from fleet2d.configuration.units import InputPath, Length
 from fleet2d.errors import FloorPlanError
-from fleet2d.floorplan.formats.fields import MAX_COORDINATE_M, shown_value
+from fleet2d.floorplan.formats.files import MAX_COORDINATE_M, in_file, read_yaml, shown_value
 from fleet2d.floorplan.formats.occupancy import (
     RAY_WIDTH_M,
     SPECK_AREA_M2,
+    GreyPicture,
     OccupancyMap,
     OccupancySource,
     free_space,
+    read_grey,
 )
-from fleet2d.floorplan.formats.raster import GreyPicture, read_grey
-from fleet2d.floorplan.geometry.lattice import MAX_CELL_M, MIN_CELL_M
+from fleet2d.floorplan.lattice import MAX_CELL_M, MIN_CELL_M
 from fleet2d.floorplan.plan import FloorPlan
-from fleet2d.floorplan.source import in_file, read_yaml
 from fleet2d.kernels import Bool
 
 # The grey that map savers write for unknown; above this free_thresh it would count as free.

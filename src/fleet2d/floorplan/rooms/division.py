@@ -1,26 +1,291 @@
-"""Divide the free space of a plan into rooms, by the regions that its source gives."""
+"""Label chambers by the rough boxes that a file draws over a plan.
+
+Walls determine where rooms end, and boxes how they are labelled. A box is matched to the chamber
+that it outlines, and doesn't reach into others. Several boxes in one chamber, as in an open plan,
+divide it.
+"""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
 import shapely
 from shapely import Polygon
 
-from fleet2d.floorplan.geometry.gates import Segment
-from fleet2d.floorplan.geometry.lattice import Lattice
-from fleet2d.floorplan.geometry.mesh import build_mesh
-from fleet2d.floorplan.rooms.adjacency import open_borders
-from fleet2d.floorplan.rooms.chambers import Chambers, cut_chambers
-from fleet2d.floorplan.rooms.doorway_search import MAX_DOOR_M, find_passages
-from fleet2d.floorplan.rooms.doorways import DoorLine, fit_lines, rooms_beside
-from fleet2d.floorplan.rooms.labelling import label_chambers
-from fleet2d.floorplan.rooms.regions import LabelledRegion, Region, cells_in, snap_regions
-from fleet2d.floorplan.rooms.room import NO_ROOM, Room, assign_rooms, dropped_note, make_rooms
-from fleet2d.floorplan.rooms.segmentation import segment_rooms
-from fleet2d.kernels import I16, I64, Bool
-from fleet2d.kernels.space import Mesh
+from fleet2d.floorplan.lattice import Lattice
+from fleet2d.floorplan.mesh import Segment, build_mesh
+from fleet2d.floorplan.rooms.doorways import DoorLine, fit_lines, open_borders, rooms_beside
+from fleet2d.floorplan.rooms.room import (
+    NO_ROOM,
+    LabelledRegion,
+    Patch,
+    Region,
+    Room,
+    assign_rooms,
+    cells_in,
+    dropped_note,
+    make_rooms,
+    snap_regions,
+)
+from fleet2d.floorplan.rooms.segmentation import (
+    MAX_DOOR_M,
+    Chambers,
+    cut_chambers,
+    find_passages,
+    segment_rooms,
+)
+from fleet2d.kernels import F64, I16, I32, I64, Bool
+from fleet2d.kernels.space import Mesh, label_frames, label_parts, spread_labels, squared_distance
+
+MIN_OUTLINE_OVERLAP = 0.5
+"""A box outlines a chamber if the intersection of box and chamber's frame is at least this share
+of their union."""
+MIN_REACH_SHARE = 0.3
+"""A box also claims a chamber that an opening joins to its own, if it covers this share of it."""
+MIN_TOUCH_SHARE = 0.15
+"""A box only touches a chamber that has less than this share of the box's cells, and of which the
+box covers less than half."""
+NOT_FREE, TOO_SMALL = "covers no free space", "covers too little free space"
+ONLY_TOUCHES = "only touches rooms"
+MIN_KEPT_SHARE = 0.25
+"""Where boxes overlap: one that keeps less than this share of its cells is no room of its own."""
+MIN_ROOM_M2, MIN_ROOM_WIDTH_M = 0.5, 0.4
+"""Least area and width of a room with a label."""
+MIN_REST_M2, MIN_REST_WIDTH_M = 2.5, 0.8
+"""Least area and width of a room without a label …"""
+REST_SHARE, REST_SHARE_OF_ONE = 0.06, 0.3
+"""… and its least share of a chamber that has several labels, or only one."""
+
+
+@dataclass
+class _JoinedChambers:
+    """Chambers that openings join into one, and for each box the chambers that it claims."""
+
+    chambers: list[int]
+    claims: dict[int, set[int]] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class ChamberLabels:
+    """The rooms that chambers and boxes make.
+
+    Attributes:
+        of_cell: For each free cell the number of its box, or from the number of boxes on that of
+            a room that no box claims; -1 where not free. int32 (rows, columns).
+        rests: Number of rooms that no box claims.
+        merged: For each box the box that gets its labels: itself, or one that covers it.
+        dropped: For each box that is not a room the reason; by box.
+    """
+
+    of_cell: I32
+    rests: int
+    merged: dict[int, int]
+    dropped: dict[int, str]
+
+
+def label_chambers(
+    chambers: Chambers, boxes: Sequence[Patch], is_opening: Sequence[bool], cell: float
+) -> ChamberLabels:
+    """Divide the free space among the boxes that label the rooms of a plan.
+
+    Args:
+        chambers: The free space, cut at doorways and openings.
+        boxes: The free cells in each labelled rectangle of the plan.
+        is_opening: Whether each line at which the chambers were cut is an opening, not a doorway.
+        cell: Side of a cell [m].
+    """
+    frames = label_frames(chambers.of_cell, chambers.count)
+    claims, dropped = _claims(chambers, frames, boxes, is_opening, cell)
+    blocks = _blocks(chambers, claims, is_opening, cell)
+    out = np.full(chambers.of_cell.shape, -1, np.int32)
+    for box in sorted(claims, key=lambda b: (-boxes[b].cells, -b)):
+        claimed = np.zeros(chambers.count + 1, np.bool_)  # its last entry serves -1
+        claimed[list(claims[box])] = True
+        window = boxes[box].window
+        out[window][boxes[box].mask & claimed[chambers.of_cell[window]]] = box
+    merged = {box: box for box in range(len(boxes))}
+    next_room = len(boxes)
+    for block in blocks:
+        window = _window(frames[block.chambers])
+        inside = np.isin(chambers.of_cell[window], block.chambers)
+        labels = np.where(inside, out[window], -1).astype(np.int32)
+        for box in sorted(block.claims, key=lambda b: (-boxes[b].cells, -b)):
+            cells = _cells_in(boxes[box], window, inside)
+            _keep_one_piece(labels, box, cells, cell, merged, dropped)
+        labels, next_room = _fill(labels, inside, cell, next_room)
+        out[window][inside] = labels[inside]
+    return ChamberLabels(out, next_room - len(boxes), merged, dict(sorted(dropped.items())))
+
+
+# --- Which boxes claim which chambers ------------------------------------------------------------
+
+
+def _claims(
+    chambers: Chambers, frames: I64, boxes: Sequence[Patch], is_opening: Sequence[bool], cell: float
+) -> tuple[dict[int, set[int]], dict[int, str]]:
+    """Return the chambers that each box claims, and the reasons of boxes that claim none."""
+    sizes = np.bincount(chambers.of_cell[chambers.of_cell >= 0], minlength=chambers.count)
+    neighbors: dict[int, set[int]] = {c: set() for c in range(chambers.count)}
+    for link in chambers.links:
+        if is_opening[link.line]:
+            a, b = link.chambers
+            neighbors[a].add(b)
+            neighbors[b].add(a)
+    claims: dict[int, set[int]] = {}
+    dropped: dict[int, str] = {}
+    for number, box in enumerate(boxes):
+        counts = np.bincount(chambers.of_cell[box.window][box.mask], minlength=chambers.count)
+        if _too_small(box, cell):
+            dropped[number] = TOO_SMALL if box.cells else NOT_FREE
+            continue
+        overlap = _overlaps(box.frame, frames)
+        overlap[counts < MIN_OUTLINE_OVERLAP * MIN_OUTLINE_OVERLAP * sizes] = 0
+        best = int(np.argmax(overlap if overlap.max() >= MIN_OUTLINE_OVERLAP else counts))
+        if (
+            counts[best] < MIN_TOUCH_SHARE * counts.sum()
+            and counts[best] < MIN_OUTLINE_OVERLAP * sizes[best]
+        ):
+            dropped[number] = ONLY_TOUCHES
+            continue
+        claims[number] = {best}
+        queue = [best]
+        while queue:
+            for neighbor in sorted(neighbors[queue.pop()] - claims[number]):
+                if counts[neighbor] >= MIN_REACH_SHARE * sizes[neighbor]:
+                    claims[number].add(neighbor)
+                    queue.append(neighbor)
+    return claims, dropped
+
+
+def _too_small(box: Patch, cell: float) -> bool:
+    row, column, end_row, end_column = box.frame.tolist()
+    narrow = min(end_row - row, end_column - column) * cell < MIN_ROOM_WIDTH_M
+    return narrow or box.cells * cell**2 < MIN_ROOM_M2
+
+
+def _overlaps(frame: I64, frames: I64) -> F64:
+    """Return the intersection of a frame with each of others, as a share of their union."""
+    low, high = np.maximum(frame[:2], frames[:, :2]), np.minimum(frame[2:], frames[:, 2:])
+    common = np.clip(high - low, 0, None).prod(axis=1)
+    areas = (frames[:, 2:] - frames[:, :2]).prod(axis=1)
+    return common / ((frame[2:] - frame[:2]).prod() + areas - common)
+
+
+def _blocks(
+    chambers: Chambers, claims: dict[int, set[int]], is_opening: Sequence[bool], cell: float
+) -> list[_JoinedChambers]:
+    """Join chambers across openings, except where they separate two labels."""
+    owner = list(range(chambers.count))
+    sizes = np.bincount(chambers.of_cell[chambers.of_cell >= 0], minlength=chambers.count)
+    by_chamber: dict[int, set[int]] = {c: set() for c in owner}
+    for box, claimed in claims.items():
+        for chamber in claimed:
+            by_chamber[chamber].add(box)
+    for link in chambers.links:
+        a, b = link.chambers
+        free = not by_chamber[a] and not by_chamber[b]
+        shared = bool(by_chamber[a] & by_chamber[b])
+        tiny = any(
+            not by_chamber[one] and sizes[one] * cell**2 < MIN_REST_M2 for one in link.chambers
+        )
+        if is_opening[link.line] and (free or shared or tiny):
+            low, high = sorted((owner[a], owner[b]))
+            owner = [low if root == high else root for root in owner]
+    blocks = {root: _JoinedChambers([]) for root in sorted(set(owner))}
+    for chamber, root in enumerate(owner):
+        blocks[root].chambers.append(chamber)
+        for box in by_chamber[chamber]:
+            blocks[root].claims.setdefault(box, set()).add(chamber)
+    return list(blocks.values())
+
+
+# --- Dividing a block among its boxes -------------------------------------------------------------
+
+
+def _window(frames: I64) -> tuple[slice, slice]:
+    """Return the rows and columns of the smallest window that holds all frames."""
+    (row, column), (end_row, end_column) = frames[:, :2].min(axis=0), frames[:, 2:].max(axis=0)
+    return slice(int(row), int(end_row)), slice(int(column), int(end_column))
+
+
+def _cells_in(box: Patch, window: tuple[slice, slice], inside: Bool) -> Bool:
+    """Return the cells of a box inside a block, bool (rows, columns) of the block's window."""
+    common = [
+        (max(a.start, b.start), max(min(a.stop, b.stop), a.start, b.start))
+        for a, b in zip(box.window, window, strict=True)
+    ]
+    target, source = (
+        tuple(
+            slice(low - extent.start, high - extent.start)
+            for (low, high), extent in zip(common, bounds, strict=True)
+        )
+        for bounds in (window, box.window)
+    )
+    cells = np.zeros(inside.shape, np.bool_)
+    cells[target] = box.mask[source]
+    return cells & inside
+
+
+def _fill(labels: I32, inside: Bool, cell: float, next_room: int) -> tuple[I32, int]:
+    """Give every cell of a block a room; return also the number of the next room without a box."""
+    boxes = np.flatnonzero(np.bincount(labels[labels >= 0]))
+    first_room = next_room
+    next_room = _number_rests(labels, inside, len(boxes), cell, next_room)
+    if len(boxes) == 1 and next_room == first_room:
+        return np.where(inside, boxes[0], -1).astype(np.int32), next_room
+    if (labels[inside] < 0).any():
+        labels = spread_labels(labels, inside)
+    while (labels[inside] < 0).any():  # parts that share no side with labelled cells
+        part = label_parts(inside & (labels < 0), False)
+        labels[part == 0] = next_room
+        next_room += 1
+    return labels, next_room
+
+
+def _keep_one_piece(
+    labels: I32, box: int, whole: Bool, cell: float, merged: dict[int, int], dropped: dict[int, str]
+) -> None:
+    """Leave a box its largest piece, or nothing if that is too small to be a room."""
+    own = labels == box
+    if own.any():
+        part = label_parts(own, False)
+        largest = part == np.argmax(np.bincount(part[own]))
+        labels[own & ~largest] = -1
+        own = largest
+    cells = int(np.count_nonzero(own))
+    if cells >= MIN_KEPT_SHARE * np.count_nonzero(whole) and cells * cell**2 >= MIN_ROOM_M2:
+        return
+    labels[own] = -1
+    covering = labels[whole & (labels >= 0)]
+    if len(covering) and np.count_nonzero(whole):
+        merged[box] = int(np.argmax(np.bincount(covering)))
+    else:
+        dropped[box] = TOO_SMALL
+
+
+def _number_rests(labels: I32, inside: Bool, boxes: int, cell: float, next_room: int) -> int:
+    """Number the parts of a block that no box covers and that are large enough to be rooms."""
+    rest = inside & (labels < 0)
+    if boxes == 0:
+        labels[rest] = next_room
+        return next_room + 1
+    share = REST_SHARE_OF_ONE if boxes == 1 else REST_SHARE
+    least = max(MIN_REST_M2 / cell**2, share * np.count_nonzero(inside))
+    if np.count_nonzero(rest) < least:
+        return next_room
+    radius = MIN_REST_WIDTH_M / 2 / cell
+    core = squared_distance(np.pad(rest, 1))[1:-1, 1:-1] >= radius**2
+    if not core.any():
+        return next_room
+    opened = rest & (squared_distance(~core) < radius**2)
+    part = label_parts(opened, False)
+    sizes = np.bincount(part[opened])
+    for number in np.flatnonzero(sizes >= least):
+        labels[part == number] = next_room
+        next_room += 1
+    return next_room
+
 
 RegionKind = Literal["exact", "boxes", "none"]
 """The regions of a source are the rooms themselves (`exact`), boxes that label what walls bound

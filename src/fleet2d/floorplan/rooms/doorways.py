@@ -1,17 +1,20 @@
-"""Doorways: passages between rooms, where a door may hang."""
+"""Doorways: passages between rooms, their walls, and the links that they make between rooms."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 import shapely
-from shapely import LineString, Polygon
+from numpy.typing import NDArray
+from shapely import LineString, MultiPolygon, Polygon
+from shapely.geometry.base import BaseGeometry
 
-from fleet2d.floorplan.geometry.gates import Segment
-from fleet2d.floorplan.geometry.lattice import Lattice
+from fleet2d.floorplan.lattice import UNITS_PER_CELL, Lattice
+from fleet2d.floorplan.mesh import Segment
 from fleet2d.floorplan.objects import Point
-from fleet2d.kernels import F64, I16
+from fleet2d.kernels import F64, I16, I64, Bool
 
 # How far beyond the end of a door line its wall may be [m].
 REACH_M = 0.3
@@ -216,3 +219,276 @@ def rooms_beside(lattice: Lattice, room_of_place: I16, segment: Segment) -> tupl
     if left < 0 or right < 0:
         left = right = max(left, right, 0)
     return left, right
+
+
+_CENTRE = UNITS_PER_CELL // 2 + 1
+
+# Least length of an open border [cells]; a shorter one is an artifact of the cells at walls.
+MIN_SIDES = 2
+
+
+@dataclass(frozen=True)
+class RoomLink:
+    """A link between two rooms.
+
+    Attributes:
+        rooms: Their indices, the lower first.
+        kind: `doorway`, or `open` where they meet without a wall between them.
+        width_m: Width of the doorway, or length of the open border along the longer axis [m].
+        doorway: Index of the doorway, None for an open border.
+    """
+
+    rooms: tuple[int, int]
+    kind: Literal["doorway", "open"]
+    width_m: float
+    doorway: int | None = None
+
+
+def room_links(
+    lattice: Lattice, room_of_cell: I16, doorways: Sequence[Doorway]
+) -> tuple[RoomLink, ...]:
+    """Return the links between rooms: doorways by index, then open borders by rooms."""
+    doors = [
+        RoomLink((min(d.rooms), max(d.rooms)), "doorway", d.width_m, d.index)
+        for d in doorways
+        if d.rooms[0] != d.rooms[1]
+    ]
+    segments = doorway_segments(lattice, doorways)
+    return (*doors, *open_borders(lattice, room_of_cell, segments))
+
+
+def doorway_segments(lattice: Lattice, doorways: Sequence[Doorway]) -> list[Segment]:
+    """Return the doorways as segments [lattice]."""
+    segments = []
+    for doorway in doorways:
+        (x0, y0), (x1, y1) = lattice.to_lattice((doorway.start, doorway.end)).tolist()
+        segments.append(((x0, y0), (x1, y1)))
+    return segments
+
+
+def open_borders(
+    lattice: Lattice, room_of_cell: I16, passages: Sequence[Segment]
+) -> tuple[RoomLink, ...]:
+    """Return the borders of rooms without a wall, except in passages.
+
+    Args:
+        lattice: Of the plan.
+        room_of_cell: Room index of each cell, -1 where not free.
+        passages: Doorways [lattice]; borders across them don't count.
+    """
+    counts: dict[tuple[int, int], list[int]] = {}
+    for axis in (0, 1):
+        cells, pairs = _border(room_of_cell, axis)
+        step = np.array([axis == 1, axis == 0], np.int64) * UNITS_PER_CELL
+        first = cells[:, ::-1] * UNITS_PER_CELL + _CENTRE
+        across = np.zeros(len(cells), np.bool_)
+        for passage in passages:
+            across |= _crosses(first, step, passage)
+        pairs = np.sort(pairs[~across], axis=1)
+        keys, sides = np.unique(pairs[:, 0] * 2**16 + pairs[:, 1], return_counts=True)
+        for pair, number in zip(keys.tolist(), sides.tolist(), strict=True):
+            counts.setdefault(divmod(pair, 2**16), [0, 0])[axis] = number
+    return tuple(
+        RoomLink(rooms, "open", max(sides) * lattice.cell)
+        for rooms, sides in sorted(counts.items())
+        if max(sides) >= MIN_SIDES
+    )
+
+
+def _border(rooms: I16, axis: int) -> tuple[I64, I64]:
+    """Return the (row, column) of cells whose successor has another room, and both rooms."""
+    before, after = (rooms[:-1], rooms[1:]) if axis == 0 else (rooms[:, :-1], rooms[:, 1:])
+    differ = (before != after) & (before >= 0) & (after >= 0)
+    pairs = np.stack([before[differ], after[differ]], axis=1).astype(np.int64)
+    return np.argwhere(differ), pairs
+
+
+def _crosses(first: I64, step: I64, passage: Segment) -> Bool:
+    """Return which steps from cell centres meet a passage."""
+    start = np.array(passage[0])
+    along = np.array(passage[1]) - start
+
+    def side(origin: I64, direction: I64, point: I64) -> I64:
+        gap = point - origin
+        return np.sign(direction[..., 0] * gap[..., 1] - direction[..., 1] * gap[..., 0])
+
+    meets_line = side(start, along, first) * side(start, along, first + step) <= 0
+    meets_segment = side(first, step, start) * side(first, step, start + along) <= 0
+    return meets_line & meets_segment
+
+
+Place = tuple[float, float]
+
+TOUCH_M = 0.02
+"""Outlines no further apart than this touch, as coordinates are rounded (degrees to 1 cm)."""
+MAX_WALL_M = 0.6
+"""Largest thickness of a wall."""
+NEAR_M = 0.25
+"""Largest distance of a door from the wall that it is in."""
+
+# Places along a door's width, as shares of it, at which the wall is measured; the first decides.
+_ALONG = (0.5, 0.1, 0.9)
+_OVER = 1e-3  # how far an opening reaches into the space on either side, to be joined to it [m]
+
+
+@dataclass(frozen=True)
+class Passage:
+    """A door's passage through a wall.
+
+    Attributes:
+        start: One end of the door as drawn (x, y) [m].
+        end: The other end [m].
+        low: Offset of the wall's near face from the door, to the left [m]; negative: to the right.
+        high: Offset of its far face [m].
+        through: Whether both sides have free space; else only the side beyond `low` has or, if
+            that is minus infinity, the side beyond `high`.
+    """
+
+    start: Place
+    end: Place
+    low: float
+    high: float
+    through: bool
+
+    @property
+    def line(self) -> tuple[Place, Place]:
+        """The door, moved into the middle of the wall."""
+        return self._beside((self.low + self.high) / 2)
+
+    @property
+    def opening(self) -> Polygon:
+        """The part of the wall that is opened."""
+        return self._between(self.low - _OVER, self.high + _OVER)
+
+    @property
+    def halves(self) -> tuple[Polygon, ...]:
+        """The opened part of the wall, split along its middle in two; none without a wall."""
+        middle = (self.low + self.high) / 2
+        if self.high - self.low < _OVER:
+            return ()
+        return self._between(self.low, middle), self._between(middle, self.high)
+
+    def inside(self, depth: float) -> Place:
+        """Return the place at a depth [m] inside a door that leads outside (x, y) [m]."""
+        at = self.high + depth if self.low == -np.inf else self.low - depth
+        (x0, y0), (x1, y1) = self._beside(at)
+        return (x0 + x1) / 2, (y0 + y1) / 2
+
+    def _between(self, low: float, high: float) -> Polygon:
+        (a, b), (d, c) = self._beside(low), self._beside(high)
+        return Polygon([a, b, c, d])
+
+    def _beside(self, offset: float) -> tuple[Place, Place]:
+        start, end = np.array(self.start), np.array(self.end)
+        shift = offset * _normal(start, end)
+        (x0, y0), (x1, y1) = (start + shift).tolist(), (end + shift).tolist()
+        return (x0, y0), (x1, y1)
+
+
+def door_axes(shape: BaseGeometry) -> Iterator[list[tuple[Place, Place]]]:
+    """Yield for each door in a shape its possible lines; of an area its axes, the longer first."""
+    for part in shapely.get_parts(shape).tolist():
+        corners = shapely.get_coordinates(part)
+        if part.geom_type == "LineString":
+            yield [_ends(corners[0], corners[-1])]
+        elif part.geom_type == "Polygon":
+            sides = np.diff(corners, axis=0)
+            along = sides[np.argmax((sides**2).sum(axis=1))]
+            along = along / np.sqrt(along @ along)
+            yield _middle_lines(corners, along)
+
+
+def find_passage(free: MultiPolygon, start: Place, end: Place) -> Passage | None:
+    """Return the passage of a door through the nearest wall, or None without a way through.
+
+    Where no wall is near, in open space, the passage has no depth.
+    """
+    first, last = np.array(start), np.array(end)
+    if not ((last - first) ** 2).sum() > 0:
+        return None
+    normal = _normal(first, last)
+    spans: list[tuple[float, float]] = []
+    for share in _ALONG:
+        walls = _walls_across(free, first + share * (last - first), normal)
+        near = [wall for wall in walls if max(wall[0], -wall[1]) <= NEAR_M]
+        inner = [wall for wall in near if np.isfinite(wall).all()]
+        if share == _ALONG[0]:
+            one_sided = [wall for wall in near if np.isfinite(wall).any()]
+            if not near:
+                return Passage(start, end, 0.0, 0.0, True)
+            if not inner:
+                return Passage(start, end, *one_sided[0], False) if one_sided else None
+        if inner:
+            spans.append(min(inner, key=lambda wall: max(wall[0], -wall[1])))
+    low, high = min(low for low, _ in spans), max(high for _, high in spans)
+    return Passage(start, end, low, high, True)
+
+
+def shared_borders(rooms: Sequence[MultiPolygon]) -> list[LineString]:
+    """Return the lines along which rooms touch one another, side by side."""
+    borders: list[BaseGeometry] = []
+    tree = shapely.STRtree(rooms)
+    pairs = tree.query(rooms, predicate="dwithin", distance=TOUCH_M)
+    for one, other in sorted((int(i), int(k)) for i, k in pairs.T if i < k):
+        near = (
+            rooms[other]
+            .buffer(TOUCH_M, join_style="mitre")
+            .difference(rooms[other].buffer(-TOUCH_M, join_style="mitre"))
+        )
+        sides = _sides(rooms[one])
+        pieces = shapely.intersection(sides, near)
+        lengths, most = shapely.length(pieces), 2 * TOUCH_M
+        # The first centimetres of a side that leads away from the border are near it, too.
+        along = (lengths > most) | ((lengths > 0) & (lengths >= shapely.length(sides) / 2))
+        parts = shapely.get_parts(pieces[along])
+        lines = parts[shapely.get_type_id(parts) == shapely.GeometryType.LINESTRING]
+        borders += shapely.get_parts(shapely.line_merge(shapely.multilinestrings(lines))).tolist()
+    return [line for line in borders if isinstance(line, LineString) and line.length > 0]
+
+
+def _sides(area: MultiPolygon) -> NDArray[np.object_]:
+    """Return the sides of an area, each a line."""
+    rings = shapely.get_parts(shapely.boundary(area)).tolist()
+    outlines = [shapely.get_coordinates(ring) for ring in rings]
+    starts, ends = (
+        np.concatenate([ring[s] for ring in outlines]) for s in (slice(-1), slice(1, None))
+    )
+    return np.asarray(shapely.linestrings(np.stack([starts, ends], axis=1)))
+
+
+def _walls_across(free: MultiPolygon, at: F64, normal: F64) -> list[tuple[float, float]]:
+    """Return the walls on a line across a door, from and to [m]; infinite at the line's ends."""
+    across = LineString([at - MAX_WALL_M * normal, at + MAX_WALL_M * normal])
+    walls = []
+    for part in shapely.get_parts(across.difference(free)).tolist():
+        if part.is_empty:
+            continue
+        offsets = (shapely.get_coordinates(part) - at) @ normal
+        low, high = float(offsets.min()), float(offsets.max())
+        low = -np.inf if low < _OVER - MAX_WALL_M else low
+        high = np.inf if high > MAX_WALL_M - _OVER else high
+        if high > low:
+            walls.append((low, high))
+    return walls
+
+
+def _middle_lines(corners: F64, along: F64) -> list[tuple[Place, Place]]:
+    """Return the middle lines of an area along a direction and across it, the longer first."""
+    middle_lines = []
+    axes = (along, np.array([-along[1], along[0]]))
+    spans = [(float((corners @ axis).min()), float((corners @ axis).max())) for axis in axes]
+    for number, axis in enumerate(axes):
+        (low, high), (left, right) = spans[number], spans[1 - number]
+        aside = (left + right) / 2 * axes[1 - number]
+        middle_lines.append((high - low, _ends(low * axis + aside, high * axis + aside)))
+    return [line for _, line in sorted(middle_lines, key=lambda pair: -pair[0])]
+
+
+def _normal(start: F64, end: F64) -> F64:
+    along = end - start
+    return np.array([-along[1], along[0]]) / np.sqrt(along @ along)
+
+
+def _ends(start: F64, end: F64) -> tuple[Place, Place]:
+    (x0, y0), (x1, y1) = start.tolist(), end.tolist()
+    return (x0, y0), (x1, y1)

@@ -1,19 +1,343 @@
-"""Whole plans: arrangements of core, wings and garage."""
+"""Layouts of synthetic homes: rooms in groups, in wings, as rectangles."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from math import fsum, sqrt
 
-from fleet2d.floorplan.synthetic.core import core_trees, service_block
-from fleet2d.floorplan.synthetic.draws import Choices
-from fleet2d.floorplan.synthetic.geometry import Box
-from fleet2d.floorplan.synthetic.grouping import Groups
-from fleet2d.floorplan.synthetic.program import Brief
-from fleet2d.floorplan.synthetic.request import LayoutRequest
-from fleet2d.floorplan.synthetic.slicing import Mouth, Strip, Tree, choose_squarest, tree_area
-from fleet2d.floorplan.synthetic.wing import Wing
-from fleet2d.floorplan.synthetic.wings import add_bays, draw_wing
+from fleet2d.floorplan.synthetic.program import Brief, Choices
+from fleet2d.floorplan.synthetic.slicing import (
+    PER_M,
+    PER_M2,
+    WALL,
+    Box,
+    Cut,
+    LayoutRequest,
+    Leaf,
+    Mouth,
+    Slot,
+    Strip,
+    Tree,
+    Wing,
+    choose_squarest,
+    gross_area,
+    is_promising,
+    slenderness,
+    tree_area,
+)
+from fleet2d.runtime.determinism import sum_in_order
+
+RoomGroup = list[Slot]
+"""Slots that stay next to each other in this order."""
+
+
+@dataclass
+class Groups:
+    """The rooms of a home, sorted by where they may go.
+
+    Attributes:
+        entry: The group with the entryway, or None; its first slot is the entryway.
+        private: Groups for strips; the first is that of the main bedroom, which comes last in it.
+        service: Rooms for a block of their own: garage, gym and what goes with them.
+        pantry: Small rooms beside the kitchen.
+        closet: A small room for the end of a corridor, or None.
+    """
+
+    entry: RoomGroup | None = None
+    private: list[RoomGroup] = field(default_factory=list)
+    service: list[int] = field(default_factory=list)
+    pantry: list[int] = field(default_factory=list)
+    closet: int | None = None
+
+
+def group_rooms(briefs: Sequence[Brief], choices: Choices) -> Groups:
+    """Group the rooms by where they may go."""
+    by_kind = _by_kind(briefs)
+    groups = Groups()
+    if by_kind["garage"]:
+        groups.service = by_kind["garage"] + by_kind["gym"]
+    small = _small_rooms(by_kind, groups, choices)
+    shared = [i for i in by_kind["bathroom"] if briefs[i].partner is None]
+    fronts = choices.shuffled(shared + small)
+    for bed in by_kind["bedroom"]:
+        owned = [i for i, brief in enumerate(briefs) if brief.partner == bed]
+        groups.private.append([*_beside(owned, fronts, briefs, choices), (bed,)])
+    if by_kind["entryway"]:
+        groups.entry = _entry_group(by_kind["entryway"][0], fronts, briefs, choices)
+    for room in fronts:
+        if briefs[room].kind == "bathroom":
+            groups.private.append([(room,)])
+        elif groups.closet is None and briefs[room].kind in ("storage", "toilet"):
+            groups.closet = room
+        else:
+            groups.pantry.append(room)
+    groups.private += [[(i,)] for i in by_kind["office"]]
+    if not by_kind["garage"]:
+        groups.private += [[(i,)] for i in by_kind["gym"]]
+    return groups
+
+
+def _by_kind(briefs: Sequence[Brief]) -> dict[str, list[int]]:
+    kinds = ("garage", "gym", "laundry", "storage", "toilet", "bathroom", "bedroom", "office")
+    return {
+        kind: [i for i, brief in enumerate(briefs) if brief.kind == kind]
+        for kind in (*kinds, "entryway")
+    }
+
+
+def _small_rooms(by_kind: dict[str, list[int]], groups: Groups, choices: Choices) -> list[int]:
+    """Return the small rooms for strips; the others go to the service block or the kitchen."""
+    strip_rooms = list(by_kind["toilet"])
+    for room in by_kind["laundry"] + by_kind["storage"]:
+        place = choices.weighted((("service", 60), ("pantry", 25), ("strip", 15)))
+        if place == "service" and groups.service:
+            groups.service.append(room)
+        elif place == "strip" or groups.pantry:
+            strip_rooms.append(room)
+        else:
+            groups.pantry.append(room)
+    return strip_rooms
+
+
+def _beside(
+    owned: list[int], fronts: list[int], briefs: Sequence[Brief], choices: Choices
+) -> list[Slot]:
+    """Return the slots beside a bedroom: a room of its own at the back, a shared one before it."""
+    if len(owned) >= 2:
+        first, second = sorted(owned, key=lambda i: briefs[i].area)[:2]
+        return [(first, second)]
+    if not owned:
+        return []
+    if fronts and choices.chance(60):
+        return [(fronts.pop(), owned[0])]
+    return [(owned[0],)]
+
+
+def _entry_group(
+    entry: int, fronts: list[int], briefs: Sequence[Brief], choices: Choices
+) -> list[Slot]:
+    """Return the entryway, maybe with a toilet beside it and a coat room behind that."""
+    toilets = [i for i in fronts if briefs[i].kind == "toilet"]
+    closets = [i for i in fronts if briefs[i].kind == "storage"]
+    if toilets and closets and choices.chance(75):
+        fronts.remove(toilets[0])
+        fronts.remove(closets[0])
+        return [(entry,), (toilets[0], closets[0])]
+    return [(entry,)]
+
+
+def core_trees(groups: Groups, briefs: Sequence[Brief], choices: Choices) -> list[Tree]:
+    """Draw trees of living room, dining room and kitchen; wings join them at high x or high y."""
+    room_of = {brief.kind: i for i, brief in enumerate(briefs)}
+    living = Leaf(room_of["living_room"])
+    trees: list[Tree] = []
+    for across in (True, False):
+        kitchen = _kitchen(room_of["kitchen"], groups.pantry, across, choices)
+        if "dining_room" in room_of:
+            trees += _with_dining(living, Leaf(room_of["dining_room"]), kitchen, across)
+            continue
+        trees += [Cut(across, (kitchen, living)), Cut(across, (living, kitchen))]
+        share = choices.between(45, 65)
+        low, high = Leaf(living.room, share), Leaf(living.room, 100 - share)
+        trees.append(Cut(across, (low, Cut(not across, (kitchen, high)))))
+    return choices.shuffled(trees)[: max(5, len(trees) * 5 // 6)]
+
+
+def _with_dining(living: Leaf, dining: Leaf, kitchen: Tree, across: bool) -> list[Tree]:
+    sides = (Cut(not across, (dining, kitchen)), Cut(not across, (kitchen, dining)))
+    return [
+        *(Cut(across, (side, living)) for side in sides),
+        *(Cut(across, (living, side)) for side in sides),
+        Cut(across, (kitchen, dining, living)),
+        Cut(across, (living, dining, kitchen)),
+    ]
+
+
+def _kitchen(kitchen: int, pantry: Sequence[int], across: bool, choices: Choices) -> Tree:
+    """Return the kitchen, with small rooms at one end of it."""
+    if not pantry:
+        return Leaf(kitchen)
+    side: Tree = Leaf(pantry[0])
+    if len(pantry) > 1:
+        side = Cut(across, tuple(Leaf(room) for room in pantry))
+    pair = (side, Leaf(kitchen))
+    return Cut(not across, pair if choices.chance(50) else pair[::-1])
+
+
+@dataclass(frozen=True)
+class Service:
+    """A block of garage and what is beside it.
+
+    Attributes:
+        trees: Ways to divide it.
+        width: Its width, where the core is high enough [units].
+        whole: Whether it is as high as the core in any case.
+        at_high: Whether it is flush with the core's high side, else with its low one.
+        out: How far it stands out there [units].
+    """
+
+    trees: list[Tree]
+    width: int
+    whole: bool
+    at_high: bool
+    out: int
+
+    def boxes(self, areas: Mapping[int, float], right: int, low: int, high: int) -> list[Box]:
+        """Return its rooms left of a core between two heights [units]."""
+        area = tree_area(self.trees[0], areas)
+        height = min(int(area / self.width + 0.5), high - low)
+        if self.whole or height > high - low - 20:
+            height = high - low
+        if not self.whole:
+            low, high = (low, high + self.out) if self.at_high else (low - self.out, high)
+        low, high = (high - height, high) if self.at_high else (low, low + height)
+        width = int(area / height + 0.5)
+        return choose_squarest(self.trees, areas, (right - width, low, right, high))
+
+
+def service_block(groups: Groups, outline: str | None, choices: Choices) -> Service | None:
+    """Draw a block of garage and what is beside it."""
+    if not groups.service:
+        return None
+    garage, *others = (Leaf(room) for room in groups.service)
+    trees: list[Tree] = []
+    for across in (True, False):
+        rest: Tree = others[0] if len(others) == 1 else Cut(not across, tuple(others))
+        if not others:
+            trees = [garage]
+        else:
+            trees += [Cut(across, (garage, rest)), Cut(across, (rest, garage))]
+    return Service(
+        choices.shuffled(trees),
+        choices.between(72, 130),
+        outline is not None,
+        choices.chance(50),
+        choices.pick((0, 0, 20, 40)),
+    )
+
+
+TRIES = 3
+
+
+def draw_wing(
+    groups: Sequence[RoomGroup],
+    entry: RoomGroup | None,
+    closet: int | None,
+    corridor: int,
+    request: LayoutRequest,
+    briefs: Sequence[Brief],
+    choices: Choices,
+) -> Wing | None:
+    """Draw a wing; the first group is that of its main bedroom. None if no try fits."""
+    areas = {i: brief.area for i, brief in enumerate(briefs)}
+    gross = {i: gross_area(area) for i, area in areas.items() if area}
+    for _ in range(TRIES):
+        suite = closet is None and choices.chance(55)
+        front, back = _sides(groups, entry, areas, suite, choices)
+        if not front or not back:
+            continue
+        fore, aft = _strips(front, back, request.outline, bool(entry), choices)
+        rooms = [areas[slot[0]] for slot in aft.slots if len(slot) == 1]
+        middle = fsum(rooms) / len(rooms) if rooms else 14.0
+        width = request.corridor + WALL
+        depths = [int(PER_M * sqrt(middle) * percent / 100) for percent in (78, 90, 102, 114)]
+        wings = [
+            Wing(fore, aft, corridor, width, min(max(depth, 56), 112), suite, closet)
+            for depth in depths
+        ]
+        wing = _squarest_wing(wings, gross, briefs)
+        if wing is not None:
+            return wing
+    return None
+
+
+def _strips(
+    front: Sequence[RoomGroup],
+    back: Sequence[RoomGroup],
+    outline: str | None,
+    entry: bool,
+    choices: Choices,
+) -> tuple[Strip, Strip]:
+    """Draw the strips on the two sides of a corridor, with bays."""
+    fore, aft = _strip(front), _strip(back)
+    if outline is None and choices.chance(45):
+        fore = add_bays(fore, choices, entry)
+    if outline is None and choices.chance(35):
+        aft = add_bays(aft, choices, False)
+    if outline == "U" and entry:
+        fore = Strip(fore.slots, (-choices.between(28, 40), *fore.bays[1:]))  # a porch
+    return fore, aft
+
+
+def _sides(
+    groups: Sequence[RoomGroup],
+    entry: RoomGroup | None,
+    areas: Mapping[int, float],
+    suite: bool,
+    choices: Choices,
+) -> tuple[list[RoomGroup], list[RoomGroup]]:
+    """Divide groups of rooms among the front and the back of a corridor.
+
+    Args:
+        groups: The rooms, those of the main bedroom first.
+        entry: The group that begins the front, or None.
+        areas: Of the rooms [m²].
+        suite: Whether the main bedroom ends the back.
+        choices: The stream to draw from.
+    """
+    main, *others = groups
+    front: list[RoomGroup] = []
+    back: list[RoomGroup] = []
+    weights = [_area([entry] if entry else [], areas), _area([main], areas)]
+    for group in choices.shuffled(others):
+        # Mostly to the side with less in it, so that both come out about as deep.
+        to_back = (weights[0] > weights[1]) != choices.chance(15)
+        (back if to_back else front).append(group if choices.chance(50) else group[::-1])
+        weights[to_back] += _area([group], areas)
+    if suite:
+        back.append(main)
+        # The front room beside the suite must still reach the corridor: the largest does.
+        front.sort(key=lambda group: _area([group[-1:]], areas))
+    else:
+        back.insert(choices.below(len(back) + 1), main if choices.chance(50) else main[::-1])
+    return [*([entry] if entry else []), *front], back
+
+
+def _strip(groups: Sequence[RoomGroup]) -> Strip:
+    slots = tuple(slot for group in groups for slot in group)
+    return Strip(slots, (0,) * len(slots))
+
+
+def _squarest_wing(
+    wings: Sequence[Wing], areas: Mapping[int, float], briefs: Sequence[Brief]
+) -> Wing | None:
+    """Return the wing whose rooms are least slender, or None where none fits."""
+    best, least = None, 0.0
+    for wing in wings:
+        rooms = wing.place(areas)
+        if rooms is not None and is_promising(rooms.boxes, briefs):
+            score = slenderness(rooms.boxes)
+            if best is None or score < least:
+                best, least = wing, score
+    return best
+
+
+def _area(groups: Sequence[RoomGroup], areas: Mapping[int, float]) -> float:
+    return fsum(areas[room] for group in groups for slot in group for room in slot)
+
+
+def add_bays(strip: Strip, choices: Choices, entry: bool) -> Strip:
+    """Move one end of a strip, or the entryway, outwards or inwards."""
+    count = len(strip.slots)
+    if count < 2:
+        return strip
+    step = choices.between(10, 34) * (1 if choices.chance(60) else -1)
+    if entry and choices.chance(40):
+        return Strip(strip.slots, (-choices.between(16, 30), *[0] * (count - 1)))
+    moved_slots = choices.between(1, count - 1)
+    bays = [step if i >= count - moved_slots else 0 for i in range(count)]
+    return Strip(strip.slots, tuple(bays))
+
 
 # Least depth of the core [units].
 LEAST_CORE = 70
@@ -229,3 +553,62 @@ def columns(
         return boxes
 
     return place
+
+
+# Share of the home's clear area that is in rooms; the rest is in door gaps.
+ROOMS_SHARE = 0.992
+# How far the area may be from the requested one, as a share of it, and the tries to get there.
+TOLERANCE = 0.012
+ROUNDS = 7
+
+
+@dataclass(frozen=True)
+class RoomLayout:
+    """A home's rooms, placed.
+
+    Attributes:
+        briefs: The rooms, hallways included.
+        boxes: The places of the rooms [units]; a room may have several.
+    """
+
+    briefs: list[Brief]
+    boxes: list[Box]
+
+
+def draw_layout(request: LayoutRequest, choices: Choices) -> RoomLayout | None:
+    """Draw one layout, or return None where the rooms do not fit as drawn."""
+    groups = group_rooms(request.briefs, choices)
+    bedrooms = sum(brief.kind == "bedroom" for brief in request.briefs)
+    briefs = [*request.briefs, Brief("hallway", 0.0)]
+    hall = len(briefs) - 1
+    if groups.closet is None and bedrooms <= 2 and choices.chance(70 if bedrooms == 1 else 25):
+        briefs.pop()
+        placing = columns(groups, request, briefs, choices)
+    elif bedrooms > 3 and choices.chance(65 if bedrooms < 6 else 90):
+        groups.private += [[(room,)] for room in groups.service]
+        briefs.append(Brief("hallway", 0.0))
+        placing = two_wings(groups, request, briefs, (hall, hall + 1), choices)
+    elif choices.chance(65):
+        placing = inline(groups, request, briefs, hall, choices)
+    else:
+        placing = across(groups, request, briefs, hall, choices)
+    if placing is None:
+        return None
+    boxes = _place_at_scale(placing, briefs, request.area_m2)
+    return None if boxes is None else RoomLayout(briefs, boxes)
+
+
+def _place_at_scale(placing: Placing, briefs: Sequence[Brief], area_m2: float) -> list[Box] | None:
+    """Place the rooms at the scale at which their clear areas add up to the requested area."""
+    target = area_m2 * PER_M2 * ROOMS_SHARE
+    factor = 1.0
+    for _ in range(ROUNDS):
+        areas = {i: gross_area(brief.area * factor) for i, brief in enumerate(briefs) if brief.area}
+        boxes = placing(areas)
+        if boxes is None or not is_promising(boxes, briefs):
+            return None
+        area = sum_in_order(box.clear_area for box in boxes)
+        if abs(area - target) <= TOLERANCE * target:
+            return boxes
+        factor *= target / area
+    return None

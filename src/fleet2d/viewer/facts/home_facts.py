@@ -7,7 +7,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from fleet2d.floorplan.geometry.lattice import UNITS_PER_CELL
+from fleet2d.floorplan.lattice import UNITS_PER_CELL
 from fleet2d.floorplan.objects import PlacedObject
 from fleet2d.floorplan.plan import FloorPlan, Room, rings
 from fleet2d.kernels import I16

@@ -10,8 +10,8 @@ from fleet2d.artifacts.manifest import FILE_NAME
 from fleet2d.configuration.problems import refusal
 from fleet2d.entities.objects.door import Door
 from fleet2d.errors import ArtifactError, Fleet2DError
-from fleet2d.floorplan.arrangement import move_object
-from fleet2d.floorplan.home.home import Home
+from fleet2d.floorplan.home import Home
+from fleet2d.floorplan.objects import move_object
 from fleet2d.floorplan.rooms.doorways import Doorway
 from fleet2d.kernels.space import Mesh
 from fleet2d.runs.run import Run

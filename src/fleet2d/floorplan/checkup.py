@@ -1,0 +1,389 @@
+"""The check-up of a floor plan: findings that are wrong or odd, and their places."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
+
+from fleet2d.errors import FloorPlanError
+from fleet2d.floorplan.home import Home
+from fleet2d.floorplan.objects import PlacedObject, Point
+from fleet2d.floorplan.plan import FloorPlan, Room
+from fleet2d.floorplan.rooms.room import UNKNOWN, LabelledRegion
+from fleet2d.floorplan.space import Space, grown_cells, with_approaches
+from fleet2d.kernels import Bool
+from fleet2d.runtime.determinism import sum_in_order
+
+Severity = Literal["unlivable", "wrong", "odd"]
+
+PERSON_RADIUS = 0.2
+"""The radius of a person who uses the furniture [m], which is the default of users."""
+
+HOME_M2 = (8.0, 2000.0)
+"""Least and largest area of a home."""
+
+# Units that a file may have instead of metres, and their length [m].
+OTHER_UNITS = (
+    ("centimetres", 0.01),
+    ("millimetres", 0.001),
+    ("inches", 0.0254),
+    ("feet", 0.3048),
+    ("pixels of 5 cm", 0.05),
+)
+LIKELY_M2 = (25.0, 400.0)
+ROOM_M2 = (0.8, 200.0)  # median area of a home's rooms
+TINY_ROOM_M2 = 0.5
+SPECK_M2 = 0.02  # least area of a pillar
+PART_M2 = 0.5  # least area of floor whose loss matters
+DOOR_M = (0.5, 1.6)  # median width of a home's doors
+WIDEST_DOOR_M = 2.0
+# How far labels may reach over the outer walls, and which share of them may lie farther out.
+MAX_OVER_WALLS_M = 0.3
+MAX_OUTSIDE_SHARE = 0.25
+# Share of the smaller of two labels, and area, from which on their overlap is reported.
+MAX_OVERLAP_SHARE = 0.25
+MAX_OVERLAP_M2 = 1.0
+# Largest distance from which furniture without places of use must be reachable [m].
+BESIDE_M = 0.5
+MAX_UNLABELLED_SHARE = 0.5  # share of the floor without a known use from which on it is reported
+
+_ORDER: tuple[Severity, ...] = ("unlivable", "wrong", "odd")
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Something that is wrong or odd with a home.
+
+    Attributes:
+        kind: Its subject, such as `parts` or `room`.
+        severity: `unlivable`: no body fits into the home; `wrong`: something will not work;
+            `odd`: worth a look.
+        text: A sentence that describes it.
+        at: The place (x, y) [m], or None for the whole home.
+        shape: The extent [m], if there is one.
+    """
+
+    kind: str
+    severity: Severity
+    text: str
+    at: Point | None = None
+    shape: BaseGeometry | None = None
+
+
+def checkup(plan: FloorPlan, radius: float = 0.15) -> list[Finding]:
+    """Return what is wrong or odd with a home, the worst first.
+
+    Args:
+        plan: The home.
+        radius: The radius of the robot that drives in it [m].
+
+    Example:
+        >>> import shapely
+        >>> from fleet2d.floorplan.plan import LabelledRegion
+        >>> gap = shapely.box(4, 0, 4.2, 0.25)
+        >>> free = shapely.union_all([shapely.box(0, 0, 4, 4), gap, shapely.box(4.2, 0, 8, 4)])
+        >>> kitchen = LabelledRegion(("Kitchen",), shapely.box(0, 0, 4.1, 4))
+        >>> office = LabelledRegion(("Office",), shapely.box(4.1, 0, 8, 4))
+        >>> for finding in checkup(FloorPlan.build("flat", free, [kitchen, office])):
+        ...     print(finding.severity, finding.text)
+        wrong a body of radius 0.15 m can't get to office_0 (15.2 m2)
+    """
+    findings = [
+        *_scale(plan),
+        *_parts(plan),
+        *_specks(plan),
+        *_labels(plan),
+        *_doors(plan),
+        *_standing_in_walls(plan),
+        *_routes(plan, radius),
+        *_uses(plan),
+    ]
+    return sorted(findings, key=lambda finding: _ORDER.index(finding.severity))
+
+
+def _scale(plan: FloorPlan) -> Iterator[Finding]:
+    area = plan.area_m2
+    if not HOME_M2[0] <= area <= HOME_M2[1]:
+        size = "small" if area < HOME_M2[0] else "large"
+        yield Finding(
+            "scale",
+            "wrong",
+            f"{area:,.1f} m2 is very {size} for a home: is the plan in metres?{_guess(area)}",
+        )
+        return
+    areas = sorted(room.area_m2 for room in plan.rooms if room.type != UNKNOWN)
+    if len(areas) >= 3 and not ROOM_M2[0] <= areas[len(areas) // 2] <= ROOM_M2[1]:
+        yield Finding(
+            "scale",
+            "odd",
+            f"half of the rooms are {'smaller' if areas[0] < 1 else 'larger'} than"
+            f" {areas[len(areas) // 2]:.1f} m2: is the plan in metres?",
+        )
+
+
+def _guess(area: float) -> str:
+    """Return a hint to the unit in which the numbers would make a usual home."""
+    for unit, metres in OTHER_UNITS:
+        if LIKELY_M2[0] <= area * metres**2 <= LIKELY_M2[1]:
+            return f" It looks like {unit} ({area * metres**2:.0f} m2)"
+    return ""
+
+
+def _parts(plan: FloorPlan) -> Iterator[Finding]:
+    parts = sorted(shapely.get_parts(plan.free_space).tolist(), key=lambda part: -part.area)[1:]
+    for part in parts:
+        if part.area >= PART_M2:
+            at = part.representative_point()
+            text = f"nothing joins a part of {part.area:.2f} m2 at {_place(at)} to the rest"
+            yield Finding("parts", "wrong", text, (at.x, at.y), part)
+    small = [part for part in parts if part.area < PART_M2]
+    if small:
+        at = small[0].representative_point()
+        lone = len(small) == 1
+        text = (
+            f"nothing joins {len(small)} part{'' if lone else 's'} smaller than {PART_M2:g} m2 to"
+            f" the rest, {'' if lone else 'the largest '}at {_place(at)}"
+        )
+        yield Finding("parts", "odd", text, (at.x, at.y), shapely.MultiPolygon(small))
+
+
+def _specks(plan: FloorPlan) -> Iterator[Finding]:
+    holes = [hole for part in shapely.get_parts(plan.free_space) for hole in part.interiors]
+    specks = [s for s in map(shapely.Polygon, holes) if s.area < SPECK_M2]
+    if specks:
+        at = specks[0].representative_point()
+        yield Finding(
+            "specks",
+            "odd",
+            f"{len(specks)} piece{'s' * (len(specks) > 1)} of wall smaller than {SPECK_M2:g} m2"
+            f" inside the home, the first at {_place(at)}",
+            (at.x, at.y),
+            shapely.MultiPolygon(specks),
+        )
+
+
+# --- Labels --------------------------------------------------------------------------------------
+
+
+def _labels(plan: FloorPlan) -> Iterator[Finding]:
+    for room in plan.rooms:
+        if room.area_m2 < TINY_ROOM_M2 and room.type != UNKNOWN:
+            text = f"{room.name} has only {room.area_m2:.2f} m2"
+            yield Finding("room", "odd", text, room.anchor_xy)
+    unlabelled = sum_in_order(room.area_m2 for room in plan.rooms if room.type == UNKNOWN)
+    share = unlabelled / sum_in_order(room.area_m2 for room in plan.rooms)
+    if share > MAX_UNLABELLED_SHARE:
+        text = f"{100 * share:.0f} % of the floor belongs to no room with a known use"
+        yield Finding("labels", "odd", text)
+    regions = _by_shape(plan)
+    yield from _outside(plan, regions)
+    yield from _overlaps(regions)
+
+
+def _by_shape(plan: FloorPlan) -> list[LabelledRegion]:
+    """Return the regions with an extent, those of one shape joined to one with all labels."""
+    joined: dict[bytes, LabelledRegion] = {}
+    for region in plan.regions:
+        key = shapely.to_wkb(shapely.normalize(region.shape))
+        known = joined.get(key)
+        if known is not None:
+            region = replace(known, labels=known.labels + region.labels)
+        if region.shape.area > 0:
+            joined[key] = region
+    return list(joined.values())
+
+
+def _outside(plan: FloorPlan, regions: list[LabelledRegion]) -> Iterator[Finding]:
+    filled = [shapely.Polygon(part.exterior) for part in shapely.get_parts(plan.free_space)]
+    reach = shapely.union_all(filled).buffer(MAX_OVER_WALLS_M, join_style="mitre")
+    for region in regions:
+        outside = shapely.difference(region.shape, reach)
+        if outside.area > MAX_OUTSIDE_SHARE * region.shape.area:
+            at = outside.representative_point()
+            yield Finding(
+                "outside",
+                "odd",
+                f"{100 * outside.area / region.shape.area:.0f} % of what is labelled"
+                f" {_called(region)} lies outside the home, at {_place(at)}",
+                (at.x, at.y),
+                outside,
+            )
+
+
+def _overlaps(regions: list[LabelledRegion]) -> Iterator[Finding]:
+    shapes = np.array([region.shape for region in regions], dtype=object)
+    first, second = shapely.STRtree(shapes).query(shapes, predicate="intersects")
+    for i, j in sorted(zip(first.tolist(), second.tolist(), strict=True)):
+        one, other = regions[i], regions[j]
+        if i >= j or set(one.types) == set(other.types):
+            continue
+        both = shapely.intersection(one.shape, other.shape)
+        smaller = min(one.shape.area, other.shape.area)
+        if both.area > max(MAX_OVERLAP_M2, MAX_OVERLAP_SHARE * smaller):
+            at = both.representative_point()
+            yield Finding(
+                "overlap",
+                "odd",
+                f"the labels {_called(one)} and {_called(other)} overlap by {both.area:.1f} m2"
+                f" at {_place(at)}: the smaller one counts there",
+                (at.x, at.y),
+                both,
+            )
+
+
+def _called(region: LabelledRegion) -> str:
+    return region.name or "/".join(region.types) or UNKNOWN
+
+
+def _doors(plan: FloorPlan) -> Iterator[Finding]:
+    for line in plan.lost_doorways:
+        (x0, y0), (x1, y1) = line.start, line.end
+        yield Finding(
+            "door",
+            "wrong",
+            f"the door {line.name + ' ' if line.name else ''}from ({x0:.2f}, {y0:.2f}) to"
+            f" ({x1:.2f}, {y1:.2f}) m is in no wall: it doesn't close a passage",
+            ((x0 + x1) / 2, (y0 + y1) / 2),
+            shapely.LineString([line.start, line.end]),
+        )
+    doors = [door for door in plan.doorways if door.leaf]
+    for door in doors:
+        if door.width_m > WIDEST_DOOR_M:
+            yield Finding(
+                "door",
+                "odd",
+                f"the door {door.name} is {door.width_m:.2f} m wide",
+                _middle(door.start, door.end),
+                shapely.LineString([door.start, door.end]),
+            )
+    widths = sorted(door.width_m for door in doors)
+    if len(widths) >= 3 and not DOOR_M[0] <= widths[len(widths) // 2] <= DOOR_M[1]:
+        yield Finding(
+            "scale",
+            "odd",
+            f"half of the doors are about {widths[len(widths) // 2]:.2f} m wide or"
+            f" {'less' if widths[len(widths) // 2] < 1 else 'more'}: is the plan in metres?",
+        )
+
+
+# --- Routes ---------------------------------------------------------------------------------------
+
+
+def _routes(plan: FloorPlan, radius: float) -> Iterator[Finding]:
+    """Find the places that a robot can't get to, because of walls or of furniture."""
+    body = f"a body of radius {radius:g} m"
+    try:
+        space = Home(plan).space(radius)
+    except FloorPlanError:
+        yield Finding("space", "unlivable", f"{body} fits nowhere in {plan.name}")
+        return
+    main = main_part(plan, space)
+    if plan.entrance is not None and main is None:
+        x, y = plan.entrance
+        text = f"{body} can't stand at the entrance at ({x:.2f}, {y:.2f}) m"
+        yield Finding("entrance", "wrong", text, plan.entrance)
+    reached = space.part_of_cell == (0 if main is None else main)
+    empty = Space(plan, radius) if plan.objects else None
+    for room in plan.rooms:
+        in_room = plan.room_of_cell == room.index
+        if not (in_room & reached).any():
+            yield _closed_room(room, body, empty, space, in_room)
+            continue
+        for part in range(space.parts):
+            lost = in_room & (space.part_of_cell == part) & ~reached
+            if np.count_nonzero(lost) * plan.lattice.cell**2 >= PART_M2:
+                yield _corner(plan, room, lost, body, empty)
+
+
+def main_part(plan: FloorPlan, space: Space) -> int | None:
+    """Return the part of a space with the entrance, or the largest; None if no part has it."""
+    if plan.entrance is None:
+        return 0
+    x, y = plan.lattice.point_at(plan.entrance)
+    part = space.part_at(x, y)
+    return part if part >= 0 else None
+
+
+def _closed_room(
+    room: Room, body: str, empty: Space | None, space: Space, in_room: Bool
+) -> Finding:
+    severity: Severity = "wrong" if room.area_m2 >= TINY_ROOM_M2 else "odd"
+    size = f"{room.name} ({room.area_m2:.1f} m2)"
+    if empty is not None and (in_room & (empty.part_of_cell == 0)).any():
+        text = f"furniture keeps {body} out of {size}"
+    elif (in_room & (space.part_of_cell >= 0)).any():
+        text = f"{body} can't get to {size}"
+    else:
+        text = f"{body} fits nowhere in {size}"
+    return Finding("room", severity, text, room.anchor_xy)
+
+
+def _corner(plan: FloorPlan, room: Room, lost: Bool, body: str, empty: Space | None) -> Finding:
+    rows, columns = np.nonzero(lost)
+    nearest = int(np.argmin((rows - rows.mean()) ** 2 + (columns - columns.mean()) ** 2))
+    cell = plan.lattice.cell_centre(int(rows[nearest]), int(columns[nearest]))
+    x, y = plan.lattice.to_metres(cell).tolist()
+    corner = f"{len(rows) * plan.lattice.cell**2:.1f} m2 of {room.name}, at ({x:.2f}, {y:.2f}) m"
+    text = f"{body} can't get to {corner}"
+    if empty is not None and empty.part_of_cell[rows[nearest], columns[nearest]] == 0:
+        text = f"furniture keeps {body} out of {corner}"
+    return Finding("room", "wrong", text, (x, y))
+
+
+# --- Objects -------------------------------------------------------------------------------------
+
+
+def _standing_in_walls(plan: FloorPlan) -> Iterator[Finding]:
+    free = plan.free_space
+    for thing in plan.objects:
+        inside = shapely.intersection(thing.footprint, free).area
+        if thing.blocks == "nothing" and shapely.distance(thing.footprint, free) < BESIDE_M:
+            continue  # a charger in its niche, a mat half under a door
+        if inside < 0.95 * thing.footprint.area:
+            lost = 100 * (1 - inside / thing.footprint.area)
+            text = f"{lost:.0f} % of {thing.name} is in a wall or outside the home"
+            yield Finding("object", "wrong", text, _centre(thing), thing.footprint)
+    solid = [thing for thing in plan.objects if thing.blocks != "nothing"]
+    for i, thing in enumerate(solid):
+        for other in solid[:i]:
+            both = shapely.intersection(thing.footprint, other.footprint)
+            if both.area > SPECK_M2:
+                text = f"{thing.name} and {other.name} stand in each other ({both.area:.2f} m2)"
+                yield Finding("object", "odd", text, _centre(thing), both)
+
+
+def _uses(plan: FloorPlan) -> Iterator[Finding]:
+    """Find the objects that nobody can get to."""
+    if not plan.objects:
+        return
+    try:
+        space = Home(plan).space(PERSON_RADIUS)
+    except FloorPlanError:
+        return  # reported for the robot; for a home of dolls it doesn't matter
+    standing = space.part_of_cell == (main_part(plan, space) or 0)
+    for thing in plan.objects:
+        if thing.uses:
+            reached = bool(with_approaches(plan, thing, standing, plan.objects).uses)
+        else:
+            reach = PERSON_RADIUS + BESIDE_M
+            window, beside = grown_cells(plan.lattice, thing.footprint, reach)
+            reached = bool((standing[window] & beside).any())
+        if not reached:
+            text = f"nobody can get to {thing.name}: there is no free place to use it from"
+            yield Finding("object", "wrong", text, _centre(thing), thing.footprint)
+
+
+def _place(at: shapely.Point) -> str:
+    return f"({at.x:.2f}, {at.y:.2f}) m"
+
+
+def _centre(thing: PlacedObject) -> Point:
+    middle = thing.footprint.centroid
+    return middle.x, middle.y
+
+
+def _middle(start: Point, end: Point) -> Point:
+    return (start[0] + end[0]) / 2, (start[1] + end[1]) / 2

@@ -1,1 +1,0 @@
-"""Furniture: its catalogue, and how a home is furnished."""

@@ -1,0 +1,458 @@
+"""The home of a run: its floor plan, what stands in it now, and changes of it during the run."""
+
+from collections.abc import Callable, Collection, Hashable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from datetime import date, datetime, timedelta
+from functools import lru_cache
+from typing import Annotated, Any, Self, TypeVar
+
+import numpy as np
+import shapely
+from pydantic import BeforeValidator, Field, PlainSerializer, WithJsonSchema, model_validator
+from shapely import Polygon
+
+from fleet2d.configuration.components import Settings
+from fleet2d.configuration.problems import problem
+from fleet2d.configuration.units import format_duration, parse_duration
+from fleet2d.errors import FloorPlanError, PlacementError
+from fleet2d.floorplan.layers import COSTMAP, CostedSpace, Layers
+from fleet2d.floorplan.mesh import Gates, Segment, build_mesh, snap_polygon
+from fleet2d.floorplan.objects import PlacedObject, Point, UsePlace, find_named
+from fleet2d.floorplan.plan import Cache, FloorPlan, Room
+from fleet2d.floorplan.rooms.doorways import Doorway, doorway_segments
+from fleet2d.floorplan.rooms.room import room_type
+from fleet2d.floorplan.space import Space
+from fleet2d.kernels import I32
+from fleet2d.kernels.space import Mesh
+
+VERBS = ("open", "shut", "lock", "unlock", "move", "room")
+
+
+def parse_moment(value: Any) -> datetime | timedelta:
+    """Parse a local time, or the time since the start."""
+    moment = _local_time(value)
+    if moment is None:
+        return parse_duration(value)
+    if moment.tzinfo is not None:
+        raise problem("expected a local time of the home, without a time zone")
+    return moment
+
+
+def _local_time(value: Any) -> datetime | None:
+    """Return the date and time that a value is, or None if it is something else."""
+    if isinstance(value, datetime):
+        return value
+    if isinstance(value, date):
+        return datetime(value.year, value.month, value.day)
+    try:
+        return datetime.fromisoformat(value) if isinstance(value, str) else None
+    except ValueError:
+        return None
+
+
+def format_moment(moment: datetime | timedelta) -> str:
+    """Format a moment as `parse_moment` reads it."""
+    return moment.isoformat() if isinstance(moment, datetime) else format_duration(moment)
+
+
+Moment = Annotated[
+    datetime | timedelta,
+    BeforeValidator(parse_moment),
+    PlainSerializer(format_moment),
+    WithJsonSchema(
+        {
+            "description": "a local time like 2026-01-07T14:00, or the time since the start like"
+            " '2 d 14 h'",
+            "type": ["string", "number", "object"],
+            "examples": ["2026-01-07T14:00", "2 d"],
+        }
+    ),
+]
+
+
+class HomeChange(Settings):
+    """One change of the home: exactly one of open, shut, lock, unlock, move and room.
+
+    Attributes:
+        at: Time of the change; left out by an algorithm or a script: now.
+        open: The door that is opened.
+        shut: The door that is shut.
+        lock: The door that is locked.
+        unlock: The door that is unlocked.
+        move: The piece of furniture that is moved.
+        to: New place of its middle, [x, y] in metres.
+        turn_deg: Angle by which it is turned, counter-clockwise.
+        room: The room whose use changes.
+        type: The type of the room from then on.
+
+    Example:
+        >>> HomeChange(shut="bath_door").verb
+        'shut'
+        >>> HomeChange(at="2 d", room="office_0", type="bedroom").at
+        datetime.timedelta(days=2)
+    """
+
+    at: Moment | None = None
+    open: str | None = None
+    shut: str | None = None
+    lock: str | None = None
+    unlock: str | None = None
+    move: str | None = None
+    to: Point | None = None
+    turn_deg: float = Field(default=0.0, ge=-3600, le=3600)
+    room: str | None = None
+    type: str | None = None
+
+    @model_validator(mode="after")
+    def _is_one_change(self) -> Self:
+        verbs = [verb for verb in VERBS if getattr(self, verb) is not None]
+        if len(verbs) != 1:
+            listed = " and ".join(verbs) or "nothing"
+            raise problem(f"give exactly one of {', '.join(VERBS)}, got {listed}")
+        for verb, further in (("move", "to"), ("room", "type")):
+            if (verbs[0] == verb) != (getattr(self, further) is not None):
+                raise problem(f"'{verb}' and '{further}' go together")
+        return self
+
+    @property
+    def verb(self) -> str:
+        """The verb of the change, such as `shut`."""
+        return next(verb for verb in VERBS if getattr(self, verb) is not None)
+
+    @property
+    def target(self) -> str:
+        """The name of the door, object or room that changes."""
+        return str(getattr(self, self.verb))
+
+
+@dataclass(frozen=True)
+class HomeChanges:
+    """Changes of the home that an algorithm requests from the next step on.
+
+    Example:
+        >>> output = HomeChanges([HomeChange(shut="bath_door")])
+        >>> output.to_columns()["target"].tolist()
+        ['bath_door']
+    """
+
+    changes: tuple[HomeChange, ...]
+
+    def __init__(self, changes: Iterable[HomeChange]) -> None:
+        object.__setattr__(self, "changes", tuple(changes))
+
+    def to_columns(self) -> dict[str, np.ndarray[Any, Any]]:
+        """Return the changes as columns of a table."""
+        return {
+            "change": np.array([change.verb for change in self.changes], object),
+            "target": np.array([change.target for change in self.changes], object),
+        }
+
+
+# Types of rooms through which people leave a home without an entrance, the likeliest first.
+EXIT_ROOMS = ("entryway", "lobby", "hallway", "hall", "living_room", "kitchen")
+# Arrangements of doors and furniture whose walls and spaces are cached, for each home.
+CACHED_ARRANGEMENTS = 128
+# Homes whose walls and spaces a process caches for its next run, and further values of each.
+CACHED_HOMES = 8
+CACHED_VALUES = 512
+
+T = TypeVar("T")
+
+NO_DOORS: frozenset[int] = frozenset()
+
+
+class Home:
+    """The home of a run: its floor plan, and what changes of it during the run.
+
+    Attributes:
+        plan: The floor plan, which never changes.
+        doors: The doorways that have a door, by the number of the door.
+        rooms: The rooms by index, with their present types.
+        objects: The objects at their present places.
+        shut: Numbers of the doors that are shut.
+        locked: Numbers of the doors that nobody can open by hand.
+        version: Number of changes so far.
+        layers: Named arrays with a value for each cell.
+
+    Example:
+        >>> import fleet2d
+        >>> home = fleet2d.Home(fleet2d.load_floorplan())
+        >>> home.space(radius=0.2).parts
+        1
+    """
+
+    def __init__(self, plan: FloorPlan, doors: Sequence[Doorway] = ()) -> None:
+        self.plan = plan
+        self.doors = tuple(doors)
+        self.rooms: tuple[Room, ...] = plan.rooms
+        self.objects: tuple[PlacedObject, ...] = plan.objects
+        self.shut: frozenset[int] = NO_DOORS
+        self.locked: frozenset[int] = NO_DOORS
+        self.version = 0
+        self.layers = Layers(plan)
+        self._shapes = _shapes_of(plan, doorway_segments(plan.lattice, self.doors))
+        self._walls: tuple[int, Mesh] = (-1, plan.mesh)
+        self._places: tuple[int, dict[tuple[int, int], tuple[int, int]]] = (-1, {})
+        # The layer `costmap` at its last use, the number of its changes, and the spaces of bodies
+        # that pay its costs.
+        self._costs: I32 = np.zeros((0, 0), np.int32)
+        self._costs_version = 0
+        self._costed: dict[Space, CostedSpace] = {}
+
+    @property
+    def constants(self) -> dict[str, object]:
+        """The parts of it that never change during a run, by name."""
+        return {"plan": self.plan, "walls": self.plan.mesh, "shapes": self._shapes}
+
+    def draw(self, ax: Any = None) -> Any:
+        """Draw the floor plan; see `FloorPlan.draw`."""
+        return self.plan.draw(ax)
+
+    def _repr_png_(self) -> bytes | None:
+        """Show the floor plan in a notebook, where matplotlib is installed."""
+        return self.plan._repr_png_()
+
+    def cached(self, key: Hashable, make: Callable[[], T]) -> T:
+        """Return the value of a key, which all runs in this home share.
+
+        Args:
+            key: All that the value depends on besides the floor plan: walls, spaces, objects,
+                numbers.
+            make: Makes the value at its first use. It must not change afterwards: arrays must be
+                read-only.
+        """
+        return self._shapes.values.get(key, make)
+
+    @property
+    def walls(self) -> Mesh:
+        """What blocks sight at present: walls, shut doors and tall furniture [lattice]."""
+        if self._walls[0] != self.version:
+            self._walls = self.version, self._shapes.walls(self.shut, _tall(self.objects))
+        return self._walls[1]
+
+    def space(self, radius: float, *, opens_doors: bool = False) -> Space:
+        """Return the present space of bodies of a radius, built at its first use.
+
+        Args:
+            radius: The radius of the body [m].
+            opens_doors: Whether the body passes shut doors that aren't locked.
+        """
+        shut = self.shut & self.locked if opens_doors else self.shut
+        return self._shapes.space(radius, shut, self.objects)
+
+    @property
+    def costs_version(self) -> int:
+        """Number of changes of the layer `costmap`; 0 without one."""
+        if COSTMAP in self.layers:
+            values = self.layers[COSTMAP].values
+            if not np.array_equal(self._costs, values):
+                self._costs, self._costed = values.astype(np.int32), {}
+                self._costs_version += 1
+        return self._costs_version
+
+    @property
+    def hinders(self) -> bool:
+        """Whether routes may be closed at present that are open at other times."""
+        return bool(self.shut) or (COSTMAP in self.layers and self.costs_version > 1)
+
+    def costed(self, space: Space) -> Space:
+        """Return the space of a body that pays the costs of the costmap; the same without one.
+
+        Raises:
+            FloorPlanError: The costmap leaves no place for the body.
+        """
+        if self.costs_version == 0:
+            return space
+        if space not in self._costed:
+            self._costed[space] = CostedSpace(space, self._costs)
+        return self._costed[space]
+
+    def door_line(self, door: int) -> Segment:
+        """Return the segment at which a shut door stands [lattice]."""
+        return doorway_segments(self.plan.lattice, [self.doors[door]])[0]
+
+    def set_door(self, door: int, *, is_open: bool) -> None:
+        """Open or shut a door."""
+        self.shut = self.shut - {door} if is_open else self.shut | {door}
+        self.version += 1
+
+    def set_lock(self, door: int, *, locked: bool) -> None:
+        """Lock or unlock a door."""
+        self.locked = self.locked | {door} if locked else self.locked - {door}
+        self.version += 1
+
+    def put(self, thing: PlacedObject) -> None:
+        """Replace the object of the same name."""
+        self.objects = tuple(thing if o.name == thing.name else o for o in self.objects)
+        self.version += 1
+
+    def use_room_as(self, room: Room, kind: str) -> None:
+        """Change what a room is used for."""
+        new_type = room_type(kind)
+        changed_room = replace(room, type=new_type, labels=(new_type,))
+        self.rooms = tuple(changed_room if r.index == room.index else r for r in self.rooms)
+        self.version += 1
+
+    def object(self, name: str) -> PlacedObject:
+        """Return an object by its name.
+
+        Raises:
+            PlacementError: There is no such object.
+        """
+        return find_named(self.objects, name, self.plan.name, "object", PlacementError)
+
+    def approach(self, use: UsePlace, space: Space, part: int) -> tuple[int, int]:
+        """Return the lattice point from which a body steps to a place where an object is used.
+
+        Raises:
+            PlacementError: The space has no such part.
+        """
+        at = (use.x, use.y) if use.approach is None else use.approach
+        x, y = self.plan.lattice.point_at(at)
+        if space.part_at(x, y) == part:
+            return x, y
+        point = space.nearest(x, y, part)
+        if point is None:
+            raise PlacementError(f"a body of radius {space.radius:g} m fits nowhere here")
+        return point
+
+    def room_of(self, thing: PlacedObject) -> Room | None:
+        """Return the room of the plan that holds the middle of an object."""
+        return self._shapes.room_of(thing)
+
+    @property
+    def approaches(self) -> Mapping[tuple[int, int], tuple[int, int]]:
+        """The point from which a body steps to each place of use at present, by place [lattice]."""
+        if self._places[0] != self.version:
+            point_at = self.plan.lattice.point_at
+            uses = (use for thing in self.objects for use in thing.uses)
+            self._places = (
+                self.version,
+                {
+                    point_at((u.x, u.y)): point_at(u.approach)
+                    for u in uses
+                    if u.approach is not None
+                },
+            )
+        return self._places[1]
+
+    def approach_of(self, place: tuple[int, int]) -> tuple[int, int] | None:
+        """Return the point from which a body steps to a place of use [lattice]; None for others."""
+        version, approaches = self._places
+        return (approaches if version == self.version else self.approaches).get(place)
+
+    def way_out(self, space: Space, part: int) -> tuple[int, int]:
+        """Return the lattice point where a body in a part of the space leaves the home.
+
+        Raises:
+            PlacementError: The space has no such part.
+        """
+        point = space.nearest(*self._door(space, part), part)
+        if point is None:
+            raise PlacementError(
+                f"a body of radius {space.radius:g} m fits nowhere in {self.plan.name}"
+            )
+        return point
+
+    def _door(self, space: Space, part: int) -> tuple[int, int]:
+        """Return the plan's entrance, or the middle of the likeliest room with an exit."""
+        at = self.plan.entrance
+        if at is None:
+            rooms = [room for kind in EXIT_ROOMS for room in self.rooms if room.type == kind]
+            rooms += sorted(self.rooms, key=lambda room: -room.cells)
+            reachable = (room for room in rooms if len(space.cells(room.index, part)))
+            at = next(reachable, self.rooms[0]).anchor_xy
+        x, y = self.plan.lattice.point_at(at)
+        return x, y
+
+
+class _Shapes:
+    """Walls and spaces of a home, by shut doors and objects; all runs in the home share them."""
+
+    def __init__(self, plan: FloorPlan, door_lines: Sequence[Segment]) -> None:
+        self.plan = plan
+        self.values = Cache(CACHED_VALUES)
+        self.door_lines = door_lines
+        self._room_of: dict[str, tuple[PlacedObject, Room | None]] = {}
+        self.walls = lru_cache(CACHED_ARRANGEMENTS)(self._make_walls)
+        self._gates = lru_cache(CACHED_ARRANGEMENTS)(self._make_gates)
+        self.space_of = lru_cache(CACHED_ARRANGEMENTS)(self._make_space)
+
+    def __deepcopy__(self, memo: dict[int, object]) -> Self:
+        """Return itself, as branches of a run share it, too."""
+        return self
+
+    def room_of(self, thing: PlacedObject) -> Room | None:
+        entry = self._room_of.get(thing.name)
+        if entry is None or entry[0] is not thing:
+            middle = thing.footprint.centroid
+            entry = thing, self.plan.room_at(middle.x, middle.y)
+            self._room_of[thing.name] = entry
+        return entry[1]
+
+    def space(
+        self, radius: float, shut: Collection[int], objects: tuple[PlacedObject, ...]
+    ) -> Space:
+        return self.space_of(radius, frozenset(shut), _solid(objects))
+
+    def _make_walls(self, shut: frozenset[int], tall: tuple[PlacedObject, ...]) -> Mesh:
+        if not self.door_lines:
+            return self._build_mesh(tall)
+        return self._gates(tall).shut(shut)
+
+    def _make_gates(self, tall: tuple[PlacedObject, ...]) -> Gates:
+        return Gates(self._build_mesh(tall), self.door_lines)
+
+    def _build_mesh(self, tall: tuple[PlacedObject, ...]) -> Mesh:
+        plan = self.plan
+        if not tall and not self.door_lines:
+            return plan.mesh
+        polygons = plan.polygons
+        if tall:
+            blocks = shapely.union_all([lattice_footprint(plan, thing) for thing in tall])
+            rest = shapely.get_parts(shapely.difference(shapely.MultiPolygon(polygons), blocks))
+            polygons = [part for shape in rest.tolist() for part in snap_polygon(shape).polygons]
+        if not polygons:
+            raise FloorPlanError(f"the objects of {plan.name} leave no free space")
+        corners = [end for line in self.door_lines for end in line]
+        return build_mesh(polygons, plan.lattice.columns, plan.lattice.rows, corners)
+
+    def _make_space(
+        self, radius: float, shut: frozenset[int], solid: tuple[PlacedObject, ...]
+    ) -> Space:
+        space = Space(
+            self.plan,
+            radius,
+            walls=self.walls(shut, _tall(solid)),
+            obstacles=[lattice_footprint(self.plan, thing) for thing in solid],
+            shut=[self.door_lines[door] for door in sorted(shut)],
+        )
+        space.key = radius, shut, solid
+        return space
+
+
+_SHAPES = Cache(CACHED_HOMES)
+
+
+def keep_homes(count: int) -> None:
+    """Cache the walls and spaces of at least `count` homes for later runs, about 10 MB each."""
+    _SHAPES.grow(count)
+
+
+def _shapes_of(plan: FloorPlan, door_lines: Sequence[Segment]) -> _Shapes:
+    """Return the walls and spaces of a plan with doors, which all runs in it share."""
+    # By identity, since a state that is saved to a file refers to the plan itself.
+    return _SHAPES.get((id(plan), *door_lines), lambda: _Shapes(plan, door_lines))
+
+
+def lattice_footprint(plan: FloorPlan, thing: PlacedObject) -> Polygon:
+    """Return the floor that an object covers [lattice], on even units as walls are."""
+    return Polygon(plan.lattice.to_walls(np.asarray(thing.footprint.exterior.coords)[:-1]))
+
+
+def _tall(objects: tuple[PlacedObject, ...]) -> tuple[PlacedObject, ...]:
+    return tuple(thing for thing in objects if thing.blocks == "sight")
+
+
+def _solid(objects: tuple[PlacedObject, ...]) -> tuple[PlacedObject, ...]:
+    return tuple(thing for thing in objects if thing.blocks != "nothing")

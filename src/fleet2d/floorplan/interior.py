@@ -1,0 +1,630 @@
+"""A home while furniture is put into it: places for pieces, and the routes that must stay open."""
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from shapely import MultiPolygon, Polygon
+from shapely.geometry.base import BaseGeometry
+
+from fleet2d.floorplan.furniture import stand_furniture
+from fleet2d.floorplan.home import lattice_footprint
+from fleet2d.floorplan.lattice import UNITS_PER_CELL
+from fleet2d.floorplan.mesh import GRID
+from fleet2d.floorplan.objects import PlacedObject
+from fleet2d.floorplan.plan import FloorPlan, Room, rings
+from fleet2d.floorplan.space import (
+    BODY_RADIUS,
+    Space,
+    Window,
+    grow_shape,
+    grown_cells,
+    shrink,
+    with_approaches,
+)
+from fleet2d.kernels import I64, Bool
+from fleet2d.kernels.numbers import QUARTER, TURN
+from fleet2d.kernels.space import label_parts, squared_distance
+from fleet2d.runtime.determinism import Draws
+
+# Largest distance of a wall behind a piece, to allow for the steps of jagged walls [m].
+WALL_REACH = 0.15
+# Least part of its back that a piece against a wall has there, in tenths.
+MIN_BACKED = 8
+# Number of places that are tried for a group before it is left out.
+ATTEMPTS = 10
+# A place may have this many points less than the best, for variety.
+VARIETY = 8
+# A smaller part of the floor may be cut off from the rest.
+POCKET_M2 = 0.06
+# Distance from a door beyond which more distance earns no points [m].
+FAR_M = 3.0
+
+Score = Callable[[int, tuple[int, int], tuple[int, int]], I64 | None]
+
+
+@dataclass(frozen=True)
+class Piece:
+    """A piece of furniture in a group, whose back is at the bottom.
+
+    Attributes:
+        type: Its type in the catalogue.
+        left: Distance of its footprint from the group's left corner [m].
+        ahead: Distance of its footprint from the group's back [m].
+        width: Extent of the footprint along the back [m].
+        depth: Extent of the footprint away from the back [m].
+        turn: Direction of its front, quarter turns counter-clockwise from that of the group.
+    """
+
+    type: str
+    left: float
+    ahead: float
+    width: float
+    depth: float
+    turn: int = 0
+
+
+@dataclass(frozen=True)
+class FurnitureGroup:
+    """Pieces that are placed together, in a rectangle of floor that they have for themselves.
+
+    Attributes:
+        width: Extent along the back [m].
+        depth: Extent away from the back [m].
+        pieces: Its pieces.
+        wall: Whether its back must be against a wall.
+        front: Depth of the floor before it that stays empty [m].
+        corner: Points for a place in a corner.
+        away: Points for a place far from doors.
+    """
+
+    width: float
+    depth: float
+    pieces: tuple[Piece, ...]
+    wall: bool = True
+    front: float = 0.0
+    corner: int = 40
+    away: int = 20
+
+
+class RoomView:
+    """A room and its surroundings in a window of cells, which is turned to have each wall as base.
+
+    Turned by `turn` quarters, rows count away from the wall and columns along it. Sizes are in
+    cells.
+    """
+
+    def __init__(self, plan: FloorPlan, room: Room, whole: Bool, doors: Bool) -> None:
+        lattice = plan.lattice
+        self.room = room
+        self.lattice = lattice
+        margin = 1 + count_cells(lattice.cell, 1.0)
+        rows, columns = _bounds(plan, room)
+        rows = slice(max(rows.start - margin, 0), min(rows.stop + margin, lattice.rows))
+        columns = slice(max(columns.start - margin, 0), min(columns.stop + margin, lattice.columns))
+        self.window = (rows, columns)
+        self.inside = largest_part(plan.room_of_cell[self.window] == room.index)
+        self.pocket = int(POCKET_M2 / lattice.cell**2)
+        self._whole, doors = whole[self.window], doors[self.window]
+        self._may_hold = self._whole & self.inside & ~doors
+        self._from_doors = squared_distance(np.pad(~doors, 1, constant_values=True))[1:-1, 1:-1]
+        reach = max(1, count_cells(lattice.cell, WALL_REACH))
+        solid = [np.rot90(~self._whole, turn) for turn in range(4)]
+        self._behind = [_sums(cells_after(mask, reach, 0)) for mask in solid]
+        self._right = [_sums(cells_after(mask, reach, 1)) for mask in solid]
+        self._left = [_sums(cells_after(mask, -reach, 1)) for mask in solid]
+
+    def places(
+        self, group: FurnitureGroup, occupied: Bool, draws: Draws, score: Score | None = None
+    ) -> Iterator[tuple[int, int, int]]:
+        """Yield places for a group, good ones first: turn, first row, first column.
+
+        Args:
+            group: The group.
+            occupied: Cells that other things occupy, bool (rows, columns) of the plan.
+            draws: The stream that chooses among good places.
+            score: Called with a turn, the shape of the turned window and the size of the group;
+                returns points for each first cell, or None where no place has that turn.
+        """
+        empty = ~occupied[self.window]
+        turns, rows, columns, points = [], [], [], []
+        for turn in range(4):
+            options = self._options(group, turn, empty, score)
+            if options is not None:
+                turns.append(np.full(len(options[0]), turn))
+                rows.append(options[0])
+                columns.append(options[1])
+                points.append(options[2])
+        if not turns:
+            return
+        places = np.stack([np.concatenate(turns), np.concatenate(rows), np.concatenate(columns)], 1)
+        value = np.concatenate(points)
+        for _ in range(ATTEMPTS):
+            if not len(value):
+                return
+            good = np.flatnonzero(value >= value.max() - VARIETY)
+            turn, row, column = places[good[draws.below(len(good))]].tolist()
+            yield turn, row, column
+            # A group that doesn't fit at a place doesn't fit close by either.
+            near = np.abs(places[:, 1:] - (row, column)).max(axis=1) <= self._step
+            rest = ~(near & (places[:, 0] == turn))
+            places, value = places[rest], value[rest]
+
+    @property
+    def _step(self) -> int:
+        return count_cells(self.lattice.cell, 0.2)
+
+    def _options(
+        self, group: FurnitureGroup, turn: int, empty: Bool, score: Score | None
+    ) -> tuple[I64, I64, I64] | None:
+        """Return the rows and columns of first cells where the group can be, and their points."""
+        width, depth = self._size(group)
+        front = count_cells(self.lattice.cell, group.front)
+        free = np.rot90(self._may_hold & empty, turn)
+        high, wide = free.shape
+        if depth + front > high or width > wide:
+            return None
+        extra = None if score is None else score(turn, (high, wide), (width, depth))
+        if score is not None and extra is None:
+            return None
+        possible = _count(free, depth, width) == depth * width
+        if front:
+            before = _count(np.rot90(self._whole & empty, turn), front, width) == front * width
+            possible[: before.shape[0] - depth] &= before[depth:][: possible.shape[0]]
+            possible[max(before.shape[0] - depth, 0) :] = False
+        if not possible.any():
+            return None
+        rows, columns = np.nonzero(possible)
+        if group.wall:
+            touching = _in_box(self._behind[turn], rows, columns, 1, width)
+            backed = 10 * touching >= MIN_BACKED * width
+            rows, columns = rows[backed], columns[backed]
+        points = self._points(group, turn, rows, columns)
+        if extra is not None:
+            more = extra[rows, columns]
+            rows, columns, points = rows[more >= 0], columns[more >= 0], (points + more)[more >= 0]
+        return rows, columns, points
+
+    def _points(self, group: FurnitureGroup, turn: int, rows: I64, columns: I64) -> I64:
+        """Return the points of first cells for corners and for the distance from doors."""
+        width, depth = self._size(group)
+        points = np.zeros(len(rows), np.int64)
+        if group.corner:
+            right = _in_box(self._right[turn], rows, columns, depth, 1)
+            left = _in_box(self._left[turn], rows, columns + width - 1, depth, 1)
+            points += group.corner * np.maximum(left, right) // depth
+        if group.away:
+            far = count_cells(self.lattice.cell, FAR_M)
+            distance = np.rot90(self._from_doors, turn)[rows + depth // 2, columns + width // 2]
+            points += np.minimum(distance, far * far) * group.away // (far * far)
+        return points
+
+    def _size(self, group: FurnitureGroup) -> tuple[int, int]:
+        cell = self.lattice.cell
+        return max(1, count_cells(cell, group.width)), max(1, count_cells(cell, group.depth))
+
+    def rectangle(
+        self, group: FurnitureGroup, turn: int, row: int, column: int
+    ) -> tuple[slice, slice]:
+        """Return the rows and columns of the plan that a group and the floor before it occupy."""
+        width, depth = self._size(group)
+        depth += count_cells(self.lattice.cell, group.front)
+        (x0, y0), (x1, y1) = self._unturned(turn, [(column, row), (column + width, row + depth)])
+        x0, x1, y0, y1 = min(x0, x1), max(x0, x1), min(y0, y1), max(y0, y1)
+        return slice(int(y0), int(y1)), slice(int(x0), int(x1))
+
+    def pieces(self, group: FurnitureGroup, turn: int, row: int, column: int) -> list[PlacedObject]:
+        """Return the furniture of a group whose first cell is at a row and column.
+
+        The list is empty if the cells are too large for it.
+        """
+        cell = self.lattice.cell
+        objects = []
+        for piece in group.pieces:
+            # Edges are rounded, not sizes: what is side by side stays so.
+            u0, v0 = count_cells(cell, piece.left), count_cells(cell, piece.ahead)
+            u1 = count_cells(cell, piece.left + piece.width)
+            v1 = count_cells(cell, piece.ahead + piece.depth)
+            if u1 == u0 or v1 == v0:
+                return []  # the cells are larger than the piece
+            u0, u1, v0, v1 = column + u0, column + u1, row + v0, row + v1
+            (x0, y0), (x1, y1) = self._unturned(turn, [(u0, v0), (u1, v1)])
+            # The back is at the bottom: away from it is +y before turning.
+            heading = (QUARTER * (turn + piece.turn + 1)) % TURN
+            corners = np.array([(x0, y0), (x1, y1)]) * UNITS_PER_CELL
+            (ax, ay), (bx, by) = self.lattice.to_metres(corners).tolist()
+            size = (abs(bx - ax), abs(by - ay))
+            if heading % (2 * QUARTER) == 0:
+                size = size[::-1]
+            middle = ((ax + bx) / 2, (ay + by) / 2)
+            objects.append(stand_furniture(piece.type, middle, heading, size))
+        return objects
+
+    def _unturned(self, turn: int, points: list[tuple[int, int]]) -> list[tuple[int, int]]:
+        """Return corners of cells (x, y) of the turned window as those of the plan."""
+        height, width = self.inside.shape
+        x0, y0 = self.window[1].start, self.window[0].start
+        out = []
+        for u, v in points:
+            x, y = ((u, v), (width - v, u), (width - u, height - v), (v, height - u))[turn]
+            out.append((x0 + x, y0 + y))
+        return out
+
+    def turn_place(self, turn: int, x: float, y: float) -> tuple[float, float]:
+        """Return a place (x, y) [m] as column and row of the turned window."""
+        height, width = self.inside.shape
+        low = self.lattice.to_lattice((x, y)) / UNITS_PER_CELL
+        x, y = float(low[0]) - self.window[1].start, float(low[1]) - self.window[0].start
+        return ((x, y), (y, width - x), (width - x, height - y), (height - y, x))[turn]
+
+
+def _bounds(plan: FloorPlan, room: Room) -> tuple[slice, slice]:
+    lattice = plan.lattice
+    low = lattice.to_lattice(room.bounds[:2]) // UNITS_PER_CELL
+    high = lattice.to_lattice(room.bounds[2:]) // UNITS_PER_CELL
+    return slice(int(low[1]), int(high[1])), slice(int(low[0]), int(high[0]))
+
+
+def largest_part(mask: Bool, within: Bool | None = None) -> Bool:
+    """Return the connected part of a mask with the most cells, of those `within` if given."""
+    part = label_parts(np.ascontiguousarray(mask), False)
+    sizes = np.bincount(part[mask if within is None else mask & within], minlength=1)
+    return mask & (part == int(np.argmax(sizes)))
+
+
+def count_cells(cell: float, metres: float) -> int:
+    """Return how many cells of a side [m] come nearest to a length [m]."""
+    # Slightly more than a half is added, so that sums of equal value are rounded alike.
+    return math.floor(metres / cell + 0.5 + 1e-6)
+
+
+def _sums(mask: Bool) -> I64:
+    """Count the cells of a mask above and left of each corner, (rows + 1, columns + 1)."""
+    sums = np.zeros((mask.shape[0] + 1, mask.shape[1] + 1), np.int32)
+    np.cumsum(np.cumsum(mask, axis=0, dtype=np.int32), axis=1, out=sums[1:, 1:])
+    return sums
+
+
+def _in_box(sums: I64, rows: I64, columns: I64, high: int, wide: int) -> I64:
+    """Return how many cells of a mask are in the boxes that begin at some cells."""
+    right, top = columns + wide, rows + high
+    return sums[top, right] - sums[rows, right] - sums[top, columns] + sums[rows, columns]
+
+
+def _count(mask: Bool, high: int, wide: int) -> I64:
+    """Return how many cells of the mask are in the rectangle that begins at each cell."""
+    sums = _sums(mask)
+    return sums[high:, wide:] - sums[:-high, wide:] - sums[high:, :-wide] + sums[:-high, :-wide]
+
+
+def cells_after(mask: Bool, reach: int, axis: int) -> Bool:
+    """Return the cells that follow a cell of the mask within `reach`, or precede it if negative."""
+    out = np.zeros_like(mask)
+    size = mask.shape[axis]
+    for step in range(1, abs(reach) + 1):
+        first, last = slice(0, size - step), slice(step, size)
+        target, origin = (last, first) if reach > 0 else (first, last)
+        if axis == 0:
+            out[target] |= mask[origin]
+        else:
+            out[:, target] |= mask[:, origin]
+    return out
+
+
+DOOR_CLEARANCE = 0.9
+"""Depth of the floor before a doorway that stays empty, on either side [m]."""
+
+THIN_RADIUS = 0.1
+"""The radius of the thinnest body whose routes furniture leaves open [m]."""
+NARROW_RADII = (0.225, 0.2, 0.175, 0.15, 0.125)
+"""Radii between those two, which matter in homes with passages that not every body fits through."""
+CUT_OFF_M2 = 0.25
+"""Furniture may cut off less than this of a body's space, such as a corner behind a bed [m²]."""
+
+# The outlines of the space of a body [lattice], by its radius [m].
+BodySpaces = dict[float, list[Polygon]]
+
+
+class Interior:
+    """A home while furniture is put into it.
+
+    Attributes:
+        plan: The home.
+        objects: The objects in it, those of the plan first.
+        standing: Cells where the middle of a body can be, bool (rows, columns).
+    """
+
+    def __init__(self, plan: FloorPlan) -> None:
+        self.plan = plan
+        self.objects: list[PlacedObject] = []
+        space = Space(plan, BODY_RADIUS)
+        self.standing: Bool = space.part_of_cell >= 0
+        self.whole = whole_cells(plan)
+        self.doors = door_cells(plan, self.standing)
+        self.occupied = np.zeros_like(self.whole)
+        self._views: dict[int, RoomView] = {}
+        self._main: dict[int, Bool] = {}
+        self._approached = np.zeros_like(self.whole)
+        self._spaces = _body_spaces(plan, space)
+        for thing in plan.objects:
+            window, covered = grown_cells(plan.lattice, thing.footprint, 0.0)
+            self.occupied[window] |= covered
+            if thing.blocks != "nothing":
+                window, covered = grown_cells(plan.lattice, thing.footprint, BODY_RADIUS)
+                self.standing[window] &= ~covered
+        for thing in plan.objects:
+            self._record(thing)
+        shapely.prepare(plan.free_space)
+
+    def place(
+        self, room: Room, group: FurnitureGroup, draws: Draws, score: Score | None = None
+    ) -> bool:
+        """Put a group into a room; return whether there was a place for it.
+
+        Args:
+            room: The room.
+            group: The group.
+            draws: The stream that chooses among good places.
+            score: Further points for places, see `RoomView.places`.
+        """
+        view = self.view(room)
+        for turn, row, column in view.places(group, self.occupied, draws, score):
+            things = view.pieces(group, turn, row, column)
+            if things and self._add(view, things):
+                window = view.rectangle(group, turn, row, column)
+                self.occupied[window] = True
+                return True
+        return False
+
+    def view(self, room: Room) -> RoomView:
+        """Return the view of a room."""
+        if room.index not in self._views:
+            self._views[room.index] = RoomView(self.plan, room, self.whole, self.doors)
+        return self._views[room.index]
+
+    def _add(self, view: RoomView, things: list[PlacedObject]) -> bool:
+        """Add objects if they stand in free space, are usable and cut no route; return whether."""
+        for thing in things:
+            if not shapely.covers(self.plan.free_space, thing.footprint):
+                return False
+        before = self.standing[view.window].copy()
+        grown = []
+        for thing in things:
+            if thing.blocks != "nothing":
+                window, covered = grown_cells(self.plan.lattice, thing.footprint, BODY_RADIUS)
+                self.standing[window] &= ~covered
+                grown.append(window)
+        usable = spaces = None
+        if self._ways_stay_open(view, before, grown):
+            usable = self._usable(view, things)
+        if usable is not None:
+            spaces = self._spaces_with(usable)
+        if usable is None or spaces is None:
+            self.standing[view.window] = before
+            return False
+        self._spaces = spaces
+        for thing in usable:
+            self._record(thing)
+        return True
+
+    def _ways_stay_open(self, view: RoomView, before: Bool, grown: list[Window]) -> bool:
+        """Return whether connected cells still are, and the room can still be entered.
+
+        Args:
+            view: The room.
+            before: Cells of its window where a body could stand, before the objects were added.
+            grown: The windows in which that has changed.
+        """
+        after = self.standing[view.window]
+        if bool((self._approached[view.window] & ~after).any()):
+            return False
+        if bool((before & view.inside).any()) and not bool((after & view.inside).any()):
+            return False
+        if not grown:
+            return True
+        # Cells that stay connected near by stay so; otherwise a route may lead farther around.
+        near = tuple(_hull([w[k] for w in grown], view.window[k].start) for k in (0, 1))
+        return not _split(before[near], after[near], 0) or not _split(before, after, view.pocket)
+
+    def _usable(self, view: RoomView, things: list[PlacedObject]) -> list[PlacedObject] | None:
+        """Return the objects with reachable places to use them, or None if one has none."""
+        usable, everything = [], [*self.objects, *things]
+        for thing in things:
+            reachable = with_approaches(self.plan, thing, self._reached(view), everything)
+            if thing.uses and not reachable.uses:
+                return None
+            usable.append(reachable)
+        return usable
+
+    def _spaces_with(self, things: list[PlacedObject]) -> BodySpaces | None:
+        """Return the spaces of bodies among further objects, or None if these cut a space in two.
+
+        Cells alone can't tell: between slanted walls, or for a thin body, there may be a way where
+        no two neighboring cells are free.
+        """
+        spaces: BodySpaces = {}
+        for radius, parts in self._spaces.items():
+            blocked = _blocked(self.plan, things, radius)
+            spaces[radius] = []
+            for part in parts:
+                pieces = _pieces(part, blocked)
+                if len(_large(self.plan, pieces)) > 1:
+                    return None
+                spaces[radius] += pieces[:1]
+        uses = [use for thing in (*self.objects, *things) for use in thing.uses]
+        approaches = [use.approach for use in uses if use.approach is not None]
+        if approaches:
+            x, y = self.plan.lattice.to_lattice(approaches).T
+            before, after = (
+                shapely.contains_xy(MultiPolygon(by_radius[BODY_RADIUS]), x, y)
+                for by_radius in (self._spaces, spaces)
+            )
+            if (before & ~after).any():
+                return None
+        return spaces
+
+    def _reached(self, view: RoomView) -> Bool:
+        """Return the largest connected part of the standing cells in and around a room."""
+        index = view.room.index
+        if index not in self._main:
+            self._main[index] = np.zeros_like(self.standing)
+            main = largest_part(self.standing[view.window], view.inside)
+            self._main[index][view.window] = main
+        # It is never split, so the rest of it is still connected.
+        return self._main[index] & self.standing
+
+    def _record(self, thing: PlacedObject) -> None:
+        """Record an object, and the cells from which it is used, which must stay free."""
+        lattice = self.plan.lattice
+        self.objects.append(thing)
+        for use in thing.uses:
+            if use.approach is not None:
+                row, column = lattice.cell_of(*lattice.point_at(use.approach))
+                self._approached[row, column] = bool(self.standing[row, column])
+
+
+def _body_spaces(plan: FloorPlan, space: Space) -> BodySpaces:
+    """Return the spaces of bodies among the walls and objects of a plan.
+
+    Args:
+        plan: The plan.
+        space: The space of a body of `BODY_RADIUS` between its walls.
+    """
+
+    def among_objects(radius: float) -> list[Polygon]:
+        polygons = space.polygons
+        if radius != BODY_RADIUS:
+            polygons = shrink(plan.polygons, radius * plan.lattice.units_per_m)
+        blocked = _blocked(plan, plan.objects, radius)
+        return [piece for polygon in polygons for piece in _pieces(polygon, blocked)]
+
+    spaces = {radius: among_objects(radius) for radius in (BODY_RADIUS, THIN_RADIUS)}
+    if _has_narrow_places(plan, spaces):
+        spaces |= {radius: among_objects(radius) for radius in NARROW_RADII}
+    return spaces
+
+
+def _has_narrow_places(plan: FloorPlan, spaces: BodySpaces) -> bool:
+    """Return whether thin bodies get to places, or between places, where large ones don't."""
+    wide, thin = _large(plan, spaces[BODY_RADIUS]), np.array(spaces[THIN_RADIUS], np.object_)
+    inside = np.asarray(shapely.point_on_surface(wide))
+    if (shapely.contains(thin[:, None], inside).sum(axis=1) > 1).any():
+        return True
+    # The octagon of a body reaches up to 8 % farther than its radius.
+    reach = (1.09 * BODY_RADIUS - THIN_RADIUS) * plan.lattice.units_per_m
+    near = MultiPolygon(wide).buffer(reach, join_style="mitre")
+    return any(_large(plan, _pieces(part, near)) for part in thin)
+
+
+def _blocked(plan: FloorPlan, things: Iterable[PlacedObject], radius: float) -> BaseGeometry:
+    """Return where the middle of a body can't be because of objects [lattice]."""
+    # Further by the rounding of a space, so that what is connected here is connected in the space.
+    reach = radius * plan.lattice.units_per_m + GRID
+    solid = [lattice_footprint(plan, thing) for thing in things if thing.blocks != "nothing"]
+    return shapely.union_all([grow_shape(shapely.get_coordinates(s), reach) for s in solid])
+
+
+def _pieces(polygon: Polygon, without: BaseGeometry) -> list[Polygon]:
+    """Return the pieces of a polygon that lie outside of a shape, the largest first."""
+    if not polygon.intersects(without):
+        return [polygon]
+    pieces = shapely.get_parts(shapely.difference(polygon, without)).tolist()
+    polygons = [piece for piece in pieces if piece.geom_type == "Polygon"]
+    return sorted(polygons, key=lambda piece: -piece.area)
+
+
+def _large(plan: FloorPlan, polygons: Sequence[Polygon]) -> list[Polygon]:
+    """Return the polygons [lattice] that furniture may not cut off."""
+    least = CUT_OFF_M2 * plan.lattice.units_per_m**2
+    return [polygon for polygon in polygons if polygon.area >= least]
+
+
+def _hull(slices: list[slice], start: int) -> slice:
+    """Return the slice, relative to a start, that holds others and one more cell on either side."""
+    first, last = min(s.start for s in slices) - 1, max(s.stop for s in slices) + 1
+    return slice(max(first - start, 0), last - start)
+
+
+def _split(before: Bool, after: Bool, pocket: int) -> bool:
+    """Return whether a part of a mask was split, or one larger than a pocket was lost."""
+    old, new = (label_parts(np.ascontiguousarray(mask), False) for mask in (before, after))
+    parts = int(old.max()) + 1
+    old_part, new_part = old[after], new[after]
+    becomes = np.full(parts, -1, np.int64)
+    becomes[old_part] = new_part
+    if bool((becomes[old_part] != new_part).any()):
+        return True
+    sizes = np.bincount(old[before], minlength=parts)
+    return bool(((becomes < 0) & (sizes > pocket)).any())
+
+
+def whole_cells(plan: FloorPlan) -> Bool:
+    """Return the free cells that no wall cuts, bool (rows, columns).
+
+    Walls are sampled in steps of a quarter of a cell, so a wall that only cuts the corner of a cell
+    may be missed.
+    """
+    cells: Bool = plan.free.copy()
+    for polygon in plan.polygons:
+        for ring in rings(polygon):
+            points = shapely.get_coordinates(ring)
+            parts = np.abs(np.diff(points, axis=0)).max(axis=1) // (UNITS_PER_CELL // 4) + 1
+            parts = parts.astype(np.int64)
+            piece = np.repeat(np.arange(len(parts)), parts)
+            step = np.arange(len(piece)) - np.repeat(np.cumsum(parts) - parts, parts)
+            share = (step / parts[piece])[:, None]
+            along = points[piece] * (1 - share) + points[piece + 1] * share
+            # A wall along the side of a cell touches it without being in it.
+            inner = along[(along % UNITS_PER_CELL != 0).all(axis=1)]
+            column, row = (inner // UNITS_PER_CELL).astype(np.int64).T
+            cells[row, column] = False
+    return cells
+
+
+def door_cells(plan: FloorPlan, standing: Bool) -> Bool:
+    """Return the cells before doorways and before borders that rooms share, bool (rows, columns).
+
+    A border counts where a body can walk across it (`standing` on either side, and two radii
+    beside): it is the doorway of a plan without doorways.
+    """
+    cell = plan.lattice.cell
+    reach, beside = count_cells(cell, DOOR_CLEARANCE), count_cells(cell, 2 * BODY_RADIUS)
+    cells = np.zeros_like(plan.free)
+    for turn in range(4):
+        rooms, can_stand = np.rot90(plan.room_of_cell, turn), np.rot90(standing, turn)
+        free, zone = np.rot90(plan.free, turn), np.rot90(cells, turn)
+        border = np.zeros_like(free)
+        border[1:] = free[1:] & free[:-1] & (rooms[1:] != rooms[:-1])
+        crossed = border.copy()
+        crossed[1:] &= can_stand[1:] & can_stand[:-1]
+        seeds = border & (
+            crossed | cells_after(crossed, beside, 1) | cells_after(crossed, -beside, 1)
+        )
+        seeds |= np.rot90(_doorway_cells(plan, upright=turn % 2 == 1), turn)
+        for _ in range(reach):
+            zone |= seeds
+            seeds[1:] = seeds[:-1] & free[1:]
+            seeds[0] = False
+    if plan.entrance is not None:
+        xs, ys = plan.lattice.centre_axes()
+        x, y = plan.lattice.point_at(plan.entrance)
+        units = int(DOOR_CLEARANCE * plan.lattice.units_per_m)
+        cells |= (xs[None, :] - x) ** 2 + (ys[:, None] - y) ** 2 < units * units
+    return cells
+
+
+def _doorway_cells(plan: FloorPlan, *, upright: bool) -> Bool:
+    """Return the free cells along the doorways that are passed along x (upright) or along y."""
+    cells = np.zeros_like(plan.free)
+    for door in plan.doorways:
+        start, end = plan.lattice.to_lattice([door.start, door.end])
+        along = np.abs(end - start)
+        if 2 * along[1 if upright else 0] < along[0 if upright else 1]:
+            continue
+        steps = int(along.max()) // (UNITS_PER_CELL // 4) + 1
+        share = np.arange(steps + 1)[:, None]
+        at = (start * (steps - share) + end * share) // steps // UNITS_PER_CELL
+        cells[at[:, 1], at[:, 0]] = True
+    return cells & plan.free

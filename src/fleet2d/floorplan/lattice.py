@@ -1,0 +1,179 @@
+"""The fixed-point grid of all positions and walls, and its conversion from and to metres."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from fleet2d.errors import FloorPlanError
+from fleet2d.kernels import F64, I64
+
+UNITS_PER_CELL = 64
+MARGIN_CELLS = 2
+MIN_CELL_M = 0.01
+MAX_CELL_M = 1.0
+
+# Products of three coordinates must stay inside int64: the sight kernels rely on this bound.
+COORDINATE_LIMIT = 2**20
+
+# Most cells of a plan: finding its rooms takes 30 bytes a cell, 600 MB in all.
+MAX_CELLS = 20_000_000
+
+
+@dataclass(frozen=True)
+class Lattice:
+    """A square grid of cells over a floor plan, 64 lattice units to the side of a cell.
+
+    Cell (row r, column c) covers the lattice square from (64c, 64r) to (64c + 64, 64r + 64).
+
+    Attributes:
+        cell: Side of a cell [m].
+        origin: Corner of cell (0, 0) [m], a multiple of the cell.
+        columns: Cells along x.
+        rows: Cells along y.
+
+    Example:
+        >>> lattice = Lattice.around((0.1, 0.1, 5.06, 5.06), cell=0.05)
+        >>> lattice.origin, lattice.columns, lattice.rows
+        ((0.0, 0.0), 104, 104)
+        >>> lattice.to_lattice([0.1, 0.05])
+        array([128,  64])
+        >>> lattice.to_metres([128, 64])
+        array([0.1 , 0.05])
+    """
+
+    cell: float
+    origin: tuple[float, float]
+    columns: int
+    rows: int
+
+    def __post_init__(self) -> None:
+        check_cell(self.cell)
+        if UNITS_PER_CELL * max(self.columns, self.rows) >= COORDINATE_LIMIT:
+            width, height = self.columns * self.cell, self.rows * self.cell
+            raise FloorPlanError(
+                f"the floor plan is {width:.0f} m x {height:.0f} m, too large for cells of"
+                f" {self.cell:g} m (at most {COORDINATE_LIMIT // UNITS_PER_CELL - 1} cells a side):"
+                f" set floorplan.cell to {_smallest_cell(max(width, height)):g} or more,"
+                " and check that the file is in metres"
+            )
+        if self.columns * self.rows > MAX_CELLS:
+            width, height = self.columns * self.cell, self.rows * self.cell
+            fits = math.ceil(100 * math.sqrt(width * height / MAX_CELLS)) / 100
+            millions, most = self.columns * self.rows / 1e6, MAX_CELLS / 1e6
+            raise FloorPlanError(
+                f"the floor plan is {width:.0f} m x {height:.0f} m: {millions:.0f} million cells of"
+                f" {self.cell:g} m, and at most {most:.0f} million fit into 1 GB of memory:"
+                f" set floorplan.cell to {fits:g} or more, and check that the file is in metres"
+            )
+
+    @classmethod
+    def around(cls, bounds: tuple[float, float, float, float], cell: float) -> Self:
+        """Return the lattice that covers `bounds` (x0, y0, x1, y1) [m] and two cells more.
+
+        Raises:
+            FloorPlanError: The cell is not within 0.01–1.0 m, or the bounds are not finite or too
+                large for it.
+        """
+        check_cell(cell)
+        if not all(math.isfinite(value) for value in bounds):
+            raise FloorPlanError(f"the floor plan's bounds are not finite numbers: {bounds}")
+        # The bounds are snapped as walls are, so that a plan and its stored copy share a lattice.
+        units = UNITS_PER_CELL / cell
+        low_x, low_y, high_x, high_y = (2 * round(value * units / 2) for value in bounds)
+        first = (low_x // UNITS_PER_CELL - MARGIN_CELLS, low_y // UNITS_PER_CELL - MARGIN_CELLS)
+        last = (
+            -(-high_x // UNITS_PER_CELL) + MARGIN_CELLS,
+            -(-high_y // UNITS_PER_CELL) + MARGIN_CELLS,
+        )
+        return cls(
+            cell=cell,
+            origin=(first[0] * cell, first[1] * cell),
+            columns=last[0] - first[0],
+            rows=last[1] - first[1],
+        )
+
+    @cached_property
+    def units_per_m(self) -> float:
+        """Lattice units to a metre: 1280 for cells of 5 cm."""
+        return UNITS_PER_CELL / self.cell
+
+    @cached_property
+    def _origin_units(self) -> I64:
+        cells = np.rint(np.asarray(self.origin) / self.cell).astype(np.int64)
+        return cells * UNITS_PER_CELL
+
+    def to_lattice(self, xy: ArrayLike) -> I64:
+        """Return positions (…, 2) [m] as the nearest lattice points, int64 of the same shape."""
+        units = np.rint(np.asarray(xy, dtype=np.float64) * self.units_per_m)
+        return units.astype(np.int64) - self._origin_units
+
+    @cached_property
+    def _origin_point(self) -> tuple[int, int]:
+        x, y = self._origin_units.tolist()
+        return x, y
+
+    def point_at(self, xy: Sequence[float]) -> tuple[int, int]:
+        """Return one position (x, y) [m] as the nearest lattice point; quicker than `to_lattice`.
+
+        Example:
+            >>> Lattice.around((0.1, 0.1, 5.06, 5.06), cell=0.05).point_at((0.1, 0.05))
+            (128, 64)
+        """
+        units, (x0, y0) = self.units_per_m, self._origin_point
+        return round(xy[0] * units) - x0, round(xy[1] * units) - y0
+
+    def xy_of(self, x: int, y: int) -> tuple[float, float]:
+        """Return one lattice point in metres; quicker than `to_metres`.
+
+        Example:
+            >>> Lattice.around((0.1, 0.1, 5.06, 5.06), cell=0.05).xy_of(128, 64)
+            (0.1, 0.05)
+        """
+        units, (x0, y0) = self.units_per_m, self._origin_point
+        return (x + x0) / units, (y + y0) / units
+
+    def to_walls(self, xy: ArrayLike) -> I64:
+        """Return positions (…, 2) [m] as the nearest even lattice points, where walls may stand."""
+        halves = np.rint(np.asarray(xy, dtype=np.float64) * self.units_per_m / 2)
+        return 2 * halves.astype(np.int64) - self._origin_units
+
+    def to_metres(self, xy: ArrayLike) -> F64:
+        """Return lattice points (…, 2) in metres, float64 of the same shape."""
+        return (np.asarray(xy) + self._origin_units) / self.units_per_m
+
+    def cell_of(self, x: int, y: int) -> tuple[int, int]:
+        """Return (row, column) of the cell that holds a lattice point."""
+        return int(y) // UNITS_PER_CELL, int(x) // UNITS_PER_CELL
+
+    def cell_centre(self, row: int, column: int) -> tuple[int, int]:
+        """Return a cell's centre (x, y) [lattice]: the odd point next to its exact middle."""
+        half = UNITS_PER_CELL // 2 + 1
+        return UNITS_PER_CELL * column + half, UNITS_PER_CELL * row + half
+
+    def centre_axes(self) -> tuple[I64, I64]:
+        """Return the x (columns,) and the y (rows,) of the cell centres, lattice units."""
+        half = UNITS_PER_CELL // 2 + 1
+        return (
+            np.arange(self.columns, dtype=np.int64) * UNITS_PER_CELL + half,
+            np.arange(self.rows, dtype=np.int64) * UNITS_PER_CELL + half,
+        )
+
+
+def check_cell(cell: float) -> None:
+    """Raise FloorPlanError unless `cell` is a valid cell size."""
+    if not MIN_CELL_M <= cell <= MAX_CELL_M:
+        raise FloorPlanError(
+            f"floorplan.cell is {cell:g} m: choose a cell size from {MIN_CELL_M:g} m to"
+            f" {MAX_CELL_M:g} m (0.05 m is usual)"
+        )
+
+
+def _smallest_cell(extent: float) -> float:
+    """Return a cell size, in whole centimetres, at which `extent` [m] fits."""
+    cells = COORDINATE_LIMIT // UNITS_PER_CELL - 2 * MARGIN_CELLS - 2
+    return math.ceil(100 * extent / cells) / 100

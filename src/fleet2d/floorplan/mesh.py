@@ -1,0 +1,484 @@
+"""Walls on the lattice: repaired, snapped, triangulated, and cut by gates that shut."""
+
+from collections.abc import Collection, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import shapely
+from shapely import MultiPolygon, Polygon
+from shapely.geometry.base import BaseGeometry
+
+from fleet2d.bounds import CROSSINGS
+from fleet2d.errors import FloorPlanError
+from fleet2d.floorplan.lattice import COORDINATE_LIMIT, Lattice
+from fleet2d.kernels import I32, I64
+from fleet2d.kernels.space import SUB, WALL, Mesh
+from fleet2d.runtime.determinism import sum_in_order
+
+# Edges that are looked up at once: each may cross all others.
+_EDGES = 64
+
+
+def repair(shape: BaseGeometry) -> BaseGeometry:
+    """Return the area that an invalid shape encloses: all that its outlines go round is inside.
+
+    Raises:
+        FloorPlanError: It crosses itself too often; repairing would take too long.
+
+    Example:
+        >>> bow = shapely.Polygon([(0, 0), (2, 2), (2, 0), (0, 2)])
+        >>> repair(bow).area
+        2.0
+    """
+    _check_crossings(shape)
+    return shapely.make_valid(shape, method="structure", keep_collapsed=False)
+
+
+def _check_crossings(shape: BaseGeometry) -> None:
+    outlines = shapely.get_rings(shapely.get_parts(shape))
+    corners = [shapely.get_coordinates(outline) for outline in outlines]
+    ends = [np.stack([c[:-1], c[1:]], axis=1) for c in corners]
+    edges: Any = shapely.linestrings(np.concatenate(ends)) if ends else np.empty(0, object)
+    tree, count = shapely.STRtree(edges), 0
+    for begin in range(0, len(edges), _EDGES):
+        pairs = tree.query(edges[begin : begin + _EDGES], predicate="crosses")
+        count += pairs.shape[1] // 2  # each crossing is found from both edges
+        CROSSINGS.check(count, "it", FloorPlanError, least="at least ")
+
+
+GRID = 2
+"""Walls lie on even lattice units; cell centres are odd, so no straight wall hits one."""
+
+
+class SnappedPolygon(NamedTuple):
+    """A polygon moved onto the wall lattice.
+
+    Attributes:
+        polygons: Its parts, with even integer coordinates; none if it was too thin.
+        area_change: New area minus old area, square lattice units.
+        tolerance: The most that moving every wall point by the rounding can change the area.
+    """
+
+    polygons: list[Polygon]
+    area_change: float
+    tolerance: float
+
+
+def snap_polygon(polygon: Polygon | MultiPolygon) -> SnappedPolygon:
+    """Move a polygon in lattice units onto even coordinates, and drop what collapses to nothing.
+
+    Parts thinner than the lattice vanish, and a part that is joined by less than that becomes a
+    polygon of its own. So do the loops of an outline that crosses itself; the change of the area
+    shows whether that was a small slip or a wrong outline, so check
+    `abs(area_change) <= tolerance`.
+
+    Args:
+        polygon: Free space in lattice units; any coordinates.
+
+    >>> snapped = snap_polygon(shapely.box(0.3, 0.2, 99.7, 10.9))
+    >>> [part.bounds for part in snapped.polygons], round(snapped.area_change, 2)
+    ([(0.0, 0.0, 100.0, 10.0)], -63.58)
+    """
+    sound = polygon if polygon.is_valid else shapely.make_valid(polygon, method="structure")
+    snapped = shapely.set_precision(sound, GRID)
+    parts = [part for part in shapely.get_parts(snapped) if part.area > 0]
+    parts = [shapely.orient_polygons(part) for part in parts]
+    area_change = sum_in_order(part.area for part in parts) - polygon.area
+    return SnappedPolygon(parts, area_change, GRID * polygon.length)
+
+
+def build_mesh(
+    polygons: Sequence[Polygon], columns: int, rows: int, corners: Sequence[tuple[int, int]] = ()
+) -> Mesh:
+    """Triangulate free space.
+
+    Args:
+        polygons: The free space; even integer coordinates, interiors disjoint. Rings may touch each
+            other in points.
+        columns: Width of the plan, cells.
+        rows: Height of the plan, cells.
+        corners: Points on walls that become vertices, even where the wall is straight.
+
+    Raises:
+        FloorPlanError: If the polygons are not such a free space, or don't fit the plan.
+
+    >>> mesh = build_mesh([shapely.box(0, 0, 640, 320)], columns=10, rows=5)
+    >>> mesh.vertices.tolist(), len(mesh.triangles)
+    ([[0, 0], [0, 320], [640, 0], [640, 320]], 2)
+    """
+    rings = _rings(polygons, columns * SUB, rows * SUB)
+    if corners:
+        rings = _split_at(rings, np.array(corners, np.int64).reshape(-1, 2))
+    mesh = _build(rings)
+    if mesh is None:
+        # A corner that touches the middle of another wall: make it a vertex of that wall, too.
+        mesh = _build(_split_at_touching_vertices(rings))
+    if mesh is None:
+        raise FloorPlanError(
+            "The free space can't be cut into triangles that end at its walls. Send the outlines "
+            "to snap_polygon first."
+        )
+    return mesh
+
+
+def _rings(polygons: Sequence[Polygon], width: int, height: int) -> list[list[I64]]:
+    """Return each polygon as open rings, outer first: int64 (n, 2), free space on the left."""
+    if not polygons or any(polygon.area <= 0 for polygon in polygons):
+        raise FloorPlanError(
+            "The floor plan has no free space: there is no polygon, or one without an area."
+        )
+    whole = MultiPolygon(list(polygons))
+    if not whole.is_valid:
+        raise FloorPlanError(
+            "The outlines cross, overlap or share a piece of wall: "
+            f"{shapely.is_valid_reason(whole)} (lattice units). Merge outlines that overlap."
+        )
+    rings = []
+    for polygon in polygons:
+        exact = shapely.get_coordinates(polygon)
+        if not np.array_equal(exact % GRID, np.zeros_like(exact)):
+            raise FloorPlanError(
+                "Walls must lie on even lattice units. Pass the polygon to snap_polygon first."
+            )
+        low, high = exact.min(axis=0), exact.max(axis=0)
+        if low.min() < 0 or high[0] > width or high[1] > height or high.max() >= COORDINATE_LIMIT:
+            raise FloorPlanError(
+                f"The walls reach from {low.tolist()} to {high.tolist()} lattice units, but the "
+                f"plan covers [0, 0] to [{width}, {height}], and nothing may reach "
+                f"{COORDINATE_LIMIT}. Use larger cells."
+            )
+        oriented = shapely.orient_polygons(polygon)
+        rings.append(
+            [
+                shapely.get_coordinates(ring)[:-1].astype(np.int64)
+                for ring in (oriented.exterior, *oriented.interiors)
+            ]
+        )
+    return _drop_flat_vertices(rings)
+
+
+def _keys(points: I64) -> I64:
+    """Return one number per point that sorts like (x, y)."""
+    return points[..., 0] * (2 * COORDINATE_LIMIT) + points[..., 1]
+
+
+def _drop_flat_vertices(polygons: list[list[I64]]) -> list[list[I64]]:
+    """Drop vertices in the middle of a straight wall, except where rings touch."""
+    everywhere = np.concatenate([_keys(ring) for rings in polygons for ring in rings])
+    keys, counts = np.unique(everywhere, return_counts=True)
+    touching = keys[counts > 1]
+
+    def straighten(ring: I64) -> I64:
+        before, after = np.roll(ring, 1, axis=0) - ring, np.roll(ring, -1, axis=0) - ring
+        bends = before[:, 0] * after[:, 1] != before[:, 1] * after[:, 0]
+        return ring[bends | np.isin(_keys(ring), touching)]
+
+    return [[straighten(ring) for ring in rings] for rings in polygons]
+
+
+def _split_at_touching_vertices(polygons: list[list[I64]]) -> list[list[I64]]:
+    """Insert every vertex that lies in the middle of a wall into that wall."""
+    return _split_at(
+        polygons, np.unique(np.concatenate([r for rings in polygons for r in rings]), axis=0)
+    )
+
+
+def _split_at(polygons: list[list[I64]], vertices: I64) -> list[list[I64]]:
+    """Insert each of some points that lies in the middle of a wall into that wall."""
+    tree = shapely.STRtree(np.asarray(shapely.points(vertices)))
+
+    def split(ring: I64) -> I64:
+        ends = np.roll(ring, -1, axis=0)
+        boxes = shapely.box(*np.minimum(ring, ends).T, *np.maximum(ring, ends).T)
+        wall, near = tree.query(np.asarray(boxes))
+        along, offsets = (ends - ring)[wall], vertices[near] - ring[wall]
+        distances = (offsets * along).sum(axis=1)
+        on_line = along[:, 0] * offsets[:, 1] == along[:, 1] * offsets[:, 0]
+        between = on_line & (distances > 0) & (distances < (along * along).sum(axis=1))
+        inserted = np.flatnonzero(between)
+        order = inserted[np.lexsort((distances[inserted], wall[inserted]))]
+        return np.insert(ring, wall[order] + 1, vertices[near[order]], axis=0)
+
+    return [[split(ring) for ring in rings] for rings in polygons]
+
+
+def _build(polygons: list[list[I64]]) -> Mesh | None:
+    """Return the mesh, or None when the triangles don't fill just the space between the rings."""
+    rings = [ring for rings in polygons for ring in rings]
+    wall_starts = np.concatenate(rings)
+    wall_ends = np.concatenate([np.roll(ring, -1, axis=0) for ring in rings])
+    # Not np.unique, which imports masked arrays.
+    keys = np.sort(_keys(wall_starts))
+    keys = keys[np.diff(keys, prepend=-1) != 0]
+    vertices = np.stack([keys // (2 * COORDINATE_LIMIT), keys % (2 * COORDINATE_LIMIT)], axis=1)
+    corners = _triangulate(polygons)
+    triangles = np.searchsorted(keys, _keys(corners))
+    area = int(_doubled_areas(corners).sum())
+    area_between_walls = int(_cross_products(wall_starts, wall_ends).sum())
+    if area != area_between_walls or not np.array_equal(vertices[triangles], corners):
+        return None
+    walls = np.searchsorted(keys, _keys(wall_starts)) * len(keys)
+    walls += np.searchsorted(keys, _keys(wall_ends))
+    neighbors = _neighbors(triangles, len(keys), np.sort(walls, kind="stable"))
+    if neighbors is None:
+        return None
+    return Mesh(vertices, triangles.astype(np.int32), neighbors)
+
+
+def _triangulate(polygons: list[list[I64]]) -> I64:
+    """Return triangles that fill the polygons: int64 (t, 3, 2), counter-clockwise corners."""
+    shapes = [Polygon(rings[0], rings[1:]) for rings in polygons]
+    filled = shapely.get_parts(shapely.constrained_delaunay_triangles(shapes))
+    exact = shapely.get_coordinates(filled).reshape(len(filled), 4, 2)[:, :3]
+    corners: I64 = exact.astype(np.int64)
+    areas = _doubled_areas(corners)
+    corners[areas < 0] = corners[areas < 0][:, ::-1]
+    return corners[areas != 0]
+
+
+def _cross_products(starts: I64, ends: I64) -> I64:
+    """Return the cross products of points; over a closed ring they add up to twice its area."""
+    return starts[:, 0] * ends[:, 1] - starts[:, 1] * ends[:, 0]
+
+
+def _doubled_areas(corners: I64) -> I64:
+    """Return twice the signed area of each triangle; `corners` is int64 (t, 3, 2)."""
+    return _cross_products(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+
+
+def _neighbors(triangles: I64, vertex_count: int, walls: I64) -> I32 | None:
+    """Return the triangle across each edge.
+
+    Args:
+        triangles: int64 (t, 3), vertex ids.
+        vertex_count: Number of vertices.
+        walls: start * vertex_count + end of each wall, with the free space on its left, sorted.
+
+    Returns:
+        int32 (t, 3); None unless every edge is either shared by two triangles or is a wall.
+    """
+    starts, ends = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
+    edges = starts * vertex_count + ends
+    order = np.argsort(edges, kind="stable")
+    ordered = edges[order]
+    reverse = ends * vertex_count + starts
+    position = np.minimum(np.searchsorted(ordered, reverse), len(ordered) - 1)
+    shared = ordered[position] == reverse
+    if (ordered[1:] == ordered[:-1]).any() or not np.array_equal(np.sort(edges[~shared]), walls):
+        return None
+    across = np.where(shared, order[position] // 3, WALL)
+    return across.reshape(-1, 3).astype(np.int32)
+
+
+Segment = tuple[tuple[int, int], tuple[int, int]]
+
+
+class Gates:
+    """A mesh in which some segments are edges, so that shutting one changes only two numbers.
+
+    The triangles on both sides of a shut gate are not neighbors: every kernel sees a wall without
+    thickness.
+
+    Attributes:
+        mesh: The mesh with all gates open.
+
+    Example:
+        >>> import shapely
+        >>> from fleet2d.floorplan.mesh import build_mesh
+        >>> gate = ((320, 0), (320, 640))
+        >>> mesh = build_mesh([shapely.box(0, 0, 640, 640)], 10, 10, corners=gate)
+        >>> gates = Gates(mesh, [gate])
+        >>> from fleet2d.kernels.space import locate
+        >>> from fleet2d.kernels.sight import line_of_sight
+        >>> for walls in (gates.mesh, gates.shut({0})):
+        ...     line_of_sight(walls, 11, 11, locate(walls, 11, 11), 631, 11)
+        True
+        False
+    """
+
+    def __init__(self, mesh: Mesh, segments: Sequence[Segment]) -> None:
+        """Make the segments edges of a mesh.
+
+        Args:
+            mesh: A mesh with their ends as vertices, and only free space between these.
+            segments: From wall to wall [lattice]; they don't cross each other.
+
+        Raises:
+            FloorPlanError: The mesh has no such vertices, or a wall is between them.
+        """
+        self.mesh, self._sides = _with_edges(mesh, segments)
+
+    def shut(self, gates: Collection[int]) -> Mesh:
+        """Return the mesh with these gates shut, by their number."""
+        if not gates:
+            return self.mesh
+        neighbors = self.mesh.neighbors.copy()
+        for gate in gates:
+            for triangle, edge in self._sides[gate]:
+                neighbors[triangle, edge] = WALL
+        return self.mesh.with_neighbors(neighbors)
+
+
+def _with_edges(
+    mesh: Mesh, segments: Sequence[Segment]
+) -> tuple[Mesh, list[tuple[tuple[int, int], ...]]]:
+    """Return the mesh with the segments as edges, and both sides of each: (triangle, edge)."""
+    vertices = mesh.vertices
+    corners = [tuple(triangle) for triangle in mesh.triangles.tolist()]
+    owner = {(t[k], t[(k + 1) % 3]): i for i, t in enumerate(corners) for k in range(3)}
+    ends = [(_vertex(vertices, a), _vertex(vertices, b)) for a, b in segments]
+    for a, b in ends:
+        _force_edge(vertices, corners, owner, a, b)
+    triangles = np.array(corners, np.int32)
+    neighbors = np.array(
+        [[owner.get((t[(k + 1) % 3], t[k]), WALL) for k in range(3)] for t in corners], np.int32
+    )
+    sides = [
+        tuple((owner[edge], corners[owner[edge]].index(edge[0])) for edge in ((a, b), (b, a)))
+        for a, b in ends
+    ]
+    return Mesh(vertices, triangles, neighbors), sides
+
+
+def _force_edge(
+    vertices: I64, corners: list[tuple[int, ...]], owner: dict[tuple[int, int], int], a: int, b: int
+) -> None:
+    """Flip the edges that cross a segment until it is an edge itself (Sloan 1993)."""
+    if (a, b) in owner and (b, a) in owner:
+        return
+    crossing = _crossing(vertices, owner, a, b)
+    attempts = 16 * (len(crossing) + 1) ** 2
+    while crossing:
+        attempts -= 1
+        p, q = crossing.pop(0)
+        left, right = owner[p, q], owner[q, p]
+        c, d = (next(v for v in corners[t] if v not in (p, q)) for t in (left, right))
+        if attempts == 0:
+            break
+        if _turn(vertices, d, c, q) * _turn(vertices, d, c, p) >= 0:
+            crossing.append((p, q))  # the quadrilateral is not convex yet
+            continue
+        corners[left], corners[right] = (p, d, c), (d, q, c)
+        del owner[p, q], owner[q, p]
+        for t in (left, right):
+            x, y, z = corners[t]
+            owner[x, y] = owner[y, z] = owner[z, x] = t
+        if {c, d} != {a, b} and _cross(vertices, a, b, c, d):
+            crossing.append((c, d))
+    if (a, b) not in owner or (b, a) not in owner:
+        at = vertices[[a, b]].tolist()
+        raise FloorPlanError(f"the door line {at} [lattice] does not cross free space alone")
+
+
+def _crossing(
+    vertices: I64, owner: dict[tuple[int, int], int], a: int, b: int
+) -> list[tuple[int, int]]:
+    """Return the inner edges that cross a segment, each once."""
+    edges = np.array([edge for edge in owner if edge[0] < edge[1] and edge[::-1] in owner])
+    if len(edges) == 0:
+        return []
+    start, along = vertices[a], vertices[b] - vertices[a]
+    side = along[0] * (vertices[:, 1] - start[1]) - along[1] * (vertices[:, 0] - start[0])
+    apart = edges[np.sign(side[edges[:, 0]]) * np.sign(side[edges[:, 1]]) < 0]
+    return [(p, q) for p, q in apart.tolist() if _cross(vertices, a, b, p, q)]
+
+
+def _cross(vertices: I64, a: int, b: int, p: int, q: int) -> bool:
+    """Return whether two segments cross between their ends."""
+    apart = _turn(vertices, a, b, p) * _turn(vertices, a, b, q) < 0
+    return apart and _turn(vertices, p, q, a) * _turn(vertices, p, q, b) < 0
+
+
+def _turn(vertices: I64, a: int, b: int, c: int) -> int:
+    """Return 1, 0 or -1 as c lies left of, on or right of the line from a to b."""
+    (ax, ay), (bx, by), (cx, cy) = vertices[[a, b, c]].tolist()
+    cross = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
+    return int(cross > 0) - int(cross < 0)
+
+
+def _vertex(vertices: I64, point: tuple[int, int]) -> int:
+    """Return the id of the vertex at a point."""
+    matches = np.flatnonzero((vertices == np.array(point, np.int64)).all(axis=1))
+    if len(matches) == 0:
+        raise FloorPlanError(f"the door line ends at {point} [lattice], where no wall is")
+    return int(matches[0])
+
+
+# Number of parts of which a note lists the areas.
+PARTS_LISTED = 5
+
+# Distance at which a coordinate counts as on the lattice, for rounding of decimals [lattice].
+LATTICE_TOLERANCE = 1e-6
+
+
+def free_on_lattice(
+    name: str, free: Polygon | MultiPolygon, cell: float
+) -> tuple[Lattice, list[Polygon]]:
+    """Put free space [m] on the lattice, in canonical order, so that equal walls make equal plans.
+
+    Args:
+        name: Name of the plan, for messages.
+        free: The free space between the walls [m].
+        cell: Side of a cell [m].
+
+    Returns:
+        The lattice that covers it, and the free space on it.
+
+    Raises:
+        FloorPlanError: It encloses no area, or would lose more of it than rounding explains.
+    """
+    if free.is_empty or not free.area > 0:
+        raise FloorPlanError(
+            f"the outline of {name} encloses no area: check that its points go round the free space"
+        )
+    first = Lattice.around(free.bounds, cell)
+    snapped = _on_walls(free, first.units_per_m)
+    if not snapped.polygons:
+        raise FloorPlanError(
+            f"nothing is left of {name} ({free.area:.3g} m2) at cells of {cell:g} m: choose a"
+            " smaller floorplan.cell, and check that the file is in metres"
+        )
+    if abs(snapped.area_change) > snapped.tolerance:
+        change = snapped.area_change / first.units_per_m**2
+        raise FloorPlanError(
+            f"rounding the walls of {name} to cells of {cell:g} m would change its area by"
+            f" {change:+.2f} of {free.area:.2f} m2: choose a smaller floorplan.cell, and check that"
+            " the outline doesn't run over itself"
+        )
+    # The lattice of the snapped walls, so that a plan and its stored copy agree.
+    corners = shapely.total_bounds(snapped.polygons) / first.units_per_m
+    lattice = Lattice.around(tuple(corners.tolist()), cell)
+    shift = lattice.to_lattice((0.0, 0.0))
+    moved = [shapely.transform(polygon, lambda xy: xy + shift) for polygon in snapped.polygons]
+    return lattice, canonical_order(moved)
+
+
+def canonical_order(polygons: Sequence[Polygon]) -> list[Polygon]:
+    """Return polygons and their rings in canonical order."""
+    normal = shapely.orient_polygons(shapely.normalize(polygons))
+    return sorted(normal.tolist(), key=lambda p: shapely.get_coordinates(p).tolist())
+
+
+def _on_walls(free: Polygon | MultiPolygon, units_per_m: float) -> SnappedPolygon:
+    """Snap free space [m] to even lattice units; free space that is there already stays as it is.
+
+    Snapping is not idempotent, as a wall that moves may come near another corner, but a stored plan
+    must be read back unchanged.
+    """
+    exact = shapely.transform(free, lambda xy: xy * units_per_m)
+    even = shapely.transform(exact, lambda xy: 2 * np.rint(xy / 2))
+    moved = np.abs(shapely.get_coordinates(even) - shapely.get_coordinates(exact)).max()
+    if moved < LATTICE_TOLERANCE and even.is_valid:
+        parts = shapely.get_parts(even)
+        return SnappedPolygon(parts.tolist(), even.area - exact.area, GRID * exact.length)
+    return snap_polygon(exact)
+
+
+def part_notes(lattice: Lattice, polygons: Sequence[Polygon]) -> list[str]:
+    """Return a note with the areas of the parts of free space, if there are several."""
+    if len(polygons) == 1:
+        return []
+    areas = sorted((p.area / lattice.units_per_m**2 for p in polygons), reverse=True)
+    sizes = ", ".join(f"{area:.2f}" for area in areas[:PARTS_LISTED])
+    more = ", …" if len(areas) > PARTS_LISTED else ""
+    return [f"the free space is in {len(areas)} parts that nothing joins: {sizes}{more} m2"]

@@ -1,0 +1,486 @@
+"""The space of a round body and its shortest routes: free space shrunk by the body's radius."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from functools import cached_property, lru_cache
+from typing import Any
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely import LineString, MultiPoint, Point, Polygon
+from shapely.geometry.base import BaseGeometry
+
+from fleet2d.errors import FloorPlanError
+from fleet2d.floorplan.lattice import UNITS_PER_CELL, Lattice
+from fleet2d.floorplan.mesh import Segment, build_mesh, snap_polygon
+from fleet2d.floorplan.objects import PlacedObject, UsePlace
+from fleet2d.floorplan.plan import FloorPlan, read_only
+from fleet2d.kernels import F64, I32, I64, Bool
+from fleet2d.kernels.sight import line_of_sight
+from fleet2d.kernels.space import (
+    SUB,
+    Corners,
+    Mesh,
+    Routes,
+    label_triangles,
+    locate,
+    rasterize_cells,
+    strictly_inside,
+    walking_distance,
+)
+
+# Snapping of the shrunk walls and rounding of a pose add up to less than this [lattice].
+ROUNDING = 3
+# Number of free cells that are tried for a way back into the space, nearest first.
+ESCAPE_ATTEMPTS = 200
+# Number of results that a space caches of each of its searches.
+CACHED_ROUTES = 4096
+
+
+class Space:
+    """The places where the centre of a body of one radius may be (its configuration space).
+
+    Walls, obstacles and shut doors are grown by a regular octagon round the body: a body keeps its
+    radius from each, on all sides alike, and at most 8 % more from slanted ones.
+
+    Attributes:
+        radius: The body's radius [m].
+        polygons: The space's outlines [lattice].
+        mesh: The same in triangles.
+        part_of_cell: The connected part that holds each cell's centre, int32 (rows, columns), -1
+            where the body can't be.
+        parts: Number of connected parts; part 0 holds the most cells.
+    """
+
+    def __init__(
+        self,
+        plan: FloorPlan,
+        radius: float,
+        *,
+        walls: Mesh | None = None,
+        obstacles: Sequence[Polygon] = (),
+        shut: Sequence[Segment] = (),
+    ) -> None:
+        """Compute the space.
+
+        Args:
+            plan: The floor plan.
+            radius: The body's radius [m].
+            walls: The mesh that blocks sight; None for the plan's.
+            obstacles: Further obstacles to movement [lattice].
+            shut: The lines of shut doors [lattice].
+
+        Raises:
+            FloorPlanError: The body fits nowhere.
+        """
+        self.plan = plan
+        self.walls = plan.mesh if walls is None else walls
+        self._cache_searches()
+        self.radius = radius
+        self.key: tuple[Any, ...] = ()  # the home's key of this space
+        lattice = plan.lattice
+        reach = radius * lattice.units_per_m
+        blocks = [np.asarray(o.exterior.coords) for o in obstacles]
+        blocks += [np.array(segment, np.float64) for segment in shut]
+        polygons = shrink(plan.polygons, reach, [grow_shape(block, reach) for block in blocks])
+        if not polygons:
+            raise FloorPlanError(
+                f"a body of radius {radius:g} m fits nowhere in {plan.name}: give it a smaller"
+                " radius or check the scale of the plan"
+            )
+        self.polygons = polygons
+        self.mesh: Mesh = build_mesh(polygons, lattice.columns, lattice.rows)
+        triangles = rasterize_cells(self.mesh, lattice.rows, lattice.columns)
+        part = label_triangles(self.mesh.neighbors)
+        part_of_cell = np.where(triangles >= 0, part[triangles], -1)
+        # Parts without a cell's centre rank last and aren't counted.
+        sizes = np.bincount(part_of_cell[part_of_cell >= 0], minlength=int(part.max()) + 1)
+        order = np.argsort(-sizes, kind="stable")
+        rank = np.empty_like(order)
+        rank[order] = np.arange(len(order))
+        self.part_of_cell = read_only(
+            np.where(triangles >= 0, rank[part_of_cell], -1).astype(np.int32)
+        )
+        self._part_of_triangle = read_only(rank[part].astype(np.int32))
+        self.parts = int(np.count_nonzero(sizes))
+
+    def _cache_searches(self) -> None:
+        """Cache the searches, since behaviors repeat them for the same rooms and routes."""
+        self.route = lru_cache(CACHED_ROUTES)(self._find_route)
+        self.cells = lru_cache(None)(self._find_cells)
+        self.nearest = lru_cache(CACHED_ROUTES)(self._find_nearest)
+        self.part_about = lru_cache(CACHED_ROUTES)(self._find_part)
+        self.part_of = lru_cache(CACHED_ROUTES)(self.part_at)  # of places that bodies come back to
+        self.rooms_of = lru_cache(None)(self._find_rooms)
+
+    def __deepcopy__(self, memo: dict[int, object]) -> "Space":
+        """Return itself, as nothing in it changes."""
+        return self
+
+    @cached_property
+    def routes(self) -> Routes:
+        """The corners of the space and the legs between them, built at their first use."""
+        return Routes(self.mesh, self._corners())
+
+    @property
+    def shortest(self) -> Routes | None:
+        """The routes between points strictly inside; None: other than the shortest ones are."""
+        return self.routes
+
+    def part_at(self, x: int, y: int) -> int:
+        """Return the connected part of a lattice point strictly inside the space, else -1."""
+        if not strictly_inside(self.mesh, x, y):
+            return -1
+        return int(self._part_of_triangle[locate(self.mesh, x, y)])
+
+    def part_near(self, x: int, y: int) -> int:
+        """Return the part nearest to a point outside the space."""
+        near = self.nearest(x, y)
+        return 0 if near is None else self.part_at(*near)
+
+    def _find_rooms(self, part: int) -> frozenset[int]:
+        """Return the indices of the rooms in which a part of the space has cells."""
+        rooms = self.plan.room_of_cell[self.part_of_cell == part]
+        return frozenset(np.flatnonzero(np.bincount(rooms[rooms >= 0])).tolist())
+
+    def _find_part(self, xy: tuple[float, float]) -> int:
+        """Return the part of a place [m], or the nearest one."""
+        x, y = self.plan.lattice.point_at(xy)
+        part = self.part_at(x, y)
+        return self.part_near(x, y) if part < 0 else part
+
+    def _find_cells(self, room: int | None = None, part: int = 0) -> I64:
+        """Return the cells (row, column) of a part of the space, or of a room, int64 (n, 2)."""
+        mask = self.part_of_cell == part
+        if room is not None:
+            mask &= self.plan.room_of_cell == room
+        return read_only(np.argwhere(mask))
+
+    def _find_nearest(
+        self, x: int, y: int, part: int | None = None, room: int | None = None
+    ) -> tuple[int, int] | None:
+        """Return the centre of the free cell nearest to a point; ties: lowest row, column."""
+        cells = self._by_distance(x, y, part, room)
+        return self.plan.lattice.cell_centre(*cells[0].tolist()) if len(cells) else None
+
+    def _find_route(self, start: tuple[int, int], goal: tuple[int, int]) -> I64 | None:
+        """Return the shortest path (n, 2) from `start` to `goal` [lattice], or None.
+
+        From a start on the border of the space, where a walk may end early, it first leads inside.
+        """
+        if not strictly_inside(self.mesh, *goal):
+            return None
+        if strictly_inside(self.mesh, *start):
+            route = self.routes.find(*start, *goal)
+            return None if route is None else read_only(route)
+        inside = self._way_in(*start)
+        route = None if inside is None else self.routes.find(*inside, *goal)
+        return None if route is None else read_only(np.concatenate([[start], route]))
+
+    def distance_field(self, places: I64) -> F64:
+        """Return the walking distance of each cell from the nearest of some places.
+
+        Args:
+            places: Lattice points (n, 2).
+
+        Returns:
+            float64 (rows, columns) [m], by steps to sides and corners of cells, so up to 8 % longer
+            than the straight line; infinite where the body can't be or come from.
+        """
+        return self._metres(self._steps(places))
+
+    def distances(self, place: tuple[int, int], points: I64) -> F64:
+        """Return the walking distances of points from a place, as `distance_field` measures them.
+
+        Args:
+            place: Lattice point.
+            points: Lattice points (n, 2).
+
+        Returns:
+            float64 (n,) [m].
+        """
+        steps = self._steps(np.array([place], np.int64))
+        return self._metres(steps[points[:, 1] // SUB, points[:, 0] // SUB])
+
+    def _steps(self, places: I64) -> I32:
+        cells = np.asarray(places, np.int64).reshape(-1, 2)[:, ::-1] // SUB
+        return walking_distance(self.part_of_cell >= 0, np.ascontiguousarray(cells))
+
+    def _metres(self, steps: I32) -> F64:
+        return np.where(steps >= 0, steps * (self.plan.lattice.cell / 5), np.inf)
+
+    def _way_in(self, x: int, y: int) -> tuple[int, int] | None:
+        walls = self.walls
+        triangle = locate(walls, x, y)
+        for row, column in self._by_distance(x, y)[:ESCAPE_ATTEMPTS].tolist():
+            target = self.plan.lattice.cell_centre(row, column)
+            if triangle >= 0 and line_of_sight(walls, x, y, triangle, *target):
+                return target
+        return None
+
+    def _by_distance(self, x: int, y: int, part: int | None = None, room: int | None = None) -> I64:
+        mask = self.part_of_cell >= 0 if part is None else self.part_of_cell == part
+        if room is not None:
+            mask = mask & (self.plan.room_of_cell == room)
+        cells = np.argwhere(mask)
+        xs, ys = self.plan.lattice.centre_axes()
+        away = (xs[cells[:, 1]] - x) ** 2 + (ys[cells[:, 0]] - y) ** 2
+        return cells[np.argsort(away, kind="stable")]
+
+    def _corners(self) -> Corners:
+        """Return the vertices at which the border turns into the space."""
+        vertices = self.mesh.vertices
+        before, at, after = [], [], []
+        for polygon in self.polygons:
+            for ring in (polygon.exterior, *polygon.interiors):
+                points = np.asarray(ring.coords)[:-1].astype(np.int64)
+                before.append(np.roll(points, 1, axis=0))
+                at.append(points)
+                after.append(np.roll(points, -1, axis=0))
+        p, q, r = np.concatenate(before), np.concatenate(at), np.concatenate(after)
+        into, out = q - p, r - q
+        reflex = (
+            into[:, 0] * out[:, 1] - into[:, 1] * out[:, 0] < 0
+        )  # the free space lies to the left
+        keys = vertices[:, 0] << 32 | vertices[:, 1]  # sorted, as the vertices are
+        ids = np.searchsorted(keys, q[:, 0] << 32 | q[:, 1])
+        walls_meeting = np.bincount(ids, minlength=len(vertices))
+        vertex, first = np.unique(ids[reflex], return_index=True)
+        return Corners(
+            vertex=vertex.astype(np.int64),
+            before=p[reflex][first],
+            after=r[reflex][first],
+            simple=walls_meeting[vertex] == 1,
+        )
+
+
+def shrink(
+    polygons: Sequence[Polygon], radius: float, blocked: Sequence[BaseGeometry] = ()
+) -> list[Polygon]:
+    """Shrink polygons by an octagon of at least `radius` to each side.
+
+    Args:
+        polygons: Free space [lattice].
+        radius: The radius of the body [lattice].
+        blocked: Shapes that are removed from the result.
+    """
+    octagon = _octagon(radius)
+    shrunk: list[Polygon] = []
+    for polygon in polygons:
+        grown = [
+            _grow_walls(np.asarray(r.coords), octagon)
+            for r in (polygon.exterior, *polygon.interiors)
+        ]
+        grown.append(np.array(blocked, np.object_))
+        rest = shapely.difference(polygon, shapely.union_all(np.concatenate(grown)))
+        for part in shapely.get_parts(rest):
+            if part.geom_type == "Polygon" and part.area > 0:
+                shrunk += snap_polygon(part).polygons
+    return shrunk
+
+
+def _octagon(radius: float) -> I64:
+    """Return the corners of the octagon that stands for a body."""
+    a = _even_at_least(radius + ROUNDING)
+    # tan(22.5 degrees), rounded up: the slanted sides are no nearer than the straight ones.
+    b = _even_at_least(a * 0.41421357)
+    return np.array([(a, b), (b, a), (-b, a), (-a, b), (-a, -b), (-b, -a), (b, -a), (a, -b)])
+
+
+def grow_shape(corners: F64, radius: float) -> BaseGeometry:
+    """Grow a line, or the inside of a ring [lattice], by the octagon of a body.
+
+    Args:
+        corners: Two ends, or the closed ring of an outline, float64 (n, 2).
+        radius: The radius of the body [lattice].
+    """
+    octagon = _octagon(radius)
+    if len(corners) < 4:
+        return shapely.union_all(_grow_walls(corners, octagon))
+    solid = Polygon(corners)
+    if is_convex(solid):
+        ends = (corners[:-1, None] + octagon).reshape(-1, 2)
+        return MultiPoint(ends).convex_hull
+    return shapely.union_all([*_grow_walls(corners, octagon), solid])
+
+
+def is_convex(polygon: Polygon) -> bool:
+    """Return whether a polygon is convex, but for rounding."""
+    return not polygon.interiors and polygon.area >= polygon.convex_hull.area * (1 - 1e-9)
+
+
+def _grow_walls(ring: F64, octagon: I64) -> NDArray[np.object_]:
+    """Grow every wall of a ring by the octagon; return convex polygons."""
+    ends = np.concatenate([ring[:-1, None] + octagon, ring[1:, None] + octagon], axis=1)
+    return np.asarray(shapely.convex_hull(shapely.multipoints(ends)))
+
+
+def _even_at_least(value: float) -> int:
+    return 2 * int(np.ceil(value / 2))
+
+
+@lru_cache(CACHED_ROUTES)
+def straight_way(begin: tuple[int, int], end: tuple[int, int]) -> I64:
+    """Return the straight route, int64 (2, 2), read-only as those of `Space.route` are."""
+    return read_only(np.array([begin, end], np.int64))
+
+
+BODY_RADIUS = 0.25
+"""The radius of the body that furniture leaves space for [m]: that of a large person."""
+
+# How far from a place of use a body may stand [m]; and how far from it a body that sits or lies
+# there may get up.
+STAND_REACH = 0.35
+SIT_REACH = 1.6
+# Number of cells that are tried for a way onto a piece of furniture, nearest first.
+ATTEMPTS = 600
+# What snapping of the grown footprint may add [lattice].
+SLACK = 8
+HALF = UNITS_PER_CELL // 2
+
+Window = tuple[slice, slice]
+
+
+def standing_cells(
+    plan: FloorPlan, radius: float, objects: Iterable[PlacedObject] | None = None
+) -> Bool:
+    """Return the cells where the middle of a body can be, bool (rows, columns).
+
+    A cell beside furniture counts only if the body can be at every point of it, so that a body can
+    walk between neighboring cells.
+
+    Args:
+        plan: The floor plan.
+        radius: The body's radius [m].
+        objects: The furniture in the way; None for the plan's.
+
+    Raises:
+        FloorPlanError: The body fits nowhere between the walls.
+    """
+    cells = Space(plan, radius).part_of_cell >= 0
+    for thing in plan.objects if objects is None else objects:
+        if thing.blocks != "nothing":
+            window, covered = grown_cells(plan.lattice, thing.footprint, radius)
+            cells[window] &= ~covered
+    return cells
+
+
+def grown_cells(lattice: Lattice, footprint: Polygon, radius: float) -> tuple[Window, Bool]:
+    """Return the cells on which a body of a radius [m] would touch a footprint [m].
+
+    Returns:
+        The rows and columns of the smallest window that holds them, and which of its cells.
+    """
+    reach = radius * lattice.units_per_m + HALF + SLACK
+    a, b = int(np.ceil(reach)), int(np.ceil(reach * 0.41421357))
+    octagon = np.array([(a, b), (b, a), (-b, a), (-a, b), (-a, -b), (-b, -a), (b, -a), (a, -b)])
+    pieces = [footprint] if is_convex(footprint) else _triangles(footprint)
+    hulls = []
+    for piece in pieces:
+        corners = lattice.to_lattice(shapely.get_coordinates(piece)[:-1])
+        hull = shapely.convex_hull(shapely.multipoints((corners[:, None] + octagon).reshape(-1, 2)))
+        hulls.append(shapely.get_coordinates(shapely.orient_polygons(hull)).astype(np.int64))
+    window = _window(lattice, np.concatenate(hulls))
+    xs, ys = lattice.centre_axes()
+    x, y = xs[window[1]][None, :], ys[window[0]][:, None]
+    covered = np.zeros((y.shape[0], x.shape[1]), np.bool_)
+    for corners in hulls:
+        inside = np.ones_like(covered)
+        for (ax, ay), (bx, by) in zip(corners[:-1].tolist(), corners[1:].tolist(), strict=True):
+            inside &= (bx - ax) * (y - ay) - (by - ay) * (x - ax) >= 0
+        covered |= inside
+    return window, covered
+
+
+def with_approaches(
+    plan: FloorPlan,
+    thing: PlacedObject,
+    standing: Bool,
+    others: Iterable[PlacedObject] = (),
+) -> PlacedObject:
+    """Return an object with only those places of use that a body can get to.
+
+    A person who stands at an object stands on the nearest cell where a body can stand. A person who
+    sits or lies on it gets there from the nearest such cell in sight of the place.
+
+    Args:
+        plan: The floor plan.
+        thing: The object; `standing` already excludes its footprint.
+        standing: Cells where the middle of the body can be, bool (rows, columns).
+        others: Other objects, over which no body steps, except for a chair to sit on.
+    """
+    x0, y0, x1, y1 = thing.footprint.bounds
+    near = shapely.box(x0 - SIT_REACH, y0 - SIT_REACH, x1 + SIT_REACH, y1 + SIT_REACH)
+    solid = [
+        other.footprint
+        for other in others
+        if other.blocks != "nothing" and other is not thing and near.intersects(other.footprint)
+    ]
+    uses = []
+    for use in thing.uses:
+        reach = STAND_REACH if use.posture == "stand" else SIT_REACH
+        at = Point(use.x, use.y)
+        is_seat = use.posture != "stand"
+        obstacles = [shape for shape in solid if not (is_seat and shape.intersects(at))]
+        cell = nearest_standing(plan, use, standing, reach, obstacles)
+        if cell is None:
+            continue
+        x, y = plan.lattice.to_metres(plan.lattice.cell_centre(*cell)).tolist()
+        if use.posture == "stand":
+            use = replace(use, x=x, y=y)
+        uses.append(replace(use, approach=(x, y)))
+    return replace(thing, uses=tuple(uses))
+
+
+def nearest_standing(
+    plan: FloorPlan,
+    use: UsePlace,
+    standing: Bool,
+    reach: float,
+    obstacles: Sequence[Polygon] = (),
+) -> tuple[int, int] | None:
+    """Return the cell (row, column) from which a body gets to a place of use, or None.
+
+    Args:
+        plan: The floor plan.
+        use: The place.
+        standing: Cells where the middle of the body can be, bool (rows, columns).
+        reach: Largest distance from the place [m].
+        obstacles: Shapes over which no body steps [m].
+    """
+    lattice = plan.lattice
+    x, y = lattice.point_at((use.x, use.y))
+    if not strictly_inside(plan.mesh, x, y):
+        return None
+    units = int(reach * lattice.units_per_m) + HALF
+    window = _window(lattice, np.array([(x - units, y - units), (x + units, y + units)]))
+    rows, columns = np.nonzero(standing[window])
+    rows, columns = rows + window[0].start, columns + window[1].start
+    xs, ys = lattice.centre_axes()
+    away = (xs[columns] - x) ** 2 + (ys[rows] - y) ** 2
+    near = np.flatnonzero(away <= units * units)
+    triangle = locate(plan.mesh, x, y)
+    for i in near[np.argsort(away[near], kind="stable")][:ATTEMPTS].tolist():
+        row, column = int(rows[i]), int(columns[i])
+        centre = lattice.cell_centre(row, column)
+        if not line_of_sight(plan.mesh, x, y, triangle, *centre):
+            continue
+        step = LineString([(use.x, use.y), lattice.to_metres(centre).tolist()])
+        if not any(step.intersects(shape) for shape in obstacles):
+            return row, column
+    return None
+
+
+def _window(lattice: Lattice, points: I64) -> Window:
+    """Return the rows and columns of the cells around lattice points (n, 2)."""
+    (x0, y0), (x1, y1) = points.min(axis=0) // UNITS_PER_CELL, points.max(axis=0) // UNITS_PER_CELL
+    rows = slice(*np.clip((y0, y1 + 1), 0, lattice.rows).tolist())
+    columns = slice(*np.clip((x0, x1 + 1), 0, lattice.columns).tolist())
+    return rows, columns
+
+
+def _triangles(footprint: Polygon) -> list[Polygon]:
+    """Return a footprint as convex pieces."""
+    parts = shapely.get_parts(shapely.constrained_delaunay_triangles(footprint))
+    return parts.tolist()

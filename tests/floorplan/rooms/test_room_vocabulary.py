@@ -1,0 +1,101 @@
+from pathlib import Path
+
+import pytest
+
+from fleet2d.floorplan.rooms.room import (
+    ALSO_CALLED,
+    PRIORITY,
+    leading_type,
+    room_type,
+    usual_type,
+)
+
+HOUSEEXPO = [
+    "Bedroom",
+    "Bathroom",
+    "Toilet",
+    "Kitchen",
+    "Room",
+    "Living_Room",
+    "Office",
+    "Dining_Room",
+    "Garage",
+    "Hallway",
+    "Hall",
+    "Child_Room",
+    "Gym",
+    "Storage",
+    "Balcony",
+    "Wardrobe",
+    "Guest_Room",
+    "Lobby",
+    "Entryway",
+    "Terrace",
+    "Loggia",
+    "Boiler_room",
+    "Aeration",
+    "Passenger_elevator",
+    "Freight_elevator",
+]
+
+
+def test_room_type_of_every_houseexpo_category_is_known() -> None:
+    known = {*PRIORITY, "room"}
+
+    assert 25 == len(HOUSEEXPO)
+    assert set() == {room_type(label) for label in HOUSEEXPO} - known
+
+
+def test_leading_type_prefers_living_to_catch_alls() -> None:
+    assert "bathroom" == leading_type(("toilet", "bathroom"))
+    assert "child_room" == leading_type(("bedroom", "child_room"))
+    assert "sauna" == leading_type(("room", "sauna", "attic"))
+    assert "gym" == leading_type(("sauna", "gym"))
+    assert "unknown" == leading_type(())
+
+
+@pytest.mark.parametrize(
+    ("name", "kind"),
+    [
+        ("Kitchen", "kitchen"),
+        ("living room", "living_room"),
+        ("Master Bedroom", "bedroom"),
+        ("Bedroom 2", "bedroom"),
+        ("Guest Room", "guest_room"),
+        ("Entrance", "entryway"),
+        ("Küche", "kitchen"),
+        ("WC", "toilet"),
+        ("Gäste-WC", "toilet"),
+        ("Chambre d'amis", "guest_room"),
+        ("Chambre parentale", "bedroom"),
+        ("Salle de bains 2", "bathroom"),
+        ("Cuarto de baño", "bathroom"),
+        ("Yoga Studio", "yoga_studio"),
+        ("Dressing Room", "wardrobe"),
+        ("Room 5", "room_5"),
+        ("42", "42"),
+        ("  ", "unknown"),
+    ],
+)
+def test_usual_type_goes_by_the_words_of_a_name(name: str, kind: str) -> None:
+    assert kind == usual_type(name)
+
+
+def test_every_other_name_is_spelled_as_labels_are_and_means_one_type() -> None:
+    names = [name for names in ALSO_CALLED.values() for name in names]
+
+    assert set() == set(ALSO_CALLED) - set(PRIORITY)
+    assert names == [room_type(name) for name in names]
+    assert len(names) == len(set(names))
+    assert set() == set(names) & set(PRIORITY)
+
+
+def test_documentation_lists_the_vocabulary_as_it_is() -> None:
+    page = (Path(__file__).parents[3] / "docs" / "rooms.md").read_text(encoding="utf-8")
+    rows = {row.split("`")[1]: row for row in page.splitlines() if row.startswith("| `")}
+
+    for kind in PRIORITY:
+        for name in ALSO_CALLED.get(kind, ()):
+            assert name.replace("_", " ") in rows[kind], (kind, name)
+    for label in HOUSEEXPO:
+        assert label in rows[room_type(label)], label

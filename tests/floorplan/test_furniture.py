@@ -1,0 +1,89 @@
+"""The catalogue is sound, and pieces stand and are used where it says."""
+
+import math
+from pathlib import Path
+
+import pytest
+
+from fleet2d.errors import FloorPlanError
+from fleet2d.floorplan.furniture import FURNITURE, Furniture, furniture_type, stand_furniture
+from fleet2d.kernels.numbers import QUARTER, TURN
+
+PAGE = Path(__file__).parents[3] / "docs" / "objects.md"
+TALL = {"wardrobe", "fridge", "bookshelf", "shelf"}
+ALL = [pytest.param(furniture, id=furniture.type) for furniture in FURNITURE.values()]
+
+
+@pytest.mark.parametrize("furniture", ALL)
+def test_sizes_of_a_type_are_a_range_of_a_home(furniture: Furniture) -> None:
+    for low, high in (furniture.width, furniture.depth):
+        assert 0.2 <= low <= high <= 2.5
+
+
+@pytest.mark.parametrize("furniture", ALL)
+def test_catalogue_of_the_documentation_has_every_type(furniture: Furniture) -> None:
+    sizes = [
+        f"{a:.2f}" if a == b else f"{a:.2f}–{b:.2f}" for a, b in (furniture.width, furniture.depth)
+    ]
+    row = f"| `{furniture.type}` | {sizes[0]} | {sizes[1]} | {furniture.blocks} |"
+    assert row in PAGE.read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("furniture", ALL)
+def test_only_what_is_tall_blocks_sight(furniture: Furniture) -> None:
+    assert (furniture.type in TALL) == (furniture.blocks == "sight")
+
+
+@pytest.mark.parametrize("furniture", ALL)
+def test_people_stand_beside_blocking_furniture_and_not_in_it(furniture: Furniture) -> None:
+    thing = stand_furniture(furniture.type, (0.0, 0.0))
+    x0, y0, x1, y1 = thing.footprint.bounds
+    for use in thing.uses:
+        inside = x0 < use.x < x1 and y0 < use.y < y1
+        if use.posture == "stand":
+            assert inside == (furniture.type == "shower")
+        else:
+            assert abs(use.x) <= (x1 - x0) / 2 + 0.5
+            assert abs(use.y) <= (y1 - y0) / 2 + 0.5
+
+
+@pytest.mark.parametrize(
+    ("heading", "x", "y", "facing"),
+    [
+        (0, 3.65, 2.0, math.pi),
+        (QUARTER, 3.0, 2.65, 1.5 * math.pi),
+        (2 * QUARTER, 2.35, 2.0, 0.0),
+        (3 * QUARTER, 3.0, 1.35, 0.5 * math.pi),
+    ],
+)
+def test_person_stands_before_a_stove_and_faces_it(
+    heading: int, x: float, y: float, facing: float
+) -> None:
+    (use,) = stand_furniture("stove", (3.0, 2.0), heading, (0.6, 0.6)).uses
+
+    assert pytest.approx((x, y, facing)) == (use.x, use.y, use.heading)
+
+
+def test_turning_a_piece_turns_its_footprint_and_its_uses() -> None:
+    plain = stand_furniture("bed", (0.0, 0.0), 0, (1.6, 2.0))
+    turned = stand_furniture("bed", (0.0, 0.0), TURN // 8, (1.6, 2.0))
+
+    assert pytest.approx(plain.footprint.area) == turned.footprint.area
+    for before, after in zip(plain.uses, turned.uses, strict=True):
+        c = math.cos(math.pi / 4)
+        expected = (c * before.x - c * before.y, c * before.x + c * before.y)
+        assert pytest.approx(expected) == (after.x, after.y)
+    assert pytest.approx(math.pi / 4) == turned.heading
+
+
+def test_bed_lies_from_the_pillow_along_its_heading() -> None:
+    bed = stand_furniture("bed", (0.0, 0.0), 0, (1.6, 2.0))
+
+    assert (-1.0, -0.8, 1.0, 0.8) == pytest.approx(bed.footprint.bounds)
+    assert ["lie", "lie", "stand", "stand"] == [use.posture for use in bed.uses]
+    assert [0.4, -0.4] == pytest.approx([use.y for use in bed.uses[:2]])
+
+
+def test_unknown_type_is_refused_with_the_nearest_name() -> None:
+    with pytest.raises(FloorPlanError, match=r"'sofaa'.*did you mean 'sofa'"):
+        furniture_type("sofaa")

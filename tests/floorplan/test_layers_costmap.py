@@ -1,0 +1,236 @@
+"""Routes of least cost, which keep away from walls and out of no-go areas."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import shapely
+from tests.scenes import flat_path
+
+import fleet2d
+from fleet2d._core import leg_cost
+from fleet2d.errors import InputError
+from fleet2d.floorplan.home import Home
+from fleet2d.floorplan.layers import (
+    CostedSpace,
+    CostmapSettings,
+    LayerSettings,
+    cells_within,
+    costs_of,
+    route_by_cost,
+)
+from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.floorplan.space import Space
+from fleet2d.kernels.sight import line_of_sight
+from fleet2d.kernels.space import locate
+
+HALL = FloorPlan.build(
+    "hall", shapely.box(0, 0, 6, 4), no_go=[shapely.box(2, 1, 4, 3), shapely.box(5, 3.5, 5.5, 4)]
+)
+
+
+@pytest.fixture(scope="module")
+def space() -> Space:
+    return Home(HALL).space(0.15)
+
+
+def length(way: np.ndarray) -> float:
+    return float(np.hypot(*np.diff(way, axis=0).T).sum())
+
+
+def at(plan: FloorPlan, x: float, y: float) -> tuple[int, int]:
+    point = plan.lattice.to_lattice((x, y)).tolist()
+    return point[0], point[1]
+
+
+def test_cost_falls_from_walls_to_nothing_at_the_clearance() -> None:
+    costs = costs_of(HALL, CostmapSettings(clearance=0.5, wall_cost=200, no_go="ignore"))
+    row = [
+        int(costs[HALL.lattice.cell_of(*at(HALL, x, 2.0))])
+        for x in (0.01, 0.13, 0.26, 0.48, 0.55, 3)
+    ]
+
+    assert row == sorted(row, reverse=True)
+    assert 160 <= row[0] <= 200
+    assert [0, 0] == row[-2:]
+    assert 90 <= row[2] <= 110
+
+
+@pytest.mark.parametrize(("no_go", "inside"), [("forbid", -1), ("cost", 500), ("ignore", 0)])
+def test_no_go_areas_are_what_the_settings_say(no_go: str, inside: int) -> None:
+    costs = costs_of(HALL, CostmapSettings(no_go=no_go, no_go_cost=500))  # type: ignore[arg-type]
+
+    assert inside == costs[HALL.lattice.cell_of(*at(HALL, 3.0, 2.0))]
+    assert 1600 + 100 == pytest.approx(cells_within(HALL, HALL.no_go).sum(), abs=100)
+
+
+def test_route_avoids_or_crosses_a_no_go_area_by_the_settings(space: Space) -> None:
+    a, b = at(HALL, 1.0, 2.0), at(HALL, 5.0, 2.0)
+    area = HALL.no_go[0]
+    ways = {}
+    for no_go in ("forbid", "cost", "ignore"):
+        costs = costs_of(HALL, CostmapSettings(no_go=no_go, clearance=0))  # type: ignore[arg-type]
+        way = route_by_cost(space, costs, a, b)
+        assert way is not None
+        ways[no_go] = shapely.LineString(HALL.lattice.to_metres(way))
+    assert shapely.intersection(ways["forbid"], area).length < 0.1
+    assert ways["forbid"].length > 4.3
+    assert ways["ignore"].length == pytest.approx(4.0, abs=0.05)
+    assert ways["cost"].length > 4.3
+
+
+def test_goal_in_a_forbidden_area_is_out_of_reach_and_a_start_there_is_left(space: Space) -> None:
+    costs = costs_of(HALL, CostmapSettings())
+    inside, outside = at(HALL, 3.0, 2.1), at(HALL, 1.0, 2.0)
+
+    assert route_by_cost(space, costs, outside, inside) is None
+    way = route_by_cost(space, costs, inside, outside)
+    assert way is not None
+    assert (inside, outside) == (tuple(way[0].tolist()), tuple(way[-1].tolist()))
+    assert length(way) < 1.3 * 64 / 0.05 * 3
+    assert route_by_cost(space, np.full(costs.shape, -1), outside, outside) is None
+
+
+def test_route_without_costs_is_nearly_the_shortest(shared_data: Path) -> None:
+    plan = fleet2d.load_floorplan(flat_path())
+    space = Home(plan).space(0.15)
+    free = np.zeros(plan.free.shape, np.int64)
+    rng = np.random.default_rng(3)
+    cells = space.cells(None, 0)
+    worst = 1.0
+    for a, b in rng.choice(cells, (40, 2)).tolist():
+        start, goal = plan.lattice.cell_centre(*a), plan.lattice.cell_centre(*b)
+        shortest, cheapest = space.route(start, goal), route_by_cost(space, free, start, goal)
+        assert shortest is not None
+        assert cheapest is not None
+        assert length(cheapest) >= length(shortest) - 1e-6
+        worst = max(worst, length(cheapest) / max(length(shortest), 1.0))
+    assert worst < 1.06
+
+
+def test_route_stays_in_the_space_and_is_cheaper_than_the_shortest() -> None:
+    plan = fleet2d.load_floorplan(flat_path())
+    space = Home(plan).space(0.15)
+    costs = costs_of(plan, CostmapSettings(clearance=0.6, wall_cost=400))
+    rng = np.random.default_rng(4)
+    cheaper = 0
+    for a, b in rng.choice(space.cells(None, 0), (30, 2)).tolist():
+        start, goal = plan.lattice.cell_centre(*a), plan.lattice.cell_centre(*b)
+        shortest, way = space.route(start, goal), route_by_cost(space, costs, start, goal)
+        assert shortest is not None
+        assert way is not None
+        for (x, y), (px, py) in zip(way[:-1].tolist(), way[1:].tolist(), strict=True):
+            assert (x, y) == (px, py) or line_of_sight(
+                space.mesh, x, y, locate(space.mesh, x, y), px, py
+            )
+        before, after = (
+            sum(
+                leg_cost(costs, *p, *q)
+                for p, q in zip(w[:-1].tolist(), w[1:].tolist(), strict=True)
+            )
+            for w in (shortest, way)
+        )
+        assert after <= before * 1.05  # the grid's steps lie in eight directions
+        cheaper += after < 0.9 * before
+    assert cheaper > 5
+
+
+def test_goal_outside_the_space_has_no_route(space: Space) -> None:
+    costs = costs_of(HALL, CostmapSettings(no_go="ignore"))
+
+    assert route_by_cost(space, costs, at(HALL, 1, 2), at(HALL, 5.99, 2)) is None
+    assert route_by_cost(space, costs, at(HALL, 1, 2), (-50, -50)) is None
+
+
+@pytest.mark.parametrize(
+    ("settings", "why"),
+    [
+        ({"clearance": -1}, "clearance"),
+        ({"wall_cost": 2000}, "wall_cost"),
+        ({"no_go": "maybe"}, "no_go"),
+    ],
+)
+def test_wrong_settings_are_an_error_that_names_the_key(
+    settings: dict[str, object], why: str
+) -> None:
+    with pytest.raises(InputError, match=f"floorplan.costmap.{why}"):
+        fleet2d.load_scenario(None, floorplan={"type": "bundled", "costmap": settings})
+
+
+def flooded(open_cells: set[tuple[int, int]]) -> list[set[tuple[int, int]]]:
+    """Return the parts of a set of cells, by walking from side to side, the largest first."""
+    parts, unvisited = [], set(open_cells)
+    while unvisited:
+        queue = [unvisited.pop()]
+        part = set(queue)
+        while queue:
+            row, column = queue.pop()
+            for other in (
+                (row + 1, column),
+                (row - 1, column),
+                (row, column + 1),
+                (row, column - 1),
+            ):
+                if other in unvisited:
+                    unvisited.remove(other)
+                    part.add(other)
+                    queue.append(other)
+        parts.append(part)
+    return sorted(parts, key=lambda part: (-len(part), min(part)))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_costed_space_equals_a_search_over_its_cells(seed: int) -> None:
+    plan = fleet2d.load_floorplan(flat_path())
+    base = Home(plan).space(0.15)
+    rng = np.random.default_rng(seed)
+    costs = rng.integers(0, 300, plan.free.shape)
+    for row, column in rng.choice(np.argwhere(plan.free), 12):  # bars across the home
+        costs[row : row + 3, column : column + 40] = -1
+    closed = np.argwhere(costs < 0)
+    cells = {
+        (row, column)
+        for row, column in np.argwhere(base.part_of_cell >= 0).tolist()
+        if ((closed - (row, column)) ** 2).sum(axis=1).min() > (0.15 / 0.05 + 0.5) ** 2
+    }
+    expected = flooded(cells)
+
+    space = CostedSpace(base, costs)
+
+    assert len(expected) == space.parts
+    for number, part in enumerate(expected):
+        assert part == {tuple(cell) for cell in space.cells(None, number).tolist()}
+    chosen = [sorted(cells)[i] for i in rng.choice(len(cells), 12)]
+    for (a, b), (c, d) in zip(chosen[:6], chosen[6:], strict=True):
+        start, goal = plan.lattice.cell_centre(a, b), plan.lattice.cell_centre(c, d)
+        way = space.route(start, goal)
+        assert (space.part_at(*start) == space.part_at(*goal)) == (way is not None)
+        if way is not None:
+            assert (start, goal) == (tuple(way[0].tolist()), tuple(way[-1].tolist()))
+
+
+def test_costed_space_is_new_only_when_costs_change() -> None:
+    home = Home(fleet2d.load_floorplan(flat_path()))
+    base = home.space(0.15)
+    assert home.costed(base) is base
+    assert 0 == home.costs_version
+
+    layer = home.layers.add_layer("costmap", LayerSettings(dtype="int32", store=False))
+    space = home.costed(base)
+    layer.values[0, 0] = 0
+    assert (space, 1) == (home.costed(base), home.costs_version)
+    layer.values[30, 30] = 7
+    assert home.costed(base) is not space
+    assert 2 == home.costs_version
+
+
+def test_furniture_costs_as_walls_do() -> None:
+    settings = CostmapSettings(clearance=0.5, wall_cost=200, no_go="ignore")
+    costs = costs_of(HALL, settings, [shapely.box(2.5, 1.5, 3.5, 2.5)])
+    beside, farther, far = (
+        int(costs[HALL.lattice.cell_of(*at(HALL, x, 2.0))]) for x in (3.53, 3.78, 4.2)
+    )
+
+    assert 160 <= beside <= 200
+    assert 80 <= farther <= 120
+    assert 0 == far

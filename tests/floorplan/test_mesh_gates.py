@@ -1,0 +1,135 @@
+"""Doors in the mesh: shut ones are walls to every kernel, open ones are nothing."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import assume, given, settings
+from tests.homes import Home, all_homes, awkward_points, home_of
+from tests.reference.line_of_sight import is_inside, touches_any_wall
+from tests.strategies import homes, seeds
+from tests.thorough import examples
+
+from fleet2d._core import region_contains
+from fleet2d.errors import FloorPlanError
+from fleet2d.floorplan.lattice import Lattice
+from fleet2d.floorplan.mesh import Gates, Segment, build_mesh
+from fleet2d.floorplan.rooms.doorways import DoorLine, fit_lines
+from fleet2d.kernels import I64, Bool
+from fleet2d.kernels.sight import line_of_sight, visible_region
+from fleet2d.kernels.space import Mesh, locate
+
+ROOM = [shapely.box(0, 0, 640, 640)]
+MIDDLE: Segment = ((320, 0), (320, 640))
+
+
+def with_doors(home: Home, rng: np.random.Generator, count: int) -> tuple[Home, list[Segment]]:
+    """Return the home with doors from wall to wall at random places and angles."""
+    lattice = Lattice(0.05, (0.0, 0.0), home.columns, home.rows)
+    cells = home.cells
+    lines = []
+    for x, y in cells[rng.integers(len(cells), size=count)].tolist():
+        dx, dy = rng.integers(-3, 4, 2).tolist()
+        if (dx, dy) == (0, 0):
+            dx = 1
+        ends = lattice.to_metres([(x - 99 * dx, y - 99 * dy), (x + 99 * dx, y + 99 * dy)])
+        lines.append(DoorLine(tuple(ends[0].tolist()), tuple(ends[1].tolist())))
+    polygons, segments, _ = fit_lines(lattice, home.polygons, lines)
+    return home_of(polygons), [segment for segment in segments if segment is not None]
+
+
+def verdicts(mesh: Mesh, eye: I64, points: I64) -> Bool:
+    """Return whether each point is visible, by the walk through the mesh."""
+    x, y = eye.tolist()
+    triangle = locate(mesh, x, y)
+    return np.array(
+        [triangle >= 0 and line_of_sight(mesh, x, y, triangle, *p) for p in points.tolist()]
+    )
+
+
+def truth(home: Home, shut: list[Segment], eye: I64, points: I64) -> Bool:
+    """Return whether each point is visible, by looking at every wall and every shut door."""
+    walls = home.walls
+    if shut:
+        walls = np.concatenate([walls, np.array(shut, np.int64).reshape(-1, 4)])
+    inside = is_inside(home.walls, np.concatenate([eye[None], points]))
+    return inside[1:] & inside[0] & ~touches_any_wall(walls, eye, points)
+
+
+def compare(home: Home, rng: np.random.Generator, doors: int, eyes: int, points: int) -> int:
+    """Compare all verdicts with some doors shut; return how many there were."""
+    home, segments = with_doors(home, rng, doors)
+    corners = [end for segment in segments for end in segment]
+    gates = Gates(build_mesh(home.polygons, home.columns, home.rows, corners), segments)
+    pairs = 0
+    for _ in range(eyes):
+        shut = set(np.flatnonzero(rng.integers(2, size=len(segments))).tolist())
+        mesh = gates.shut(shut)
+        lines = [segments[i] for i in sorted(shut)]
+        eye = home.cells[rng.integers(len(home.cells))]
+        targets = awkward_points(home, rng, points)
+        on_doors = [np.array(ends, np.int64) for line in segments for ends in (line,)]
+        targets = np.concatenate([targets, *[(e[:1] + e[1:]) // 2 for e in on_doors]])
+        answers = verdicts(mesh, eye, targets)
+        np.testing.assert_array_equal(truth(home, lines, eye, targets), answers)
+        pairs += len(targets)
+    return pairs
+
+
+@given(homes(), seeds())
+@settings(max_examples=examples(60))
+def test_sight_past_shut_and_open_doors_equals_a_test_of_every_wall(
+    polygons: list[shapely.Polygon], seed: int
+) -> None:
+    assume(len(home_of(polygons).cells))
+    compare(home_of(polygons), np.random.default_rng(seed), doors=4, eyes=3, points=40)
+
+
+def test_doors_of_real_homes_end_sight_exactly_as_walls(shared_data: Path) -> None:
+    rng = np.random.default_rng(5)
+    pairs = [compare(home, rng, doors=6, eyes=4, points=250) for home in all_homes(shared_data)]
+    assert sum(pairs) > 800 * len(pairs)
+
+
+@given(homes(), seeds())
+@settings(max_examples=examples(40))
+def test_regions_follow_doors_as_single_sight_lines_do(
+    polygons: list[shapely.Polygon], seed: int
+) -> None:
+    rng = np.random.default_rng(seed)
+    assume(len(home_of(polygons).cells))
+    home, segments = with_doors(home_of(polygons), rng, 3)
+    corners = [end for segment in segments for end in segment]
+    gates = Gates(build_mesh(home.polygons, home.columns, home.rows, corners), segments)
+    mesh = gates.shut(range(len(segments)))
+    eye = home.cells[rng.integers(len(home.cells))]
+    points = awkward_points(home, rng, 60)
+    x, y = eye.tolist()
+    pieces = visible_region(mesh, x, y)
+    inside = [region_contains(mesh, x, y, *pieces, *p) for p in points.tolist()]
+    assert inside == truth(home, segments, eye, points).tolist()
+
+
+def test_all_doors_open_is_the_home_without_doors() -> None:
+    gates = Gates(build_mesh(ROOM, 10, 10, MIDDLE), [MIDDLE])
+    assert gates.shut(()) is gates.mesh
+    assert (gates.mesh.neighbors >= 0).sum() == 2 * (len(gates.mesh.triangles) - 1)
+
+
+def test_shutting_changes_nothing_of_the_mesh_that_was_handed_out() -> None:
+    gates = Gates(build_mesh(ROOM, 10, 10, MIDDLE), [MIDDLE])
+    before = gates.mesh.neighbors.copy()
+    assert (gates.shut({0}).neighbors != before).sum() == 2
+    np.testing.assert_array_equal(before, gates.mesh.neighbors)
+
+
+def test_segment_that_ends_at_no_wall_is_refused() -> None:
+    with pytest.raises(FloorPlanError, match=r"ends at \(320, 300\)"):
+        Gates(build_mesh(ROOM, 10, 10), [((320, 300), (0, 0))])
+
+
+def test_segment_through_a_wall_is_refused() -> None:
+    room = [shapely.box(0, 0, 640, 640).difference(shapely.box(200, 0, 300, 400))]
+    with pytest.raises(FloorPlanError, match="does not cross free space alone"):
+        Gates(build_mesh(room, 10, 10, ((0, 100), (640, 100))), [((0, 100), (640, 100))])

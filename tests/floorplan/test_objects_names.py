@@ -1,0 +1,40 @@
+"""Names of rooms and objects: numbered, made distinct, looked up."""
+
+from types import SimpleNamespace
+
+import pytest
+
+from fleet2d.errors import FloorPlanError, PlacementError
+from fleet2d.floorplan.objects import distinct_names, find_named, number_names
+
+THINGS = [SimpleNamespace(name=name) for name in ("kitchen_0", "bedroom_0")]
+
+
+def test_numbers_skip_own_names_and_count_by_type() -> None:
+    names = number_names([None, "bed_1", "", None], ["bed", "sofa", "bed", "sofa"], "object")
+
+    assert ["bed_0", "bed_1", "bed_2", "sofa_0"] == names
+
+
+def test_two_of_one_name_are_refused() -> None:
+    with pytest.raises(FloorPlanError, match="two rooms are named 'den': give each room its own"):
+        number_names(["den", "den"], ["office", "office"], "room")
+
+
+def test_repeated_names_get_the_next_free_number_with_a_note() -> None:
+    notes: list[str] = []
+
+    names = distinct_names(["Bath", "Bath", "Bath 2", None, "Bath", None], "rooms", notes)
+
+    assert ["Bath", "Bath 3", "Bath 2", None, "Bath 4", None] == names
+    assert "several rooms are called Bath: one of them is Bath 3 here" == notes[0]
+
+
+def test_thing_is_found_by_name_or_refused_with_the_nearest() -> None:
+    assert THINGS[1] is find_named(THINGS, "bedroom_0", "flat", "room")
+    with pytest.raises(PlacementError) as caught:
+        find_named(THINGS, "kitchen", "flat", "room", PlacementError)
+
+    assert str(caught.value) == (
+        "flat has no room 'kitchen': did you mean 'kitchen_0'? Its rooms are: kitchen_0, bedroom_0"
+    )

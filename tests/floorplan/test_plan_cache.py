@@ -1,0 +1,114 @@
+"""Homes that the runs of a process share: made once for each content, and read-only."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import fleet2d
+from fleet2d.floorplan import home as homes
+from fleet2d.floorplan import source
+from fleet2d.floorplan.formats.native import HOMES
+from fleet2d.floorplan.plan import Cache
+from fleet2d.metrics.ltp_error import walking_distances
+
+SHORT = "simulation.duration=6 h"
+
+
+@pytest.fixture(autouse=True)
+def empty_caches() -> None:
+    source._PLANS.clear()
+    homes._SHAPES.clear()
+
+
+def test_value_used_least_recently_is_dropped() -> None:
+    cache, calls = Cache(size=2), list[str]()
+    for key in "abacb":
+        cache.get(key, lambda key=key: calls.append(key))
+
+    assert list("abcb") == calls
+    assert len(cache) == 2
+
+
+def test_value_that_could_not_be_made_is_not_stored() -> None:
+    cache = Cache(size=2)
+    with pytest.raises(ZeroDivisionError):
+        cache.get("a", lambda: 1 // 0)
+
+    assert cache.get("a", lambda: 5) == 5
+
+
+def test_cache_grows_and_never_shrinks() -> None:
+    cache, calls = Cache(size=1), list[str]()
+    cache.grow(2)
+    cache.grow(1)
+    for key in "abab":
+        cache.get(key, lambda key=key: calls.append(key))
+
+    assert list("ab") == calls
+
+
+def test_second_run_shares_plan_spaces_and_ratings() -> None:
+    first, second = (fleet2d.Simulation(None, SHORT, seed=seed) for seed in (4, 5))
+    hangouts = [
+        next(b for b in simulation.actors["astro"].behaviors if hasattr(b, "places"))
+        for simulation in (first, second)
+    ]
+
+    assert first.home is not second.home
+    assert first.home.plan is second.home.plan
+    assert first.home.space(0.15) is second.home.space(0.15)
+    assert hangouts[0].nearness is hangouts[1].nearness
+    assert walking_distances(first.home) is walking_distances(second.home)
+
+
+def test_changed_file_is_read_anew(tmp_path: Path) -> None:
+    path = tmp_path / "home.json"
+    content: dict[str, Any] = json.loads((HOMES / "family_home.json").read_text())
+    path.write_text(json.dumps(content))
+    at = f"floorplan.path={path}"
+    first = fleet2d.Simulation(None, "floorplan.type=native", at, SHORT, seed=4).home.plan
+    again = fleet2d.Simulation(None, "floorplan.type=native", at, SHORT, seed=4).home.plan
+    path.write_text(json.dumps({**content, "name": "another"}))
+    changed = fleet2d.Simulation(None, "floorplan.type=native", at, SHORT, seed=4).home.plan
+
+    assert first is again
+    assert (first.name, changed.name) == ("family_home", "another")
+
+
+def test_shared_arrays_are_read_only() -> None:
+    simulation = fleet2d.Simulation(None, SHORT, seed=4)
+    plan, space = simulation.home.plan, simulation.home.space(0.15)
+    hangout: Any = next(b for b in simulation.actors["astro"].behaviors if hasattr(b, "places"))
+    shared: list[np.ndarray[Any, Any]] = [
+        plan.free, plan.room_of_cell, plan.room_of_place, plan.mesh.vertices, space.part_of_cell,
+        space.cells(), space.cells(2), hangout.nearness, hangout.places.points,
+        hangout.places.room, hangout.places.block, hangout.places.prox,
+        walking_distances(simulation.home),
+    ]  # fmt: skip
+
+    assert [False] * len(shared) == [array.flags.writeable for array in shared]
+    assert isinstance(plan.polygons, tuple)
+
+
+def test_run_is_the_same_whatever_ran_before_in_its_home() -> None:
+    alone = fleet2d.run(None, SHORT, seed=4).digest
+    simulation = fleet2d.Simulation(None, SHORT, seed=7)
+    simulation.home.use_room_as(simulation.home.rooms[0], "office")
+    simulation.home.layers.add("dust").values[:] = 5
+    simulation.home.objects = simulation.home.objects[:-1]
+    simulation.home.version += 1
+    simulation.run()
+
+    assert alone == fleet2d.run(None, SHORT, seed=4).digest
+
+
+def test_equal_floor_plans_have_spaces_of_their_own() -> None:
+    plans = [fleet2d.load_floorplan() for _ in range(2)]
+    first, second = (fleet2d.Home(plan) for plan in plans)
+
+    assert plans[0] == plans[1]
+    assert first.space(0.15) is not second.space(0.15)  # each belongs to its own plan
+    assert first.space(0.15).plan is plans[0]

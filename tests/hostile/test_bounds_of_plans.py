@@ -1,0 +1,150 @@
+"""Pictures and outlines at the bounds: read or refused within 10 s and 1 GB, in a process each."""
+
+import json
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tests.thorough import some
+
+MAX_SECONDS, MAX_MB = 10, 1000
+READ = """
+import resource, sys, time
+import fleet2d
+from fleet2d.errors import FloorPlanError
+
+resolution = 0.05 if sys.argv[1].endswith(".pgm") else None
+start = time.process_time()
+try:
+    plan = fleet2d.load_floorplan(sys.argv[1], resolution=resolution)
+    fleet2d.Home(plan).space(0.2)
+    answer = f"read: {plan.area_m2:.0f} m2"
+except FloorPlanError as error:
+    answer = str(error)
+megabytes = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024
+print(time.process_time() - start, megabytes, answer)
+"""
+
+
+def pgm(path: Path, shades: np.ndarray) -> Path:
+    rows, columns = shades.shape
+    path.write_bytes(b"P5\n%d %d\n255\n" % (columns, rows) + shades.tobytes())
+    return path
+
+
+def framed(side: int) -> np.ndarray:
+    """Return a white picture within a black line."""
+    shades = np.full((side, side), 255, np.uint8)
+    shades[[0, -1]] = shades[:, [0, -1]] = 0
+    return shades
+
+
+def white(folder: Path) -> Path:
+    return pgm(folder / "home.pgm", np.full((5000, 5000), 255, np.uint8))
+
+
+def one_row(folder: Path) -> Path:
+    return pgm(folder / "home.pgm", np.full((1, 1 << 25), 255, np.uint8))
+
+
+def half_a_row(folder: Path) -> Path:
+    return pgm(folder / "home.pgm", np.full((1, 1 << 24), 255, np.uint8))
+
+
+def largest_hall(folder: Path) -> Path:
+    return pgm(folder / "home.pgm", framed(4096))
+
+
+def combs(folder: Path) -> Path:
+    shades = framed(4096)
+    shades[10:-10, ::12] = 0
+    return pgm(folder / "home.pgm", shades)
+
+
+def pillars(folder: Path) -> Path:
+    shades = framed(4096)
+    for row in range(4):
+        for column in range(4):
+            shades[row::30, column::30] = 0
+    return pgm(folder / "home.pgm", shades)
+
+
+def noise(folder: Path) -> Path:
+    shades = framed(4096)
+    shades[np.random.default_rng(0).random(shades.shape) > 0.7] = 0
+    return pgm(folder / "home.pgm", shades)
+
+
+def comb_of(teeth: int) -> list[list[float]]:
+    """Return the corners of a home of 60 m with thin teeth along a wall."""
+    xs = np.linspace(60, 0, 2 * teeth + 1)[1:-1]
+    tips = [[round(float(x), 6), 10.0 if k % 2 else 5.0] for k, x in enumerate(xs)]
+    return [[0, 0], [60, 0], *tips, [0, 10]]
+
+
+def geojson(folder: Path, corners: list[list[float]]) -> Path:
+    room = {
+        "type": "Feature",
+        "properties": {"kind": "room"},
+        "geometry": {"type": "Polygon", "coordinates": [[*corners, corners[0]]]},
+    }
+    path = folder / "home.geojson"
+    content = {"type": "FeatureCollection", "units": "m", "features": [room]}
+    path.write_text(json.dumps(content), encoding="utf-8")
+    return path
+
+
+def teeth_at_the_bound(folder: Path) -> Path:
+    return geojson(folder, comb_of(12_400))
+
+
+def too_many_teeth(folder: Path) -> Path:
+    return geojson(folder, comb_of(60_000))
+
+
+def most_values(folder: Path) -> Path:
+    angles = np.linspace(0, 2 * np.pi, 990_000, endpoint=False)
+    corners = np.round(np.stack([50 * np.cos(angles), 50 * np.sin(angles)], axis=1), 4)
+    return geojson(folder, corners.tolist())
+
+
+def largest_square(folder: Path) -> Path:
+    outline = [[0, 0], [223, 0], [223, 223], [0, 223]]
+    path = folder / "home.json"
+    plan = {"format": "fleet2d-floorplan", "version": 1, "free": [{"outline": outline}]}
+    path.write_text(json.dumps(plan), encoding="utf-8")
+    return path
+
+
+ATTACKS = [
+    (white, "FLEET2D_MAX_PIXELS"),
+    (one_row, "FLEET2D_MAX_PIXELS"),
+    (half_a_row, "at most 32768 a side"),
+    (too_many_teeth, "FLEET2D_MAX_CORNERS"),
+]
+SLOW_ATTACKS = [
+    (pillars, "FLEET2D_MAX_CORNERS"),
+    (largest_hall, "read: 41882 m2"),
+    (combs, "read: "),
+    (noise, ""),
+    (teeth_at_the_bound, "read: "),
+    (most_values, "FLEET2D_MAX_CORNERS"),
+    (largest_square, "read: 49729 m2"),
+]
+
+
+@pytest.mark.parametrize(("make", "answer"), [*ATTACKS, *some(SLOW_ATTACKS, 4)])
+def test_no_plan_takes_long_or_much(
+    tmp_path: Path, make: Callable[[Path], Path], answer: str
+) -> None:
+    """A white picture took 1.6 GB, one of a single row 2.4 GB, and 60,000 teeth took 27 s."""
+    command = [sys.executable, "-c", READ, str(make(tmp_path))]
+    run = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True)
+    seconds, megabytes, reply = run.stdout.split(maxsplit=2)
+
+    assert answer in reply
+    assert float(seconds) < MAX_SECONDS
+    assert int(megabytes) < MAX_MB
