@@ -10,7 +10,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from fleet2d.cli.app import app
+from fleet2d.cli.__main__ import app
 from fleet2d.engine.simulation import Simulation
 from fleet2d.scenario.model import load_scenario
 

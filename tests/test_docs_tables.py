@@ -10,7 +10,7 @@ import typer
 import yaml
 from pydantic import BaseModel, TypeAdapter, ValidationError
 
-from fleet2d.cli.app import app
+from fleet2d.cli.__main__ import app
 from fleet2d.configuration.components import lookup
 from fleet2d.entities.behavior import Behavior
 from fleet2d.entities.equipment import Localization

@@ -15,8 +15,8 @@ from typer.testing import CliRunner
 
 import fleet2d
 from fleet2d import _core
-from fleet2d.cli import plugins
-from fleet2d.cli.app import app
+from fleet2d.cli import __main__ as plugins
+from fleet2d.cli.__main__ import app
 
 SOURCE = Path(fleet2d.__file__).parent
 LEAVES = {
@@ -30,7 +30,7 @@ LEAVES = {
 REST = """
 import sys
 import fleet2d
-from fleet2d.cli.app import app
+from fleet2d.cli.__main__ import app
 from fleet2d.configuration.components import PACKAGES, components
 
 for kind in PACKAGES:

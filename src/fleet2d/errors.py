@@ -1,14 +1,12 @@
 """Exceptions, all derived from :class:`Fleet2DError`, and what turns other failures into them."""
 
-import os
 import signal
 import sys
-import threading
 import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, ClassVar, NoReturn
+from typing import Any, ClassVar
 
 # A longer line of a message quotes input, and is shortened to its head and tail [characters].
 _LONGEST, _HEAD, _TAIL = 1000, 600, 300
@@ -135,9 +133,6 @@ class blame:  # noqa: N801  (used as a function)
     now: ClassVar["blame | None"] = None
     """The innermost component whose code is running, for the watchdog."""
 
-    last: ClassVar["blame | None"] = None
-    """The component whose code was called last."""
-
     interrupts: ClassVar[bool] = True
     """Whether Ctrl-C raises KeyboardInterrupt; if not, a component must have raised it."""
 
@@ -154,7 +149,7 @@ class blame:  # noqa: N801  (used as a function)
 
     def __enter__(self) -> None:
         """Make this the running component."""
-        self._outer, blame.now, blame.last = blame.now, self, self
+        self._outer, blame.now = blame.now, self
 
     def __exit__(self, kind: Any, error: BaseException | None, trace: Any) -> None:
         """Replace an exception by one that names the component."""
@@ -200,34 +195,6 @@ def ctrl_c_watch() -> Iterator[None]:
     finally:
         blame.pressed = None
         signal.signal(signal.SIGINT, before)
-
-
-@contextmanager
-def exit_guard() -> Iterator[None]:
-    """Make `os._exit` of a component's code an error, which else ends the program without a word.
-
-    In another thread it still ends the program, with exit code 1 and a message.
-    """
-    leave, program = os._exit, os.getpid()
-
-    def guarded(status: int) -> NoReturn:
-        caller = sys._getframe(1)
-        package = caller.f_globals.get("__name__", "").partition(".")[0]
-        if os.getpid() != program or package == "fleet2d":  # a child process ends like this
-            leave(status)
-        if threading.current_thread() is threading.main_thread():
-            raise SystemExit(f"os._exit({status})")
-        place = f"{Path(caller.f_code.co_filename).name}:{caller.f_lineno}"
-        last = f"; {blame.last.path} was called last, {blame.last.time}" if blame.last else ""
-        message = f"error: a thread ended the program by os._exit({status}) ({place}){last}"
-        os.write(2, f"{message}\n".encode())
-        leave(1)
-
-    os._exit = guarded
-    try:
-        yield
-    finally:
-        os._exit = leave
 
 
 def text_of(error: BaseException) -> str:

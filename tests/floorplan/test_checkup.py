@@ -8,7 +8,7 @@ import shapely
 from tests.homes import plan_files
 from typer.testing import CliRunner
 
-from fleet2d.cli.app import app
+from fleet2d.cli.__main__ import app
 from fleet2d.floorplan.checkup import Finding, checkup
 from fleet2d.floorplan.formats.native import native_document
 from fleet2d.floorplan.furniture import stand_furniture

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 import fleet2d
-from fleet2d.cli.app import app
+from fleet2d.cli.__main__ import app
 from fleet2d.configuration.documents import read_document
 from fleet2d.entities.entity import Robot, User
 from fleet2d.entities.meander import Meander

@@ -1,6 +1,117 @@
-"""`python -m fleet2d.cli`: as the command `fleet2d`."""
+"""The program `fleet2d`, also as `python -m fleet2d.cli`, and how its commands are found.
 
-from fleet2d.cli import main
+A command is a module of this package, with a function of the module's name or a Typer app of
+several commands: `scenario_diff` in `scenario_diff.py` is `fleet2d scenario-diff`. It needs no
+mention elsewhere. Installed packages add others by entry points of the group `fleet2d.command`, and
+some of Fleet2D's own commands do so, too. All are imported when they are called, and should import
+what they need then, too.
+"""
+
+import pkgutil
+from collections.abc import Iterator
+from difflib import get_close_matches
+from importlib import import_module
+from typing import Annotated, Any
+
+import typer
+from typer.core import TyperGroup
+from typer.main import get_group
+
+from fleet2d import __version__, cli
+from fleet2d.memory import rare_collections
+
+GROUP = "fleet2d.command"
+
+
+class Commands(TyperGroup):
+    """The commands of Fleet2D and of installed packages, by name."""
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        """Return the names of all commands that can be loaded, sorted."""
+        own = set(_modules())
+        others = {entry.name for entry in entries()} - own
+        return sorted(own | {name for name in others if self.get_command(ctx, name) is not None})
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        """Return a command, None if there is none of that name."""
+        module = _modules().get(cmd_name)
+        if module is not None:
+            with rare_collections():
+                function = getattr(import_module(f"{cli.__name__}.{module}"), module)
+            return _command(cmd_name, function, ctx)
+        entry = next((entry for entry in entries() if entry.name == cmd_name), None)
+        return None if entry is None else _load(entry, ctx)
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """Return the name of the command that arguments call, the command, and its arguments.
+
+        Raises:
+            UsageError: There is no such command; the message names the nearest one.
+        """
+        if not args[0].startswith("-") and self.get_command(ctx, args[0]) is None:
+            near = get_close_matches(args[0], self.list_commands(ctx), n=1)
+            hint = f": did you mean {near[0]!r}?" if near else "."
+            ctx.fail(f"No such command {args[0]!r}{hint}")
+        return super().resolve_command(ctx, args)
+
+
+def entries(group: str = GROUP) -> Iterator[Any]:
+    """Return the entry points of a group."""
+    from importlib.metadata import entry_points  # slow to import, and rarely needed
+
+    return iter(entry_points(group=group))
+
+
+def _modules() -> dict[str, str]:
+    """Return the name of the module of each command, by the command's name."""
+    names = (module.name for module in pkgutil.iter_modules(cli.__path__))
+    return {name.replace("_", "-"): name for name in names if name != "__main__"}
+
+
+def _load(entry: Any, ctx: Any) -> Any:
+    """Load a command; None if its package is missing or, with a message, if it fails."""
+    try:
+        value = entry.load()
+    except Exception as error:  # noqa: BLE001 - a plugin may raise anything
+        missing = error.name or "" if isinstance(error, ModuleNotFoundError) else ""
+        if not missing or not f"{entry.module}.".startswith(f"{missing}."):
+            typer.echo(f"the command {entry.name!r} ({entry.value}) fails: {error}", err=True)
+        return None
+    return _command(entry.name, value, ctx)
+
+
+def _command(name: str, value: Any, ctx: Any) -> Any:
+    """Return the command of a function, or the group of a Typer app."""
+    app = typer.Typer(rich_markup_mode=None, callback=lambda: None)
+    if isinstance(value, typer.Typer):
+        app.add_typer(value, name=name)
+    else:
+        app.command(name)(value)
+    return get_group(app).get_command(ctx, name)
+
+
+app = typer.Typer(
+    cls=Commands,
+    help="Simulate weeks of a home in a fraction of a second, exactly reproducible.",
+    no_args_is_help=True,
+    invoke_without_command=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+)
+
+
+@app.callback()
+def about(
+    version: Annotated[
+        bool, typer.Option("--version", is_eager=True, help="Print the version.")
+    ] = False,
+) -> None:
+    """Simulate weeks of a home in a fraction of a second, exactly reproducible."""
+    if version:
+        typer.echo(f"fleet2d {__version__}")
+        raise typer.Exit
+
 
 if __name__ == "__main__":  # a scenario may name it as the module of a component
-    main()
+    cli.main()

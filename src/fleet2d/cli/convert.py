@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from fleet2d.cli.plugins import entries
+from fleet2d.cli.__main__ import entries
 from fleet2d.errors import InputError
 from fleet2d.options import Resolution
 

@@ -7,8 +7,7 @@ from typing import Annotated
 
 import typer
 
-from fleet2d.cli.progress import run_with_progress
-from fleet2d.cli.summary import print_results
+from fleet2d.cli.run import print_results, run_with_progress
 from fleet2d.options import TrustFiles, TrustFolders, trust_of
 
 

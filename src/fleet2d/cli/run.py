@@ -1,0 +1,308 @@
+"""`fleet2d run`: simulate a scenario; its progress, its messages and its summary."""
+
+import gc
+import json
+import os
+import sys
+import threading
+import time
+import traceback
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext, redirect_stdout, suppress
+from datetime import timedelta
+from pathlib import Path
+from types import FrameType
+from typing import TYPE_CHECKING, Annotated, Any, cast
+
+import typer
+
+from fleet2d.errors import ArtifactError, RunDirectoryError, blame
+from fleet2d.memory import rare_collections
+from fleet2d.options import file_name, split
+
+if TYPE_CHECKING:
+    from fleet2d.engine.simulation import Simulation
+    from fleet2d.metrics.metric import Metric
+    from fleet2d.runs.run import Run
+
+
+FIRST_S = 30.0
+"""Time after which a running component is named [s]; the next message comes after twice as long."""
+
+
+@contextmanager
+def watched(first_s: float = FIRST_S) -> Iterator[None]:
+    """Print to stderr each component that runs longer than `first_s`, and the line it is at."""
+    is_over = threading.Event()
+    thread_id = threading.get_ident()
+    thread = threading.Thread(
+        target=_watch, args=(is_over, thread_id, first_s), daemon=True, name="fleet2d-watchdog"
+    )
+    thread.start()
+    try:
+        yield
+    finally:
+        is_over.set()
+        thread.join(timeout=1)
+
+
+def _watch(is_over: threading.Event, thread_id: int, first_s: float) -> None:
+    call, start_s, limit_s = blame.now, time.monotonic(), first_s
+    while not is_over.wait(first_s / 6):
+        time_s = time.monotonic()
+        if blame.now is None or blame.now is not call:
+            call, start_s, limit_s = blame.now, time_s, first_s
+        elif time_s - start_s >= limit_s:
+            limit_s *= 2
+            moment = "before the first step" if call.step is None else f"at step {call.step}"
+            frame = sys._current_frames().get(thread_id)
+            typer.echo(
+                f"{call.path} has been running for {time_s - start_s:.0f} s {moment}{_line(frame)};"
+                " Ctrl-C twice stops it",
+                err=True,
+            )
+
+
+def _line(frame: FrameType | None) -> str:
+    """Return the current line of the user's code as text; empty if there is none."""
+    other_code = (str(Path(__file__).parents[1]), sys.prefix, sys.base_prefix, "<")
+    lines = traceback.extract_stack(frame) if frame else []
+    frames = [f for f in lines if not f.filename.startswith(other_code)]
+    return f" ({Path(frames[-1].filename).name}:{frames[-1].lineno})" if frames else ""
+
+
+def run_with_progress(simulation: "Simulation", *, show: bool) -> "Run":
+    """Run to the end, with a progress bar on stderr if `show`.
+
+    Raises:
+        Exit: Ctrl-C or SIGTERM; what was simulated until then is stored.
+    """
+    try:
+        with watched():
+            return _run_with_bar(simulation, show=show)
+    except KeyboardInterrupt:
+        typer.echo(
+            f"interrupted at {simulation.time:%Y-%m-%d %H:%M}; what was simulated until then is in"
+            f" {simulation.directory}: continue it by `fleet2d resume {simulation.directory}`",
+            err=True,
+        )
+        raise typer.Exit(130) from None
+
+
+def _run_with_bar(simulation: "Simulation", *, show: bool) -> "Run":
+    gc.freeze()  # loaded modules live to the end: the collector needn't scan them
+    if not show:
+        return simulation.run()
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+        task = progress.add_task("", total=simulation.clock.steps)
+        start_s = time.perf_counter()
+
+        def update(current: "Simulation") -> None:
+            simulated_s = current.step * current.clock.step_us / 1e6
+            speedup = simulated_s / (time.perf_counter() - start_s)
+            text = f"{current.time:%a %d %b %Y %H:%M}  {speedup:,.0f} x real time"
+            progress.update(task, completed=current.step, description=text)
+
+        return simulation.run(update)
+
+
+SEPARATOR = " · "
+
+_LOADED = time.perf_counter()
+
+
+def print_results(result: "Run", *, as_json: bool, quiet: bool) -> None:
+    """Print the results of a run: as one JSON object, as a table, or nothing.
+
+    Raises:
+        ArtifactError: They can't be written; the run is stored nevertheless.
+    """
+    summary = summary_of(result)
+    try:
+        if as_json:
+            typer.echo(json.dumps(summary))
+        elif not quiet:
+            print_summary(summary, result)
+    except BrokenPipeError:  # its reader has seen enough
+        raise
+    except OSError as error:
+        raise ArtifactError(
+            f"the results can't be printed ({error.strerror or error}): the run is stored in"
+            f" {result.directory}"
+        ) from error
+
+
+def summary_of(run: "Run") -> dict[str, Any]:
+    """Return the content of `--json`."""
+    manifest = run.manifest
+    wall = {**manifest["wall_s"], "total": _since_start()}
+    return {
+        "run_dir": str(run.directory),
+        "steps": manifest["steps"],
+        "simulated_s": manifest["simulated_s"],
+        "seed": manifest["seed"],
+        "digest": run.digest,
+        "wall_s": wall,
+        "speedup": manifest["simulated_s"] / (wall["setup"] + wall["simulate"] + wall["save"]),
+        "peak_rss_mb": _peak_rss_mb(),
+        "metrics": run.metrics,
+        **({"expectations": verdicts} if (verdicts := manifest["expectations"]) else {}),
+    }
+
+
+def print_summary(summary: dict[str, Any], run: "Run") -> None:
+    """Print the summary as text: speed, a table of metrics, notes."""
+    from rich.console import Console
+    from rich.table import Table
+
+    from fleet2d.configuration.units import format_duration
+
+    console = Console()
+    wall = summary["wall_s"]
+    simulated = format_duration(timedelta(seconds=summary["simulated_s"]))
+    seconds = wall["setup"] + wall["simulate"] + wall["save"]
+    console.print(
+        f"{simulated} in {seconds:.2f} s: {summary['speedup']:,.0f} x real time"
+        f" (set-up {wall['setup']:.2f} s, simulate {wall['simulate']:.2f} s,"
+        f" save {wall['save']:.2f} s;"
+        f" whole process {wall['total']:.2f} s, {summary['peak_rss_mb']:.0f} MB)",
+        highlight=False,
+        soft_wrap=True,
+    )
+    table, hidden = Table("metric", "of", "value", "", show_edge=False), 0
+    for metric, result in summary["metrics"].items():
+        metric_class = _class_of(run, metric)
+        rows = _flat(metric_class.summary(result))
+        hidden += len(_flat(result)) - len(rows)
+        last_unit = None
+        for name, value in rows:
+            unit = metric_class.units.get(name.rsplit(SEPARATOR, 1)[-1], metric_class.unit)
+            table.add_row(metric, name, _text(value, unit), "" if unit == last_unit else unit)
+            metric, last_unit = "", unit
+    if table.row_count:
+        console.print(table)
+    if hidden:
+        console.print(f"{hidden} more numbers are in the run: --json shows them", highlight=False)
+    for verdict in run.manifest["expectations"].values():
+        console.print(verdict["says"], highlight=False, markup=False, soft_wrap=True)
+    for note in run.notes or run.manifest["notes"]:
+        console.print(f"note: {note}", highlight=False, markup=False)
+    console.print(f"seed {summary['seed']}, digest {summary['digest'][:16]}", highlight=False)
+    console.print(f"stored in {summary['run_dir']}", highlight=False, soft_wrap=True, markup=False)
+
+
+def _text(value: Any, unit: str) -> str:
+    """Return a value as text: shares in percent, other numbers with few digits."""
+    if not isinstance(value, float):
+        return str(value)
+    if unit.startswith("share"):
+        return f"{100 * value:.1f} %" if value >= 0.001 or value == 0 else "< 0.1 %"
+    return f"{value:,.0f}" if abs(value) >= 1000 else f"{value:.3g}"
+
+
+def _class_of(run: "Run", metric: str) -> "type[Metric]":
+    """Return the class of a metric, which has its units and its summary."""
+    from fleet2d.configuration.components import lookup
+
+    configured = run.manifest["scenario"]["metrics"][metric]
+    return cast("type[Metric]", lookup("metric", configured["type"]))
+
+
+def _flat(result: Any, prefix: str = "") -> list[tuple[str, Any]]:
+    """Return nested results as rows (name, value)."""
+    if not isinstance(result, dict):
+        return [(prefix, result)]
+    return [
+        row
+        for key, value in result.items()
+        for row in _flat(value, f"{prefix}{SEPARATOR}{key}" if prefix else key)
+    ]
+
+
+def _since_start() -> float:
+    """Return the wall time since this process started [s]."""
+    try:
+        ticks = int(Path("/proc/self/stat").read_text().rsplit(")", 1)[1].split()[19])
+        return time.clock_gettime(time.CLOCK_BOOTTIME) - ticks / os.sysconf("SC_CLK_TCK")
+    except (OSError, AttributeError, ValueError, IndexError):
+        # Not on Linux: the time since this module was loaded.
+        return time.perf_counter() - _LOADED
+
+
+def _peak_rss_mb() -> float | None:
+    """Return the largest memory of this process so far [MB]; None where the system can't say."""
+    try:
+        import resource
+    except ImportError:
+        return None
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return peak / (1024 * 1024 if sys.platform == "darwin" else 1024)
+
+
+Arguments = Annotated[
+    list[str] | None,
+    typer.Argument(
+        metavar="[SCENARIO.yaml] [KEY.PATH=VALUE]...",
+        help="A scenario (left out: the bundled base scenario), and changes to it.",
+    ),
+]
+
+
+def run(
+    arguments: Arguments = None,
+    seed: Annotated[int | None, typer.Option(help="The seed of all randomness.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Directory for the run.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")] = False,
+) -> None:
+    """Simulate a scenario and store the run."""
+    with redirect_stdout(sys.stderr) if as_json else nullcontext():  # output of components
+        result = run_with_progress(
+            _set_up(arguments, seed, out), show=sys.stderr.isatty() and not quiet
+        )
+    print_results(result, as_json=as_json, quiet=quiet)
+
+
+def _set_up(arguments: list[str] | None, seed: int | None, out: Path | None) -> "Simulation":
+    with rare_collections():
+        from fleet2d.engine.simulation import Simulation
+        from fleet2d.scenario.model import load_scenario
+
+        gc.freeze()
+
+    scenario, overrides = split(arguments)
+    settings = {} if seed is None else {"seed": seed}
+    with watched(), rare_collections():
+        loaded = load_scenario(scenario, *overrides, **settings)
+        name = loaded.name or (Path(scenario).stem if scenario else "run")
+        directory = out or _fresh_directory(name)
+        try:
+            return Simulation(loaded, out=directory)
+        except BaseException:
+            if out is None:
+                with suppress(OSError):
+                    directory.rmdir()
+                    directory.parent.rmdir()  # fails if there are other runs
+            raise
+
+
+def _fresh_directory(name: str) -> Path:
+    """Create and return runs/NAME-001, or the directory of the first free number."""
+    stem = file_name(name) or "run"
+    number = 1
+    while True:
+        directory = Path("runs") / f"{stem}-{number:03d}"
+        try:
+            directory.mkdir(parents=True)  # at once, so that a parallel run takes the next
+        except FileExistsError:
+            number += 1
+        except OSError as error:
+            raise RunDirectoryError(
+                f"{directory} can't be created: {error.strerror}; name another directory by --out"
+            ) from error
+        else:
+            return directory

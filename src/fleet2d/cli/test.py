@@ -1,0 +1,317 @@
+"""`fleet2d test`: run scenarios with expectations; the table of verdicts and JUnit XML."""
+
+import json
+import re
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+from xml.etree import ElementTree as ET
+
+import typer
+
+from fleet2d.errors import Fleet2DError, InputError
+from fleet2d.options import file_name
+from fleet2d.storage.files import write_atomically
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from fleet2d.engine.simulation import Simulation
+    from fleet2d.expectations.verdict import Verdict
+    from fleet2d.scenario.model import Scenario
+
+
+@dataclass
+class ScenarioCase:
+    """A scenario with a seed, and its results.
+
+    Attributes:
+        source: The file of the scenario, as on the command line.
+        scenario: The scenario, with the seed.
+        overrides: Changes of the scenario, as on the command line.
+        verdicts: The verdicts on expectations, by name.
+        error: The error that ended the run; empty if there is none.
+        wall_s: The wall time of the run [s].
+        files: The run directory and pictures of a failure.
+    """
+
+    source: str
+    scenario: "Scenario"
+    overrides: Sequence[str]
+    verdicts: "Mapping[str, Verdict]" = field(default_factory=dict)
+    error: str = ""
+    wall_s: float = 0.0
+    files: list[Path] = field(default_factory=list)
+
+    @property
+    def seed(self) -> int:
+        """The seed."""
+        assert self.scenario.simulation.seed is not None
+        return self.scenario.simulation.seed
+
+    @property
+    def fails(self) -> bool:
+        """Whether the run failed or violates an expectation."""
+        return bool(self.error) or not all(v.holds for v in self.verdicts.values())
+
+    @property
+    def name(self) -> str:
+        """The name of its run directory and pictures."""
+        return f"{file_name(Path(self.source).stem) or 'run'}-seed-{self.seed}"
+
+    def commands(self, verdict: "Verdict") -> str:
+        """Return the commands that run it and show the worst moment of a verdict."""
+        changes = " ".join(f"'{override}'" for override in self.overrides)
+        run = f"fleet2d run {self.source} {changes}".rstrip()
+        worst = verdict.worst
+        moment = f" --at 'step {worst.worst}'" if worst is not None else ""
+        return f"{run} --seed {self.seed} --out {self.name} && fleet2d show {self.name}{moment}"
+
+
+# Characters that XML 1.0 can't contain.
+_ILLEGAL = re.compile(r"[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+
+
+def write_junit(path: Path, cases: "Sequence[ScenarioCase]") -> None:
+    """Write a test suite for each scenario, with a test for each expectation and seed.
+
+    Raises:
+        InputError: The file can't be written.
+    """
+    root = ET.Element("testsuites")
+    for source in dict.fromkeys(case.source for case in cases):
+        cases_of_source = [case for case in cases if case.source == source]
+        suite = ET.SubElement(root, "testsuite", name=_xml_text(source))
+        failures = errors = 0
+        for case in cases_of_source:
+            failures += sum(not verdict.holds for verdict in case.verdicts.values())
+            errors += bool(case.error)
+            _add_case(suite, case)
+        counts = {"tests": len(suite), "failures": failures, "errors": errors, "skipped": 0}
+        for name, count in counts.items():
+            suite.set(name, str(count))
+        suite.set("time", f"{sum(case.wall_s for case in cases_of_source):.3f}")
+    ET.indent(root)
+    text = ET.tostring(root, encoding="utf-8", xml_declaration=True)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_atomically(path, text)
+    except OSError as error:
+        raise InputError(f"--junit {path} can't be written: {error.strerror}") from None
+
+
+def _add_case(suite: ET.Element, case: "ScenarioCase") -> None:
+    names = list(case.verdicts) or list(case.scenario.expect)
+    for name in names:
+        test = ET.SubElement(
+            suite,
+            "testcase",
+            classname=_xml_text(Path(case.source).stem),
+            name=f"{_xml_text(name)}[seed {case.seed}]",
+            time=f"{case.wall_s / len(names):.3f}",
+        )
+        if case.error:
+            error = ET.SubElement(test, "error", message=_xml_text(case.error))
+            error.text = _xml_text(case.error)
+            return
+        verdict = case.verdicts[name]
+        if not verdict.holds:
+            failure = ET.SubElement(test, "failure", message=_xml_text(str(verdict)))
+            files = "".join(f"\nstored: {path}" for path in case.files)
+            failure.text = _xml_text(f"{verdict}\nto see it: {case.commands(verdict)}{files}")
+
+
+def _xml_text(text: str) -> str:
+    return _ILLEGAL.sub("?", text)
+
+
+def print_cases(cases: "Sequence[ScenarioCase]") -> None:
+    """Print a table of expectations, then the failures."""
+    from rich.console import Console
+    from rich.table import Table
+
+    console = Console()
+    table = Table("scenario", "expectation", "held", "at least by", show_edge=False)
+    for source in dict.fromkeys(case.source for case in cases):
+        cases_of_source = [case for case in cases if case.source == source]
+        label = source
+        for name in cases_of_source[0].scenario.expect:
+            verdicts = [case.verdicts[name] for case in cases_of_source if name in case.verdicts]
+            count = sum(verdict.holds for verdict in verdicts)
+            table.add_row(label, name, f"{count} of {len(cases_of_source)}", _least(verdicts))
+            label = ""
+    console.print(table)
+    for case in cases:
+        _print_failure(console, case)
+    failed = sum(case.fails for case in cases)
+    runs = f"{len(cases)} run{'' if len(cases) == 1 else 's'}"
+    console.print(f"{failed} of {runs} failed" if failed else f"all held: {runs}", highlight=False)
+
+
+def _print_failure(console: "Console", case: "ScenarioCase") -> None:
+    prefix = f"{case.source}, seed {case.seed}: "
+    lines = [f"{prefix}{case.error}"] if case.error else []
+    for verdict in case.verdicts.values():
+        if not verdict.holds:
+            lines += [f"{prefix}{verdict}", f"  to see it: {case.commands(verdict)}"]
+    lines += [f"  stored: {path}" for path in case.files]
+    for line in lines:
+        console.print(line, highlight=False, markup=False, soft_wrap=True)
+
+
+def _least(verdicts: "Sequence[Verdict]") -> str:
+    """Return the least robustness of verdicts as text, else the least time to spare."""
+    from math import isfinite
+
+    from fleet2d.expectations.verdict import amount
+
+    measured = [verdict for verdict in verdicts if isfinite(verdict.robustness)]
+    if measured:
+        worst = min(measured, key=lambda verdict: verdict.robustness)
+        return amount(worst.robustness, worst.unit)
+    slack = [verdict.slack_s for verdict in verdicts if verdict.slack_s is not None]
+    return f"{min(slack):g} s to spare" if slack else ""
+
+
+FIRST_SEED = 1
+MOST_STORED = 5
+"""The most failing seeds of one scenario that are stored or drawn."""
+
+
+def test(
+    arguments: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="SCENARIO.yaml... [KEY.PATH=VALUE]...",
+            help="Scenarios with expectations, and changes to all of them.",
+        ),
+    ],
+    seeds: Annotated[int, typer.Option(min=1, help="The number of seeds of each.")] = 1,
+    seed: Annotated[
+        int | None, typer.Option(min=0, help="The first seed; left out: the scenario's own, or 1.")
+    ] = None,
+    junit: Annotated[Path | None, typer.Option(help="JUnit XML to write.")] = None,
+    pictures: Annotated[
+        Path | None, typer.Option(help="Folder for a picture of the worst moment of each failure.")
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder for the run directories of seeds that fail.")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+) -> None:
+    """Run scenarios and judge their expectations; exit code 1 if one is violated."""
+    files = [argument for argument in arguments if "=" not in argument]
+    overrides = [argument for argument in arguments if "=" in argument]
+    if not files:
+        raise InputError("name the scenarios to test: fleet2d test SCENARIO.yaml…")
+    if pictures is not None:
+        _check_pictures()
+    cases = [case for file in files for case in _cases(file, overrides, seeds, seed)]
+    failures: Counter[str] = Counter()
+    for case in cases:
+        _run(case)
+        if case.fails and not case.error and (pictures or out):
+            failures[case.source] += 1
+            if failures[case.source] <= MOST_STORED:
+                _store(case, pictures, out)
+    if junit is not None:
+        write_junit(junit, cases)
+    if as_json:
+        typer.echo(json.dumps([_content(case) for case in cases]))
+    else:
+        print_cases(cases)
+    if any(case.fails for case in cases):
+        raise typer.Exit(1)
+
+
+def _cases(
+    source: str, overrides: Sequence[str], seeds: int, seed: int | None
+) -> Iterator[ScenarioCase]:
+    """Yield a scenario with each of its seeds, after a check of its set-up.
+
+    Raises:
+        InputError: The scenario or an expectation is wrong, or it has no expectations.
+    """
+    from fleet2d.engine.simulation import Simulation
+    from fleet2d.scenario.model import load_scenario
+
+    scenario = load_scenario(source, *overrides)
+    if not scenario.expect:
+        raise InputError(
+            f"{source} has no expectations: write, for example,\n"
+            "  expect: {keeps_off: 'always(distance(ana, astro) > 0.5 m)'}"
+        )
+    if seed is None:
+        seed = scenario.simulation.seed
+    first_seed = FIRST_SEED if seed is None else seed
+    Simulation(scenario)
+    for number in range(first_seed, first_seed + seeds):
+        simulation = scenario.simulation.model_copy(update={"seed": number})
+        yield ScenarioCase(
+            source, scenario.model_copy(update={"simulation": simulation}), overrides
+        )
+
+
+def _run(case: ScenarioCase) -> None:
+    """Run a case, and judge it."""
+    import time
+
+    start_s = time.perf_counter()
+    try:
+        simulation = _simulation(case)
+        simulation.run()
+        case.verdicts = simulation.verdicts()
+    except Fleet2DError as error:
+        case.error = str(error)
+    case.wall_s = time.perf_counter() - start_s
+
+
+def _simulation(case: ScenarioCase, out: Path | None = None) -> "Simulation":
+    from fleet2d.engine.simulation import Simulation
+
+    return Simulation(case.scenario, out=out)
+
+
+def _store(case: ScenarioCase, pictures: Path | None, out: Path | None) -> None:
+    """Run a failed case again, to store it and to draw the worst moments."""
+    directory = None if out is None else out / case.name
+    run = _simulation(case, directory).run()
+    if directory is not None:
+        case.files.append(directory)
+    if pictures is None:
+        return
+    from fleet2d.viewer.scenes.figures import draw_moment
+
+    pictures.mkdir(parents=True, exist_ok=True)
+    for verdict in case.verdicts.values():
+        worst = verdict.worst
+        if worst is not None:
+            path = pictures / f"{case.name}-{file_name(verdict.name)}.png"
+            draw_moment(run, worst.worst, path)
+            case.files.append(path)
+
+
+def _check_pictures() -> None:
+    """Check that pictures can be drawn, before anything is run.
+
+    Raises:
+        InputError: matplotlib is missing.
+    """
+    from importlib.util import find_spec
+
+    if find_spec("matplotlib") is None:
+        raise InputError("--pictures needs matplotlib: pip install 'fleet2d[viz]'")
+
+
+def _content(case: ScenarioCase) -> dict[str, Any]:
+    return {
+        "scenario": case.source,
+        "seed": case.seed,
+        "holds": not case.fails,
+        "error": case.error or None,
+        "wall_s": case.wall_s,
+        "expectations": {name: verdict.content() for name, verdict in case.verdicts.items()},
+        "files": [str(path) for path in case.files],
+    }
