@@ -23,20 +23,20 @@ from matplotlib.figure import Figure
 from matplotlib.image import imread
 from matplotlib.text import Text
 
-from fleet2d.pictures.actogram import (
+from fleet2d.pictures.life import BodyTrace, best_view, field_of_view, opacity, trace_of
+from fleet2d.pictures.run import (
     FAINTEST,
     MARK_PART,
     NOT_SIMULATED,
     draw_actogram,
+    draw_run,
     hours_shown,
     mark_boxes,
     marks_by_day,
     room_color,
     rooms_by_day,
+    run_figure,
 )
-from fleet2d.pictures.life import best_view, field_of_view, opacity
-from fleet2d.pictures.run import draw_run, run_figure
-from fleet2d.pictures.traces import BodyTrace, trace_of
 from fleet2d.sight.fov import VisibleRegion
 
 MEANDER = {"type": "meander"}

@@ -31,7 +31,7 @@ def show_diary(name: str | None, out: Path | None, days: int, seed: int) -> list
     """
     from pydantic import TypeAdapter, ValidationError
 
-    from fleet2d.pictures.diary import diary_days, diary_lines, draw_diary
+    from fleet2d.pictures.charts import diary_days, diary_lines, draw_diary
     from fleet2d.routines.persona import AnyPersona, bundled_names
 
     if name is None:
@@ -183,7 +183,7 @@ def _draw_run(directory: Path, out: Path | None, picture: RunPicture) -> Path:
         target = out or directory / f"{picture.layer}.png"
         draw_layer(run, picture.layer, target, picture.step)
     elif picture.reliability is not None:
-        from fleet2d.pictures.reliability import draw_reliability
+        from fleet2d.pictures.charts import draw_reliability
 
         target = out or directory / f"{picture.reliability}-reliability.png"
         draw_reliability(run, picture.reliability, target)
@@ -219,7 +219,7 @@ def _draw_floorplan(
     plan = load_floorplan(source, resolution=resolution) if source else load_floorplan()
     target = out or Path(f"{file_name(plan.name) or 'plan'}.png")
     if fov is not None:
-        from fleet2d.pictures.fov import draw_fov, parse_pose
+        from fleet2d.pictures.layers import draw_fov, parse_pose
 
         draw_fov(plan, parse_pose(fov), target)
     else:

@@ -64,7 +64,7 @@ def _check_floorplan(
     """Print the findings of a floor plan and draw them; exit with 2 if it is unlivable."""
     from fleet2d.floorplan.checkup import checkup
     from fleet2d.floorplan.load import load_floorplan
-    from fleet2d.pictures.checkup import draw_checkup
+    from fleet2d.pictures.floorplan import draw_checkup
 
     plan = load_floorplan(source, resolution=resolution)
     findings = checkup(plan, radius)

@@ -1,21 +1,31 @@
-"""Draw a layer of a stored run over its floor plan, with a scale of its colours."""
+"""Pictures of values by cell: layers, and what is visible from a place."""
 
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import matplotlib as mpl
 import numpy as np
+import shapely
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import ListedColormap, Normalize
+from matplotlib.patches import Circle, Polygon, Wedge
 from numpy.typing import NDArray
 
+from fleet2d.errors import InputError
+from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.plan import FloorPlan
-from fleet2d.palette import TEXT_COLOR
+from fleet2d.kernels.numbers import TURN
+from fleet2d.kernels.sight import Reach
+from fleet2d.palette import TEXT_COLOR, VIEW_COLOR, VIEW_EDGE
 from fleet2d.pictures.floorplan import check_picture, figure_size, floorplan_axes, picture
+from fleet2d.pictures.life import SightWalls, field_of_view
 from fleet2d.pictures.theme import SCALE
 from fleet2d.runs.layers import PREFIX, layer_steps, read_layer
 from fleet2d.runs.run import Run
+from fleet2d.sight.camera import USUAL_ANGLE_DEG, USUAL_RANGE_M
+from fleet2d.sight.flashlight import Flashlight
+from fleet2d.sight.fov import FieldOfView, VisibleRegion
 
 # The brighter part of viridis: names of rooms are written over it.
 COLORS = ListedColormap(mpl.colormaps["viridis"](np.linspace(0.35, 1.0, 256)))
@@ -88,3 +98,124 @@ def layer_on_axes(plan: FloorPlan, values: NDArray[Any], axes: Axes) -> ScalarMa
         image, extent=extent, origin="lower", interpolation="nearest", zorder=2.1, label=SCALE
     )
     return colors
+
+
+ROBOT_COLOR = "#22344f"
+RADIUS_M = 0.17
+
+
+class CameraPose(NamedTuple):
+    """The pose of a camera, with its range and angle.
+
+    Attributes:
+        x: Its position [m].
+        y: Its position [m].
+        heading_deg: Its heading, counter-clockwise from +x [degrees].
+        far: Its range [m].
+        angle_deg: Its angle of view, at most 360 [degrees].
+    """
+
+    x: float
+    y: float
+    heading_deg: float
+    far: float = USUAL_RANGE_M[1]
+    angle_deg: float = USUAL_ANGLE_DEG
+
+    def reach(self, plan: FloorPlan) -> Reach:
+        """Return its range and angle in the integers of the kernels."""
+        far = round(self.far * plan.lattice.units_per_m)
+        return Reach(0, far * far, max(1, round(self.angle_deg / 360 * TURN)))
+
+
+def parse_pose(text: str) -> CameraPose:
+    """Return the pose of a text of three to five numbers.
+
+    Raises:
+        InputError: The text has other numbers, or something else.
+
+    Example:
+        >>> parse_pose("2.5, 1, 90")
+        CameraPose(x=2.5, y=1.0, heading_deg=90.0, far=4.5, angle_deg=108.0)
+    """
+    try:
+        numbers = [float(part) for part in text.split(",")]
+        pose = CameraPose(*numbers)
+        is_valid = 0 < pose.far <= 1000 and 0 < pose.angle_deg <= 360 and np.isfinite(numbers).all()
+    except (ValueError, TypeError):
+        is_valid = False
+    if not is_valid:
+        raise InputError(
+            f"--fov {text}: write x,y,heading [m, m, degrees], optionally a range [m] and an angle"
+            " up to 360 degrees: --fov 2.5,1,90,4.5,108"
+        )
+    return pose
+
+
+def draw_fov(plan: FloorPlan, pose: CameraPose, path: Path) -> None:
+    """Draw the field of view of a camera in a floor plan to a PNG, SVG or PDF file.
+
+    Left is the region of `line_of_sight` and `visibility_polygon`, right the cells of
+    `flashlight`.
+
+    Args:
+        plan: The floor plan.
+        pose: The camera.
+        path: The file, whose name ends with `.png`, `.svg` or `.pdf`. An existing file is replaced.
+
+    Raises:
+        PlacementError: The pose is in a wall or outside the home.
+        InputError: The file name has another suffix, or the file can't be written.
+    """
+    check_picture(path)
+    VisibleRegion(SightWalls.of(Home(plan)), pose.x, pose.y)  # raises PlacementError
+    width, height = figure_size(plan)
+    with picture(path, 2 * width, height) as figure:
+        left = figure.add_axes((0, 0, 0.5, 1))
+        right = figure.add_axes((0.5, 0, 0.5, 1))
+        region_panel(plan, pose, left, "visibility_polygon, line_of_sight")
+        cells_panel(plan, pose, right, Flashlight(), "flashlight")
+
+
+def region_panel(plan: FloorPlan, pose: CameraPose, axes: Axes, title: str) -> None:
+    """Draw the exact region in view of a pose, and the sector of its range and angle."""
+    _draw_plan(plan, axes, title)
+    half = pose.angle_deg / 2
+    ends = (pose.heading_deg - half, pose.heading_deg + half)
+    sector = Wedge((pose.x, pose.y), pose.far, *ends, fill=False, ec=VIEW_EDGE, lw=0.8, ls=":")
+    sector.set_zorder(3)
+    axes.add_patch(sector)
+    camera = {"range": (0.0, pose.far), "angle_deg": pose.angle_deg}
+    heading = float(np.deg2rad(pose.heading_deg))
+    region = field_of_view(SightWalls.of(Home(plan)), np.array([pose.x, pose.y]), heading, camera)
+    for part in shapely.get_parts(region):
+        outline = shapely.get_coordinates(part.exterior)
+        axes.add_patch(Polygon(outline, facecolor=VIEW_COLOR, alpha=0.5, ec="none", zorder=2.2))
+        axes.add_patch(Polygon(outline, fill=False, edgecolor=VIEW_EDGE, lw=1.0, zorder=3.1))
+    _draw_robot(pose, axes)
+
+
+def cells_panel(
+    plan: FloorPlan, pose: CameraPose, axes: Axes, method: FieldOfView, title: str
+) -> None:
+    """Draw the cells in view of a pose by a method."""
+    _draw_plan(plan, axes, title)
+    x, y = plan.lattice.point_at((pose.x, pose.y))
+    heading = round(pose.heading_deg / 360 * TURN) % TURN
+    mask = method.cells(Home(plan), x, y, heading, pose.reach(plan))
+    layer_on_axes(plan, mask, axes)
+    _draw_robot(pose, axes)
+
+
+def _draw_plan(plan: FloorPlan, axes: Axes, title: str) -> None:
+    floorplan_axes(plan, axes, names=False, title=False)
+    x0, _, _, y1 = plan.bounds
+    axes.text(x0, y1 + 0.3, title, fontsize=11, color=TEXT_COLOR, va="bottom", zorder=5)
+
+
+def _draw_robot(pose: CameraPose, axes: Axes) -> None:
+    body = Circle((pose.x, pose.y), RADIUS_M, facecolor=ROBOT_COLOR, edgecolor="white", lw=0.9)
+    body.set_zorder(4.3)
+    axes.add_patch(body)
+    heading = np.deg2rad(pose.heading_deg)
+    nose = (pose.x + RADIUS_M * np.cos(heading), pose.y + RADIUS_M * np.sin(heading))
+    axes.plot([pose.x, nose[0]], [pose.y, nose[1]], color="white", lw=1.2, zorder=4.4)

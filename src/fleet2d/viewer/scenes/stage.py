@@ -17,8 +17,7 @@ from matplotlib.patheffects import withStroke
 from fleet2d.kernels import F64, Bool
 from fleet2d.palette import ACCENT_COLOR, TEXT_COLOR, VIEW_COLOR, VIEW_EDGE
 from fleet2d.pictures.floorplan import floorplan_axes
-from fleet2d.pictures.life import RIM_COLOR, SightWalls, field_of_view
-from fleet2d.pictures.overlay import QUIET_COLOR
+from fleet2d.pictures.life import QUIET_COLOR, RIM_COLOR, SightWalls, field_of_view
 from fleet2d.runs.run import Run
 from fleet2d.runs.trajectory import Trajectory
 from fleet2d.viewer.facts.contract import BodyFacts

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.kernels import F64, I16
 from fleet2d.palette import TEXT_COLOR, deep_color
-from fleet2d.pictures.overlay import HATCH_COLOR, QUIET_COLOR
+from fleet2d.pictures.life import HATCH_COLOR, QUIET_COLOR
 from fleet2d.runs.run import Run
 from fleet2d.viewer.facts.sightings import sightings_of
 

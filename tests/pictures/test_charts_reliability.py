@@ -8,7 +8,7 @@ import pytest
 from tests.scenes import run, scenario, table
 
 from fleet2d.errors import ArtifactError, InputError
-from fleet2d.pictures.reliability import draw_reliability, forecasts_of
+from fleet2d.pictures.charts import draw_reliability, forecasts_of
 
 
 @pytest.fixture(scope="module")

@@ -13,9 +13,7 @@ from fleet2d.floorplan.checkup import checkup
 from fleet2d.floorplan.furniture import FURNITURE, stand_furniture
 from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
 from fleet2d.floorplan.rooms.doorways import DoorLine
-from fleet2d.pictures.checkup import draw_checkup
-from fleet2d.pictures.floorplan import draw_floorplan
-from fleet2d.pictures.objects import FILL_COLORS, SYMBOLS
+from fleet2d.pictures.floorplan import FILL_COLORS, SYMBOLS, draw_checkup, draw_floorplan
 
 BOX = shapely.box(0, 0, 8, 6)
 
