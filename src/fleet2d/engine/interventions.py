@@ -13,12 +13,12 @@ from typing import Any, NamedTuple
 
 from fleet2d.configuration.units import micros
 from fleet2d.interventions.intervention import (
+    WHEN,
     Intervention,
     Lasting,
+    Trigger,
     dump_intervention,
 )
-from fleet2d.interventions.script import WHEN
-from fleet2d.interventions.when import Trigger
 from fleet2d.runtime.clock import Clock
 from fleet2d.runtime.events import Event
 

@@ -1,4 +1,8 @@
-"""The run that interventions read and change; see `fleet2d.interventions.world`."""
+"""Scripts in a run: the run that interventions read and change, and when they are applied.
+
+Entries of a scenario's script and requests from outside are checked, then scheduled at their time
+or until their event.
+"""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from datetime import datetime
@@ -6,6 +10,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from fleet2d.configuration.problems import did_you_mean, suggest
 from fleet2d.configuration.units import format_duration, micros
 from fleet2d.engine.interventions import (
     OUTSIDE,
@@ -15,22 +20,28 @@ from fleet2d.engine.interventions import (
     read_record,
 )
 from fleet2d.engine.state import State
+from fleet2d.entities.behavior import Actor
 from fleet2d.entities.body import Pose
 from fleet2d.entities.decisions import Arbiter, DecidingActor
 from fleet2d.entities.objects.home_object import SensorFault
 from fleet2d.errors import ScenarioError
 from fleet2d.floorplan.home import Home, HomeChange
-from fleet2d.interventions.intervention import Intervention, parse_intervention
-from fleet2d.interventions.possible_events import check_trigger
-from fleet2d.interventions.script import WHEN, Entry, parse_entry
-from fleet2d.interventions.when import ClockTime
+from fleet2d.interventions.intervention import (
+    WHEN,
+    ClockTime,
+    Entry,
+    Intervention,
+    Trigger,
+    parse_entry,
+    parse_intervention,
+)
 from fleet2d.runtime.clock import Clock
-from fleet2d.runtime.events import Event, EventKind
+from fleet2d.runtime.events import KINDS, Event, EventKind
 from fleet2d.sight.camera import Disturbance
 
 
 class EngineWorld:
-    """A run at the step of an intervention; see `fleet2d.interventions.world`."""
+    """A run at the step of an intervention; see `fleet2d.interventions.intervention`."""
 
     def __init__(self, state: State, step: int) -> None:
         self._state, self.step = state, step
@@ -251,3 +262,82 @@ def steps_of(entry: Entry, clock: Clock, first: int) -> list[int]:
             f" to {ends:%Y-%m-%d %H:%M:%S}"
         )
     return steps
+
+
+# The events that can happen
+
+# Events of every person: an order can cause them if no behavior does.
+OF_PEOPLE = frozenset(
+    {EventKind.ACTIVITY, EventKind.CAME_HOME, EventKind.LEFT_HOME, EventKind.USES}
+)
+OF_DOORS = frozenset({EventKind.OPENED, EventKind.SHUT, EventKind.LOCKED, EventKind.UNLOCKED})
+OF_HOME = frozenset({EventKind.MOVED, EventKind.ROOM_CHANGED})
+
+
+def possible_events(world: EngineWorld) -> dict[str, frozenset[str]]:
+    """Return the kinds of events that can happen to each entity, by name; "" is the home."""
+    robot_events = {EventKind.CALLED}
+    kinds = {name: _kinds_of(user, world, OF_PEOPLE) for name, user in world.users.items()}
+    kinds |= {name: _kinds_of(robot, world, robot_events) for name, robot in world.robots.items()}
+    kinds |= dict.fromkeys(world.doors, OF_DOORS)
+    kinds |= dict.fromkeys(world.sensors, frozenset({EventKind.SENSOR}))
+    return {"": OF_HOME} | kinds
+
+
+def check_trigger(world: EngineWorld, trigger: Trigger) -> None:
+    """Refuse an event that can never happen.
+
+    Raises:
+        ScenarioError: It can't happen; the message lists the events that can.
+    """
+    possible = possible_events(world)
+    if trigger.entity is not None and (not trigger.entity or trigger.entity not in possible):
+        names = [name for name in possible if name]
+        raise ScenarioError(
+            f"there is nobody and nothing named {trigger.entity!r}{suggest(trigger.entity, names)}"
+        )
+    kinds = sorted(frozenset().union(*possible.values()))
+    if trigger.event not in {*KINDS, *kinds}:
+        raise ScenarioError(
+            f"there is no event {trigger.event!r}{did_you_mean(trigger.event, [*kinds, *KINDS])}"
+            f" What can happen in this run: {', '.join(kinds)}"
+        )
+    if trigger.entity is not None:
+        kinds = sorted(possible[trigger.entity])
+    if trigger.event not in kinds:
+        place = "in this run" if trigger.entity is None else f"to {trigger.entity}"
+        raise ScenarioError(
+            f"{trigger.event!r} can never happen {place}{suggest(trigger.event, kinds, 'What can')}"
+        )
+    if trigger.event in (EventKind.USER_SEEN, EventKind.USER_LOST):
+        _check_detail(trigger, world.users, "user")
+    if trigger.event in (EventKind.ROBOT_SEEN, EventKind.ROBOT_LOST):
+        _check_detail(trigger, world.robots, "robot")
+
+
+def _check_detail(trigger: Trigger, names: Iterable[str], noun: str) -> None:
+    """Refuse an unknown body to come into view; the empty name is one that isn't recognized."""
+    names = list(names)
+    if trigger.detail and trigger.detail not in names:
+        raise ScenarioError(
+            f"there is no {noun} {trigger.detail!r}{suggest(trigger.detail, names)}"
+        )
+
+
+def _kinds_of(actor: Actor, world: EngineWorld, always: Iterable[str]) -> frozenset[str]:
+    """Return the kinds of events that can happen to a body."""
+    kinds = {str(kind) for kind in always}
+    is_robot = actor.name in world.robots
+    if actor.entity.eyes and (world.users if is_robot else world.robots):
+        kinds |= set(actor.entity.sight_events)
+    if getattr(actor.entity, "battery", None) is not None:
+        kinds.add(EventKind.BATTERY)
+    if getattr(actor.entity, "gives_way", None) is not None:
+        kinds |= {EventKind.GIVES_WAY, EventKind.GIVES_UP}
+    if world.doors or world.home.costs_version:
+        kinds.add(EventKind.WAY_BLOCKED)
+    for behavior in actor.behaviors:
+        kinds |= behavior.records
+        if not type(behavior).__module__.startswith("fleet2d."):
+            kinds |= KINDS  # it may record any of them
+    return frozenset(kinds)

@@ -22,7 +22,7 @@ from fleet2d.entities.decisions import DecidingActor
 from fleet2d.entities.objects.door import Door
 from fleet2d.errors import ComponentError, PlacementError, ScenarioError
 from fleet2d.floorplan.home import Home
-from fleet2d.interventions.script import causes_errors
+from fleet2d.interventions.intervention import causes_errors
 from fleet2d.runtime.clock import Clock
 from fleet2d.runtime.events import EventKind, EventStream
 from fleet2d.scenario.model import Scenario

@@ -1,14 +1,18 @@
-"""Interventions on the home: open, shut, lock, unlock, move, room."""
+"""Interventions on the home: its doors, furniture, rooms and sensors; and on algorithms."""
 
-from typing import ClassVar
+from typing import Any, ClassVar, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
+from fleet2d.algorithms.algorithm import FROZEN, WITHHELD, RoomDistribution
 from fleet2d.configuration.components import register
+from fleet2d.configuration.problems import problem, suggest
+from fleet2d.configuration.units import InputPath
+from fleet2d.entities.objects.home_object import SensorFault
 from fleet2d.entities.place import Point
+from fleet2d.errors import ScenarioError
 from fleet2d.floorplan.home import HomeChange
-from fleet2d.interventions.intervention import Intervention
-from fleet2d.interventions.world import World
+from fleet2d.interventions.intervention import Intervention, Lasting, World
 
 
 class HomeIntervention(Intervention):
@@ -119,3 +123,156 @@ class SetRoomType(HomeIntervention):
     def home_change(self) -> HomeChange:
         """The change."""
         return HomeChange(room=self.name, type=self.type)
+
+
+@register("intervention", "stick")
+class Stick(Lasting):
+    """Let a sensor report a fixed state: a false alarm if it is short, a fault if it is long.
+
+    Attributes:
+        sensor: The sensor.
+        says: The state: on, always triggered; off, never triggered; silent, it reports nothing.
+    """
+
+    subject: ClassVar[str] = "sensor"
+    sensor: str
+    says: SensorFault = "silent"
+
+    def check(self, world: World) -> None:
+        """Refuse an unknown sensor."""
+        if self.sensor not in world.sensors:
+            raise ScenarioError(
+                f"there is no sensor {self.sensor!r}{suggest(self.sensor, world.sensors)}"
+            )
+
+    def begin(self, world: World) -> None:
+        """Apply the latest active intervention on the sensor."""
+        says = (
+            act.says
+            for act in reversed(world.lasting)
+            if isinstance(act, Stick) and act.sensor == self.sensor
+        )
+        world.stick(self.sensor, next(says, None))
+
+    def end(self, world: World) -> None:
+        """Return to the intervention before, if that is still active, else to its readings."""
+        self.begin(world)
+
+
+@register("intervention", "restore")
+class Restore(Intervention):
+    """End all active interventions on a robot, a sensor or an algorithm that have a duration.
+
+    Attributes:
+        name: The robot, sensor or algorithm.
+    """
+
+    subject: ClassVar[str] = "name"
+    name: str
+
+    def check(self, world: World) -> None:
+        """Refuse an unknown name."""
+        names = [*world.users, *world.robots, *world.sensors, *world.algorithms]
+        if self.name not in names:
+            raise ScenarioError(
+                f"there is nothing named {self.name!r} to restore{suggest(self.name, names)}"
+            )
+
+    def begin(self, world: World) -> None:
+        """End them."""
+        world.undo(lambda act: isinstance(act, Lasting) and getattr(act, act.subject) == self.name)
+
+
+@register("intervention", "reset")
+class Reset(Intervention):
+    """Let an algorithm forget what it has learned, or load what another run has learned.
+
+    Its present output remains until its next update.
+
+    Attributes:
+        algorithm: The algorithm.
+        learned: Learned state to load, a file of the folder learned/ of another run; left out: the
+            algorithm starts without any.
+    """
+
+    subject: ClassVar[str] = "algorithm"
+    algorithm: str
+    learned: InputPath | None = None
+
+    def check(self, world: World) -> None:
+        """Refuse an unknown algorithm."""
+        check_algorithm(world, self.algorithm)
+
+    def begin(self, world: World) -> None:
+        """Restart the algorithm."""
+        world.reset(self.algorithm, self.learned)
+
+
+@register("intervention", "replace")
+class Replace(Lasting):
+    """Let behaviors and other algorithms read another output of an algorithm for a while.
+
+    The algorithm itself continues, and its tables and metrics show its real output.
+
+    Attributes:
+        algorithm: The algorithm.
+        rooms: Weights of rooms; 0 for those left out.
+        values: Numbers and texts by name, for an output that is a mapping.
+        frozen: Whether its output at that step remains.
+        withheld: Whether there is no output, as before the first one.
+    """
+
+    subject: ClassVar[str] = "algorithm"
+    algorithm: str
+    rooms: dict[str, float] = Field(default={}, min_length=0)
+    values: dict[str, float | str] = Field(default={})
+    frozen: bool = False
+    withheld: bool = False
+
+    @model_validator(mode="after")
+    def _is_one_output(self) -> Self:
+        if sum(map(bool, (self.rooms, self.values, self.frozen, self.withheld))) != 1:
+            raise problem(
+                "give exactly one of 'rooms', 'values', 'frozen: true' and 'withheld: true'"
+            )
+        for room, weight in self.rooms.items():
+            if weight < 0:
+                raise problem(f"rooms.{room}: weight {weight:g} is negative")
+        return self
+
+    def check(self, world: World) -> None:
+        """Refuse an unknown algorithm or room."""
+        check_algorithm(world, self.algorithm)
+        names = [room.name for room in world.home.rooms]
+        for room in self.rooms:
+            if room not in names:
+                raise ScenarioError(f"there is no room {room!r}{suggest(room, names)}")
+
+    def begin(self, world: World) -> None:
+        """Replace the output."""
+        world.replace(self.algorithm, self._output(world))
+
+    def end(self, world: World) -> None:
+        """Return to the latest intervention that is still active, else to the real output."""
+        active = (
+            act
+            for act in reversed(world.lasting)
+            if isinstance(act, Replace) and act.algorithm == self.algorithm
+        )
+        latest = next(active, None)
+        world.replace(self.algorithm, None if latest is None else latest._output(world))
+
+    def _output(self, world: World) -> Any:
+        if self.rooms:
+            return RoomDistribution([self.rooms.get(room.name, 0.0) for room in world.home.rooms])
+        return dict(self.values) or (FROZEN if self.frozen else WITHHELD)
+
+
+def check_algorithm(world: World, name: str) -> None:
+    """Refuse an unknown algorithm.
+
+    Raises:
+        ScenarioError: There is no such algorithm; the message lists those that there are.
+    """
+    if name not in world.algorithms:
+        raise ScenarioError(f"there is no algorithm {name!r}{suggest(name, world.algorithms)}")

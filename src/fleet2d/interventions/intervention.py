@@ -1,31 +1,128 @@
-"""The base of interventions, and how they are written: `{put: ana, to: kitchen}`."""
+"""Interventions as data: how they are written, as {put: ana, to: kitchen}, and when they happen."""
 
-from collections.abc import Mapping
-from datetime import timedelta
-from typing import Annotated, Any, ClassVar
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from datetime import datetime, timedelta
+from pathlib import Path
+from typing import Annotated, Any, ClassVar, NamedTuple, Protocol, Self
 
 from pydantic import (
+    BeforeValidator,
+    Field,
     GetJsonSchemaHandler,
+    PlainSerializer,
     SerializationInfo,
+    SerializerFunctionWrapHandler,
     TypeAdapter,
     ValidationError,
     ValidationInfo,
+    WithJsonSchema,
+    model_serializer,
+    model_validator,
 )
 from pydantic_core import CoreSchema, InitErrorDetails
 
-from fleet2d.configuration.components import Codec, Component, components
+from fleet2d.configuration.components import Codec, Component, Settings, components
 from fleet2d.configuration.problems import (
     did_you_mean,
     problem,
     problem_at,
     refusal,
     rewrite,
+    shown,
     suggest,
 )
-from fleet2d.configuration.units import PositiveDuration
+from fleet2d.configuration.units import (
+    Duration,
+    PositiveDuration,
+    format_time_of_day,
+    parse_time_of_day,
+    weekdays_of,
+)
+from fleet2d.entities.body import Pose
 from fleet2d.entities.decisions import DecidingActor
+from fleet2d.entities.objects.home_object import SensorFault
 from fleet2d.errors import ScenarioError
-from fleet2d.interventions.world import World
+from fleet2d.floorplan.home import Home, HomeChange, format_moment, parse_moment
+from fleet2d.runtime.clock import Clock, midnight_of
+from fleet2d.runtime.events import Event, EventKind
+from fleet2d.sight.camera import Disturbance
+
+
+class World(Protocol):
+    """A run at the step of an intervention."""
+
+    @property
+    def step(self) -> int:
+        """The present step."""
+
+    @property
+    def clock(self) -> Clock:
+        """The clock of the run, which converts between times and steps."""
+
+    @property
+    def home(self) -> Home:
+        """The home, as it is at present."""
+
+    @property
+    def users(self) -> Mapping[str, DecidingActor]:
+        """The people, by name."""
+
+    @property
+    def robots(self) -> Mapping[str, DecidingActor]:
+        """The robots, by name."""
+
+    @property
+    def doors(self) -> Sequence[str]:
+        """The names of the doors."""
+
+    @property
+    def sensors(self) -> Sequence[str]:
+        """The names of the sensors."""
+
+    @property
+    def algorithms(self) -> Sequence[str]:
+        """The names of the algorithms."""
+
+    @property
+    def lasting(self) -> Sequence[object]:
+        """The active interventions with a duration, in the order of their begin."""
+
+    def undo(self, applies: Callable[[object], bool]) -> None:
+        """End the active interventions to which a condition applies."""
+
+    def keeps_truth(self, robot: str) -> bool:
+        """Whether the run stores the truth beside what a robot perceives."""
+
+    def disturb(self, robot: str, disturbances: Sequence[Disturbance]) -> None:
+        """Set all disturbances of the cameras of a robot from the present step on."""
+
+    def stick(self, sensor: str, says: SensorFault | None) -> None:
+        """Set the fault of a sensor from the present step on; None: it works."""
+
+    def reset(self, algorithm: str, learned: Path | None) -> None:
+        """Restart an algorithm with nothing learned, or with what a file holds."""
+
+    def replace(self, algorithm: str, output: object) -> None:
+        """Let all but metrics read another output of an algorithm; see `Learners.replace`."""
+
+    def move(self, actor: DecidingActor, pose: Pose) -> None:
+        """Put a body at a pose, where it decides anew."""
+
+    def drive(self, actor: DecidingActor) -> None:
+        """Let a body follow only plans from outside from now on, not its behaviors."""
+
+    def check_change(self, change: HomeChange) -> None:
+        """Refuse an impossible change of the home.
+
+        Raises:
+            ScenarioError: It names something unknown.
+        """
+
+    def change(self, change: HomeChange) -> None:
+        """Change the home at the present step."""
+
+    def emit(self, entity: str, event: EventKind, detail: str) -> None:
+        """Record an event at the present step."""
 
 
 class Intervention(Component):
@@ -214,3 +311,230 @@ def dump_intervention(act: Intervention) -> dict[str, Any]:
         {'do': 'put', 'entity': 'ana', 'to': 'kitchen'}
     """
     return _ADAPTER.dump_python(act, mode="json", exclude_defaults=True)
+
+
+DAY = timedelta(days=1)
+
+
+class ClockTime(NamedTuple):
+    """A time of day, on some days of the week.
+
+    Attributes:
+        days: The days of the week, 0 is Monday.
+        time: The time since midnight.
+        text: The text in the scenario.
+    """
+
+    days: tuple[int, ...]
+    time: timedelta
+    text: str
+
+    def moments(self, clock: Clock) -> Iterator[datetime]:
+        """Yield all such moments of a run, in order."""
+        midnight = midnight_of(clock.start)
+        end = clock.time(clock.steps)
+        while midnight < end:
+            moment = midnight + self.time
+            if midnight.weekday() in self.days and clock.start <= moment < end:
+                yield moment
+            midnight += DAY
+
+
+def parse_when(value: object) -> datetime | timedelta | ClockTime:
+    """Read a time: ``19:00``, ``monday 07:30``, ``2026-01-07T14:00``, or ``2 h`` from the start.
+
+    Example:
+        >>> parse_when("weekend 9:00").text, parse_when("2 h")
+        ('weekend 09:00', datetime.timedelta(seconds=7200))
+    """
+    if isinstance(value, ClockTime):
+        return value
+    words = value.split() if isinstance(value, str) else []
+    if not 1 <= len(words) <= 2 or ":" not in words[-1] or "-" in words[-1]:
+        if isinstance(value, str) and not value.strip()[:1].isdigit():
+            raise problem(
+                f"expected a time, got {shown(value)}: write it like '19:00', 'monday 07:30',"
+                " '2026-01-07T14:00', or '2 h' from the start"
+            )
+        return parse_moment(value)
+    if words[1:] and words[0][0].isdigit():  # 2026-01-07 14:00
+        return parse_moment(value)
+    time = parse_time_of_day(words[-1])
+    days = weekdays_of((words[0] if words[1:] else "daily").split(","))
+    name = f"{words[0]} " if words[1:] else ""
+    return ClockTime(tuple(sorted(days)), time, f"{name}{format_time_of_day(time)}")
+
+
+def _format_when(when: datetime | timedelta | ClockTime) -> str:
+    return when.text if isinstance(when, ClockTime) else format_moment(when)
+
+
+When = Annotated[
+    datetime | timedelta | ClockTime,
+    BeforeValidator(parse_when),
+    PlainSerializer(_format_when),
+    WithJsonSchema(
+        {
+            "description": "a time of day like 19:00, with days of the week before it like 'monday"
+            " 07:30' or 'weekdays 08:00', a local time like 2026-01-07T14:00, or the time since the"
+            " start like '2 h'",
+            "x-quantity": "time",
+            "type": ["string", "number", "object"],
+            "examples": ["19:00", "monday 07:30", "2026-01-07T14:00", "2 h"],
+        }
+    ),
+]
+
+
+class Trigger(Settings):
+    """An event that triggers an intervention: ``[user_seen, astro, ana]``, or its kind alone.
+
+    Attributes:
+        event: Its kind, as in the table of events.
+        entity: The body, door or sensor that it happens to; left out: any.
+        detail: Its detail: the user that is seen, the activity; left out: any.
+
+    Example:
+        >>> Trigger(event="user_seen", entity="astro").fits(Event(5, "astro", "user_seen", "ana"))
+        True
+    """
+
+    event: str = Field(min_length=1)
+    entity: str | None = None
+    detail: str | None = None
+
+    def fits(self, event: Event) -> bool:
+        """Whether an event triggers the intervention."""
+        return (
+            event.event == self.event
+            and self.entity in (None, event.entity)
+            and self.detail in (None, event.detail)
+        )
+
+
+def _as_mapping(value: Any) -> Any:
+    if isinstance(value, str):
+        return {"event": value}
+    if isinstance(value, Sequence) and 1 <= len(value) <= 3:
+        return dict(zip(Trigger.model_fields, value, strict=False))
+    if not isinstance(value, Mapping | Trigger):
+        raise problem(
+            f"expected an event, got {shown(value)}: give its kind, the entity that it happens"
+            " to, and its detail, like [user_seen, astro, ana]"
+        )
+    return value
+
+
+On = Annotated[
+    Trigger,
+    BeforeValidator(_as_mapping),
+    PlainSerializer(lambda trigger: trigger.model_dump(exclude_none=True)),
+    WithJsonSchema(
+        {
+            "description": "an event: its kind, who it happens to, and what else it says, like"
+            " [user_seen, astro, ana]",
+            "x-quantity": "event",
+            "anyOf": [
+                {"type": "string"},
+                {"type": "array", "items": {"type": "string"}, "minItems": 1, "maxItems": 3},
+                {
+                    "type": "object",
+                    "properties": {key: {"type": "string"} for key in Trigger.model_fields},
+                    "required": ["event"],
+                    "additionalProperties": False,
+                },
+            ],
+            "examples": ["docks", ["user_seen", "astro"], ["activity", "ana", "dinner"]],
+        }
+    ),
+]
+"""An event in a script: its kind alone, a list, or a mapping."""
+
+
+# The keys that stand beside those of an intervention.
+WHEN = frozenset({"at", "on", "each", "delay"})
+
+
+class Entry(Settings):
+    """An intervention at a time or on an event: ``{at: "19:00", put: ana, to: kitchen}``.
+
+    It happens at the first step that isn't before its time; or at the step after its event, or
+    later by a delay.
+
+    Attributes:
+        at: The time.
+        on: The event instead of a time: [user_seen, astro, ana], or its kind alone.
+        each: Whether it happens at every such time or event, not only at the first.
+        delay: Time from the event to the intervention; at least a step.
+        act: The intervention.
+
+    Example:
+        >>> entry = Entry(at="19:00", put="ana", to="kitchen")
+        >>> entry.act.to
+        ('kitchen',)
+        >>> entry.model_dump(mode="json", exclude_defaults=True)
+        {'at': '19:00', 'do': 'put', 'entity': 'ana', 'to': 'kitchen'}
+    """
+
+    at: When | None = None
+    on: On | None = None
+    each: bool = False
+    delay: Duration = timedelta(0)
+    act: Annotated[Intervention, Verb()]
+
+    @model_validator(mode="before")
+    @classmethod
+    def _nest_act(cls, data: Any) -> Any:
+        """Move the keys of the intervention, which are written beside its time, into `act`."""
+        if not isinstance(data, dict) or "act" in data:
+            return data
+        times = {key: value for key, value in data.items() if key in WHEN}
+        return {**times, "act": {key: value for key, value in data.items() if key not in WHEN}}
+
+    @classmethod
+    def _explain(cls, line: InitErrorDetails, data: Any) -> InitErrorDetails:
+        """Return an error that names the keys as they are written."""
+        line = super()._explain(line, data)
+        if line["loc"][:1] == ("act",):
+            line["loc"] = line["loc"][1:]
+        return line
+
+    @model_validator(mode="after")
+    def _has_one_time(self) -> Self:
+        if (self.at is None) == (self.on is None):
+            raise problem("give exactly one of 'at' (a time) and 'on' (an event)")
+        if self.on is None and self.delay:
+            raise problem("'delay' is the time after an event: it goes with 'on'")
+        if self.each and self.on is None and not isinstance(self.at, ClockTime):
+            raise problem(
+                "'each' goes with an event, or a time that comes again, like '19:00' or 'monday"
+                " 07:30'"
+            )
+        return self
+
+    @model_serializer(mode="wrap")
+    def _flatten_act(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Return the keys of the intervention beside its time."""
+        content: dict[str, Any] = handler(self)
+        act: dict[str, Any] = content.pop("act", {})
+        return {key: value for key, value in content.items() if value is not None} | act
+
+
+def parse_entry(content: Mapping[str, Any]) -> Entry:
+    """Return the entry of a script that a mapping describes.
+
+    Raises:
+        ScenarioError: It is not valid; the message says what is wrong.
+    """
+    try:
+        return Entry.model_validate(dict(content))
+    except ValidationError as error:
+        raise refusal("", error) from None
+
+
+def causes_errors(act: Intervention, robot: str) -> bool:
+    """Whether an intervention lets a robot perceive something wrong."""
+    disturbance = getattr(act, "disturbance", None)
+    if disturbance is None or getattr(act, "entity", None) != robot:
+        return False
+    return bool(disturbance.errs or disturbance.mistaken or disturbance.injected)

@@ -20,7 +20,7 @@ from fleet2d.errors import ScenarioError
 from fleet2d.floorplan.home import HomeChange
 from fleet2d.floorplan.load import advise_type
 from fleet2d.floorplan.source import FloorPlanSource
-from fleet2d.interventions.script import Entry
+from fleet2d.interventions.intervention import Entry
 from fleet2d.metrics.metric import Metric
 from fleet2d.scenario.compose import compose
 from fleet2d.scenario.expectation_field import ExpectationField

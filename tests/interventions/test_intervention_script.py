@@ -6,11 +6,13 @@ import pytest
 
 from fleet2d.errors import ScenarioError
 from fleet2d.interventions.intervention import (
+    WHEN,
+    Entry,
     dump_intervention,
+    parse_entry,
     parse_intervention,
     verbs,
 )
-from fleet2d.interventions.script import WHEN, Entry, parse_entry
 
 EACH = [
     {"put": "ana", "to": "kitchen", "heading_deg": 90},

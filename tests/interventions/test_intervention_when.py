@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 from pydantic import TypeAdapter, ValidationError
 
-from fleet2d.interventions.when import ClockTime, On, Trigger, When, parse_when
+from fleet2d.interventions.intervention import ClockTime, On, Trigger, When, parse_when
 from fleet2d.runtime.clock import Clock
 from fleet2d.runtime.events import Event
 
