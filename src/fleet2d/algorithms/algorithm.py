@@ -4,7 +4,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from pathlib import Path
-from typing import Any, ClassVar, Protocol, runtime_checkable
+from typing import Any, ClassVar
 from zipfile import ZipFile
 
 import numpy as np
@@ -172,18 +172,6 @@ def _flat(state: Mapping[str, Any], above: str, where: str) -> Iterator[tuple[st
         yield path, array
 
 
-@runtime_checkable
-class Tabular(Protocol):
-    """Protocol of outputs of other classes, which convert themselves to rows."""
-
-    def to_columns(self, rooms: Sequence[str]) -> Mapping[str, ArrayLike]:
-        """Return columns of equal length, by name.
-
-        Args:
-            rooms: The names of the home's rooms, in the order of their indices.
-        """
-
-
 class RoomDistribution:
     """A probability for each room: weights divided by their sum (uniform if the sum is zero).
 
@@ -272,7 +260,7 @@ def to_columns(output: Any, rooms: Sequence[str], where: str) -> dict[str, NDArr
     Args:
         output: A RoomDistribution (columns room, share), HomeChanges (change, target), a mapping
             of names to numbers or strings (one row), a mapping of names to arrays of one length,
-            or an object whose `to_columns` returns such a mapping.
+            or an object whose `to_columns(rooms)` returns such a mapping.
         rooms: The names of the rooms.
         where: The component's path, for errors.
 
@@ -291,7 +279,7 @@ def to_columns(output: Any, rooms: Sequence[str], where: str) -> dict[str, NDArr
         return {"room": np.array(rooms, dtype=object), "share": output.share}
     if isinstance(output, HomeChanges):
         return output.to_columns()
-    if not isinstance(output, Mapping) and isinstance(output, Tabular):
+    if not isinstance(output, Mapping) and hasattr(output, "to_columns"):
         output = output.to_columns(rooms)
     if not isinstance(output, Mapping) or not output:
         raise ComponentError(

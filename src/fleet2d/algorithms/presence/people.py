@@ -50,8 +50,9 @@ class DayEvidence(NamedTuple):
         """Return the evidence of bins of one day."""
         sightings = evidence.by_patch.sightings
         # Where somebody unknown was perceived, who may be any user, the patch counts as unwatched.
-        watched = np.where(sightings.unknown, np.uint8(0), evidence.by_patch.shown_255)
-        watched = np.pad(watched, ((0, 0), (0, 1)))  # away, the last patch, is never watched
+        shown = evidence.by_patch.shown_255
+        watched = np.zeros((len(shown), shown.shape[1] + 1), np.uint8)  # away, the last, never is
+        watched[:, :-1] = np.where(sightings.unknown, np.uint8(0), shown)
         return cls(
             int(evidence.day[0]),
             evidence.minute,
