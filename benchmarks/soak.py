@@ -91,4 +91,5 @@ def main() -> None:
             people(chosen.count or 1000, chosen.days, Path(folder))
 
 
-main()
+if __name__ == "__main__":
+    main()

@@ -21,7 +21,7 @@ from fleet2d.studies.driver import RunOptions, StudyJob, check_study, run_study
 from fleet2d.studies.executors import (
     Event,
     Executor,
-    Finished,
+    FinishedTask,
     LocalExecutor,
     SerialExecutor,
     TaskSchedule,
@@ -35,8 +35,8 @@ EXAMPLES = Path(__file__).parents[1] / "examples" / "studies"
 HOUR = {"extends": "bundled:base", "simulation": {"duration": "1 h"}}
 
 
-class MadeUpExecutor:
-    """Gives back results without simulating: what is left is the driver."""
+class InstantExecutor:
+    """Returns results without simulating: what is left is the driver."""
 
     workers = 1
 
@@ -48,16 +48,16 @@ class MadeUpExecutor:
                 outcome = VariantOutcome(
                     "complete", f"{task.number:064x}", numbers, {}, {"total": 0.03}
                 )
-                yield Finished(task, record_of(task, outcome).encode(), 1)
+                yield FinishedTask(task, record_of(task, outcome), 1)
             else:  # set-ups
-                yield Finished(task, b"", 1)
+                yield FinishedTask(task, "", 1)
 
 
 def run(study: Any, folder: Path, executor: Executor) -> float:
-    """Run a study and return the seconds that it took."""
-    began = time.perf_counter()
+    """Run a study; return the wall time [s]."""
+    start_s = time.perf_counter()
     run_study(check_study(study), folder, executor, RunOptions())
-    return time.perf_counter() - began
+    return time.perf_counter() - start_s
 
 
 def overhead(folder: Path, seeds: int = 200) -> None:
@@ -72,7 +72,7 @@ def overhead(folder: Path, seeds: int = 200) -> None:
 
 
 def speedup(folder: Path, days: int = 5, seeds: int = 40) -> None:
-    """Print how much faster two workers are than one, start included and not."""
+    """Print how much faster two workers are than one, their start included."""
     base = {**HOUR, "simulation": {"duration": {"days": days}}}
     study = {"base": base, "axes": {"robots.astro.speed": [0.3, 0.6]}, "replicates": seeds}
     seconds = {n: run(study, folder / f"workers{n}", LocalExecutor(n)) for n in (1, 2)}
@@ -86,7 +86,7 @@ def driver(folder: Path, variants: int = 100_000) -> None:
     """Print time and memory of a driver of many variants, in a process of its own."""
     speeds = [round(0.1 + i / 1000, 3) for i in range(variants // 1000)]
     study = {"base": HOUR, "axes": {"robots.astro.speed": speeds}, "replicates": 1000}
-    seconds = run(study, folder / "many", MadeUpExecutor())
+    seconds = run(study, folder / "many", InstantExecutor())
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     files = sum(path.is_file() for path in (folder / "many").rglob("*"))
     size = sum(path.stat().st_size for path in (folder / "many").rglob("*") if path.is_file())
@@ -94,18 +94,18 @@ def driver(folder: Path, variants: int = 100_000) -> None:
         f"driver of {variants:,} variants: {seconds:.0f} s, {1000 * seconds / variants:.2f} ms"
         f" each, {peak:.0f} MB at most, {files} files of {size / 1e6:.0f} MB"
     )
-    began = time.perf_counter()
-    run_study(check_study(study), folder / "many", MadeUpExecutor(), RunOptions())
-    print(f"  going on with nothing to do: {time.perf_counter() - began:.1f} s")
+    start_s = time.perf_counter()
+    run_study(check_study(study), folder / "many", InstantExecutor(), RunOptions())
+    print(f"  going on with nothing to do: {time.perf_counter() - start_s:.1f} s")
 
 
 def reading(folder: Path) -> None:
-    """Print how long a study of 1,000 variants takes to open and sum up."""
+    """Print how long a study of 1,000 variants takes to open and summarize."""
     speeds = [round(0.1 + i / 1000, 3) for i in range(100)]
     study = {"base": HOUR, "axes": {"robots.astro.speed": speeds}, "replicates": 10}
-    run(study, folder / "thousand", MadeUpExecutor())
+    run(study, folder / "thousand", InstantExecutor())
     code = (
-        "import time; began = time.perf_counter()\n"
+        "import time; start_s = time.perf_counter()\n"
         "import fleet2d\n"
         f"study = fleet2d.open_study({str(folder / 'thousand')!r})\n"
         "opened = time.perf_counter()\n"
@@ -113,7 +113,7 @@ def reading(folder: Path) -> None:
         "first = time.perf_counter()\n"
         "again = fleet2d.open_study(study.location)\n"
         "again.summary('metric_1.ana.value', ['robots.astro.speed'])\n"
-        "print(f'opening and aggregating 1,000 variants: {first - began:.2f} s with imports,'\n"
+        "print(f'opening and aggregating 1,000 variants: {first - start_s:.2f} s with imports,'\n"
         "      f' {time.perf_counter() - first:.3f} s again')\n"
     )
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
@@ -134,18 +134,27 @@ def months(folder: Path, workers: int) -> None:
 def main() -> None:
     """Measure what is asked for."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("what", nargs="*", default=["overhead", "speedup", "driver", "reading"])
+    parts = ("overhead", "speedup", "driver", "reading", "months")
+    parser.add_argument("what", nargs="*", metavar="|".join(parts), default=parts[:-1])
     parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--small", action="store_true", help="few variants: does it work?")
     arguments = parser.parse_args()
+    if unknown := set(arguments.what) - set(parts):
+        parser.error(f"there is no {', '.join(unknown)}")
     print(f"load before: {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores")
     with tempfile.TemporaryDirectory() as folder:
         for name in arguments.what:
+            folder_of = Path(folder, name)
             if name == "months":
-                months(Path(folder), arguments.workers)
+                months(folder_of, arguments.workers)
+            elif name == "overhead":
+                overhead(folder_of, seeds=1 if arguments.small else 200)
+            elif name == "speedup":
+                speedup(folder_of, 1 if arguments.small else 5, 1 if arguments.small else 40)
+            elif name == "driver":
+                driver(folder_of, 1_000 if arguments.small else 100_000)
             else:
-                {"overhead": overhead, "speedup": speedup, "driver": driver, "reading": reading}[
-                    name
-                ](Path(folder))
+                reading(folder_of)
 
 
 if __name__ == "__main__":
