@@ -16,8 +16,7 @@ from fleet2d.configuration.trust import check_code
 from fleet2d.configuration.units import PositiveDuration, folder_of
 from fleet2d.errors import ScenarioError
 from fleet2d.scenario.compose import compose
-from fleet2d.scenario.explain import explain
-from fleet2d.scenario.model import Scenario
+from fleet2d.scenario.model import Scenario, explain
 from fleet2d.studies.axes import AnyAxis, Parameter, check_count
 
 
