@@ -5,9 +5,9 @@ import types
 import typing
 from typing import Any, Literal, is_typeddict
 
-from fleet2d.viewer.facts import contract
+from fleet2d.viewer import contract
 
-HEADER = "// Written by `python -m tools.contract_types` from fleet2d.viewer.facts.contract.\n"
+HEADER = "// Written by `python -m tools.contract_types` from fleet2d.viewer.contract.\n"
 _PLAIN = {str: "string", int: "number", float: "number", bool: "boolean", type(None): "null"}
 
 

@@ -15,8 +15,7 @@ import fleet2d
 from fleet2d.floorplan.home import Home
 from fleet2d.pictures.life import SightWalls
 from fleet2d.sight.fov import VisibleRegion
-from fleet2d.viewer.export import embedded_run
-from fleet2d.viewer.facts.page_data import PageData
+from fleet2d.viewer.page_data import PageData, embedded_run
 
 TARGET = Path(__file__).parents[1] / "page" / "test" / "run.json"
 SCENARIO: dict[str, Any] = {

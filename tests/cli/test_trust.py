@@ -109,7 +109,7 @@ def hostile() -> dict[str, bytes]:
     from fleet2d.engine.simulation import Simulation
     from fleet2d.storage.files import FolderLock
     from fleet2d.studies.records import Journal
-    from fleet2d.viewer.server.serve import PageServer
+    from fleet2d.viewer.page_server import PageServer
 
     dotted = b"\x80\x04\x8c\x13fleet2d.paper.speed\x8c\x10subprocess.Popen\x93\x8c\x04true\x85R."
     imported = b"\x80\x04\x8c\x17fleet2d.artifacts.store\x8c\x04Path\x93\x8c\x01x\x85R."

@@ -29,7 +29,7 @@ from fleet2d.engine.resume import resume
 from fleet2d.errors import Fleet2DError, RunDirectoryError
 from fleet2d.runs.exporters import exporter
 from fleet2d.runs.run import open_run
-from fleet2d.viewer.export import export_html
+from fleet2d.viewer.page_data import export_html
 from fleet2d.viewer.report import write_report
 
 SECRET = "precious, and nobody's business"
@@ -61,7 +61,7 @@ def to_report(run: Path) -> None:
 
 
 def to_film(run: Path) -> None:
-    from fleet2d.viewer.scenes.film import write_film
+    from fleet2d.viewer.film import write_film
 
     write_film(open_run(run), run / "film.gif", 0, 60, height=120)
 

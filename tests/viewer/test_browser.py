@@ -12,10 +12,9 @@ import pytest
 from tests.thorough import THOROUGH
 
 import fleet2d
-from fleet2d.viewer.export import embedded_run, export_html, html_of
-from fleet2d.viewer.facts.page_data import PageData
-from fleet2d.viewer.server.live import LiveRun
-from fleet2d.viewer.server.serve import PageServer
+from fleet2d.viewer.live import LiveRun
+from fleet2d.viewer.page_data import PageData, embedded_run, export_html, html_of
+from fleet2d.viewer.page_server import PageServer
 
 from .browser import chromium, page_at
 

@@ -27,6 +27,11 @@ DTYPES: dict[str, np.dtype[Any]] = {
 }
 _NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.\-]*")
 
+TRACK, PLANNED, WALK = 0, 1, 2
+KEY_KINDS = ("track", "planned", "walk")
+"""The kinds of rows in the table key_frames: a breakpoint that the body reached, the planned end of
+a segment that was interrupted before, the state from which a random walk continues."""
+
 
 @dataclass(frozen=True, slots=True)
 class Column:

@@ -50,7 +50,7 @@ def export(  # noqa: PLR0913 - the options of the command
         if out is not None:
             typer.echo(run.export(out, layout, first=first, end=last, every=every))
         elif html is not None:
-            from fleet2d.viewer.export import export_html
+            from fleet2d.viewer.page_data import export_html
 
             export_html(run, html, first, last)
             typer.echo(f"{html}: {html.stat().st_size / 1e6:.1f} MB")

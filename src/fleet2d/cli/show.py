@@ -188,8 +188,8 @@ def _draw_run(directory: Path, out: Path | None, picture: RunPicture) -> Path:
         target = out or directory / f"{picture.reliability}-reliability.png"
         draw_reliability(run, picture.reliability, target)
     elif picture.at is not None:
+        from fleet2d.viewer.figures import draw_moment
         from fleet2d.viewer.moments import clock_of, step_of
-        from fleet2d.viewer.scenes.figures import draw_moment
 
         step = step_of(picture.at, clock_of(run))
         target = out or directory / f"step-{step}.png"
@@ -200,8 +200,8 @@ def _draw_run(directory: Path, out: Path | None, picture: RunPicture) -> Path:
         target = out or directory / "picture.png"
         draw_run(run, target)
     else:
+        from fleet2d.viewer.figures import draw_stretch
         from fleet2d.viewer.moments import steps_of
-        from fleet2d.viewer.scenes.figures import draw_stretch
 
         first, end = steps_of(run, picture.begin, picture.end)
         target = out or directory / f"{picture.figure}-{first}-{end}.png"

@@ -282,7 +282,7 @@ def _store(case: ScenarioCase, pictures: Path | None, out: Path | None) -> None:
         case.files.append(directory)
     if pictures is None:
         return
-    from fleet2d.viewer.scenes.figures import draw_moment
+    from fleet2d.viewer.figures import draw_moment
 
     pictures.mkdir(parents=True, exist_ok=True)
     for verdict in case.verdicts.values():

@@ -9,7 +9,7 @@ import numpy as np
 
 from fleet2d.algorithms.log import SensorRow
 from fleet2d.algorithms.observations import Activities, NearestRooms, Observations, Truth
-from fleet2d.artifacts.table import Column, TableSpec
+from fleet2d.artifacts.table import KEY_KINDS, Column, TableSpec
 from fleet2d.engine.bodies import Basis
 from fleet2d.engine.cameras import Cameras
 from fleet2d.engine.sensors import Sensors
@@ -26,7 +26,6 @@ from fleet2d.engine.trajectories import (
 )
 from fleet2d.floorplan.objects import POSTURES
 from fleet2d.kernels import I8, I32, I64
-from fleet2d.runs.run import KEY_KINDS
 from fleet2d.runtime.events import HOME, RANKS, Event, EventKind
 
 

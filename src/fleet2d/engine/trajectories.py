@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from fleet2d.artifacts.store import ArtifactSettings
-from fleet2d.artifacts.table import Column, TableSpec
+from fleet2d.artifacts.table import PLANNED, TRACK, WALK, Column, TableSpec
 from fleet2d.configuration.units import whole_steps
 from fleet2d.engine.bodies import Basis, Bodies
 from fleet2d.entities.body import Track
@@ -13,7 +13,6 @@ from fleet2d.kernels import I64
 from fleet2d.kernels.motion import Breakpoints
 from fleet2d.kernels.numbers import in_radians
 from fleet2d.kernels.space import SUB
-from fleet2d.runs.run import PLANNED, TRACK, WALK
 from fleet2d.runtime.clock import Clock
 
 STEP = Column("step", "step", description="step at which the row takes effect")

@@ -35,12 +35,6 @@ _NOTEBOOK = "fleet2d.viewer.notebook"
 _REPRODUCE = "fleet2d.engine.reproduce"
 
 
-TRACK, PLANNED, WALK = 0, 1, 2
-KEY_KINDS = ("track", "planned", "walk")
-"""The kinds of rows in the table key_frames: a breakpoint that the body reached, the planned end of
-a segment that was interrupted before, the state from which a random walk continues."""
-
-
 class Tables(Mapping[str, "pa.Table"]):
     """Tables by name, each read when it is first used."""
 

@@ -5,11 +5,12 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import datetime, timedelta
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fleet2d.artifacts.table import KEY_KINDS, PLANNED, WALK
 from fleet2d.bounds import one_line
 from fleet2d.configuration.trust import restrict_stored
 from fleet2d.configuration.units import whole_steps
@@ -29,9 +30,11 @@ from fleet2d.kernels.motion import (
 )
 from fleet2d.kernels.numbers import TURN, in_radians
 from fleet2d.kernels.space import SUB
-from fleet2d.runs.run import KEY_KINDS, PLANNED, WALK, Run
 from fleet2d.runtime.clock import Clock
 from fleet2d.scenario.model import load_scenario
+
+if TYPE_CHECKING:
+    from fleet2d.runs.run import Run
 
 # The sections of a scenario that bodies depend on; the components of all others are not imported.
 _BODIES = ("simulation", "floorplan", "users", "robots")
@@ -60,7 +63,7 @@ class Trajectory:
     room: I16
 
 
-def rebuild_path(run: Run, plan: FloorPlan, entity: str, every: timedelta) -> Trajectory:
+def rebuild_path(run: "Run", plan: FloorPlan, entity: str, every: timedelta) -> Trajectory:
     """Return the poses of a body of a stored run at regular times.
 
     Args:
@@ -84,7 +87,7 @@ class PathReader:
         clock: The simulated time of the run.
     """
 
-    def __init__(self, run: Run, plan: FloorPlan, entity: str) -> None:
+    def __init__(self, run: "Run", plan: FloorPlan, entity: str) -> None:
         """Read the key frames of a body.
 
         Raises:
@@ -213,7 +216,7 @@ def _segments(kind: I64) -> Iterator[tuple[int, int]]:
         begin = end
 
 
-def _keys_of(run: Run, plan: FloorPlan, entity: str) -> dict[str, Any]:
+def _keys_of(run: "Run", plan: FloorPlan, entity: str) -> dict[str, Any]:
     """Return the key frames of a body in lattice units, each column (n,)."""
     entities = run.manifest["entities"]
     names = [*entities["users"], *entities["robots"]]
@@ -238,7 +241,7 @@ def _keys_of(run: Run, plan: FloorPlan, entity: str) -> dict[str, Any]:
     }
 
 
-def _walker(run: Run, plan: FloorPlan, entity: str, clock: Clock) -> tuple[Home, Actor, Meander]:
+def _walker(run: "Run", plan: FloorPlan, entity: str, clock: Clock) -> tuple[Home, Actor, Meander]:
     """Return the home, the body and its behavior that repeats its random walk."""
     sections = run.manifest["scenario"]
     with restrict_stored():

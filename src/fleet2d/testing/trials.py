@@ -552,7 +552,7 @@ def _store(
     yield f"  run: {out}"
     try:
         from fleet2d.runs.run import open_run
-        from fleet2d.viewer.scenes.figures import draw_moment
+        from fleet2d.viewer.figures import draw_moment
 
         picture = out.with_suffix(".png")
         run = open_run(out)

@@ -42,7 +42,7 @@ def view(
     scenario, overrides = split(names)
     if scenario is not None and scenario.endswith("/"):
         raise RunDirectoryError(f"{scenario} does not exist: give a run directory or a scenario")
-    from fleet2d.viewer.server.live import watch_scenario
+    from fleet2d.viewer.live import watch_scenario
 
     with restrict_to(trust, trust_dir):
         run = watch_scenario(
@@ -75,7 +75,7 @@ def _where(run: "Run") -> str:
 
 def _view_runs(directories: list[Path], port: int, *, browser: bool) -> None:
     from fleet2d.artifacts.manifest import FILE_NAME
-    from fleet2d.viewer.server.serve import MOST_RUNS, PageServer
+    from fleet2d.viewer.page_server import MOST_RUNS, PageServer
 
     if len(directories) > MOST_RUNS:
         raise InputError(
@@ -117,8 +117,8 @@ def film(  # noqa: PLR0913 - options of the command line
     """Make a film of a stretch of a stored run."""
     from fleet2d.pictures.theme import themed
     from fleet2d.runs.run import open_run
+    from fleet2d.viewer.film import write_film
     from fleet2d.viewer.moments import steps_of
-    from fleet2d.viewer.scenes.film import write_film
 
     run = open_run(directory)
     first, last = steps_of(run, begin, end)

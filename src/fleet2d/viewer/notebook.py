@@ -9,8 +9,8 @@ from typing import Any
 from fleet2d.errors import Fleet2DError
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.runs.run import Run
-from fleet2d.viewer.facts.run_facts import run_title
 from fleet2d.viewer.moments import clock_of, step_of
+from fleet2d.viewer.run_facts import run_title
 
 NOTEBOOK_DPI = 100
 
@@ -19,7 +19,7 @@ def draw_run(run: Run, at: str | int | None, axes: Any, theme: str = "light") ->
     """Draw a run, or a moment of it; see `Run.draw`."""
     from fleet2d.pictures.run import run_figure
     from fleet2d.pictures.theme import apply_theme, check_theme, themed
-    from fleet2d.viewer.scenes.figures import moment_figure, moment_on_axes
+    from fleet2d.viewer.figures import moment_figure, moment_on_axes
 
     last = run.manifest["steps"] - 1
     step = last if at is None else at if isinstance(at, int) else step_of(at, clock_of(run), "at")

@@ -14,12 +14,10 @@ import yaml
 from fleet2d.configuration.units import format_duration
 from fleet2d.errors import ArtifactError, InputError
 from fleet2d.runs.run import Run
-from fleet2d.viewer.export import POLICY, embedded_run, html_of
-from fleet2d.viewer.facts.page_data import PageData
-from fleet2d.viewer.facts.run_facts import run_title
-from fleet2d.viewer.files import write_file
 from fleet2d.viewer.moments import clock_of
 from fleet2d.viewer.notebook import figure_png
+from fleet2d.viewer.page_data import POLICY, PageData, embedded_run, html_of, write_file
+from fleet2d.viewer.run_facts import run_title
 
 DAY = timedelta(days=1)
 MOST_TIMELINE = 20_000_000
@@ -126,7 +124,7 @@ def _figures(run: Run) -> list[str]:
     """Return the figures of the report as HTML."""
     from fleet2d.pictures.floorplan import drawing_style
     from fleet2d.pictures.run import run_figure
-    from fleet2d.viewer.scenes.figures import stretch_figure
+    from fleet2d.viewer.figures import stretch_figure
 
     steps = run.manifest["steps"]
     day = min(steps, max(1, DAY // timedelta(microseconds=run.manifest["step_us"])))

@@ -4,8 +4,7 @@ from pathlib import Path
 
 from fleet2d.errors import extra
 from fleet2d.runs.run import Run
-from fleet2d.viewer.export import embedded_run, html_of
-from fleet2d.viewer.facts.page_data import PageData
+from fleet2d.viewer.page_data import PageData, embedded_run, html_of
 
 with extra("view", "a widget needs anywidget"):
     import anywidget

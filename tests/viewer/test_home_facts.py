@@ -4,7 +4,7 @@ import pytest
 from tests.scenes import run, scenario
 
 from fleet2d.errors import ScenarioError
-from fleet2d.viewer.facts.walls import doors_of
+from fleet2d.viewer.home_facts import doors_of
 
 
 def test_an_edited_door_of_a_manifest_is_refused() -> None:

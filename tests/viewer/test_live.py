@@ -10,10 +10,10 @@ from starlette.testclient import TestClient
 
 import fleet2d
 from fleet2d.errors import InputError
-from fleet2d.viewer.facts.contract import LiveOrder
-from fleet2d.viewer.facts.page_data import PageData
-from fleet2d.viewer.server.application import ServedRuns, page_app
-from fleet2d.viewer.server.live import LiveRun, read_order
+from fleet2d.viewer.contract import LiveOrder
+from fleet2d.viewer.live import LiveRun, read_order
+from fleet2d.viewer.page_data import PageData
+from fleet2d.viewer.page_server import ServedRuns, page_app
 
 PORT = 8765
 OWN = f"http://127.0.0.1:{PORT}"

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 import fleet2d
 from fleet2d.runs.run import Tables
-from fleet2d.viewer.facts.marks import expectation_marks, intervention_marks, marks_of
+from fleet2d.viewer.run_facts import expectation_marks, intervention_marks, marks_of
 
 STEPS = 1000
 

@@ -12,8 +12,7 @@ import pytest
 
 import fleet2d
 from fleet2d.errors import InputError
-from fleet2d.viewer.export import embedded_run, export_html, html_of
-from fleet2d.viewer.facts.page_data import PageData
+from fleet2d.viewer.page_data import PageData, embedded_run, export_html, html_of
 
 DATA = re.compile(r'<script type="application/json" id="fleet2d-runs">(.*?)</script>', re.DOTALL)
 

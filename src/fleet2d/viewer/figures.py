@@ -29,11 +29,9 @@ from fleet2d.pictures.run import run_figure
 from fleet2d.pictures.theme import SCALE
 from fleet2d.runs.run import Run
 from fleet2d.runtime.clock import midnight_of
-from fleet2d.viewer.facts.run_facts import bodies_of
-from fleet2d.viewer.moments import clock_of
-from fleet2d.viewer.part import part_of_run
-from fleet2d.viewer.scenes.stage import Stage
-from fleet2d.viewer.scenes.strip import draw_strip, strip_rows
+from fleet2d.viewer.moments import clock_of, part_of_run
+from fleet2d.viewer.run_facts import bodies_of
+from fleet2d.viewer.stage import Stage, draw_strip, strip_rows
 
 FigureKind = Literal["life", "heat", "strip"]
 

@@ -6,9 +6,9 @@ from pathlib import Path
 import pytest
 from tools.contract_types import contract_source
 
-from fleet2d.viewer.server.application import PAGE
+from fleet2d.viewer.page_server import PAGE
 
-SOURCES = Path(__file__).parents[3] / "page"
+SOURCES = Path(__file__).parents[2] / "page"
 FILES = ("index.html", "package.json", "package-lock.json", "tsconfig.json", "vite.config.ts")
 
 pytestmark = pytest.mark.skipif(not SOURCES.exists(), reason="the page's sources are not here")

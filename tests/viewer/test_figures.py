@@ -7,10 +7,10 @@ from tests.scenes import Cli
 
 import fleet2d
 from fleet2d.errors import InputError
+from fleet2d.viewer.figures import draw_moment, draw_stretch
+from fleet2d.viewer.film import write_film
 from fleet2d.viewer.report import write_report
-from fleet2d.viewer.scenes.figures import draw_moment, draw_stretch
-from fleet2d.viewer.scenes.film import write_film
-from fleet2d.viewer.scenes.stage import Stage
+from fleet2d.viewer.stage import Stage
 
 MAGIC = {".png": b"\x89PNG", ".svg": b"<?xml", ".pdf": b"%PDF", ".gif": b"GIF8", ".webp": b"RIFF"}
 

@@ -1,0 +1,280 @@
+"""The data of a run for the page, computed when it is first requested, and the page in one file."""
+
+import base64
+import io
+import json
+import shutil
+import tempfile
+import weakref
+from datetime import timedelta
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fleet2d.errors import ArtifactError, InputError
+from fleet2d.runs.run import Run
+from fleet2d.storage.files import path_in, write_atomically
+from fleet2d.viewer.contract import RunFacts, SightingFacts, WallsFacts
+from fleet2d.viewer.home_facts import WallsHistory, doors_of, walls_facts
+from fleet2d.viewer.moments import KEY_FRAMES, key_frame_rows, positions
+from fleet2d.viewer.run_facts import run_facts, run_title, sightings_of
+
+
+def write_file(path: Path, content: bytes) -> None:
+    """Write a file; readers see all of it, or none.
+
+    Raises:
+        InputError: It can't be written.
+    """
+    try:
+        write_atomically(path, content)
+    except OSError as error:
+        raise InputError(f"{path} can't be written: {error.strerror}") from error
+
+
+POSES = "poses"
+"""A table that replaces `key_frames` for the page in runs with random walks."""
+MOST_POSES = 200_000
+MOST_ROWS = 1 << 17
+
+
+class PageData:
+    """The data of a run for the page.
+
+    Attributes:
+        run: The run.
+        title: Its title.
+    """
+
+    def __init__(self, run: Run) -> None:
+        """Take a run; nothing is computed."""
+        self.run = run
+        self.title = run_title(run)
+        self._folder: Path | None = None
+
+    @cached_property
+    def _walls(self) -> WallsHistory:
+        return WallsHistory(self.run, self._doors)
+
+    @cached_property
+    def _doors(self) -> Any:
+        return doors_of(self.run)
+
+    @cached_property
+    def facts(self) -> RunFacts:
+        """Everything about the run except its tables.
+
+        Raises:
+            ArtifactError: The run has no floor plan, or is damaged.
+        """
+        facts = run_facts(self.run, self._doors, self._walls)
+        facts["walks_every_s"] = self._walks_every_us / 1e6
+        return facts
+
+    @cached_property
+    def facts_json(self) -> bytes:
+        """The facts as JSON."""
+        return compact_json(self.facts)
+
+    def walls(self, number: int) -> WallsFacts:
+        """Return the walls that block sight in one of the run's arrangements.
+
+        Raises:
+            ArtifactError: There is no such arrangement.
+        """
+        return walls_facts(self._walls.mesh(number))
+
+    @property
+    def arrangements(self) -> int:
+        """The number of different arrangements of doors and furniture in the run."""
+        return self._walls.count
+
+    @cached_property
+    def sightings(self) -> list[SightingFacts]:
+        """The stretches in which robots noticed users."""
+        return sightings_of(self.run)
+
+    def table_path(self, name: str) -> Path:
+        """Return the Parquet file of a table.
+
+        Raises:
+            ArtifactError: The run has no such table.
+        """
+        if name == POSES and self._walks_every_us:
+            return self._temporary_file(POSES, self._poses)
+        if name not in self.run.tables:
+            raise ArtifactError(f"the run has no table {name!r}")
+        if self.run.directory is not None:
+            path = path_in(self.run.directory, f"{name}.parquet")
+            if path.is_file():
+                return path
+        # A run in memory, or an unfinished one, whose rows are in its journal.
+        return self._temporary_file(name, lambda: self.run.tables[name])
+
+    def _temporary_file(self, name: str, table: Any) -> Path:
+        """Return a temporary file of a table that is not a file of a run directory."""
+        if self._folder is None:
+            self._folder = Path(tempfile.mkdtemp(prefix="fleet2d-view-"))
+            weakref.finalize(self, shutil.rmtree, self._folder, ignore_errors=True)
+        path = self._folder / f"{name}.parquet"
+        if not path.exists():
+            write_table(table(), path)
+        return path
+
+    @cached_property
+    def _walks_every_us(self) -> int:
+        """The interval of positions in `poses` [us]; 0 if the run has no random walks."""
+        if "key_frames" not in self.run.tables:
+            return 0
+        kinds = self.run.tables["key_frames"]["kind"].cast("string")
+        if "walk" not in kinds.unique().to_pylist():
+            return 0
+        step_us, steps = self.run.manifest["step_us"], self.run.manifest["steps"]
+        return int(step_us * -(-steps // MOST_POSES))
+
+    def _poses(self) -> Any:
+        """Return positions of everybody at equal intervals, in the columns of key_frames."""
+        import pyarrow as pa
+
+        entities = self.run.manifest["entities"]
+        interval = timedelta(microseconds=self._walks_every_us)
+        names = (*entities["users"], *entities["robots"])
+        parts = [positions(self.run, name, interval) for name in names]
+        return pa.concat_tables(parts)
+
+
+def compact_json(content: Any) -> bytes:
+    """Return content as JSON without spaces."""
+    return json.dumps(content, separators=(",", ":"), allow_nan=False).encode()
+
+
+def write_table(table: Any, target: Path | io.BytesIO) -> None:
+    """Write a table as Parquet, with the encodings of the tables of a run directory."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    names = {field.name: field.type for field in table.schema}
+    delta_names = [n for n, t in names.items() if pa.types.is_int64(t) or pa.types.is_timestamp(t)]
+    texts = [n for n, t in names.items() if pa.types.is_dictionary(t) or pa.types.is_string(t)]
+    pq.write_table(
+        table,
+        target,
+        compression="zstd",
+        use_dictionary=texts,
+        column_encoding=dict.fromkeys(delta_names, "DELTA_BINARY_PACKED"),
+        row_group_size=MOST_ROWS,
+    )
+
+
+PAGE = Path(__file__).parent / "page"
+POLICY = (
+    "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:"
+)
+
+
+def export_html(run: Run, path: Path, first: int = 0, end: int | None = None) -> None:
+    """Write a run, or a part of it, as one self-contained HTML file.
+
+    Args:
+        run: The run.
+        path: The file; an existing file is replaced.
+        first: The first step to show.
+        end: The step after the last; None for the end of the run.
+
+    Raises:
+        InputError: The part is empty, or the file can't be written.
+        ArtifactError: The run has no floor plan, or is damaged.
+    """
+    data = PageData(run)
+    steps = run.manifest["steps"]
+    end = steps if end is None else end
+    if not 0 <= first < end <= steps:
+        raise InputError(
+            f"from step {first} to {end} there is nothing to show: the run has {steps}"
+        )
+    write_file(path, html_of([embedded_run(data, first, end)]).encode())
+
+
+def embedded_run(data: PageData, first: int, end: int) -> dict[str, Any]:
+    """Return all data of a run that the page needs, as its type ``EmbeddedRun``."""
+    facts: RunFacts = {**data.facts, "first_step": first, "end_step": end}
+    is_whole = first == 0 and end == facts["steps"]
+    tables = {}
+    for table in facts["tables"]:
+        name = table["name"]
+        if name == KEY_FRAMES and facts["walks_every_s"] > 0:
+            name = POSES
+        tables[name] = _base64_table(data, name, None if is_whole else (first, end))
+    return {
+        "facts": facts,
+        "sightings": [_cut(lane, first, end) for lane in data.sightings],
+        "walls": [data.walls(number) for number in range(data.arrangements)],
+        "tables": tables,
+    }
+
+
+def html_of(runs: list[dict[str, Any]]) -> str:
+    """Return the page with its script, its style and its data in one document."""
+    # Escaped, so that no text of a run can end the element around it.
+    data = json.dumps(runs, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
+    script = (PAGE / "page.js").read_text(encoding="utf-8").replace("</script", "<\\/script")
+    style = (PAGE / "page.css").read_text(encoding="utf-8")
+    return "\n".join(
+        (
+            "<!doctype html>",
+            '<html lang="en"><head><meta charset="utf-8">',
+            f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">',
+            '<meta name="viewport" content="width=device-width, initial-scale=1">',
+            '<meta name="color-scheme" content="light dark">',
+            "<title>Fleet2D</title>",
+            f"<style>{style}</style></head>",
+            '<body><div id="page"></div>',
+            f'<script type="application/json" id="fleet2d-runs">{data}</script>',
+            f'<script type="module">{script}</script></body></html>',
+            "",
+        )
+    )
+
+
+def _base64_table(data: PageData, name: str, part: tuple[int, int] | None) -> str:
+    """Return a table as a Parquet file in base64."""
+    path = data.table_path(name)
+    if part is None:
+        return base64.b64encode(path.read_bytes()).decode()
+    import pyarrow.parquet as pq
+
+    table = pq.read_table(path)
+    rows = _rows(table, name, *part)
+    content = io.BytesIO()
+    write_table(table.take(rows), content)
+    return base64.b64encode(content.getvalue()).decode()
+
+
+def _rows(table: Any, name: str, first: int, end: int) -> Any:
+    """Return the indices of the rows of a table that matter between two steps."""
+    step = table["step"].to_numpy()
+    if name in (KEY_FRAMES, POSES):
+        return key_frame_rows(table, first, end)
+    if name.startswith("layer."):
+        return np.arange(len(step))
+    if name == "observations":
+        return np.flatnonzero((step >= first) & (step < end))
+    return np.flatnonzero(step < end)  # earlier rows still hold: doors, beliefs, activities
+
+
+def _cut(lane: SightingFacts, first: int, end: int) -> SightingFacts:
+    """Return the stretches of a lane that lie between two steps."""
+    rows = [
+        i
+        for i, (low, high) in enumerate(zip(lane["first"], lane["last"], strict=True))
+        if high >= first and low < end
+    ]
+    return SightingFacts(
+        robot=lane["robot"],
+        user=lane["user"],
+        first=[lane["first"][i] for i in rows],
+        last=[lane["last"][i] for i in rows],
+        false=[lane["false"][i] for i in rows],
+    )

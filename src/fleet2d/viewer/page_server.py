@@ -1,0 +1,369 @@
+"""Responses of the server."""
+
+import asyncio
+import secrets
+import socket
+import threading
+import webbrowser
+from collections.abc import Awaitable, Callable, Mapping, Sequence
+from contextlib import suppress
+from http import HTTPStatus
+from pathlib import Path
+from types import FrameType
+from typing import Protocol
+
+from starlette.applications import Starlette
+from starlette.concurrency import run_in_threadpool
+from starlette.datastructures import Headers, MutableHeaders
+from starlette.requests import Request
+from starlette.responses import FileResponse, JSONResponse, Response
+from starlette.routing import Route
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from fleet2d import __version__
+from fleet2d.errors import ArtifactError, Fleet2DError, InputError, extra
+from fleet2d.runs.run import open_run
+from fleet2d.viewer.contract import Problem, SessionFacts
+from fleet2d.viewer.page_data import PageData, compact_json
+
+
+def json_answer(content: bytes, status: int = 200) -> Response:
+    """Return a response of JSON bytes."""
+    return Response(content, status, media_type="application/json")
+
+
+def problem(message: str, status: int = 422) -> Response:
+    """Return a response with the reason why something can't be shown or done."""
+    return json_answer(compact_json(Problem(message=message)), status)
+
+
+HOSTS = ("127.0.0.1", "localhost", "[::1]")
+POLICY = "; ".join(
+    (
+        "default-src 'none'",
+        "script-src 'self'",
+        "style-src 'self'",
+        "img-src 'self' data: blob:",
+        "connect-src 'self'",
+        "base-uri 'none'",
+        "form-action 'none'",
+        "frame-ancestors 'none'",
+    )
+)
+HEADERS: Mapping[str, str] = {
+    "Content-Security-Policy": POLICY,
+    "X-Content-Type-Options": "nosniff",
+    "X-Frame-Options": "DENY",
+    "Referrer-Policy": "no-referrer",
+    "Cross-Origin-Opener-Policy": "same-origin",
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "Cache-Control": "no-store",
+}
+
+
+def new_token() -> str:
+    """Return a token that can't be guessed."""
+    return secrets.token_urlsafe(24)
+
+
+class Guard:
+    """Refuses requests of other web pages, for other host names, and without the token.
+
+    Another web page can make a browser send requests here, but it doesn't know the token, and the
+    browser adds the origin of the request (`Origin`, `Sec-Fetch-Site`). A foreign name that points
+    at this machine is visible in `Host`.
+    """
+
+    def __init__(self, app: ASGIApp, token: str, port: int) -> None:
+        """Guard an application.
+
+        Args:
+            app: The application that serves allowed requests.
+            token: The first part of every allowed path.
+            port: The port of the server.
+        """
+        self._app, self._token = app, token
+        self._hosts = {f"{host}:{port}" for host in HOSTS}
+        self._origins = {f"http://{host}" for host in self._hosts}
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Serve a request, or refuse it."""
+        if scope["type"] == "lifespan":
+            await self._app(scope, receive, send)
+            return
+        if scope["type"] != "http":
+            return
+        reason = self._refusal(scope)
+        if reason:
+            response = JSONResponse({"message": reason}, HTTPStatus.FORBIDDEN)
+            await response(scope, receive, _with_headers(send))
+            return
+        await self._app(scope, receive, _with_headers(send))
+
+    def _refusal(self, scope: Scope) -> str:
+        """Return why a request is refused; empty if it is allowed."""
+        headers = Headers(scope=scope)
+        if headers.get("host", "") not in self._hosts:
+            return "this server answers under 127.0.0.1 and localhost only"
+        origin = headers.get("origin")
+        if origin is not None and origin not in self._origins:
+            return "this request comes from another web page"
+        if headers.get("sec-fetch-site", "none") not in ("same-origin", "none"):
+            return "this request comes from another web page"
+        is_change = scope["method"] not in ("GET", "HEAD")
+        if is_change and origin is None:
+            return "this request does not say which page it comes from"
+        token = scope["path"].lstrip("/").split("/", 1)[0]
+        if not secrets.compare_digest(token.encode(), self._token.encode()):
+            return "the address lacks its token: open the address that fleet2d view printed"
+        return ""
+
+
+def _with_headers(send: Send) -> Send:
+    async def send_with_headers(message: Message) -> None:
+        if message["type"] == "http.response.start":
+            headers = MutableHeaders(scope=message)
+            for name, value in HEADERS.items():
+                headers[name] = value
+        await send(message)
+
+    return send_with_headers
+
+
+PAGE = Path(__file__).parent / "page"
+MEDIA = {
+    ".html": "text/html",
+    ".js": "text/javascript",
+    ".css": "text/css",
+    ".svg": "image/svg+xml",
+}
+
+Endpoint = Callable[[Request], Awaitable[Response]]
+
+
+class LiveRoutes(Protocol):
+    """The routes that a running simulation adds to the server."""
+
+    def routes(self) -> list[Route]:
+        """Return its routes."""
+
+    def end_streams(self) -> None:
+        """End all open responses; called in the handler of a signal."""
+
+
+class ServedRuns:
+    """The runs that are served; each is opened when it is first requested."""
+
+    def __init__(self, sources: Sequence[Path | PageData]) -> None:
+        """Name run directories, or data of runs; nothing is opened."""
+        self._sources = list(sources)
+        self._data: dict[int, PageData] = {}
+
+    @property
+    def titles(self) -> list[str]:
+        """The titles of the runs."""
+        return [
+            source.title if isinstance(source, PageData) else source.resolve().name
+            for source in self._sources
+        ]
+
+    def data(self, number: int) -> PageData:
+        """Return the data of a run.
+
+        Raises:
+            ArtifactError: There is no such run.
+            Fleet2DError: It can't be read.
+        """
+        if not 0 <= number < len(self._sources):
+            raise ArtifactError(f"there is no run {number}")
+        if number not in self._data:
+            source = self._sources[number]
+            self._data[number] = (
+                source if isinstance(source, PageData) else PageData(open_run(source))
+            )
+        return self._data[number]
+
+    def preload(self) -> None:
+        """Compute the data that the page requests first; errors are reported on its request."""
+        for number in range(len(self._sources)):
+            with suppress(Fleet2DError, OSError, ValueError, KeyError):
+                data = self.data(number)
+                _ = data.facts_json
+                data.walls(0)
+                _ = data.sightings
+
+
+def page_app(
+    runs: ServedRuns, token: str, port: int, live: LiveRoutes | None = None, page: Path = PAGE
+) -> ASGIApp:
+    """Return the application that serves the page and some runs.
+
+    Args:
+        runs: The runs.
+        token: The first part of every path.
+        port: The port of the server.
+        live: A running simulation, beside or instead of runs.
+        page: The folder of the page's bundle.
+    """
+
+    async def session(_: Request) -> Response:
+        facts = SessionFacts(runs=runs.titles, live=live is not None, version=__version__)
+        return json_answer(compact_json(facts))
+
+    async def file(request: Request) -> Response:
+        name = request.path_params.get("name", "index.html")
+        path = page / name
+        if path.suffix not in MEDIA or not path.is_file():
+            return problem(f"there is no page {name}", 404)
+        return FileResponse(path, media_type=MEDIA[path.suffix])
+
+    routes = [
+        Route("/", file),
+        Route("/session.json", session),
+        Route("/run/{number:int}/facts.json", _endpoint(runs, _facts)),
+        Route("/run/{number:int}/sightings.json", _endpoint(runs, _sightings)),
+        Route("/run/{number:int}/walls/{walls:int}.json", _endpoint(runs, _walls)),
+        Route("/run/{number:int}/tables/{table}.parquet", _endpoint(runs, _table)),
+        *(live.routes() if live else ()),
+        Route("/{name}", file),
+    ]
+    return Guard(_strip_token(token, Starlette(routes=routes)), token, port)
+
+
+def _strip_token(token: str, app: ASGIApp) -> ASGIApp:
+    """Remove the token from paths; the guard has compared it."""
+
+    async def serve(scope, receive, send) -> None:  # type: ignore[no-untyped-def]
+        path = scope.get("path", "")
+        if scope["type"] == "http":
+            path = path.removeprefix(f"/{token}") or "/"
+            scope = {**scope, "path": path, "raw_path": path.encode(), "root_path": ""}
+        await app(scope, receive, send)
+
+    return serve
+
+
+def _endpoint(runs: ServedRuns, respond: Callable[[PageData, Request], Response]) -> Endpoint:
+    """Return the endpoint of data of a run; its response to errors is their message."""
+
+    def work(request: Request) -> Response:
+        try:
+            return respond(runs.data(request.path_params["number"]), request)
+        except Fleet2DError as error:
+            return problem(str(error))
+        except (OSError, ValueError, KeyError) as error:
+            return problem(f"the run can't be read: its files are damaged ({error!r})")
+
+    async def endpoint(request: Request) -> Response:
+        return await run_in_threadpool(work, request)
+
+    return endpoint
+
+
+def _facts(data: PageData, _: Request) -> Response:
+    return json_answer(data.facts_json)
+
+
+def _sightings(data: PageData, _: Request) -> Response:
+    return json_answer(compact_json(data.sightings))
+
+
+def _walls(data: PageData, request: Request) -> Response:
+    return json_answer(compact_json(data.walls(request.path_params["walls"])))
+
+
+def _table(data: PageData, request: Request) -> Response:
+    path = data.table_path(request.path_params["table"])
+    return FileResponse(path, media_type="application/vnd.apache.parquet")
+
+
+with extra("view", "watching needs a server"):
+    import starlette  # noqa: F401 - the server needs it, too
+    import uvicorn
+
+
+HOST = "127.0.0.1"
+MOST_RUNS = 4
+
+
+class _Server(uvicorn.Server):
+    """A server that ends the streams of a running simulation, which else would keep it open."""
+
+    def __init__(self, config: uvicorn.Config, live: LiveRoutes | None) -> None:
+        super().__init__(config)
+        self._live = live
+
+    def handle_exit(self, sig: int, frame: FrameType | None) -> None:
+        """End the server on a signal."""
+        if self._live is not None:
+            self._live.end_streams()
+        super().handle_exit(sig, frame)
+
+
+class PageServer:
+    """The server of the page, with its port.
+
+    Attributes:
+        address: The address of the page, with its token.
+        listens_at: Host and port.
+    """
+
+    def __init__(
+        self, sources: Sequence[Path | PageData], *, port: int = 0, live: LiveRoutes | None = None
+    ) -> None:
+        """Bind a port of this machine.
+
+        Args:
+            sources: Run directories, or data of runs.
+            port: The port; 0: a free one.
+            live: A running simulation.
+
+        Raises:
+            InputError: The port is in use.
+        """
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            self._socket.bind((HOST, port))
+        except (OSError, OverflowError) as error:
+            self._socket.close()
+            raise InputError(f"port {port} can't be used: {error}; choose another --port") from None
+        host, self._port = self._socket.getsockname()[:2]
+        self.listens_at: tuple[str, int] = (str(host), int(self._port))
+        token = new_token()
+        self.address = f"http://{HOST}:{self._port}/{token}/"
+        self._runs = ServedRuns(sources)
+        app = page_app(self._runs, token, self._port, live)
+        # Quiet: a page that is open when the server ends is no error.
+        config = uvicorn.Config(
+            app, log_level="critical", lifespan="off", ws="none", timeout_graceful_shutdown=1
+        )
+        self._server = _Server(config, live)
+
+    def show(self, *, open_browser: bool, announce: Callable[[str], None]) -> None:
+        """Announce the address of the page, open a browser if requested, serve until Ctrl-C."""
+        announce(self.address)
+        if open_browser:
+            webbrowser.open(self.address)
+        with suppress(KeyboardInterrupt):
+            self.run()
+
+    def run(self) -> None:
+        """Serve until Ctrl-C."""
+        threading.Thread(target=self._runs.preload, daemon=True, name="fleet2d-preload").start()
+        asyncio.run(self._server.serve(sockets=[self._socket]))
+
+    def close(self) -> None:
+        """Free the port of a server that was never run."""
+        self._socket.close()
+
+    def start(self) -> Callable[[], None]:
+        """Serve in a thread; return a function that stops it."""
+        thread = threading.Thread(target=self.run, daemon=True, name="fleet2d-view")
+        thread.start()
+
+        def stop() -> None:
+            self._server.should_exit = True
+            thread.join(timeout=5)
+
+        return stop

@@ -1,0 +1,352 @@
+"""The facts of a run that the page receives: everything except its tables."""
+
+import math
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from fleet2d import __version__
+from fleet2d.artifacts.manifest import plain
+from fleet2d.configuration.units import parse_duration
+from fleet2d.engine.simulation import Simulation
+from fleet2d.entities.objects.door import Door
+from fleet2d.errors import ArtifactError
+from fleet2d.kernels import I64, Bool
+from fleet2d.palette import body_color
+from fleet2d.runs.layers import PREFIX
+from fleet2d.runs.run import Run, categories
+from fleet2d.sight.camera import USUAL_ANGLE_DEG, USUAL_RANGE_M
+from fleet2d.storage.files import path_in
+from fleet2d.viewer.contract import (
+    BodyFacts,
+    CameraFacts,
+    ColumnFacts,
+    DoorFacts,
+    MarkFacts,
+    RunFacts,
+    SightingFacts,
+    TableFacts,
+    WallsChange,
+)
+from fleet2d.viewer.home_facts import HomeDoors, WallsHistory, door_facts, home_facts
+
+INTERVENTIONS = "interventions"
+VIOLATIONS = "violations"  # name of the table
+
+
+def marks_of(run: Run) -> list[MarkFacts]:
+    """Return the marks of a run's interventions and expectations.
+
+    Raises:
+        ArtifactError: The table of violations is damaged.
+    """
+    manifest = run.manifest
+    marks = intervention_marks(manifest.get("interventions") or ())
+    verdicts = manifest.get("expectations") or {}
+    violations = _violations(run) if verdicts else {}
+    for name, verdict in verdicts.items():
+        marks += expectation_marks(name, verdict, violations.get(name, []), manifest["steps"])
+    return marks
+
+
+def intervention_marks(records: Iterable[Mapping[str, Any]]) -> list[MarkFacts]:
+    """Return the marks of interventions, from the records of a manifest."""
+    return [
+        MarkFacts(
+            lane=INTERVENTIONS,
+            step=int(record["step"]),
+            end=int(record["step"]) + 1,
+            kind="intervention",
+            label=intervention_label(record),
+        )
+        for record in records
+    ]
+
+
+def intervention_label(record: Mapping[str, Any]) -> str:
+    """Return a short label of an intervention.
+
+    >>> intervention_label({"do": "change", "step": 4, "change": {"shut": "bath_door", "at": None}})
+    'shut bath_door'
+    >>> intervention_label({"do": "put", "step": 4, "entity": "ana", "x": 5, "by": "script.0"})
+    'put ana (script.0)'
+    """
+    change = record.get("change")
+    fields = change if isinstance(change, Mapping) else record
+    parts = [value for key, value in fields.items() if isinstance(value, str) and key != "by"]
+    if isinstance(change, Mapping):
+        parts = next(([key, value] for key, value in change.items() if value), ["change"])
+    by = f" ({record['by']})" if record.get("by") else ""
+    return " ".join(str(part) for part in parts[:3]) + by
+
+
+def expectation_marks(
+    name: str, verdict: Mapping[str, Any], violations: Iterable[tuple[int, int]], steps: int
+) -> list[MarkFacts]:
+    """Return the stretches of a run in which an expectation held, or was violated.
+
+    Args:
+        name: The name of the expectation.
+        verdict: The verdict of the manifest.
+        violations: The first and last step of each violation, in order.
+        steps: The number of steps of the run.
+
+    Example:
+        >>> marks = expectation_marks("quiet", {"holds": False}, [(10, 19)], 100)
+        >>> [(mark["step"], mark["end"], mark["kind"]) for mark in marks]
+        [(0, 10, 'held'), (10, 20, 'violated'), (20, 100, 'held')]
+    """
+    label = str(verdict.get("says") or verdict.get("expectation") or name)
+    marks: list[MarkFacts] = []
+
+    def add(step: int, end: int, kind: Literal["held", "violated", "open"]) -> None:
+        if end > step:
+            marks.append(MarkFacts(lane=name, step=step, end=end, kind=kind, label=label))
+
+    end_of_last, is_decided = 0, verdict.get("decided", True)
+    for first, last in violations:
+        add(end_of_last, first, "held")
+        add(max(end_of_last, first), last + 1, "violated")
+        end_of_last = max(end_of_last, last + 1)
+    is_violated = not marks and not verdict.get("holds", True)
+    add(end_of_last, steps, "violated" if is_violated else "held" if is_decided else "open")
+    return marks
+
+
+def _violations(run: Run) -> dict[str, list[tuple[int, int]]]:
+    """Return the first and last steps of violations in order, by name of the expectation."""
+    if VIOLATIONS not in run.tables:
+        return {}
+    table = run.tables[VIOLATIONS]
+    columns = ("expectation", "step", "last_step")
+    names, first, last = (table[column].to_pylist() for column in columns)
+    violations: dict[str, list[tuple[int, int]]] = {}
+    for name, begin, end in sorted(zip(names, first, last, strict=True)):
+        violations.setdefault(name, []).append((begin, end))
+    return violations
+
+
+JOIN_S = 6.0  # shorter gaps between sightings are no gaps in a lane
+
+
+def sightings_of(run: Run) -> list[SightingFacts]:
+    """Return the stretches in which each robot noticed each user, in order."""
+    if "observations" not in run.tables:
+        return []
+    table = run.tables["observations"]
+    step = table["step"].to_numpy()
+    robot, robots = categories(table["robot"])
+    user, users = categories(table["user"])
+    false = np.zeros(len(step), np.bool_)
+    if "true_user" in table.column_names:
+        true_user, true_names = categories(table["true_user"])
+        names = np.array([*users, ""], dtype=object)
+        true = np.array([*true_names, ""], dtype=object)
+        is_mistaken = (names[user] != true[true_user]) & (user >= 0)
+        false = (true_user < 0) | is_mistaken
+    gap = max(1, round(JOIN_S * 1e6 / run.manifest["step_us"]))
+    lanes = []
+    for r, robot_name in enumerate(robots):
+        for u, user_name in enumerate([*users, ""]):
+            code = u if user_name else -1
+            rows = (robot == r) & (user == code)
+            if rows.any():
+                first, last, is_false = _stretches(step[rows], false[rows], gap)
+                lanes.append(
+                    SightingFacts(
+                        robot=robot_name,
+                        user=user_name,
+                        first=first.tolist(),
+                        last=last.tolist(),
+                        false=is_false.tolist(),
+                    )
+                )
+    return lanes
+
+
+def _stretches(step: I64, false: Bool, gap: int) -> tuple[I64, I64, Any]:
+    """Return first and last step of each stretch without a gap, and whether it is of false ones."""
+    order = np.argsort(step, kind="stable")
+    step, false = step[order], false[order]
+    cuts = (np.diff(step) > gap) | (false[1:] != false[:-1])
+    begins = np.append(0, np.flatnonzero(cuts) + 1)
+    ends = np.append(begins[1:] - 1, len(step) - 1)
+    return step[begins], step[ends], false[begins]
+
+
+Role = Literal["log", "algorithm", "metric", "layer"]
+
+
+def run_facts(run: Run, doors: HomeDoors, walls: WallsHistory) -> RunFacts:
+    """Return the facts of a run.
+
+    Raises:
+        ArtifactError: The run has no floor plan, or the plan can't be read.
+    """
+    manifest = run.manifest
+    scenario = manifest["scenario"]
+    return RunFacts(
+        title=run_title(run),
+        status=run.status,
+        notes=list(run.notes),
+        start=manifest["start"],
+        step_us=manifest["step_us"],
+        steps=manifest["steps"],
+        first_step=0,
+        end_step=manifest["steps"],
+        seed=manifest["seed"],
+        digest=run.digest,
+        version=__version__,
+        home=home_facts(run.plan, doors.facts),
+        bodies=bodies_of(scenario, manifest["entities"]),
+        tables=[_table_facts(run, name) for name in run.tables],
+        walls=walls.changes,
+        marks=marks_of(run),
+        metrics=run.metrics,
+        scenario=scenario,
+        walks_every_s=0.0,
+    )
+
+
+def run_title(run: Run) -> str:
+    """Return the title of a run: the name of its directory, else of its scenario."""
+    if run.directory is not None:
+        return Path(run.directory).resolve().name
+    return str(run.manifest["scenario"].get("name") or "run")
+
+
+def bodies_of(scenario: Mapping[str, Any], entities: Mapping[str, Any]) -> list[BodyFacts]:
+    """Return the facts of users, then of robots."""
+    bodies = []
+    for bucket, robot in (("users", False), ("robots", True)):
+        for number, name in enumerate(entities.get(bucket, ())):
+            settings = scenario.get(bucket, {}).get(name, {})
+            color = settings.get("color")
+            bodies.append(
+                BodyFacts(
+                    name=name,
+                    robot=robot,
+                    color=color if _is_color(color) else body_color(number, robot=robot),
+                    radius=float(settings.get("radius", 0.15 if robot else 0.2)),
+                    cameras=_cameras(settings),
+                    behaviors=[b.get("type", "") for b in settings.get("behaviors", ())],
+                )
+            )
+    return bodies
+
+
+def _is_color(value: object) -> bool:
+    return isinstance(value, str) and value.startswith("#") and len(value) == 7
+
+
+def _cameras(settings: Mapping[str, Any]) -> list[CameraFacts]:
+    cameras = dict(settings.get("cameras") or {})
+    if settings.get("camera"):
+        cameras = {"camera": settings["camera"], **cameras}
+    return [_camera(name, camera) for name, camera in cameras.items()]
+
+
+def _camera(name: str, camera: Mapping[str, Any]) -> CameraFacts:
+    near, far = camera.get("range", USUAL_RANGE_M)
+    forward, left = camera.get("offset", (0.0, 0.0))
+    pan = camera.get("pan") or {}
+    dwell = parse_duration(pan.get("dwell", "5 s"))
+    return CameraFacts(
+        name=name,
+        near=near,
+        far=far,
+        angle=math.radians(camera.get("angle_deg", USUAL_ANGLE_DEG)),
+        forward=forward,
+        left=left,
+        heading=math.radians(camera.get("heading_deg", 0.0)),
+        pan=[math.radians(degrees) for degrees in pan.get("headings_deg", ())],
+        pan_us=round(dwell.total_seconds() * 1e6),
+    )
+
+
+def _table_facts(run: Run, name: str) -> TableFacts:
+    description = run.manifest["tables"].get(name)
+    if description is None:  # the manifest of an unfinished run doesn't list its tables
+        description = {"rows": _rows_of(run, name), "columns": _columns_of(run, name)}
+    path = None if run.directory is None else path_in(run.directory, f"{name}.parquet")
+    return TableFacts(
+        name=name,
+        rows=int(description["rows"]),
+        bytes=path.stat().st_size if path is not None and path.exists() else 0,
+        role=_role(run.manifest["scenario"], name),
+        columns=[
+            ColumnFacts(
+                name=column["name"],
+                kind=column.get("kind", ""),
+                unit=column.get("unit", ""),
+                description=column.get("description", ""),
+            )
+            for column in description["columns"]
+        ],
+    )
+
+
+def _rows_of(run: Run, name: str) -> int:
+    try:
+        return int(run.tables[name].num_rows)
+    except ArtifactError:
+        return 0
+
+
+def _columns_of(run: Run, name: str) -> list[dict[str, str]]:
+    from fleet2d.artifacts.arrow import spec_of
+
+    try:
+        columns = spec_of(run.tables[name].schema).columns
+    except ArtifactError:
+        return []
+    return [{"name": c.name, "kind": c.kind, "unit": c.unit} for c in columns]
+
+
+def _role(scenario: Mapping[str, Any], name: str) -> Role:
+    if name.startswith(PREFIX):
+        return "layer"
+    if name in scenario.get("algorithms", {}):
+        return "algorithm"
+    return "metric" if name in scenario.get("metrics", {}) else "log"
+
+
+def live_facts(simulation: Simulation) -> RunFacts:
+    """Return what the page receives about a running simulation, which has no tables yet."""
+    scenario = plain(simulation.scenario.resolved())
+    clock = simulation.clock
+    entities = {
+        "users": list(simulation.scenario.users),
+        "robots": list(simulation.scenario.robots),
+    }
+    return RunFacts(
+        title=simulation.scenario.name or "live run",
+        status="running",
+        notes=[],
+        start=clock.start.isoformat(),
+        step_us=clock.step_us,
+        steps=clock.steps,
+        first_step=0,
+        end_step=clock.steps,
+        seed=simulation.seed,
+        digest=None,
+        version=__version__,
+        home=home_facts(simulation.home.plan, _doors(simulation)),
+        bodies=bodies_of(scenario, entities),
+        tables=[],
+        walls=[WallsChange(step=0, walls=0)],
+        marks=[],
+        metrics={},
+        scenario=scenario,
+        walks_every_s=0.0,
+    )
+
+
+def _doors(simulation: Simulation) -> list[DoorFacts]:
+    return [
+        door_facts(name, door, door.find(simulation.home.plan))
+        for name, door in simulation.scenario.objects.items()
+        if isinstance(door, Door)
+    ]

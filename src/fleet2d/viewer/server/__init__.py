@@ -1,1 +1,0 @@
-"""The server of the page: stored runs, and running simulations that it watches and controls."""
