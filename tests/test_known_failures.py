@@ -327,7 +327,7 @@ ELSEWHERE = {
     (User, "opens_doors"): "tests/engine/test_home_changes: there is no door in this home",
     (Robot, "gives_way"): "tests/engine/test_collisions_clearance: it meets nobody on its way here",
     (Robot, "opens_doors"): "tests/engine/test_home_changes: there is no door in this home",
-    (ArtifactSettings, "checkpoint"): "tests/engine/test_resume: a file, no table",
+    (ArtifactSettings, "checkpoint"): "tests/engine/test_repeat_resume: a file, no table",
     (ArtifactSettings, "learned"): "tests/algorithms/test_learned: a file, no table",
     (Schedule, "cooldown"): "tests/entities/test_arbitration: there is one behavior here",
     (Meander, "cooldown"): "tests/entities/test_arbitration: a walk is never over",

@@ -9,8 +9,8 @@ from fleet2d.configuration.units import Length as Length
 from fleet2d.configuration.units import Share as Share
 from fleet2d.engine.encounters import Interrupt as Interrupt
 from fleet2d.engine.encounters import SpanView as SpanView
-from fleet2d.engine.reproduce import reproduce as reproduce
-from fleet2d.engine.resume import resume as resume
+from fleet2d.engine.repeat import reproduce as reproduce
+from fleet2d.engine.repeat import resume as resume
 from fleet2d.engine.simulation import Simulation as Simulation
 from fleet2d.engine.simulation import run as run
 from fleet2d.entities.behavior import Actor as Actor

@@ -412,7 +412,7 @@ UNUSED = (
     "fleet2d.calibrate",
     "fleet2d.engine.expectations",
     "fleet2d.expectations.vocabulary",
-    "fleet2d.engine.resume",
+    "fleet2d.engine.repeat",
     "fleet2d.entities.users.guest",
     "fleet2d.expectations",
     "fleet2d.fit",

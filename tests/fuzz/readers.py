@@ -185,7 +185,7 @@ def _unfinished_beside(folder: Path) -> None:
 
 def _resume(path: Path) -> None:
     """Open an unfinished run, and set it up to go on."""
-    from fleet2d.engine.resume import reopen
+    from fleet2d.engine.repeat import reopen
 
     root = path.parents[1]
     fleet2d.open_run(root)

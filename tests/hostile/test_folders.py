@@ -18,14 +18,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.engine.test_resume import cut_off
+from tests.engine.test_repeat_resume import cut_off
 from tests.scenes import everything
 from tests.thorough import some
 
 import fleet2d
 from fleet2d.artifacts.seal import verify_run
-from fleet2d.engine.reproduce import reproduce
-from fleet2d.engine.resume import resume
+from fleet2d.engine.repeat import reproduce, resume
 from fleet2d.errors import Fleet2DError, RunDirectoryError
 from fleet2d.runs.exporters import exporter
 from fleet2d.runs.run import open_run

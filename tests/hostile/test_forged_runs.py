@@ -13,14 +13,14 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from tests.engine.test_resume import cut_off
+from tests.engine.test_repeat_resume import cut_off
 from tests.scenes import Cli, everything
 from tests.thorough import some
 
 import fleet2d
 from fleet2d.artifacts.manifest import Manifest
 from fleet2d.artifacts.seal import digest_table, make_seal, run_digest, verify_run
-from fleet2d.engine.reproduce import reproduce
+from fleet2d.engine.repeat import reproduce
 from fleet2d.errors import ArtifactError, RunDirectoryError
 from fleet2d.runs.run import open_run
 

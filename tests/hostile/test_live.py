@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests.engine.test_resume import cut_off
+from tests.engine.test_repeat_resume import cut_off
 from tests.scenes import AGENDA, OWN, scenario
 from tests.thorough import examples
 

@@ -14,7 +14,7 @@ def reproduce(
     trust_dir: TrustFolders = None,
 ) -> None:
     """Run a stored run again from its manifest, and compare."""
-    from fleet2d.engine.reproduce import reproduce_trusting
+    from fleet2d.engine.repeat import reproduce_trusting
 
     result = reproduce_trusting(directory, trust_of(trust, trust_dir))
     for cause in result.causes:

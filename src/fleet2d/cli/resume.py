@@ -19,7 +19,7 @@ def resume(
     quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")] = False,
 ) -> None:
     """Continue an interrupted or killed run; the result equals that of an undisturbed run."""
-    from fleet2d.engine.resume import reopen
+    from fleet2d.engine.repeat import reopen
 
     with redirect_stdout(sys.stderr) if as_json else nullcontext():  # output of components
         simulation, note = reopen(directory, trust_of(trust, trust_dir))

@@ -227,7 +227,7 @@ class Away(PersonIntervention):
 
     def begin(self, world: World) -> None:
         """Give the order."""
-        user(world, self.entity).obey(GoOut(self.duration), world.step)
+        user(world, self.entity).follow_order(GoOut(self.duration), world.step)
 
 
 @register("intervention", "call_home")
@@ -248,7 +248,7 @@ class CallHome(PersonIntervention):
 
     def begin(self, world: World) -> None:
         """Give the order."""
-        user(world, self.entity).obey(GoTo(self.to, None, self.duration), world.step)
+        user(world, self.entity).follow_order(GoTo(self.to, None, self.duration), world.step)
 
 
 @register("intervention", "guest")
@@ -275,7 +275,7 @@ class LetIn(PersonIntervention):
 
     def begin(self, world: World) -> None:
         """Give the order."""
-        user(world, self.entity).obey(GoTo(self.to, None, self.duration), world.step)
+        user(world, self.entity).follow_order(GoTo(self.to, None, self.duration), world.step)
 
 
 @register("intervention", "activity")
@@ -308,4 +308,4 @@ class StartActivity(PersonIntervention):
     def begin(self, world: World) -> None:
         """Give the order."""
         order = DoActivity(self.what, self.to, self.duration)
-        user(world, self.entity).obey(order, world.step)
+        user(world, self.entity).follow_order(order, world.step)

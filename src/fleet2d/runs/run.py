@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 # What shows and judges runs builds upon them, so it is imported by its name when it is used.
 _NOTEBOOK = "fleet2d.viewer.notebook"
-_REPRODUCE = "fleet2d.engine.reproduce"
+_REPRODUCE = "fleet2d.engine.repeat"
 
 
 class Tables(Mapping[str, "pa.Table"]):

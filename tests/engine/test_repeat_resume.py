@@ -72,7 +72,7 @@ def test_a_run_may_be_cut_off_many_times(tmp_path: Path) -> None:
         simulation.run_until(60 * minute)
         directory = cut_off(simulation)
         from fleet2d.configuration.trust import Trust
-        from fleet2d.engine.resume import reopen
+        from fleet2d.engine.repeat import reopen
 
         simulation, remark = reopen(directory, Trust())
         assert f"step {600 * (minute // 10)}" in remark
