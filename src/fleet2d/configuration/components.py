@@ -15,13 +15,11 @@ A component in a module below its kind's package needs no import anywhere else.
 
 import importlib
 import inspect
-import json
 import pkgutil
 import re
 from collections.abc import Callable, Iterable, Mapping, Sized
 from dataclasses import dataclass
 from functools import cache, lru_cache
-from pathlib import PurePath
 from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
 
 from pydantic import (
@@ -31,7 +29,6 @@ from pydantic import (
     GetCoreSchemaHandler,
     GetJsonSchemaHandler,
     ModelWrapValidatorHandler,
-    PydanticUserError,
     SerializationInfo,
     ValidationError,
     ValidationInfo,
@@ -112,49 +109,6 @@ class DescribedModel(BaseModel):
             if key in properties and name in texts and not field.description:
                 properties[key]["description"] = texts[name]
         return result
-
-
-if TYPE_CHECKING:
-    from pydantic._internal._model_construction import ModelMetaclass
-else:
-    ModelMetaclass = type(BaseModel)
-
-
-class ComponentClass(ModelMetaclass):
-    """The metaclass of components, which explains errors in the declaration of fields."""
-
-    def __new__(
-        cls, name: str, bases: tuple[type, ...], namespace: dict[str, Any], **kwargs: Any
-    ) -> type:
-        """Create the class.
-
-        Raises:
-            TypeError: a field is declared in a way that can't be configuration.
-        """
-        # A user's class is built at once, so that the error stands where the class is declared.
-        kwargs.setdefault("defer_build", namespace["__module__"].startswith("fleet2d."))
-        try:
-            return super().__new__(cls, name, bases, namespace, **kwargs)
-        except PydanticUserError as error:
-            raise TypeError(_wrong_field(name, namespace, error)) from None
-
-
-def _wrong_field(name: str, namespace: Mapping[str, Any], error: PydanticUserError) -> str:
-    untyped = ("model-field-missing-annotation", "model-field-overridden")
-    attribute = re.search(r"`(\w+) = |Field '(\w+)'", error.message)
-    if error.code not in untyped or attribute is None:
-        reason = re.sub(r"<class '(?:\w+\.)*(\w+)'>", r"\1", error.message)
-        return f"{name} has a field that can't be configuration: {reason.partition('. ')[0]}"
-    key = attribute[1] or attribute[2]
-    value = namespace.get(key)
-    kind = "str | None" if value is None else type(value).__name__
-    literal = json.dumps(value, ensure_ascii=False) if isinstance(value, str) else repr(value)
-    if len(literal) > 40 or isinstance(value, PurePath):
-        literal = "…"
-    return (
-        f"{name}.{key} has no type: write `{key}: {kind} = {literal}` for configuration, "
-        f"`{key}: ClassVar[{kind}] = {literal}` for a constant"
-    )
 
 
 _FORM = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,99}")
@@ -338,7 +292,7 @@ def _example(cls: type[Settings], key: str) -> str:
     return f"[{', '.join(f'{value:g}' for value in values)}]"
 
 
-class Component(Settings, metaclass=ComponentClass):
+class Component(Settings):
     """A part of a scenario that a ``type`` selects.
 
     Declared fields are configuration and frozen. All other attributes of an instance are run state:
@@ -359,6 +313,12 @@ class Component(Settings, metaclass=ComponentClass):
         """Set the type name to the path of the class, until it is registered under a name."""
         super().__init_subclass__(**kwargs)
         cls.type_name = class_path(cls)
+
+    @classmethod
+    def __pydantic_init_subclass__(cls, **kwargs: Any) -> None:
+        """Build a user's class at once, so that an error stands where the class is declared."""
+        if not cls.__module__.startswith("fleet2d."):
+            cls.model_rebuild(raise_errors=False)
 
     def __setattr__(self, name: str, value: Any) -> None:
         """Refuse to change configuration; store all other attributes as run state."""

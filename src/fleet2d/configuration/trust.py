@@ -540,7 +540,8 @@ def _failure(error: BaseException, folder: Path) -> str:
         file = _short_path(error.filename, folder)
         return f"{file}:{error.lineno}: {type(error).__name__}: {error.msg}"
     is_ours = isinstance(error, ScenarioError)
-    message = f"{'' if is_ours else f'{type(error).__name__}: '}{public_name(text_of(error))}"
+    text = public_name(text_of(error)).partition("\n\nFor further information")[0]
+    message = text if is_ours else f"{type(error).__name__}: {text}"
     frames = [
         frame
         for frame in traceback.extract_tb(error.__traceback__)
