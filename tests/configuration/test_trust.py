@@ -162,7 +162,7 @@ def test_a_study_whose_code_is_named_runs(fleet2d: Cli) -> None:
 
 def test_a_study_of_a_bundled_scenario_has_no_code(fleet2d: Cli) -> None:
     """Its name has the form of a component's, `bundled.py` and the class `base`."""
-    study = {"base": "bundled:base", "axes": {"simulation.seed": [1]}, "replicates": 1}
+    study = {"base": "bundled:base", "axes": {"robots.astro.speed": [0.3]}, "replicates": 1}
     Path("study.yaml").write_text(yaml.safe_dump(study))
     assert 0 == fleet2d("study", "run", "study.yaml", "--dry-run")[0]
     Path("bundled.py").touch()

@@ -275,7 +275,7 @@ def test_a_signal_during_the_code_of_a_component_is_not_its_error(
     (tmp_path / "mine.py").write_text(STOPS)
     algorithms = {"own": {"type": "mine:Stops"}}
     base = {"extends": "bundled:base", "algorithms": algorithms}
-    study = {"base": base, "axes": {"simulation.seed": [1]}, "replicates": 1}
+    study = {"base": base, "axes": {"robots.astro.speed": [0.3]}, "replicates": 1}
     (tmp_path / "study.yaml").write_text(json.dumps(study))
     code = (
         "import signal; signal.signal(signal.SIGINT, signal.default_int_handler);"
