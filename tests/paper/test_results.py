@@ -9,12 +9,11 @@ import numpy as np
 import pytest
 
 from fleet2d.errors import FloorPlanError, InputError
-from fleet2d.paper import feedback, ltp_gap, rtp_gap, speed
-from fleet2d.paper.months import PaperOptions, ignore_progress
+from fleet2d.paper import months, speed
+from fleet2d.paper.command import RESULTS, check_names, reproduce
+from fleet2d.paper.months import PaperOptions, Result, Table, ignore_progress, make_directory
 from fleet2d.paper.pictures import draw
-from fleet2d.paper.result import Result, Table, make_directory
-from fleet2d.paper.results import RESULTS, check_names, reproduce
-from fleet2d.paper.watched import FrameSeries
+from fleet2d.paper.speed import FrameSeries
 from fleet2d.scenario.model import load_scenario
 from fleet2d.studies.design import Design, build_design
 from fleet2d.studies.specification import read_specification
@@ -67,24 +66,24 @@ def test_right_after_a_sighting_the_naive_guess_is_right_and_after_hours_is_not(
     results: dict[str, Result],
 ) -> None:
     top_1 = results["rtp-gap"].numbers["means"]["top_1"]
-    assert top_1[rtp_gap.NAIVE]["0-1 min"][0] > 0.9
-    assert top_1[rtp_gap.NAIVE]["over 4 h"][0] < 0.2
+    assert top_1[months.NAIVE_GUESS]["0-1 min"][0] > 0.9
+    assert top_1[months.NAIVE_GUESS]["over 4 h"][0] < 0.2
     assert top_1["hmm"]["over 4 h"][0] > 0.5
 
 
 def test_differences_are_paired_by_seed(results: dict[str, Result]) -> None:
     tv = results["feedback"].numbers["tv"]
-    assert set(feedback.POLICIES) == set(tv)
-    less = feedback.differences(tv)
+    assert set(months.POLICIES) == set(tv)
+    less = months.differences(tv)
     for policy, by in tv.items():
-        assert feedback.NAIVE not in less[policy]
+        assert months.NAIVE_ESTIMATOR not in less[policy]
         for name, values in less[policy].items():
-            expected = [a - b for a, b in zip(by[name], by[feedback.NAIVE], strict=True)]
+            expected = [a - b for a, b in zip(by[name], by[months.NAIVE_ESTIMATOR], strict=True)]
             assert expected == values
 
 
 def design_of(seeds: int) -> Design:
-    return build_design(read_specification(feedback.study_of(seeds, 1)))
+    return build_design(read_specification(months.feedback_study(seeds, 1)))
 
 
 def test_a_robot_goes_by_the_estimator_of_its_column_only() -> None:
@@ -93,17 +92,17 @@ def test_a_robot_goes_by_the_estimator_of_its_column_only() -> None:
         labels, scenario = design.parameters(index), design.scenario(index).resolved()
         behaviors = scenario["robots"]["astro"]["behaviors"]
         sources = [b["source"] for b in behaviors if b["type"] == "hangout"]
-        uses_estimator = feedback.POLICIES[str(labels["robot"])].uses_estimator
+        uses_estimator = months.POLICIES[str(labels["robot"])].uses_estimator
         assert ([labels["estimator"]] if uses_estimator else []) == sources
-        expected = {labels["estimator"]} if uses_estimator else set(feedback.ESTIMATORS)
+        expected = {labels["estimator"]} if uses_estimator else set(months.ESTIMATORS)
         assert expected == set(scenario["algorithms"])
         assert len(expected) == len(scenario["metrics"])
 
 
 def test_estimators_share_a_month_unless_the_robot_acts_on_them() -> None:
-    dependent = sum(policy.uses_estimator for policy in feedback.POLICIES.values())
-    months = dependent * len(feedback.ESTIMATORS) + len(feedback.POLICIES) - dependent
-    assert 3 * months == len(design_of(3))
+    dependent = sum(policy.uses_estimator for policy in months.POLICIES.values())
+    runs = dependent * len(months.ESTIMATORS) + len(months.POLICIES) - dependent
+    assert 3 * runs == len(design_of(3))
 
 
 # --- Speed --------------------------------------------------------------------------------------
@@ -158,7 +157,7 @@ def test_results_come_in_the_order_of_the_paper() -> None:
     assert ["speed", "feedback"] == check_names(["feedback", "speed", "speed"])
     with pytest.raises(InputError, match="did you mean 'feedback'"):
         check_names(["feedbak"])
-    assert (ltp_gap.NAME, rtp_gap.NAME) == tuple(check_names(["rtp-gap", "ltp-gap"]))
+    assert (months.LTP_GAP, months.RTP_GAP) == tuple(check_names(["rtp-gap", "ltp-gap"]))
 
 
 def test_a_directory_that_cannot_be_made_is_said_before_anything_is_run(tmp_path: Path) -> None:

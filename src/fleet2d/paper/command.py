@@ -1,20 +1,20 @@
 """The command that repeats the measurements of the paper: `fleet2d reproduce-paper`."""
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
+from fleet2d.configuration.problems import suggest
 from fleet2d.errors import InputError
-from fleet2d.paper.result import PAPER_COLUMN
 
 if TYPE_CHECKING:
-    from fleet2d.paper.months import OnProgress
-    from fleet2d.paper.result import Result
+    from fleet2d.paper.months import OnProgress, PaperOptions, Result
 
+RESULTS = ("speed", "ltp-gap", "rtp-gap", "feedback")  # in the order of the paper
 WIDTH = 200  # of lines in a file [characters]
 
 
@@ -44,9 +44,7 @@ def reproduce_paper(
     ] = None,
 ) -> None:
     """Repeat the measurements of the paper, and print them beside its figures."""
-    from fleet2d.paper.months import PaperOptions
-    from fleet2d.paper.result import make_directory
-    from fleet2d.paper.results import check_names, reproduce
+    from fleet2d.paper.months import PaperOptions, make_directory
     from fleet2d.studies.executors import cores
 
     names = check_names(results or [])
@@ -64,6 +62,44 @@ def reproduce_paper(
             target = out / f"{name}.png"
             draw(result, target)
             typer.echo(target)
+
+
+def check_names(names: Sequence[str]) -> list[str]:
+    """Return the names of results in the order of the paper; all of them if `names` is empty.
+
+    Raises:
+        InputError: There is no such result.
+
+    Example:
+        >>> check_names(["feedback", "speed"])
+        ['speed', 'feedback']
+    """
+    for name in names:
+        if name not in RESULTS:
+            raise InputError(f"there is no result {name!r}{suggest(name, RESULTS)}")
+    return [name for name in RESULTS if name in names or not names]
+
+
+def reproduce(name: str, options: "PaperOptions", on_progress: "OnProgress") -> "Result":
+    """Repeat the measurements of one result.
+
+    Args:
+        name: One of `RESULTS`.
+        options: The size.
+        on_progress: Receives the progress.
+
+    Raises:
+        InputError: The map can't be read, or matplotlib is missing, which drawing frames needs.
+    """
+    from fleet2d.paper import months, speed
+
+    functions = (
+        speed.reproduce,
+        months.reproduce_ltp_gap,
+        months.reproduce_rtp_gap,
+        months.reproduce_feedback,
+    )
+    return dict(zip(RESULTS, functions, strict=True))[name](options, on_progress)
 
 
 def _can_draw() -> bool:
@@ -99,6 +135,8 @@ def _print(result: "Result") -> None:
     from rich.console import Console
     from rich.markup import escape
     from rich.table import Table
+
+    from fleet2d.paper.months import PAPER_COLUMN
 
     console = Console(soft_wrap=True, width=None if sys.stdout.isatty() else WIDTH)
     console.print(f"\n{escape(result.title)}", highlight=False)

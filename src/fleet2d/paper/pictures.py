@@ -8,9 +8,8 @@ import numpy as np
 
 from fleet2d.errors import extra
 from fleet2d.metrics.rtp_score import GAPS
-from fleet2d.paper import feedback, ltp_gap, rtp_gap, speed
-from fleet2d.paper.months import interval
-from fleet2d.paper.result import Result
+from fleet2d.paper import months, speed
+from fleet2d.paper.months import Result, interval
 from fleet2d.pictures.floorplan import check_picture, drawing_style, save_figure
 
 with extra("viz", "drawing needs matplotlib"):
@@ -87,9 +86,9 @@ def draw_ltp_gap(numbers: Mapping[str, Any], axes: Axes) -> None:
 def draw_rtp_gap(numbers: Mapping[str, Any], axes: Axes) -> None:
     """Draw the share of right rooms by gap, with intervals."""
     rows = numbers["means"]["top_1"]
-    gaps = [gap for gap in GAPS if gap in rows[rtp_gap.NAIVE] and gap != NEVER_SEEN]
+    gaps = [gap for gap in GAPS if gap in rows[months.NAIVE_GUESS] and gap != NEVER_SEEN]
     for number, (name, by_gap) in enumerate(rows.items()):
-        is_naive = name == rtp_gap.NAIVE
+        is_naive = name == months.NAIVE_GUESS
         values = np.array([by_gap[gap] for gap in gaps])
         x = np.arange(len(gaps)) + 0.06 * (number - (len(rows) - 1) / 2)
         axes.errorbar(
@@ -113,9 +112,9 @@ def draw_rtp_gap(numbers: Mapping[str, Any], axes: Axes) -> None:
 def draw_feedback(numbers: Mapping[str, Any], axes: Axes) -> None:
     """Draw the mean errors of estimators under each policy, with intervals."""
     tv = numbers["tv"]
-    for number, estimator in enumerate(feedback.ESTIMATORS):
+    for number, estimator in enumerate(months.ESTIMATORS):
         cells = np.array([interval(by[estimator]) for by in tv.values()])
-        x = np.arange(len(tv)) + 0.16 * (number - (len(feedback.ESTIMATORS) - 1) / 2)
+        x = np.arange(len(tv)) + 0.16 * (number - (len(months.ESTIMATORS) - 1) / 2)
         ends = np.abs(cells[:, 1:] - cells[:, :1]).T
         label = estimator.replace("_", " ")
         axes.bar(x, cells[:, 0], 0.15, color=COLORS[number], label=label)
@@ -133,7 +132,7 @@ def _broken_lines(policy: str) -> str:
 
 DRAWERS: dict[str, Callable[[Mapping[str, Any], Axes], None]] = {
     speed.NAME: draw_speed,
-    ltp_gap.NAME: draw_ltp_gap,
-    rtp_gap.NAME: draw_rtp_gap,
-    feedback.NAME: draw_feedback,
+    months.LTP_GAP: draw_ltp_gap,
+    months.RTP_GAP: draw_rtp_gap,
+    months.FEEDBACK: draw_feedback,
 }

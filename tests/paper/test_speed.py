@@ -6,7 +6,7 @@ from matplotlib.colors import to_rgb
 from fleet2d.engine.simulation import Simulation
 from fleet2d.kernels import U8
 from fleet2d.palette import ROBOT_COLORS, USER_COLORS
-from fleet2d.paper.watched import FrameSeries, LiveView, time_frames
+from fleet2d.paper.speed import FrameSeries, LiveView, time_frames
 
 
 def at_hour(hour: int) -> Simulation:
