@@ -10,9 +10,10 @@ import os
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 from datetime import datetime, timedelta
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, NoReturn, Protocol
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NoReturn
 
 import numpy as np
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
@@ -352,32 +353,48 @@ class Seal(_Record):
     files: dict[FileName, FileRecord]
 
 
-class ManifestFacts(Protocol):
-    """What fields of the manifest are filled from: the engine passes all that it knows of a run.
-
-    The scenario, the state and the pace are of packages above this one, which can't be imported.
+@dataclass(frozen=True)
+class RunStart:
+    """What is known of a run before its first step.
 
     Attributes:
-        scenario: The scenario, see `fleet2d.scenario.model`.
+        scenario: The resolved configuration, with the seed.
         seed: The seed of the scenario, or the one that was drawn.
         clock: The steps of the run.
-        state: The home, bodies, actors, learners …, see `fleet2d.engine.state`.
-        wall_s: Wall time by phase so far [s].
-        pace: Slows the run down; None: it runs as fast as it can.
-        results: The results of the metrics; empty before the end.
+        users: Names of the users.
+        robots: Names of the robots.
+        input_files: The files that the run reads.
+        notes: Remarks for the user.
     """
 
-    scenario: Any
+    scenario: dict[str, Any]
     seed: int
     clock: Clock
-    state: Any
-    wall_s: Mapping[str, float]
-    pace: Any
-    results: Mapping[str, Any]
+    users: list[str]
+    robots: list[str]
+    input_files: Iterable[Path]
+    notes: list[str]
 
-    @property
-    def input_files(self) -> Iterable[Path]:
-        """The files that the run reads."""
+
+@dataclass(frozen=True)
+class RunEnd:
+    """What is known of a run after its last step.
+
+    Attributes:
+        steps: Number of steps simulated.
+        metrics: The results of the metrics.
+        wall_s: Wall time by phase [s].
+        input_files: The files that were read after the run began.
+        interventions: All interventions from outside, in order.
+        notes: Further remarks for the user.
+    """
+
+    steps: int
+    metrics: Mapping[str, Any]
+    wall_s: Mapping[str, float]
+    input_files: Iterable[Path]
+    interventions: list[dict[str, Any]]
+    notes: list[str]
 
 
 class Manifest(BaseModel):
@@ -436,24 +453,15 @@ class Manifest(BaseModel):
     resumed: Annotated[list[Count], VARIES] = []
     seal: Seal | None = None
 
-    def describe_start(self, run: ManifestFacts) -> None:
+    def describe_start(self, start: RunStart) -> None:
         """Set the fields that are known before the first step."""
-        self.scenario = run.scenario.resolved()
-        self.scenario["simulation"]["seed"] = run.seed
-        self.seed = run.seed
-        self.step_us = run.clock.step_us
-        self.start = run.clock.start.isoformat()
-        self.entities = Entities(users=list(run.scenario.users), robots=list(run.scenario.robots))
+        self.scenario, self.seed = start.scenario, start.seed
+        self.step_us = start.clock.step_us
+        self.start = start.clock.start.isoformat()
+        self.entities = Entities(users=start.users, robots=start.robots)
         self.versions = versions()
-        self.inputs = [input_record(path) for path in run.input_files]
-        self.notes = [
-            *run.state.home.plan.notes,
-            *(
-                f"{actor.path} has no behavior: it stays where it is"
-                for actor in run.state.actors
-                if not actor.entity.behaviors
-            ),
-        ]
+        self.inputs = [input_record(path) for path in start.input_files]
+        self.notes = start.notes
 
     def add_inputs(self, paths: Iterable[Path]) -> bool:
         """Add files that were read after the run began; return whether any was new."""
@@ -464,22 +472,15 @@ class Manifest(BaseModel):
                 self.inputs.append(input_record(path))
         return bool(new_paths)
 
-    def describe_end(self, run: ManifestFacts) -> None:
+    def describe_end(self, end: RunEnd) -> None:
         """Set the fields that are known after the last step; tables and digest are set already."""
-        self.steps = run.state.bodies.step
-        self.simulated_s = self.steps * run.clock.step_us / 1e6
-        self.metrics = dict(run.results)
-        self.wall_s = dict(run.wall_s)
-        self.add_inputs(run.state.interruptions.files)
-        interventions = run.state.interventions
-        is_over = self.steps >= run.clock.steps
-        self.interventions = interventions.done if is_over else interventions.records
-        speedup = run.pace.speedup_until(self.simulated_s) if run.pace else 0.0
-        if run.pace and speedup < 0.98 * run.pace.speedup:
-            self.notes.append(
-                f"{SLOW} {run.pace.speedup:g}, but only {speedup:.0f} times real time was reached,"
-                " because computing took longer"
-            )
+        self.steps = end.steps
+        self.simulated_s = end.steps * self.step_us / 1e6
+        self.metrics = dict(end.metrics)
+        self.wall_s = dict(end.wall_s)
+        self.add_inputs(end.input_files)
+        self.interventions = end.interventions
+        self.notes += end.notes
 
     @classmethod
     def varying(cls) -> list[str]:

@@ -8,13 +8,12 @@ import secrets
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import nullcontext, suppress
-from dataclasses import dataclass
 from datetime import datetime, timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO, Self
 
 from fleet2d.algorithms.algorithm import Algorithm
-from fleet2d.artifacts.manifest import FLOORPLAN_NAME, LEARNED_NAME, Status
+from fleet2d.artifacts.manifest import FLOORPLAN_NAME, LEARNED_NAME, SLOW, RunEnd, RunStart, Status
 from fleet2d.artifacts.store import RunStore, cannot_write
 from fleet2d.artifacts.unfinished import UnfinishedRun
 from fleet2d.configuration.problems import suggest
@@ -22,7 +21,7 @@ from fleet2d.configuration.units import micros, parse_duration
 from fleet2d.engine.checkpoint import Checkpoint, CheckpointWriter
 from fleet2d.engine.inputs import input_files
 from fleet2d.engine.interventions import is_from_outside
-from fleet2d.engine.loop import Loop, Pace
+from fleet2d.engine.loop import Loop
 from fleet2d.engine.script import repeat, request
 from fleet2d.engine.setup import set_up
 from fleet2d.engine.snapshot import (
@@ -120,7 +119,7 @@ class Simulation(InterventionMethods):
             self._keeper = CheckpointWriter(store, settings, self.clock, self._checkpoint_header)
         self._loop = Loop(self.clock, simulation.speedup, self._keeper)
         self._setup_s = 0.0
-        store.manifest.describe_start(self._facts())
+        store.manifest.describe_start(self._start())
         store.manifest.interventions = outside
 
     def _open_store(self) -> None:
@@ -723,21 +722,47 @@ class Simulation(InterventionMethods):
             self._store_learned()
         self._store.close_tables()
         self._loop.save_s += time.perf_counter() - began
-        self._store.manifest.describe_end(self._facts(results))
+        self._store.manifest.describe_end(self._end(results))
         self._store.close(status)
         self._run = run_of(self._store)
         self._run.plan = self.home.plan
         return self._run
 
-    def _facts(self, results: Mapping[str, Any] | None = None) -> "EngineFacts":
-        return EngineFacts(
-            self.scenario,
+    def _start(self) -> RunStart:
+        scenario = self.scenario.resolved()
+        scenario["simulation"]["seed"] = self.seed
+        idle = [actor.path for actor in self._state.actors if not actor.behaviors]
+        return RunStart(
+            scenario,
             self.seed,
             self.clock,
-            self._state,
+            users=list(self.scenario.users),
+            robots=list(self.scenario.robots),
+            input_files=input_files(self.scenario),
+            notes=[
+                *self.home.plan.notes,
+                *(f"{path} has no behavior: it stays where it is" for path in idle),
+            ],
+        )
+
+    def _end(self, results: Mapping[str, Any]) -> RunEnd:
+        interventions, pace = self._state.interventions, self._loop.pace
+        notes = []
+        speedup = pace.speedup_until(self.step * self.clock.step_us / 1e6) if pace else 0.0
+        if pace and speedup < 0.98 * pace.speedup:
+            notes = [
+                f"{SLOW} {pace.speedup:g}, but only {speedup:.0f} times real time was reached,"
+                " because computing took longer"
+            ]
+        return RunEnd(
+            self.step,
+            results,
             self._wall_s,
-            self._loop.pace,
-            results or {},
+            input_files=self._state.interruptions.files,
+            interventions=(
+                interventions.done if self.step >= self.clock.steps else interventions.records
+            ),
+            notes=notes,
         )
 
     def _store_learned(self) -> None:
@@ -763,24 +788,6 @@ class Simulation(InterventionMethods):
             self.finish("failed")
         if self.directory is not None and self._run is not None:
             error.add_note(f"the run until then, {self.time}, is in {self.directory}")
-
-
-@dataclass
-class EngineFacts:
-    """All that the engine knows of a run: what `ManifestFacts` has."""
-
-    scenario: Scenario
-    seed: int
-    clock: Clock
-    state: State
-    wall_s: Mapping[str, float]
-    pace: Pace | None
-    results: Mapping[str, Any]
-
-    @property
-    def input_files(self) -> list[Path]:
-        """The files that the run reads."""
-        return input_files(self.scenario)
 
 
 def run(
