@@ -1,4 +1,8 @@
-"""Disturbed cameras: the effect of interventions on the tables of the kernel that looks."""
+"""The cameras of a body in a run: their memory from span to span, and what they perceive.
+
+The look is compiled. Here are its tables, the effect of interventions on them, and methods of sight
+that are written in Python.
+"""
 
 import math
 from collections.abc import Iterator, Sequence, Set
@@ -56,159 +60,9 @@ from fleet2d.sight.line_of_sight import LineOfSight
 from fleet2d.sight.perception import Perception
 
 # Squared distance beyond which a dark camera sees nobody.
-NOT_EVEN_AT_0 = -1
-
-
-def present_errors(disturbances: Sequence[Disturbance], camera: str) -> Perception | None:
-    """Return the present errors of a camera, by the latest intervention; None: the usual ones."""
-    errs = [
-        disturbance.errs
-        for disturbance in of_camera(disturbances, camera)
-        if disturbance.errs is not None
-    ]
-    return errs[-1] if errs else None
-
-
-def dark_cameras(disturbances: Sequence[Disturbance], cameras: Sequence[str]) -> list[int]:
-    """Return the cameras that see nothing, by number."""
-    return [
-        c
-        for c, camera in enumerate(cameras)
-        if any(disturbance.dark for disturbance in of_camera(disturbances, camera))
-    ]
-
-
-def worsen(lenses: Lenses, disturbances: Sequence[Disturbance], cameras: Sequence[str]) -> None:
-    """Change lenses in place: dark cameras see nobody, others notice people less often."""
-    lenses.widest[dark_cameras(disturbances, cameras)] = NOT_EVEN_AT_0
-    for c, camera in enumerate(cameras):
-        for disturbance in of_camera(disturbances, camera):
-            chance = Fraction(int(lenses.chance[c])) * Fraction(disturbance.detection)
-            lenses.chance[c] = round(chance)
-
-
-def forced_of(
-    disturbances: Sequence[Disturbance], cameras: Sequence[str], people: Sequence[str]
-) -> I64:
-    """Return what each person in view is perceived as, (cameras, people); see About.FORCED."""
-    index = {name: u for u, name in enumerate(people)} | {"": -1}
-    forced = np.zeros((len(cameras), len(people)), np.int64)
-    for c, camera in enumerate(cameras):
-        for disturbance in of_camera(disturbances, camera):
-            if disturbance.missed is not None:
-                forced[c, index[disturbance.missed]] = FORCED_MISS
-            if disturbance.mistaken is not None:
-                user, other = disturbance.mistaken
-                forced[c, index[user]] = FORCED_IDENTITY + index[other]
-    return forced
-
-
-def injected_by(
-    disturbances: Sequence[Disturbance], cameras: Sequence[str], context: TableContext
-) -> I64:
-    """Return the false sightings of cameras that aren't dark, (n, 5); see ErrorTables."""
-    dark = dark_cameras(disturbances, cameras)
-    index = {name: u for u, name in enumerate(context.users)} | {"": -1}
-    rows = [
-        (
-            c,
-            index[sighting.user],
-            *context.lattice.to_lattice((sighting.x, sighting.y)),
-            sighting.heading,
-        )
-        for c, camera in enumerate(cameras)
-        for disturbance in of_camera(disturbances, camera)
-        if (sighting := disturbance.injected) is not None and c not in dark
-    ]
-    return np.array(rows, np.int64).reshape(-1, 5)
-
-
-def carry_over(memory: SightMemory, old: SightMemory, forced: I64) -> SightMemory:
-    """Return the memory of cameras for other errors, with the content of the old memory.
-
-    Args:
-        memory: The new memory, of a robot that has seen nobody.
-        old: The memory of the same cameras so far.
-        forced: What each user in view is perceived as from now on, (cameras, users).
-    """
-    about = old.about.copy()
-    about[..., About.FORCED.value] = forced
-    rows = max(memory.backlog.shape[1], int(old.waiting[:, 1].max(initial=0)))
-    backlog = np.zeros((len(about), rows, len(SightingColumn)), np.int64)
-    waiting = np.zeros_like(old.waiting)
-    for c, (begin, length) in enumerate(old.waiting.tolist()):
-        places = (begin + np.arange(length)) % max(1, old.backlog.shape[1])
-        backlog[c, :length], waiting[c, 1] = old.backlog[c, places], length
-    return SightMemory(old.noticed, old.seen, about, backlog, waiting)
-
-
+NO_RANGE = -1
 # Methods may round points to cells, so points this far outside the field of view are checked, too.
 SLACK = 2 * SUB
-
-
-def points_seen(
-    method: FieldOfView,
-    home: Home,
-    lenses: Lenses,
-    robot: Poses,
-    crowd: UserPoses,
-    first: int,
-    step_us: int,
-) -> U64:
-    """Return which points of each body are in view of each camera at each step.
-
-    Args:
-        method: The method of sight.
-        home: The home.
-        lenses: The cameras.
-        robot: The n poses of the owner of the cameras.
-        crowd: The other bodies.
-        first: The step of the first pose.
-        step_us: Length of a step [us].
-
-    Returns:
-        uint64 (cameras, bodies, n), bit i for point i.
-
-    Raises:
-        ComponentError: The method doesn't return a bool for each point.
-    """
-    widest = np.array(
-        [[(math.isqrt(squared) + SLACK) ** 2 for squared in row] for row in lenses.widest.tolist()],
-        np.int64,
-    ).reshape(lenses.widest.shape)
-    queries, number = view_queries(
-        lenses, widest, SLACK, robot, crowd.x, crowd.y, crowd.away, first, step_us
-    )
-    answers = np.zeros(len(queries) + 1, np.uint64)
-    has_moved = queries[1:, : Query.EYE_HEADING + 1] != queries[:-1, : Query.EYE_HEADING + 1]
-    has_moved[:, Query.BODY] = False
-    begins = [0, *(np.flatnonzero(has_moved.any(axis=1)) + 1).tolist()] if len(queries) else []
-    for begin, end in zip(begins, [*begins[1:], len(queries)], strict=False):
-        answers[begin + 1 : end + 1] = _answers(method, home, lenses, queries[begin:end])
-    return answers[number]
-
-
-def _answers(method: FieldOfView, home: Home, lenses: Lenses, queries: I64) -> U64:
-    """Return which points of each body are in view, for one pose of one camera."""
-    camera, _, x, y, heading = queries[0, : Query.EYE_HEADING + 1].tolist()
-    reach = Reach(
-        int(lenses.near_squared[camera]),
-        int(lenses.far_squared[camera]),
-        int(lenses.half_angle[camera]),
-    )
-    bodies = lenses.bodies[camera, queries[:, Query.BODY], : int(lenses.points[camera]) + 1]
-    points = (bodies + queries[:, None, [Query.BODY_X, Query.BODY_Y]]).reshape(-1, 2)
-    flags: object = method.sees(home, x, y, heading, reach, points)  # a user's own may be wrong
-    if not isinstance(flags, np.ndarray) or flags.dtype != bool or flags.shape != (len(points),):
-        raise ComponentError(
-            f"{type(method).__name__} returned {flags!r}, expected a bool array of shape"
-            f" ({len(points)},), a value for each point"
-        )
-    in_view = flags.reshape(len(queries), -1)
-    bits: U64 = np.uint64(1) << np.arange(in_view.shape[1], dtype=np.uint64)
-    return in_view @ bits
-
-
 # The name of the random stream of each draw.
 USER_STREAMS = {
     UserDraw.DETECT: "detect",
@@ -555,3 +409,155 @@ def open_cameras(basis: Basis) -> tuple[list[Cameras], list[Cameras]]:
         if actor.entity.eyes
     ]
     return [c for c in cameras if c.row < users], [c for c in cameras if c.row >= users]
+
+
+# Interventions
+
+
+def present_errors(disturbances: Sequence[Disturbance], camera: str) -> Perception | None:
+    """Return the present errors of a camera, by the latest intervention; None: the usual ones."""
+    errs = [
+        disturbance.errs
+        for disturbance in of_camera(disturbances, camera)
+        if disturbance.errs is not None
+    ]
+    return errs[-1] if errs else None
+
+
+def dark_cameras(disturbances: Sequence[Disturbance], cameras: Sequence[str]) -> list[int]:
+    """Return the cameras that see nothing, by number."""
+    return [
+        c
+        for c, camera in enumerate(cameras)
+        if any(disturbance.dark for disturbance in of_camera(disturbances, camera))
+    ]
+
+
+def worsen(lenses: Lenses, disturbances: Sequence[Disturbance], cameras: Sequence[str]) -> None:
+    """Change lenses in place: dark cameras see nobody, others notice people less often."""
+    lenses.widest[dark_cameras(disturbances, cameras)] = NO_RANGE
+    for c, camera in enumerate(cameras):
+        for disturbance in of_camera(disturbances, camera):
+            chance = Fraction(int(lenses.chance[c])) * Fraction(disturbance.detection)
+            lenses.chance[c] = round(chance)
+
+
+def forced_of(
+    disturbances: Sequence[Disturbance], cameras: Sequence[str], people: Sequence[str]
+) -> I64:
+    """Return what each person in view is perceived as, (cameras, people); see About.FORCED."""
+    index = {name: u for u, name in enumerate(people)} | {"": -1}
+    forced = np.zeros((len(cameras), len(people)), np.int64)
+    for c, camera in enumerate(cameras):
+        for disturbance in of_camera(disturbances, camera):
+            if disturbance.missed is not None:
+                forced[c, index[disturbance.missed]] = FORCED_MISS
+            if disturbance.mistaken is not None:
+                user, other = disturbance.mistaken
+                forced[c, index[user]] = FORCED_IDENTITY + index[other]
+    return forced
+
+
+def injected_by(
+    disturbances: Sequence[Disturbance], cameras: Sequence[str], context: TableContext
+) -> I64:
+    """Return the false sightings of cameras that aren't dark, (n, 5); see ErrorTables."""
+    dark = dark_cameras(disturbances, cameras)
+    index = {name: u for u, name in enumerate(context.users)} | {"": -1}
+    rows = [
+        (
+            c,
+            index[sighting.user],
+            *context.lattice.to_lattice((sighting.x, sighting.y)),
+            sighting.heading,
+        )
+        for c, camera in enumerate(cameras)
+        for disturbance in of_camera(disturbances, camera)
+        if (sighting := disturbance.injected) is not None and c not in dark
+    ]
+    return np.array(rows, np.int64).reshape(-1, 5)
+
+
+def carry_over(memory: SightMemory, old: SightMemory, forced: I64) -> SightMemory:
+    """Return the memory of cameras for other errors, with the content of the old memory.
+
+    Args:
+        memory: The new memory, of a robot that has seen nobody.
+        old: The memory of the same cameras so far.
+        forced: What each user in view is perceived as from now on, (cameras, users).
+    """
+    about = old.about.copy()
+    about[..., About.FORCED.value] = forced
+    rows = max(memory.backlog.shape[1], int(old.waiting[:, 1].max(initial=0)))
+    backlog = np.zeros((len(about), rows, len(SightingColumn)), np.int64)
+    waiting = np.zeros_like(old.waiting)
+    for c, (begin, length) in enumerate(old.waiting.tolist()):
+        places = (begin + np.arange(length)) % max(1, old.backlog.shape[1])
+        backlog[c, :length], waiting[c, 1] = old.backlog[c, places], length
+    return SightMemory(old.noticed, old.seen, about, backlog, waiting)
+
+
+# Methods of sight in Python
+
+
+def points_seen(
+    method: FieldOfView,
+    home: Home,
+    lenses: Lenses,
+    robot: Poses,
+    crowd: UserPoses,
+    first: int,
+    step_us: int,
+) -> U64:
+    """Return which points of each body are in view of each camera at each step.
+
+    Args:
+        method: The method of sight.
+        home: The home.
+        lenses: The cameras.
+        robot: The n poses of the owner of the cameras.
+        crowd: The other bodies.
+        first: The step of the first pose.
+        step_us: Length of a step [us].
+
+    Returns:
+        uint64 (cameras, bodies, n), bit i for point i.
+
+    Raises:
+        ComponentError: The method doesn't return a bool for each point.
+    """
+    widest = np.array(
+        [[(math.isqrt(squared) + SLACK) ** 2 for squared in row] for row in lenses.widest.tolist()],
+        np.int64,
+    ).reshape(lenses.widest.shape)
+    queries, number = view_queries(
+        lenses, widest, SLACK, robot, crowd.x, crowd.y, crowd.away, first, step_us
+    )
+    answers = np.zeros(len(queries) + 1, np.uint64)
+    has_moved = queries[1:, : Query.EYE_HEADING + 1] != queries[:-1, : Query.EYE_HEADING + 1]
+    has_moved[:, Query.BODY] = False
+    begins = [0, *(np.flatnonzero(has_moved.any(axis=1)) + 1).tolist()] if len(queries) else []
+    for begin, end in zip(begins, [*begins[1:], len(queries)], strict=False):
+        answers[begin + 1 : end + 1] = _answers(method, home, lenses, queries[begin:end])
+    return answers[number]
+
+
+def _answers(method: FieldOfView, home: Home, lenses: Lenses, queries: I64) -> U64:
+    """Return which points of each body are in view, for one pose of one camera."""
+    camera, _, x, y, heading = queries[0, : Query.EYE_HEADING + 1].tolist()
+    reach = Reach(
+        int(lenses.near_squared[camera]),
+        int(lenses.far_squared[camera]),
+        int(lenses.half_angle[camera]),
+    )
+    bodies = lenses.bodies[camera, queries[:, Query.BODY], : int(lenses.points[camera]) + 1]
+    points = (bodies + queries[:, None, [Query.BODY_X, Query.BODY_Y]]).reshape(-1, 2)
+    flags: object = method.sees(home, x, y, heading, reach, points)  # a user's own may be wrong
+    if not isinstance(flags, np.ndarray) or flags.dtype != bool or flags.shape != (len(points),):
+        raise ComponentError(
+            f"{type(method).__name__} returned {flags!r}, expected a bool array of shape"
+            f" ({len(points)},), a value for each point"
+        )
+    in_view = flags.reshape(len(queries), -1)
+    bits: U64 = np.uint64(1) << np.arange(in_view.shape[1], dtype=np.uint64)
+    return in_view @ bits

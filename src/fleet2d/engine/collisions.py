@@ -1,8 +1,10 @@
-"""Blocking: the bodies that are about to walk into another one, step by step.
+"""Collisions: bodies that are about to walk or drive into another one, step by step.
 
-It follows from the poses alone. A body is in another one's way at a step if that one moves towards
-it, and they would overlap before the next step. The body that moves decides at that step, before it
-moves, so the result doesn't depend on spans.
+It follows from the poses alone, and the body that moves decides at that step, before it moves, so
+the result doesn't depend on spans. Bodies that block each other wait, go round or squeeze past: a
+body is in the way if one moves towards it, and they would overlap before the next step. Robots that
+give way keep clear of people: a person is in the way if the next move would bring the robot nearer,
+and within its distance; for a robot that goes round people, if the bodies would touch.
 """
 
 from collections.abc import Sequence

@@ -1,4 +1,8 @@
-"""The base class of interrupts, and the part of a run that they see."""
+"""What interrupts plans besides cameras: interrupts, and robots that come near to people.
+
+Both follow from the poses alone, step by step, so they don't depend on spans. A span ends with the
+first of them, and the body decides right after it.
+"""
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass

@@ -1,4 +1,9 @@
-"""Changes of the home during a run: their times and order, and the bodies that they stop."""
+"""Changes of the home during a run: their times and order, and the bodies that they stop.
+
+Known changes wait in a queue by step: those of the scenario, doors by their schedule, doors on the
+way of a body, and doors that close by themselves. Changes are made before decisions in a step, so
+they hold for all bodies in it.
+"""
 
 import heapq
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""The seen area of a robot: the cells that its cameras have had in view, and when."""
+"""The layers of a run: those of what robots have seen, and when each layer is stored."""
 
 from collections.abc import Collection, Sequence, Set
 from dataclasses import dataclass
@@ -220,7 +220,7 @@ class SeenArea(Watcher):
 NEEDS = ("evidence", "exposure", *SEEN_LAYERS)
 
 
-def lay_layers(home: Home, source: FloorPlanSource) -> None:
+def add_layers(home: Home, source: FloorPlanSource) -> None:
     """Add the layers of a scenario to a home, except those of what robots have seen."""
     layers = dict(source.layers)
     costs = layers.pop(COSTMAP, None)

@@ -1,4 +1,8 @@
-"""The tables of a run and their columns."""
+"""The recorder of a run: which tables it has, and the rows for them.
+
+Rows are collected over spans and stored in the order of (step, entity), so that the tables don't
+depend on the spans of a run.
+"""
 
 import time
 from collections.abc import Sequence

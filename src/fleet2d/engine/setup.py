@@ -12,7 +12,7 @@ from fleet2d.engine.collisions import BlockedWays, Clearance
 from fleet2d.engine.encounters import SIGHT_EVENTS, Encounters, Interruptions
 from fleet2d.engine.home_changes import Changes
 from fleet2d.engine.interventions import Interventions
-from fleet2d.engine.layers import LayerBook, lay_layers
+from fleet2d.engine.layers import LayerBook, add_layers
 from fleet2d.engine.learners import Learners
 from fleet2d.engine.recorder import Recorder, activities_of, table_specs
 from fleet2d.engine.script import schedule_script
@@ -136,7 +136,7 @@ def _furnished_home(scenario: Scenario) -> Home:
             door_names[doorway.index] = name
             doors.append(doorway)
     home = Home(plan, doors)
-    lay_layers(home, scenario.floorplan)
+    add_layers(home, scenario.floorplan)
     return home
 
 

@@ -1,4 +1,4 @@
-"""Events of seeing and losing, from sightings that were changed after the look."""
+"""The errors of sightings that come after the look: components, and the belief about a pose."""
 
 import math
 from collections.abc import Sequence

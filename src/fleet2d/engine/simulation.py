@@ -1,4 +1,7 @@
-"""The simulation: a run in progress, which can be stepped, changed, read and copied."""
+"""The simulation: a run in progress, which can be stepped, changed, read and copied.
+
+It has the state of the run, and a loop that takes the state from span to span.
+"""
 
 import copy
 import io

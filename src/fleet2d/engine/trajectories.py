@@ -1,4 +1,7 @@
-"""The columns that several tables of a run share."""
+"""The tables of poses: samples at regular times, and key frames.
+
+From key frames, which are few, all poses of a run can be rebuilt.
+"""
 
 from collections.abc import Sequence
 
