@@ -129,9 +129,9 @@ class RunExpectations:
         """Return the present activity of a user; None if none is known."""
         return self._activities.now(row)
 
-    def cameras_of(self, name: str) -> "CameraView":
+    def cameras_of(self, name: str) -> "ExpectedCameras":
         """Return the cameras of a body."""
-        return CameraView(next(c for c in self._cameras if c.owner.name == name), self)
+        return ExpectedCameras(next(c for c in self._cameras if c.owner.name == name), self)
 
     # Measuring
 
@@ -254,7 +254,7 @@ def _type_of(behavior: Any) -> str:
 
 
 @dataclass(frozen=True)
-class CameraView:
+class ExpectedCameras:
     """The cameras of a body as `fleet2d.expectations.signals.MeasuredCameras` describes them."""
 
     cameras: Cameras

@@ -53,6 +53,7 @@ class DueIntervention(NamedTuple):
         """The entry of the manifest.
 
         Example:
+            >>> from fleet2d.interventions.intervention import parse_intervention
             >>> DueIntervention(60, OUTSIDE, 0, parse_intervention({"replan": "astro"})).record
             {'do': 'replan', 'step': 60, 'entity': 'astro'}
         """
