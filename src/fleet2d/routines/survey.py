@@ -28,7 +28,7 @@ import numpy as np
 
 from fleet2d.kernels import F64, I32
 from fleet2d.kernels.motion import NO_GAP_S
-from fleet2d.routines.distributions import KNOTS, Distribution, draw_weighted, lognormal, position
+from fleet2d.routines.distributions import KNOTS, draw_weighted, lognormal, position
 from fleet2d.routines.planner import Episode
 from fleet2d.runtime.determinism import Draws
 
@@ -144,12 +144,9 @@ def _survival(facts: dict[str, Any], category: str) -> list[float]:
     """Return the probability that an episode of each age lasts another step."""
     mean_s = facts["minutes"].get(category, 60) * 60
     lasts = lognormal(*SLEEP_S) if category == "sleeping" else lognormal(mean_s, SPREAD * mean_s)
-    ended = [_share_below(lasts, age * STEP_S) for age in range(AGES + 1)]
+    whole = (KNOTS - 1) << 24
+    ended = [position(lasts.knots, age * STEP_S) / whole for age in range(AGES + 1)]
     return [(1 - b) / (1 - a) if a < 1 else 0.5 for a, b in pairwise(ended)]
-
-
-def _share_below(lasts: Distribution, value: int) -> float:
-    return position(lasts.knots, value) / ((KNOTS - 1) << 24)
 
 
 def _next(now: F64, target: F64, survival: F64) -> tuple[F64, F64, F64]:
@@ -263,7 +260,9 @@ def to_activities(
             name = "work_at_home" if works_at_home else "work"
         elif category == "eating":
             eats_at_home = draws.below(WHOLE) < table()["eat_at_home"]
-            name = _meal(begin // 3600 % 24) if eats_at_home else "outing"
+            hour = begin // 3600 % 24
+            meal = next((meal for until, meal in MEALS if hour < until), "dinner")
+            name = meal if eats_at_home else "outing"
         elif category == "exercise":
             exercises_at_home = draws.below(WHOLE) < table()["exercise_at_home"]
             name = "exercise" if exercises_at_home else "sport"
@@ -271,10 +270,6 @@ def to_activities(
             name = PLAIN[category]
         day.append(Episode(name, begin, end, category))
     return day
-
-
-def _meal(hour: int) -> str:
-    return next((meal for until, meal in MEALS if hour < until), "dinner")
 
 
 def _add_pastimes(

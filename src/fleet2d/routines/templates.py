@@ -61,10 +61,8 @@ def _day_plan(persona: "Persona", name: str, day: "DayTemplate") -> DayPlan:
     if day.recorded:
         return _recorded_plan(name, day)
     wake = starts(day.wake, 0)
-    assert wake is not None
     dawn = wake.shortest
     sleep = starts(day.sleep, dawn)
-    assert sleep is not None
     order = _in_order(day.do)
     jobs = tuple(_job(persona, task, day.do[task], order, dawn) for task in order)
     leisure = persona.leisure if day.leisure is None else day.leisure
@@ -93,7 +91,8 @@ def _in_order(tasks: dict[str, "Task"]) -> list[str]:
 def _job(persona: "Persona", name: str, task: "Task", order: list[str], dawn: int) -> Job:
     activity = persona.activity(task.activity or name)
     place = int(task.before_bed) - int(task.on_waking)
-    begin = None if place or (task.after and not _timed(task)) else starts(task, dawn)
+    has_time = task.at is not None or task.between is not None
+    begin = None if place or (task.after and not has_time) else starts(task, dawn)
     if task.fixed and task.at is not None:
         begin = uniform(of_day(task.at, dawn), of_day(task.at, dawn))
     return Job(
@@ -108,10 +107,6 @@ def _job(persona: "Persona", name: str, task: "Task", order: list[str], dawn: in
         exclusive=activity.exclusive,
         place=place,
     )
-
-
-def _timed(timing: "Timing") -> bool:
-    return timing.at is not None or timing.between is not None
 
 
 def _pastime(

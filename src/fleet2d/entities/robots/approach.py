@@ -195,7 +195,8 @@ def way_seconds(actor: Actor, start: LatticePoint, goal: LatticePoint) -> float 
     route = actor.space.route(start, goal)
     if route is None or actor.drive is None:
         return None if route is None else sum_in_order(_legs(route)) / actor.speed
-    rows = actor.breakpoints(route, 0, _first_heading(route))
+    (dx, dy), *_ = np.diff(route, axis=0).tolist() or [[0, 0]]
+    rows = actor.breakpoints(route, 0, heading_of(dx, dy))
     return float(rows[-1, 0]) / 1e6 if len(rows) else 0.0
 
 
@@ -224,8 +225,9 @@ def spot_near(now: Situation, x: float, y: float, distance: float) -> LatticePoi
         steps = max(1, int(length / (lattice.units_per_m / 20)))
         for k in range(1, steps + 1):
             point = start + (end - start) * k // steps
-            if _distance(person, point) <= reach and _is_free(actor, point):
-                return int(point[0]), int(point[1])
+            at = int(point[0]), int(point[1])
+            if _distance(person, at) <= reach and actor.space.part_at(*at) == actor.part:
+                return at
     return int(goal[0]), int(goal[1])
 
 
@@ -271,16 +273,6 @@ def check_has_camera(actor: Actor, behavior: str) -> None:
             f"{actor.path}: {behavior} depends on what the robot sees, but it has no camera: give"
             " it one, like camera: {range: [0.3, 4.5], angle_deg: 108}, or leave the behavior out"
         )
-
-
-def _is_free(actor: Actor, point: I64) -> bool:
-    return actor.space.part_at(int(point[0]), int(point[1])) == actor.part
-
-
-def _first_heading(route: I64) -> int:
-    """Return the direction of the first leg of a route [1/4096 turn]."""
-    (dx, dy), *_ = np.diff(route, axis=0).tolist() or [[0, 0]]
-    return heading_of(dx, dy)
 
 
 def _legs(route: I64) -> list[float]:

@@ -1,6 +1,6 @@
 """Hangout: stand near people without blocking their way, and move rarely."""
 
-from datetime import datetime, timedelta
+from datetime import timedelta
 from itertools import combinations
 from typing import ClassVar, Literal
 
@@ -276,7 +276,9 @@ class Hangout(BeliefBehavior):
     def decide(self, now: Situation) -> Plan:
         """Stay, or go to a better place; go back to its place after another behavior's turn."""
         plan, quiet_until = now.plan(), holds(self.quiet, now.time)
-        if quiet_until is not None and not self._is_in_avoided_room(now):
+        # As after a visit, or when the run begins.
+        is_in_avoided_room = now.room is not None and now.room.index in self.avoided
+        if quiet_until is not None and not is_in_avoided_room:
             return plan.stay(until=quiet_until)
         if self.place is None or (quiet_until is None and now.time >= self.decides_at):
             self.is_blocked = False
@@ -293,17 +295,12 @@ class Hangout(BeliefBehavior):
             self._face_room(now, plan)
         if quiet_until is not None:
             return plan.stay(until=quiet_until)
-        return plan.stay(until=self.decides_at).ask_by(
-            self._quiet_begins(self.decides_at, now.time)
-        )
+        quiet_begins = (span.next_begin(now.time) for span in self.quiet)
+        return plan.stay(until=self.decides_at).ask_by(min([self.decides_at, *quiet_begins]))
 
     def give_up(self, now: Situation) -> None:
         """Stay where it is until the next period."""
         self.is_blocked = True
-
-    def _is_in_avoided_room(self, now: Situation) -> bool:
-        """Return whether it is in a room to avoid, as after a visit or when the run begins."""
-        return now.room is not None and now.room.index in self.avoided
 
     def _choose(self, now: Situation, plan: Plan) -> None:
         """Choose the place to stand at until the next period."""
@@ -355,7 +352,3 @@ class Hangout(BeliefBehavior):
         x, y = now.home.plan.lattice.point_at(room.anchor_xy)
         if (x, y) != (plan.x, plan.y):
             plan.face(x, y)
-
-    def _quiet_begins(self, until: datetime, time: datetime) -> datetime:
-        """Return when the next quiet hours begin, or `until` if that is earlier."""
-        return min([until, *(span.next_begin(time) for span in self.quiet)])

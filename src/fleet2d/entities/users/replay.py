@@ -314,7 +314,8 @@ class RoomFollower:
         arrive_us = visit.first * self.step_us
         may_leave = max(plan.time_us, before.keep * self.step_us)
         if before.place == AWAY:
-            self._come_home(plan, before, arrive_us)
+            back_us = max(plan.time_us, min((before.last + 1) * self.step_us, arrive_us - 1))
+            plan.jump(back_us, away=0).note("came_home")
             may_leave = max(plan.time_us, may_leave)
         spot = self._spot(visit, plan)
         rows = self._way(plan, spot)
@@ -326,10 +327,6 @@ class RoomFollower:
         self._set_out(plan, rows, may_leave, arrive_us, before)
         if visit.place == AWAY:
             plan.jump(arrive_us, away=1).note("left_home")
-
-    def _come_home(self, plan: Plan, out: LoggedVisit, arrive_us: int) -> None:
-        back_us = max(plan.time_us, min((out.last + 1) * self.step_us, arrive_us - 1))
-        plan.jump(back_us, away=0).note("came_home")
 
     def _near(self, plan: Plan, spot: tuple[int, int]) -> tuple[int, int]:
         """Return the place in the room of a spot that is nearest to the body."""

@@ -601,23 +601,21 @@ class ResidentBehavior(Behavior):
         if rooms is venue.rooms:  # no door is shut
             return venue
         if len(rooms) < len(venue.rooms):
-            activity = venue.activity
-            seats = self.spots.at_furniture(activity.objects, rooms, activity.posture)
-            venue = venue._replace(rooms=rooms, seats=seats)
+            venue = self._within(venue, rooms)
         return venue._replace(stores=self.spots.reachable(venue.stores))
 
     def _in_room(self, venue: Venue, index: int) -> Venue:
         """Return the present venue of an activity; in a room that its household chose, if any."""
         if index != ANY_ROOM:
             room = next((room for room in self.reachable_rooms if room.index == index), None)
-            venue = venue if room is None else self._within(venue, room)
+            venue = venue if room is None else self._within(venue, [room])
         return self._at_present(venue) if self.is_hindered else venue
 
-    def _within(self, venue: Venue, room: "Room") -> Venue:
-        """Return the venue of an activity, in one room only."""
+    def _within(self, venue: Venue, rooms: list["Room"]) -> Venue:
+        """Return the venue of an activity, in some of its rooms only."""
         activity = venue.activity
-        seats = self.spots.at_furniture(activity.objects, (room,), activity.posture)
-        return venue._replace(rooms=[room], seats=seats)
+        seats = self.spots.at_furniture(activity.objects, rooms, activity.posture)
+        return venue._replace(rooms=rooms, seats=seats)
 
     def _venue(self, actor: "Actor", activity: Activity) -> Venue:
         if activity.away:
