@@ -1,4 +1,4 @@
-"""Layers: named arrays with a value for each cell, which entities and algorithms read and write."""
+"""Layers: named arrays with a value for each cell, and the costmap, which routes avoid."""
 
 import math
 import re

@@ -1,4 +1,4 @@
-"""Read a floor plan by its name: a file of a known format, a bundled home, or a synthetic one.
+"""Read a floor plan by its name, a file, a bundled home or a synthetic one, and write it to a file.
 
 A synthetic home is named by its seed, such as `synthetic:7`. The readers of foreign formats are
 imported when a file needs them.
@@ -10,25 +10,16 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-import shapely
-import yaml
-from shapely import LineString, MultiPolygon, Point
-from shapely.geometry import mapping
-from shapely.geometry.base import BaseGeometry
-
 from fleet2d.configuration.components import components, lookup
 from fleet2d.configuration.problems import suggest
 from fleet2d.configuration.units import folder_of
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.formats.files import YAML, read_document, read_yaml
-from fleet2d.floorplan.formats.geojson import COLLECTION
 from fleet2d.floorplan.formats.native import (
     FORMAT,
     bundled_names,
-    cell_polygons,
     native_document,
     native_plan,
-    object_document,
     read_bundled,
 )
 from fleet2d.floorplan.plan import FloorPlan
@@ -244,6 +235,8 @@ def save_floorplan(plan: FloorPlan, path: str | Path) -> None:
     path = Path(path)
     suffix = path.suffix.lower()
     if suffix == ".geojson":
+        from fleet2d.floorplan.formats.geojson import geojson_document
+
         text = _json(geojson_document(plan))
     elif suffix == ".json":
         text = _json(native_document(plan))
@@ -254,34 +247,6 @@ def save_floorplan(plan: FloorPlan, path: str | Path) -> None:
     _write_new(path, text)
 
 
-def geojson_document(plan: FloorPlan) -> dict[str, Any]:
-    """Return a plan as a GeoJSON FeatureCollection, in metres; `read_geojson` reads it."""
-    to_metres = plan.lattice.to_metres
-    features = [_feature(shapely.transform(p, to_metres), "free") for p in plan.polygons]
-    for room in plan.rooms:
-        cells = MultiPolygon(cell_polygons(plan.room_of_cell == room.index))
-        properties = {"name": room.name, "type": room.type, "labels": list(room.labels)}
-        features.append(_feature(shapely.transform(cells, to_metres), "room", **properties))
-    for door in plan.doorways:
-        kind = "door" if door.leaf else "opening"
-        features.append(_feature(LineString([door.start, door.end]), kind, name=door.name))
-    for thing in plan.objects:
-        properties = object_document(thing)
-        del properties["footprint"]
-        features.append(_feature(thing.footprint, "object", **properties))
-    features += [_feature(area, "no_go") for area in plan.no_go]
-    if plan.entrance is not None:
-        features.append(_feature(Point(plan.entrance), "entrance"))
-    return {"type": COLLECTION, "name": plan.name, "units": "m", "features": features}
-
-
-def _feature(shape: BaseGeometry, kind: str, **properties: Any) -> dict[str, Any]:
-    if isinstance(shape, MultiPolygon) and len(shape.geoms) == 1:
-        shape = shape.geoms[0]
-    all_properties = {"kind": kind, **properties}
-    return {"type": "Feature", "properties": all_properties, "geometry": mapping(shape)}
-
-
 def _json(document: dict[str, Any]) -> str:
     """Return JSON with one point to a line."""
     return _POINT.sub(r"[\1, \2]", json.dumps(document, indent=1)) + "\n"
@@ -289,6 +254,8 @@ def _json(document: dict[str, Any]) -> str:
 
 def _yaml(document: dict[str, Any], path: Path) -> str:
     """Return YAML with one point to a line."""
+    import yaml  # a home in a JSON file is read without it
+
     dumper: Any = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
     style: dict[str, Any] = {"default_flow_style": None, "sort_keys": False, "width": 100}
     try:

@@ -1,4 +1,4 @@
-"""The space of a round body and its shortest routes: free space shrunk by the body's radius."""
+"""Where bodies can be: the space of a round body, its shortest routes, and places to stand."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""Text and legends over a whole figure, at positions in inches."""
+"""Life in a home: traces of bodies, fields of view, and text and legends over a figure."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""An actogram: a row per simulated day, coloured by the room that somebody is in."""
+"""Pictures of a run: its home with the lives in it, and an actogram, a row for each day."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass

@@ -9,8 +9,8 @@ from pydantic import ValidationError
 
 from fleet2d.configuration.components import lookup
 from fleet2d.errors import FloorPlanError
-from fleet2d.floorplan.formats.geojson import GeoJson, read_geojson
-from fleet2d.floorplan.load import geojson_document, load_floorplan, save_floorplan
+from fleet2d.floorplan.formats.geojson import GeoJson, geojson_document, read_geojson
+from fleet2d.floorplan.load import load_floorplan, save_floorplan
 from fleet2d.floorplan.plan import FloorPlan
 
 Ring = list[list[float]]

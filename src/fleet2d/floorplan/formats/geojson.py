@@ -15,7 +15,8 @@ import numpy as np
 import shapely
 import shapely.geometry
 from pydantic import Field, TypeAdapter
-from shapely import MultiPolygon, Point, Polygon
+from shapely import LineString, MultiPolygon, Point, Polygon
+from shapely.geometry import mapping
 from shapely.geometry.base import BaseGeometry
 
 from fleet2d.bounds import CORNERS, POLYGONS
@@ -31,7 +32,7 @@ from fleet2d.floorplan.formats.files import (
     shown_value,
     validate,
 )
-from fleet2d.floorplan.formats.native import ObjectUse
+from fleet2d.floorplan.formats.native import ObjectUse, cell_polygons, object_document
 from fleet2d.floorplan.mesh import repair
 from fleet2d.floorplan.objects import PlacedObject, distinct_names
 from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
@@ -658,3 +659,34 @@ def _multi(shape: BaseGeometry) -> MultiPolygon:
 
 def _parts(shape: BaseGeometry) -> list[Polygon]:
     return [part for part in shapely.get_parts(shape).tolist() if part.geom_type == "Polygon"]
+
+
+# --- Writing ---------------------------------------------------------------------------------
+
+
+def geojson_document(plan: FloorPlan) -> dict[str, Any]:
+    """Return a plan as a GeoJSON FeatureCollection, in metres; `read_geojson` reads it."""
+    to_metres = plan.lattice.to_metres
+    features = [_feature(shapely.transform(p, to_metres), "free") for p in plan.polygons]
+    for room in plan.rooms:
+        cells = MultiPolygon(cell_polygons(plan.room_of_cell == room.index))
+        properties = {"name": room.name, "type": room.type, "labels": list(room.labels)}
+        features.append(_feature(shapely.transform(cells, to_metres), "room", **properties))
+    for door in plan.doorways:
+        kind = "door" if door.leaf else "opening"
+        features.append(_feature(LineString([door.start, door.end]), kind, name=door.name))
+    for thing in plan.objects:
+        properties = object_document(thing)
+        del properties["footprint"]
+        features.append(_feature(thing.footprint, "object", **properties))
+    features += [_feature(area, "no_go") for area in plan.no_go]
+    if plan.entrance is not None:
+        features.append(_feature(Point(plan.entrance), "entrance"))
+    return {"type": COLLECTION, "name": plan.name, "units": "m", "features": features}
+
+
+def _feature(shape: BaseGeometry, kind: str, **properties: Any) -> dict[str, Any]:
+    if isinstance(shape, MultiPolygon) and len(shape.geoms) == 1:
+        shape = shape.geoms[0]
+    all_properties = {"kind": kind, **properties}
+    return {"type": "Feature", "properties": all_properties, "geometry": mapping(shape)}

@@ -1,4 +1,14 @@
-"""The content of a file in Fleet2D's own floor plan format, and its JSON Schema."""
+"""Fleet2D's own floor plan format: outlines, rooms, doors and objects, as JSON or YAML.
+
+A plan that is written by `native_document` and read again at the same cell size is equal to it::
+
+    {"format": "fleet2d-floorplan", "version": 1, "name": "flat",
+     "free": [{"outline": [[0, 0], [5, 0], [5, 3], [0, 3]], "holes": []}],
+     "rooms": [{"type": "kitchen", "polygon": [[0, 0], [2, 0], [2, 3], [0, 3]]}],
+     "entrance": [4.5, 0.5]}
+
+`PlanFile` has all keys. The bundled homes are files in this format.
+"""
 
 from functools import cached_property
 from pathlib import Path
@@ -36,9 +46,9 @@ from fleet2d.floorplan.formats.files import (
     shown_value,
     validate,
 )
-from fleet2d.floorplan.lattice import UNITS_PER_CELL, Lattice
+from fleet2d.floorplan.lattice import UNITS_PER_CELL
 from fleet2d.floorplan.objects import Blocks, PlacedObject, Posture, UsePlace
-from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
+from fleet2d.floorplan.plan import FloorPlan, LabelledRegion, rings
 from fleet2d.floorplan.rooms.doorways import DoorLine
 from fleet2d.floorplan.rooms.room import UNKNOWN, room_type
 from fleet2d.floorplan.source import FloorPlanSource
@@ -356,19 +366,21 @@ def plan_of(file: PlanFile, path: Path, cell: float) -> FloorPlan:
 
 def native_document(plan: FloorPlan) -> dict[str, Any]:
     """Return a plan as the mapping that `read_native` reads, of plain JSON data."""
-    lattice = plan.lattice
+    to_metres = plan.lattice.to_metres
     document: dict[str, Any] = {
         "format": FORMAT,
         "version": VERSION,
         "name": plan.name,
-        "free": [_part_document(lattice, polygon) for polygon in plan.polygons],
+        "free": [
+            _part_document(shapely.transform(polygon, to_metres)) for polygon in plan.polygons
+        ],
         "rooms": [
             {
                 "name": room.name,
                 "type": room.type,
                 "labels": list(room.labels),
                 "region": [
-                    _part_document(lattice, polygon)
+                    _part_document(shapely.transform(polygon, to_metres))
                     for polygon in cell_polygons(plan.room_of_cell == room.index)
                 ],
             }
@@ -409,21 +421,13 @@ def _use_document(use: UsePlace) -> dict[str, Any]:
 
 
 def _area_document(polygon: Polygon) -> Any:
-    outline, *holes = (
-        shapely.get_coordinates(ring)[:-1].tolist()
-        for ring in (polygon.exterior, *polygon.interiors)
-    )
-    return {"outline": outline, "holes": holes} if holes else outline
+    area = _part_document(polygon)
+    return area if "holes" in area else area["outline"]
 
 
-def _part_document(lattice: Lattice, polygon: Polygon) -> dict[str, Any]:
-    def metres(ring: shapely.LinearRing) -> Any:
-        return lattice.to_metres(shapely.get_coordinates(ring)[:-1]).tolist()
-
-    part = {"outline": metres(polygon.exterior)}
-    if polygon.interiors:
-        part["holes"] = [metres(hole) for hole in polygon.interiors]
-    return part
+def _part_document(polygon: Polygon) -> dict[str, Any]:
+    outline, *holes = (shapely.get_coordinates(ring)[:-1].tolist() for ring in rings(polygon))
+    return {"outline": outline, "holes": holes} if holes else {"outline": outline}
 
 
 def cell_polygons(mask: Bool) -> list[Polygon]:

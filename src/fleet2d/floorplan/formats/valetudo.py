@@ -1,4 +1,4 @@
-"""The content of a Valetudo map file (JSON, version 2): its layers of pixels and its entities.
+"""Maps of robot vacuums with Valetudo (JSON, format version 2).
 
 The file numbers pixels from the top and has lengths in centimetres. A place (x, y) [cm] of the file
 is (x / 100, -y / 100) [m] here, so that y points up and nothing is mirrored.

@@ -1,8 +1,8 @@
-"""Label chambers by the rough boxes that a file draws over a plan.
+"""Divide free space into rooms, by its walls and the regions that a file labels.
 
-Walls determine where rooms end, and boxes how they are labelled. A box is matched to the chamber
-that it outlines, and doesn't reach into others. Several boxes in one chamber, as in an open plan,
-divide it.
+Where the regions are rough boxes, walls determine where rooms end, and boxes how they are labelled:
+a box is matched to the chamber that it outlines, and doesn't reach into others. Several boxes in
+one chamber, as in an open plan, divide it.
 """
 
 from collections.abc import Mapping, Sequence

@@ -1,9 +1,12 @@
-"""Find the passages of a floor plan: short lines between walls, with wider space on both sides.
+"""Segment free space by its walls alone: passages, the chambers between them, rooms.
 
 A passage is a line from a corner of a wall to another corner, or to the nearest point of a wall,
 that can't be made shorter by moving its ends: where the clearance to the walls has a local minimum.
 These are the critical lines of Thrun, "Learning metric-topological maps for indoor mobile robot
 navigation" (Artificial Intelligence 99, 1998), found on the walls themselves instead of on a grid.
+To cut the free space at them and to join what is too small to be a room is Voronoi segmentation,
+one of the four methods that Bormann, Jordan, Li, Hampp and Hägele compare in "Room Segmentation:
+Survey, Implementation, and Analysis" (ICRA 2016).
 """
 
 from collections.abc import Iterator, Sequence

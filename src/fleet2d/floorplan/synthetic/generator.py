@@ -1,4 +1,4 @@
-"""Which rooms open to which: doors and openings by the types of rooms, until all are linked."""
+"""Generate a home: link the rooms of many layouts by doors, judge each, and finish the best."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""Convert a generated home to a floor plan."""
+"""The `synthetic` floor plan: a home generated from a seed, its settings, and its floor plan."""
 
 from collections.abc import Sequence
 from typing import Literal, Self
