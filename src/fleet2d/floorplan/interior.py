@@ -14,7 +14,7 @@ from fleet2d.floorplan.home import lattice_footprint
 from fleet2d.floorplan.lattice import UNITS_PER_CELL
 from fleet2d.floorplan.mesh import GRID
 from fleet2d.floorplan.objects import PlacedObject
-from fleet2d.floorplan.plan import FloorPlan, Room, rings
+from fleet2d.floorplan.plan import FloorPlan, Room
 from fleet2d.floorplan.space import (
     BODY_RADIUS,
     Space,
@@ -568,7 +568,7 @@ def whole_cells(plan: FloorPlan) -> Bool:
     """
     cells: Bool = plan.free.copy()
     for polygon in plan.polygons:
-        for ring in rings(polygon):
+        for ring in shapely.get_rings(polygon):
             points = shapely.get_coordinates(ring)
             parts = np.abs(np.diff(points, axis=0)).max(axis=1) // (UNITS_PER_CELL // 4) + 1
             parts = parts.astype(np.int64)

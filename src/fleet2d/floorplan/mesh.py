@@ -151,7 +151,7 @@ def _rings(polygons: Sequence[Polygon], width: int, height: int) -> list[list[I6
         rings.append(
             [
                 shapely.get_coordinates(ring)[:-1].astype(np.int64)
-                for ring in (oriented.exterior, *oriented.interiors)
+                for ring in shapely.get_rings(oriented)
             ]
         )
     return _drop_flat_vertices(rings)

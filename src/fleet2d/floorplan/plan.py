@@ -296,7 +296,7 @@ class FloorPlan:
             "lattice": [lattice.cell, *lattice.origin, lattice.columns, lattice.rows],
             "rooms": [[room.name, room.type, *room.labels] for room in self.rooms],
             "entrance": self.entrance,
-            "rings": [[len(ring.coords) for ring in rings(p)] for p in self.polygons],
+            "rings": [[len(ring.coords) for ring in shapely.get_rings(p)] for p in self.polygons],
         }
         # Parts that a plan doesn't have are left out, so that older digests stay valid.
         if self.doorways:
@@ -422,8 +422,3 @@ class FloorPlan:
                 f"the entrance of {self.name} at ({x:g}, {y:g}) m is not in free space: the nearest"
                 f" free cell is at ({free_x:.2f}, {free_y:.2f}) m"
             )
-
-
-def rings(polygon: Polygon) -> list[shapely.LinearRing]:
-    """Return the rings of a polygon, the outer one first."""
-    return [polygon.exterior, *polygon.interiors]

@@ -233,7 +233,7 @@ class Space:
         vertices = self.mesh.vertices
         before, at, after = [], [], []
         for polygon in self.polygons:
-            for ring in (polygon.exterior, *polygon.interiors):
+            for ring in shapely.get_rings(polygon):
                 points = np.asarray(ring.coords)[:-1].astype(np.int64)
                 before.append(np.roll(points, 1, axis=0))
                 at.append(points)
@@ -268,10 +268,7 @@ def shrink(
     octagon = _octagon(radius)
     shrunk: list[Polygon] = []
     for polygon in polygons:
-        grown = [
-            _grow_walls(np.asarray(r.coords), octagon)
-            for r in (polygon.exterior, *polygon.interiors)
-        ]
+        grown = [_grow_walls(np.asarray(r.coords), octagon) for r in shapely.get_rings(polygon)]
         grown.append(np.array(blocked, np.object_))
         rest = shapely.difference(polygon, shapely.union_all(np.concatenate(grown)))
         for part in shapely.get_parts(rest):

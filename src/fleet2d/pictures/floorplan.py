@@ -25,7 +25,7 @@ from fleet2d.errors import InputError
 from fleet2d.floorplan.checkup import Finding
 from fleet2d.floorplan.lattice import UNITS_PER_CELL
 from fleet2d.floorplan.objects import PlacedObject
-from fleet2d.floorplan.plan import FloorPlan, Room, rings
+from fleet2d.floorplan.plan import FloorPlan, Room
 from fleet2d.floorplan.rooms.room import NO_ROOM
 from fleet2d.floorplan.space import grown_cells
 from fleet2d.kernels import F64, I16, Bool
@@ -384,7 +384,7 @@ def _outline(plan: FloorPlan, polygons: Sequence[shapely.Polygon]) -> Outline:
     parts = []
     for polygon in polygons:
         # Holes need the opposite orientation.
-        for ring in rings(shapely.orient_polygons(polygon)):
+        for ring in shapely.get_rings(shapely.orient_polygons(polygon)):
             corners = plan.lattice.to_metres(shapely.get_coordinates(ring))
             parts.append(Outline(corners, closed=True))
     return Outline.make_compound_path(*parts)

@@ -48,7 +48,7 @@ from fleet2d.floorplan.formats.files import (
 )
 from fleet2d.floorplan.lattice import UNITS_PER_CELL
 from fleet2d.floorplan.objects import Blocks, PlacedObject, Posture, UsePlace
-from fleet2d.floorplan.plan import FloorPlan, LabelledRegion, rings
+from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
 from fleet2d.floorplan.rooms.doorways import DoorLine
 from fleet2d.floorplan.rooms.room import UNKNOWN, room_type
 from fleet2d.floorplan.source import FloorPlanSource
@@ -426,7 +426,8 @@ def _area_document(polygon: Polygon) -> Any:
 
 
 def _part_document(polygon: Polygon) -> dict[str, Any]:
-    outline, *holes = (shapely.get_coordinates(ring)[:-1].tolist() for ring in rings(polygon))
+    corners = shapely.get_coordinates
+    outline, *holes = (corners(ring)[:-1].tolist() for ring in shapely.get_rings(polygon))
     return {"outline": outline, "holes": holes} if holes else {"outline": outline}
 
 

@@ -186,7 +186,7 @@ def _with_corner(polygon: Polygon, point: F64) -> Polygon:
     """
     if (shapely.get_coordinates(polygon) == point).all(axis=1).any():
         return polygon
-    rings = [np.asarray(ring.coords) for ring in (polygon.exterior, *polygon.interiors)]
+    rings = [np.asarray(ring.coords) for ring in shapely.get_rings(polygon)]
     walls = np.concatenate([np.stack([ring[:-1], ring[1:]], axis=1) for ring in rings])
     after = int(np.argmin(shapely.distance(shapely.linestrings(walls), shapely.Point(point))))
     number = 0

@@ -113,7 +113,7 @@ def find_passages(
 def _walls(polygons: Sequence[Polygon]) -> _Walls:
     starts, ends, befores = [], [], []
     for polygon in polygons:
-        for ring in (polygon.exterior, *polygon.interiors):
+        for ring in shapely.get_rings(polygon):
             corners = shapely.get_coordinates(ring)[:-1]
             starts.append(corners)
             ends.append(np.roll(corners, -1, axis=0))
