@@ -17,7 +17,7 @@ from fleet2d.errors import ArtifactError, Fleet2DError
 from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.lattice import UNITS_PER_CELL
 from fleet2d.floorplan.objects import PlacedObject, move_object
-from fleet2d.floorplan.plan import FloorPlan, Room, rings
+from fleet2d.floorplan.plan import FloorPlan, Room
 from fleet2d.floorplan.rooms.doorways import Doorway
 from fleet2d.kernels import I16
 from fleet2d.kernels.space import Mesh
@@ -55,7 +55,10 @@ def home_facts(plan: FloorPlan, doors: Sequence[DoorFacts] = ()) -> HomeFacts:
         bounds=plan.bounds,
         area_m2=plan.area_m2,
         free=[
-            [points(lattice.to_metres(shapely.get_coordinates(ring)[:-1])) for ring in rings(part)]
+            [
+                points(lattice.to_metres(shapely.get_coordinates(ring)[:-1]))
+                for ring in shapely.get_rings(part)
+            ]
             for part in plan.polygons
         ],
         rooms=[_room_facts(room) for room in plan.rooms],
