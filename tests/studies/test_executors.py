@@ -2,8 +2,6 @@
 
 import os
 import signal
-import subprocess
-import sys
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
@@ -102,19 +100,3 @@ def test_a_worker_with_much_memory_is_replaced_between_two_tasks() -> None:
 
 def pid_of(task: WorkerTask) -> int:
     return os.getpid()
-
-
-def test_a_script_needs_no_guard(tmp_path: Path) -> None:
-    """Workers don't run the script again that starts the study, as `spawn` does by itself."""
-    script = tmp_path / "script.py"
-    script.write_text(
-        "import operator, fleet2d\n"
-        "scenario = fleet2d.load_scenario('simulation.duration=1 min', seed=1)\n"
-        "digest = operator.attrgetter('digest')\n"
-        "print(len(fleet2d.map_runs(digest, [scenario], workers=1)))\n"
-    )
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
-    done = subprocess.run(
-        [sys.executable, script], capture_output=True, text=True, check=False, env=environment
-    )
-    assert (0, "1\n", "") == (done.returncode, done.stdout, done.stderr)

@@ -306,6 +306,13 @@ def test_a_study_without_a_search_is_refused(tmp_path: Path) -> None:
         tune(small(), tmp_path, SerialExecutor())
 
 
-def test_an_objective_that_no_run_has_is_named(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"no trial succeeded.*no metric 'happiness'"):
+def test_an_objective_that_no_variant_can_have_is_refused(tmp_path: Path) -> None:
+    """It showed only when all trials had failed."""
+    with pytest.raises(ScenarioError, match=r"tune\.objectives: no variant has .*'happiness'"):
         tuned(tmp_path, objectives={"happiness": "maximize"}, trials=1)
+    assert not (tmp_path / "tune").exists()
+
+
+def test_an_objective_that_no_run_has_is_named(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"no trial succeeded.*no metric 'distance.happiness'"):
+        tuned(tmp_path, objectives={"distance.happiness": "maximize"}, trials=1)
