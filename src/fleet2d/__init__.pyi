@@ -31,6 +31,7 @@ from fleet2d.floorplan.load import load_floorplan as load_floorplan
 from fleet2d.floorplan.plan import FloorPlan as FloorPlan
 from fleet2d.floorplan.plan import LabelledRegion as LabelledRegion
 from fleet2d.metrics.metric import Metric as Metric
+from fleet2d.runs.exporters import export as export
 from fleet2d.runs.run import Run as Run
 from fleet2d.runs.run import open_run as open_run
 from fleet2d.scenario.model import Scenario as Scenario

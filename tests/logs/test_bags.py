@@ -222,7 +222,7 @@ def test_columns_are_not_for_bags(ros: Ros, tmp_path: Path) -> None:
 def test_exported_run_is_driven_again(name: str, tmp_path: Path) -> None:
     """There and back: a robot that follows the bag of a run is where it was in that run."""
     first = fleet2d.run("bundled:base", "simulation.duration=40 min", seed=4)
-    first.export(tmp_path / name)
+    fleet2d.export(first, tmp_path / name)
     bag = {"path": str(tmp_path / name), "id": "astro/base_link", "time_zone": "UTC"}
     again = fleet2d.run(
         "bundled:base",

@@ -7,11 +7,13 @@ import typer
 
 from fleet2d.errors import InputError
 from fleet2d.options import TrustFiles, TrustFolders, restrict_to
-from fleet2d.runs.exporters import formats
+from fleet2d.runs import exporters
 
 
 def _format_help() -> str:
-    described = (f"{name}: {text}" if text else f"{name}." for name, text in formats().items())
+    described = (
+        f"{name}: {text}" if text else f"{name}." for name, text in exporters.formats().items()
+    )
     return f"Its format; by default that of the suffix of FILE. {' '.join(described)}"
 
 
@@ -48,7 +50,7 @@ def export(  # noqa: PLR0913 - the options of the command
     first, last = steps_of(run, begin, end)
     with restrict_to(trust, trust_dir):
         if out is not None:
-            typer.echo(run.export(out, layout, first=first, end=last, every=every))
+            typer.echo(exporters.export(run, out, layout, first=first, end=last, every=every))
         elif html is not None:
             from fleet2d.viewer.page_data import export_html
 

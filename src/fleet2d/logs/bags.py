@@ -24,7 +24,7 @@ _POSES: dict[str, Callable[[Any], Any]] = {
 _LATEST_SIMULATED_NS = 10**17  # stamps below are of a simulated clock: three years
 
 
-class _Poses(NamedTuple):
+class _PlanarPoses(NamedTuple):
     """Planar poses over time.
 
     Attributes:
@@ -88,7 +88,7 @@ def read_bag(
     )
 
 
-def _poses(reader: Any, path: Path, name: str | None) -> tuple[_Poses, str]:
+def _poses(reader: Any, path: Path, name: str | None) -> tuple[_PlanarPoses, str]:
     """Return the poses of a topic or frame, and a line about them."""
     topics = {c.topic: c for c in reader.connections if c.msgtype in _POSES}
     if name is None and len(topics) == 1:
@@ -131,13 +131,13 @@ def _planar(place: Any, turn: Any) -> tuple[float, float, float]:
     return float(place.x), float(place.y), float(heading)
 
 
-def _columns(rows: list[tuple[int, float, float, float]]) -> _Poses:
+def _columns(rows: list[tuple[int, float, float, float]]) -> _PlanarPoses:
     time = np.array([row[0] for row in rows], np.int64)
     x, y, heading = np.array([row[1:] for row in rows], np.float64).reshape(-1, 3).T
-    return _Poses(time, x, y, heading)
+    return _PlanarPoses(time, x, y, heading)
 
 
-def _links(reader: Any, path: Path) -> dict[str, tuple[str, _Poses]]:
+def _links(reader: Any, path: Path) -> dict[str, tuple[str, _PlanarPoses]]:
     """Return each frame's parent, and its poses in the parent."""
     connections = [c for c in reader.connections if c.msgtype in TRANSFORMS]
     FIXES.check(sum(c.msgcount for c in connections), path, LogError)
@@ -165,7 +165,9 @@ def _transforms(
             yield *names, (stamp, *pose)
 
 
-def _in_root(links: dict[str, tuple[str, _Poses]], frame: str, path: Path) -> tuple[_Poses, str]:
+def _in_root(
+    links: dict[str, tuple[str, _PlanarPoses]], frame: str, path: Path
+) -> tuple[_PlanarPoses, str]:
     """Return the poses of a frame in the root of its tree, at the times of its fastest link."""
     chain = [frame]
     while chain[-1] in links:
@@ -186,4 +188,4 @@ def _in_root(links: dict[str, tuple[str, _Poses]], frame: str, path: Path) -> tu
         cos, sin = np.cos(turn), np.sin(turn)
         x, y = link.x[at] + cos * x - sin * y, link.y[at] + sin * x + cos * y
         heading = heading + turn
-    return _Poses(time, x, y, (heading + np.pi) % (2 * np.pi) - np.pi), chain[-1]
+    return _PlanarPoses(time, x, y, (heading + np.pi) % (2 * np.pi) - np.pi), chain[-1]

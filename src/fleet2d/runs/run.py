@@ -162,38 +162,6 @@ class Run:
 
         return rebuild_path(self, self.plan, entity, every)
 
-    def export(
-        self,
-        path: Path | str,
-        layout: str | None = None,
-        *,
-        first: int = 0,
-        end: int | None = None,
-        every: str | None = None,
-    ) -> str:
-        """Write the run, or a part of it, to a file for other programs.
-
-        Args:
-            path: The file, or the folder of a bag.
-            layout: The name of its format, such as "mcap"; None: by the suffix of the file.
-            first: The first step.
-            end: The step after the last one; None for the end of the run.
-            every: Time between two poses, such as "10 s"; None for the step.
-
-        Returns:
-            A line about the file.
-
-        Raises:
-            InputError: There is no such format, it needs a library that isn't installed, or `every`
-                is no multiple of the step.
-            ArtifactError: The run stored no key frames, or the file can't be written.
-        """
-        from fleet2d.runs.exporters import exporter, format_of
-        from fleet2d.runs.records import Selection
-
-        write = exporter(layout or format_of(Path(path)))
-        return write(self, Path(path), Selection.of(self, first, end, every))
-
     def judge(self, expectation: Expectation | str, name: str = "") -> Verdict:
         """Judge the run by an expectation; the run is repeated exactly for this, from its manifest.
 

@@ -27,6 +27,39 @@ Exporter = Callable[["Run", Path, "Selection"], str]
 _SUFFIXES = {".txt": "casas", ".rrd": "rerun", "": "rosbag2"}
 
 
+def export(
+    run: "Run",
+    path: Path | str,
+    layout: str | None = None,
+    *,
+    first: int = 0,
+    end: int | None = None,
+    every: str | None = None,
+) -> str:
+    """Write a run, or a part of it, to a file for other programs.
+
+    Args:
+        run: The run.
+        path: The file, or the folder of a bag.
+        layout: The name of its format, such as "mcap"; None: by the suffix of the file.
+        first: The first step.
+        end: The step after the last one; None for the end of the run.
+        every: Time between two poses, such as "10 s"; None for the step.
+
+    Returns:
+        A line about the file.
+
+    Raises:
+        InputError: There is no such format, it needs a library that isn't installed, or `every` is
+            no multiple of the step.
+        ArtifactError: The run stored no key frames, or the file can't be written.
+    """
+    from fleet2d.runs.records import Selection  # with NumPy, which the help needn't import
+
+    write = exporter(layout or format_of(Path(path)))
+    return write(run, Path(path), Selection.of(run, first, end, every))
+
+
 def formats() -> dict[str, str]:
     """Return what each format is, by its name, without importing any.
 
