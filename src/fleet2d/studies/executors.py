@@ -172,7 +172,7 @@ class Broken:
 
 
 @dataclass(frozen=True)
-class Result:
+class Done:
     """The message of a worker that has done its first task, with its memory [MB]."""
 
     payload: Any
@@ -234,7 +234,7 @@ class CrewExecutor(ABC, Generic[AnyWorker]):
         """Send a task to a worker. Errors are ignored: `_messages` reports a dead worker."""
 
     @abstractmethod
-    def _messages(self) -> Iterator[tuple[AnyWorker, Ready | Broken | Result | Died]]:
+    def _messages(self) -> Iterator[tuple[AnyWorker, Ready | Broken | Done | Died]]:
         """Wait for messages of workers, at most one of each."""
 
     @abstractmethod
@@ -280,7 +280,7 @@ class CrewExecutor(ABC, Generic[AnyWorker]):
     def _handle(
         self,
         worker: AnyWorker,
-        message: Ready | Broken | Result | Died,
+        message: Ready | Broken | Done | Died,
         tasks: TaskSchedule,
         attempts: dict[int, int],
     ) -> Event | None:
@@ -290,7 +290,7 @@ class CrewExecutor(ABC, Generic[AnyWorker]):
                 worker.is_ready, self._failed_starts = True, 0
             case Broken(trace):
                 raise InputError(f"a worker can't be set up:\n{trace}")
-            case Result(payload, rss_mb):
+            case Done(payload, rss_mb):
                 task = worker.tasks.popleft()
                 worker.is_full = rss_mb > self.memory_mb
                 return FinishedTask(task, payload, attempts.get(task.number, 0) + 1)
@@ -360,7 +360,7 @@ class LocalExecutor(CrewExecutor[LocalWorker]):
         with suppress(OSError):
             worker.connection.send(task)
 
-    def _messages(self) -> Iterator[tuple[LocalWorker, Ready | Broken | Result | Died]]:
+    def _messages(self) -> Iterator[tuple[LocalWorker, Ready | Broken | Done | Died]]:
         worker_of = {worker.connection: worker for worker in self._crew}
         for connection in wait(list(worker_of)):
             worker = worker_of[connection]  # type: ignore[index]
@@ -417,7 +417,7 @@ def _work(job: bytes, connection: "Connection[Any, Any]") -> None:
         while True:
             task = connection.recv()
             payload = function(task)
-            connection.send(Result(payload, peak_rss_mb()))
+            connection.send(Done(payload, peak_rss_mb()))
 
 
 def _end_with_driver() -> None:

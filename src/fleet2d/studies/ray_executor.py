@@ -13,9 +13,9 @@ from fleet2d.studies.executors import (
     Broken,
     CrewExecutor,
     Died,
+    Done,
     Event,
     Ready,
-    Result,
     TaskSchedule,
     Worker,
     WorkerJob,
@@ -92,14 +92,14 @@ class RayExecutor(CrewExecutor[RayWorker]):
 
     def _start(self, job: Any) -> RayWorker:
         # Ray never restarts workers, as the driver retries their tasks.
-        worker_class = self._ray.remote(num_cpus=1, max_restarts=0, max_task_retries=0)(_Actor)
+        worker_class = self._ray.remote(num_cpus=1, max_restarts=0, max_task_retries=0)(_RemoteJob)
         handle = worker_class.remote([job])
         return RayWorker(handle, handle.start.remote())
 
     def _send(self, worker: RayWorker, task: WorkerTask) -> None:
         worker.references.append(worker.handle.run.remote(task))
 
-    def _messages(self) -> Iterator[tuple[RayWorker, Ready | Broken | Result | Died]]:
+    def _messages(self) -> Iterator[tuple[RayWorker, Ready | Broken | Done | Died]]:
         awaited = {
             worker.references[0] if worker.is_ready else worker.start: worker
             for worker in self._crew
@@ -123,7 +123,7 @@ class RayExecutor(CrewExecutor[RayWorker]):
                 self._ray.kill(worker.handle)
 
 
-class _Actor:
+class _RemoteJob:
     """A worker on the cluster: it calls a job for each task."""
 
     def __init__(self, job_reference: list[Any]) -> None:
@@ -134,9 +134,9 @@ class _Actor:
         """Return that the worker is set up."""
         return Ready()
 
-    def run(self, task: WorkerTask) -> Result:
+    def run(self, task: WorkerTask) -> Done:
         """Run a task."""
-        return Result(self._job(task))
+        return Done(self._job(task))
 
 
 def _join(ray: Any, address: str | None) -> None:
