@@ -21,6 +21,7 @@ from pydantic_core import PydanticCustomError
 
 from fleet2d.configuration.problems import problem, shown
 from fleet2d.errors import ScenarioError
+from fleet2d.runtime.clock import DAY_S, HOUR_S
 
 
 class Text(str):
@@ -188,8 +189,8 @@ DURATION = Quantity(
         ms=(Fraction(1, 1000), "millisecond milliseconds"),
         s=(1, "sec second seconds"),
         min=(60, "minute minutes"),
-        h=(3600, "hour hours"),
-        d=(86_400, "day days"),
+        h=(HOUR_S, "hour hours"),
+        d=(DAY_S, "day days"),
         w=(604_800, "week weeks"),
     ),
     ("30 s", "5 min", "1 h", "14 d"),
@@ -290,7 +291,7 @@ def format_duration(duration: timedelta) -> str:
     ['30 d', '1 h', '90 s', '0.5 s', '0 s']
     """
     count = micros(duration)
-    for unit, seconds in (("d", 86_400), ("h", 3600), ("min", 60)):
+    for unit, seconds in (("d", DAY_S), ("h", HOUR_S), ("min", 60)):
         if count and count % (seconds * 10**6) == 0:
             return f"{count // (seconds * 10**6)} {unit}"
     return f"{_plain(Decimal(count).scaleb(-6))} s"
@@ -314,7 +315,7 @@ def parse_time_of_day(value: object) -> timedelta:
         value = value.isoformat()
     if isinstance(value, str) and (match := _TIME_OF_DAY.fullmatch(value.strip())):
         seconds = Fraction(match[3] or 0)
-        count = (int(match[1]) * 3600 + int(match[2]) * 60 + seconds) * 10**6
+        count = (int(match[1]) * HOUR_S + int(match[2]) * 60 + seconds) * 10**6
         value = timedelta(microseconds=int(count))
     elif not isinstance(value, timedelta):
         raise problem(f"expected a time of day like '07:30' or '22:15:30', got {shown(value)}")

@@ -16,7 +16,12 @@ from fleet2d.kernels import I64
 from fleet2d.kernels.motion import Breakpoints
 from fleet2d.kernels.numbers import in_radians
 from fleet2d.kernels.space import SUB
+<<<<<<< HEAD
 from fleet2d.runtime.clock import Clock
+=======
+from fleet2d.runs.run import PLANNED, TRACK, WALK
+from fleet2d.runtime.clock import HOUR_US, Clock
+>>>>>>> b5f1ac82 (The length of a day and of an hour stands once, in the clock)
 
 STEP = Column("step", "step", description="step at which the row takes effect")
 TIME = Column("time", "time", description="local time")
@@ -127,7 +132,7 @@ def _steps_between(settings: ArtifactSettings, clock: Clock) -> int:
 
 
 # Time between the key frames of a random walk [us].
-WALK_KEY_US = 3_600_000_000
+WALK_KEY_US = HOUR_US
 
 
 class KeyFrames:

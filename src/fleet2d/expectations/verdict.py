@@ -9,7 +9,7 @@ from fleet2d.configuration.units import format_duration
 from fleet2d.errors import InputError
 from fleet2d.expectations.expectation import TINY, And, Expectation, RunSignals, number_text
 from fleet2d.expectations.temporal import Temporal, Violation, after
-from fleet2d.runtime.clock import Clock
+from fleet2d.runtime.clock import DAY_S, HOUR_S, Clock
 
 
 @dataclass(frozen=True)
@@ -218,7 +218,7 @@ def spoken(duration: timedelta) -> str:
     ('2 h 38 min 34 s', '40.5 s', '2 d')
     """
     parts, remainder = [], duration
-    for unit, length in (("d", 86400), ("h", 3600), ("min", 60)):
+    for unit, length in (("d", DAY_S), ("h", HOUR_S), ("min", 60)):
         count, remainder = divmod(remainder, timedelta(seconds=length))
         parts += [f"{count} {unit}"] if count else []
     return " ".join(parts + ([format_duration(remainder)] if remainder or not parts else []))

@@ -12,7 +12,6 @@ import numpy as np
 import yaml
 
 from fleet2d.fit.timeline import (
-    MINUTES,
     ActivityPlace,
     Distances,
     LivedDay,
@@ -30,7 +29,7 @@ from fleet2d.routines.distributions import KNOTS, exponential
 from fleet2d.routines.life import Life
 from fleet2d.routines.persona import Persona
 from fleet2d.routines.planner import Episode, RecordedDay, write_day
-from fleet2d.runtime.clock import DAY_S
+from fleet2d.runtime.clock import DAY_MINUTES, DAY_S
 from fleet2d.runtime.determinism import Draws, stream_key
 
 BLOCK = 180  # length of a part of the day that has pastimes of its own [min]
@@ -171,7 +170,9 @@ class _Fitter:
         wakes = [day.wake for day in days]
         beds = [day.bed for day in days]
         shortest = min(day.next_wake - day.bed for day in days)
-        least_night = self.dawn + MINUTES - max(beds)  # if the next day begins as early as possible
+        least_night = (
+            self.dawn + DAY_MINUTES - max(beds)
+        )  # if the next day begins as early as possible
         tasks, rest = self._tasks(days)
         return {
             "wake": _timing(wakes),
@@ -222,9 +223,9 @@ class _Fitter:
         leisure = {}
         for block in sorted(blocks):
             first = dawn + block * BLOCK
-            if first >= dawn + MINUTES:
+            if first >= dawn + DAY_MINUTES:
                 continue
-            last = min(first + BLOCK, dawn + MINUTES) - 1
+            last = min(first + BLOCK, dawn + DAY_MINUTES) - 1
             for _, done in sorted(blocks[block].items()):
                 state, is_main = self._main_state(done)
                 base = self.names[state] if is_main else f"in_{self.timeline.states[state].place}"
@@ -433,7 +434,7 @@ def sample_persona(
                 for first, last in _fetches(activity, episode, Draws(key, ordinal * 1024 + i)):
                     rooms[day * DAY_S + first : day * DAY_S + last] = place
     sample = slice(DAY_S + 30, (days + 1) * DAY_S + 30, 60)  # the middles of the minutes
-    return states[sample].reshape(-1, MINUTES), rooms[sample].reshape(-1, MINUTES)
+    return states[sample].reshape(-1, DAY_MINUTES), rooms[sample].reshape(-1, DAY_MINUTES)
 
 
 def _fetches(activity: Activity, episode: Episode, draws: Draws) -> list[tuple[int, int]]:
@@ -471,12 +472,12 @@ def sample_markov(labels: I16, count: int, days: int, seed: int = 0) -> I16:
             follows[label] = share
     limits: list[list[int]] = follows.cumsum(axis=1).tolist()
     draws = Draws(stream_key(seed, "fit", "markov"), 0)
-    out = np.empty(days * MINUTES, np.int16)
+    out = np.empty(days * DAY_MINUTES, np.int16)
     at = bisect_right(share.cumsum().tolist(), draws.below(int(share.sum())))
     for minute in range(len(out)):
         out[minute] = at
         at = bisect_right(limits[at], draws.below(limits[at][-1]))
-    return out.reshape(-1, MINUTES)
+    return out.reshape(-1, DAY_MINUTES)
 
 
 class Validation(NamedTuple):

@@ -13,10 +13,9 @@ from fleet2d.kernels import F64, I16, Bool
 from fleet2d.logs.log import AWAY, ActivityLog, LogError
 from fleet2d.logs.placement import DOOR, UNKNOWN, USUAL, LoggedVisit, VisitRule, visits_of
 from fleet2d.metrics.ltp_error import total_variation
-from fleet2d.runtime.clock import DAY_S
+from fleet2d.runtime.clock import DAY_MINUTES, DAY_S
 from fleet2d.runtime.determinism import sum_in_order
 
-MINUTES = 1440
 UNKNOWN_STATE = -1
 # Silence up to this counts as staying in the room, in general and in one room.
 HOLD = timedelta(hours=3)
@@ -27,7 +26,7 @@ RARE_MINUTES, RARE_RUNS = 30, 4
 # Being up for up to this long in the night doesn't end the night [min].
 UP_AT_NIGHT = 60
 SHORTEST_NIGHT = 120  # min
-NOON = MINUTES // 2
+NOON = DAY_MINUTES // 2
 HOURS = 24
 FEWEST_STAYS = 5  # the fewest stays at a place whose durations are compared
 
@@ -129,7 +128,7 @@ def _by_minute(seconds: I16, states: int) -> I16:
         count = (by_minute == state).sum(axis=1)
         best[count > most] = state
         most = np.maximum(most, count)
-    return best.reshape(-1, MINUTES)
+    return best.reshape(-1, DAY_MINUTES)
 
 
 def is_sleep(state: ActivityPlace) -> bool:
@@ -150,7 +149,7 @@ def _one_per_stay(pairs: list[ActivityPlace], minutes: I16) -> I16:
         if label >= 0:
             stay = flat[begin : begin + length]
             stay[:] = np.argmax(np.bincount(stay, minlength=len(pairs)))
-    return flat.reshape(-1, MINUTES)
+    return flat.reshape(-1, DAY_MINUTES)
 
 
 def _without_rare(
@@ -224,7 +223,7 @@ def find_days(timeline: Timeline) -> list[LivedDay]:
         before, after = nights.get(number - 1), nights.get(number)
         if before is None or after is None or before[1] >= after[0]:
             continue
-        midnight = number * MINUTES
+        midnight = number * DAY_MINUTES
         awake = _runs(flat, before[1], after[0], midnight)
         night = _runs(flat, after[0], after[1], midnight)
         up = tuple(r for r in night if not asleep[midnight + r.begin])
@@ -247,7 +246,7 @@ def _nights(asleep: Bool, days: int) -> dict[int, tuple[int, int]]:
             joined.append([begin, end])
     nights: dict[int, tuple[int, int]] = {}
     for begin, end in joined:
-        number = ((begin + end) // 2 - NOON) // MINUTES
+        number = ((begin + end) // 2 - NOON) // DAY_MINUTES
         longest = nights.get(number, (0, SHORTEST_NIGHT - 1))
         if -1 <= number < days and end - begin > longest[1] - longest[0]:
             nights[number] = (begin, end)
@@ -308,7 +307,7 @@ def shares(labels: I16, count: int) -> F64:
 
 def by_hour(labels: I16, count: int) -> F64:
     """Return the shares of the labels in each hour of the day, (24, count)."""
-    hours = labels.reshape(len(labels), HOURS, MINUTES // HOURS)
+    hours = labels.reshape(len(labels), HOURS, DAY_MINUTES // HOURS)
     return np.stack([shares(hours[:, hour], count) for hour in range(HOURS)])
 
 

@@ -10,6 +10,7 @@ from fleet2d.algorithms.history import History
 from fleet2d.configuration.components import register
 from fleet2d.floorplan.home import Home
 from fleet2d.metrics.metric import Metric
+from fleet2d.runtime.clock import HOUR_S
 
 SHARES = {"half": 0.5, "most": 0.9}
 
@@ -58,5 +59,5 @@ class Coverage(Metric):
             for name, share in SHARES.items():
                 needed = int(np.ceil(share * self.cells))
                 if 0 < needed <= len(first):
-                    numbers[robot][f"{name}_h"] = int(first[needed - 1]) * self.step_s / 3600
+                    numbers[robot][f"{name}_h"] = int(first[needed - 1]) * self.step_s / HOUR_S
         return numbers

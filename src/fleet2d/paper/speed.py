@@ -24,6 +24,7 @@ import numpy as np
 
 from fleet2d.errors import InputError, extra
 from fleet2d.paper.months import PAPER_COLUMN, OnProgress, PaperOptions, Result, Table, counted
+from fleet2d.runtime.clock import DAY_S
 
 if TYPE_CHECKING:
     from fleet2d.engine.simulation import Simulation
@@ -203,7 +204,7 @@ class PaperNumber(NamedTuple):
 
 UNKNOWN = PaperNumber(NO_NUMBER)
 PAPER_BASE = PaperNumber("194 s: 45 load a prebuilt cache, 127 simulate; 13,000 x", 13_000)
-PAPER_CROWDS = {50: PaperNumber("28 min, and all memory", 30 * 86_400 / (28 * 60))}
+PAPER_CROWDS = {50: PaperNumber("28 min, and all memory", 30 * DAY_S / (28 * 60))}
 PAPER_WATCHED = PaperNumber("8 to 12 x", 10)
 PAPER_CACHE = PaperNumber("6 h to build the cache")
 

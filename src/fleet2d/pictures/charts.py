@@ -29,13 +29,13 @@ from fleet2d.routines.persona import Persona
 from fleet2d.routines.planner import FINISHES, INTERRUPTS, RESUMES, Episode
 from fleet2d.runs.run import Run
 from fleet2d.runs.trajectory import rebuild_path
+from fleet2d.runtime.clock import HOUR_S
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
 MONDAY = date(2026, 1, 5)
-DAY_S, HOUR_S = 86_400, 3_600
 INTERRUPTING = (INTERRUPTS, FINISHES)
 # End of a strip [hours]: a day lasts from waking up to the next waking up.
 HOURS = 34

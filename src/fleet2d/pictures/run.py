@@ -46,10 +46,9 @@ from fleet2d.pictures.life import (
     trace_of,
 )
 from fleet2d.runs.run import Run, categories
-from fleet2d.runtime.clock import midnight_of
+from fleet2d.runtime.clock import DAY_MINUTES, DAY_US, HOUR_US, midnight_of
 
-DAY_US = 86_400_000_000
-BINS = 1440  # coloured intervals of a day
+BINS = DAY_MINUTES  # coloured intervals of a day
 MARKS = 288  # intervals of a day with a mark, whose height is the share of sightings
 # Rows are a few pixels high: their colours are deeper than those of the floor plan.
 DEEPER = 1.9
@@ -492,7 +491,7 @@ class _Picture:
         if -1 in indices:
             yield Chip("away", None, "away")
         if np.isin([user.name for user in self.users], self.observations.user).any():
-            label = f"seen by a robot: height is the share of {24 * 60 // MARKS} min"
+            label = f"seen by a robot: height is the share of {DAY_MINUTES // MARKS} min"
             yield Chip("seen", "#dfe1e4", label)
 
     def _footer(self) -> None:
@@ -542,7 +541,7 @@ def _date(time: datetime) -> str:
 
 
 def _length(us: int) -> str:
-    for unit, size in (("day", 86_400_000_000), ("hour", 3_600_000_000), ("minute", 60_000_000)):
+    for unit, size in (("day", DAY_US), ("hour", HOUR_US), ("minute", 60_000_000)):
         if us >= size:
             count = us / size
             return f"{count:.3g} {unit}{'s' * (count != 1)}"

@@ -21,7 +21,6 @@ from fleet2d.routines.activity import (
     seconds,
 )
 from fleet2d.routines.planner import (
-    DAY_S,
     FINISHES,
     INTERRUPTS,
     PLANNED,
@@ -31,6 +30,7 @@ from fleet2d.routines.planner import (
     PrivateRooms,
     new_episode,
 )
+from fleet2d.runtime.clock import DAY_S
 from fleet2d.runtime.determinism import Draws
 
 FOLDER = Path(__file__).parent

@@ -13,7 +13,6 @@ from fleet2d.routines.household import Household, with_absences
 from fleet2d.routines.interruptions import interrupt
 from fleet2d.routines.persona import Persona, holds_on
 from fleet2d.routines.planner import (
-    DAY_S,
     INTERRUPTS,
     MILLION,
     NEVER,
@@ -31,6 +30,7 @@ from fleet2d.routines.planner import (
     with_jobs,
 )
 from fleet2d.routines.templates import starts
+from fleet2d.runtime.clock import DAY_S
 from fleet2d.runtime.determinism import Draws, stream_key
 
 # The number of days that are kept after they were drawn, of a person and of a household.

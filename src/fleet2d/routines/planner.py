@@ -30,9 +30,9 @@ from pydantic import BeforeValidator, PlainSerializer, WithJsonSchema
 from fleet2d.configuration.problems import problem
 from fleet2d.kernels.motion import ANY_ROOM, DayPlanner, Role, RoomUse
 from fleet2d.routines.distributions import Distribution
+from fleet2d.runtime.clock import DAY_S
 from fleet2d.runtime.determinism import Draws
 
-DAY_S = 86_400
 MILLION = 1_000_000
 NEVER = 1 << 40  # later than any time [s]
 PLANNED, INTERRUPTS = Role.PLANNED.value, Role.INTERRUPTS.value

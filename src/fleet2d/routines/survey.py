@@ -30,6 +30,7 @@ from fleet2d.kernels import F64, I32
 from fleet2d.kernels.motion import NO_GAP_S
 from fleet2d.routines.distributions import KNOTS, draw_weighted, lognormal, position
 from fleet2d.routines.planner import Episode
+from fleet2d.runtime.clock import HOUR_S
 from fleet2d.runtime.determinism import Draws
 
 TABLE = Path(__file__).parent / "survey.json"
@@ -39,11 +40,11 @@ CATEGORIES = (
 STEP_S = 600
 DAY_STEPS = 144
 WEEK_STEPS = 7 * DAY_STEPS
-DAWN_S = 4 * 3600  # the survey's days begin at 04:00
+DAWN_S = 4 * HOUR_S  # the survey's days begin at 04:00
 AGES = 96  # the largest age of an episode that is distinguished [steps]
 ONE = 1 << 24
 WARM_UP_WEEKS = 2
-SLEEP_S = (8 * 3600, 3600)  # mean and deviation; the survey's mean is of nights cut at 04:00
+SLEEP_S = (8 * HOUR_S, HOUR_S)  # mean and deviation; the survey's mean is of nights cut at 04:00
 SPREAD = 0.6  # standard deviation of an episode's duration, relative to its mean
 
 
@@ -260,7 +261,7 @@ def to_activities(
             name = "work_at_home" if works_at_home else "work"
         elif category == "eating":
             eats_at_home = draws.below(WHOLE) < table()["eat_at_home"]
-            hour = begin // 3600 % 24
+            hour = begin // HOUR_S % 24
             meal = next((meal for until, meal in MEALS if hour < until), "dinner")
             name = meal if eats_at_home else "outing"
         elif category == "exercise":

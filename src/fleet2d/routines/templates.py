@@ -9,15 +9,8 @@ import numpy as np
 from fleet2d.configuration.problems import problem_at
 from fleet2d.routines.activity import seconds
 from fleet2d.routines.distributions import Distribution, normal, uniform
-from fleet2d.routines.planner import (
-    DAY_S,
-    MILLION,
-    NEVER,
-    DayPlan,
-    Job,
-    PastimeOption,
-    to_recording,
-)
+from fleet2d.routines.planner import MILLION, NEVER, DayPlan, Job, PastimeOption, to_recording
+from fleet2d.runtime.clock import DAY_S
 from fleet2d.runtime.determinism import Draws
 
 if TYPE_CHECKING:

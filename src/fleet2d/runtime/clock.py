@@ -10,9 +10,11 @@ from fleet2d.errors import InputError
 from fleet2d.kernels import I64
 
 MICROSECOND = timedelta(microseconds=1)
-HOUR_US = 3_600_000_000
-DAY_US = 24 * HOUR_US
-DAY_S = 86_400
+HOUR_S = 60 * 60
+DAY_S = 24 * HOUR_S
+DAY_MINUTES = 24 * 60
+HOUR_US = HOUR_S * 1_000_000
+DAY_US = DAY_S * 1_000_000
 
 
 @dataclass(frozen=True)

@@ -39,6 +39,7 @@ from fleet2d.kernels.sight import (
     TablePart,
     UserDraw,
 )
+from fleet2d.runtime.clock import HOUR_US
 from fleet2d.runtime.determinism import sum_in_order
 from fleet2d.sight.fov import FieldOfView
 from fleet2d.sight.line_of_sight import LineOfSight
@@ -398,7 +399,7 @@ def _fill_false_positives(
     if not any(rates):
         return
     tables.has_ghosts[camera] = 1
-    hours = Decimal(lens.period * context.step_us) / (3600 * 10**6)
+    hours = Decimal(lens.period * context.step_us) / HOUR_US
     mean = sum(map(Decimal, rates)) * hours
     if mean > 1:
         raise ScenarioError(

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fleet2d.errors import extra
+from fleet2d.runtime.clock import DAY_US
 from fleet2d.studies.answers import estimate
 from fleet2d.studies.parts import VARIANT
 
@@ -16,7 +17,6 @@ if TYPE_CHECKING:
 
 
 VALUE, DAY = "value", "day"
-_US_A_DAY = 86_400_000_000
 _CLOCK = (VARIANT, "step", "time")
 
 
@@ -50,7 +50,7 @@ def over_time(study: "Study", metric: str) -> "pl.DataFrame | None":
             return None
         rows = rows.filter(pl.any_horizontal(pl.col(c) == selector for c in texts))
     start = pl.col("time").dt.truncate("1d").min().over(VARIANT)
-    day = (pl.col("time") - start).dt.total_microseconds() / _US_A_DAY
+    day = (pl.col("time") - start).dt.total_microseconds() / DAY_US
     return (
         rows.with_columns(day.alias(DAY), pl.col(column).alias(VALUE))
         .group_by(VARIANT, DAY, *study.columns)

@@ -6,6 +6,7 @@ from contextlib import contextmanager
 from datetime import timedelta
 from typing import TYPE_CHECKING
 
+from fleet2d.runtime.clock import DAY_S, HOUR_S
 from fleet2d.studies.driver import Observer
 
 if TYPE_CHECKING:
@@ -96,10 +97,10 @@ def in_words(time_span: timedelta) -> str:
     ('3.3 min', '30.0 h')
     """
     seconds = time_span.total_seconds()
-    for name, unit in (("years", 31_557_600), ("months", 2_629_800), ("days", 86_400)):
+    for name, unit in (("years", 31_557_600), ("months", 2_629_800), ("days", DAY_S)):
         if seconds >= 2 * unit:
             return f"{seconds / unit:,.1f} {name}"
-    for name, unit in (("h", 3600), ("min", 60)):
+    for name, unit in (("h", HOUR_S), ("min", 60)):
         if seconds >= unit:
             return f"{seconds / unit:.1f} {name}"
     return f"{seconds:.1f} s"

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from fleet2d.engine.inputs import input_files
 from fleet2d.engine.simulation import Simulation
 from fleet2d.errors import ComponentError
+from fleet2d.runtime.clock import DAY_S
 from fleet2d.scenario.model import Scenario
 
 if TYPE_CHECKING:
@@ -201,7 +202,7 @@ class RunSpeed:
         return self.setup_s + simulated_s / self.speedup
 
 
-def measure(scenario: Scenario, simulated_s: float = 86_400.0, most_s: float = 2.0) -> RunSpeed:
+def measure(scenario: Scenario, simulated_s: float = DAY_S, most_s: float = 2.0) -> RunSpeed:
     """Run the beginning of a scenario to measure its speed.
 
     Args:

@@ -24,6 +24,7 @@ from fleet2d.floorplan.home import HomeChange
 from fleet2d.kernels.numbers import TURN
 from fleet2d.kernels.space import Mesh
 from fleet2d.runs.run import Run
+from fleet2d.runtime.clock import DAY_S
 from fleet2d.viewer.contract import LiveBody, LiveEvent, LiveFrame, LiveOrder, MarkFacts
 from fleet2d.viewer.home_facts import walls_facts
 from fleet2d.viewer.page_data import compact_json
@@ -350,7 +351,7 @@ class LiveRun:
         elif action == "step":
             self._paused = True
             if not self.engine.done:
-                self.engine.advance(max(1, min(86_400, round(order["value"]))))
+                self.engine.advance(max(1, min(DAY_S, round(order["value"]))))
         elif self.engine.done:
             raise InputError("the run is over: it can't be changed any more")
         else:

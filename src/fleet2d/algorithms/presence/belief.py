@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from fleet2d.configuration.problems import suggest
 from fleet2d.errors import ComponentError
 from fleet2d.kernels import F64, Bool
+from fleet2d.runtime.clock import DAY_S
 
 ANYONE = "anyone"
 AWAY = "away"
@@ -247,7 +248,7 @@ def slot_of_week(time: datetime, slots: int = HOURS) -> int:
         (7, 167)
     """
     seconds = ((time.weekday() * 24 + time.hour) * 60 + time.minute) * 60 + time.second
-    return seconds * slots // (7 * 86400)
+    return seconds * slots // (7 * DAY_S)
 
 
 def with_anyone(chains: list[F64], unknown: Bool | None = None) -> F64:

@@ -18,9 +18,10 @@ from fleet2d.configuration.components import register
 from fleet2d.configuration.units import Share
 from fleet2d.kernels import F64, I64, Bool
 from fleet2d.kernels.presence import StayModel, Stretches, advance, follow
+from fleet2d.runtime.clock import DAY_MINUTES
 
 WEEKEND = 5  # its first day, Monday being 0
-FEWEST_BINS = 1440  # with fewer bins of evidence, hours aren't distinguished
+FEWEST_BINS = DAY_MINUTES  # with fewer bins of evidence, hours aren't distinguished
 MAX_RATIO = 20.0  # largest ratio, and inverse of the smallest, of an hour's share to the mean share
 LEAST = 1e-9
 MAX_LEAVE = 0.5  # largest probability per bin to leave, unless it was larger before

@@ -16,8 +16,9 @@ from fleet2d.algorithms.presence.exposure_ratio import ratios, seen_and_watched
 from fleet2d.configuration.components import register
 from fleet2d.configuration.units import Share
 from fleet2d.kernels import F64, I64
+from fleet2d.runtime.clock import DAY_MINUTES
 
-WEEK = 10_080  # minutes
+WEEK = 7 * DAY_MINUTES
 PERIODS = 100  # candidate periods: a week divided by 1, 2 … 100
 ORDERS = 5  # models with 0 to 4 periods
 SPANS = 1.5  # periods that the data must span before one is considered
@@ -93,7 +94,7 @@ class Fremen(Estimator):
             if today != self.counts.today and self.day:
                 self._end_day(today)
             sums = self.sums(part)
-            self.day.append((((today - 1) * 1440 + part.minute) % WEEK, sums))
+            self.day.append((((today - 1) * DAY_MINUTES + part.minute) % WEEK, sums))
             self.counts.add(part.day, part.minute, sums)
 
     def presence(self, users: Sequence[str], time: datetime) -> Presence:

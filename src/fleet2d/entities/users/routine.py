@@ -27,7 +27,8 @@ from fleet2d.routines.activity import Activity, catalogue
 from fleet2d.routines.household import AWAY, AnyHousehold, AnyPeriod, Household, with_absences
 from fleet2d.routines.life import WELCOME, Life, Lives, MemberRooms
 from fleet2d.routines.persona import AnyPersona, Persona, bundled_persona
-from fleet2d.routines.planner import DAY_S, PLANNED, REST, RESUMES, SLEEP, Episode
+from fleet2d.routines.planner import PLANNED, REST, RESUMES, SLEEP, Episode
+from fleet2d.runtime.clock import DAY_S
 from fleet2d.runtime.determinism import Draws, stream_key
 
 if TYPE_CHECKING:

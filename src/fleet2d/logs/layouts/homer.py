@@ -22,7 +22,7 @@ from pathlib import Path
 
 from fleet2d.bounds import one_line
 from fleet2d.logs.log import ActivityLog, LogError, Reading, in_order, log_lines
-from fleet2d.runtime.clock import DAY_US
+from fleet2d.runtime.clock import DAY_MINUTES, DAY_US
 
 AGENDA = re.compile(r"(\w+) \((\d{1,9}):(\d\d) - (?:(\d{1,9})\s?days? - )?(\d{1,9}):(\d\d)\)")
 SCRIPT = re.compile(r"### (\w+?)-\w+\.txt")
@@ -123,7 +123,7 @@ def _day(path: Path) -> list[_ScriptedActivity]:
 def _agenda(match: re.Match[str], path: Path, line: int) -> _ScriptedActivity:
     begin = int(match[2]) * 60 + int(match[3])
     end = (int(match[4] or 0) * 24 + int(match[5])) * 60 + int(match[6])
-    if begin >= 24 * 60 or int(match[5]) > 24:
+    if begin >= DAY_MINUTES or int(match[5]) > 24:
         raise LogError(
             f"{path}, line {line}: expected a time within 24 hours, got {one_line(match[0])!r}"
         )
