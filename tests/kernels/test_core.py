@@ -2,7 +2,9 @@
 
 import ast
 import copy
+import importlib
 import pickle
+import re
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
@@ -121,6 +123,34 @@ def test_kernels_pass_on_only_what_others_import() -> None:
 
     assert passed_on
     assert set() == passed_on - imported
+
+
+# Structs of the core with other names than their named tuples.
+NAMED_TUPLES = {
+    "DayEvidence": "PeopleEvidence",
+    "PeopleModel": "StayModel",
+    "PeopleMoments": "Moments",
+    "PosesToFill": "Poses",
+}
+
+
+def test_named_tuples_have_the_members_of_their_structs_in_order() -> None:
+    """Tuples become structs by position, so two fields in another order would be taken for each other."""
+    members = {}
+    for path in (PACKAGE.parents[1] / "src" / "core" / "python").iterdir():
+        text = path.read_text(encoding="utf-8")
+        for match in re.finditer(r"members_of<(\w+)> =\s*std::tuple\((.*?)\);", text, re.S):
+            members[match[1]] = tuple(re.findall(r"::(\w+)", match[2]))
+    del members["Chains"]  # plain tuples of the probabilities, bins and offsets of `PeoplePlaces`
+    fields = {
+        name: value._fields
+        for module in ("motion", "presence", "sight", "space")
+        for name, value in vars(importlib.import_module(f"fleet2d.kernels.{module}")).items()
+        if hasattr(value, "_fields")
+    }
+
+    assert len(members) > 15
+    assert {name: fields[NAMED_TUPLES.get(name, name)] for name in members} == members
 
 
 # --- A call of every function ------------------------------------------------------------------
