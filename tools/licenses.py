@@ -22,6 +22,7 @@ REQUIREMENT = re.compile(
 ELSEWHERE = re.compile(r"sys_platform == '(win32|emscripten)'")
 # What the metadata of packages say, and its identifier of SPDX.
 IDENTIFIERS = {
+    "any-OSI": "any-OSI",
     "Apache 2.0": "Apache-2.0",
     "Apache Software License": "Apache-2.0",
     "BSD 2-Clause License": "BSD-2-Clause",

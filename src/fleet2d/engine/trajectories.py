@@ -16,12 +16,7 @@ from fleet2d.kernels import I64
 from fleet2d.kernels.motion import Breakpoints
 from fleet2d.kernels.numbers import in_radians
 from fleet2d.kernels.space import SUB
-<<<<<<< HEAD
-from fleet2d.runtime.clock import Clock
-=======
-from fleet2d.runs.run import PLANNED, TRACK, WALK
 from fleet2d.runtime.clock import HOUR_US, Clock
->>>>>>> b5f1ac82 (The length of a day and of an hour stands once, in the clock)
 
 STEP = Column("step", "step", description="step at which the row takes effect")
 TIME = Column("time", "time", description="local time")
