@@ -21,7 +21,6 @@ from fleet2d.fit.persona import (
     validate,
 )
 from fleet2d.fit.timeline import (
-    MINUTES,
     Distances,
     Timeline,
     by_hour,
@@ -36,6 +35,7 @@ from fleet2d.fit.timeline import (
 from fleet2d.logs.layouts import read_log
 from fleet2d.logs.log import ActivityLog, LogError
 from fleet2d.routines.persona import Persona, read_persona
+from fleet2d.runtime.clock import DAY_MINUTES
 from fleet2d.runtime.determinism import Draws, stream_key
 
 FIRST = datetime(2020, 3, 2)  # a Monday
@@ -186,7 +186,7 @@ def test_distances_of_samples_agree_with_their_definitions(a: np.ndarray, b: np.
 
 
 def test_stays_that_midnight_or_a_gap_cuts_are_left_out() -> None:
-    day = np.zeros(MINUTES, np.int16)
+    day = np.zeros(DAY_MINUTES, np.int16)
     day[100:110] = 1
     day[200:230] = -1
     day[300:305] = 1
