@@ -27,6 +27,7 @@ from fleet2d.artifacts.seal import verify_run
 from fleet2d.engine.repeat import reproduce, resume
 from fleet2d.errors import Fleet2DError, RunDirectoryError
 from fleet2d.runs.exporters import exporter
+from fleet2d.runs.records import Selection
 from fleet2d.runs.run import open_run
 from fleet2d.viewer.page_data import export_html
 from fleet2d.viewer.report import write_report
@@ -52,7 +53,8 @@ def to_page(run: Path) -> None:
 
 
 def to_sensors(run: Path) -> None:
-    exporter("casas")(open_run(run), run.parent / "sensors.txt")
+    opened = open_run(run)
+    exporter("casas")(opened, run.parent / "sensors.txt", Selection.of(opened))
 
 
 def to_report(run: Path) -> None:

@@ -483,3 +483,23 @@ def _length(values: Any) -> int:
     if isinstance(values, np.ndarray):
         return -1 if values.ndim == 0 else len(values)
     return len(values) if isinstance(values, list) else -1
+
+
+def categories(column: Any) -> tuple[I64, list[str]]:
+    """Return the category of each row as a number, and the names of the categories.
+
+    Args:
+        column: A column of a pyarrow table, of text or of a dictionary of texts.
+
+    Returns:
+        int64 (rows,), -1 where the column is null; and the name that each number stands for.
+
+    Example:
+        >>> import pyarrow as pa
+        >>> numbers, names = categories(pa.chunked_array([["ana", None], ["bob", "ana"]]))
+        >>> numbers.tolist(), names
+        ([0, -1, 1, 0], ['ana', 'bob'])
+    """
+    encoded = column.cast("string").combine_chunks().dictionary_encode()
+    numbers = encoded.indices.fill_null(-1).to_numpy(zero_copy_only=False).astype(np.int64)
+    return numbers, encoded.dictionary.to_pylist()

@@ -18,6 +18,7 @@ from matplotlib.patheffects import withStroke
 from matplotlib.text import Text
 from numpy.typing import NDArray
 
+from fleet2d.artifacts.table import categories
 from fleet2d.errors import ArtifactError, PlacementError
 from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.lattice import Lattice
@@ -25,7 +26,7 @@ from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.kernels import F64, I16, I64, Bool
 from fleet2d.kernels.space import Mesh
 from fleet2d.palette import TEXT_COLOR, VIEW_COLOR, VIEW_EDGE, body_color
-from fleet2d.runs.run import Run, categories
+from fleet2d.runs.run import Run
 from fleet2d.runs.trajectory import rebuild_path
 from fleet2d.sight.fov import VisibleRegion, WallPlan
 

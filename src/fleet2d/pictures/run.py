@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 
+from fleet2d.artifacts.table import categories
 from fleet2d.configuration.units import micros
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.kernels import F64, I16, I64
@@ -45,7 +46,7 @@ from fleet2d.pictures.life import (
     places_of,
     trace_of,
 )
-from fleet2d.runs.run import Run, categories
+from fleet2d.runs.run import Run
 from fleet2d.runtime.clock import DAY_MINUTES, DAY_US, HOUR_US, midnight_of
 
 BINS = DAY_MINUTES  # coloured intervals of a day

@@ -9,14 +9,11 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from fleet2d.artifacts.manifest import FILE_NAME, FLOORPLAN_NAME, Manifest
 from fleet2d.artifacts.seal import changed_tables, digest_of_file, digest_table, run_digest
 from fleet2d.artifacts.unfinished import Prefix
 from fleet2d.configuration.problems import suggest
 from fleet2d.errors import ArtifactError, RunDirectoryError, printable
-from fleet2d.kernels import I64
 from fleet2d.storage.files import PARTIAL, path_in
 
 if TYPE_CHECKING:
@@ -385,23 +382,3 @@ def _not_installed(package: str) -> ArtifactError:
     return ArtifactError(
         f"{package} is not installed: `pip install {package}`, or use .arrow(name)"
     )
-
-
-def categories(column: Any) -> tuple[I64, list[str]]:
-    """Return the category of each row as a number, and the names of the categories.
-
-    Args:
-        column: A column of a pyarrow table, of text or of a dictionary of texts.
-
-    Returns:
-        int64 (rows,), -1 where the column is null; and the name that each number stands for.
-
-    Example:
-        >>> import pyarrow as pa
-        >>> numbers, names = categories(pa.chunked_array([["ana", None], ["bob", "ana"]]))
-        >>> numbers.tolist(), names
-        ([0, -1, 1, 0], ['ana', 'bob'])
-    """
-    encoded = column.cast("string").combine_chunks().dictionary_encode()
-    numbers = encoded.indices.fill_null(-1).to_numpy(zero_copy_only=False).astype(np.int64)
-    return numbers, encoded.dictionary.to_pylist()

@@ -9,10 +9,11 @@ import numpy as np
 from pydantic_core import PydanticCustomError
 
 from fleet2d.artifacts.manifest import Manifest
+from fleet2d.artifacts.table import categories
 from fleet2d.configuration.units import micros, parse_duration
 from fleet2d.errors import ArtifactError, InputError
 from fleet2d.kernels import I64
-from fleet2d.runs.run import Run, categories
+from fleet2d.runs.run import Run
 from fleet2d.runtime.clock import Clock, midnight_of
 
 _DAY = re.compile(r"day (\d+)(?:[ ,]+(\d{1,2}):(\d{2})(?::(\d{2}))?)?", re.IGNORECASE)

@@ -9,6 +9,7 @@ import numpy as np
 
 from fleet2d import __version__
 from fleet2d.artifacts.manifest import plain
+from fleet2d.artifacts.table import categories
 from fleet2d.configuration.units import parse_duration
 from fleet2d.engine.simulation import Simulation
 from fleet2d.entities.objects.door import Door
@@ -16,7 +17,7 @@ from fleet2d.errors import ArtifactError
 from fleet2d.kernels import I64, Bool
 from fleet2d.palette import body_color
 from fleet2d.runs.layers import PREFIX
-from fleet2d.runs.run import Run, categories
+from fleet2d.runs.run import Run
 from fleet2d.sight.camera import USUAL_ANGLE_DEG, USUAL_RANGE_M
 from fleet2d.storage.files import path_in
 from fleet2d.viewer.contract import (
