@@ -13,6 +13,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
+from time import perf_counter
 from typing import Any
 
 from fleet2d.algorithms.log import Log
@@ -246,7 +247,7 @@ class Loop:
     @property
     def running_s(self) -> float:
         """Wall time since `run` was called [s]; 0 if it isn't running."""
-        return 0.0 if self._began is None else time.perf_counter() - self._began
+        return 0.0 if self._began is None else perf_counter() - self._began
 
     def run(
         self,
@@ -266,7 +267,7 @@ class Loop:
         Raises:
             KeyboardInterrupt: Ctrl-C, after the present span.
         """
-        stored_s, self._began = state.recorder.wall_s, time.perf_counter()
+        stored_s, self._began = state.recorder.wall_s, perf_counter()
         if self.pace is not None:
             self.pace.resume(self._simulated_s(state))
         with ExitStack() as stack:
@@ -291,7 +292,7 @@ class Loop:
     def _simulate(
         self, state: State, end: int, on_progress: Callable[[], None] | None, spans: int | None
     ) -> None:
-        reported, bodies = time.perf_counter(), state.bodies
+        reported, bodies = perf_counter(), state.bodies
         while bodies.step < end and not self._is_stopping and spans != 0:
             most = self.pace.steps(self._step_us) if self.pace else end
             span = Span(bodies.step, min(end, bodies.step + most))
@@ -301,9 +302,9 @@ class Loop:
                 self._keeper.after_span(state)
             if self.pace is not None:
                 self.pace.hold(self._simulated_s(state), lambda: self._is_stopping)
-            if on_progress is not None and time.perf_counter() - reported > REPORT_S:
+            if on_progress is not None and perf_counter() - reported > REPORT_S:
                 on_progress()
-                reported = time.perf_counter()
+                reported = perf_counter()
             spans = None if spans is None else spans - 1
 
     def _simulated_s(self, state: State) -> float:
