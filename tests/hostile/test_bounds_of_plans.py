@@ -98,7 +98,7 @@ def geojson(folder: Path, corners: list[list[float]]) -> Path:
 
 
 def teeth_at_the_bound(folder: Path) -> Path:
-    return geojson(folder, comb_of(6_000))
+    return geojson(folder, comb_of(4_800))
 
 
 def too_many_teeth(folder: Path) -> Path:
