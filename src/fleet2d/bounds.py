@@ -92,7 +92,9 @@ for each alias."""
 EXTENDED_FILES = Bound("EXTENDED_FILES", 100, "files")
 """Files of a scenario: its own and those that they extend."""
 ENTRIES = Bound("ENTRIES", 5_000, "entries")
-"""Entries of a section of a scenario, such as its users, and of a list of mappings or texts."""
+"""Entries of a section of a scenario, such as its users."""
+ITEMS = Bound("ITEMS", 20_000, "entries")
+"""Entries of a list of mappings or texts, such as a script."""
 JSON_VALUES = Bound("JSON_VALUES", 3_000_000, "values")
 """Values in a JSON text."""
 PIXELS = Bound("PIXELS", 1 << 24, "pixels")

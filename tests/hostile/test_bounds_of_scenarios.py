@@ -49,6 +49,11 @@ def bombs(n: int) -> dict[str, tuple[str, str]]:
             f"{BASE}script:\n" + "- {put: ana, at: 19:00, place: kitchen}\n" * n,
             "script: it has",
         ),
+        "script that runs": (
+            f"{BASE}script:\n"
+            + "".join(f"- {{at: {i} s, hold: ana}}\n" for i in range(18_000 if THOROUGH else 6_000)),
+            "began",
+        ),
         "anchors": ("a:\n" + "".join(f"- &a{i} x\n" for i in range(8 * n)), "at most 200000"),
         "fewer anchors": (
             "a:\n" + "".join(f"- &a{i} x{i}\n" for i in range(190_000)),
@@ -62,7 +67,15 @@ def bombs(n: int) -> dict[str, tuple[str, str]]:
     }  # fmt: skip
 
 
-QUICK = ["extends", "extends itself in pairs", "users", "behaviors", "anchors", "wrong users"]
+QUICK = [
+    "extends",
+    "extends itself in pairs",
+    "users",
+    "behaviors",
+    "anchors",
+    "wrong users",
+    "script that runs",
+]
 
 
 @pytest.mark.parametrize("name", list(bombs(1)) if THOROUGH else QUICK)

@@ -37,7 +37,7 @@ from pydantic import (
 from pydantic.fields import FieldInfo
 from pydantic_core import CoreSchema, InitErrorDetails, core_schema
 
-from fleet2d.bounds import ENTRIES, one_line
+from fleet2d.bounds import ENTRIES, ITEMS, Bound, one_line
 from fleet2d.configuration.problems import (
     Location,
     did_you_mean,
@@ -117,7 +117,7 @@ _FORM = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,99}")
 def _check_names(entries: Any) -> Any:
     """Refuse names that can't be part of a key path, a file name or a table name."""
     if isinstance(entries, Mapping):
-        _check_count((), entries)
+        _check_count(ENTRIES, (), entries)
         for name in entries:
             if not _FORM.fullmatch(str(name)):
                 raise problem_at(
@@ -271,12 +271,12 @@ def _refuse_early(data: Mapping[Any, Any], fields: Mapping[str, FieldInfo]) -> N
             text = str(value).lower()
             raise problem_at((key,), f"expected a number, got {text}", value)
         if isinstance(value, list | tuple) and value and isinstance(value[0], str | Mapping):
-            _check_count((key,), value)
+            _check_count(ITEMS, (key,), value)
 
 
-def _check_count(location: Location, entries: Sized) -> None:
+def _check_count(bound: Bound, location: Location, entries: Sized) -> None:
     try:
-        ENTRIES.check(len(entries), "it")
+        bound.check(len(entries), "it")
     except InputError as error:
         raise problem_at(location, str(error)) from None
 
