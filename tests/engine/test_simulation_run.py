@@ -85,7 +85,7 @@ def test_a_paced_run_is_reproduced_as_fast_as_possible(
 ) -> None:
     content = scenario("5 min", users={"ana": {"type": "meander"}})
     fleet2d.run(content, out=tmp_path / "run", speedup=200)
-    monkeypatch.setattr("fleet2d.engine.simulation.Pace", None)  # which nobody may ask for
+    monkeypatch.setattr("fleet2d.engine.loop.Pace", None)  # which nobody may ask for
     assert fleet2d.reproduce(tmp_path / "run").same
 
 

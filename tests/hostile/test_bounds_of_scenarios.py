@@ -19,7 +19,9 @@ try:
 except fleet2d.InputError as error:
     print(error)
 usage = resource.getrusage(resource.RUSAGE_SELF)
-print(usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024)
+# Not ru_maxrss, which has the memory of the process that this one was forked from.
+status = open('/proc/self/status').read()
+print(usage.ru_utime + usage.ru_stime, int(status.split('VmHWM:')[1].split()[0]) / 1024)
 """
 BASE = "extends: bundled:base\n"
 

@@ -107,7 +107,7 @@ CLOSED = """
 import os, signal, sys
 sys.path.insert(0, sys.argv[1])
 import fleet2d
-simulation = fleet2d.Simulation("simulation.duration.days=2", out="out", seed=4)
+simulation = fleet2d.Simulation("simulation.duration.days=400", out="out", seed=4)
 
 def stop(current):
     if current.step > 40_000:
