@@ -16,8 +16,8 @@ from tests.strategies import homes, quick
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.furnish import RULES, furnish
 from fleet2d.floorplan.furniture import FURNITURE, stand_furniture
+from fleet2d.floorplan.furniture_places import DOOR_CLEARANCE
 from fleet2d.floorplan.home import Home
-from fleet2d.floorplan.interior import DOOR_CLEARANCE
 from fleet2d.floorplan.load import load_floorplan
 from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
 from fleet2d.floorplan.rooms.room import PRIORITY

@@ -1,4 +1,4 @@
-"""Plain JSON data: what manifests and other files of a run consist of."""
+"""The manifest of a run: what was run, with what, and what came out; strict JSON, as a model."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Content digests: what a table holds, whatever its chunks, compression and file bytes are."""
+"""Digests of the content of tables, the seal over all that a run stored, and checks of both."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a run stores: the `artifacts` section of a scenario."""
+"""The run store: its settings, and the writer of a run directory that survives crashes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Text on the frames of a film: each piece is drawn once, then pasted as a picture."""
+"""Films of a stretch of a run: MP4, GIF or WebP, with text on each frame."""
 
 import re
 from collections.abc import Callable, Iterator, Sequence

@@ -1,4 +1,4 @@
-"""Responses of the server."""
+"""The server of the page: it serves the page and some runs on this machine, and nothing else."""
 
 import asyncio
 import secrets

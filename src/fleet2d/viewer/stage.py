@@ -1,4 +1,4 @@
-"""A strip of time: a row for each body, coloured by the room that it is in."""
+"""A home with everyone in it at a step of a run, and a strip of time with a row for each body."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
