@@ -289,7 +289,7 @@ def test_a_bound_is_raised_by_the_environment(
 
 def test_bounds_have_names_of_their_own() -> None:
     assert len(BOUNDS) == len({bound.variable for bound in BOUNDS})
-    assert all(isinstance(bound, Bound) and bound.usual > 0 for bound in BOUNDS)
+    assert all(isinstance(bound, Bound) and bound.default > 0 for bound in BOUNDS)
 
 
 @pytest.mark.parametrize(

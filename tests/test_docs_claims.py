@@ -283,7 +283,7 @@ def test_bounds_of_the_page_are_those_of_the_program() -> None:
     for cells in rows(page("security"), "| variable | bound |"):
         number, _, unit = cells[1].replace(",", "").partition(" ")
         said[cells[0].strip("`")] = int(number) * units.get(unit, 1)
-    assert {bound.variable: bound.most for bound in BOUNDS} == said
+    assert {bound.variable: bound.limit for bound in BOUNDS} == said
 
 
 def test_keys_of_a_study_are_those_of_the_page() -> None:

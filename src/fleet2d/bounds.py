@@ -19,7 +19,7 @@ class Bound:
 
     Attributes:
         name: The name of the environment variable that raises it, without `FLEET2D_MAX_`.
-        usual: The bound without that variable.
+        default: The bound without that variable.
         noun: What is counted, for messages.
 
     Example:
@@ -30,7 +30,7 @@ read more, set FLEET2D_MAX_DEPTH=100 in the environment
     """
 
     name: str
-    usual: int
+    default: int
     noun: str
 
     @property
@@ -39,7 +39,7 @@ read more, set FLEET2D_MAX_DEPTH=100 in the environment
         return f"FLEET2D_MAX_{self.name}"
 
     @property
-    def most(self) -> int:
+    def limit(self) -> int:
         """The present bound.
 
         Raises:
@@ -47,7 +47,7 @@ read more, set FLEET2D_MAX_DEPTH=100 in the environment
         """
         text = os.environ.get(self.variable, "")
         if not text:
-            return self.usual
+            return self.default
         if not (text.isascii() and text.isdigit() and len(text) < 19 and int(text) > 0):
             raise InputError(f"{self.variable}: expected a whole number above 0, got {text[:40]!r}")
         return int(text)
@@ -58,7 +58,7 @@ read more, set FLEET2D_MAX_DEPTH=100 in the environment
         subject: object,
         error: type[Fleet2DError] = InputError,
         *,
-        least: str = (""),
+        prefix: str = "",
     ) -> None:
         """Refuse an amount beyond the bound.
 
@@ -66,15 +66,16 @@ read more, set FLEET2D_MAX_DEPTH=100 in the environment
             amount: The amount.
             subject: The file or object that has it, for the message.
             error: The type of the error.
-            least: Text before an amount that was not counted to its end, such as "more than ".
+            prefix: Text before an amount that was not counted to its end, such as "more than ".
 
         Raises:
             Fleet2DError: The amount is beyond the bound; an error of the type `error`.
         """
-        if amount > self.most:
+        if amount > self.limit:
+            enough = amount * (2 if prefix else 1)
             raise error(
-                f"{subject} has {least}{amount} {self.noun}, and at most {self.most} are read; to"
-                f" read more, set {self.variable}={amount * (2 if least else 1)} in the environment"
+                f"{subject} has {prefix}{amount} {self.noun}, and at most {self.limit} are read; to"
+                f" read more, set {self.variable}={enough} in the environment"
             )
 
 
@@ -86,7 +87,7 @@ LOG_BYTES = Bound("LOG_BYTES", 1 << 30, "bytes")
 """Size of a log."""
 DEPTH = Bound("DEPTH", 64, "lists in lists")
 """Depth of YAML."""
-VALUES = Bound("VALUES", 200_000, "values")
+YAML_VALUES = Bound("VALUES", 200_000, "values")
 """Values in a YAML text, or in a scenario and all that it extends; those of an anchor count again
 for each alias."""
 EXTENDED_FILES = Bound("EXTENDED_FILES", 100, "files")
@@ -131,7 +132,7 @@ def read_bytes(path: Path, bound: Bound, error: type[Fleet2DError] = InputError)
     """
     check_file(path, bound, error)
     with path.open("rb") as file:
-        content = file.read(bound.most + 1)
+        content = file.read(bound.limit + 1)
     bound.check(len(content), path, error)  # it may have grown in the meantime
     return content
 

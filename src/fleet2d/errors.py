@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 
 # A longer line of a message quotes input, and is shortened to its head and tail [characters].
 _LONGEST, _HEAD, _TAIL = 1000, 600, 300
-_MOST_LINES = 200
+_MAX_LINES = 200
 
 
 class Fleet2DError(Exception):
@@ -47,8 +47,8 @@ def _cut(text: str) -> str:
     if len(text) <= _LONGEST:
         return text
     lines = text.split("\n")
-    if len(lines) > _MOST_LINES:
-        lines[_MOST_LINES:] = [f"... {len(lines) - _MOST_LINES} more lines"]
+    if len(lines) > _MAX_LINES:
+        lines[_MAX_LINES:] = [f"... {len(lines) - _MAX_LINES} more lines"]
     return "\n".join(
         line if len(line) <= _LONGEST else f"{line[:_HEAD]}...{line[-_TAIL:]}" for line in lines
     )

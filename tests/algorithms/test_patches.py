@@ -10,7 +10,7 @@ from tests.scenes import TESTS, everything, run
 
 import fleet2d
 from fleet2d import Algorithm, History, Present
-from fleet2d.algorithms.evidence import MOST_PATCHES, SIDE_M, patches_of, whole_rooms
+from fleet2d.algorithms.evidence import MAX_PATCHES, SIDE_M, patches_of, whole_rooms
 from fleet2d.algorithms.observations import NOWHERE
 
 HERE = f"{TESTS.as_posix()}/algorithms/test_patches"
@@ -37,7 +37,7 @@ def test_patches_are_boxes_of_about_a_metre_or_a_dozenth_of_the_room(shared_data
     for plan in plans(shared_data):
         patches = patches_of(plan)
         for patch, room in enumerate(patches.room.tolist()):
-            side = max(SIDE_M / plan.lattice.cell, (plan.rooms[room].cells / MOST_PATCHES) ** 0.5)
+            side = max(SIDE_M / plan.lattice.cell, (plan.rooms[room].cells / MAX_PATCHES) ** 0.5)
             extent = np.ptp(np.argwhere(patches.of_cell == patch), axis=0) + 1
             assert (extent <= 1.5 * side + 2).all()
 

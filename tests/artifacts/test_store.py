@@ -23,7 +23,7 @@ from fleet2d.artifacts.store import ArtifactSettings, RunStore
 from fleet2d.artifacts.table import Column, TableSpec
 from fleet2d.configuration.components import descriptions
 from fleet2d.errors import ArtifactError, RunDirectoryError
-from fleet2d.runs.run import open_run, run_of
+from fleet2d.runs.run import open_run, open_store
 
 from .tables import EVERY_KIND, part, rows_of_every_kind, stored
 
@@ -99,7 +99,7 @@ def test_rows_come_back_as_they_were_given(tmp_path: Path, flush_rows: int) -> N
 def test_memory_and_file_give_the_same_tables(tmp_path: Path) -> None:
     rows = rows_of_every_kind(200)
     stored(rows, directory=tmp_path / "run", pieces=7, flush_rows=50)
-    memory = run_of(stored(rows, pieces=3))
+    memory = open_store(stored(rows, pieces=3))
     disk = open_run(tmp_path / "run")
 
     assert memory.arrow("every_kind").equals(disk.arrow("every_kind"), check_metadata=True)

@@ -30,7 +30,7 @@ from fleet2d.artifacts.unfinished import (
 )
 from fleet2d.errors import ArtifactError, RunDirectoryError
 from fleet2d.kernels.numbers import encode_arrays
-from fleet2d.runs.run import open_run, run_of
+from fleet2d.runs.run import open_run, open_store
 from fleet2d.storage.journal import FrameWriter, read_frames
 
 from .tables import EVERY_KIND, part, rows_of_every_kind, stored
@@ -88,7 +88,7 @@ def test_a_killed_run_reads_up_to_its_last_commit(tmp_path: Path, flush_rows: in
     store = begin_run(tmp_path / "run", flush_rows=flush_rows)
     store.append("every_kind", **part(ROWS, 0, 50))
     run = open_run(kill(store))
-    whole = run_of(stored(part(ROWS, 0, 500)))
+    whole = open_store(stored(part(ROWS, 0, 500)))
 
     assert "running" == run.status
     assert 4 == run.manifest["steps"]

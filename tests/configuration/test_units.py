@@ -15,7 +15,7 @@ from pydantic_core import PydanticCustomError
 
 from fleet2d.configuration.units import (
     GROUPS,
-    LONGEST_DURATION,
+    MAX_DURATION,
     WEEKDAYS,
     AngleDeg,
     Days,
@@ -75,7 +75,7 @@ def test_duration_is_read_exactly(written: object, microseconds: int) -> None:
     assert microseconds == micros(read(Duration, written))
 
 
-@given(st.integers(0, micros(LONGEST_DURATION)))
+@given(st.integers(0, micros(MAX_DURATION)))
 def test_duration_survives_its_canonical_spelling(count: int) -> None:
     duration = timedelta(microseconds=count)
 

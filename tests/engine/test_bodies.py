@@ -57,7 +57,7 @@ def test_watchers_take_in_fewer_steps_the_more_bodies_there_are_but_never_few(
     simulation = fleet2d.Simulation(everything("1 min"))
     simulation._state.actors = [None] * actors  # type: ignore[list-item]
     assert capacity == simulation._state.capacity
-    assert state.LEAST_STEPS <= capacity <= state.MOST_STEPS
+    assert state.MIN_STEPS <= capacity <= state.MAX_STEPS
 
 
 def test_a_row_of_a_block_is_the_poses_of_a_body_at_each_step() -> None:

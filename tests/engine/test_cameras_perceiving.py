@@ -97,8 +97,8 @@ def test_every_table_is_the_same_for_every_max_span(whole: Run, span: int) -> No
 def test_every_table_is_the_same_when_watchers_take_in_few_steps_at_once(
     whole: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("fleet2d.engine.state.MOST_STEPS", 1)
-    monkeypatch.setattr("fleet2d.engine.state.LEAST_STEPS", 50)
+    monkeypatch.setattr("fleet2d.engine.state.MAX_STEPS", 1)
+    monkeypatch.setattr("fleet2d.engine.state.MIN_STEPS", 50)
     assert digests(whole) == digests(run(full()))
 
 

@@ -24,8 +24,8 @@ def test_tables_do_not_depend_on_when_rows_are_handed_over(
     monkeypatch: pytest.MonkeyPatch, span: int | None
 ) -> None:
     expected = digests(run(everything("30 min")))
-    monkeypatch.setattr(recorder, "MOST_ROWS", 0)
-    monkeypatch.setattr(recorder, "ROWS_OF_A_BODY", 0)
+    monkeypatch.setattr(recorder, "MAX_ROWS", 0)
+    monkeypatch.setattr(recorder, "ROWS_PER_BODY", 0)
     assert expected == digests(run(everything("30 min"), max_span=span))
 
 
@@ -37,7 +37,7 @@ def test_every_step_of_the_end_is_the_same_when_rows_are_handed_over_late_or_ear
         content = everything(f"{seconds} s")
         expected = digests(run(content))
         with monkeypatch.context() as patch:
-            patch.setattr(recorder, "MOST_ROWS", 0)
+            patch.setattr(recorder, "MAX_ROWS", 0)
             assert expected == digests(run(content, max_span=1)), seconds
 
 

@@ -58,10 +58,10 @@ def test_every_table_is_the_same_however_rows_are_gathered_and_stored(
     whole: Run, monkeypatch: pytest.MonkeyPatch, steps: int, gathered: int, rows: int
 ) -> None:
     """Blocks of poses, rows on their way to the store and row groups all end somewhere else."""
-    monkeypatch.setattr("fleet2d.engine.state.MOST_STEPS", 1)
-    monkeypatch.setattr("fleet2d.engine.state.LEAST_STEPS", steps)
-    monkeypatch.setattr("fleet2d.engine.recorder.MOST_ROWS", gathered)
-    monkeypatch.setattr("fleet2d.engine.recorder.ROWS_OF_A_BODY", 0)
+    monkeypatch.setattr("fleet2d.engine.state.MAX_STEPS", 1)
+    monkeypatch.setattr("fleet2d.engine.state.MIN_STEPS", steps)
+    monkeypatch.setattr("fleet2d.engine.recorder.MAX_ROWS", gathered)
+    monkeypatch.setattr("fleet2d.engine.recorder.ROWS_PER_BODY", 0)
     store = functools.partial(RunStore, flush_rows=rows)
     monkeypatch.setattr("fleet2d.engine.simulation.RunStore", store)
     assert digests(whole) == digests(run(everything()))

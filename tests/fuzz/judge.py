@@ -18,7 +18,7 @@ MOST_S = 10.0
 """Processor time that reading may take."""
 MOST_BYTES = 1 << 30
 """Memory that reading may add to what the process has had at most."""
-MOST_TEXT = 8000
+MAX_TEXT_BYTES = 8000
 
 
 class HangError(BaseException):
@@ -59,7 +59,7 @@ def _judge(reader: Reader, content: bytes) -> str:
                 reader.read(path)
         except Fleet2DError as error:
             text = str(error)
-            if len(text) > MOST_TEXT or any(len(line) > 1000 for line in text.split("\n")):
+            if len(text) > MAX_TEXT_BYTES or any(len(line) > 1000 for line in text.split("\n")):
                 return f"a message of {len(text)} characters"
         except HangError:
             return f"more than {MOST_S:g} s"

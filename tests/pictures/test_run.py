@@ -25,8 +25,8 @@ from matplotlib.text import Text
 
 from fleet2d.pictures.life import BodyTrace, best_view, field_of_view, opacity, trace_of
 from fleet2d.pictures.run import (
-    FAINTEST,
     MARK_PART,
+    MIN_MARK_HEIGHT,
     NOT_SIMULATED,
     draw_actogram,
     draw_run,
@@ -240,7 +240,9 @@ def test_ink_of_the_marks_is_in_proportion_to_the_time_seen() -> None:
 def test_a_single_sighting_has_a_mark_of_the_least_height_in_its_row() -> None:
     (box,) = mark_boxes(marks_by_day(np.array([86_400 + 43_200]), START, 1_000_000, 3), 0.1)
     assert [12.0, 12.0 + 1 / 12] == pytest.approx([box[:, 0].min(), box[:, 0].max()])
-    assert [1.9 - MARK_PART * FAINTEST, 1.9] == pytest.approx([box[:, 1].min(), box[:, 1].max()])
+    assert [1.9 - MARK_PART * MIN_MARK_HEIGHT, 1.9] == pytest.approx(
+        [box[:, 1].min(), box[:, 1].max()]
+    )
 
 
 def test_ink_in_the_picture_is_in_proportion_too() -> None:

@@ -14,7 +14,7 @@ from tests.artifacts.tables import EVERY_KIND, rows_of_every_kind, stored
 from fleet2d.artifacts.arrow import spec_of
 from fleet2d.artifacts.store import RunStore
 from fleet2d.errors import ArtifactError, RunDirectoryError
-from fleet2d.runs.run import Run, open_run, run_of
+from fleet2d.runs.run import Run, open_run, open_store
 
 ROWS = rows_of_every_kind(300)
 
@@ -27,7 +27,7 @@ def directory(tmp_path: Path) -> Path:
 
 
 def test_run_in_memory_reads_like_a_stored_one(directory: Path) -> None:
-    for run in (open_run(directory), run_of(stored(ROWS))):
+    for run in (open_run(directory), open_store(stored(ROWS))):
         assert "complete" == run.status
         assert ["every_kind"] == list(run.tables)
         assert "every_kind" in run.tables
@@ -151,7 +151,7 @@ def test_crashed_run_opens_with_what_is_whole(tmp_path: Path) -> None:
 
 def test_run_before_close_is_refused() -> None:
     with pytest.raises(ArtifactError, match="not closed yet"):
-        run_of(RunStore(None, [EVERY_KIND]))
+        open_store(RunStore(None, [EVERY_KIND]))
 
 
 def test_run_says_where_and_how(directory: Path) -> None:

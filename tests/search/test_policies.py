@@ -11,7 +11,7 @@ from tests.thorough import examples
 
 from fleet2d.runtime.determinism import Draws, stream_key
 from fleet2d.search.policies import (
-    MOST_EXACT,
+    MAX_EXACT_SITES,
     after_empty_looks,
     exact,
     greedy,
@@ -180,9 +180,9 @@ def test_restricted_mean_counts_what_is_not_found_as_the_deadline() -> None:
 
 def test_sixteen_sites_are_solved_and_more_are_refused() -> None:
     rng = np.random.default_rng(4)
-    places = rng.uniform(0, 10, (MOST_EXACT + 1, 2))
+    places = rng.uniform(0, 10, (MAX_EXACT_SITES + 1, 2))
     travel = np.sqrt(((places[:, None] - places[None]) ** 2).sum(axis=-1))
-    weights = rng.uniform(size=MOST_EXACT + 1)
+    weights = rng.uniform(size=MAX_EXACT_SITES + 1)
     problem = search_problem(weights / weights.sum(), travel[0], travel)
     with pytest.raises(ValueError, match="17 sites"):
         exact(problem)
@@ -193,7 +193,7 @@ def test_sixteen_sites_are_solved_and_more_are_refused() -> None:
     best = play(fewer, exact(fewer)).cost
     for policy in HEURISTICS:
         assert best <= play(fewer, policy(fewer)).cost
-    assert sorted(receding(problem)) == list(range(MOST_EXACT + 1))
+    assert sorted(receding(problem)) == list(range(MAX_EXACT_SITES + 1))
 
 
 def test_an_empty_look_fades_with_its_age() -> None:

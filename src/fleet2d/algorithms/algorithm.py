@@ -113,7 +113,7 @@ def array_of(
     name: str,
     shape: tuple[int, ...],
     kind: type[np.generic] = np.float64,
-    most: float = 1e300,
+    max_value: float = 1e300,
 ) -> NDArray[Any]:
     """Return a copy of an array of a learned state.
 
@@ -122,7 +122,7 @@ def array_of(
         name: Name of the array.
         shape: The shape it must have; -1 for any length above 0.
         kind: Type of the returned array.
-        most: The largest absolute value allowed.
+        max_value: The largest absolute value allowed.
 
     Raises:
         ComponentError: It is missing, of another shape, or not of finite numbers.
@@ -132,7 +132,7 @@ def array_of(
         size == expected or expected < 0 < size
         for size, expected in zip(array.shape, shape, strict=True)
     )
-    if not fits or array.dtype.kind not in "biuf" or not (np.abs(array) <= most).all():
+    if not fits or array.dtype.kind not in "biuf" or not (np.abs(array) <= max_value).all():
         raise ComponentError(
             f"the learned state lacks a numeric array {name!r} of shape {shape}: it is damaged, or"
             " from another home, other users or another estimator"

@@ -19,9 +19,9 @@ from fleet2d.kernels.presence import gather_views, list_sightings
 from fleet2d.kernels.space import label_triangles, rasterize_cells
 from fleet2d.runtime.clock import DAY_US, MICROSECOND, Clock, midnight_of
 
-# Side of a patch [m], approximately; larger where a room would have more than about MOST_PATCHES.
+# Side of a patch [m], approximately; larger where a room would have more than about MAX_PATCHES.
 SIDE_M = 1.0
-MOST_PATCHES = 12
+MAX_PATCHES = 12
 
 # Length of a bin [us]; one step where a step is longer.
 BIN_US = 60_000_000
@@ -82,7 +82,7 @@ def patches_of(plan: FloorPlan) -> Patches:
     row, column = np.nonzero(rooms != NOWHERE)
     room = rooms[row, column].astype(np.int64)
     total = np.bincount(room, minlength=count)
-    side = np.maximum(SIDE_M / plan.lattice.cell, np.sqrt(np.ceil(total / MOST_PATCHES)))
+    side = np.maximum(SIDE_M / plan.lattice.cell, np.sqrt(np.ceil(total / MAX_PATCHES)))
     box_row, box_rows = _divide(row, room, side, count)
     box_column, box_columns = _divide(column, room, side, count)
     boxes = box_rows * box_columns

@@ -31,7 +31,7 @@ from fleet2d.storage import files
 from fleet2d.storage.files import PARTIAL
 
 # Bytes of text in one array: Arrow counts them by 32 bits.
-MOST_TEXT = 2**31 - 1
+MAX_TEXT_BYTES = 2**31 - 1
 
 _TYPES = {
     "step": pa.int64(),
@@ -113,7 +113,7 @@ def _array_of(chunk: ColumnChunk, column: Column, dictionary: pa.Array | None) -
     if chunk.lengths is not None:
         ends = np.zeros(len(chunk.lengths) + 1, np.int64)
         np.cumsum(chunk.lengths, out=ends[1:])
-        if ends[-1] > MOST_TEXT:
+        if ends[-1] > MAX_TEXT_BYTES:
             raise ArtifactError(
                 f"{column.name} is more than 2 GiB of text at once: append fewer rows at a time"
             )
@@ -283,7 +283,7 @@ def read_parquet(path: Path, kinds: Mapping[str, Kind] | None = None) -> pa.Tabl
     with _opened(path) as file:
         if kinds is not None:
             _check_columns(path, file.schema_arrow, kinds)
-        TABLE_BYTES.check(unpacked_bytes(file), path, ArtifactError, least="about ")
+        TABLE_BYTES.check(unpacked_bytes(file), path, ArtifactError, prefix="about ")
         try:
             table = file.read()
         except (OSError, pa.ArrowException) as error:
@@ -311,7 +311,7 @@ def read_row_groups(path: Path) -> Iterator[pa.Table]:
     with _opened(path) as file:
         yield file.schema_arrow.empty_table()
         for group in range(file.num_row_groups):
-            TABLE_BYTES.check(unpacked_bytes(file, group), path, ArtifactError, least="about ")
+            TABLE_BYTES.check(unpacked_bytes(file, group), path, ArtifactError, prefix="about ")
             try:
                 part = file.read_row_group(group)
             except (OSError, pa.ArrowException) as error:

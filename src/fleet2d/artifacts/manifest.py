@@ -23,7 +23,7 @@ from fleet2d.bounds import FILE_BYTES, read_bytes
 from fleet2d.configuration.problems import did_you_mean
 from fleet2d.configuration.units import parse_duration
 from fleet2d.errors import RunDirectoryError, printable
-from fleet2d.sight.camera import USUAL_ANGLE_DEG, USUAL_RANGE_M
+from fleet2d.sight.camera import DEFAULT_ANGLE_DEG, DEFAULT_RANGE_M
 from fleet2d.storage.files import path_in, write_atomically
 
 if TYPE_CHECKING:
@@ -176,8 +176,8 @@ class _StoredPan(_StoredPart):
 
 
 class _StoredCamera(_StoredPart):
-    range: Annotated[_Pair, AfterValidator(_check_range)] = list(USUAL_RANGE_M)
-    angle_deg: Annotated[float, Field(gt=0, le=360)] = USUAL_ANGLE_DEG
+    range: Annotated[_Pair, AfterValidator(_check_range)] = list(DEFAULT_RANGE_M)
+    angle_deg: Annotated[float, Field(gt=0, le=360)] = DEFAULT_ANGLE_DEG
     offset: _Pair = [0.0, 0.0]
     heading_deg: float = 0.0
     pan: _StoredPan | None = None
@@ -260,9 +260,9 @@ LEARNED_NAME = "learned"
 """The folder in a run directory of what algorithms have learned."""
 
 # Problems of one manifest that a message lists, at most.
-_MOST_PROBLEMS = 5
+_MAX_PROBLEMS = 5
 # Characters of a wrong value that a message quotes, at most.
-_MOST_CHARACTERS = 60
+_MAX_CHARACTERS = 60
 
 SLOW = "simulation.speedup is"
 """Beginning of the note that a run was slower than its speedup."""
@@ -585,14 +585,14 @@ def json_of(path: Path, text: bytes) -> Any:
 def _problems(error: ValidationError) -> str:
     """Return a message that names the wrong fields and what is wrong with each."""
     lines = []
-    for line in error.errors(include_url=False)[:_MOST_PROBLEMS]:
+    for line in error.errors(include_url=False)[:_MAX_PROBLEMS]:
         key = printable(".".join(map(str, line["loc"])))
         if line["type"] == "extra_forbidden":
             known = Manifest.model_fields if len(line["loc"]) == 1 else ()
             lines.append(f"{key} is not a field of a manifest{did_you_mean(key, known)}"[:200])
             continue
         value = repr(line["input"])
-        value = value if len(value) <= _MOST_CHARACTERS else f"{value[:_MOST_CHARACTERS]}…"
+        value = value if len(value) <= _MAX_CHARACTERS else f"{value[:_MAX_CHARACTERS]}…"
         lines.append(f"{key}: {line['msg']}, got {value}"[:300])
     more = error.error_count() - len(lines)
     return "; ".join([*lines, *([f"and {more} more"] if more > 0 else [])]).replace(".;", ";")

@@ -52,7 +52,7 @@ JOURNAL = JournalFormat(
 # of the process loses none of it.
 SYNC_S = 5.0
 # Rows in one frame at most: a few damaged bytes must not request all memory.
-_MOST_ROWS = 1 << 20
+_MAX_ROWS = 1 << 20
 # The years 1 to 9999 [us since 1970], which `datetime` can express.
 _FIRST_TIME, _END_OF_TIME = -62_135_596_800_000_000, 253_402_300_800_000_000
 _to_json = json.JSONEncoder(separators=(",", ":")).encode
@@ -245,7 +245,7 @@ def _spec_of(description: Mapping[str, Any]) -> TableSpec:
 
 
 def _chunk_of(spec: TableSpec, rows: int, content: bytes, words: dict[str, Dictionary]) -> Chunk:
-    if not 0 <= rows <= _MOST_ROWS:
+    if not 0 <= rows <= _MAX_ROWS:
         raise ValueError(f"{rows} rows at once")
     reader = ArrayReader(content)
     return {

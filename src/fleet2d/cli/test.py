@@ -176,7 +176,7 @@ def _least(verdicts: "Sequence[Verdict]") -> str:
 
 
 FIRST_SEED = 1
-MOST_STORED = 5
+MAX_STORED_SEEDS = 5
 """The most failing seeds of one scenario that are stored or drawn."""
 
 
@@ -214,7 +214,7 @@ def test(
         _run(case)
         if case.fails and not case.error and (pictures or out):
             failures[case.source] += 1
-            if failures[case.source] <= MOST_STORED:
+            if failures[case.source] <= MAX_STORED_SEEDS:
                 _store(case, pictures, out)
     if junit is not None:
         write_junit(junit, cases)

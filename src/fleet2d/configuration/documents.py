@@ -11,7 +11,7 @@ from typing import Any
 
 import yaml
 
-from fleet2d.bounds import DEPTH, FILE_BYTES, VALUES, one_line, read_bytes
+from fleet2d.bounds import DEPTH, FILE_BYTES, YAML_VALUES, one_line, read_bytes
 from fleet2d.configuration.problems import Location, did_you_mean
 from fleet2d.configuration.units import Text
 from fleet2d.errors import InputError, ScenarioError
@@ -120,7 +120,7 @@ def _composed(loader: Any) -> yaml.Node | None:
 def _check_events(text: str) -> None:
     """Refuse a text of too many levels or values before its nodes are built."""
     depth = values = 0
-    most_depth, most_values = DEPTH.most, VALUES.most
+    most_depth, most_values = DEPTH.limit, YAML_VALUES.limit
     for event in yaml.parse(text, Loader=_FastLoader):
         if isinstance(event, yaml.CollectionEndEvent):
             depth -= 1
@@ -128,9 +128,9 @@ def _check_events(text: str) -> None:
             values += 1
             depth += isinstance(event, yaml.CollectionStartEvent)
             if depth > most_depth:
-                DEPTH.check(depth, "it", least="at least ")
+                DEPTH.check(depth, "it", prefix="at least ")
             if values > most_values:
-                VALUES.check(values, "it", least="more than ")
+                YAML_VALUES.check(values, "it", prefix="more than ")
 
 
 def parse(text: str) -> Any:
@@ -163,7 +163,7 @@ class TreeWalk:
 
     def __init__(self) -> None:
         """Start with no values."""
-        self._values, self._most_values, self._most_depth = 0, VALUES.most, DEPTH.most
+        self._values, self._most_values, self._most_depth = 0, YAML_VALUES.limit, DEPTH.limit
         self._scalars = Loader("")
         self._pairs: dict[int, dict[str, Pair] | None] = {}
 
@@ -180,9 +180,9 @@ class TreeWalk:
         """
         self._values += 1
         if self._values > self._most_values:
-            VALUES.check(self._values, "it", least="more than ")
+            YAML_VALUES.check(self._values, "it", prefix="more than ")
         if len(parents) >= self._most_depth:
-            DEPTH.check(len(parents) + 1, "it", least="at least ")
+            DEPTH.check(len(parents) + 1, "it", prefix="at least ")
         if node in parents:  # nodes are equal only to themselves
             raise NodeError(node, "a value can't contain itself")
 

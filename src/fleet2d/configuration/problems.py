@@ -11,7 +11,7 @@ from fleet2d.errors import ScenarioError
 
 Location = tuple[int | str, ...]
 
-MOST_LINES = 100
+MAX_LINES = 100
 """Lines of an error that are explained; a file may have as many errors as values."""
 
 _PYDANTIC_ERRORS = frozenset(get_args(core_schema.ErrorType))
@@ -56,7 +56,7 @@ def rewrite(
 ) -> ValidationError:
     """Return the same error, its first lines only, with ``change`` applied to each of them."""
     lines = []
-    for line in error.errors(include_url=False)[:MOST_LINES]:
+    for line in error.errors(include_url=False)[:MAX_LINES]:
         kind, context = line["type"], line.get("ctx", {})
         details = InitErrorDetails(type=kind, loc=line["loc"], input=line["input"], ctx=context)
         if kind not in _PYDANTIC_ERRORS:

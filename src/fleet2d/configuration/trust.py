@@ -32,7 +32,7 @@ from fleet2d.configuration.units import folder_of
 from fleet2d.errors import InputError, RunDirectoryError, ScenarioError, may_be_ctrl_c, text_of
 
 # Files that a message lists, at most.
-_MOST_LISTED = 20
+_MAX_LISTED = 20
 
 _PREFIX = "fleet2d_scenario_"
 # The folders of scenarios by the packages that their modules are imported into.
@@ -185,11 +185,11 @@ def _refusal(title: str, content: object, trust: Trust) -> str:
         return ""
     lines = [
         f"  {file} ({', '.join(keys[:3])}{', …' * (len(keys) > 3)}){_shown_hash(file)}"
-        for file, keys in list(code.items())[:_MOST_LISTED]
+        for file, keys in list(code.items())[:_MAX_LISTED]
     ]
-    if len(code) > _MOST_LISTED:
-        lines.append(f"  … {len(code) - _MOST_LISTED} more")
-    options = " ".join(f"--trust {shlex.quote(str(file))}" for file in list(code)[:_MOST_LISTED])
+    if len(code) > _MAX_LISTED:
+        lines.append(f"  … {len(code) - _MAX_LISTED} more")
+    options = " ".join(f"--trust {shlex.quote(str(file))}" for file in list(code)[:_MAX_LISTED])
     return "\n".join(
         [
             f"{title} has components of its own, which would run:",

@@ -79,8 +79,8 @@ InputFileOrFolder = Annotated[
 """An existing file or folder, likewise."""
 
 
-LONGEST_DURATION = timedelta(days=365_250)  # 1000 years: microseconds stay far inside int64
-MOST_DIGITS = 400  # of a number: fractions with very many digits would fill the memory
+MAX_DURATION = timedelta(days=365_250)  # 1000 years: microseconds stay far inside int64
+MAX_DIGITS = 400  # of a number: fractions with very many digits would fill the memory
 MICROSECOND = timedelta(microseconds=1)
 
 # Exponents are short on purpose: Fraction("1e999999999") would fill the memory.
@@ -119,8 +119,8 @@ class Quantity:
             part = _PART.match(text, position)
             if part is None or (not part[2] and part.span() != (0, len(text))):
                 raise self._unreadable(text)
-            if len(part[1]) > MOST_DIGITS:
-                raise problem(f"expected at most {MOST_DIGITS} digits in a row, got {shown(text)}")
+            if len(part[1]) > MAX_DIGITS:
+                raise problem(f"expected at most {MAX_DIGITS} digits in a row, got {shown(text)}")
             total += Fraction(part[1]) * (self._unit(part[2], text) if part[2] else 1)
             position = part.end()
         return total
@@ -133,7 +133,7 @@ class Quantity:
             exact = value if isinstance(value, Decimal) else Decimal(repr(float(value)))
         except OverflowError:
             raise problem(f"expected {self.name}, a finite number, got {shown(value)}") from None
-        if not exact.is_finite() or exact.adjusted() > MOST_DIGITS:
+        if not exact.is_finite() or exact.adjusted() > MAX_DIGITS:
             raise problem(f"expected {self.name}, a finite number, got {shown(value)}")
         return Fraction(exact)
 
@@ -274,12 +274,12 @@ def parse_duration(value: object) -> timedelta:
         count = round(seconds * 10**6)
         if seconds and not count:
             raise problem(f"expected a duration of 1 microsecond or longer, got {shown(value)}")
-        if abs(count) > micros(LONGEST_DURATION):
+        if abs(count) > micros(MAX_DURATION):
             raise problem(f"expected a duration of at most 1000 years, got {shown(value)}")
         value = timedelta(microseconds=count)
     if value < timedelta(0):
         raise problem(f"expected a duration of 0 or more, got {format_duration(value)}")
-    if value > LONGEST_DURATION:
+    if value > MAX_DURATION:
         raise problem(f"expected a duration of at most 1000 years, got {format_duration(value)}")
     return value
 

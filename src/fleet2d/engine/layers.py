@@ -49,7 +49,7 @@ from fleet2d.sight.camera import TableContext, stack_lenses
 # thousand poses.
 SLOTS = 1 << 14
 # Most steps in one call of the kernel.
-LONGEST = 1 << 16
+MAX_BATCH_STEPS = 1 << 16
 
 
 class SeenArea(Watcher):
@@ -140,7 +140,7 @@ class SeenArea(Watcher):
             self._settle()
             self._set_walls(walls)
         while self.next_step < end:
-            first, until = self.next_step, min(end, self.next_step + LONGEST)
+            first, until = self.next_step, min(end, self.next_step + MAX_BATCH_STEPS)
             self.next_step = until
             runs = bodies.runs(self.row, first, until)
             record, bins = self._record, self._new_bins(first, until)

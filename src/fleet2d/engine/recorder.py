@@ -132,8 +132,8 @@ def _sensor_table(sensors: Sensors) -> TableSpec:
 OF_USERS = frozenset({EventKind.USER_LOST, EventKind.USER_SEEN})
 ACTIVITY = EventKind.ACTIVITY.value
 # Rows that are collected before they are stored: so many, or more with many bodies.
-MOST_ROWS = 1 << 15
-ROWS_OF_A_BODY = 128
+MAX_ROWS = 1 << 15
+ROWS_PER_BODY = 128
 
 
 def activities_of(cameras: Sequence[Cameras], users: int) -> Activities:
@@ -176,7 +176,7 @@ class Recorder:
         self._rooms = NearestRooms(basis.home.plan)
         self._camera_codes = _codes_of(cameras)
         self._count = 0  # observations and readings
-        self._most = max(MOST_ROWS, ROWS_OF_A_BODY * len(basis.actors))
+        self._most = max(MAX_ROWS, ROWS_PER_BODY * len(basis.actors))
         self.wall_s = 0.0
 
     def before_plan(self, row: int, step: int) -> None:

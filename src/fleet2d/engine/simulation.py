@@ -44,7 +44,7 @@ from fleet2d.interventions.intervention import Intervention
 from fleet2d.interventions.methods import InterventionMethods
 from fleet2d.kernels.numbers import in_radians
 from fleet2d.memory import free_bodies, rare_collections
-from fleet2d.runs.run import Run, run_of
+from fleet2d.runs.run import Run, open_store
 from fleet2d.runtime.clock import Clock, next_time
 from fleet2d.runtime.events import Event, EventKind, Listener
 from fleet2d.scenario.model import Scenario, load_scenario
@@ -727,7 +727,7 @@ class Simulation(InterventionMethods):
         self._loop.save_s += time.perf_counter() - began
         self._store.manifest.describe_end(self._end(results))
         self._store.close(status)
-        self._run = run_of(self._store)
+        self._run = open_store(self._store)
         self._run.plan = self.home.plan
         return self._run
 

@@ -33,9 +33,9 @@ if TYPE_CHECKING:
     from fleet2d.expectations.expectation import Expectation
 
 # The most steps that watchers process together: fewer if there are many bodies.
-MOST_STEPS = 1 << 16
-LEAST_STEPS = 1 << 12
-MOST_POSES = 1 << 21
+MAX_STEPS = 1 << 16
+MIN_STEPS = 1 << 12
+MAX_POSES = 1 << 21
 
 
 @dataclass
@@ -103,7 +103,7 @@ class State:
     @property
     def capacity(self) -> int:
         """The most steps that watchers process together."""
-        return max(LEAST_STEPS, min(MOST_STEPS, MOST_POSES // max(1, len(self.actors))))
+        return max(MIN_STEPS, min(MAX_STEPS, MAX_POSES // max(1, len(self.actors))))
 
     # Decisions of scripts
 

@@ -156,7 +156,7 @@ class Charge:
         return begins, rate[first:].tolist()
 
 
-LONGEST = timedelta(days=1)
+MAX_CORRECTION_INTERVAL = timedelta(days=1)
 MINUTE_US = 60_000_000
 # Noise is in 1/65536 of the unit of what it is added to, per unit of random_bell.
 FINE = 1 << 16
@@ -189,7 +189,7 @@ class Localization(Settings):
 
     @model_validator(mode="after")
     def _jumps_at_most_once(self) -> Self:
-        if self.corrected_every > LONGEST:
+        if self.corrected_every > MAX_CORRECTION_INTERVAL:
             raise problem_at(("corrected_every",), "at most a day is between two corrections")
         expected = self.jumps_per_hour * self.corrected_every / timedelta(hours=1)
         if expected > 1:

@@ -13,7 +13,7 @@ from fleet2d.kernels.motion import WalkRule
 from fleet2d.kernels.numbers import BELL_STD, TURN
 
 # A step longer than any home is never possible; this limit keeps products within 64 bits.
-LONGEST_STRIDE = 256 << 21
+MAX_STRIDE = 256 << 21
 
 
 @register("behavior", "meander")
@@ -40,7 +40,7 @@ class Meander(Behavior):
         std = self.turn_std_deg / 360 * TURN * math.sqrt(step_s)  # headings per step
         self.rule = WalkRule(
             key=actor.stream("meander"),
-            stride=min(round(actor.speed * step_s * 256), LONGEST_STRIDE),
+            stride=min(round(actor.speed * step_s * 256), MAX_STRIDE),
             sway=round(std / BELL_STD * 65536),
             turn_limit=min(max(1, math.floor(actor.turn_rate * step_s)), TURN // 2),
             stays=int(self.at_walls == "stay"),

@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
 from fleet2d.configuration.problems import did_you_mean, problem, refusal
-from fleet2d.configuration.units import LONGEST_DURATION, micros
+from fleet2d.configuration.units import MAX_DURATION, micros
 from fleet2d.entities.body import Motion, RandomWalk, Track
 from fleet2d.entities.place import seat_at
 from fleet2d.errors import ComponentError, NoWayError
@@ -268,7 +268,7 @@ class Plan:
         """
         self._check_goes_on()
         if duration is not None:
-            if not timedelta(0) <= duration <= LONGEST_DURATION:
+            if not timedelta(0) <= duration <= MAX_DURATION:
                 raise ComponentError(
                     f"{self._body.path}: can't stay for {duration}: 0 to 1000 years are possible;"
                     " leave the duration out to stay for good"

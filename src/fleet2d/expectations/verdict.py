@@ -74,7 +74,7 @@ class Verdict:
         if math.isfinite(self.robustness):
             parts.append(f"by {amount(self.robustness, self.unit)}")
         if self.slack_s is not None:
-            parts.append(f"with {spoken(timedelta(seconds=self.slack_s))} to spare")
+            parts.append(f"with {duration_in_words(timedelta(seconds=self.slack_s))} to spare")
         return f" {', '.join(parts)}" if parts else ""
 
     def _when(self) -> str:
@@ -84,7 +84,7 @@ class Verdict:
         day = "%a %d %b %H:%M:%S"
         begin, end = self.clock.time(worst.first), self.clock.time(worst.last)
         step = timedelta(microseconds=self.clock.step_us)
-        text = f", from {begin:{day}} to {end:%H:%M:%S} ({spoken(end - begin + step)})"
+        text = f", from {begin:{day}} to {end:%H:%M:%S} ({duration_in_words(end - begin + step)})"
         if end.date() != begin.date():
             text = f", from {begin:{day}} to {end:{day}}"
         if worst.first == worst.last:
@@ -211,11 +211,13 @@ def _finite(value: float) -> float | None:
     return 0.0 if abs(value) <= TINY else value
 
 
-def spoken(duration: timedelta) -> str:
+def duration_in_words(duration: timedelta) -> str:
     """Format a duration in days, hours, minutes and seconds.
 
-    >>> spoken(timedelta(seconds=9514)), spoken(timedelta(seconds=40.5)), spoken(timedelta(days=2))
-    ('2 h 38 min 34 s', '40.5 s', '2 d')
+    >>> duration_in_words(timedelta(seconds=9514))
+    '2 h 38 min 34 s'
+    >>> duration_in_words(timedelta(seconds=40.5))
+    '40.5 s'
     """
     parts, remainder = [], duration
     for unit, length in (("d", DAY_S), ("h", HOUR_S), ("min", 60)):

@@ -24,7 +24,7 @@ with extra("calibrate", "calibration needs scipy"):
 CHI_SQUARE_95 = 3.8414588206941236  # one degree of freedom
 NEVER = 1e-12  # the least distance of probabilities from 0 and 1
 ENOUGH = 1e-10  # the search ends when a round gains less log-likelihood than this
-MOST_ROUNDS = 200
+MAX_ROUNDS = 200
 SURE = 12.0  # logits from here on count as a share of 1
 
 
@@ -33,14 +33,14 @@ class Factor:
 
     Attributes:
         names: The names of its parameters.
-        least: The least value of each parameter.
-        most: The largest value of each parameter.
+        lower: The smallest value of each parameter.
+        upper: The largest value of each parameter.
         starts: Values of the parameters from which the search for the maximum starts.
     """
 
     names: tuple[str, ...]
-    least: tuple[float, ...]
-    most: tuple[float, ...]
+    lower: tuple[float, ...]
+    upper: tuple[float, ...]
     starts: tuple[tuple[float, ...], ...]
 
     def shares(self, theta: F64) -> tuple[F64, F64]:
@@ -98,15 +98,15 @@ class ProductLikelihood:
 
     def __init__(self, factors: Sequence[Factor], outcomes: Bool) -> None:
         self.factors, self.outcomes = factors, outcomes
-        self.least = np.array([v for factor in factors for v in factor.least])
-        self.most = np.array([v for factor in factors for v in factor.most])
+        self.lower = np.array([v for factor in factors for v in factor.lower])
+        self.upper = np.array([v for factor in factors for v in factor.upper])
 
     def fit(self) -> Fit:
         """Return the best of the fits from all starting points."""
         starts: list[list[float]] = [[]]
         for factor in self.factors:
             starts = [[*values, *start] for values in starts for start in factor.starts]
-        free = np.ones(len(self.least), bool)
+        free = np.ones(len(self.lower), bool)
         return max(
             (self._climb(np.array(start, np.float64), free) for start in starts),
             key=lambda fit: fit.log_likelihood,
@@ -144,17 +144,17 @@ class ProductLikelihood:
 
     def _climb(self, theta: F64, free: Bool) -> Fit:
         """Return the maximum over the free parameters, by damped Fisher scoring from `theta`."""
-        theta = np.clip(theta, self.least, self.most)
+        theta = np.clip(theta, self.lower, self.upper)
         shares, slopes = self._model(theta)
         value, damping = self._value(shares), 1e-3
-        for _ in range(MOST_ROUNDS):
+        for _ in range(MAX_ROUNDS):
             slopes = slopes[:, free]
             score = slopes.T @ ((self.outcomes - shares) / (1 - shares))
             information = slopes.T @ (slopes * (shares / (1 - shares))[:, None])
             damped = information + np.diag(damping * np.diag(information) + 1e-9)
             trial = theta.copy()
             trial[free] += np.linalg.solve(damped, score) if len(score) else score
-            trial = np.clip(trial, self.least, self.most)
+            trial = np.clip(trial, self.lower, self.upper)
             trial_shares, trial_slopes = self._model(trial)
             gain = self._value(trial_shares) - value
             if gain < 0 and damping < 1e9:
@@ -169,7 +169,7 @@ class ProductLikelihood:
 
     def _interval_end(self, best: Fit, index: int, side: int) -> float | None:
         """Return the lower (-1) or upper (1) end of a parameter's interval; None if unbounded."""
-        limit = float((self.most if side > 0 else self.least)[index])
+        limit = float((self.upper if side > 0 else self.lower)[index])
         free = np.ones(len(best.theta), bool)
         free[index] = False
         theta = best.theta  # of the last value tried, from which the next search starts
@@ -242,8 +242,8 @@ class Falling(Factor):
         self.names = (f"{name} midpoint", f"{name} width")
         self._x = values
         span = max(float(values.max()), 1e-6)
-        self.least = (-span, math.log(span / 1000))
-        self.most = (3 * span, math.log(3 * span))
+        self.lower = (-span, math.log(span / 1000))
+        self.upper = (3 * span, math.log(3 * span))
         self.starts = tuple((share * span, math.log(span / 8)) for share in (0.5, 0.8, 1.1))
 
     def shares(self, theta: F64) -> tuple[F64, F64]:

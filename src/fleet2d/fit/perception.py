@@ -28,9 +28,9 @@ from fleet2d.fit.likelihood import (
 from fleet2d.kernels import F64, I64, Bool
 from fleet2d.runtime.determinism import sum_in_order
 
-LEAST_ROWS = 50
-MOST_METRES = 100.0  # a larger distance in a home is in another unit
-MOST_DEGREES = 360.0
+MIN_ROWS = 50
+MAX_METRES = 100.0  # a larger distance in a home is in another unit
+MAX_DEGREES = 360.0
 TRUE, FALSE = frozenset({"1", "true", "yes"}), frozenset({"0", "false", "no"})
 ANGLES = (
     "bearing",
@@ -44,8 +44,8 @@ COLUMNS = frozenset({"distance", "detected", *ANGLES, "identity", "true_identity
 UNKNOWN = frozenset({"", "unknown", "none", "null"})
 GROUPS = 10
 SIGNIFICANCE = 0.05  # the largest p value of a likelihood ratio test with which a factor is used
-LEAST_KNOWN = 20  # the fewest detections with an identity to fit recognition to
-MOST_ROWS = 60  # of a curve by distance
+MIN_IDENTIFIED = 20  # the fewest detections with an identity to fit recognition to
+MAX_ROWS = 60  # of a curve by distance
 
 
 @dataclass(frozen=True)
@@ -87,8 +87,8 @@ def read_detections(path: Path) -> DetectionLog:
             the line and the column.
     """
     table = _read_table(path)
-    if len(table) < LEAST_ROWS:
-        raise InputError(f"{path} has {len(table)} rows: a fit needs at least {LEAST_ROWS}")
+    if len(table) < MIN_ROWS:
+        raise InputError(f"{path} has {len(table)} rows: a fit needs at least {MIN_ROWS}")
     has_identity = table.has("identity") and table.has("true_identity")
     log = DetectionLog(
         path,
@@ -126,9 +126,9 @@ def _read_table(path: Path) -> "_LogTable":
             columns = [name.strip() for name in next(reader, [])]
             _check_columns(path, columns)
             table = _LogTable(path, columns)
-            for row in islice(filter(None, reader), LOG_ROWS.most + 1):
+            for row in islice(filter(None, reader), LOG_ROWS.limit + 1):
                 table.add(reader.line_num, row)
-        LOG_ROWS.check(len(table), path, least="at least ")
+        LOG_ROWS.check(len(table), path, prefix="at least ")
     except UnicodeDecodeError:
         raise InputError(f"{path} is not text in UTF-8: save it as a CSV file in UTF-8") from None
     except (OSError, csv.Error) as error:
@@ -200,9 +200,7 @@ class _LogTable:
         """
         for unit, factor in (("deg", 1.0), ("rad", 180 / math.pi)):
             if self.has(f"{name}_{unit}"):
-                degrees = (
-                    self.column(f"{name}_{unit}", _angle_up_to(MOST_DEGREES / factor)) * factor
-                )
+                degrees = self.column(f"{name}_{unit}", _angle_up_to(MAX_DEGREES / factor)) * factor
                 return np.abs((degrees + 180) % 360 - 180)
         if self.has(name):
             raise InputError(
@@ -224,8 +222,8 @@ def _number(text: str) -> float:
 
 def _distance(text: str) -> float:
     value = _number(text)
-    if not 0 <= value <= MOST_METRES:
-        raise ValueError(f"a distance from 0 to {MOST_METRES:g} m")
+    if not 0 <= value <= MAX_METRES:
+        raise ValueError(f"a distance from 0 to {MAX_METRES:g} m")
     return value
 
 
@@ -346,7 +344,7 @@ class Calibration:
         estimates, farthest = recognition.right.estimates, float(self.log.distance.max())
         # Dense enough for straight lines between rows to be within 0.3 % of the logistic curve.
         width = estimates["distance width"].value if "distance width" in estimates else farthest
-        rows = min(MOST_ROWS, 2 + int(2 * farthest / width))
+        rows = min(MAX_ROWS, 2 + int(2 * farthest / width))
         places = [_short(x) for x in np.linspace(0, farthest, rows).tolist()]
         shares = [round(_at(estimates, x), 4) for x in places]
         right = [[x, share] for x, share in zip(places, shares, strict=True)]
@@ -414,7 +412,7 @@ def _fit_identity(log: DetectionLog, notes: list[str]) -> Recognition | None:
         return None
     true, perceived = log.true_identity[log.detected], log.identity[log.detected]
     right = recognized(log)
-    if len(true) < LEAST_KNOWN or right.all() or not right.any():
+    if len(true) < MIN_IDENTIFIED or right.all() or not right.any():
         notes.append(
             f"identity: left out: {int(right.sum())} of {len(true)} detections are recognized,"
             " too few or too uniform to fit anything to"

@@ -23,7 +23,7 @@ from fleet2d.fit.timeline import (
 )
 from fleet2d.kernels import I16
 from fleet2d.logs.log import AWAY, LogError
-from fleet2d.logs.placement import USUAL
+from fleet2d.logs.placement import USUAL_ROOMS
 from fleet2d.routines.activity import Activity, seconds
 from fleet2d.routines.distributions import KNOTS, exponential
 from fleet2d.routines.life import Life
@@ -40,7 +40,7 @@ LIE, SIT = ("sleep", "nap", "bed", "wake_up"), ("eat", "tv", "work", "read", "re
 # its beginning is at most SPREAD, and the gap to begins at other times more than APART [min].
 LEAST_SHARE, SPREAD, APART = 0.8, 20, 60
 LONG = 10  # the least mean duration of a task [min]
-FEWEST = 4  # the fewest days of a kind from which a template is fitted
+MIN_TEMPLATE_DAYS = 4  # the fewest days of a kind from which a template is fitted
 WORKDAYS = 5
 Model = Literal["recorded", "laws"]
 # The date of the first sampled day, a Monday.
@@ -125,7 +125,7 @@ def _kinds_of_days(
         return {"every_day": ("daily", list(days))}, ["no dates: all days are of one kind"]
     weekdays = [day for day in days if timeline.weekdays[day.number] < WORKDAYS]
     weekend = [day for day in days if timeline.weekdays[day.number] >= WORKDAYS]
-    if min(len(weekdays), len(weekend)) < FEWEST:
+    if min(len(weekdays), len(weekend)) < MIN_TEMPLATE_DAYS:
         note = (
             f"{len(weekdays)} weekdays and {len(weekend)} days of weekends: too few for two kinds"
         )
@@ -297,7 +297,7 @@ class _Fitter:
         activity, place = self.timeline.states[state]
         if place == AWAY:
             return {"away": True}
-        rooms = dict.fromkeys([place, *USUAL.get(place, ()), "any"])
+        rooms = dict.fromkeys([place, *USUAL_ROOMS.get(place, ()), "any"])
         posture = "lie" if any(word in activity for word in LIE) else "stand"
         if posture == "stand" and any(word in activity for word in SIT):
             posture = "sit"

@@ -21,7 +21,7 @@ SAMPLED = 140
 LABELS = ("log", "persona", "Markov chain")
 LINES = ("#222222", "#c2410c", "#9aa5b1")
 BINS = 12
-LEAST = 10  # the least mean number of rows per bin
+MIN_ROWS_PER_BIN = 10  # the smallest mean number of rows per bin
 FIT_COLOR, OBSERVED_COLOR = "#2b6cb0", "#3d4148"
 
 
@@ -134,7 +134,7 @@ def _draw_shares(axes: Axes, values: F64, detected: Bool, shares: F64) -> None:
     """Draw observed shares with their intervals, and the mean fitted share of the same rows."""
     from fleet2d.fit.likelihood import wilson
 
-    bins = min(BINS, max(1, len(values) // LEAST))
+    bins = min(BINS, max(1, len(values) // MIN_ROWS_PER_BIN))
     edges = np.quantile(values, np.linspace(0, 1, bins + 1))
     index = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, bins - 1)
     rows = []

@@ -11,7 +11,7 @@ from fleet2d.configuration.units import micros
 from fleet2d.floorplan.rooms.room import room_type
 from fleet2d.kernels import F64, I16, Bool
 from fleet2d.logs.log import AWAY, ActivityLog, LogError
-from fleet2d.logs.placement import DOOR, UNKNOWN, USUAL, LoggedVisit, VisitRule, visits_of
+from fleet2d.logs.placement import DOOR, UNKNOWN, USUAL_ROOMS, LoggedVisit, VisitRule, visits_of
 from fleet2d.metrics.ltp_error import total_variation
 from fleet2d.runtime.clock import DAY_MINUTES, DAY_S
 from fleet2d.runtime.determinism import sum_in_order
@@ -28,7 +28,7 @@ UP_AT_NIGHT = 60
 SHORTEST_NIGHT = 120  # min
 NOON = DAY_MINUTES // 2
 HOURS = 24
-FEWEST_STAYS = 5  # the fewest stays at a place whose durations are compared
+MIN_STAYS = 5  # the fewest stays at a place whose durations are compared
 
 
 class ActivityPlace(NamedTuple):
@@ -99,7 +99,7 @@ def read_seconds(log: ActivityLog) -> tuple[list[ActivityPlace], I16]:
 
 
 def _kind(label: str) -> str:
-    kind = USUAL.get(room_type(label), (room_type(label),))[0]
+    kind = USUAL_ROOMS.get(room_type(label), (room_type(label),))[0]
     return AWAY if label == AWAY else kind
 
 
@@ -288,7 +288,7 @@ def distances(real: I16, other: I16, count: int) -> Distances:
         for times, other_times in zip(
             dwell_times(real, count), dwell_times(other, count), strict=True
         )
-        if len(times) >= FEWEST_STAYS
+        if len(times) >= MIN_STAYS
     ]
     total = max(sum(len(times) for times, _ in pairs), 1)
     return Distances(

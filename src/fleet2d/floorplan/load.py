@@ -25,7 +25,7 @@ from fleet2d.floorplan.formats.native import (
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.source import FloorPlanSource
 
-USUAL_CELL_M = 0.05
+DEFAULT_CELL_M = 0.05
 IMAGES = (".pgm", ".png")
 JSON = (".json", ".geojson")
 SYNTHETIC = re.compile(r"synthetic:(0|[1-9][0-9]{0,17})", re.ASCII)
@@ -50,7 +50,7 @@ def load_floorplan(
         'family_home'
     """
     names = bundled_names()
-    path, usual = Path(plan), USUAL_CELL_M if cell is None else cell
+    path, usual = Path(plan), DEFAULT_CELL_M if cell is None else cell
     if path.suffix.lower() in IMAGES and path.is_file():
         return _load_image(path, resolution, cell)
     if resolution is not None:
@@ -84,7 +84,7 @@ def _load_document(path: Path, cell: float | None) -> FloorPlan:
     if kind is None:
         raise _unknown_format(path)
     if kind == "native":
-        return native_plan(content, path, USUAL_CELL_M if cell is None else cell)
+        return native_plan(content, path, DEFAULT_CELL_M if cell is None else cell)
     settings: dict[str, Any] = {"path": path} if cell is None else {"path": path, "cell": cell}
     source = lookup("floorplan", kind).model_construct(**settings)
     assert isinstance(source, FloorPlanSource)

@@ -43,7 +43,7 @@ def _check_crossings(shape: BaseGeometry) -> None:
     for begin in range(0, len(edges), _EDGES):
         pairs = tree.query(edges[begin : begin + _EDGES], predicate="crosses")
         count += pairs.shape[1] // 2  # each crossing is found from both edges
-        CROSSINGS.check(count, "it", FloorPlanError, least="at least ")
+        CROSSINGS.check(count, "it", FloorPlanError, prefix="at least ")
 
 
 GRID = 2

@@ -16,7 +16,7 @@ from fleet2d.kernels import F64, I64
 from fleet2d.runtime.clock import DAY_US
 
 # The most lines that a note lists.
-_MOST_NAMED = 20
+_MAX_NAMED = 20
 # The most characters in a line of a log.
 _LONGEST = 10_000
 AWAY = "away"
@@ -34,8 +34,8 @@ def log_lines(path: Path) -> Iterator[tuple[int, str]]:
         check_file(path, LOG_BYTES, LogError)
         with path.open(encoding="utf-8", errors="replace") as lines:
             for number, text in enumerate(iter(lambda: lines.readline(_LONGEST), ""), 1):
-                if number > LOG_ROWS.most:
-                    LOG_ROWS.check(number, path, LogError, least="more than ")
+                if number > LOG_ROWS.limit:
+                    LOG_ROWS.check(number, path, LogError, prefix="more than ")
                 if len(text) == _LONGEST:
                     raise LogError(
                         f"{path}, line {number}: it is longer than {_LONGEST} characters"
@@ -155,8 +155,8 @@ def in_order(readings: list[Reading], path: Path, *, sort: bool) -> tuple[list[R
     notes = []
     wrong = [str(reading.line) for reading in readings if reading.end_us < reading.begin_us]
     if wrong:
-        more = f" and {len(wrong) - _MOST_NAMED} more" if len(wrong) > _MOST_NAMED else ""
-        lines = f"{', '.join(wrong[:_MOST_NAMED])}{more}"
+        more = f" and {len(wrong) - _MAX_NAMED} more" if len(wrong) > _MAX_NAMED else ""
+        lines = f"{', '.join(wrong[:_MAX_NAMED])}{more}"
         notes.append(f"an end before the beginning is ignored, in line {lines}")
     if early:
         readings = sorted(readings, key=lambda reading: reading.begin_us)  # stable

@@ -20,7 +20,7 @@ RoomChoice = tuple[str, ...]
 
 DOOR = "door"
 """The front door: after a long silence there, the person is out."""
-USUAL: dict[str, RoomChoice] = {
+USUAL_ROOMS: dict[str, RoomChoice] = {
     "away": (AWAY,),
     "outsidedoor": (DOOR,),
     "outside_door": (DOOR,),
@@ -219,7 +219,7 @@ def _usual(label: str, rooms: Sequence[Room]) -> RoomChoice | None:
     if any(room.name == label for room in rooms):
         return (label,)
     kind = room_type(label)
-    return _first_fit(USUAL.get(kind, (kind,)), rooms)
+    return _first_fit(USUAL_ROOMS.get(kind, (kind,)), rooms)
 
 
 def _first_fit(choice: RoomChoice, rooms: Sequence[Room]) -> RoomChoice | None:

@@ -40,7 +40,7 @@ NAMES = {
 EARLIEST_US, LATEST_US = -2_208_988_800_000_000, 7_258_118_400_000_000
 """The years 1900 and 2200 [us since 1970]."""
 
-MOST_NUMBER = 8e18  # of nanoseconds since 1970
+MAX_TIMESTAMP_NS = 8e18  # of nanoseconds since 1970
 QUARTER_HOUR_US = 900_000_000
 
 
@@ -173,7 +173,7 @@ def _table(path: Path) -> pa.Table:
         if path.suffix.lower() in (".parquet", ".pq"):
             with pq.ParquetFile(path) as file:
                 FIXES.check(file.metadata.num_rows, path, LogError)
-                TABLE_BYTES.check(unpacked_bytes(file), path, LogError, least="about ")
+                TABLE_BYTES.check(unpacked_bytes(file), path, LogError, prefix="about ")
                 table = file.read()
         else:
             table = pacsv.read_csv(path)
@@ -314,7 +314,7 @@ def _parse_texts(texts: list[str], path: Path, line: I64) -> tuple[I64, bool]:
 
 def _scale_numbers(numbers: NDArray[Any], path: Path, line: I64) -> tuple[I64, bool]:
     """Return numeric times [us], and whether they count from 1970."""
-    wrong = np.flatnonzero(~(np.abs(numbers.astype(np.float64)) < MOST_NUMBER))
+    wrong = np.flatnonzero(~(np.abs(numbers.astype(np.float64)) < MAX_TIMESTAMP_NS))
     if len(wrong):
         raise LogError(f"{path}, line {line[wrong[0]]}: its time is not a number, or out of range")
     size = float(np.max(np.abs(numbers.astype(np.float64))))

@@ -12,7 +12,7 @@ from fleet2d.floorplan.home import Home
 from fleet2d.metrics.metric import Metric
 
 AWAY = "away"
-MOST_PLACES = 4  # places per user in the closing table
+MAX_PLACES = 4  # places per user in the closing table
 
 
 @register("metric", "room_share")
@@ -56,6 +56,6 @@ class RoomShare(Metric):
     def summary(cls, result: Mapping[str, Any]) -> Mapping[str, Any]:
         """Return the places where each user is most of the time, the longest first."""
         return {
-            user: dict(sorted(shares.items(), key=lambda item: -item[1])[:MOST_PLACES])
+            user: dict(sorted(shares.items(), key=lambda item: -item[1])[:MAX_PLACES])
             for user, shares in result.items()
         }

@@ -20,7 +20,7 @@ from fleet2d.metrics.belief_reader import BeliefReader
 from fleet2d.metrics.metric import Metric
 from fleet2d.runtime.determinism import sum_in_order
 
-LEAST = 1e-6  # smaller probabilities are raised to this before taking logarithms
+MIN_PROBABILITY = 1e-6  # smaller probabilities are raised to this before taking logarithms
 MASSES = 15  # number of groups of about equal size, by forecast probability
 # Upper ends of the classes of the gap since a user was last seen [min], and their names.
 GAP_ENDS = (1, 5, 15, 60, 240)
@@ -31,19 +31,19 @@ SHOWN = ("log_loss", "top_1", "ece", "skill", "reference_skill")  # in the closi
 NEVER = -1
 
 
-def log_loss(probability: F64, truth: I64, least: float = LEAST) -> F64:
-    """Return -ln max(p(truth), least) of each forecast [nats]; strictly proper but for the clip.
+def log_loss(probability: F64, truth: I64, floor: float = MIN_PROBABILITY) -> F64:
+    """Return -ln max(p(truth), floor) of each forecast [nats]; strictly proper but for the clip.
 
     Args:
         probability: float64 (n, places), rows sum to one.
         truth: int64 (n,), the true place.
-        least: Smaller probabilities are raised to this.
+        floor: Smaller probabilities are raised to this.
 
     Example:
         >>> log_loss(np.array([[0.5, 0.5], [1.0, 0.0]]), np.array([0, 1])).round(3).tolist()
         [0.693, 13.816]
     """
-    return -natural_log(np.maximum(_of(probability, truth), least))
+    return -natural_log(np.maximum(_of(probability, truth), floor))
 
 
 def brier_score(probability: F64, truth: I64) -> F64:
@@ -261,7 +261,7 @@ class RtpScore(Metric):
     The gap is the time since a robot last perceived that user correctly, or `never seen`. For each
     class of gaps and over all:
 
-    - log_loss: mean of -ln p(truth), p raised to 1e-6 at least [nats];
+    - log_loss: mean of -ln p(truth), with p at least 1e-6 [nats];
     - brier: mean of sum over places of (p - 1{truth})^2, 0 to 2; its parts `reliability`,
       `resolution` and `uncertainty` (Murphy, `scores.murphy`): brier = reliability - resolution +
       uncertainty;

@@ -17,7 +17,7 @@ from fleet2d.kernels.sight import points_in_sight
 from fleet2d.metrics.metric import Metric, kaplan_meier, quantile, restricted_mean
 from fleet2d.runtime.determinism import sum_in_order
 from fleet2d.runtime.events import Event
-from fleet2d.sight.camera import USUAL_RANGE_M
+from fleet2d.sight.camera import DEFAULT_RANGE_M
 
 ENDS = ("found", "not_at_home", "gave_up")
 
@@ -87,7 +87,7 @@ class TimeToFind(Metric):
     }
 
     deadline: PositiveDuration = timedelta(minutes=10)
-    sight: Length = Field(default=USUAL_RANGE_M[1], gt=0)
+    sight: Length = Field(default=DEFAULT_RANGE_M[1], gt=0)
     radius: Length = Field(default=0.15, gt=0, le=2)
 
     def start(self, home: Home) -> None:

@@ -175,8 +175,8 @@ def _draw_no_go(plan: FloorPlan, axes: Axes) -> None:
 
 
 # Formats of pictures, each with the metadata that would differ from time to time.
-STAMPS = MappingProxyType({".png": "Software", ".svg": "Date", ".pdf": "CreationDate"})
-ENDINGS = tuple(STAMPS)
+DATE_METADATA = MappingProxyType({".png": "Software", ".svg": "Date", ".pdf": "CreationDate"})
+SUFFIXES = tuple(DATE_METADATA)
 
 WALL_M = 0.15  # thickness of outer walls, which files don't contain
 LONG_SIDE_IN = 10.0
@@ -225,10 +225,10 @@ def check_picture(path: Path) -> None:
     Raises:
         InputError: It has another suffix.
     """
-    ending = path.suffix.lower()
-    if ending not in ENDINGS:
+    suffix = path.suffix.lower()
+    if suffix not in SUFFIXES:
         raise InputError(
-            f"{path}: a picture is written as .png, .svg or .pdf, not as {ending or 'no ending'!r}"
+            f"{path}: a picture is written as .png, .svg or .pdf, not as {suffix or 'no suffix'!r}"
         )
 
 
@@ -245,7 +245,7 @@ def save_figure(figure: Figure, path: Path) -> None:
     Raises:
         InputError: The file can't be written.
     """
-    unstamped = {STAMPS[path.suffix.lower()]: None}
+    unstamped = {DATE_METADATA[path.suffix.lower()]: None}
     content = io.BytesIO()
     apply_theme(figure).savefig(content, format=path.suffix[1:].lower(), metadata=unstamped)
     try:

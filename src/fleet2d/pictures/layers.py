@@ -23,7 +23,7 @@ from fleet2d.pictures.life import SightWalls, field_of_view
 from fleet2d.pictures.theme import SCALE
 from fleet2d.runs.layers import PREFIX, layer_steps, read_layer
 from fleet2d.runs.run import Run
-from fleet2d.sight.camera import USUAL_ANGLE_DEG, USUAL_RANGE_M
+from fleet2d.sight.camera import DEFAULT_ANGLE_DEG, DEFAULT_RANGE_M
 from fleet2d.sight.flashlight import Flashlight
 from fleet2d.sight.fov import FieldOfView, VisibleRegion
 
@@ -118,8 +118,8 @@ class CameraPose(NamedTuple):
     x: float
     y: float
     heading_deg: float
-    far: float = USUAL_RANGE_M[1]
-    angle_deg: float = USUAL_ANGLE_DEG
+    far: float = DEFAULT_RANGE_M[1]
+    angle_deg: float = DEFAULT_ANGLE_DEG
 
     def reach(self, plan: FloorPlan) -> Reach:
         """Return its range and angle in the integers of the kernels."""

@@ -342,11 +342,11 @@ BLUR_M = 0.14  # standard deviation of the spot of a body, about its own size
 REACH = 5  # radius of the blur [standard deviations]; with less, spots have square edges
 SOLID = 0.4  # the highest opacity of presence, at which the plan stays legible
 HALF = 4.0  # time, in multiples of the mean over all cells, at which presence has half of that
-MOST_LEGS = 3_000  # drawn of a body
+MAX_LEGS = 3_000  # drawn of a body
 CANDIDATES = 60  # moments to compare when a view is chosen
-MOST_PLACES = 260  # places of sightings that are drawn; more would hide the plan
+MAX_PLACES = 260  # places of sightings that are drawn; more would hide the plan
 CLEAR_M = 0.5  # twice the space between a name and a robot
-FAR_ENOUGH_M = 2.0
+FAR_APART_M = 2.0
 RIM_COLOR = "#ffffffb0"  # around names
 
 
@@ -428,7 +428,7 @@ def draw_paths(trace: BodyTrace, axes: Axes) -> None:
     """Draw the paths of a body as thin lines."""
     # Many paths are drawn fainter than few: opacity adds up where they cross.
     darkest, faintest, enough = (0.6, 0.09, 60) if trace.robot else (0.3, 0.04, 60)
-    legs = trace.legs[:: 1 + len(trace.legs) // (MOST_LEGS + 1)]
+    legs = trace.legs[:: 1 + len(trace.legs) // (MAX_LEGS + 1)]
     alpha = min(darkest, max(faintest, enough / max(1, len(legs))))
     width = 0.9 if len(legs) <= 600 else 0.6
     lines = LineCollection(list(legs), colors=trace.color, lw=width, alpha=alpha, zorder=2.5)
@@ -526,7 +526,7 @@ def best_view(
         score = area if area < 0.97 * sector_area else 0.3 * area
         if len(users):
             distance = float(np.hypot(*(users - robot.xy[i]).T).max())
-            score *= min(1.0, distance / FAR_ENOUGH_M)
+            score *= min(1.0, distance / FAR_APART_M)
         if score > highest:
             highest = score
             parts = [shapely.get_coordinates(p.exterior) for p in shapely.get_parts(outline)]

@@ -31,7 +31,7 @@ from fleet2d.pictures.floorplan import (
 from fleet2d.pictures.life import (
     HATCH_COLOR,
     LINE_IN,
-    MOST_PLACES,
+    MAX_PLACES,
     QUIET_COLOR,
     BodyTrace,
     CameraView,
@@ -56,7 +56,8 @@ DEEPER = 1.9
 GAPS_UP_TO = 75  # days; of longer runs, rows have no gaps between them
 # The height of a mark where somebody was seen all the time, as a share of the row.
 MARK_PART = 0.5
-FAINTEST = 0.06  # the least height of a mark, as a share of that: a single sighting is visible
+# The minimum height of a mark, as a share of that: a single sighting is visible.
+MIN_MARK_HEIGHT = 0.06
 
 NOT_SIMULATED = -2
 
@@ -103,7 +104,7 @@ def mark_boxes(marks: F64, lift: float = 0.0) -> F64:
     """Return the marks of an actogram as boxes, float64 (n, 4, 2): hour of the day, row.
 
     The height of a mark is the share of its interval in which somebody was seen, so that the ink is
-    proportional to the time; the least height is `FAINTEST`.
+    proportional to the time; the least height is `MIN_MARK_HEIGHT`.
 
     Args:
         marks: The shares that `marks_by_day` returned.
@@ -112,7 +113,7 @@ def mark_boxes(marks: F64, lift: float = 0.0) -> F64:
     day, interval = np.nonzero(marks > 0)
     left, right = interval * (24 / MARKS), (interval + 1) * (24 / MARKS)
     bottom = day + 1 - lift
-    top = bottom - MARK_PART * np.maximum(marks[day, interval], FAINTEST)
+    top = bottom - MARK_PART * np.maximum(marks[day, interval], MIN_MARK_HEIGHT)
     corners = np.stack([left, top, right, top, right, bottom, left, bottom], axis=1)
     return corners.reshape(-1, 4, 2)
 
@@ -215,7 +216,7 @@ def _dated_rows(start: datetime, days: int) -> tuple[list[float], list[str]]:
     return [day + 0.5 for day in labelled], names
 
 
-MOST_BODIES = 4  # users with an actogram, and robots
+MAX_BODIES = 4  # users with an actogram, and robots
 
 # Inches.
 WIDTH = 10.67  # the largest; with a narrow plan the picture is narrower
@@ -226,12 +227,13 @@ GAP = 0.3
 DATES = 0.78  # beside the first actogram
 CAPTION = 0.42  # above each actogram
 ACTOGRAMS = {0: 0.0, 1: 4.25, 2: 4.9, 3: 5.1, 4: 5.4}
-LEFT_LEAST = (7.2, 3.7)  # least width of the plan with legend and header: alone, beside actograms
-BODY_MOST = 6.6
-BODY_LEAST = (2.3, 3.4)
-ROW_LEAST = 0.08
+# Minimum width of the plan with legend and header: alone, beside actograms.
+MIN_LEFT_WIDTHS = (7.2, 3.7)
+MAX_BODY_HEIGHT = 6.6
+MIN_BODY_HEIGHTS = (2.3, 3.4)
+MIN_ROW_HEIGHT = 0.08
 TICKS = 0.24  # below each actogram
-ROW_MOST = 0.55
+MAX_ROW_HEIGHT = 0.55
 SCALE_WORDS = 0.2  # below the bar of the scale
 
 SMALL = 7.5
@@ -305,12 +307,12 @@ class _Picture:
 
     def _traces(self, bucket: str, *, robot: bool) -> list[BodyTrace]:
         names = self.run.manifest["entities"][bucket]
-        if len(names) > MOST_BODIES:
-            self.notes.append(f"{MOST_BODIES} of {len(names)} {bucket} are shown")
+        if len(names) > MAX_BODIES:
+            self.notes.append(f"{MAX_BODIES} of {len(names)} {bucket} are shown")
         if not self.steps:
             return []
         traces = []
-        for number, name in enumerate(names[:MOST_BODIES]):
+        for number, name in enumerate(names[:MAX_BODIES]):
             trace = trace_of(self.run, self.plan, name, number, robot=robot)
             if trace is not None:
                 traces.append(trace)
@@ -326,7 +328,7 @@ class _Picture:
         }
         rings = {name: places for name, places in places_of_robot.items() if len(places)}
         count = sum(map(len, rings.values()))
-        if count > MOST_PLACES:
+        if count > MAX_PLACES:
             self.notes.append(f"the {count:,} places where robots saw users are not drawn")
             return {}
         return rings
@@ -362,7 +364,7 @@ class _Picture:
         self.life_lines = self.overlay.lines(self.left, list(self._life_chips()), SMALL)
         self.room_lines = self.overlay.lines(self.right - DATES, list(self._room_chips()), SMALL)
         # With few days, the legend starts in the space below their rows.
-        days = ROW_MOST * len(self.days[0]) if self.days else 0.0
+        days = MAX_ROW_HEIGHT * len(self.days[0]) if self.days else 0.0
         self.rows_high = min(self.body - CAPTION - TICKS, days)
         spare = self.body - CAPTION - TICKS - self.rows_high
         lines = max(len(self.life_lines), len(self.room_lines) - int(spare / LINE_IN))
@@ -378,15 +380,15 @@ class _Picture:
         left, right, low, high = x0 - edge, x1 + edge, y0 - scale_depth(self.plan), y1 + edge
         self.right = ACTOGRAMS[len(self.panels)]
         beside = 2 * EDGE + self.right + (GAP if self.right else 0.0)
-        most, least = WIDTH - beside, LEFT_LEAST[len(self.panels) > 0]
+        most, least = WIDTH - beside, MIN_LEFT_WIDTHS[len(self.panels) > 0]
         # The text under the scale bar has the same size in inches in any home.
-        scale = min(most / (right - left), (BODY_MOST - SCALE_WORDS) / (high - low))  # in/m
+        scale = min(most / (right - left), (MAX_BODY_HEIGHT - SCALE_WORDS) / (high - low))  # in/m
         low -= SCALE_WORDS / scale
         self.limits = (left, right, low, high)
         self.left = min(most, max(least, scale * (right - left)))
         days = len(self.days[0]) if self.days else 0
-        rows = float(np.clip(CAPTION + TICKS + ROW_LEAST * days, *BODY_LEAST))
-        self.body = min(BODY_MOST, max(rows, scale * (high - low)))
+        rows = float(np.clip(CAPTION + TICKS + MIN_ROW_HEIGHT * days, *MIN_BODY_HEIGHTS))
+        self.body = min(MAX_BODY_HEIGHT, max(rows, scale * (high - low)))
         self.width = self.left + beside
 
     def _axes(self, x: float, y: float, width: float, height: float) -> Any:

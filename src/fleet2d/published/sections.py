@@ -89,7 +89,11 @@ class ConfigReader:
         return data
 
     def number(
-        self, keys: Keys, above: float = -math.inf, least: float = -math.inf, most: float = math.inf
+        self,
+        keys: Keys,
+        above: float = -math.inf,
+        minimum: float = -math.inf,
+        maximum: float = math.inf,
     ) -> float | None:
         """Return a finite number within limits, or None."""
         value = self.get(keys)
@@ -97,21 +101,23 @@ class ConfigReader:
             return None
         expected = "a number"
         expected += f" above {above:g}" if above > -math.inf else ""
-        expected += f" of {least:g} or more" if least > -math.inf else ""
-        expected += f", {most:g} at most" if most < math.inf else ""
+        expected += f" of {minimum:g} or more" if minimum > -math.inf else ""
+        expected += f", {maximum:g} at maximum" if maximum < math.inf else ""
         is_number = isinstance(value, int | float) and not isinstance(value, bool)
-        if not is_number or not (abs(value) < _HUGE and above < value <= most and value >= least):
+        if not is_number or not (
+            abs(value) < _HUGE and above < value <= maximum and value >= minimum
+        ):
             raise self.wrong(keys, f"expected {expected}, got {shown(value)}")
         return float(value)
 
-    def integer(self, keys: Keys, least: int, below: int = 2**63) -> int | None:
+    def integer(self, keys: Keys, minimum: int, below: int = 2**63) -> int | None:
         """Return a whole number; None if the key is missing."""
         value = self.get(keys)
         if value is None:
             return None
-        if isinstance(value, bool) or not isinstance(value, int) or not least <= value < below:
+        if isinstance(value, bool) or not isinstance(value, int) or not minimum <= value < below:
             raise self.wrong(
-                keys, f"expected a whole number of {least} or more, got {shown(value)}"
+                keys, f"expected a whole number of {minimum} or more, got {shown(value)}"
             )
         return value
 
@@ -189,7 +195,7 @@ def convert_simulation(reader: ConfigReader, step: timedelta) -> dict[str, Any]:
         )
     start = _start(reader)
     result: dict[str, Any] = {"start": start.isoformat()} if start else {}
-    seed = reader.integer((*_SIMULATION, "seed"), least=0)
+    seed = reader.integer((*_SIMULATION, "seed"), minimum=0)
     if seed is not None:
         reader.remark(
             (*_SIMULATION, "seed"),
@@ -266,7 +272,7 @@ def convert_outputs(reader: ConfigReader, step: timedelta) -> dict[str, Any]:
             reader.remark(
                 (*keys, key), "left out: `fleet2d run --out DIR` says where a run is stored"
             )
-    every = reader.integer((*keys, "every_n_steps"), least=1)
+    every = reader.integer((*keys, "every_n_steps"), minimum=1)
     if reader.boolean((*keys, "save")) is False:
         reader.remark(
             (*keys, "save"), "every table is off; a run still makes a directory with its manifest"
@@ -394,7 +400,7 @@ def body_keys(reader: ConfigReader, keys: Keys) -> Keys:
 def _body(reader: ConfigReader, keys: Keys, step: timedelta) -> dict[str, Any]:
     """Return the keys that users and robots have in common."""
     result: dict[str, Any] = {}
-    radius = reader.number((*keys, "radius"), least=0, most=_WIDEST_M)
+    radius = reader.number((*keys, "radius"), minimum=0, maximum=_WIDEST_M)
     if radius:
         result["radius"] = radius
     else:
@@ -440,7 +446,7 @@ def _walk(reader: ConfigReader, keys: Keys, step: timedelta) -> dict[str, Any]:
 
 def _speed(reader: ConfigReader, keys: Keys, step_s: Fraction) -> float | None:
     """Return the speed [m/s], in metres per step in the old file; None: it stands still."""
-    stride = reader.number(keys, least=0)
+    stride = reader.number(keys, minimum=0)
     speed = float(Fraction(repr(stride)) / step_s) if stride else 0.0
     if speed < _SLOWEST_M_S:
         reader.remark(keys, f"missing, 0 or below {_SLOWEST_M_S} m/s; it stands still")
@@ -462,7 +468,7 @@ def _speed(reader: ConfigReader, keys: Keys, step_s: Fraction) -> float | None:
 
 def _turns(reader: ConfigReader, keys: Keys, step_s: Fraction) -> dict[str, float]:
     """Return the keys of random turns, whose deviation is in degrees per step in the old file."""
-    deviation = abs(reader.number(keys, least=-_WIDEST_TURN_DEG, most=_WIDEST_TURN_DEG) or 0.0)
+    deviation = abs(reader.number(keys, minimum=-_WIDEST_TURN_DEG, maximum=_WIDEST_TURN_DEG) or 0.0)
     if not deviation:
         return {"turn_std_deg": 0.0}
     limit = _TURN_LIMIT_STD * deviation / float(step_s)
@@ -505,7 +511,7 @@ def _range(reader: ConfigReader, keys: Keys) -> list[float]:
         distance = Camera().range[1]
         reader.remark((*keys, "distance"), f"missing; {distance:g} m is used")
     limits = ("min_distance", "max_distance")
-    lowest, highest = (reader.number((*keys, limit), least=0) for limit in limits)
+    lowest, highest = (reader.number((*keys, limit), minimum=0) for limit in limits)
     near, far = lowest or 0.0, distance if highest is None else highest
     if near >= far:
         raise reader.wrong(

@@ -50,7 +50,7 @@ class SchemaForms:
 FOLDER = Path(__file__).parent
 SECOND = timedelta(seconds=1)
 # Standard deviation of a duration of which only the mean is given, relative to the mean.
-USUAL_SPREAD = 0.3
+DEFAULT_SPREAD = 0.3
 
 
 def seconds(duration: timedelta) -> int:
@@ -113,7 +113,7 @@ class DurationDistribution(Settings):
     def table(self) -> Distribution:
         """Return the distribution as a table of quantiles [s]."""
         mean = seconds(self.mean)
-        std = seconds(self.std) if self.std is not None else int(mean * USUAL_SPREAD)
+        std = seconds(self.std) if self.std is not None else int(mean * DEFAULT_SPREAD)
         low = None if self.at_least is None else seconds(self.at_least)
         high = None if self.at_most is None else seconds(self.at_most)
         if self.law == "fixed" or (std == 0 and self.law != "measured" and self.law != "uniform"):

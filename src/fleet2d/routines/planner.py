@@ -210,7 +210,7 @@ def plan_day(
 CROSSING, REACH_S = 6, 1200
 # An episode that lasts at least this many times the shift ends at its recorded time.
 TAKES_UP = 4
-LEAST_S = 30  # the least duration of an episode
+MIN_EPISODE_S = 30  # the least duration of an episode
 END = "end"
 
 
@@ -329,11 +329,11 @@ def draw_recorded(recording: Recording, first: int, draws: Draws, next_wake: int
     day = recording.days[d]
     now, shift = day.begins[0], 0
     result: list[Episode] = []
-    while i < len(day.activities) - 1 and now < next_wake - LEAST_S:
+    while i < len(day.activities) - 1 and now < next_wake - MIN_EPISODE_S:
         over = day.begins[i + 1]
         if shift and over - day.begins[i] >= TAKES_UP * abs(shift):
             shift = 0
-        end = min(max(over + shift, now + LEAST_S), next_wake)
+        end = min(max(over + shift, now + MIN_EPISODE_S), next_wake)
         result.append(Episode(day.activities[i], now, end))
         now = end
         if draws.below(16) < CROSSING:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from fleet2d.runs.run import Run
 
 # Poses of all bodies in one chunk. As Python objects they take up to 2 kB each.
-MOST_POSES = 20_000
+MAX_POSES = 20_000
 # Tables that hold poses: exporters have the poses themselves.
 POSES = ("key_frames", "trajectories")
 
@@ -132,7 +132,7 @@ class Records:
         rows = {name: _Rows(self.run, name) for name in (self.tables if tables is None else tables)}
         step_us = self.run.manifest["step_us"]
         stride = whole_steps(self.part.every, step_us, "every", InputError)
-        steps = stride * max(MOST_POSES // max(len(names), 1), 1)
+        steps = stride * max(MAX_POSES // max(len(names), 1), 1)
         for first in range(self.part.first, self.part.end, steps):
             end = min(first + steps, self.part.end)
             yield Chunk(

@@ -89,7 +89,7 @@ class Run:
         read: Callable[[str], pa.Table],
         notes: Sequence[str] = (),
     ) -> None:
-        """Read nothing yet; `open_run` and `run_of` create runs."""
+        """Read nothing yet; `open_run` and `open_store` create runs."""
         self.directory = directory
         self.manifest: dict[str, Any] = manifest.content()
         self.tables = Tables(names, read)
@@ -323,8 +323,8 @@ def _read_table(root: Path, manifest: Manifest, name: str) -> pa.Table:
     return read_parquet(path_in(root, f"{name}.parquet"), kinds)
 
 
-def run_of(store: RunStore) -> Run:
-    """Return the run that a store holds, for reading.
+def open_store(store: RunStore) -> Run:
+    """Open the run in a store for reading.
 
     Raises:
         ArtifactError: The store is not closed yet.

@@ -7,7 +7,7 @@ from functools import reduce
 from pathlib import Path
 from typing import Any
 
-from fleet2d.bounds import EXTENDED_FILES, VALUES, one_line
+from fleet2d.bounds import EXTENDED_FILES, YAML_VALUES, one_line
 from fleet2d.configuration.components import base_of, lookup
 from fleet2d.configuration.documents import Document, Keys, parse_yaml, read_document
 from fleet2d.configuration.problems import suggest
@@ -119,10 +119,10 @@ def _load(
         title = os.path.normpath(path) if bundled == str(source) else str(source)
         if path.resolve() in chain:
             raise ScenarioError(f"{title} extends itself: {_chain(chain, path)}")
-        EXTENDED_FILES.check(len(sizes) + 1, "the scenario", ScenarioError, least="at least ")
+        EXTENDED_FILES.check(len(sizes) + 1, "the scenario", ScenarioError, prefix="at least ")
         document = read_document(path, title)
         sizes.append(len(document.places))
-        VALUES.check(sum(sizes), "the scenario", ScenarioError, least="more than ")
+        YAML_VALUES.check(sum(sizes), "the scenario", ScenarioError, prefix="more than ")
         folder, chain = path.parent, (*chain, path.resolve())
     extended = document.data.pop("extends", None) or []
     parents = extended if isinstance(extended, list) else [extended]

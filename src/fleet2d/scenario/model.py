@@ -31,7 +31,7 @@ from fleet2d.configuration.components import (
 )
 from fleet2d.configuration.documents import Document
 from fleet2d.configuration.problems import (
-    MOST_LINES,
+    MAX_LINES,
     Location,
     did_you_mean,
     problem,
@@ -353,7 +353,7 @@ def explain(error: ValidationError, document: Document) -> ScenarioError:
     problems: dict[tuple[str, str], list[ErrorDetails]] = {}
     groups: set[str] = set()
     lines = error.errors(include_url=False)
-    for line in lines[:MOST_LINES]:
+    for line in lines[:MAX_LINES]:
         # A list is also called too short when all of its entries are wrong.
         depth = len(line["loc"])
         if line["type"] == "too_short" and any(
@@ -372,7 +372,7 @@ def explain(error: ValidationError, document: Document) -> ScenarioError:
         ": ".join(part for part in (place, key, describe(*details)) if part)
         for (place, key), details in problems.items()
     ]
-    if len(lines) >= MOST_LINES:
+    if len(lines) >= MAX_LINES:
         texts.append("... and more: these are the first")
     return ScenarioError("\n".join(texts))
 

@@ -15,7 +15,7 @@ from fleet2d.search.problem import SearchProblem
 
 Policy = Literal["random", "nearest", "likeliest", "greedy", "exact", "receding"]
 
-MOST_EXACT = 16
+MAX_EXACT_SITES = 16
 """The most sites for an exact order, whose cost grows as 2**sites: 0.3 s and 25 MB for so many."""
 HORIZON = 8
 """The number of sites that a receding horizon orders exactly."""
@@ -53,7 +53,7 @@ def exact(problem: SearchProblem) -> list[int]:
     (way(i, j) + look(j)) * gain(outside S) + V(S + j, j). Takes 2**n n**2 operations.
 
     Raises:
-        ValueError: There are more than MOST_EXACT sites.
+        ValueError: There are more than MAX_EXACT_SITES sites.
 
     Example:
         >>> from fleet2d.search.problem import search_problem
@@ -62,9 +62,9 @@ def exact(problem: SearchProblem) -> list[int]:
         ([0, 1, 2], [2, 0, 1])
     """
     count = len(problem.prior)
-    if count > MOST_EXACT:
+    if count > MAX_EXACT_SITES:
         raise ValueError(
-            f"an exact order of {count} sites takes too long: give {MOST_EXACT} at most"
+            f"an exact order of {count} sites takes too long: give {MAX_EXACT_SITES} at most"
         )
     if not count:
         return []

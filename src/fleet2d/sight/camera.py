@@ -57,12 +57,12 @@ from fleet2d.sight.perception import (
 
 # Squares of distances in lattice units stay far inside 64 bits.
 FARTHEST_M = 10_000
-MOST_POINTS = 32
+MAX_POINTS = 32
 # The view of a camera that a scenario doesn't describe: nearest and farthest distance, and width.
-USUAL_RANGE_M = (0.0, 4.5)
-USUAL_ANGLE_DEG = 108.0
+DEFAULT_RANGE_M = (0.0, 4.5)
+DEFAULT_ANGLE_DEG = 108.0
 # A user not noticed for this long is lost, where a camera doesn't say otherwise.
-USUAL_PATIENCE = timedelta(seconds=5)
+DEFAULT_PATIENCE = timedelta(seconds=5)
 
 
 class Pan(Settings):
@@ -131,8 +131,8 @@ class Camera(Settings):
         perception: Its errors; null: the robot's `perception`.
     """
 
-    range: tuple[Length, Length] = Field(default=USUAL_RANGE_M, examples=[[0.3, 4.5]])
-    angle_deg: AngleDeg = Field(default=USUAL_ANGLE_DEG, gt=0, le=360)
+    range: tuple[Length, Length] = Field(default=DEFAULT_RANGE_M, examples=[[0.3, 4.5]])
+    angle_deg: AngleDeg = Field(default=DEFAULT_ANGLE_DEG, gt=0, le=360)
     detection: Share = 1.0
     lost_after: Duration | None = Field(default=None, examples=["5 s"])
     offset: tuple[Length, Length] = Field(default=(0.0, 0.0), examples=[[0.1, 0]])
@@ -140,7 +140,7 @@ class Camera(Settings):
     pan: Pan | None = None
     period: PositiveDuration | None = None
     latency: Duration = timedelta(0)
-    body_points: int = Field(default=0, ge=0, le=MOST_POINTS)
+    body_points: int = Field(default=0, ge=0, le=MAX_POINTS)
     perception: Perception | None = None
 
     @model_validator(mode="after")
@@ -158,7 +158,7 @@ class Camera(Settings):
 
     @model_validator(mode="after")
     def _looks_before_it_forgets(self) -> Self:
-        patience = USUAL_PATIENCE if self.lost_after is None else self.lost_after
+        patience = DEFAULT_PATIENCE if self.lost_after is None else self.lost_after
         if self.period is not None and self.period > patience:
             raise problem_at(
                 ("period",),
@@ -173,7 +173,7 @@ class Camera(Settings):
         Raises:
             ValueError: The period, or a given `lost_after`, is not a multiple of the step.
         """
-        lost_us = micros(USUAL_PATIENCE if self.lost_after is None else self.lost_after)
+        lost_us = micros(DEFAULT_PATIENCE if self.lost_after is None else self.lost_after)
         if lost_us % step_us and self.lost_after is not None:
             raise ValueError(
                 f"lost_after is {format_duration(self.lost_after)}, which is not a multiple of"

@@ -24,9 +24,9 @@ from fleet2d.runtime.determinism import stream_key
 
 FARTHEST_M = 10_000.0
 """Largest coordinate of a perceived position [m]."""
-MOST = 1e6
+MAX_VALUE = 1e6
 """Largest absolute value of other numbers."""
-MOST_OF_A_LOOK = 64
+MAX_DRAWS_PER_LOOK = 64
 """Draws of the false positives of one look; what is beyond repeats them."""
 FALSE_POSITIVE = "a false positive"
 
@@ -162,7 +162,7 @@ class CameraSightings:
             if value is not None:
                 new[name] = self._numbers(name, value, FARTHEST_M, " m")
         if heading is not None:
-            new["heading"] = self._numbers("heading", heading, MOST)
+            new["heading"] = self._numbers("heading", heading, MAX_VALUE)
         if posture is not None:
             new["posture"] = self._codes("posture", posture, 0, len(POSTURES))
         if user is not None:
@@ -185,8 +185,11 @@ class CameraSightings:
         Raises:
             ComponentError: A value has another shape, isn't finite, or moves them out of bounds.
         """
-        turns = self._numbers("turn_deg", turn_deg, MOST) / 360 * (2 * TURN)
-        factor, added = self._numbers("scale", scale, MOST), self._numbers("offset", offset, MOST)
+        turns = self._numbers("turn_deg", turn_deg, MAX_VALUE) / 360 * (2 * TURN)
+        factor, added = (
+            self._numbers("scale", scale, MAX_VALUE),
+            self._numbers("offset", offset, MAX_VALUE),
+        )
         distance, sines = self.distance, half_sines()
         target = np.maximum(0.0, distance * factor + added)
         stretch = target / np.where(distance > 0, distance, 1.0)
@@ -230,7 +233,7 @@ class CameraSightings:
             name, addresses = FALSE_POSITIVE, steps[rows]
             if person == NOBODY:  # a look may have several
                 first = np.searchsorted(self.step[rows], self.step[rows])
-                addresses = addresses * MOST_OF_A_LOOK + (np.arange(len(rows)) - first)
+                addresses = addresses * MAX_DRAWS_PER_LOOK + (np.arange(len(rows)) - first)
             else:
                 name = self.users[person]
             draws[rows] = draw(self._stream.key(purpose, name), addresses)

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 LEVEL = 0.95
 RESAMPLES = 2000
 POWER_Z = 0.84  # standard normal quantile of a power of 80 %
-MOST_NEEDED = 10_000  # units of a level
+MAX_NEEDED_UNITS = 10_000  # units of a level
 BLOCK = 4_000_000  # largest number of weights in memory
 
 
@@ -95,8 +95,8 @@ class MeanEstimate:
             def is_enough(count: int, level: str = level) -> bool:
                 return self.spread.detects(self.mean, {**self.spread.units, level: count})
 
-            if current >= 2 and is_enough(MOST_NEEDED):
-                count = bisect_left(range(MOST_NEEDED), True, lo=2, key=is_enough)
+            if current >= 2 and is_enough(MAX_NEEDED_UNITS):
+                count = bisect_left(range(MAX_NEEDED_UNITS), True, lo=2, key=is_enough)
                 counts[level] = max(count, current + 1)
         return counts
 

@@ -119,9 +119,9 @@ def check_count(count: Number) -> Number:
     Raises:
         PydanticCustomError: They are.
     """
-    if count > VARIANTS.most:
+    if count > VARIANTS.limit:
         raise problem(
-            f"more than {VARIANTS.most:,} values are too many for one study; to allow more, set"
+            f"more than {VARIANTS.limit:,} values are too many for one study; to allow more, set"
             f" {VARIANTS.variable} in the environment"
         )
     return count

@@ -27,7 +27,7 @@ Workers = Annotated[
     int | None, typer.Option(min=1, help="Processes at a time; left out: one per core.")
 ]
 Where = Annotated[str, typer.Argument(metavar="DIR", help="The folder or store of a study.")]
-MOST_LINES = 10  # of a list that is printed
+MAX_LINES = 10  # of a list that is printed
 IDENTITY_START = 6
 """The fewest characters of an identity that name a variant."""
 
@@ -171,14 +171,14 @@ def _print_plan(checked: "CheckedStudy", workers: int | None) -> None:
     count = workers or cores()
     check_setups(plan, LocalExecutor(count))
     for column, labels in plan.design.labels.items():
-        values = ", ".join(map(str, labels[:MOST_LINES]))
-        more = f", … {len(labels)} in all" if len(labels) > MOST_LINES else ""
+        values = ", ".join(map(str, labels[:MAX_LINES]))
+        more = f", … {len(labels)} in all" if len(labels) > MAX_LINES else ""
         _print(f"{column}: {values}{more}")
     _print("")
-    for variant in plan.variants[:MOST_LINES]:
+    for variant in plan.variants[:MAX_LINES]:
         _print(f"  {plan.design.describe(variant.index)}")
-    if len(plan.variants) > MOST_LINES:
-        _print(f"  … {len(plan.variants) - MOST_LINES} more")
+    if len(plan.variants) > MAX_LINES:
+        _print(f"  … {len(plan.variants) - MAX_LINES} more")
     expected = forecast(plan)
     _print(
         f"\n{len(plan.variants)} variants, {len({v.home_key for v in plan.variants})} homes,"
@@ -192,10 +192,10 @@ def _print_failures(location: str) -> None:
 
     table = open_study(location).arrow_variants.select(["variant", "status", "error"])
     failed = [row for row in table.to_pylist() if row["status"] == "failed"]
-    for row in failed[:MOST_LINES]:
+    for row in failed[:MAX_LINES]:
         _print(f"variant {row['variant']} failed: {row['error']}", err=True)
-    if len(failed) > MOST_LINES:
-        _print(f"… {len(failed) - MOST_LINES} more", err=True)
+    if len(failed) > MAX_LINES:
+        _print(f"… {len(failed) - MAX_LINES} more", err=True)
 
 
 def _number_of(study: "Study", variant: str) -> int:

@@ -112,7 +112,7 @@ def home_key(content: Mapping[str, Any]) -> str:
 
 
 NOT_APPLICABLE = -1
-MOST_VARIANTS = 10_000_000
+MAX_VARIANTS = 10_000_000
 SWITCHES = ("key_frames", "observations", "events")  # of `artifacts`, named after their tables
 
 
@@ -291,9 +291,9 @@ def build_design(specification: Specification) -> Design:
         for i, rule in enumerate(file.rules)
     )
     count = math.prod(len(axis.choices) for axis in axes)
-    if count > MOST_VARIANTS:
+    if count > MAX_VARIANTS:
         raise ScenarioError(
-            f"{specification.name} would have {count:,} combinations: at most {MOST_VARIANTS:,}"
+            f"{specification.name} would have {count:,} combinations: at most {MAX_VARIANTS:,}"
             " can be run as one study; sample some of them by an axis of the kind `sample`"
         )
     base = merge(specification.base, _artifacts(file.keep.tables))

@@ -70,8 +70,8 @@ COLORS = (
     "#2c6fb0", "#b5305c", "#3f8a4f", "#c26a12", "#8153b5", "#1f8a8c", "#8a6d3b", "#5b6770",
 )  # fmt: skip
 DARK, PALE = "#2d3138", "#c4c9d0"
-MOST_LINES = 8
-MOST_LABELS = 24
+MAX_LINES = 8
+MAX_LABELS = 24
 MOMENTS = 60  # the most points of a line over time
 
 
@@ -152,7 +152,7 @@ def draw_course(
     days = frame[DAY].unique().sort().to_numpy()
     moments = days[np.unique(np.linspace(0, len(days) - 1, MOMENTS).round().astype(int))]
     figure, axes = _figure(3.0)
-    for number, label in enumerate(labels[:MOST_LINES]):
+    for number, label in enumerate(labels[:MAX_LINES]):
         group = frame if axis is None else frame.filter(pl.col(axis).eq_missing(label))
         points = []
         for day in moments:
@@ -187,7 +187,7 @@ def _tidy(axes: Axes) -> None:
 
 def _label(axes: Axes, labels: Sequence[str]) -> None:
     """Label the x axis at 0, 1, 2 …; of many labels only every n-th is written."""
-    stride = max(1, -(-len(labels) // MOST_LABELS))
+    stride = max(1, -(-len(labels) // MAX_LABELS))
     ticks = range(0, len(labels), stride)
     longest = max(map(len, labels), default=0)
     is_slanted = longest * len(labels) > 90

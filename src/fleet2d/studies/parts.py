@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 RECORDS, RESULTS, TABLES = "parts", "results", "tables"
 VARIANT = "variant"
-ROWS_A_GROUP = 250_000
+ROWS_PER_GROUP = 250_000
 
 
 @dataclass(frozen=True)
@@ -190,7 +190,7 @@ class _PartFileWriter:
     def write(self, number: int, rows: "pa.Table") -> None:
         """Add the rows of a variant."""
         self._buffer.append(with_variant(rows, number, self._schema))
-        if sum(table.num_rows for table in self._buffer) >= ROWS_A_GROUP:
+        if sum(table.num_rows for table in self._buffer) >= ROWS_PER_GROUP:
             self._flush()
 
     def __enter__(self) -> "_PartFileWriter":

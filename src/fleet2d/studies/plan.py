@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 
-MOST_PROBLEMS = 10  # in one report
+MAX_PROBLEMS = 10  # in one report
 LAYERS = ("explored", "first_seen", "last_seen", "time_since_seen")  # tables of robots' maps
 FEW_SETUPS = 8  # up to here starting workers costs more than it saves
 
@@ -178,7 +178,7 @@ def make_plan(
             variants += _planned(design, first, content, input_hash(scenario, files))
         except InputError as error:
             problems.append(str(error))
-            if len(problems) == MOST_PROBLEMS:
+            if len(problems) == MAX_PROBLEMS:
                 break
             continue
         on_scenario(variants[-1].template, scenario)
@@ -260,7 +260,7 @@ def check_setups(
             text = event.reason if isinstance(event, LostTask) else event.payload
             if text:
                 problems[event.task.index] = f"{plan.design.describe(event.task.index)}: {text}"
-            if len(problems) == MOST_PROBLEMS:
+            if len(problems) == MAX_PROBLEMS:
                 break
     finally:
         events.close()
@@ -268,8 +268,8 @@ def check_setups(
 
 
 def _raise_problems(problems: list[str]) -> None:
-    if len(problems) == MOST_PROBLEMS:
-        problems = [*problems, f"… and perhaps more: these are the first {MOST_PROBLEMS}"]
+    if len(problems) == MAX_PROBLEMS:
+        problems = [*problems, f"… and perhaps more: these are the first {MAX_PROBLEMS}"]
     if problems:
         raise ScenarioError("\n".join(_without_repetition(problems)))
 

@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from fleet2d.studies.reader import Study
 
 
-MOST_METRICS = 12
-MOST_SHARES = 8
+MAX_METRICS = 12
+MAX_SHARES = 8
 STYLE = """
 body{font:15px/1.5 system-ui,sans-serif;max-width:56em;margin:2em auto;padding:0 1em;color:#2d3138}
 h1{font-size:1.6em}
@@ -147,7 +147,7 @@ class _Page:
         """Return the metrics of the report, those of comparisons first."""
         compared = [comparison.metric for comparison in self.study.meta.compare]
         ordered = dict.fromkeys([*compared, *self.study.metrics])
-        return [name for name in ordered if name in self.study.metrics][:MOST_METRICS]
+        return [name for name in ordered if name in self.study.metrics][:MAX_METRICS]
 
     def _metric(self, metric: str) -> Iterator[str]:
         from fleet2d.studies.figures import draw_course, draw_distribution, draw_means
@@ -178,7 +178,7 @@ class _Page:
         shares = study.shares(metric)
         if len(shares):
             yield "<h3>share of the variance, by axis and by interaction</h3>"
-            yield _frame(shares.head(MOST_SHARES), text=("source",))
+            yield _frame(shares.head(MAX_SHARES), text=("source",))
 
     def _failures(self) -> Iterator[str]:
         failures = self.study.failures

@@ -45,7 +45,7 @@ if TYPE_CHECKING:
     import optuna
 
 
-MOST_RUNS = 40  # unfinished runs that a worker holds for the next stage of their trial
+MAX_RUNS = 40  # unfinished runs that a worker holds for the next stage of their trial
 FAILURE = "failure"  # the attribute of a failed trial that holds the error
 
 
@@ -121,7 +121,7 @@ class TrialJob:
         metrics = run.until(task.until_s).metrics
         if task.until_s is not None and not run.done:
             self._runs[key] = run
-            while len(self._runs) > MOST_RUNS:  # workers don't hear of trials that ended early
+            while len(self._runs) > MAX_RUNS:  # workers don't hear of trials that ended early
                 del self._runs[next(iter(self._runs))]
         return metrics
 
@@ -332,7 +332,7 @@ def check_settings(job: TrialJob, index: int) -> None:
 
 SEARCH, TRIALS, HELD_OUT = "search.json", "trials.log", "held_out"
 SETTING, BEFORE, TUNED = "setting", "as it was", "tuned"
-MOST_TUNED = 5  # settings to judge after a search for several objectives
+MAX_JUDGED_SETTINGS = 5  # settings to judge after a search for several objectives
 
 
 class TuneObserver(Protocol):
@@ -623,7 +623,7 @@ def _best(study: "optuna.Study", settings: TuneSettings) -> "dict[str, optuna.tr
     Raises:
         InputError: All trials failed.
     """
-    best = study.best_trials[:MOST_TUNED]
+    best = study.best_trials[:MAX_JUDGED_SETTINGS]
     if not best:
         reasons = (trial.user_attrs.get(FAILURE) for trial in study.trials)
         reason = next(filter(None, reasons), "none is complete")

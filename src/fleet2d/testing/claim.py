@@ -14,7 +14,7 @@ from fleet2d.kernels import F64, I64
 from fleet2d.runtime.determinism import sum_in_order
 from fleet2d.scenario.model import Scenario, load_scenario
 
-MOST_SEEDS = 10_000
+MAX_SEEDS = 10_000
 BISECTIONS = 14
 ATTRIBUTE = "fleet2d_claim"
 """The attribute of a test function that holds its claim."""
@@ -79,8 +79,8 @@ def rate_test(seeds: int, holds: float = 1.0, error: float = 0.05) -> RateTest:
     Raises:
         InputError: A number is out of range.
     """
-    if not 1 <= seeds <= MOST_SEEDS:
-        raise InputError(f"seeds={seeds}: expected 1 to {MOST_SEEDS:,} seeds")
+    if not 1 <= seeds <= MAX_SEEDS:
+        raise InputError(f"seeds={seeds}: expected 1 to {MAX_SEEDS:,} seeds")
     if not 0 < holds <= 1:
         raise InputError(f"holds={holds}: expected a rate above 0 and up to 1, such as 0.95")
     if not 0 < error < 0.5:

@@ -35,7 +35,7 @@ Settings = Mapping[str, Any]
 
 _AXIS: TypeAdapter[Any] = TypeAdapter(AnyAxis)
 RANDOM_SHARE = 0.25  # of the budget, before the search is guided
-LEAST_RANDOM = 10
+MIN_RANDOM_POINTS = 10
 CANDIDATES = 64
 
 
@@ -300,7 +300,7 @@ class FailureSearch:
         """Prepare a search; with is_guided=False all points are random, for comparison."""
         self._job, self._budget, self._seed = job, budget, seed
         self._generator = random.Random(seed)  # noqa: S311 - a search, not a secret
-        self._random = max(LEAST_RANDOM, round(RANDOM_SHARE * budget)) if is_guided else budget
+        self._random = max(MIN_RANDOM_POINTS, round(RANDOM_SHARE * budget)) if is_guided else budget
         self._study = _optuna(seed, self._random) if is_guided else None
         self._suggested: dict[int, Any] = {}
         self.failure: FailingPoint | None = None

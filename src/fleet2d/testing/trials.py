@@ -29,7 +29,7 @@ SCALES = {"m": 1.0, "m/s": 0.5, "share": 0.1, "s": 60.0, "times": 1.0}
 """Margins that count as neither narrow nor wide, by unit; 1 for others."""
 LASTING = ("always(", "never(", "at_most(")
 """Expectations that fail at the first step of a violation; others fail at their deadline."""
-MOST_HOMES = 32  # in memory
+MAX_HOMES = 32  # in memory
 NOTHING = ArtifactSettings(
     trajectories="off",
     key_frames=False,
@@ -42,7 +42,7 @@ SECTIONS = ("users", "robots", "objects", "algorithms", "metrics")
 """The sections of the scenario whose entries are left out one by one."""
 LEADS = tuple(timedelta(minutes=minutes) for minutes in (0, 1, 5, 15, 60, 240, 1440, 10_080))
 """Times from the start of a shorter run to the failure, tried in this order."""
-MOST_SEEDS_SHOWN = 8
+MAX_SEEDS_SHOWN = 8
 
 
 class Trial(Simulation):
@@ -241,7 +241,7 @@ def run_claim(claim: Claim, body: Body) -> ClaimResult:
         Fleet2DError: The scenario or the test is wrong, or a component failed.
     """
     for keep in (keep_homes, keep_plans):
-        keep(min(len(claim.variants), MOST_HOMES))
+        keep(min(len(claim.variants), MAX_HOMES))
     __tracebackhide__ = True
     rate, trials, failures = claim.rate, list[TrialResult](), 0
     for variant in claim.trials():
@@ -520,7 +520,7 @@ def _by_expectation(result: ClaimResult) -> Iterable[str]:
         if len(result.trials) == 1:
             continue
         seeds = [trial.variant.text for trial, _ in cases]
-        shown = "; ".join(seeds[:MOST_SEEDS_SHOWN]) + "; …" * (len(seeds) > MOST_SEEDS_SHOWN)
+        shown = "; ".join(seeds[:MAX_SEEDS_SHOWN]) + "; …" * (len(seeds) > MAX_SEEDS_SHOWN)
         worst, failure = min(cases, key=lambda case: case[1].margin)
         yield f"  {name}: failed in {len(cases)} of {len(result.trials)} ({shown})"
         if len(cases) > 1 and name != ASSERT:

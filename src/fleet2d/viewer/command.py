@@ -75,12 +75,10 @@ def _where(run: "Run") -> str:
 
 def _view_runs(directories: list[Path], port: int, *, browser: bool) -> None:
     from fleet2d.artifacts.manifest import FILE_NAME
-    from fleet2d.viewer.page_server import MOST_RUNS, PageServer
+    from fleet2d.viewer.page_server import MAX_RUNS, PageServer
 
-    if len(directories) > MOST_RUNS:
-        raise InputError(
-            f"{len(directories)} runs don't fit side by side: give at most {MOST_RUNS}"
-        )
+    if len(directories) > MAX_RUNS:
+        raise InputError(f"{len(directories)} runs don't fit side by side: give at most {MAX_RUNS}")
     for path in directories:
         if not (path / FILE_NAME).exists():
             raise RunDirectoryError(f"{path} holds no run: give what `fleet2d run --out` wrote")

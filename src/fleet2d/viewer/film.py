@@ -115,12 +115,12 @@ class TextStamps:
         return Stamp(picture, left - round(x), top - round(self._height - y))
 
 
-ENDINGS = (".mp4", ".gif", ".webp")
-MOST_FRAMES_A_S = 25
+SUFFIXES = (".mp4", ".gif", ".webp")
+MAX_FRAMES_PER_S = 25
 HEIGHT_PX = 720
 HEIGHT_IN = 7.2
 # A GIF or WebP is written from pictures that are all in memory.
-MOST_PICTURES = 3_000
+MAX_PICTURES = 3_000
 
 
 def write_film(
@@ -150,8 +150,8 @@ def write_film(
         ArtifactError: The run stored no key frames or no floor plan.
     """
     _check(path, speed, height)
-    # Steps between two frames: a second of film has at most MOST_FRAMES_A_S frames.
-    stride = max(1, round(speed * 1e6 / run.manifest["step_us"] / MOST_FRAMES_A_S))
+    # Steps between two frames: a second of film has at most MAX_FRAMES_PER_S frames.
+    stride = max(1, round(speed * 1e6 / run.manifest["step_us"] / MAX_FRAMES_PER_S))
     rate = Fraction(speed).limit_denominator(1000) * 1_000_000
     rate /= run.manifest["step_us"] * stride
     with drawing_style():
@@ -179,7 +179,7 @@ def _store(path: Path, frames: Iterator[tuple[int, U8]], total: int, rate: Fract
 
 
 def _check(path: Path, speed: float, height: int) -> None:
-    if path.suffix.lower() not in ENDINGS:
+    if path.suffix.lower() not in SUFFIXES:
         raise InputError(
             f"{path}: a film is written as .mp4, .gif or .webp, not as"
             f" {path.suffix or 'no ending'!r}"
@@ -271,9 +271,9 @@ def _write_pictures(
     numbers: list[int] = []
     pictures: list[Any] = []
     for number, pixels in frames:
-        if len(pictures) >= MOST_PICTURES:
+        if len(pictures) >= MAX_PICTURES:
             raise InputError(
-                f"{kind.upper()} films have at most {MOST_PICTURES} pictures: choose a"
+                f"{kind.upper()} films have at most {MAX_PICTURES} pictures: choose a"
                 " higher --speed, a shorter stretch, or .mp4"
             )
         picture = Image.fromarray(pixels).convert("RGB")

@@ -116,7 +116,7 @@ def _room_facts(room: Room) -> RoomFacts:
 
 
 _MOVE = re.compile(r"(.+) to \((\S+), (\S+)\)")
-MOST_ARRANGEMENTS = 500
+MAX_ARRANGEMENTS = 500
 
 
 @dataclass
@@ -204,7 +204,7 @@ class WallsHistory:
                 return
         else:
             return
-        if len(self._meshes) >= MOST_ARRANGEMENTS:
+        if len(self._meshes) >= MAX_ARRANGEMENTS:
             return
         walls = self._number()
         if walls != self.changes[-1]["walls"]:

@@ -32,7 +32,7 @@ from fleet2d.viewer.page_server import PageServer, json_answer, problem
 from fleet2d.viewer.run_facts import intervention_marks, live_facts
 
 AHEAD_US = 120_000_000
-MOST_CORNERS = 60
+MAX_CORNERS = 60
 
 
 class LiveEngine:
@@ -92,7 +92,7 @@ class LiveEngine:
         track = actor.motion.breakpoints
         time = np.asarray(track.time)
         first = int(np.searchsorted(time, now_us, side="right"))
-        for i in range(first, min(len(time), first + MOST_CORNERS)):
+        for i in range(first, min(len(time), first + MAX_CORNERS)):
             if time[i] > now_us + AHEAD_US:
                 return
             yield int(time[i]), int(track.x[i]), int(track.y[i])
@@ -223,10 +223,10 @@ def _note(actor: Any) -> str:
 
 
 FRAME_US = 60_000_000  # the most simulated time between two frames
-FRAMES_A_S = 30  # at a chosen speed
-BATCHES_A_S = 30
-MOST_WAITING = 4_000  # frames in the queue of a page
-MOST_BODY = 4_096  # bytes of an order
+FRAMES_PER_S = 30  # at a chosen speed
+BATCHES_PER_S = 30
+MAX_QUEUED = 4_000  # frames in the queue of a page
+MAX_ORDER_BYTES = 4_096  # bytes of an order
 ORDER_WAIT_S = 10.0
 IDLE_S = 0.1
 FRAME_WAIT_S = 0.5  # less than the server waits for open responses when it ends
@@ -315,7 +315,7 @@ class LiveRun:
     def _steps_per_frame(self) -> int:
         us = FRAME_US
         if self._speed:
-            us = min(us, round(self._speed * 1e6 / FRAMES_A_S))
+            us = min(us, round(self._speed * 1e6 / FRAMES_PER_S))
         return max(1, us // self._clock.step_us)
 
     def _apply_orders(self, seconds: float) -> None:
@@ -380,7 +380,7 @@ class LiveRun:
     def _send(self, frame: LiveFrame) -> None:
         with self._lock:
             for watcher in self._watchers:
-                if watcher.qsize() < MOST_WAITING:
+                if watcher.qsize() < MAX_QUEUED:
                     watcher.put(frame)
 
     def frames(self) -> Iterator[list[LiveFrame]]:
@@ -397,10 +397,10 @@ class LiveRun:
                 except queue.Empty:
                     yield []
                     continue
-                while not watcher.empty() and len(frames) < MOST_WAITING:
+                while not watcher.empty() and len(frames) < MAX_QUEUED:
                     frames.append(watcher.get_nowait())
                 yield frames
-                time.sleep(1 / BATCHES_A_S)
+                time.sleep(1 / BATCHES_PER_S)
         finally:
             with self._lock:
                 self._watchers.remove(watcher)
@@ -457,7 +457,7 @@ def read_order(body: bytes) -> LiveOrder:
     """
     refusal = InputError("the request is not a valid order")
     try:
-        content: Any = json.loads(body) if len(body) <= MOST_BODY else None
+        content: Any = json.loads(body) if len(body) <= MAX_ORDER_BYTES else None
         value, x, y = (float(content[key]) for key in ("value", "x", "y"))
         action, target = content["action"], content["target"]
     except (ValueError, KeyError, TypeError):

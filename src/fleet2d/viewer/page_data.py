@@ -36,8 +36,8 @@ def write_file(path: Path, content: bytes) -> None:
 
 POSES = "poses"
 """A table that replaces `key_frames` for the page in runs with random walks."""
-MOST_POSES = 200_000
-MOST_ROWS = 1 << 17
+MAX_POSES = 200_000
+MAX_ROWS = 1 << 17
 
 
 class PageData:
@@ -132,7 +132,7 @@ class PageData:
         if "walk" not in kinds.unique().to_pylist():
             return 0
         step_us, steps = self.run.manifest["step_us"], self.run.manifest["steps"]
-        return int(step_us * -(-steps // MOST_POSES))
+        return int(step_us * -(-steps // MAX_POSES))
 
     def _poses(self) -> Any:
         """Return positions of everybody at equal intervals, in the columns of key_frames."""
@@ -164,7 +164,7 @@ def write_table(table: Any, target: Path | io.BytesIO) -> None:
         compression="zstd",
         use_dictionary=texts,
         column_encoding=dict.fromkeys(delta_names, "DELTA_BINARY_PACKED"),
-        row_group_size=MOST_ROWS,
+        row_group_size=MAX_ROWS,
     )
 
 

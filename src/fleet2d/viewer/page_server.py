@@ -283,7 +283,7 @@ with extra("view", "watching needs a server"):
 
 
 HOST = "127.0.0.1"
-MOST_RUNS = 4
+MAX_RUNS = 4
 
 
 class _Server(uvicorn.Server):

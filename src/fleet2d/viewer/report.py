@@ -20,7 +20,7 @@ from fleet2d.viewer.page_data import POLICY, PageData, embedded_run, html_of, wr
 from fleet2d.viewer.run_facts import run_title
 
 DAY = timedelta(days=1)
-MOST_TIMELINE = 20_000_000
+MAX_TIMELINE_CHARS = 20_000_000
 """The most characters of a page that is embedded in a report."""
 STYLE = """
 :root { color-scheme: light dark; font: 15px/1.5 system-ui, sans-serif; }
@@ -164,7 +164,7 @@ def _timeline(run: Run) -> str:
     """Return the page of a run in a frame that has no access to the report."""
     with suppress(ArtifactError):  # no plan or no key frames
         page = html_of([embedded_run(PageData(run), 0, run.manifest["steps"])])
-        if len(page) <= MOST_TIMELINE:
+        if len(page) <= MAX_TIMELINE_CHARS:
             document = html.escape(page)
             return f'<iframe title="Timeline" sandbox="allow-scripts" srcdoc="{document}"></iframe>'
         return "<p>Too large for a page: <code>fleet2d view</code> shows it.</p>"

@@ -18,7 +18,7 @@ from fleet2d.kernels import I64, Bool
 from fleet2d.palette import body_color
 from fleet2d.runs.layers import PREFIX
 from fleet2d.runs.run import Run
-from fleet2d.sight.camera import USUAL_ANGLE_DEG, USUAL_RANGE_M
+from fleet2d.sight.camera import DEFAULT_ANGLE_DEG, DEFAULT_RANGE_M
 from fleet2d.storage.files import path_in
 from fleet2d.viewer.contract import (
     BodyFacts,
@@ -250,7 +250,7 @@ def _cameras(settings: Mapping[str, Any]) -> list[CameraFacts]:
 
 
 def _camera(name: str, camera: Mapping[str, Any]) -> CameraFacts:
-    near, far = camera.get("range", USUAL_RANGE_M)
+    near, far = camera.get("range", DEFAULT_RANGE_M)
     forward, left = camera.get("offset", (0.0, 0.0))
     pan = camera.get("pan") or {}
     dwell = parse_duration(pan.get("dwell", "5 s"))
@@ -258,7 +258,7 @@ def _camera(name: str, camera: Mapping[str, Any]) -> CameraFacts:
         name=name,
         near=near,
         far=far,
-        angle=math.radians(camera.get("angle_deg", USUAL_ANGLE_DEG)),
+        angle=math.radians(camera.get("angle_deg", DEFAULT_ANGLE_DEG)),
         forward=forward,
         left=left,
         heading=math.radians(camera.get("heading_deg", 0.0)),

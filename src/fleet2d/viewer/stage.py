@@ -31,7 +31,7 @@ from fleet2d.viewer.run_facts import bodies_of, sightings_of
 
 SEEN_PART = 0.22  # height of the marks of sightings at the foot of a row, as a share of it
 ROW_PART = 0.86
-MOST_SAMPLES = 100_000
+MAX_SAMPLES = 100_000
 LABEL_PART = 0.05  # stretches longer than this share of the strip have the name of their room
 
 
@@ -55,7 +55,7 @@ def strip_rows(run: Run, colors: Sequence[tuple[str, str]]) -> list[StripRow]:
         ArtifactError: The run stored no key frames.
     """
     step_us, steps = run.manifest["step_us"], run.manifest["steps"]
-    interval = timedelta(microseconds=int(step_us * -(-steps // MOST_SAMPLES)))
+    interval = timedelta(microseconds=int(step_us * -(-steps // MAX_SAMPLES)))
     rows = []
     for name, color in colors:
         path = run.path(name, interval)
@@ -149,7 +149,7 @@ def _label(axes: Axes, rows: Sequence[StripRow]) -> None:
 
 
 TAIL = timedelta(minutes=1)  # length of the paths behind bodies
-LEAST_RADIUS_M = 0.2
+MIN_RADIUS_M = 0.2
 NOSE = 1.6  # length of the line of the heading [radii]
 STRIP_ROWS = 6
 ABOVE_M = 0.6  # space above the plan
@@ -302,7 +302,7 @@ class Stage:
         interval = timedelta(microseconds=self._step_us * self.stride)
         path = self._part.path(facts["name"], interval)
         color = facts["color"]
-        radius = max(facts["radius"], LEAST_RADIUS_M)
+        radius = max(facts["radius"], MIN_RADIUS_M)
         disc = Circle((0, 0), radius, facecolor=color, edgecolor="white", lw=0.9, zorder=4.3)
         self._axes.add_patch(disc)
         (nose,) = self._axes.plot([], [], color=color, lw=2.2, zorder=4.2, solid_capstyle="round")

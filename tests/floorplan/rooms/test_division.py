@@ -9,7 +9,7 @@ from shapely import Polygon
 
 from fleet2d.floorplan.load import load_floorplan
 from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
-from fleet2d.floorplan.rooms.division import MOST_CORNERS
+from fleet2d.floorplan.rooms.division import MAX_CORNERS
 from fleet2d.kernels.space import label_parts
 
 # Two rooms of 3 x 3 m with a wall of 0.1 m and a door between them.
@@ -199,6 +199,6 @@ def test_rooms_of_walls_with_very_many_corners_are_those_of_the_plain_walls() ->
     rough = shapely.transform(dense, lambda xy: xy + 0.0008 * (np.arange(len(xy)) % 2)[:, None])
     plans = [FloorPlan.build("home", f, doorways=None, regions_are="none") for f in (free, rough)]
 
-    assert len(plans[1].mesh.vertices) > MOST_CORNERS
+    assert len(plans[1].mesh.vertices) > MAX_CORNERS
     assert areas(plans[0]) == pytest.approx(areas(plans[1]), abs=0.11)
     assert 1 == len(plans[0].doorways) == len(plans[1].doorways)

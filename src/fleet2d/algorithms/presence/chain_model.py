@@ -21,11 +21,11 @@ from fleet2d.kernels.presence import StayModel, Stretches, advance, follow
 from fleet2d.runtime.clock import DAY_MINUTES
 
 WEEKEND = 5  # its first day, Monday being 0
-FEWEST_BINS = DAY_MINUTES  # with fewer bins of evidence, hours aren't distinguished
+MIN_BINS = DAY_MINUTES  # with fewer bins of evidence, hours aren't distinguished
 MAX_RATIO = 20.0  # largest ratio, and inverse of the smallest, of an hour's share to the mean share
-LEAST = 1e-9
+MIN_SHARE = 1e-9
 MAX_LEAVE = 0.5  # largest probability per bin to leave, unless it was larger before
-FARTHEST = 10_080  # bins ahead; later forecasts equal the one at this horizon
+MAX_HORIZON = 10_080  # bins ahead; later forecasts equal the one at this horizon
 
 
 class Habits(NamedTuple):
@@ -55,13 +55,13 @@ class Habits(NamedTuple):
             weekday: Day of the week, 0 is Monday.
             hour: Hour of the day.
         """
-        if self.total[-1] < FEWEST_BINS:
+        if self.total[-1] < MIN_BINS:
             return model
         days = self.week.reshape(7, 24, -1)[:, hour]
         same_days = days[:WEEKEND] if weekday < WEEKEND else days[WEEKEND:]
         at_hour = same_days.sum(axis=0) + self.smoothing / self.total[-1] * self.total
         mean_share, share = self.total[:-1] / self.total[-1], at_hour[:-1] / at_hour[-1]
-        ratio = np.maximum(share, LEAST) / np.maximum(mean_share, LEAST)
+        ratio = np.maximum(share, MIN_SHARE) / np.maximum(mean_share, MIN_SHARE)
         pull = np.sqrt(np.clip(ratio, 1 / MAX_RATIO, MAX_RATIO))
         places = len(pull)
         leave = (1 - model.stay)[:, np.newaxis] * model.follow
@@ -69,7 +69,7 @@ class Habits(NamedTuple):
         chance = np.zeros(len(leave))
         for column in leave.T:  # summed in the same order on every machine
             chance += column
-        follow = leave / np.maximum(chance, LEAST)[:, np.newaxis]
+        follow = leave / np.maximum(chance, MIN_SHARE)[:, np.newaxis]
         most = np.maximum(1 - model.stay, MAX_LEAVE)
         return model._replace(stay=1 - np.minimum(chance, most), follow=follow)
 
@@ -136,7 +136,7 @@ class ChainPresence(Presence):
 
     def at(self, time: datetime) -> "ChainPresence":
         """Return the forecast of a later time, in whole bins; of an earlier one, itself."""
-        bins = min((time - self.time) // timedelta(microseconds=self._bin_us), FARTHEST)
+        bins = min((time - self.time) // timedelta(microseconds=self._bin_us), MAX_HORIZON)
         if bins <= 0:
             return self
         ahead = [person.after(bins, self.time, self._bin_us) for person in self._people]

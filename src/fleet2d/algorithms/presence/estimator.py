@@ -18,7 +18,7 @@ from fleet2d.kernels.presence import resampled
 
 EXACT = 1 << 40
 REPLICATES = 200  # of the bootstrap
-FEWEST_DAYS = 2  # fewest days that say anything about how much days differ
+MIN_DAYS = 2  # fewest days that say anything about how much days differ
 LN_2 = 0.6931471805599453
 ROOT_HALF = 0.7071067811865476
 TERMS = 11  # of the series: the first left out is below 1e-17 of the sum
@@ -164,7 +164,7 @@ class DayCounts:
             today: Ordinal of the day that begins. Learned days are moved by whole weeks before it.
         """
         day = 1 << 31
-        *days, last = array_of(learned, "days", (-1,), np.int64, most=day).tolist()
+        *days, last = array_of(learned, "days", (-1,), np.int64, max_value=day).tolist()
         weeks = max(0, -((today - 1 - last) // 7))
         self.days = [day - 7 * weeks for day in days]
         self.by_day = array_of(learned, "by_day", (len(days), *self.shape))
@@ -269,7 +269,7 @@ class Estimator(Component):
         """
         days = self.counts.weighted_days
         shape = (self.users + 1, self.rooms + 1)
-        if len(days) < FEWEST_DAYS:
+        if len(days) < MIN_DAYS:
             return np.zeros(shape), np.ones(shape)
         sums = resampled(key, days.reshape(len(days), -1), REPLICATES)
         home, away = self.shares(sums.reshape(REPLICATES, *self.counts.shape))

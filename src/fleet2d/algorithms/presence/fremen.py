@@ -22,7 +22,9 @@ WEEK = 7 * DAY_MINUTES
 PERIODS = 100  # candidate periods: a week divided by 1, 2 … 100
 ORDERS = 5  # models with 0 to 4 periods
 SPANS = 1.5  # periods that the data must span before one is considered
-LEAST = 1e-6  # forecasts are clipped to LEAST … 1 - LEAST before they are scored
+MIN_PROBABILITY = (
+    1e-6  # forecasts are clipped to MIN_PROBABILITY … 1 - MIN_PROBABILITY before they are scored
+)
 RECENT = 0.5  # weight of an order's log loss a day later: periods found early are often wrong
 UNIT = 1 << 30
 
@@ -127,7 +129,7 @@ class Fremen(Estimator):
         """Score each order by the finished day, then update the models with it."""
         minutes, sums = (np.concatenate(parts) for parts in zip(*self.day, strict=True))
         seen, watched = sums[..., : self.rooms], sums[..., self.rooms : -1]
-        p = np.clip(self._by_order(minutes), LEAST, 1 - LEAST)
+        p = np.clip(self._by_order(minutes), MIN_PROBABILITY, 1 - MIN_PROBABILITY)
         missed = np.maximum(watched - seen, 0)[..., np.newaxis]
         gain = seen[..., np.newaxis] * natural_log(p) + missed * natural_log(1 - p)
         self.fit = RECENT * self.fit + gain.sum(axis=0)
@@ -176,5 +178,5 @@ class Fremen(Estimator):
         super().recall(learned, today)
         self.waves = array_of(learned, "waves", self.waves.shape)
         self.fit = array_of(learned, "fit", self.fit.shape)
-        self.span = int(array_of(learned, "span", (), np.int64, most=1 << 31))
+        self.span = int(array_of(learned, "span", (), np.int64, max_value=1 << 31))
         self.first = today - self.span

@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field
 
 from fleet2d.algorithms.evidence import Evidence
-from fleet2d.algorithms.presence.estimator import FEWEST_DAYS, Estimator, normalized
+from fleet2d.algorithms.presence.estimator import MIN_DAYS, Estimator, normalized
 from fleet2d.algorithms.presence.people import DayEvidence, People, Prior, StateLayout
 from fleet2d.configuration.components import register
 from fleet2d.configuration.units import Share
@@ -113,7 +113,7 @@ class Likelihood(Estimator):
             Lower and upper ends, float64 (users + 1, rooms + 1) each, away last.
         """
         shape = (self.users + 1, self.rooms + 1)
-        if len(self.counts.days) < FEWEST_DAYS:
+        if len(self.counts.days) < MIN_DAYS:
             return np.zeros(shape), np.ones(shape)
         assert self.people is not None, "days are over"
         total, lengths = self.counts.total, self.people.length_of_stay

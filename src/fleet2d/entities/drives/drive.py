@@ -96,7 +96,7 @@ class Drive(Component):
 
 
 # The longest time for a route [s]: ten days, so that poses on it can be interpolated in 64 bits.
-LONGEST_S = 864_000
+MAX_DURATION_S = 864_000
 # A moment this near to a corner of the route is at the corner [m].
 NEAR_M = 1e-6
 
@@ -176,7 +176,7 @@ def _checked(drive: Drive, route: Route, length: float) -> Iterator[Moment]:
     for seconds, metres, heading in drive.moments(route):
         moment = Moment(seconds, metres, heading)
         if not (
-            last.seconds <= seconds <= LONGEST_S
+            last.seconds <= seconds <= MAX_DURATION_S
             and last.metres - NEAR_M <= metres <= length + NEAR_M
             and isinstance(heading, int | np.integer)
         ):

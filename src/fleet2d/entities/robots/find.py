@@ -33,7 +33,7 @@ from fleet2d.kernels import F64
 from fleet2d.kernels.numbers import TURN
 from fleet2d.runtime.clock import midnight_of
 from fleet2d.runtime.determinism import sum_in_order
-from fleet2d.search.policies import MOST_EXACT, Policy, after_empty_looks, order_by
+from fleet2d.search.policies import MAX_EXACT_SITES, Policy, after_empty_looks, order_by
 from fleet2d.search.problem import SearchProblem, search_problem
 
 # The part of a room to be shown by its viewpoints, if there are few enough of them.
@@ -205,10 +205,10 @@ class Find(BeliefBehavior):
         """Choose the viewpoints of each room."""
         check_has_camera(actor, "find")
         self.sites = Sites(actor, self.views)
-        if self.policy == "exact" and len(self.sites) > MOST_EXACT:
+        if self.policy == "exact" and len(self.sites) > MAX_EXACT_SITES:
             raise PlacementError(
-                f"{actor.path}: the exact policy works for up to {MOST_EXACT} rooms, and there are"
-                f" {len(self.sites)}: choose policy: receding"
+                f"{actor.path}: the exact policy works for up to {MAX_EXACT_SITES} rooms, and"
+                f" there are {len(self.sites)}: choose policy: receding"
             )
         self.search: SearchState | None = None
         self.plan: Plan | None = None  # the last one that it returned

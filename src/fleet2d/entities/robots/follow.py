@@ -15,7 +15,7 @@ from fleet2d.entities.robots.approach import approach, check_has_camera
 SOUGHT_FROM = 0.3
 # A person who moves no farther than this between two looks rests: the interval doubles [m].
 STILL = 0.3
-LONGEST_INTERVAL = timedelta(seconds=32)
+MAX_INTERVAL = timedelta(seconds=32)
 
 
 @register("behavior", "follow")
@@ -92,7 +92,7 @@ class Follow(Behavior):
         self.is_searching = False
         (x, y), (old_x, old_y) = now.in_view[self.person or ""], self.last
         is_resting = (x - old_x) ** 2 + (y - old_y) ** 2 <= STILL**2
-        longest = max(LONGEST_INTERVAL, self.update)
+        longest = max(MAX_INTERVAL, self.update)
         self.pause = min(2 * self.pause, longest) if is_resting else self.update
         self.last = x, y
         approach(now, plan, x, y, self.distance)

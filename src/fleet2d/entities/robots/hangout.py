@@ -201,7 +201,7 @@ def decay(x: F64) -> F64:
 
 # When exploring a room: the part of it to be shown, by at most this many viewpoints.
 ENOUGH = 0.95
-MOST_VIEWS = 4
+MAX_VIEWS = 4
 
 
 @register("behavior", "hangout")
@@ -314,7 +314,7 @@ class Hangout(BeliefBehavior):
     def _explore(self, now: Situation, plan: Plan, room: int) -> None:
         """Look round in a room from viewpoints that show nearly all of it, by present walls."""
         plan.note("explores", now.home.rooms[room].name)
-        for point in viewpoints_of(now.actor, now.home.rooms[room], ENOUGH, MOST_VIEWS).points:
+        for point in viewpoints_of(now.actor, now.home.rooms[room], ENOUGH, MAX_VIEWS).points:
             if plan.reaches(*point):
                 plan.go_to_point(*point).turn_by(1.0)
 

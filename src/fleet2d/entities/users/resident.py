@@ -446,7 +446,7 @@ def _end_of(plan: Plan) -> tuple[PlanEnd, int]:
 
 # Draws of an episode are addressed by the day's ordinal times this, plus its number. A day has
 # fewer episodes than half of it: the core adds the other half for the part of one after midnight.
-EPISODES_A_DAY = 1024
+EPISODES_PER_DAY = 1024
 END = attrgetter("end")
 # How far ahead people plan who may be interrupted by robots at any time.
 AHEAD_US = 1800 * SECOND_US
@@ -589,7 +589,7 @@ class ResidentBehavior(Behavior):
             venue = self._in_room(venue, room)
         core_venue = self.known_home.in_core(activity, self.seated(venue, which))
         stays = activity == REST and end - begin < NO_GAP_S
-        return core_venue, which[0] * EPISODES_A_DAY + which[1], end_us, role, stays
+        return core_venue, which[0] * EPISODES_PER_DAY + which[1], end_us, role, stays
 
     def seated(self, venue: Venue, which: tuple[int, int]) -> Venue:
         """Return the venue with only the places at furniture that it has for the episode."""

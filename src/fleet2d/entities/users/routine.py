@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 
 
 # All members must get the same rooms, whatever their radius: those of a body of this radius [m].
-USUAL_RADIUS = 0.2
+DEFAULT_RADIUS = 0.2
 
 
 def private_rooms(household: Household, home: "Home") -> MemberRooms:
@@ -77,7 +77,7 @@ def private_rooms(household: Household, home: "Home") -> MemberRooms:
 
 def usual_rooms(home: "Home") -> "list[Room]":
     """Return the rooms that members of a household can get to, the same for all of them."""
-    space = home.space(USUAL_RADIUS, opens_doors=True)
+    space = home.space(DEFAULT_RADIUS, opens_doors=True)
     return [room for room in home.rooms if len(space.cells(room.index, 0))]
 
 
@@ -94,9 +94,9 @@ def _rooms_of(activity: "Activity", reachable: "list[Room]") -> "list[Room]":
 
 
 # Bodies of the usual radius that are nearer to each other touch [m].
-TOUCHING_M = 2 * USUAL_RADIUS
+TOUCHING_M = 2 * DEFAULT_RADIUS
 # The number of days whose places are kept, and of episodes of a day that have draws of their own.
-CACHED_DAYS, EPISODES_A_DAY = 3, 1024
+CACHED_DAYS, EPISODES_PER_DAY = 3, 1024
 
 Places = Mapping[tuple[int, int], Seat | None]
 """The place of each member's episode, by the numbers of both; None: others have all places."""
@@ -200,7 +200,7 @@ class Seating:
         return all(end <= time[0] or begin >= time[1] for begin, end in taken)
 
     def _by_preference(self, claim: SeatClaim, ordinal: int) -> Sequence[Seat]:
-        address = ordinal * EPISODES_A_DAY + claim.episodes[0]
+        address = ordinal * EPISODES_PER_DAY + claim.episodes[0]
         first = Draws(self._keys[claim.rank], address).below(claim.own)
         return (claim.seats[first], *claim.seats[:first], *claim.seats[first + 1 :])
 

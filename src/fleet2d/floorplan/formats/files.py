@@ -62,7 +62,7 @@ def read_json(path: Path) -> dict[str, Any]:
     """
     text = _read_text(path, "JSON")
     values = text.count(",") + text.count("[") + text.count("{")
-    JSON_VALUES.check(values, path, FloorPlanError, least="about ")
+    JSON_VALUES.check(values, path, FloorPlanError, prefix="about ")
     try:
         content = json.loads(text)
     except json.JSONDecodeError as error:

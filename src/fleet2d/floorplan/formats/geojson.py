@@ -145,9 +145,9 @@ def read_features(content: dict[str, Any], level: str | None, notes: list[str]) 
         else:
             shape = _shape(item.get("geometry"), kind, where, notes)
             parts += int(shapely.get_num_geometries(shape))
-            POLYGONS.check(parts, "it", FloorPlanError, least="at least ")
+            POLYGONS.check(parts, "it", FloorPlanError, prefix="at least ")
             corners += int(shapely.get_num_coordinates(shape))
-            CORNERS.check(corners, "it", FloorPlanError, least="at least ")
+            CORNERS.check(corners, "it", FloorPlanError, prefix="at least ")
             features.append(Feature(kind, where, shape, properties, _level(properties)))
     if ignored:
         names = ", ".join(f"{name} ({count})" for name, count in ignored.items())

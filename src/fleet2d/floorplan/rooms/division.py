@@ -297,7 +297,7 @@ HALLWAY_ROOMS = 3
 HALLWAY_MAX_M2 = 25.0
 """Space without a label is a hallway if it leads to at least this many rooms, and is no larger than
 this: larger space has other uses, too."""
-MOST_CORNERS = 6_000
+MAX_CORNERS = 6_000
 """The search for passages looks at pairs of corners. With more corners than this, as in a scan with
 a point each millimetre, it straightens the walls first …"""
 STRAIGHTENED_M = (0.01, 0.02, 0.04, 0.08, 0.16)
@@ -360,7 +360,7 @@ def _with_few_corners(walls: list[Polygon], units_per_m: float) -> list[Polygon]
     """Return the walls, straightened where they have very many corners."""
     simpler, shape = walls, shapely.MultiPolygon(walls)
     for tolerance in STRAIGHTENED_M:
-        if shapely.get_num_coordinates(simpler).sum() <= MOST_CORNERS:
+        if shapely.get_num_coordinates(simpler).sum() <= MAX_CORNERS:
             break
         simple = shapely.simplify(shape, tolerance * units_per_m)
         simpler = shapely.orient_polygons(shapely.get_parts(simple)).tolist()

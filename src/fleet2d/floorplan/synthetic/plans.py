@@ -339,8 +339,8 @@ def add_bays(strip: Strip, choices: Choices, entry: bool) -> Strip:
     return Strip(strip.slots, tuple(bays))
 
 
-# Least depth of the core [units].
-LEAST_CORE = 70
+# Minimum depth of the core [units].
+MIN_CORE_DEPTH = 70
 
 Areas = Mapping[int, float]
 Placing = Callable[[Areas], list[Box] | None]
@@ -365,7 +365,7 @@ def inline(
         if rooms is None:
             return None
         y0, y1 = rooms.low - low, rooms.high + high
-        if y1 - y0 < LEAST_CORE:
+        if y1 - y0 < MIN_CORE_DEPTH:
             return None
         width = int(tree_area(core[0], areas) / (y1 - y0) + 0.5)
         boxes = rooms.boxes + choose_squarest(core, areas, (-width, y0, 0, y1), [mouth])
@@ -424,7 +424,7 @@ def across(
         length = max(int(area / height + 0.5), depth if request.outline == "rectangle" else 0)
         left = rooms.low + (depth - length) * at // 100
         high = int(area / length + 0.5)
-        if high < LEAST_CORE:
+        if high < MIN_CORE_DEPTH:
             return None
         boxes = [Box(b.room, b.y0, b.x0, b.y1, b.x1) for b in rooms.boxes]
         boxes += choose_squarest(core, areas, (left, -high, left + length, 0), [mouth])
@@ -483,7 +483,7 @@ def _between(
         return None
     y0, y1 = east.low - offsets[0], east.high + offsets[1]
     west = _fit_wing(second, areas, *((y0, y1) if as_core else (east.low, east.high)))
-    if west is None or y1 - y0 < LEAST_CORE:
+    if west is None or y1 - y0 < MIN_CORE_DEPTH:
         return None
     width = int(tree_area(core[0], areas) / (y1 - y0) + 0.5)
     other = next(box for box in west if box.room == second.corridor)
@@ -539,7 +539,7 @@ def columns(
         total = fsum(areas.values())
         height = int(sqrt(total * 100 / (1.45 * ratio)))
         y0, y1 = -low, height + high
-        if y1 - y0 < LEAST_CORE:
+        if y1 - y0 < MIN_CORE_DEPTH:
             return None
         width = int(tree_area(core[0], areas) / (y1 - y0) + 0.5)
         boxes = choose_squarest(core, areas, (-width, y0, 0, y1))

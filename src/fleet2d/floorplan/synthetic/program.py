@@ -67,8 +67,8 @@ class Choices:
 
 
 # Area of a home over that of its rooms: corridors and door gaps add to it.
-USUAL_EXTRA = 1.10
-MAX_ROOMS_OF_A_KIND = 8
+TYPICAL_AREA_FACTOR = 1.10
+MAX_ROOMS_PER_TYPE = 8
 SMALLEST_M2 = 30.0
 LARGEST_M2 = 450.0
 
@@ -83,16 +83,16 @@ class Size(NamedTuple):
     """The sizes of a type of room.
 
     Attributes:
-        least: Least area [m²].
-        usual: Usual area [m²].
-        most: Largest area [m²].
-        side: Least length of the shorter side [m].
+        min_area: Smallest area [m²].
+        typical_area: Typical area [m²].
+        max_area: Largest area [m²].
+        side: Minimum length of the shorter side [m].
         slender: Largest ratio of the sides.
     """
 
-    least: float
-    usual: float
-    most: float
+    min_area: float
+    typical_area: float
+    max_area: float
     side: float
     slender: float
 
@@ -115,7 +115,7 @@ SIZES = {
 }
 
 
-# Areas in percent of the usual one, least and most.
+# Smallest and largest area, in percent of the typical one.
 SPREAD = {
     "kitchen": (70, 185),
     "bathroom": (50, 165),
@@ -123,7 +123,7 @@ SPREAD = {
     "bedroom": (62, 134),
     "garage": (72, 130),
 }
-USUAL_SPREAD = (78, 130)
+DEFAULT_SPREAD = (78, 130)
 
 
 @dataclass(frozen=True)
@@ -163,13 +163,13 @@ def least_area(bedrooms: int, bathrooms: int, garage: bool) -> float:
     kinds = [*_base(bedrooms, bathrooms), *["garage"] * garage]
     # All but the smallest homes need a corridor, and some room for fitting walls to each other.
     spare = 1.15 if bedrooms == bathrooms == 1 else min(1.5 + 0.05 * (bedrooms + bathrooms), 2.0)
-    return round(spare * fsum(SIZES[kind].least for kind in kinds), 1)
+    return round(spare * fsum(SIZES[kind].min_area for kind in kinds), 1)
 
 
 def most_area(bedrooms: int, bathrooms: int) -> float:
     """Return the largest area [m²] of a home with so many rooms and all optional ones."""
     kinds = [*_base(bedrooms, bathrooms), "garage", *(kind for kind, _, _ in OPTIONAL)]
-    return round(0.56 * fsum(SIZES[kind].most for kind in kinds), 1)
+    return round(0.56 * fsum(SIZES[kind].max_area for kind in kinds), 1)
 
 
 # What else a home may have: the type of room, from which area on [m²], and its probability [%].
@@ -199,7 +199,7 @@ def settle_wishes(wishes: Wishes, choices: Choices) -> Wishes:
     area = wishes.area_m2
     if area is None:
         area = _draw_area(choices)
-        most = most_area(wishes.bedrooms or MAX_ROOMS_OF_A_KIND, baths)
+        most = most_area(wishes.bedrooms or MAX_ROOMS_PER_TYPE, baths)
         area = round(min(max(area, 1.25 * least_area(beds, baths, garage)), most), 1)
     _check(area, wishes)
     if wishes.bedrooms is None:
@@ -207,7 +207,7 @@ def settle_wishes(wishes: Wishes, choices: Choices) -> Wishes:
         beds = min(max((round(area) + choices.between(-36, 36) + 38) // 66, least), 6)
         while beds > least and least_area(beds, baths, garage) > 0.8 * area:
             beds -= 1
-        while beds < MAX_ROOMS_OF_A_KIND and most_area(beds, baths) < area:
+        while beds < MAX_ROOMS_PER_TYPE and most_area(beds, baths) < area:
             beds += 1
     if wishes.bathrooms is None:
         baths = min(max((45 * beds + round(area) // 3 + choices.between(-45, 45)) // 100, 1), 4)
@@ -271,20 +271,20 @@ def choose_rooms(wishes: Wishes, choices: Choices, porch: bool = False) -> list[
     """
     area, beds, baths = wishes.area_m2 or 0.0, wishes.bedrooms or 1, wishes.bathrooms or 1
     kinds = _base(beds, baths) + ["garage"] * bool(wishes.garage)
-    total = area / USUAL_EXTRA
-    # Another room is added only while the usual sizes of all leave space for it.
+    total = area / TYPICAL_AREA_FACTOR
+    # Another room is added only while the typical sizes of all leave space for it.
     fill = choices.between(70, 104) / 100
     for kind, from_area, percent in OPTIONAL:
         if porch and kind == "entryway":
             kinds.append(kind)
             continue
         is_likely = area >= from_area and choices.chance(percent)
-        if is_likely and fsum(SIZES[k].usual for k in [*kinds, kind]) <= fill * total:
+        if is_likely and fsum(SIZES[k].typical_area for k in [*kinds, kind]) <= fill * total:
             kinds.append(kind)
     for kind, _, _ in OPTIONAL:  # a very large home takes more rooms
-        if 0.85 * fsum(SIZES[k].most for k in kinds) < total and kinds.count(kind) < 2:
+        if 0.85 * fsum(SIZES[k].max_area for k in kinds) < total and kinds.count(kind) < 2:
             kinds.append(kind)
-    briefs = [Brief(kind, SIZES[kind].usual) for kind in kinds]
+    briefs = [Brief(kind, SIZES[kind].typical_area) for kind in kinds]
     return scale_areas(_assign_partners(briefs), total, choices)
 
 
@@ -294,7 +294,7 @@ def _assign_partners(briefs: Sequence[Brief]) -> list[Brief]:
     beds = [i for i, brief in enumerate(paired) if brief.kind == "bedroom"]
     baths = [i for i, brief in enumerate(paired) if brief.kind == "bathroom"]
     wardrobes = [i for i, brief in enumerate(paired) if brief.kind == "wardrobe"]
-    paired[beds[0]] = replace(paired[beds[0]], area=SIZES["bedroom"].usual * 1.25)
+    paired[beds[0]] = replace(paired[beds[0]], area=SIZES["bedroom"].typical_area * 1.25)
     # A home with many bathrooms has a second shared one.
     shared = 1 + (len(baths) > 3)
     for bath, bed in zip(baths[shared:], beds, strict=False):
@@ -306,7 +306,7 @@ def _assign_partners(briefs: Sequence[Brief]) -> list[Brief]:
 
 def scale_areas(briefs: Sequence[Brief], total: float, choices: Choices) -> list[Brief]:
     """Draw areas that add up to `total` [m²] as far as the sizes of the types allow."""
-    spreads = [SPREAD.get(brief.kind, USUAL_SPREAD) for brief in briefs]
+    spreads = [SPREAD.get(brief.kind, DEFAULT_SPREAD) for brief in briefs]
     usual = [
         brief.area * choices.between(*spread) / 100
         for brief, spread in zip(briefs, spreads, strict=True)
@@ -318,7 +318,7 @@ def scale_areas(briefs: Sequence[Brief], total: float, choices: Choices) -> list
 
     def areas(factor: float) -> list[float]:
         return [
-            min(max(area * factor, size.least), size.most)
+            min(max(area * factor, size.min_area), size.max_area)
             for area, size in zip(usual, sizes, strict=True)
         ]
 

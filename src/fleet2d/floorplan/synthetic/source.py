@@ -13,7 +13,7 @@ from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
 from fleet2d.floorplan.rooms.doorways import DoorLine
 from fleet2d.floorplan.source import FloorPlanSource
 from fleet2d.floorplan.synthetic.generator import Gap, House, Style, generate
-from fleet2d.floorplan.synthetic.program import LARGEST_M2, MAX_ROOMS_OF_A_KIND, SMALLEST_M2, Wishes
+from fleet2d.floorplan.synthetic.program import LARGEST_M2, MAX_ROOMS_PER_TYPE, SMALLEST_M2, Wishes
 from fleet2d.floorplan.synthetic.slicing import OUTER_WALL, PER_M, UNIT_M, WALL, Box, Wall
 
 Rectangle = tuple[int, int, int, int]
@@ -130,7 +130,7 @@ class Synthetic(FloorPlanSource):
 
     seed: int = Field(default=0, ge=0)
     area_m2: float | None = Field(default=None, ge=SMALLEST_M2, le=LARGEST_M2)
-    bedrooms: int | None = Field(default=None, ge=1, le=MAX_ROOMS_OF_A_KIND)
+    bedrooms: int | None = Field(default=None, ge=1, le=MAX_ROOMS_PER_TYPE)
     bathrooms: int | None = Field(default=None, ge=1, le=6)
     garage: bool | None = None
     outline: Literal["rectangle", "L", "T", "U"] | None = None

@@ -33,7 +33,7 @@ ROOM = re.compile(r"bathroom|bedroom|dining_room|home_office|kitchen|living_?roo
 FOLDERS = True
 ADDED = 1000  # objects from this number on were added later, in any room
 MINUTE_US = 60_000_000
-MOST_MINUTES = 1e6  # later times are cut to the end of their activity in any case
+MAX_MINUTES = 1e6  # later times are cut to the end of their activity in any case
 
 
 @dataclass
@@ -112,7 +112,7 @@ def _day(path: Path) -> list[_ScriptedActivity]:
             if block < 0:
                 raise LogError(f"{path}, line {number}: an action before any '### activity'")
             # Rounded to the microsecond, as sums of thirds of minutes end in …33332.
-            at = round(min(float(line), MOST_MINUTES) * MINUTE_US)
+            at = round(min(float(line), MAX_MINUTES) * MINUTE_US)
             blocks[block].steps.append((at, objects, number))
             objects = []
     if not blocks:
