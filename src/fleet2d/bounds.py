@@ -1,4 +1,4 @@
-"""Bounds on what is read from files, so that no file can take all memory or time of a machine.
+"""Bounds on what is read from files, so that no file can exhaust a machine's memory or time.
 
 Each is far beyond what real homes, logs and scenarios need. The message that refuses a file names
 the environment variable that raises the bound.
@@ -151,7 +151,7 @@ def check_file(path: Path, bound: Bound, error: type[Fleet2DError] = InputError)
 
 
 def unpacked_bytes(file: Any, group: int | None = None) -> int:
-    """Return about how many bytes a Parquet file, or one of its row groups, takes in memory.
+    """Estimate the bytes that a Parquet file, or one of its row groups, takes in memory.
 
     The file states its unpacked size, but an encoded value may stand for many rows; so it is at
     least the size of the rows.
@@ -168,7 +168,7 @@ def unpacked_bytes(file: Any, group: int | None = None) -> int:
 
 
 def _width_of(kind: Any) -> int:
-    """Return the bytes that a value of an Arrow type takes at least."""
+    """Return the minimum number of bytes of a value of an Arrow type."""
     try:
         return max(1, int(kind.bit_width) // 8)
     except ValueError:  # the offset of a text or a list

@@ -174,14 +174,14 @@ def may_be_ctrl_c(error: BaseException) -> bool:
 
 
 def end_by_signal(*_: object) -> None:
-    """Raise KeyboardInterrupt, which is no component's own: a handler of signals."""
+    """Handle a signal: raise a KeyboardInterrupt that isn't blamed on a component."""
     blame.pressed = True
     raise KeyboardInterrupt
 
 
 @contextmanager
 def ctrl_c_watch() -> Iterator[None]:
-    """Note whether Ctrl-C is pressed, so that an interrupt without it is a component's own."""
+    """Note whether Ctrl-C is pressed: a KeyboardInterrupt without it is a component's."""
     before = signal.getsignal(signal.SIGINT)
     if before not in (signal.default_int_handler, signal.SIG_IGN):  # a program's own
         yield

@@ -72,7 +72,7 @@ def library_imports() -> Iterator[None]:
 
 
 def keep_free_memory() -> None:
-    """Let the allocator of C keep the memory of freed arrays for the next ones.
+    """Let the C allocator keep the memory of freed arrays for the next ones.
 
     It returns that of arrays above 128 KB to the system at first, and requests it again, page by
     page: a tenth of the time of a short run. `release_memory` returns all that is free. Other

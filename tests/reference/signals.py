@@ -47,7 +47,7 @@ def speed(poses: Sequence[Pose], step: int) -> float:
 def sliding_max(
     values: Sequence[float], low: int, high: int, before: float, after: float
 ) -> list[float]:
-    """Return the greatest value from `low` to `high` steps after each step."""
+    """Return the maximum from `low` to `high` steps after each step."""
 
     def at(step: int) -> float:
         return before if step < 0 else after if step >= len(values) else values[step]

@@ -38,7 +38,7 @@ class Patches:
         room: int64 (patches,), ascending, the room of each patch; each room has at least one.
         cells: int64 (patches,), number of cells of each patch.
         island: int64 (rooms,), which island of the free space holds each room, where nothing joins
-            the islands; None: it is all one.
+            the islands; None: all rooms are connected.
     """
 
     of_cell: I16
@@ -237,7 +237,7 @@ class SightingCounts(NamedTuple):
 
 
 class PatchEvidence(NamedTuple):
-    """Evidence by patches of rooms, each of which is mostly in view as a whole or not at all.
+    """Evidence by patches of rooms, each of which is usually in view entirely or not at all.
 
     Attributes:
         room: int64 (patches,), ascending, the room of each patch.
@@ -248,7 +248,7 @@ class PatchEvidence(NamedTuple):
         shown_255: uint8 (bins, patches), `shown` times 255, rounded.
         sightings: Where users were perceived, by patches.
         island: int64 (rooms,), which island of the home holds each room, where nothing joins the
-            islands; None: it is all one.
+            islands; None: all rooms are connected.
     """
 
     room: I64

@@ -292,7 +292,7 @@ def read_parquet(path: Path, kinds: Mapping[str, Kind] | None = None) -> pa.Tabl
 
 
 def _check_columns(path: Path, schema: pa.Schema, kinds: Mapping[str, Kind]) -> None:
-    """Refuse a table with other columns than the manifest says, which no reader expects."""
+    """Refuse a table whose columns differ from those in the manifest."""
     if schema.names != list(kinds):
         raise ArtifactError(
             f"{path} has the columns {', '.join(schema.names)}, but {', '.join(kinds)} were stored:"

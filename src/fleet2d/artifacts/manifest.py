@@ -161,7 +161,7 @@ _Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
 
 
 class _StoredPart(BaseModel):
-    """A part of which some keys are checked, and the others left as they are."""
+    """A part with some keys checked and the others left as they are."""
 
     model_config = ConfigDict(strict=True, allow_inf_nan=False, defer_build=True)
 

@@ -160,7 +160,7 @@ class TableWriter:
     file: ParquetTable | None = None
     logged: int = 0
 
-    def hash_again(self) -> None:
+    def rehash(self) -> None:
         """Compute the digest again from the chunks in memory."""
         self.digest = TableDigest(self.buffer.spec)
         for chunk, rows in self.chunks:
@@ -235,10 +235,10 @@ class RunStore:
         for spec in specs:
             self.add_table(spec)
 
-    def hash_again(self) -> None:
+    def rehash(self) -> None:
         """Compute the digests of a run in memory again from its rows, after it was unpickled."""
         for entry in self._tables.values():
-            entry.hash_again()
+            entry.rehash()
 
     def check(self) -> None:
         """Check, without writing, that the directory can be used.

@@ -42,8 +42,8 @@ class Column:
         kind: `step` int64 · `time` timestamp[us] · `int32` · `int64` · `float64` · `bool` ·
             `category` dictionary<int32, string> · `string`.
         unit: Its unit, such as "m" or "rad"; empty where there is none.
-        nullable: Whether a value may be missing. Missing are: NaN in float64, NaT in time, code
-            -1 or None in category, None in string, and what a masked array masks.
+        nullable: Whether a value may be missing. Missing values are NaN in float64, NaT in time,
+            code -1 or None in category, None in string, and what a masked array masks.
         categories: The words that the codes of a category column stand for. Empty: the column
             takes strings, and its dictionary grows in the order in which they appear first.
         description: One line for a reader of the file.

@@ -369,7 +369,7 @@ def _grow(content: bytes, dtype: np.dtype[Any], rows: int) -> NDArray[Any]:
 
 
 def _repeat(content: bytes, dtype: np.dtype[Any], runs: int, rows: int) -> NDArray[Any]:
-    """Return the values of runs, each as often as its length says."""
+    """Return the values of run lengths, each repeated by its length."""
     middle = runs * dtype.itemsize
     lengths = np.frombuffer(content[middle:], _narrow((len(content) - middle) // max(1, runs)))
     # Before anything is repeated: a few bytes must not request all memory.

@@ -234,7 +234,7 @@ def _since_start() -> float:
 
 
 def _peak_rss_mb() -> float | None:
-    """Return the largest memory of this process so far [MB]; None where the system can't say."""
+    """Return the largest memory of this process so far [MB]; None if unknown."""
     try:
         import resource
     except ImportError:

@@ -140,7 +140,7 @@ def print_cases(cases: "Sequence[ScenarioCase]") -> None:
         for name in cases_of_source[0].scenario.expect:
             verdicts = [case.verdicts[name] for case in cases_of_source if name in case.verdicts]
             count = sum(verdict.holds for verdict in verdicts)
-            table.add_row(label, name, f"{count} of {len(cases_of_source)}", _least(verdicts))
+            table.add_row(label, name, f"{count} of {len(cases_of_source)}", _lowest(verdicts))
             label = ""
     console.print(table)
     for case in cases:
@@ -161,8 +161,8 @@ def _print_failure(console: "Console", case: "ScenarioCase") -> None:
         console.print(line, highlight=False, markup=False, soft_wrap=True)
 
 
-def _least(verdicts: "Sequence[Verdict]") -> str:
-    """Return the least robustness of verdicts as text, else the least time to spare."""
+def _lowest(verdicts: "Sequence[Verdict]") -> str:
+    """Return the lowest robustness of verdicts as text, else the shortest time to spare."""
     from math import isfinite
 
     from fleet2d.expectations.verdict import amount
@@ -177,7 +177,7 @@ def _least(verdicts: "Sequence[Verdict]") -> str:
 
 FIRST_SEED = 1
 MAX_STORED_SEEDS = 5
-"""The most failing seeds of one scenario that are stored or drawn."""
+"""Maximum number of failing seeds of one scenario that are stored or drawn."""
 
 
 def test(

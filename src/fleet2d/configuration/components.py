@@ -59,7 +59,7 @@ _ENTRY = re.compile(r"^    (\w[\w, ]*): (.*(?:\n {5,}.*)*)", re.MULTILINE)
 
 
 def descriptions(cls: type) -> dict[str, str]:
-    """Return what the section `Attributes` of a class says, and those of its bases, by name.
+    """Return the descriptions in the `Attributes` section of a class and its bases, by name.
 
     >>> class Lamp:
     ...     '''A lamp.
@@ -316,7 +316,7 @@ class Component(Settings):
 
     @classmethod
     def __pydantic_init_subclass__(cls, **kwargs: Any) -> None:
-        """Build a user's class at once, so that an error stands where the class is declared."""
+        """Build a user's class at once, so that errors point to where the class is declared."""
         if not cls.__module__.startswith("fleet2d."):
             cls.model_rebuild(raise_errors=False)
 

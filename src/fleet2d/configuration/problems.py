@@ -70,7 +70,7 @@ def rewrite(
 
 
 def refusal(prefix: str, error: ValidationError) -> ScenarioError:
-    """Return the first error of a validation, in one line.
+    """Return the first error of a validation, on one line.
 
     Args:
         prefix: The beginning of the message, such as the method that was called; may be empty.

@@ -86,7 +86,7 @@ class Trust:
         return path in self.files or self._is_in_folder(path)
 
     def has_changed(self, path: Path, content: bytes) -> bool:
-        """Whether a file that was named has another content than then."""
+        """Whether a named file has changed since it was named."""
         path = path.resolve()
         return not self._is_in_folder(path) and self.files.get(path) != _sha256(content)
 
@@ -331,7 +331,7 @@ def _files_of(folder: Path, parts: Sequence[str]) -> Iterator[Path]:
 
 
 class BrokenModule(ScenarioError):
-    """A module that fails while it is imported; ``cause`` says where and how."""
+    """A module whose import fails; ``cause`` says where and how."""
 
     def __init__(self, name: str, cause: str) -> None:
         super().__init__(f"can't import {name!r}: {cause}")

@@ -29,7 +29,7 @@ class PoseBlock(NamedTuple):
         x: int64 (bodies, steps), lattice units.
         y: int64 (bodies, steps), lattice units.
         heading: int64 (bodies, steps), 1/4096 turn.
-        away: uint8 (bodies, steps), not 0 while a body isn't at home.
+        away: uint8 (bodies, steps), nonzero while a body is away.
         posture: int8 (bodies, steps), number of the posture.
     """
 

@@ -144,12 +144,12 @@ class Cameras(Watcher):
         self._sightings: list[I64] = []  # not collected yet
         self._ahead: _Look | None = None
 
-    def prepare_to_err(self) -> None:
+    def expect_disturbances(self) -> None:
         """Let observations be stored beside the truth, because interventions will disturb them."""
         self.may_err = self.errs = True
 
     def disturb(self, disturbances: Sequence[Disturbance]) -> None:
-        """Set all disturbances from the step on before which they have looked."""
+        """Set all disturbances, from the step on at which they look next."""
         self.disturbances = list(disturbances)
         memory, people = self._set_up(), [other.name for other in self.others]
         forced = forced_of(self.disturbances, self.names, people)
@@ -183,7 +183,7 @@ class Cameras(Watcher):
         errors = [p if errs else None for p, errs in zip(perceptions, has_errors, strict=True)]
         self.errors = error_tables(lenses, errors, context)
         self._dark = dark_cameras(self.disturbances, self.names)
-        worsen(self.lenses, self.disturbances, self.names)
+        degrade(self.lenses, self.disturbances, self.names)
         self.errors.has_ghosts[self._dark] = 0
         injected = injected_by(self.disturbances, self.names, context)
         self.errors = self.errors._replace(injected=injected)
@@ -415,7 +415,7 @@ def open_cameras(basis: Basis) -> tuple[list[Cameras], list[Cameras]]:
 
 
 def present_errors(disturbances: Sequence[Disturbance], camera: str) -> Perception | None:
-    """Return the present errors of a camera, by the latest intervention; None: the usual ones."""
+    """Return the present errors of a camera, by the latest intervention; None: as configured."""
     errs = [
         disturbance.errs
         for disturbance in of_camera(disturbances, camera)
@@ -433,7 +433,7 @@ def dark_cameras(disturbances: Sequence[Disturbance], cameras: Sequence[str]) ->
     ]
 
 
-def worsen(lenses: Lenses, disturbances: Sequence[Disturbance], cameras: Sequence[str]) -> None:
+def degrade(lenses: Lenses, disturbances: Sequence[Disturbance], cameras: Sequence[str]) -> None:
     """Change lenses in place: dark cameras see nobody, others notice people less often."""
     lenses.widest[dark_cameras(disturbances, cameras)] = NO_RANGE
     for c, camera in enumerate(cameras):

@@ -94,7 +94,8 @@ class CheckpointWriter:
     """Commits the rows of a run in a directory, and writes checkpoints of its state.
 
     Attributes:
-        is_able: Whether the state can be written; False after that of a component could not.
+        is_storable: Whether the state can be written; False once writing the state of a component
+            has failed.
     """
 
     def __init__(
@@ -116,7 +117,7 @@ class CheckpointWriter:
         self._day = max(1, DAY_US // clock.step_us)
         every = settings.checkpoint
         self._every = max(1, micros(every) // clock.step_us) if isinstance(every, timedelta) else 0
-        self.is_able = every != "off"
+        self.is_storable = every != "off"
         self.resume(0)
 
     def resume(self, step: int) -> None:
@@ -141,7 +142,7 @@ class CheckpointWriter:
         if not self._every:
             computing_s, waiting_s = self._next_checkpoint
             is_due = time.process_time() >= computing_s or time.monotonic() >= waiting_s
-        if is_due and self.is_able:
+        if is_due and self.is_storable:
             self.checkpoint(state)
         else:
             self.commit(state)
@@ -170,9 +171,9 @@ class CheckpointWriter:
         computed = time.process_time()
         if self._every:
             self._next_step = (state.bodies.step // self._every + 1) * self._every
-        commit = self.commit(state, sync=self.is_able)
+        commit = self.commit(state, sync=self.is_storable)
         began = time.perf_counter()
-        if self.is_able:
+        if self.is_storable:
             constants, header = self._describe()
             header = {**header, "commit": commit}
 
@@ -182,7 +183,7 @@ class CheckpointWriter:
             try:
                 self._store.keep_checkpoint(write)
             except UnstorableStateError as error:
-                self.is_able = False
+                self.is_storable = False
                 self._store.manifest.notes.append(
                     f"no checkpoint from step {state.bodies.step} on: {error}"
                 )

@@ -241,7 +241,7 @@ class Clearance(Watcher):
         waiting = robot.waiting
         if waiting is None:
             return end
-        x, y, was_away = waiting.surroundings.everybody.T[:, :, None]
+        x, y, was_away = waiting.surroundings.users.T[:, :, None]
         has_changed = ((xs != x) | (ys != y) | (away != was_away)).any(axis=0)
         has_changed |= waiting.surroundings.arrangement != robot.arrangement
         column = int(has_changed.argmax())

@@ -84,7 +84,7 @@ class DueChange(NamedTuple):
         by: The body or thing that causes it, for the table of events.
         door: Number of that door; else -1.
         opens_for: Row of the body that the door opens for, and the step of its decision: the
-            opening is void if the body has decided anew since.
+            opening is void if the body has replanned since.
         passed_us: When the body passes the line of the door [us].
     """
 
@@ -173,7 +173,7 @@ class Changes:
                 self._put(step, None, actor.name, door, plan, moment)
 
     def make(self, step: int, actors: Sequence[Actor]) -> list[Event]:
-        """Make all changes that are due at a step; bodies whose way they block decide anew.
+        """Make all changes that are due at a step; bodies whose way they block replan.
 
         Raises:
             ComponentError: A request of an algorithm or a script is impossible.
@@ -285,7 +285,7 @@ class Changes:
         return False
 
     def _stop(self, step: int, actors: Sequence[Actor], shape: F64 | None) -> None:
-        """Let bodies decide anew whose way is blocked, or that walk at random along the walls."""
+        """Make bodies replan whose way is blocked, or that walk at random along the walls."""
         units = self.home.plan.lattice.units_per_m
         for actor in actors:
             if not isinstance(actor.motion, Track):

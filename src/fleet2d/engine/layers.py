@@ -82,7 +82,7 @@ class SeenArea(Watcher):
             row: Its row among the bodies.
             patches: The parts of rooms that bins distinguish.
             bodies: All bodies of the run.
-            every: Steps between two looks; each look stands for so many steps.
+            every: Number of steps between two looks; each look counts for this many steps.
             keeps_last: Whether `last_seen` is available.
             bin_steps: Steps in a bin of exposure, for `take_bins`; 0: no bins.
         """

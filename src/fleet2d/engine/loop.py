@@ -262,7 +262,7 @@ class Loop:
             state: The run.
             end: The step.
             on_progress: Called about every 0.1 s.
-            spans: The most spans; None: as many as there are.
+            spans: The maximum number of spans; None: all.
 
         Raises:
             KeyboardInterrupt: Ctrl-C, after the present span.

@@ -127,7 +127,7 @@ class EngineWorld:
         self._state.learners.replace(algorithm, output)
 
     def move(self, actor: DecidingActor, pose: Pose) -> None:
-        """Put a body at a pose, where it decides anew."""
+        """Put a body at a pose, where it replans."""
         self._state.recorder.move_body(actor.row, self.step)
         actor.put(pose, self.step)
 

@@ -39,7 +39,7 @@ def set_up(scenario: Scenario, clock: Clock, seed: int, store: RunStore) -> Stat
     _check_reads(scenario, basis.actors)
     for group in cameras:
         if any(causes_errors(entry.act, group.owner.name) for entry in scenario.script):
-            group.prepare_to_err()
+            group.expect_disturbances()
     changes = Changes(basis)
     for index, change in enumerate(scenario.changes):
         with _locate_errors(scenario, f"changes.{index}"):

@@ -656,7 +656,7 @@ class Simulation(InterventionMethods):
         header, body = open_snapshot(path)
         simulation = cls(header["scenario"], seed=header["seed"])
         simulation._take(read_state(body, simulation._constants))
-        simulation._store.hash_again()
+        simulation._store.rehash()
         loop = simulation._loop
         simulation._setup_s, loop.simulate_s, loop.save_s = header["wall_s"]
         return simulation

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from fleet2d.engine.expectations import RunExpectations
     from fleet2d.expectations.expectation import Expectation
 
-# The most steps that watchers process together: fewer if there are many bodies.
+# The maximum number of steps that watchers process together: fewer if there are many bodies.
 MAX_STEPS = 1 << 16
 MIN_STEPS = 1 << 12
 MAX_POSES = 1 << 21
@@ -57,7 +57,7 @@ class State:
         recorder: Rows that aren't stored yet.
         store: The tables of the run.
         events: The stream of events to all sinks.
-        max_span: The most steps of a span; None: `capacity`.
+        max_span: The maximum number of steps of a span; None: `capacity`.
         settled: The first step that watchers have not processed yet.
         pending: Events that interrupted the plan of a body, by its row, until it decides.
         interventions: The interventions, done and scheduled.
@@ -102,7 +102,7 @@ class State:
 
     @property
     def capacity(self) -> int:
-        """The most steps that watchers process together."""
+        """The maximum number of steps that watchers process together."""
         return max(MIN_STEPS, min(MAX_STEPS, MAX_POSES // max(1, len(self.actors))))
 
     # Decisions of scripts

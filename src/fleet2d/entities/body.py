@@ -244,7 +244,7 @@ class Body:
 
     @property
     def arrangement(self) -> tuple[int, int]:
-        """The versions of the home and its route costs: the space is computed anew for others."""
+        """The versions of the home and its route costs: the space is recomputed for others."""
         return self.home.version, self.home.costs_version if self.entity.minds_costs else 0
 
     def _present_space(self) -> Space:
@@ -336,7 +336,7 @@ class Body:
         return rows
 
     def seconds(self, metres: F64) -> F64:
-        """Return what it thinks that ways of some lengths take, without turns [s]."""
+        """Return its estimates of the time for ways of some lengths, without turns [s]."""
         lattice = self.home.plan.lattice
         if self.drive is None:
             return metres * lattice.units_per_m / self.speed

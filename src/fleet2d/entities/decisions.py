@@ -345,7 +345,7 @@ class DecidingActor(Actor):
         self.decide_again(step)
 
     def put(self, pose: Pose, step: int) -> None:
-        """Be at a pose from a step on, and decide anew there: a plan from elsewhere is void."""
+        """Move to a pose at a step, and replan there: a plan from elsewhere is void."""
         self.state, self._chosen, self._waiting = pose, None, None
         self.is_displaced, self.part = True, self._present_part()
         self.decide_again(step)
@@ -499,7 +499,7 @@ class DecidingActor(Actor):
         try:
             return behavior.decide(now)
         except (PlacementError, NoWayError) as error:
-            if not (self.home.hinders or self.home.version or self.is_displaced):
+            if not (self.home.may_block_routes or self.home.version or self.is_displaced):
                 raise
             plan, reason = now.plan(), str(error)
             if self._blocked != (reason, now.step):  # else the row was written before the wait

@@ -1,4 +1,4 @@
-"""Equipment of robots with a state of its own: batteries, and localization that errs."""
+"""Equipment of robots with a state of its own: batteries, and errors of localization."""
 
 from datetime import timedelta
 from typing import NamedTuple, Self

@@ -106,7 +106,7 @@ def _rest(
 
 
 def next_stop(body: Body, track: Breakpoints, interrupted_us: int) -> int | None:
-    """Return the index of the breakpoint at which the body next stands still; None: no such."""
+    """Return the index of the breakpoint at which the body next stands still, or None."""
     x, y, time = track.x, track.y, track.time
     at = max(int(np.searchsorted(time, interrupted_us, side="right")) - 1, 0)
     for i in range(at, len(time) - 1):
@@ -157,17 +157,17 @@ class Surroundings(NamedTuple):
     Attributes:
         people: x and y of the people at home, and the distance between the middles at which the
             bodies touch [lattice], int64 (n, 3).
-        everybody: x and y of all users, and whether they are away, int64 (users, 3).
+        users: x and y of all users, and whether they are away, int64 (users, 3).
         arrangement: The versions of doors and furniture, see `Body.arrangement`.
     """
 
     people: I64
-    everybody: I64
+    users: I64
     arrangement: tuple[int, int]
 
     def is_unchanged_since(self, other: "Surroundings") -> bool:
         """Return whether no person and no object has moved."""
-        same = np.array_equal(self.everybody, other.everybody)
+        same = np.array_equal(self.users, other.users)
         return same and self.arrangement == other.arrangement
 
 

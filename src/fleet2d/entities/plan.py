@@ -50,8 +50,8 @@ class Plan:
         legs: Its breakpoints so far.
         notes: What happens on the way, for the events table.
         interrupts: Events that end the plan early.
-        asks_us: When the behavior is asked again at the latest [us since the start]; None: at the
-            plan's end.
+        asks_us: The latest time at which the behavior is asked again [us since the start]; None: at
+            the plan's end.
         posture: The posture of the body at the end of the plan.
         postures: When the posture changes [us since the start], and its number in POSTURES then.
     """
@@ -357,7 +357,7 @@ class Plan:
         return self
 
     def ask_by(self, time: datetime) -> Self:
-        """Ask the behavior again at a local time at the latest, even if the plan isn't over."""
+        """Ask the behavior again no later than a local time, even if the plan isn't over."""
         asks_us = self._body.clock.elapsed(time)
         self.asks_us = asks_us if self.asks_us is None else min(asks_us, self.asks_us)
         return self

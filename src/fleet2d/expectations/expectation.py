@@ -77,7 +77,7 @@ class Trace(NamedTuple):
         return shortest(self.start, function(self.value), self.end)
 
     def sliding_max(self, low: int, high: int, before: float, after: float) -> "Trace":
-        """Return the greatest value from `low` to `high` steps after each step.
+        """Return the maximum from `low` to `high` steps after each step.
 
         Args:
             low: First step of the window, relative to each step.
@@ -89,7 +89,7 @@ class Trace(NamedTuple):
         return Trace(*maxima, self.end)
 
     def sliding_min(self, low: int, high: int, before: float, after: float) -> "Trace":
-        """Return the least value from `low` to `high` steps after each step; see `sliding_max`."""
+        """Return the minimum from `low` to `high` steps after each step; see `sliding_max`."""
         negative = Trace(self.start, -self.value, self.end)
         return negative.sliding_max(low, high, -before, -after).map(np.negative)
 
@@ -180,7 +180,7 @@ WORDS: dict[str, type["Word"]] = {}
 
 
 class Word:
-    """Base of what expectations are written with, in texts and in Python alike.
+    """Base of the terms of expectations, in text and in Python.
 
     Its class has the name of the word, like `range` or `map`; its fields are the arguments. Fields
     that may only be given by name are also written by name.
@@ -317,7 +317,7 @@ class Expectation(ABC):
         yield from ()
 
     def check(self, scene: "Scene") -> None:
-        """Refuse what a run doesn't have, part by part.
+        """Refuse names that the run doesn't have, part by part.
 
         Raises:
             ScenarioError: A name is unknown, or the condition can never happen.

@@ -1,4 +1,4 @@
-"""Signals: what is measured of a run at each step, as numbers, words or truth values.
+"""Signals: what is measured in a run at each step, as numbers, words or truth values.
 
 A signal is one class: its word, the names that it may use (of a `Scene`), and its measurement over
 a block of steps. Those that there are stand in `fleet2d.expectations.vocabulary`.

@@ -39,7 +39,7 @@ class Violation(NamedTuple):
     Attributes:
         first: The first step.
         last: The last step.
-        robustness: The least robustness in the stretch, below 0.
+        robustness: The lowest robustness in the stretch, below 0.
         worst: The first step with that robustness; for a missed time limit, the last step by which
             it was due.
     """
@@ -243,7 +243,7 @@ class until(Windowed):
 
 @dataclass(frozen=True, eq=False)
 class after(Windowed):
-    """Expect a condition each time that `trigger` begins: at once, or `within` some time.
+    """Expect a condition each time that `trigger` begins: immediately, or `within` some time.
 
     Each event counts by itself; conditions that last, such as being in a room, count each time that
     they begin. Occasions whose time isn't over when the run ends don't count.

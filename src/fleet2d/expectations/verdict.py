@@ -53,7 +53,7 @@ class Verdict:
 
     @property
     def worst(self) -> Violation | None:
-        """The violation with the least robustness, the first of equals; None if it holds."""
+        """The violation with the lowest robustness, the first if tied; None if it holds."""
         return min(self.violations, key=lambda v: v.robustness, default=None)
 
     @property

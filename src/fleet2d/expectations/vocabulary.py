@@ -1,4 +1,4 @@
-"""The words for what is measured of a run: one class each, named as it is written.
+"""The terms for what is measured in a run: one class each, named as in expectations.
 
 To add a word, derive a class from `Signal` (a number), `WordSignal` (a name) or `Condition`: its
 fields are its arguments, `check` refuses names that a run doesn't have, and `measure` returns its

@@ -22,7 +22,7 @@ with extra("calibrate", "calibration needs scipy"):
 
 
 CHI_SQUARE_95 = 3.8414588206941236  # one degree of freedom
-NEVER = 1e-12  # the least distance of probabilities from 0 and 1
+NEVER = 1e-12  # minimum distance of probabilities from 0 and 1
 ENOUGH = 1e-10  # the search ends when a round gains less log-likelihood than this
 MAX_ROUNDS = 200
 SURE = 12.0  # logits from here on count as a share of 1
@@ -33,8 +33,8 @@ class Factor:
 
     Attributes:
         names: The names of its parameters.
-        lower: The smallest value of each parameter.
-        upper: The largest value of each parameter.
+        lower: Lower bound of each parameter.
+        upper: Upper bound of each parameter.
         starts: Values of the parameters from which the search for the maximum starts.
     """
 

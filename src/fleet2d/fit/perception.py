@@ -44,7 +44,7 @@ COLUMNS = frozenset({"distance", "detected", *ANGLES, "identity", "true_identity
 UNKNOWN = frozenset({"", "unknown", "none", "null"})
 GROUPS = 10
 SIGNIFICANCE = 0.05  # the largest p value of a likelihood ratio test with which a factor is used
-MIN_IDENTIFIED = 20  # the fewest detections with an identity to fit recognition to
+MIN_IDENTIFIED = 20  # minimum number of detections with an identity to fit recognition to
 MAX_ROWS = 60  # of a curve by distance
 
 

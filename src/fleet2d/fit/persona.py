@@ -33,14 +33,14 @@ from fleet2d.runtime.clock import DAY_MINUTES, DAY_S
 from fleet2d.runtime.determinism import Draws, stream_key
 
 BLOCK = 180  # length of a part of the day that has pastimes of its own [min]
-QUANTILES = 21  # the most quantiles of a law of durations
+QUANTILES = 21  # maximum number of quantiles of a law of durations
 LIE, SIT = ("sleep", "nap", "bed", "wake_up"), ("eat", "tv", "work", "read", "relax", "computer",
     "breakfast", "lunch", "dinner", "snack", "music", "rest", "social", "toilet")  # fmt: skip
 # A task is done on at least this share of the days, at most once a day. The standard deviation of
 # its beginning is at most SPREAD, and the gap to begins at other times more than APART [min].
 LEAST_SHARE, SPREAD, APART = 0.8, 20, 60
-LONG = 10  # the least mean duration of a task [min]
-MIN_TEMPLATE_DAYS = 4  # the fewest days of a kind from which a template is fitted
+LONG = 10  # minimum mean duration of a task [min]
+MIN_TEMPLATE_DAYS = 4  # minimum number of days of a kind from which a template is fitted
 WORKDAYS = 5
 Model = Literal["recorded", "laws"]
 # The date of the first sampled day, a Monday.
@@ -367,7 +367,7 @@ def _takes(done: Sequence[Stretch]) -> dict[str, Any]:
     # Interpolated geometrically, as durations differ by factors.
     values = np.exp(np.interp(at, np.arange(len(lengths)), lengths))
     quantiles = [_seconds(round(60 * v)) for v in values.tolist()]
-    # A short least duration, so that it may be cut rather than left out.
+    # A short minimum duration, so that it may be cut rather than left out.
     return {"law": "measured", "quantiles": quantiles, "at_least": "1 min"}
 
 

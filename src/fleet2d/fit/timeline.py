@@ -28,7 +28,7 @@ UP_AT_NIGHT = 60
 SHORTEST_NIGHT = 120  # min
 NOON = DAY_MINUTES // 2
 HOURS = 24
-MIN_STAYS = 5  # the fewest stays at a place whose durations are compared
+MIN_STAYS = 5  # minimum number of stays at a place whose durations are compared
 
 
 class ActivityPlace(NamedTuple):

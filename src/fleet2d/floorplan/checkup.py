@@ -1,4 +1,4 @@
-"""The check-up of a floor plan: findings that are wrong or odd, and their places."""
+"""The check-up of a floor plan: errors and anomalies, and their places."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -36,8 +36,8 @@ OTHER_UNITS = (
 LIKELY_M2 = (25.0, 400.0)
 ROOM_M2 = (0.8, 200.0)  # median area of a home's rooms
 TINY_ROOM_M2 = 0.5
-SPECK_M2 = 0.02  # least area of a pillar
-PART_M2 = 0.5  # least area of floor whose loss matters
+SPECK_M2 = 0.02  # minimum area of a pillar
+PART_M2 = 0.5  # minimum area of floor whose loss matters
 DOOR_M = (0.5, 1.6)  # median width of a home's doors
 WIDEST_DOOR_M = 2.0
 # How far labels may reach over the outer walls, and which share of them may lie farther out.
@@ -74,7 +74,7 @@ class Finding:
 
 
 def checkup(plan: FloorPlan, radius: float = 0.15) -> list[Finding]:
-    """Return what is wrong or odd with a home, the worst first.
+    """Return the errors and anomalies of a home, the worst first.
 
     Args:
         plan: The home.
@@ -125,7 +125,7 @@ def _scale(plan: FloorPlan) -> Iterator[Finding]:
 
 
 def _guess(area: float) -> str:
-    """Return a hint to the unit in which the numbers would make a usual home."""
+    """Return a hint about the unit in which the numbers would make a plausible home."""
     for unit, metres in OTHER_UNITS:
         if LIKELY_M2[0] <= area * metres**2 <= LIKELY_M2[1]:
             return f" It looks like {unit} ({area * metres**2:.0f} m2)"

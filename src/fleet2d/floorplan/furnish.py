@@ -34,14 +34,14 @@ class FurnitureRule:
     Attributes:
         type: The type of the piece; a room that has one gets no other.
         groups: Makes groups with the piece, the best first; None: the piece alone.
-        least_m2: Smallest area of a room that gets it [m²].
+        min_m2: Smallest area of a room that gets it [m²].
         chance: Probability [%].
         unless: Types of rooms that make the piece unnecessary if the home has one.
     """
 
     type: str
     groups: GroupMaker | None = None
-    least_m2: float = 0.0
+    min_m2: float = 0.0
     chance: int = 100
     unless: tuple[str, ...] = ()
 
@@ -97,7 +97,7 @@ def _furnish_room(
         groups = rule.groups(draws) if rule.groups else _alone(rule.type, draws)
         present = {thing.type for thing in interior.objects[first:]}
         is_needless = any(kind in kinds and kind not in labels for kind in rule.unless)
-        if not is_drawn or rule.type in present or is_needless or room.area_m2 < rule.least_m2:
+        if not is_drawn or rule.type in present or is_needless or room.area_m2 < rule.min_m2:
             continue
         for group in groups:
             if interior.place(room, group, draws):
@@ -299,74 +299,74 @@ def _mirror(group: FurnitureGroup) -> FurnitureGroup:
 
 
 _SLEEP = (
-    FurnitureRule("wardrobe", least_m2=6),
-    FurnitureRule("desk", _desk, least_m2=11, chance=35, unless=("office",)),
-    FurnitureRule("dresser", least_m2=12, chance=50),
-    FurnitureRule("bookshelf", least_m2=14, chance=30),
+    FurnitureRule("wardrobe", min_m2=6),
+    FurnitureRule("desk", _desk, min_m2=11, chance=35, unless=("office",)),
+    FurnitureRule("dresser", min_m2=12, chance=50),
+    FurnitureRule("bookshelf", min_m2=14, chance=30),
 )
 _WASH = (FurnitureRule("toilet"), FurnitureRule("washbasin"))
-_STORE = (FurnitureRule("shelf"), FurnitureRule("dresser", least_m2=5, chance=60))
+_STORE = (FurnitureRule("shelf"), FurnitureRule("dresser", min_m2=5, chance=60))
 _ENTER = (
-    FurnitureRule("shoe_rack", least_m2=3, chance=80),
-    FurnitureRule("bench", least_m2=7, chance=40),
+    FurnitureRule("shoe_rack", min_m2=3, chance=80),
+    FurnitureRule("bench", min_m2=7, chance=40),
 )
 
 RULES = MappingProxyType(
     {
-        "bedroom": (FurnitureRule("bed", _beds, least_m2=4), *_SLEEP),
-        "guest_room": (FurnitureRule("bed", _beds, least_m2=4), *_SLEEP[:3]),
+        "bedroom": (FurnitureRule("bed", _beds, min_m2=4), *_SLEEP),
+        "guest_room": (FurnitureRule("bed", _beds, min_m2=4), *_SLEEP[:3]),
         "child_room": (
-            FurnitureRule("single_bed", _bed("single_bed", 0.5), least_m2=4),
-            FurnitureRule("desk", _desk, least_m2=8),
+            FurnitureRule("single_bed", _bed("single_bed", 0.5), min_m2=4),
+            FurnitureRule("desk", _desk, min_m2=8),
             *_SLEEP[:1],
-            FurnitureRule("bookshelf", least_m2=10, chance=60),
+            FurnitureRule("bookshelf", min_m2=10, chance=60),
         ),
         "living_room": (
-            FurnitureRule("sofa", _cinema, least_m2=30),
-            FurnitureRule("sofa", _lounge, least_m2=6),
+            FurnitureRule("sofa", _cinema, min_m2=30),
+            FurnitureRule("sofa", _lounge, min_m2=6),
             FurnitureRule(
-                "table", _dining(4), least_m2=18, chance=80, unless=("dining_room", "kitchen")
+                "table", _dining(4), min_m2=18, chance=80, unless=("dining_room", "kitchen")
             ),
-            FurnitureRule("bookshelf", least_m2=14, chance=70),
-            FurnitureRule("dresser", least_m2=20, chance=60),
+            FurnitureRule("bookshelf", min_m2=14, chance=70),
+            FurnitureRule("dresser", min_m2=20, chance=60),
         ),
         "dining_room": (
-            FurnitureRule("table", _dining(6), least_m2=5),
-            FurnitureRule("dresser", least_m2=12, chance=60),
+            FurnitureRule("table", _dining(6), min_m2=5),
+            FurnitureRule("dresser", min_m2=12, chance=60),
         ),
         "kitchen": (
             FurnitureRule("stove", _kitchen),
             FurnitureRule("fridge"),
             FurnitureRule("sink"),
             FurnitureRule("stove"),
-            FurnitureRule("table", _dining(4), least_m2=12, unless=("dining_room",)),
+            FurnitureRule("table", _dining(4), min_m2=12, unless=("dining_room",)),
         ),
         "bathroom": (
             *_WASH,
-            FurnitureRule("bathtub", least_m2=5.5, chance=60),
-            FurnitureRule("shower", least_m2=2.5),
-            FurnitureRule("washing_machine", least_m2=5, unless=("laundry",)),
+            FurnitureRule("bathtub", min_m2=5.5, chance=60),
+            FurnitureRule("shower", min_m2=2.5),
+            FurnitureRule("washing_machine", min_m2=5, unless=("laundry",)),
         ),
         "toilet": _WASH,
         "office": (
-            FurnitureRule("desk", _desk, least_m2=3),
-            FurnitureRule("bookshelf", least_m2=6),
-            FurnitureRule("armchair", least_m2=12, chance=50),
+            FurnitureRule("desk", _desk, min_m2=3),
+            FurnitureRule("bookshelf", min_m2=6),
+            FurnitureRule("armchair", min_m2=12, chance=50),
         ),
         "laundry": (
             FurnitureRule("washing_machine"),
-            FurnitureRule("sink", least_m2=4),
-            FurnitureRule("shelf", least_m2=4, chance=70),
+            FurnitureRule("sink", min_m2=4),
+            FurnitureRule("shelf", min_m2=4, chance=70),
         ),
-        "gym": (FurnitureRule("treadmill", least_m2=6), FurnitureRule("bench", least_m2=8)),
-        "garage": (FurnitureRule("workbench", least_m2=10), FurnitureRule("shelf", least_m2=10)),
+        "gym": (FurnitureRule("treadmill", min_m2=6), FurnitureRule("bench", min_m2=8)),
+        "garage": (FurnitureRule("workbench", min_m2=10), FurnitureRule("shelf", min_m2=10)),
         "storage": _STORE,
         "boiler_room": _STORE[:1],
-        "wardrobe": (FurnitureRule("wardrobe"), FurnitureRule("dresser", least_m2=5)),
+        "wardrobe": (FurnitureRule("wardrobe"), FurnitureRule("dresser", min_m2=5)),
         "entryway": _ENTER,
         "lobby": _ENTER,
-        "hallway": (FurnitureRule("shoe_rack", least_m2=5, chance=50, unless=("entryway",)),),
-        "hall": (FurnitureRule("bench", least_m2=8, chance=50),),
+        "hallway": (FurnitureRule("shoe_rack", min_m2=5, chance=50, unless=("entryway",)),),
+        "hall": (FurnitureRule("bench", min_m2=8, chance=50),),
     }
 )
 """The rules of each type of room, in order; other types get no furniture."""

@@ -47,7 +47,7 @@ class Furniture:
         type: Its name, as scenarios and files spell it.
         width: Least and largest extent from left to right [m].
         depth: Least and largest extent from back to front [m].
-        blocks: Whether it blocks nothing, bodies (`path`), or bodies and sight (`sight`).
+        blocks: What it blocks: nothing, bodies (`path`), or bodies and sight (`sight`).
         wall: Whether its back stands against a wall.
         front_m: Depth of the floor before it that stays empty [m].
         uses: The places to use it from.

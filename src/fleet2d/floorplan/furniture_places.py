@@ -268,7 +268,7 @@ def _bounds(plan: FloorPlan, room: Room) -> tuple[slice, slice]:
 
 
 def largest_part(mask: Bool, within: Bool | None = None) -> Bool:
-    """Return the connected part of a mask with the most cells, of those `within` if given."""
+    """Return the connected part of a mask with the most cells, counting only `within` if given."""
     part = label_parts(np.ascontiguousarray(mask), False)
     sizes = np.bincount(part[mask if within is None else mask & within], minlength=1)
     return mask & (part == int(np.argmax(sizes)))
@@ -410,7 +410,7 @@ class Interior:
         return True
 
     def _ways_stay_open(self, view: RoomView, before: Bool, grown: list[Window]) -> bool:
-        """Return whether connected cells still are, and the room can still be entered.
+        """Return whether connected cells stay connected, and the room can be entered.
 
         Args:
             view: The room.

@@ -162,7 +162,7 @@ NO_DOORS: frozenset[int] = frozenset()
 
 
 class Home:
-    """The home of a run: its floor plan, and what changes of it during the run.
+    """The home of a run: its floor plan, and how it changes during the run.
 
     Attributes:
         plan: The floor plan, which never changes.
@@ -251,7 +251,7 @@ class Home:
         return self._costs_version
 
     @property
-    def hinders(self) -> bool:
+    def may_block_routes(self) -> bool:
         """Whether routes may be closed at present that are open at other times."""
         return bool(self.shut) or (COSTMAP in self.layers and self.costs_version > 1)
 

@@ -140,7 +140,7 @@ class Layer:
     def values(self) -> NDArray[Any]:
         """The values (rows, columns); write to the array, or assign another.
 
-        The values of a layer that the run maintains itself are computed anew, and are a copy.
+        The values of a layer that the run maintains itself are recomputed, and are a copy.
         """
         return self._values if self._source is None else self._source()
 

@@ -56,7 +56,7 @@ class SnappedPolygon(NamedTuple):
     Attributes:
         polygons: Its parts, with even integer coordinates; none if it was too thin.
         area_change: New area minus old area, square lattice units.
-        tolerance: The most that moving every wall point by the rounding can change the area.
+        tolerance: The largest change of the area that rounding every wall point can cause.
     """
 
     polygons: list[Polygon]

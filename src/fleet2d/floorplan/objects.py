@@ -35,7 +35,7 @@ def find_named(
     noun: str,
     error: type[InputError] = FloorPlanError,
 ) -> N:
-    """Return the thing of a name; `owner` and `noun` are for the message.
+    """Return the item with a name; `owner` and `noun` are for the message.
 
     Raises:
         InputError: None has that name; of the type `error`.
@@ -122,7 +122,7 @@ class PlacedObject:
         name: Unique in the plan, such as `bed_0`; empty to be numbered by type.
         type: Its type, such as `bed`.
         footprint: The floor that it covers [m].
-        blocks: Whether it blocks nothing (a rug), bodies (`path`, a table), or bodies and sight
+        blocks: What it blocks: nothing (a rug), bodies (`path`, a table), or bodies and sight
             (`sight`, a wardrobe).
         uses: Places to use it from.
         heading: Direction of its front [rad], counter-clockwise from +x: of a sofa into the room,

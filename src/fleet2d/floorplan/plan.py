@@ -44,7 +44,7 @@ T = TypeVar("T")
 
 
 class Cache:
-    """The most recently used values by key, each made at its first use.
+    """A cache of the most recently used values by key, each computed at its first use.
 
     Threads may share a cache: if two make the same value at a time, both get the first.
 
@@ -80,7 +80,7 @@ class Cache:
         return value
 
     def grow(self, size: int) -> None:
-        """Hold at least `size` values from now on."""
+        """Raise the capacity to at least `size` values."""
         self._size = max(self._size, size)
 
     def clear(self) -> None:
@@ -93,7 +93,7 @@ A = TypeVar("A", bound=NDArray[Any])
 
 
 def read_only(array: A) -> A:
-    """Return the same array, made read-only, as is due where several runs share it."""
+    """Return the same array, made read-only because several runs share it."""
     array.setflags(write=False)
     return array
 
@@ -121,7 +121,7 @@ class FloorPlan:
         doorways: The passages between rooms by index, from the source or found in the walls.
         objects: Furniture and devices, in the order of the source.
         no_go: Areas that robots keep out of [m].
-        notes: Sentences on what was odd in the file and how it was read; not part of the content.
+        notes: Sentences on anomalies in the file and how it was read; not part of the content.
         regions: The labels as the file gives them; not part of the content.
         lost_doorways: Doorways of the file that stand in no passage; not part of the content.
 

@@ -37,7 +37,7 @@ from fleet2d.kernels.space import fill_from_neighbors
 
 
 class RoomCorrection(Settings):
-    """A room to name or retype, given by a place in it, or to draw anew, given by its corners.
+    """A room to name or retype, given by a place in it, or to redraw, given by its corners.
 
     Attributes:
         at: A place in the room [x, y] [m].
@@ -71,7 +71,7 @@ class RoomCorrection(Settings):
 
 
 def correct_rooms(plan: FloorPlan, corrections: Sequence[RoomCorrection]) -> FloorPlan:
-    """Return a plan with rooms renamed, retyped and drawn anew.
+    """Return a plan with rooms renamed, retyped and redrawn.
 
     Each correction applies to the rooms that those before it left. A room that loses all its cells
     is dropped.
@@ -118,7 +118,7 @@ def _shape(corners: Sequence[tuple[float, float]]) -> Polygon:
 
 
 def _make_valid(shape: Polygon | MultiPolygon) -> MultiPolygon:
-    """Return the polygons of a shape, which may cross itself since it was rounded."""
+    """Return the polygons of a shape that rounding may have made self-intersecting."""
     parts = shapely.get_parts(shapely.make_valid(shape))
     return MultiPolygon([part for part in parts if part.geom_type == "Polygon"])
 
@@ -203,7 +203,7 @@ class FurniturePiece(Settings):
         heading_deg: The direction of its front, counter-clockwise from +x.
         size: Its width and depth [m]; left out: the middle of what is usual.
         name: Its name; left out: its type and a number.
-        blocks: Whether it blocks nothing, bodies (`path`), or bodies and sight (`sight`); left out:
+        blocks: What it blocks: nothing, bodies (`path`), or bodies and sight (`sight`); left out:
             what is usual for its type.
     """
 

@@ -50,7 +50,7 @@ class Space:
         mesh: The same in triangles.
         part_of_cell: The connected part that holds each cell's centre, int32 (rows, columns), -1
             where the body can't be.
-        parts: Number of connected parts; part 0 holds the most cells.
+        parts: Number of connected parts; part 0 is the largest.
     """
 
     def __init__(
@@ -278,7 +278,7 @@ def shrink(
 
 
 def _octagon(radius: float) -> I64:
-    """Return the corners of the octagon that stands for a body."""
+    """Return the corners of the octagon that approximates a body."""
     a = _even_at_least(radius + ROUNDING)
     # tan(22.5 degrees), rounded up: the slanted sides are no nearer than the straight ones.
     b = _even_at_least(a * 0.41421357)

@@ -35,7 +35,7 @@ class BodyIntervention(Intervention):
 
 @register("intervention", "put")
 class Put(BodyIntervention):
-    """Put a body at a place at once, as if it were carried; it decides anew there.
+    """Put a body at a place at once, as if it were carried; it replans there.
 
     A robot is not told that it was moved; it can notice only by its position. In a room the point
     is drawn at random; at furniture it is the point from which the furniture is used.
@@ -128,7 +128,7 @@ class Release(BodyIntervention):
 
 @register("intervention", "replan")
 class Replan(BodyIntervention):
-    """Let a body decide anew, whatever it is doing."""
+    """Make a body replan, whatever it is doing."""
 
     def begin(self, world: World) -> None:
         """Let its behaviors decide at the present step."""
@@ -191,9 +191,9 @@ def check_reach(actor: Actor, place: RoomChoice | Point) -> None:
     home = actor.home
     if is_point(place):
         x, y = home.plan.lattice.to_lattice(place).tolist()
-        if not home.hinders or actor.space.part_at(x, y) < 0:
+        if not home.may_block_routes or actor.space.part_at(x, y) < 0:
             actor.point(place)  # type: ignore[arg-type]
-    elif home.hinders:
+    elif home.may_block_routes:
         names = {name for item in home.objects if item.uses for name in (item.name, item.type)}
         if not names & set(place):
             matching_rooms(place, home.rooms, home.rooms, home.objects)  # type: ignore[arg-type]

@@ -106,7 +106,7 @@ class World(Protocol):
         """Let all but metrics read another output of an algorithm; see `Learners.replace`."""
 
     def move(self, actor: DecidingActor, pose: Pose) -> None:
-        """Put a body at a pose, where it decides anew."""
+        """Put a body at a pose, where it replans."""
 
     def drive(self, actor: DecidingActor) -> None:
         """Let a body follow only plans from outside from now on, not its behaviors."""

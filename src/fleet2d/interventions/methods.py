@@ -40,7 +40,7 @@ class InterventionMethods(ABC):
     # People and robots
 
     def put(self, name: str, to: Any, heading_deg: float | None = None) -> None:
-        """Put a body at a place at the present step, as if it were carried; it decides anew there.
+        """Put a body at a place at the present step, as if it were carried; it replans there.
 
         Args:
             name: The person or robot.
@@ -103,7 +103,7 @@ class InterventionMethods(ABC):
         self._do("release", entity=name)
 
     def replan(self, name: str) -> None:
-        """Let a body's behaviors decide anew at the present step, whatever it is doing.
+        """Make a body's behaviors replan at the present step, whatever it is doing.
 
         Raises:
             ScenarioError: There is no such person or robot.

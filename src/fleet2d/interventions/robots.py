@@ -104,7 +104,7 @@ class SetBattery(RobotIntervention):
             raise ScenarioError(f"{self.entity} has no battery: add `battery` to the robot")
 
     def begin(self, world: World) -> None:
-        """Set it, and let the behaviors decide anew."""
+        """Set it, and make the behaviors replan."""
         actor = robot(world, self.entity)
         assert actor.charge is not None
         actor.charge.set(self.charge, actor.motion, world.step * world.clock.step_us)

@@ -66,8 +66,8 @@ class StayModel(NamedTuple):
             next stage of the same room; rows sum to one.
         spread: float64 (patches,), probability of the patch given that a person comes to its room.
         restless: float64 (rooms + 1,), probability per bin of changing patch during a stay.
-        first: int64 (rooms + 2,), the first patch of each room, that of away, and the number of
-            patches.
+        first: int64 (rooms + 2,), the first patch of each room and of away, then the
+            number of patches.
         detection: Probability that a person in view is perceived in a bin.
     """
 

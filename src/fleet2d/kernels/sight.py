@@ -175,7 +175,7 @@ class DetectionRule(NamedTuple):
     patience: int  # steps without a sighting after which an identity counts as lost
     step_us: int
     start_us: int  # time of day at step 0
-    burst: int  # most sightings that become known in one step
+    burst: int  # maximum number of sightings that become known in one step
     stop_lost: bool  # whether an event ends the span
     stop_seen: bool
 

@@ -15,9 +15,9 @@ from fleet2d.errors import InputError
 from fleet2d.kernels import F64, I64
 from fleet2d.runtime.clock import DAY_US
 
-# The most lines that a note lists.
+# Maximum number of lines that a note lists.
 _MAX_NAMED = 20
-# The most characters in a line of a log.
+# Maximum number of characters in a line of a log.
 _LONGEST = 10_000
 AWAY = "away"
 """The room label for being out of the home."""
@@ -47,7 +47,7 @@ def log_lines(path: Path) -> Iterator[tuple[int, str]]:
 
 
 class LogError(InputError):
-    """A log can't be read, or contradicts itself; the message says where and what to do."""
+    """A log is unreadable or contradicts itself; the message says where and what to do."""
 
 
 class Reading(NamedTuple):

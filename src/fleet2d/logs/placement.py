@@ -77,8 +77,8 @@ class LogFrame(Settings):
         rotation_deg: Direction of the log's x axis in the plan, counter-clockwise.
         flip_y: Whether the log's y axis is the other way, as in pictures.
         origin: Where the log's (0, 0) is in the plan [m].
-        matches: Places in both frames, two or more, instead of scale, rotation and origin: the best
-            fit to them in the least squares.
+        matches: Places in both frames, two or more, instead of scale, rotation and origin: fitted
+            to them by least squares.
 
     Example:
         >>> feet = LogFrame(scale=0.3048, rotation_deg=90, origin=(1, 2))

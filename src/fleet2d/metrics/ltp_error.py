@@ -83,7 +83,7 @@ def room_gaps(truth: F64, estimate: F64) -> F64:
 
 
 def earth_mover(truth: F64, estimate: F64, cost: F64) -> F64:
-    """Return the least mean distance by which one distribution is moved onto the other.
+    """Return the earth mover's distance between two distributions.
 
     The minimum of sum f_ij cost_ij over flows f >= 0 from room to room that turn q into p. Solved
     exactly, by successive shortest paths; mass that both have in a room stays.
@@ -286,7 +286,7 @@ class LtpError(LongTermMetric):
     - max_gap, mean_gap: greatest and mean |p - q| of a room;
     - tau: rank correlation of the rooms, Kendall's tau of the pairs that differ in truth, -1 to 1
       (`distances.rank_correlation`): it matters to a robot that goes to the likeliest rooms;
-    - earth_mover_m: least mean distance on foot by which q is moved onto p [m], between the middles
+    - earth_mover_m: earth mover's distance on foot from q to p [m], between the middles
       of rooms; only with `given: home`;
     - inside: share of rooms whose p lies in the stated interval, if there is one and `given: home`.
 

@@ -58,7 +58,7 @@ class TimeToFind(Metric):
     Of searches for users who were at home when they began:
 
     - `success`: searches that succeed with T <= `deadline` / all.
-    - `median`, `p90`: the least t with S(t) <= 0.5, or 0.1 [s], where S(t) = P(T > t) is the
+    - `median`, `p90`: the smallest t with S(t) <= 0.5, or 0.1 [s], where S(t) = P(T > t) is the
       estimate of Kaplan and Meier; left out where S stays above.
     - `mean`: restricted mean: the integral of S from 0 to `deadline`, which is E min(T, deadline)
       [s]. After the last end S stays constant.

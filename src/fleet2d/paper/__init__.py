@@ -1,1 +1,1 @@
-"""The paper's results, measured anew: speed, presence by days and by gap, the feedback loop."""
+"""The paper's results, measured again: speed, presence by days and by gap, the feedback loop."""

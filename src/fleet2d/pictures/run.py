@@ -104,7 +104,7 @@ def mark_boxes(marks: F64, lift: float = 0.0) -> F64:
     """Return the marks of an actogram as boxes, float64 (n, 4, 2): hour of the day, row.
 
     The height of a mark is the share of its interval in which somebody was seen, so that the ink is
-    proportional to the time; the least height is `MIN_MARK_HEIGHT`.
+    proportional to the time; the minimum height is `MIN_MARK_HEIGHT`.
 
     Args:
         marks: The shares that `marks_by_day` returned.
@@ -502,7 +502,7 @@ class _Picture:
             self.overlay.write(EDGE, 0.2 + number * LINE_IN, line, NOTE)
 
     def _number(self, kind: str, body: str) -> float | None:
-        """Return what the first metric of a type says of a body; None if it says no number."""
+        """Return the number of the first metric of a type for a body; None if it has none."""
         configured = self.run.manifest["scenario"].get("metrics", {})
         for name, result in self.run.metrics.items():
             if configured.get(name, {}).get("type") == kind and isinstance(result, dict):

@@ -37,7 +37,7 @@ class Distribution(NamedTuple):
 
     Attributes:
         knots: Quantiles at evenly spaced probabilities, ascending [s].
-        shortest: The least value that is drawn [s].
+        shortest: The smallest value that is drawn [s].
         longest: The largest value that is drawn [s].
         first: The position of `shortest` among the knots.
         last: The position of `longest` among them.

@@ -34,7 +34,7 @@ from fleet2d.runtime.clock import DAY_S
 from fleet2d.runtime.determinism import Draws
 
 FOLDER = Path(__file__).parent
-# The least mean time between two occurrences of a need.
+# The shortest mean time between two occurrences of a need.
 SHORTEST_INTERVAL = timedelta(minutes=5)
 
 

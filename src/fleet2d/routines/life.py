@@ -35,7 +35,7 @@ from fleet2d.runtime.determinism import Draws, stream_key
 
 # The number of days that are kept after they were drawn, of a person and of a household.
 CACHED_DAYS, CACHED_HOUSEHOLD_DAYS = 3, 8
-# The least absence after which a member is welcomed [s].
+# The shortest absence after which a member is welcomed [s].
 LONG_GONE_S = 1800
 WELCOME = "welcome"
 WELCOME_S = 90
@@ -66,7 +66,7 @@ class Life:
         self._templates: dict[int, DayPlan] = {}
 
     def __getstate__(self) -> dict[str, object]:
-        """Leave out the days, which are drawn again: they are most of the state of many people."""
+        """Leave out the days: they are redrawn, and make up most of the state."""
         return {**self.__dict__, "_cache": {}, "_templates": {}}
 
     def template(self, ordinal: int) -> DayPlan:

@@ -259,7 +259,7 @@ class DayTemplate(Settings):
 
     @property
     def weekdays(self) -> set[int]:
-        """The days of the week on which it holds, 0 = Monday."""
+        """The days of the week it applies to, 0 = Monday."""
         return weekdays_of(self.on)
 
 

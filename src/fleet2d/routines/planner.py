@@ -132,7 +132,7 @@ class DayPlan:
         name: The name of the template.
         wake: The distribution of waking [s].
         sleep: The distribution of going to bed [s].
-        least_sleep: The least duration of sleep [s].
+        least_sleep: The minimum duration of sleep [s].
         jobs: The tasks.
         pastimes: What fills the time between them.
         recorded: The recorded days, if the template has some.
@@ -210,7 +210,7 @@ def plan_day(
 CROSSING, REACH_S = 6, 1200
 # An episode that lasts at least this many times the shift ends at its recorded time.
 TAKES_UP = 4
-MIN_EPISODE_S = 30  # the least duration of an episode
+MIN_EPISODE_S = 30  # minimum duration of an episode
 END = "end"
 
 

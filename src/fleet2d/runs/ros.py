@@ -48,7 +48,7 @@ class Topic(NamedTuple):
     Attributes:
         name: Its name, such as `/astro/odom`.
         type: The type of its messages, such as `nav_msgs/msg/Odometry`.
-        latched: Whether its last message is for all who subscribe later, too.
+        latched: Whether its last message is also delivered to later subscribers.
     """
 
     name: str

@@ -111,7 +111,7 @@ class SimulationSettings(Settings):
         duration: Simulated time. A run stops at its last full step within it.
         step: The length of a step.
         seed: The seed of all random draws; null: one is drawn and stored.
-        max_span: The most steps that are computed at once. It changes no result.
+        max_span: The maximum number of steps computed at once. It doesn't change results.
         people_block: How long a person or robot waits for another body in its way before going
             round it; null: bodies don't block each other.
         speedup: Run at this many times real time; null: as fast as possible.

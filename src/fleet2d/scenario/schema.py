@@ -163,7 +163,7 @@ def _expand(value: Any, kinds: Mapping[str, Mapping[str, Any]]) -> Any:
 
 
 def _allow_composition(properties: dict[str, Any]) -> None:
-    """Add what a file may contain, unlike a composed scenario: 'extends', and deletion by null."""
+    """Add what only files may contain, not composed scenarios: 'extends', and deletion by null."""
     path = {"type": "string", "description": "a YAML file beside this one, or 'bundled:NAME'"}
     properties["extends"] = {
         "description": "The scenarios that this file extends.",

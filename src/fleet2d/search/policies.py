@@ -16,7 +16,7 @@ from fleet2d.search.problem import SearchProblem
 Policy = Literal["random", "nearest", "likeliest", "greedy", "exact", "receding"]
 
 MAX_EXACT_SITES = 16
-"""The most sites for an exact order, whose cost grows as 2**sites: 0.3 s and 25 MB for so many."""
+"""Maximum number of sites for an exact order, which costs 2**sites: 0.3 s and 25 MB for 16."""
 HORIZON = 8
 """The number of sites that a receding horizon orders exactly."""
 
@@ -45,11 +45,11 @@ def greedy(problem: SearchProblem) -> list[int]:
 
 
 def exact(problem: SearchProblem) -> list[int]:
-    """Return the order of least expected time: dynamic programming over subsets of sites.
+    """Return the order with the lowest expected time: dynamic programming over subsets of sites.
 
     Bellman 1962 and Held and Karp 1962, for the sum of detection times in place of a tour's length:
     a second after looks at the sites S costs the probability that the target is found outside S. So
-    the least cost from (S, i) on is V(S, i) = min over j outside S of
+    the lowest cost from (S, i) on is V(S, i) = min over j outside S of
     (way(i, j) + look(j)) * gain(outside S) + V(S + j, j). Takes 2**n n**2 operations.
 
     Raises:

@@ -11,7 +11,7 @@ from fleet2d.sight.perception_error import CameraSightings, PerceptionError
 
 @register("perception_error", "miscalibration")
 class Miscalibration(PerceptionError):
-    """A camera that isn't mounted or calibrated as the robot thinks: the same error in each look.
+    """A camera that isn't mounted or calibrated as the robot assumes: the same error in each look.
 
     Attributes:
         yaw_deg: Angle by which all that it perceives is turned round it, counter-clockwise, with

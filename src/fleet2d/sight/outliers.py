@@ -1,4 +1,4 @@
-"""Sightings at the wrong distance, as where the depth is that of the background."""
+"""Sightings at the wrong distance, as when the depth is that of the background."""
 
 from datetime import timedelta
 
@@ -12,7 +12,7 @@ from fleet2d.sight.perception_error import CameraSightings, PerceptionError
 
 @register("perception_error", "outliers")
 class Outliers(PerceptionError):
-    """A share of sightings is far off along the ray, as by a depth taken from the background.
+    """A share of sightings is far off along the ray, as when the depth is that of the background.
 
     Attributes:
         share: Share of sightings that are outliers.

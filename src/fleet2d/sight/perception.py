@@ -272,7 +272,7 @@ class Identity(Settings):
         confusion: For each user, the shares of users that it is mistaken for; left out: all others
             equally.
         per_track: An identity stays until the user isn't noticed for `lost_after`; otherwise it is
-            drawn anew in each look.
+            drawn again in each look.
     """
 
     right: Curve | None = None

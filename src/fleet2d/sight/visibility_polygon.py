@@ -153,7 +153,9 @@ def _shared_regions(home: Home, folder: Path) -> Regions:
     cells = int((triangles >= 0).sum())
     pieces = int(numbers[cells]) if numbers.ndim == 1 and len(numbers) > cells else -1
     if numbers.dtype != np.dtype("<i4") or len(numbers) != cells + 1 + 2 * pieces:
-        raise ScenarioError(f"sight.method.path: {file} is damaged: remove it, it is created anew")
+        raise ScenarioError(
+            f"sight.method.path: {file} is damaged: remove it, and it is created again"
+        )
     start, rest = numbers[: cells + 1], numbers[cells + 1 :]
     return Regions(_numbers(triangles), start, rest[:pieces], rest[pieces:])
 

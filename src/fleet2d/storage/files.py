@@ -60,7 +60,7 @@ def plain_name(name: object, folder: Path | str) -> str:
 
 
 def path_in(folder: Path | str, name: object) -> Path:
-    """Return the path of a file or folder that is named by a folder from somebody else.
+    """Return the path of a file or folder that is named in somebody else's folder.
 
     Every name that was read from a run, a study or another folder that a command opens is turned
     into a path here, and so are the fixed names of files in such a folder. Nothing needs to exist.

@@ -78,7 +78,7 @@ class FrameWriter:
         """Create the file, or continue it after a commit.
 
         Args:
-            path: The file; if it is in a folder from somebody else, from `path_in`.
+            path: The file; if it is in somebody else's folder, from `path_in`.
             form: The format.
             start: Where the commit ends [bytes], and the file is cut off; 0: create the file, in
                 place of one that is there.

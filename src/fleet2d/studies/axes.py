@@ -114,7 +114,7 @@ Number = TypeVar("Number", int, float)
 
 
 def check_count(count: Number) -> Number:
-    """Return a count, unless so many values are too many for one study.
+    """Return a count, unless it is too large for one study.
 
     Raises:
         PydanticCustomError: They are.
@@ -533,7 +533,7 @@ class _GroupAxis(Axis):
 
 
 class ZipAxis(_GroupAxis):
-    """Axes of equal length in step: the first choices together, the second ones, and so on.
+    """Axes of equal length in lockstep: the first choices together, the second ones, and so on.
 
     Attributes:
         zip: The axes, by name.

@@ -29,11 +29,11 @@ Workers = Annotated[
 Where = Annotated[str, typer.Argument(metavar="DIR", help="The folder or store of a study.")]
 MAX_LINES = 10  # of a list that is printed
 IDENTITY_START = 6
-"""The fewest characters of an identity that name a variant."""
+"""The minimum number of characters of an identity that name a variant."""
 
 
 def _print(text: object, *, err: bool = False) -> None:
-    """Print text, which may come from a folder of somebody else, without control characters."""
+    """Print text, which may come from somebody else's folder, without control characters."""
     typer.echo("\n".join(map(printable, str(text).split("\n"))), err=err)
 
 
@@ -241,7 +241,7 @@ def tune(  # noqa: PLR0913 - options of the command line
     ] = "local",
     changed: Annotated[
         Literal["redo"] | None,
-        typer.Option(help="redo: start anew if the folder holds another search."),
+        typer.Option(help="redo: start over if the folder holds another search."),
     ] = None,
     storage: Annotated[
         str | None, typer.Option(help="A database for the trials: sqlite:///trials.db.")

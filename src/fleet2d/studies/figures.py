@@ -72,7 +72,7 @@ COLORS = (
 DARK, PALE = "#2d3138", "#c4c9d0"
 MAX_LINES = 8
 MAX_LABELS = 24
-MOMENTS = 60  # the most points of a line over time
+MOMENTS = 60  # maximum number of points of a line over time
 
 
 def draw_comparison(table: "pl.DataFrame", axis: str, reference: Any, metric: str) -> Figure:

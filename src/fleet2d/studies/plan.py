@@ -291,7 +291,7 @@ def _planned(
 
 
 def _check_identities(design: Design, variants: Sequence[PlannedVariant]) -> None:
-    """Refuse two variants with the same scenario, of which one axis has no effect."""
+    """Refuse two variants with the same scenario: some axis has no effect."""
     by_identity: dict[str, PlannedVariant] = {}
     for variant in variants:
         equal = by_identity.setdefault(variant.identity, variant)
@@ -425,7 +425,7 @@ def _refusal(location: str, recomputed: int, stale: int) -> str:
     keep = ", --changed keep leaves those of other code as they are" if recomputed else ""
     return (
         f"{location} holds results that don't belong to this study as it is now:"
-        f" {' and '.join(filter(None, causes))}. --changed redo runs anew what has changed and"
+        f" {' and '.join(filter(None, causes))}. --changed redo runs again what has changed and"
         f" sets the old results aside{keep}; or choose another --out"
     )
 
@@ -515,7 +515,7 @@ def forecast(plan: StudyPlan, samples: int = SAMPLES) -> Forecast:
     """
     count = len(plan.variants)
     numbers = sorted({round(i * (count - 1) / max(samples - 1, 1)) for i in range(samples)})
-    measure(plan.design.scenario(0), most_s=0.0)
+    measure(plan.design.scenario(0), max_s=0.0)
     speeds = []
     for i in numbers:
         with suppress(ComponentError):  # a variant may fail without ending the study

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 FORMAT = JournalFormat(b"fleet2d study journal 2\n", ("variant",))
-SYNC_EVERY_S = 2.0  # the most that a power cut loses; a killed process loses nothing
+SYNC_EVERY_S = 2.0  # maximum loss after a power cut; a killed process loses nothing
 
 
 @dataclass(frozen=True)

@@ -176,7 +176,7 @@ def flat_numbers(metrics: Mapping[str, Any], prefix: str = "") -> Iterator[tuple
 
 
 def peak_rss_mb() -> float:
-    """Return the largest memory of this process so far [MB]; 0 where the system can't say."""
+    """Return the largest memory of this process so far [MB]; 0 if unknown."""
     try:
         import resource
     except ImportError:
@@ -202,13 +202,13 @@ class RunSpeed:
         return self.setup_s + simulated_s / self.speedup
 
 
-def measure(scenario: Scenario, simulated_s: float = DAY_S, most_s: float = 2.0) -> RunSpeed:
+def measure(scenario: Scenario, simulated_s: float = DAY_S, max_s: float = 2.0) -> RunSpeed:
     """Run the beginning of a scenario to measure its speed.
 
     Args:
         scenario: The scenario.
         simulated_s: The simulated time to run, if the scenario lasts that long [s].
-        most_s: The longest wall time after the set-up [s].
+        max_s: The longest wall time after the set-up [s].
 
     Raises:
         Fleet2DError: The scenario is wrong, or a component failed.
@@ -217,7 +217,7 @@ def measure(scenario: Scenario, simulated_s: float = DAY_S, most_s: float = 2.0)
     simulation = Simulation(scenario)
     ready_s = time.perf_counter()
     hour = max(1, int(3600e6 / simulation.clock.step_us))
-    while not simulation.done and time.perf_counter() - ready_s < most_s:
+    while not simulation.done and time.perf_counter() - ready_s < max_s:
         simulation.advance(hour)
         if simulation.step * simulation.clock.step_us / 1e6 >= simulated_s:
             break

@@ -452,7 +452,7 @@ def tune(
         folder: The folder of the search.
         executor: Where trials run.
         observer: Follows the progress.
-        changed: `redo` starts anew if the folder holds another search, whose trials stay in the
+        changed: `redo` starts over if the folder holds another search, whose trials stay in the
             storage under a name of their own; None: such a folder is refused.
         storage: The URL of a database for the trials, such as sqlite:///trials.db; None: a file in
             the folder.
@@ -541,7 +541,7 @@ def _check_identity(
     if changes and changed is None:
         raise RunDirectoryError(
             f"{storage.location} holds another search: {', '.join(changes)} changed, and what it"
-            " found can't be judged as a result of this one. --changed redo starts anew and keeps"
+            " found can't be judged as a result of this one. --changed redo starts over and keeps"
             " the old trials in the storage under a name of their own; or choose another --out"
         )
     storage.write(SEARCH, json.dumps(asdict(identity), indent=1).encode())

@@ -35,8 +35,8 @@ class RateTest:
         holds: The claimed rate, above 0 and up to 1.
         error: Largest probability of refusing a true claim, and of accepting the alternative.
         alternative: The largest rate that is refused with a probability of at least 1 - `error`.
-        accept: int64 (seeds + 1,), the most failures with which the claim is accepted, by number of
-            seeds so far; -1 where it can't be accepted yet.
+        accept: int64 (seeds + 1,), the maximum number of failures with which the claim is accepted,
+            by number of seeds so far; -1 where it can't be accepted yet.
         refuse: int64 (seeds + 1,), the fewest failures with which the claim is refused.
 
     Example:
@@ -241,7 +241,7 @@ class Claim:
         """The test of the claimed rate."""
         if self.only is not None:
             return rate_test(len(list(self.trials())))
-        return rate_test(self.most_trials, self.holds, self.error)
+        return rate_test(self.max_trials, self.holds, self.error)
 
     def of_scenario(self, source: str | Path) -> "Claim":
         """Return the claim for one scenario only, with its own seed."""
@@ -264,7 +264,7 @@ class Claim:
         return bool(self.axes or self.households)
 
     @property
-    def most_trials(self) -> int:
+    def max_trials(self) -> int:
         """Largest number of trials: one for each seed, and at least one for each variant."""
         return max(len(self.seeds), len(self.variants), 1)
 
@@ -297,7 +297,7 @@ class Claim:
         seeds = self.seeds or (own,)
         pairs = [
             (self.variants[number % len(self.variants)], seeds[number % len(seeds)])
-            for number in range(self.most_trials)
+            for number in range(self.max_trials)
         ]
         if self.only is not None:
             matches = [pair for pair in pairs if pair[1] == self.only]

@@ -292,7 +292,7 @@ class FailureSearch:
     Attributes:
         failure: The first failure; None until there is one.
         tries: Number of finished runs.
-        narrowest: The least margin so far, and its point.
+        narrowest: The smallest margin so far, and its point.
         errors: Errors of runs that couldn't be simulated, with how often they happened.
     """
 

@@ -163,7 +163,7 @@ class TrialResult:
 
     @property
     def margin(self) -> float:
-        """The least margin of all expectations, -1 to 1; 1 without expectations."""
+        """The smallest margin of all expectations, -1 to 1; 1 without expectations."""
         margins = [result.margin for result in (*self.results, *self.failures)]
         return min(margins, default=1.0)
 

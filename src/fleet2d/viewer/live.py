@@ -222,7 +222,7 @@ def _note(actor: Any) -> str:
     return ": ".join(filter(None, (str(kind), note)))
 
 
-FRAME_US = 60_000_000  # the most simulated time between two frames
+FRAME_US = 60_000_000  # maximum simulated time between two frames
 FRAMES_PER_S = 30  # at a chosen speed
 BATCHES_PER_S = 30
 MAX_QUEUED = 4_000  # frames in the queue of a page
@@ -406,7 +406,7 @@ class LiveRun:
                 self._watchers.remove(watcher)
 
     def end_streams(self) -> None:
-        """Let all `frames` end, though the simulation goes on; no lock, as a signal calls it."""
+        """End all `frames`, though the simulation goes on; lock-free for signal handlers."""
         self._streams_end = True
 
     def routes(self) -> list[Route]:

@@ -287,7 +287,7 @@ MAX_RUNS = 4
 
 
 class _Server(uvicorn.Server):
-    """A server that ends the streams of a running simulation, which else would keep it open."""
+    """A server that ends the streams of a running simulation, which would keep it open."""
 
     def __init__(self, config: uvicorn.Config, live: LiveRoutes | None) -> None:
         super().__init__(config)

@@ -21,7 +21,7 @@ from fleet2d.viewer.run_facts import run_title
 
 DAY = timedelta(days=1)
 MAX_TIMELINE_CHARS = 20_000_000
-"""The most characters of a page that is embedded in a report."""
+"""The maximum number of characters of a page that is embedded in a report."""
 STYLE = """
 :root { color-scheme: light dark; font: 15px/1.5 system-ui, sans-serif; }
 body { max-width: 62rem; margin: 2rem auto; padding: 0 1rem; }

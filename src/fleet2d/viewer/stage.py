@@ -173,7 +173,7 @@ class Stage:
 
     Attributes:
         figure: The figure.
-        stride: The number of steps between two moments that can be shown.
+        stride: The number of steps between consecutive frames.
         bodies: The users and robots.
     """
 
@@ -195,7 +195,7 @@ class Stage:
             end: The step after the last that can be shown.
             axes: Axes for the plan alone; or
             figure: an empty figure, for the plan and a strip of the time between both steps.
-            stride: The number of steps between two moments that can be shown.
+            stride: The number of steps between consecutive frames.
 
         Raises:
             ArtifactError: The run stored no key frames or no floor plan.

@@ -72,7 +72,7 @@ class Presence:
 
         Args:
             users: Names of the users.
-            home: float64 (users + 1, rooms), each row sums to one; the last is of anyone.
+            home: float64 (users + 1, rooms), each row sums to one; the last row is anyone.
             away: float64 (users + 1,).
             time: The local time that it describes.
             interval: Lower and upper ends, float64 (users + 1, rooms + 1) each, away last.

@@ -63,7 +63,7 @@ class ExposureRatio(Estimator):
         super().observe(evidence)
 
     def _divide(self, room: I64) -> None:
-        """Begin anew with the given patches."""
+        """Start over with the given patches."""
         self.room = room
         super().begin(self.rooms, self.users, self.half_life)
 

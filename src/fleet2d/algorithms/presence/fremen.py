@@ -46,7 +46,7 @@ class Fremen(Estimator):
     clipped to 0 … 1; m = 0 is the static model, sightings by exposure. Where rooms are in view as a
     whole or not at all, that is the method as published.
 
-    The order m, 0 to 4, is the one with the least recent log loss: each day's samples are forecast
+    The order m, 0 to 4, is the one with the lowest recent log loss: each day's samples are forecast
     from the days before, and a day counts half as much as the one after. p(t) is then normalized
     over rooms, and its difference to the chance of detection is away, as for the exposure ratio.
 
@@ -89,7 +89,7 @@ class Fremen(Estimator):
         self.week: tuple[F64, F64] | None = None  # the forecast for each hour
 
     def observe(self, evidence: Evidence) -> None:
-        """Add the next bins of evidence; periods are selected anew when a day is over."""
+        """Add the next bins of evidence; periods are selected again when a day is over."""
         for part in evidence.days:
             today = int(part.day[0])
             self.first = self.first or today

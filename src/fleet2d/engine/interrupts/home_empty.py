@@ -7,7 +7,7 @@ from fleet2d.kernels import Bool
 
 @register("interrupt", "home_empty")
 class HomeEmpty(Interrupt):
-    """The last person has left the home, as the phones of all people may tell a robot."""
+    """The last person has left the home, as a robot may learn from everyone's phones."""
 
     def holds(self, span: SpanView) -> Bool:
         """Return at which steps all people are away."""

@@ -7,7 +7,7 @@ from fleet2d.kernels import Bool
 
 @register("interrupt", "home_occupied")
 class HomeOccupied(Interrupt):
-    """Somebody has come home while nobody was there, as the phones of people may tell a robot."""
+    """Somebody has come home to an empty home, as a robot may learn from everyone's phones."""
 
     def holds(self, span: SpanView) -> Bool:
         """Return at which steps somebody is at home."""

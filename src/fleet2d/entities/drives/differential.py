@@ -26,5 +26,5 @@ class Differential(Drive):
             seconds, metres = seconds + lasts, metres + leg.length
 
     def straight(self, length: float, speed: float) -> Iterable[tuple[float, float]]:
-        """Return times [s] and ways [m] along a leg at which the speed changes, and at its end."""
+        """Return times [s] and distances [m] at which the speed changes on a leg, and its end."""
         return [(length / speed, length)]

@@ -83,7 +83,7 @@ class Drive(Component):
         """
 
     def seconds(self, metres: F64, speed: float) -> F64:
-        """Return what the robot thinks that ways to many places take, without turns [s].
+        """Return the robot's estimates of the time to many places, without turns [s].
 
         Args:
             metres: Lengths of the ways, inf where there is none.

@@ -1,4 +1,4 @@
-"""Robots that drive in any direction, such as those with omnidirectional wheels."""
+"""Robots that can drive in any direction, such as those with omnidirectional wheels."""
 
 from collections.abc import Iterator
 

@@ -1,4 +1,4 @@
-"""Robots that gather speed at the beginning of each leg, and brake before its end."""
+"""Robots that accelerate at the beginning of each leg, and brake before its end."""
 
 from collections.abc import Iterator
 from math import isqrt, sqrt
@@ -16,7 +16,7 @@ SHORTEST_MM = 2
 
 @register("drive", "trapezoidal")
 class Trapezoidal(Differential):
-    """Turns on the spot towards each leg; on it, gathers speed, drives at constant speed, brakes.
+    """Turns on the spot towards each leg; on it, accelerates, drives at constant speed, brakes.
 
     Gathering speed and braking take `pieces` equal times each, of constant speed: the position is
     at most speed² / (8 acceleration pieces²) off, 6 mm at 0.6 m/s. Turns are at constant rate,
@@ -24,14 +24,14 @@ class Trapezoidal(Differential):
 
     Attributes:
         acceleration: How fast it gathers speed and brakes [m/s²].
-        pieces: Number of constant speeds by which gathering speed is approximated, and braking.
+        pieces: Number of constant speeds that approximate acceleration, and braking.
     """
 
     acceleration: float = Field(default=0.5, ge=0.01, le=100)
     pieces: int = Field(default=4, ge=1, le=64)
 
     def straight(self, length: float, speed: float) -> Iterator[tuple[float, float]]:
-        """Yield times [s] and ways [m] along a leg at which the speed changes, and at its end."""
+        """Yield times [s] and distances [m] at which the speed changes on a leg, and its end."""
         ramp = min(speed * speed / self.acceleration, length) / 2  # until it is at full speed [m]
         rising = sqrt(2 * ramp / self.acceleration)
         full = self.acceleration * rising
@@ -45,7 +45,7 @@ class Trapezoidal(Differential):
             yield braking + rising * (pieces - k) / pieces, length - ramp * k * k / pieces**2
 
     def seconds(self, metres: F64, speed: float) -> F64:
-        """Return what the robot thinks that ways to many places take, each as one leg [s]."""
+        """Return the robot's estimates of the time to many places, each way as one leg [s]."""
         changing = speed * speed / self.acceleration  # gathering speed and braking [m]
         at_speed = np.maximum(metres - changing, 0.0) / speed
         return 2 * np.sqrt(np.minimum(metres, changing) / self.acceleration) + at_speed

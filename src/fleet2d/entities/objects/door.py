@@ -46,7 +46,7 @@ class Door(HomeObject):
         doorway: Its doorway: by name, by a room that has one only, by 'room-room', or the one
             nearest to a point [x, y] in metres.
         open: Whether it stands open at first.
-        locked: Whether nobody can open it by hand at first.
+        locked: Whether it is locked at first, so that nobody can open it by hand.
         closes_after: It shuts this long after somebody opened it or went through; left out: it
             stays as it was left.
         schedule: When it is opened, shut or locked, every day.

@@ -168,7 +168,7 @@ class FurnitureSensor(Sensor):
 
     Attributes:
         of: The object of the floor plan that it is in, by name.
-        hold: It goes off when nobody was there for this long.
+        hold: It turns off when nobody has been there for this long.
     """
 
     of: str

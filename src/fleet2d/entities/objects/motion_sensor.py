@@ -27,7 +27,7 @@ class MotionSensor(Sensor):
         heading_deg: Where it looks, counter-clockwise from +x.
         angle_deg: Width of its field of view.
         range: How far it sees.
-        hold: It goes off when nobody moved for this long.
+        hold: It turns off when nobody has moved for this long.
         robots: Whether robots trigger it, too.
     """
 

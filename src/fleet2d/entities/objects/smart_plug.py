@@ -22,7 +22,7 @@ class SmartPlug(FurnitureSensor):
     Attributes:
         of: The object of the floor plan that it feeds, by name.
         reach: How near to such a place counts as using the device.
-        hold: It goes off when nobody used it for this long.
+        hold: It turns off when nobody has used it for this long.
     """
 
     of: str

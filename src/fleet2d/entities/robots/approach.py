@@ -97,7 +97,7 @@ class BeliefBehavior(Behavior):
         return room_belief(now, self.source, user)
 
 
-# The most cells of a room that are tried as viewpoints, and as targets to be seen, evenly spread.
+# Maximum number of cells of a room tried as viewpoints, and as targets to be seen, evenly spread.
 STANDS_TRIED = 48
 TARGETS_TRIED = 400
 
@@ -129,7 +129,7 @@ def viewpoints_of(actor: Actor, room: Room, enough: float, most: int) -> Viewpoi
         actor: The robot.
         room: A room that it can enter.
         enough: The part of the room after which no more points are added.
-        most: The most points.
+        most: The maximum number of points.
     """
     home, space = actor.home, actor.space
     key = "views", home.walls, space, actor.part, sight_range(actor), room.index, enough, most

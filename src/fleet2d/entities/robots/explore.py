@@ -15,10 +15,10 @@ from fleet2d.kernels import Bool
 from fleet2d.kernels.numbers import TURN
 from fleet2d.kernels.space import squared_distance
 
-# The most cells of the home that are tried as viewpoints, and as targets to be seen.
+# Maximum number of cells of the home that are tried as viewpoints, and as targets to be seen.
 STANDS_TRIED = 800
 TARGETS_TRIED = 2000
-# The least part of the floor that a look has to show.
+# The smallest part of the floor that a look has to show.
 WORTH = 0.002
 # Time after which it tries again to pass a shut door to floor that isn't seen yet.
 TRIES_AGAIN = timedelta(minutes=1)

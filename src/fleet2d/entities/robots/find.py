@@ -55,7 +55,7 @@ class Sites:
 
         Args:
             actor: The robot.
-            views: The most viewpoints in a room.
+            views: The maximum number of viewpoints in a room.
         """
         rooms = actor.reachable_rooms()
         viewpoints = [viewpoints_of(actor, room, ENOUGH, views) for room in rooms]
@@ -168,7 +168,7 @@ class Find(BeliefBehavior):
         doubt: Weight of a prior proportional to the areas of rooms, beside that of the source.
         out: Probability that the person is out, as long as the source has no output.
         memory: Age at which an empty look counts half, because people move.
-        views: The most places in a room from which it looks round.
+        views: The maximum number of places in a room from which it looks around.
         distance: How far it stays from the person it found [m].
         stay: How long it stays with the person it found.
     """

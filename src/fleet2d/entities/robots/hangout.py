@@ -29,7 +29,7 @@ from fleet2d.kernels.space import CELL_CENTRE, SUB
 PERSON = 0.2
 # Personal space ends at 1.2 m (Hall): within it, a place is the worse the nearer to a seat [m].
 PERSONAL = 1.2
-# The most cells of a room that count as seats, if it has no furniture to sit or lie on.
+# Maximum number of cells of a room that count as seats, if it has no furniture to sit or lie on.
 SEATS_TRIED = 60
 # Places to stand are tried on a grid of this pitch [m].
 PITCH = 0.5
@@ -55,7 +55,7 @@ class HangoutPlaces:
         Args:
             actor: The robot.
             avoid: Indices of the rooms without places.
-            off_doors: The least distance of a place from every doorway [m].
+            off_doors: The minimum distance of a place from every doorway [m].
         """
         self._actor = actor
         home, people = actor.home, actor.home.space(PERSON, opens_doors=True)

@@ -25,7 +25,7 @@ class Opportunistic(Behavior):
         distance: How near it comes [m]; personal space ends at 1.2 m.
         interaction: How long it interacts.
         chance: Probability that it takes an opportunity.
-        again: Least time between two approaches to the same person.
+        again: Minimum time between two approaches to the same person.
     """
 
     records: ClassVar[frozenset[str]] = frozenset({"approaches", "interaction_over", "interacts"})

@@ -24,7 +24,7 @@ class Patrol(Behavior):
         rooms: The rooms of a round; all: every room that it can enter.
         waypoints: Points [x, y] in metres to go to instead of rooms.
         dwell: How long it stays at each stop.
-        order: Stops in the order given, or shuffled anew for each round.
+        order: Stops in the order given, or reshuffled for each round.
         look_around: Turn once on the spot on arriving at a stop.
     """
 
@@ -63,7 +63,7 @@ class Patrol(Behavior):
             stops = now.random("order").shuffled(stops)
         plan, has_stop = now.plan(), False
         for stop in stops:
-            if now.home.hinders and not plan.reaches(*stop):
+            if now.home.may_block_routes and not plan.reaches(*stop):
                 continue  # in a later round its door may be open, or its costs lower
             plan.go_to_point(*stop)
             if self.look_around:

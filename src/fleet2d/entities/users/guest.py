@@ -1,4 +1,4 @@
-"""Guest: a person who is out of the home until a script lets the person come."""
+"""Guest: a person who stays out of the home until a script lets them in."""
 
 from datetime import datetime
 
@@ -9,7 +9,7 @@ from fleet2d.entities.plan import Plan
 
 @register("behavior", "guest")
 class Guest(Behavior):
-    """Stay out of the home; a person who is in it leaves by the way out.
+    """Stay out of the home; leave it through the exit if inside.
 
     An intervention `guest` lets the person come.
     """

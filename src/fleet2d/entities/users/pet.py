@@ -32,7 +32,7 @@ class Pet(Behavior):
         rooms: Rooms and kinds of rooms that it may enter; none: all.
         nap: How long it sleeps at a time.
         stop: How long it stops at a spot while it roams.
-        spots: Least and most number of stops between two naps.
+        spots: Smallest and largest number of stops between two naps.
         stays_in_room: Probability that its next spot is in the same room.
     """
 

@@ -62,7 +62,7 @@ class Population(ResidentBehavior):
         self.settle(actor, {name: known[name] for name in sorted(names)}, Spots(actor))
 
     def begins_at(self, time: datetime) -> "RoomChoice | Point | None":
-        """Return the rooms of what such people usually do at the beginning of the run."""
+        """Return the rooms of a typical activity of such people at the beginning of the run."""
         draws, known = Draws(stream_key(0, "", "likely"), 0), catalogue()
         people = survey.group(survey.groups()[0] if self.group == "any" else self.group)
         ordinal = (time - timedelta(seconds=survey.DAWN_S)).toordinal()

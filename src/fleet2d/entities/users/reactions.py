@@ -26,7 +26,7 @@ RANKS = list(PROBABILITIES)
 # How far a person steps aside, and how far from a robot that called a person stops [m].
 STEP_M = 0.7
 MEET_M = 0.9
-CLEAR_M = 0.1  # the least that is added to what is too close
+CLEAR_M = 0.1  # minimum distance added to what is too close
 # How long a person waits for a robot to pass.
 PASSING = timedelta(seconds=4)
 DIRECTIONS = 16

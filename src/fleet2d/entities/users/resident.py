@@ -44,7 +44,7 @@ T = TypeVar("T")
 
 # Distance between two spots, at which bodies of the usual radius of 0.2 m don't touch [m].
 SPACING = 0.6
-# The most spots of a room that a body uses.
+# Maximum number of spots of a room that a body uses.
 HABITUAL = 8
 
 
@@ -95,7 +95,7 @@ class Spots:
     def reachable(self, rooms: list["Room"]) -> list["Room"]:
         """Return those of some rooms that the body can get to at present: doors may be locked."""
         actor = self._actor
-        if not actor.home.hinders:
+        if not actor.home.may_block_routes:
             return rooms
         return [room for room in rooms if len(actor.space.cells(room.index, actor.part))]
 
@@ -226,7 +226,7 @@ def seats_at(
 
 
 def part_of(things: Sequence[T], rank: int, members: int) -> Sequence[T]:
-    """Return the things of one of several members who divide them; at least one."""
+    """Return one member's share of things divided among several members; at least one."""
     return things[rank % members :: members] or [things[rank % len(things)]]
 
 
@@ -535,7 +535,7 @@ class ResidentBehavior(Behavior):
         react to robots plan less far ahead, as they are interrupted more often.
         """
         plan, clock = now.plan(), now.actor.clock
-        self.is_hindered = now.home.hinders  # by shut doors, for all of the plan
+        self.is_hindered = now.home.may_block_routes  # by shut doors, for all of the plan
         midnight_us = clock.elapsed(datetime.fromordinal(now.time.toordinal() + 1))
         last_us = min(plan.time_us + AHEAD_US, midnight_us) if now.actor.attention else midnight_us
         self.known_home.update()

@@ -28,7 +28,7 @@ AWAY = "away"
 SECOND_US = 1_000_000
 # How many visits are planned at once.
 VISITS = 20
-# The least length of a stay, after the time of ways is taken off.
+# The minimum length of a stay after subtracting the time of travel.
 SHORTEST_US = 10 * SECOND_US
 # Points per metre of a way at which the room is looked up.
 POINTS_PER_M = 10

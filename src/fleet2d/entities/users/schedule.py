@@ -58,7 +58,7 @@ class Agenda(Settings):
 
     @property
     def weekdays(self) -> set[int]:
-        """The days of the week it holds on, 0 = Monday."""
+        """The days of the week it applies to, 0 = Monday."""
         return weekdays_of(self.on)
 
 

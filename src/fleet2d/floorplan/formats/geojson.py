@@ -100,7 +100,7 @@ class Feature:
     level: str | None = None
 
     def text(self, *keys: str) -> str | None:
-        """Return the first of some properties that is a text, in one line; English if it has it."""
+        """Return the first of some properties that is a text, on one line; English if possible."""
         for key in keys:
             value = self.properties.get(key)
             if isinstance(value, dict):  # in IMDF by language
@@ -158,7 +158,7 @@ def read_features(content: dict[str, Any], level: str | None, notes: list[str]) 
 def in_metres(
     features: Sequence[Feature], content: dict[str, Any], units: Units, notes: list[str]
 ) -> tuple[list[Feature], Move]:
-    """Return the features in metres, and the function that moves places of the file there.
+    """Return the features in metres, and the function that converts coordinates.
 
     Raises:
         FloorPlanError: The units of the file are unclear.
@@ -260,7 +260,7 @@ def _coordinates(value: object, depth: int, least: int, where: str) -> Any:
     Args:
         value: The coordinates in the file.
         depth: Levels of lists above positions: 0 for a position itself.
-        least: Number of different positions that a line or ring has.
+        least: Minimum number of distinct positions of a line or ring.
         where: Their place in the file, for messages.
     """
     if depth == 0:

@@ -191,7 +191,7 @@ class ObjectUse(FileModel):
     """How an object is used.
 
     Attributes:
-        blocks: Whether it blocks nothing, bodies, or bodies and sight.
+        blocks: What it blocks: nothing, bodies, or bodies and sight.
         heading: Direction of its front.
         uses: Places to use it from.
     """

@@ -55,7 +55,7 @@ MIN_ROOM_M2, MIN_ROOM_WIDTH_M = 0.5, 0.4
 MIN_REST_M2, MIN_REST_WIDTH_M = 2.5, 0.8
 """Least area and width of a room without a label …"""
 REST_SHARE, REST_SHARE_OF_ONE = 0.06, 0.3
-"""… and its least share of a chamber that has several labels, or only one."""
+"""… and its minimum share of a chamber that has several labels, or only one."""
 
 
 @dataclass
@@ -71,8 +71,8 @@ class ChamberLabels:
     """The rooms that chambers and boxes make.
 
     Attributes:
-        of_cell: For each free cell the number of its box, or from the number of boxes on that of
-            a room that no box claims; -1 where not free. int32 (rows, columns).
+        of_cell: For each free cell the number of its box; rooms that no box claims are numbered
+            after the boxes; -1 where not free. int32 (rows, columns).
         rests: Number of rooms that no box claims.
         merged: For each box the box that gets its labels: itself, or one that covers it.
         dropped: For each box that is not a room the reason; by box.

@@ -28,7 +28,7 @@ from fleet2d.floorplan.synthetic.slicing import (
 )
 from fleet2d.runtime.determinism import sum_in_order
 
-JAMB = 2  # least distance of a door from the corner of a room [units]
+JAMB = 2  # minimum distance of a door from the corner of a room [units]
 
 
 class Gap(NamedTuple):
@@ -116,7 +116,7 @@ class Access:
 
 
 def link_rooms(layout: RoomLayout, walls: Sequence[Wall], widths: Widths) -> Access | None:
-    """Return the tree of links that joins all rooms at the least cost, or None if there is none.
+    """Return the tree of links that joins all rooms at the lowest cost, or None if there is none.
 
     Prim's algorithm from the entryway, else the living room. Nobody has to pass through a private
     room, except to the bathroom or wardrobe that belongs to it.

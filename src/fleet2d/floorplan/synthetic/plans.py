@@ -311,7 +311,7 @@ def _strip(groups: Sequence[RoomGroup]) -> Strip:
 def _squarest_wing(
     wings: Sequence[Wing], areas: Mapping[int, float], briefs: Sequence[Brief]
 ) -> Wing | None:
-    """Return the wing whose rooms are least slender, or None where none fits."""
+    """Return the wing with the squarest rooms, or None where none fits."""
     best, least = None, 0.0
     for wing in wings:
         rooms = wing.place(areas)

@@ -1,4 +1,4 @@
-"""The program of a synthetic home: its rooms and their sizes, drawn within what is asked for."""
+"""The program of a synthetic home: its rooms and their sizes, drawn to fit the request."""
 
 import hashlib
 from collections.abc import Sequence
@@ -158,16 +158,16 @@ class Wishes:
     garage: bool | None = None
 
 
-def least_area(bedrooms: int, bathrooms: int, garage: bool) -> float:
-    """Return the least area [m²] of a home with so many rooms."""
+def minimum_area(bedrooms: int, bathrooms: int, garage: bool) -> float:
+    """Return the minimum area [m²] of a home with these rooms."""
     kinds = [*_base(bedrooms, bathrooms), *["garage"] * garage]
     # All but the smallest homes need a corridor, and some room for fitting walls to each other.
     spare = 1.15 if bedrooms == bathrooms == 1 else min(1.5 + 0.05 * (bedrooms + bathrooms), 2.0)
     return round(spare * fsum(SIZES[kind].min_area for kind in kinds), 1)
 
 
-def most_area(bedrooms: int, bathrooms: int) -> float:
-    """Return the largest area [m²] of a home with so many rooms and all optional ones."""
+def maximum_area(bedrooms: int, bathrooms: int) -> float:
+    """Return the largest area [m²] of a home with these rooms and all optional ones."""
     kinds = [*_base(bedrooms, bathrooms), "garage", *(kind for kind, _, _ in OPTIONAL)]
     return round(0.56 * fsum(SIZES[kind].max_area for kind in kinds), 1)
 
@@ -199,22 +199,22 @@ def settle_wishes(wishes: Wishes, choices: Choices) -> Wishes:
     area = wishes.area_m2
     if area is None:
         area = _draw_area(choices)
-        most = most_area(wishes.bedrooms or MAX_ROOMS_PER_TYPE, baths)
-        area = round(min(max(area, 1.25 * least_area(beds, baths, garage)), most), 1)
+        most = maximum_area(wishes.bedrooms or MAX_ROOMS_PER_TYPE, baths)
+        area = round(min(max(area, 1.25 * minimum_area(beds, baths, garage)), most), 1)
     _check(area, wishes)
     if wishes.bedrooms is None:
         least = beds
         beds = min(max((round(area) + choices.between(-36, 36) + 38) // 66, least), 6)
-        while beds > least and least_area(beds, baths, garage) > 0.8 * area:
+        while beds > least and minimum_area(beds, baths, garage) > 0.8 * area:
             beds -= 1
-        while beds < MAX_ROOMS_PER_TYPE and most_area(beds, baths) < area:
+        while beds < MAX_ROOMS_PER_TYPE and maximum_area(beds, baths) < area:
             beds += 1
     if wishes.bathrooms is None:
         baths = min(max((45 * beds + round(area) // 3 + choices.between(-45, 45)) // 100, 1), 4)
-        while baths > 1 and least_area(beds, baths, garage) > 0.8 * area:
+        while baths > 1 and minimum_area(beds, baths, garage) > 0.8 * area:
             baths -= 1
     if wishes.garage is None:
-        garage = area > 95 and choices.chance(42) and least_area(beds, baths, True) < 0.8 * area
+        garage = area > 95 and choices.chance(42) and minimum_area(beds, baths, True) < 0.8 * area
     return Wishes(area, beds, baths, garage)
 
 
@@ -235,12 +235,12 @@ def _check(area: float, wishes: Wishes) -> None:
             f"a synthetic home with {_count(beds, 'bedroom')} has at most {beds + 2} bathrooms, not"
             f" {baths}: give it more bedrooms (floorplan.bedrooms) or fewer bathrooms"
         )
-    least, most = least_area(beds, baths, garage), most_area(beds, baths)
+    least, most = minimum_area(beds, baths, garage), maximum_area(beds, baths)
     rooms = f"{_count(beds, 'bedroom')} and {_count(baths, 'bathroom')}"
     if garage:
         rooms += " and a garage"
     if area < least:
-        fits = [n for n in range(1, beds) if least_area(n, 1, garage=False) <= area]
+        fits = [n for n in range(1, beds) if minimum_area(n, 1, garage=False) <= area]
         at_most = f"; {area:g} m2 fits {_count(max(fits), 'bedroom')}" if fits else ""
         raise FloorPlanError(
             f"a synthetic home of {area:g} m2 can't have {rooms}: they need at least {least:g} m2"

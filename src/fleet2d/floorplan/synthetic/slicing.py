@@ -225,7 +225,7 @@ def choose_squarest(
     sides: tuple[int, int, int, int],
     mouths: Sequence[Mouth] = (),
 ) -> list[Box]:
-    """Return the rooms of that tree in which they are least slender; of equals, the first.
+    """Return the rooms of the tree that makes them squarest, the first if tied.
 
     Args:
         trees: The trees to choose from.

@@ -91,7 +91,7 @@ def format_of(path: Path) -> str:
 
 @contextmanager
 def new_file(path: Path) -> Iterator[BinaryIO]:
-    """Yield a file that is there, whole, after the block, and replaces one of the same name.
+    """Yield a file that appears, complete, after the block, replacing one of the same name.
 
     Raises:
         RunDirectoryError: It can't be written.

@@ -1,4 +1,4 @@
-"""ROS 2 messages as a bag in SQLite, which every ROS 2 can play: needs the extra `ros`."""
+"""ROS 2 messages as a bag in SQLite, which any ROS 2 can play: needs the extra `ros`."""
 
 from pathlib import Path
 
@@ -9,7 +9,7 @@ from fleet2d.runs.run import Run
 
 
 def export(run: Run, path: Path, part: Selection) -> str:
-    """Write the same messages as the exporter `mcap` as a folder that `ros2 bag play` takes.
+    """Write the same messages as the exporter `mcap` as a folder that `ros2 bag play` accepts.
 
     Args:
         run: A run with key frames.
