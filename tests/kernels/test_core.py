@@ -37,6 +37,7 @@ from fleet2d.kernels.space import Corners
 from fleet2d.sight.camera import Camera, TableContext, error_tables, stack_lenses
 from fleet2d.sight.perception import Perception
 
+ROOT = Path(__file__).parents[2]
 PACKAGE = Path(fleet2d.__file__).parent
 SOURCES = sorted(PACKAGE.rglob("*.py"))
 PUBLIC = {name: value for name, value in vars(_core).items() if not name.startswith("_")}
@@ -137,7 +138,7 @@ NAMED_TUPLES = {
 def test_named_tuples_have_the_members_of_their_structs_in_order() -> None:
     """Tuples become structs by position, so two fields in another order would be taken for each other."""
     members = {}
-    for path in (PACKAGE.parents[1] / "src" / "core" / "python").iterdir():
+    for path in (ROOT / "src" / "core" / "python").iterdir():
         text = path.read_text(encoding="utf-8")
         for match in re.finditer(r"members_of<(\w+)> =\s*std::tuple\((.*?)\);", text, re.S):
             members[match[1]] = tuple(re.findall(r"::(\w+)", match[2]))
