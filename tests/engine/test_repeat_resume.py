@@ -187,7 +187,7 @@ def test_a_run_with_a_link_in_it_is_not_gone_on_with(tmp_path: Path, name: str) 
         ("rows", [[0, 12257, 7521, 0, 7]], "away must be 0 or 1"),
         ("walk", [1, 2], "plan: walk"),
         ("notes", [[0, "calls"]], r"plan: notes\.0"),
-        ("postures", [[0, 99]], "99 is the number of no posture"),
+        ("postures", [[0, 99]], "no posture has the number 99"),
         ("interrupts", ["never"], "no event 'never' interrupts"),
         ("asks_us", "soon", "plan: asks_us"),
     ],

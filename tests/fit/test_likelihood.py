@@ -95,8 +95,8 @@ class Known:
     """A factor without parameters."""
 
     names: tuple[str, ...] = ()
-    least: tuple[float, ...] = ()
-    most: tuple[float, ...] = ()
+    lower: tuple[float, ...] = ()
+    upper: tuple[float, ...] = ()
     starts: tuple[tuple[float, ...], ...] = ((),)
 
     def __init__(self, factor: F64) -> None:

@@ -63,9 +63,9 @@ def test_same_layer_may_be_added_twice_and_another_of_its_name_not(home: Home) -
         (("a", "int", 0.5), "no int can be 0.5"),
         (("a", "int", float("nan")), "no int can be nan"),
         (("a", "float32", 1e300), "no float32 can be"),
-        (("explored",), "the run keeps itself"),
-        (("explored.astro",), "the run keeps itself"),
-        (("costmap",), "the run keeps itself"),
+        (("explored",), "the run maintains itself"),
+        (("explored.astro",), "the run maintains itself"),
+        (("costmap",), "the run maintains itself"),
     ],
 )
 def test_wrong_layer_is_refused(home: Home, arguments: Any, why: str) -> None:

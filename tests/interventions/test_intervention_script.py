@@ -6,7 +6,7 @@ import pytest
 
 from fleet2d.errors import ScenarioError
 from fleet2d.interventions.intervention import (
-    WHEN,
+    ENTRY_KEYS,
     Entry,
     dump_intervention,
     parse_entry,
@@ -66,7 +66,7 @@ def test_a_wrong_entry_is_refused_and_says_what_is_wrong(
 
 
 def test_no_key_of_an_intervention_is_a_verb_or_has_a_meaning_beside_it() -> None:
-    taken = {*verbs(), *WHEN, "do", "step", "by"}
+    taken = {*verbs(), *ENTRY_KEYS, "do", "step", "by"}
     for verb, cls in verbs().items():
         assert cls.subject in cls.model_fields
         assert not taken & (cls.model_fields.keys() - {cls.subject}), verb

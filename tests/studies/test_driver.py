@@ -321,7 +321,7 @@ def test_a_file_that_changes_during_a_study_fails_its_variants(
 
     counts, study = run(failing, tmp_path / "study", Meddling())
     assert 3 == counts.failed
-    assert {driver.CHANGED} == set(study.failures["error"])
+    assert {driver.CHANGED_MESSAGE} == set(study.failures["error"])
 
 
 @pytest.mark.parametrize("workers", some([2, 1, 4], 3))

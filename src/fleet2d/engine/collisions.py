@@ -19,7 +19,7 @@ from fleet2d.engine.bodies import Basis, Bodies, Watcher, poses_of
 from fleet2d.entities.behavior import Situation
 from fleet2d.entities.decisions import DecidingActor
 from fleet2d.entities.entity import Robot
-from fleet2d.entities.giving_way import TOUCHING, Surroundings, plan_after_step, plan_around
+from fleet2d.entities.giving_way import TOUCHING_GAP_M, Surroundings, plan_after_step, plan_around
 from fleet2d.entities.plan import Note, Plan
 from fleet2d.kernels import I64, U8, Bool
 from fleet2d.kernels.motion import Poses
@@ -27,7 +27,7 @@ from fleet2d.kernels.sight import line_of_sight
 from fleet2d.kernels.space import locate
 
 # Time for which a body ignores another one that it goes round or squeezes past.
-PASSES = timedelta(seconds=10)
+PASSING_TIME = timedelta(seconds=10)
 
 
 class Wait(NamedTuple):
@@ -131,7 +131,7 @@ class BlockedWays(Watcher):
             self._waits[row] = Wait(since, step + 1, other)
         else:
             plan = plan_around(now, actor.plan, clear)
-            until = step + micros(PASSES) // step_us + 1
+            until = step + micros(PASSING_TIME) // step_us + 1
             self._waits[row] = Wait()
             self._passes[row] = Pass(until, other)
         if plan is not None:
@@ -303,7 +303,7 @@ class Clearance(Watcher):
         first_meeting: tuple[int, int] | None = None
         now_x, now_y, next_x, next_y = x[moves], y[moves], x[moves + 1], y[moves + 1]
         gap = np.where(
-            first + moves < robot.passes_until, TOUCHING, robot.entity.gives_way.distance
+            first + moves < robot.passes_until, TOUCHING_GAP_M, robot.entity.gives_way.distance
         )
         for number, user in enumerate(self._users):
             clearance = user.entity.radius + robot.entity.radius + gap

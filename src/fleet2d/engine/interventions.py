@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 from fleet2d.configuration.units import micros
 from fleet2d.interventions.intervention import (
-    WHEN,
+    ENTRY_KEYS,
     Intervention,
     Lasting,
     Trigger,
@@ -148,7 +148,7 @@ class Interventions:
 
     def _record(self, due: DueIntervention) -> None:
         request = self.requests[due.number] if due.rank == OUTSIDE else None
-        if request is not None and WHEN.isdisjoint(request):
+        if request is not None and ENTRY_KEYS.isdisjoint(request):
             self.done.append(request)
             self._origins.append("")
         else:

@@ -129,7 +129,7 @@ def _sensor_table(sensors: Sensors) -> TableSpec:
 
 
 # Events whose detail is a user, who has a column of their own.
-OF_USERS = frozenset({EventKind.USER_LOST, EventKind.USER_SEEN})
+USER_EVENTS = frozenset({EventKind.USER_LOST, EventKind.USER_SEEN})
 ACTIVITY = EventKind.ACTIVITY.value
 # Rows that are collected before they are stored: so many, or more with many bodies.
 MAX_ROWS = 1 << 15
@@ -294,7 +294,7 @@ class Recorder:
         ranks = np.array([RANKS.get(name, 0) for name in kind], np.int8)
         order = np.lexsort((ranks, rows, steps))
         kinds, details = ([column[i] for i in order.tolist()] for column in (kind, detail))
-        of_users = [i for i, name in enumerate(kinds) if name in OF_USERS]
+        of_users = [i for i, name in enumerate(kinds) if name in USER_EVENTS]
         columns: dict[str, Any] = self._times(steps[order])
         if users:
             user = np.full(len(kinds), -1, np.int32)

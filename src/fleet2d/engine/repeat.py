@@ -35,7 +35,7 @@ from fleet2d.storage.files import path_in, refuse_links
 _COMPARED_APART = frozenset({"digest", "format", "scenario", "seal", "status", "tables", "notes"})
 
 # The name of an expectation while a run is judged by it; names in scenarios have no spaces.
-JUDGED = "what is judged"
+JUDGED_NAME = "what is judged"
 
 
 @dataclass(frozen=True)
@@ -123,7 +123,7 @@ def judge_again(run: Run, expectation: Expectation | str, name: str = "") -> Ver
         refuse_untrusted(run.directory, content["scenario"], content["interventions"], trust)
     with restrict(trust) if run.directory is not None else nullcontext():
         simulation = _simulation(content, None)
-        label = simulation.expect(expectation, JUDGED)
+        label = simulation.expect(expectation, JUDGED_NAME)
         new = simulation.run()
     tables = set(_tables(content["tables"], new.manifest["tables"])) - {TABLE}
     if tables:

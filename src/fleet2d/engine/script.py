@@ -27,7 +27,7 @@ from fleet2d.entities.objects.home_object import SensorFault
 from fleet2d.errors import ScenarioError
 from fleet2d.floorplan.home import Home, HomeChange
 from fleet2d.interventions.intervention import (
-    WHEN,
+    ENTRY_KEYS,
     ClockTime,
     Entry,
     Intervention,
@@ -170,7 +170,7 @@ def request(state: State, act: Mapping[str, Any] | Intervention, step: int) -> b
         PlacementError: There is no such place, or it can't be reached.
     """
     world = EngineWorld(state, step)
-    if isinstance(act, Mapping) and not WHEN.isdisjoint(act):
+    if isinstance(act, Mapping) and not ENTRY_KEYS.isdisjoint(act):
         entry = parse_entry(act)
         _check(entry, world)
         _schedule(state, entry, world)
@@ -186,7 +186,7 @@ def repeat(state: State, records: Iterable[Mapping[str, Any]]) -> None:
     """Schedule the requests of another run, by their records in its manifest."""
     for record in records:
         step, content = read_record(record)
-        if WHEN.isdisjoint(content):
+        if ENTRY_KEYS.isdisjoint(content):
             state.interventions.request(parse_intervention(content), step)
         else:
             _schedule(state, parse_entry(content), EngineWorld(state, step))
@@ -267,21 +267,21 @@ def steps_of(entry: Entry, clock: Clock, first: int) -> list[int]:
 # The events that can happen
 
 # Events of every person: an order can cause them if no behavior does.
-OF_PEOPLE = frozenset(
+PERSON_EVENTS = frozenset(
     {EventKind.ACTIVITY, EventKind.CAME_HOME, EventKind.LEFT_HOME, EventKind.USES}
 )
-OF_DOORS = frozenset({EventKind.OPENED, EventKind.SHUT, EventKind.LOCKED, EventKind.UNLOCKED})
-OF_HOME = frozenset({EventKind.MOVED, EventKind.ROOM_CHANGED})
+DOOR_EVENTS = frozenset({EventKind.OPENED, EventKind.SHUT, EventKind.LOCKED, EventKind.UNLOCKED})
+HOME_EVENTS = frozenset({EventKind.MOVED, EventKind.ROOM_CHANGED})
 
 
 def possible_events(world: EngineWorld) -> dict[str, frozenset[str]]:
     """Return the kinds of events that can happen to each entity, by name; "" is the home."""
     robot_events = {EventKind.CALLED}
-    kinds = {name: _kinds_of(user, world, OF_PEOPLE) for name, user in world.users.items()}
+    kinds = {name: _kinds_of(user, world, PERSON_EVENTS) for name, user in world.users.items()}
     kinds |= {name: _kinds_of(robot, world, robot_events) for name, robot in world.robots.items()}
-    kinds |= dict.fromkeys(world.doors, OF_DOORS)
+    kinds |= dict.fromkeys(world.doors, DOOR_EVENTS)
     kinds |= dict.fromkeys(world.sensors, frozenset({EventKind.SENSOR}))
-    return {"": OF_HOME} | kinds
+    return {"": HOME_EVENTS} | kinds
 
 
 def check_trigger(world: EngineWorld, trigger: Trigger) -> None:

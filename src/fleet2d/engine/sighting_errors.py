@@ -58,7 +58,7 @@ def sight_events(
 Place = tuple[I64, I64, I64]  # x, y [lattice units] and heading, one element for each look
 
 # The user of a sighting that an error took back, until it would have become known.
-TAKEN_BACK = -2
+RETRACTED = -2
 
 
 class CameraErrors(NamedTuple):
@@ -124,7 +124,7 @@ class SightingErrors:
             body = poses[0][at], poses[1][at], poses[2][at]
             part[is_new] = self._change(c, part[is_new], looks[is_new], body, memory)
             rows[here], memory.backlog[c, places] = part[: len(here)], part[len(here) :]
-        is_kept = rows[:, Column.USER] != TAKEN_BACK
+        is_kept = rows[:, Column.USER] != RETRACTED
         differs = not is_kept.all() or bool((rows[:, Column.IDENTITY] != identities).any())
         if differs:
             memory.noticed[:], memory.seen[:] = before.noticed, before.seen
@@ -140,7 +140,7 @@ class SightingErrors:
             _write(rows, old, new, self._owner.home.plan.lattice)
             missed = rows[~new.noticed & (rows[:, Column.USER] != NOBODY), Column.USER]
             np.subtract.at(memory.about, (c, missed, About.NOTICED.value), 1)
-            rows[~new.noticed, Column.USER] = TAKEN_BACK
+            rows[~new.noticed, Column.USER] = RETRACTED
         if self._drift is not None:
             x, y, _ = body
             rows[:, Column.X], rows[:, Column.Y] = self._drift.misplace(

@@ -27,7 +27,13 @@ from fleet2d.entities.behavior import (
     holds,
 )
 from fleet2d.entities.body import Pose
-from fleet2d.entities.giving_way import JUST_WAITED, GivesWay, Surroundings, WaitForPeople, resumed
+from fleet2d.entities.giving_way import (
+    REPEATED_WAIT,
+    GivesWay,
+    Surroundings,
+    WaitForPeople,
+    resumed,
+)
 from fleet2d.entities.place import Point, RoomChoice
 from fleet2d.entities.plan import Plan
 from fleet2d.errors import ComponentError, NoWayError, PlacementError, blame
@@ -429,7 +435,7 @@ class DecidingActor(Actor):
     @property
     def _just_waited(self) -> int:
         """The steps after a wait within which another one counts as its continuation."""
-        return micros(JUST_WAITED) // self.clock.step_us + 1
+        return micros(REPEATED_WAIT) // self.clock.step_us + 1
 
     @property
     def waiting(self) -> WaitForPeople | None:

@@ -127,14 +127,14 @@ def heading_at(track: Breakpoints, stop: int, time_us: int) -> int:
 
 # Time between two looks whether the way is clear again: a tenth of the time waited so far, within
 # these limits.
-LOOKS_EVERY = timedelta(seconds=1), timedelta(seconds=10)
+LOOK_INTERVALS = timedelta(seconds=1), timedelta(seconds=10)
 # A wait that begins this soon after another one continues it. For this long after going round
-# people begins, the robot may come as near to them as TOUCHING.
-JUST_WAITED = timedelta(seconds=15)
+# people begins, the robot may come as near to them as TOUCHING_GAP_M.
+REPEATED_WAIT = timedelta(seconds=15)
 # Gap between the bodies at which it passes a person where there is no more room, and the gap below
 # which it counts as touching [m].
-PASSING = 0.1
-TOUCHING = 0.03
+PASSING_GAP_M = 0.1
+TOUCHING_GAP_M = 0.03
 
 
 class GivesWay(Settings):
@@ -213,7 +213,7 @@ class WaitForPeople:
         return look
 
     def _look_after(self, look: int) -> int:
-        shortest, longest = (micros(interval) for interval in LOOKS_EVERY)
+        shortest, longest = (micros(interval) for interval in LOOK_INTERVALS)
         interval = min(max(shortest, self._waited(look) // 10), longest)
         return look + max(-(-interval // self._step_us), 1)
 
@@ -251,7 +251,7 @@ class WaitForPeople:
             distance: The gap to keep where there is room [m].
         """
         actor, lattice = now.actor, now.actor.home.plan.lattice
-        for gap in (max(distance, PASSING) + lattice.cell, PASSING):
+        for gap in (max(distance, PASSING_GAP_M) + lattice.cell, PASSING_GAP_M):
             around = people + np.array([0, 0, int(gap * lattice.units_per_m)], np.int64)
             plan, detour = self._stand_for_a_step(now), RoutesAround(actor, around)
             rest = resumed(actor, plan, self.interrupted, self.step, detour)

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 ANY = "any"
 # Separates a piece of furniture from its owner: "bed of ana".
-OF = " of "
+OWNER_SEPARATOR = " of "
 
 RoomChoice = tuple[str, ...]
 Point = tuple[float, float]
@@ -49,7 +49,7 @@ def parse_place(value: object) -> RoomChoice | Point:
         ('bed of ana',)
     """
     if isinstance(value, Mapping) and set(value) == {"object", "of"}:
-        value = f"{value['object']}{OF}{value['of']}"
+        value = f"{value['object']}{OWNER_SEPARATOR}{value['of']}"
     if isinstance(value, str) and value:
         return (value,)
     if isinstance(value, Sequence) and value and not isinstance(value, str):
@@ -144,9 +144,9 @@ def matching_rooms(
         )
     choices = [room.name for room in rooms] + sorted({room.type for room in rooms})
     choices += [thing.name for thing in objects] + sorted({thing.type for thing in objects})
-    close = difflib.get_close_matches(names[0].split(OF)[0], choices, n=1)
+    close = difflib.get_close_matches(names[0].split(OWNER_SEPARATOR)[0], choices, n=1)
     hint = f"; did you mean {close[0]!r}?" if close else ""
-    if any(name.split(OF)[0] in (t.name, t.type) for name in names for t in objects):
+    if any(name.split(OWNER_SEPARATOR)[0] in (t.name, t.type) for name in names for t in objects):
         raise PlacementError(f"no place from which {requested} is used can be reached")
     raise PlacementError(
         f"there is no room {requested}{hint or '.'} The rooms are: {room_names}."
@@ -178,8 +178,8 @@ def furniture_of(body: "Body", place: RoomChoice | Point) -> PlacedObject | None
         ]
         if pieces:
             return Draws(body.stream(f"object of {name}"), 0).choice(pieces)
-        if OF in str(name):
-            owned = _owned(body, *str(name).split(OF, 1))
+        if OWNER_SEPARATOR in str(name):
+            owned = _owned(body, *str(name).split(OWNER_SEPARATOR, 1))
             if owned is not None and _gets_to(body, owned):
                 return owned
     return None

@@ -402,7 +402,7 @@ def _check_note(note: list[Any]) -> list[Any]:
 def _check_posture(change: list[int]) -> list[int]:
     _, code = change
     if not 0 <= code < len(POSTURES):
-        raise ValueError(f"{code} is the number of no posture")
+        raise ValueError(f"no posture has the number {code}")
     return change
 
 

@@ -475,7 +475,7 @@ class _CameraCondition(Condition):
             )
 
 
-SEEN = (EventKind.USER_SEEN, EventKind.ROBOT_SEEN)
+SEEN_EVENTS = (EventKind.USER_SEEN, EventKind.ROBOT_SEEN)
 LOST = (EventKind.USER_LOST, EventKind.ROBOT_LOST)
 
 
@@ -489,11 +489,11 @@ class seen(_CameraCondition):
     def measure(self, block: SignalBlock, gauge: Gauge) -> Trace:
         """Return 1 while it counts as seen."""
         changes = (
-            (event.step, float(event.event in SEEN))
+            (event.step, float(event.event in SEEN_EVENTS))
             for event in block.events
             if event.entity == self.by
             and event.detail == self.body
-            and event.event in (*SEEN, *LOST)
+            and event.event in (*SEEN_EVENTS, *LOST)
         )
         return gauge.switched(block, changes)
 
@@ -509,7 +509,7 @@ class in_view(_CameraCondition):
     def measure(self, block: SignalBlock, gauge: Gauge) -> Trace:
         """Return 1 while it is in view."""
         looks = gauge.memory.look(block.end)
-        changes = ((e.step, float(e.event in SEEN)) for e in looks if e.detail == self.body)
+        changes = ((e.step, float(e.event in SEEN_EVENTS)) for e in looks if e.detail == self.body)
         return gauge.switched(block, changes)
 
 

@@ -22,10 +22,10 @@ with extra("calibrate", "calibration needs scipy"):
 
 
 CHI_SQUARE_95 = 3.8414588206941236  # one degree of freedom
-NEVER = 1e-12  # minimum distance of probabilities from 0 and 1
-ENOUGH = 1e-10  # the search ends when a round gains less log-likelihood than this
+PROBABILITY_MARGIN = 1e-12  # minimum distance of probabilities from 0 and 1
+MIN_GAIN = 1e-10  # the search ends when a round gains less log-likelihood than this
 MAX_ROUNDS = 200
-SURE = 12.0  # logits from here on count as a share of 1
+SURE_LOGIT = 12.0  # logits from here on count as a share of 1
 
 
 class Factor:
@@ -131,11 +131,13 @@ class ProductLikelihood:
         for factor in self.factors:
             count = len(factor.names)
             share, slope = factor.shares(theta[index : index + count])
-            share = np.maximum(share, NEVER)
+            share = np.maximum(share, PROBABILITY_MARGIN)
             shares = shares * share
             slopes.append(slope / share[:, None])
             index += count
-        return np.clip(shares, NEVER, 1 - NEVER), np.concatenate(slopes, axis=1)
+        return np.clip(shares, PROBABILITY_MARGIN, 1 - PROBABILITY_MARGIN), np.concatenate(
+            slopes, axis=1
+        )
 
     def _value(self, shares: F64) -> float:
         """Return the log-likelihood of the probabilities of the rows."""
@@ -163,7 +165,7 @@ class ProductLikelihood:
                 continue
             theta, shares, slopes, value = trial, trial_shares, trial_slopes, value + gain
             damping /= 10
-            if gain < ENOUGH:
+            if gain < MIN_GAIN:
                 break
         return Fit(theta, value, shares)
 
@@ -210,18 +212,18 @@ def wilson(hits: int, total: int) -> ParameterEstimate:
 
 
 def share_of(logit: float) -> float:
-    """Return the probability that a logit stands for, exactly 1 from SURE on.
+    """Return the probability that a logit stands for, exactly 1 from SURE_LOGIT on.
 
-    >>> share_of(0.0), share_of(SURE)
+    >>> share_of(0.0), share_of(SURE_LOGIT)
     (0.5, 1.0)
     """
-    return 1.0 if logit >= SURE else 1 / (1 + math.exp(-logit))
+    return 1.0 if logit >= SURE_LOGIT else 1 / (1 + math.exp(-logit))
 
 
 class Constant(Factor):
     """The same factor for every row."""
 
-    least, most = (-SURE,), (SURE,)
+    lower, upper = (-SURE_LOGIT,), (SURE_LOGIT,)
     starts = ((2.0,),)
 
     def __init__(self, name: str, rows: int) -> None:
@@ -266,7 +268,7 @@ class Orientation(Factor):
     """
 
     names = ("side", "back")
-    least, most = (-SURE, -SURE), (SURE, SURE)
+    lower, upper = (-SURE_LOGIT, -SURE_LOGIT), (SURE_LOGIT, SURE_LOGIT)
     starts = ((2.0, 1.0),)
 
     def __init__(self, degrees: F64) -> None:

@@ -19,12 +19,12 @@ from fleet2d.runtime.determinism import sum_in_order
 UNKNOWN_STATE = -1
 # Silence up to this counts as staying in the room, in general and in one room.
 HOLD = timedelta(hours=3)
-STILL = timedelta(hours=12)
-OUT = timedelta(minutes=10)  # a longer silence at the front door counts as being out
+MAX_STILLNESS = timedelta(hours=12)
+MIN_ABSENCE = timedelta(minutes=10)  # a longer silence at the front door counts as being out
 # An activity in a room with less time and fewer runs than this loses its name.
 RARE_MINUTES, RARE_RUNS = 30, 4
 # Being up for up to this long in the night doesn't end the night [min].
-UP_AT_NIGHT = 60
+MAX_NIGHT_WAKING = 60
 SHORTEST_NIGHT = 120  # min
 NOON = DAY_MINUTES // 2
 HOURS = 24
@@ -91,9 +91,9 @@ def read_seconds(log: ActivityLog) -> tuple[list[ActivityPlace], I16]:
         begin_us=0,
         steps=log.days * DAY_S,
         gap_us=micros(HOLD),
-        still_us=micros(STILL),
+        still_us=micros(MAX_STILLNESS),
         unknown=True,
-        door_us=micros(OUT),
+        door_us=micros(MIN_ABSENCE),
     )
     return _by_second(visits_of(log, kinds, rule).visits, rule.steps)
 
@@ -240,7 +240,7 @@ def _nights(asleep: Bool, days: int) -> dict[int, tuple[int, int]]:
     sleeps = [[begin, begin + n] for value, begin, n in runs(asleep.astype(np.int16)) if value]
     joined: list[list[int]] = []
     for begin, end in sleeps:
-        if joined and begin - joined[-1][1] <= UP_AT_NIGHT:
+        if joined and begin - joined[-1][1] <= MAX_NIGHT_WAKING:
             joined[-1][1] = end
         else:
             joined.append([begin, end])

@@ -16,8 +16,8 @@ from fleet2d.runtime.determinism import Draws, stream_key
 
 # Sizes are drawn in steps of this [m].
 STEP = 0.05
-# Least and largest distance of the television from the sofa's back [m].
-WATCHING = (2.0, 6.5)
+# Smallest and largest distance of the television from the sofa's back [m].
+TV_DISTANCES_M = (2.0, 6.5)
 # Types of rooms for a robot's charger, the best first.
 CHARGER_ROOMS = ("hallway", "hall", "entryway", "lobby", "living_room", "dining_room", "office")
 CHAIR_M = 0.45
@@ -124,7 +124,9 @@ def _place_tv(interior: Interior, room: Room, first: int, draws: Draws) -> None:
         rows, columns = np.indices(shape)
         off = np.abs(2 * columns + size[0] - round(2 * u))  # in half cells
         ahead = (v - rows) * cell
-        is_watchable = (ahead > WATCHING[0]) & (ahead < WATCHING[1]) & (off * cell < 2.0)
+        is_watchable = (
+            (ahead > TV_DISTANCES_M[0]) & (ahead < TV_DISTANCES_M[1]) & (off * cell < 2.0)
+        )
         return np.where(is_watchable, 4000 - 10 * off, -1).astype(np.int64)
 
     view = interior.view(room)

@@ -81,7 +81,8 @@ def check_layers(layers: dict[str, LayerSettings]) -> dict[str, LayerSettings]:
                 if key in ("store", "every") or getattr(settings, key) == value:
                     continue  # a stored scenario has all keys
                 raise problem_at(
-                    (name, key), f"{name} is a layer that the run keeps itself: leave out {key!r}"
+                    (name, key),
+                    f"{name} is a layer that the run maintains itself: leave out {key!r}",
                 )
     return layers
 
@@ -257,7 +258,9 @@ class Layers(Mapping[str, Layer]):
         if not holds(np.dtype(dtype), fill):
             raise ComponentError(f"layer {name!r}: no {dtype} can be {fill:g}, its fill")
         if name.partition(".")[0] in (*SEEN_LAYERS, COSTMAP):
-            raise ComponentError(f"layer {name!r} is one that the run keeps itself: rename yours")
+            raise ComponentError(
+                f"layer {name!r} is one that the run maintains itself: rename yours"
+            )
         settings = LayerSettings.model_construct(
             dtype=dtype, fill=fill, unit=unit, description=description, store=store, every=every
         )

@@ -452,7 +452,7 @@ On = Annotated[
 
 
 # The keys that stand beside those of an intervention.
-WHEN = frozenset({"at", "on", "each", "delay"})
+ENTRY_KEYS = frozenset({"at", "on", "each", "delay"})
 
 
 class Entry(Settings):
@@ -488,8 +488,11 @@ class Entry(Settings):
         """Move the keys of the intervention, which are written beside its time, into `act`."""
         if not isinstance(data, dict) or "act" in data:
             return data
-        times = {key: value for key, value in data.items() if key in WHEN}
-        return {**times, "act": {key: value for key, value in data.items() if key not in WHEN}}
+        times = {key: value for key, value in data.items() if key in ENTRY_KEYS}
+        return {
+            **times,
+            "act": {key: value for key, value in data.items() if key not in ENTRY_KEYS},
+        }
 
     @classmethod
     def _explain(cls, line: InitErrorDetails, data: Any) -> InitErrorDetails:

@@ -28,7 +28,7 @@ from fleet2d.runtime.clock import DAY_S, HOUR_US, midnight_of
 # Clearance that a person needs to walk from room to room [m].
 RADIUS = 0.2
 MEAN = "mean"
-SHOWN = ("tv", "earth_mover_m", "inside", "burn_in_day")  # in the closing table
+SUMMARY_MEASURES = ("tv", "earth_mover_m", "inside", "burn_in_day")  # in the closing table
 COLUMNS = ("tv", "js", "kl", "max_gap", "mean_gap", "tau")
 
 
@@ -411,7 +411,7 @@ class LtpError(LongTermMetric):
         """Return each user's total variation, earth mover's distance [m] and burn-in day."""
         has_one_user = len(result) == 2  # whose row is equal to that of anyone
         return {
-            user: {name: row[name] for name in SHOWN if name in row}
+            user: {name: row[name] for name in SUMMARY_MEASURES if name in row}
             for user, row in result.items()
             if not (has_one_user and user == ANYONE)
         }

@@ -21,13 +21,13 @@ from fleet2d.metrics.metric import Metric
 from fleet2d.runtime.determinism import sum_in_order
 
 MIN_PROBABILITY = 1e-6  # smaller probabilities are raised to this before taking logarithms
-MASSES = 15  # number of groups of about equal size, by forecast probability
+GROUP_COUNT = 15  # number of groups of about equal size, by forecast probability
 # Upper ends of the classes of the gap since a user was last seen [min], and their names.
 GAP_ENDS = (1, 5, 15, 60, 240)
 GAPS = ("0-1 min", "1-5 min", "5-15 min", "15-60 min", "1-4 h", "over 4 h", "never seen")
 UNSEEN = len(GAPS) - 1
 ALL = "all"
-SHOWN = ("log_loss", "top_1", "ece", "skill", "reference_skill")  # in the closing table
+SUMMARY_SCORES = ("log_loss", "top_1", "ece", "skill", "reference_skill")  # in the closing table
 NEVER = -1
 
 
@@ -74,7 +74,7 @@ def top_k(probability: F64, truth: I64, k: int) -> F64:
     return np.clip((k - above) / equal, 0, 1)
 
 
-def groups_of(values: F64, masses: int = MASSES) -> I64:
+def groups_of(values: F64, masses: int = GROUP_COUNT) -> I64:
     """Return the index of the group of each value: groups of about equal size, ascending.
 
     Equal values are in the same group, that of the middle of their ranks.
@@ -88,7 +88,7 @@ def groups_of(values: F64, masses: int = MASSES) -> I64:
     return (first + last - 1) // 2 * masses // max(len(values), 1)
 
 
-def calibration_error(probability: F64, truth: I64, masses: int = MASSES) -> float:
+def calibration_error(probability: F64, truth: I64, masses: int = GROUP_COUNT) -> float:
     """Return the expected calibration error: sum over groups of n_g / n |accuracy - confidence|.
 
     The groups are of about equal size by confidence, the probability of the likeliest place
@@ -103,7 +103,7 @@ def calibration_error(probability: F64, truth: I64, masses: int = MASSES) -> flo
     return _gaps(probability.max(axis=1), top_k(probability, truth, 1), masses)
 
 
-def classwise_error(probability: F64, truth: I64, masses: int = MASSES) -> float:
+def classwise_error(probability: F64, truth: I64, masses: int = GROUP_COUNT) -> float:
     """Return the class-wise calibration error: the mean of the calibration errors of all places.
 
     The error of a place is the sum over groups of n_g / n |share true - mean probability|, with
@@ -136,7 +136,7 @@ class Murphy(NamedTuple):
     uncertainty: float
 
 
-def murphy(probability: F64, truth: I64, masses: int = MASSES) -> Murphy:
+def murphy(probability: F64, truth: I64, masses: int = GROUP_COUNT) -> Murphy:
     """Return Murphy's split of the Brier score, summed over places.
 
     For each place, forecasts are put into groups of about equal size by its probability
@@ -162,7 +162,7 @@ def murphy(probability: F64, truth: I64, masses: int = MASSES) -> Murphy:
     return Murphy(reliability, reliability + uncertainty - brier, uncertainty)
 
 
-def reliability_curve(forecast: F64, true: F64, masses: int = MASSES) -> tuple[F64, F64, I64]:
+def reliability_curve(forecast: F64, true: F64, masses: int = GROUP_COUNT) -> tuple[F64, F64, I64]:
     """Return the points of a reliability diagram.
 
     Args:
@@ -423,7 +423,7 @@ class RtpScore(Metric):
     def summary(cls, result: Mapping[str, Any]) -> Mapping[str, Any]:
         """Return each user's main scores over all gaps."""
         return {
-            user: {name: scores[ALL][name] for name in SHOWN if name in scores[ALL]}
+            user: {name: scores[ALL][name] for name in SUMMARY_SCORES if name in scores[ALL]}
             for user, scores in result.items()
         }
 

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 
 MONDAY = date(2026, 1, 5)
-INTERRUPTING = (INTERRUPTS, FINISHES)
+INTERRUPTION_ROLES = (INTERRUPTS, FINISHES)
 # End of a strip [hours]: a day lasts from waking up to the next waking up.
 HOURS = 34
 SLEEP_COLOR, AWAY_COLOR, NEED_COLOR = "#3b4a63", "#e3e3e3", "#111111"
@@ -58,7 +58,7 @@ def diary_lines(name: str, persona: Persona, days: Days) -> list[str]:
     for day, episodes in days:
         lines.append(f"{WEEKDAYS[day.weekday()]}, {day}")
         for episode in episodes:
-            indent = "    " if episode.role in INTERRUPTING else ""
+            indent = "    " if episode.role in INTERRUPTION_ROLES else ""
             again = " (goes on)" if episode.role == RESUMES else ""
             away = " (out)" if persona.activity(episode.activity).away else ""
             text = f"{indent}{episode.activity.replace('_', ' ')}{away}{again}"
@@ -69,7 +69,9 @@ def diary_lines(name: str, persona: Persona, days: Days) -> list[str]:
 
 
 def _summary(days: Days) -> list[str]:
-    counts = Counter(d.activity for _, episodes in days for d in episodes if d.role in INTERRUPTING)
+    counts = Counter(
+        d.activity for _, episodes in days for d in episodes if d.role in INTERRUPTION_ROLES
+    )
     rates = ", ".join(
         f"{name.replace('_', ' ')} {count / len(days):.1f}" for name, count in counts.most_common()
     )
@@ -99,7 +101,7 @@ def draw_diary(persona: Persona, name: str, days: Days, target: Path) -> None:
         marks = [
             (episode.begin / HOUR_S, max(episode.end - episode.begin, 120) / HOUR_S)
             for episode in episodes
-            if episode.role in INTERRUPTING
+            if episode.role in INTERRUPTION_ROLES
         ]
         axes.broken_barh(marks, (row + 0.66, 0.22), facecolors=NEED_COLOR)
     axes.set_yticks(

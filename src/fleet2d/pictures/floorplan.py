@@ -49,7 +49,7 @@ NO_GO_COLOR = "#c8452f"
 
 LABEL_PT = (2.6, 5.0)
 # Width of a letter of the font, as a share of its size.
-LETTER = 0.62
+LETTER_WIDTH = 0.62
 # Corners of a circle, and of a door's quarter of one.
 CIRCLE = 24
 SWING = 12
@@ -117,8 +117,8 @@ def label_objects(plan: FloorPlan, axes: Axes) -> None:
         x0, y0, x1, y1 = item.footprint.bounds
         label = item.type.replace("_", " ")
         across, up = x1 - x0, y1 - y0
-        flat = min(across / (LETTER * len(label)), up / 1.2) * points_per_m
-        upright = min(up / (LETTER * len(label)), across / 1.2) * points_per_m
+        flat = min(across / (LETTER_WIDTH * len(label)), up / 1.2) * points_per_m
+        upright = min(up / (LETTER_WIDTH * len(label)), across / 1.2) * points_per_m
         size = min(max(flat, upright), LABEL_PT[1])
         if size < LABEL_PT[0] or item.type in UNLABELLED:
             continue
@@ -187,7 +187,7 @@ MIN_FONT_PT = 3.5
 # Width of a letter of the font as a share of its size; share of a room that its name may fill.
 FILL = 0.9
 # The middle of a room consists of cells with at least this share of its greatest squared depth.
-DEEP = 0.9
+MIDDLE_DEPTH = 0.9
 
 
 def draw_floorplan(plan: FloorPlan, path: Path) -> None:
@@ -448,7 +448,7 @@ def _write_room(plan: FloorPlan, room: Room, empty: I16, axes: Axes) -> None:
     for text in (name_and_area, room.name.rpartition("_")[2]):
         # Widths and heights in multiples of the font size.
         lines = text.split("\n")
-        width, height = LETTER * max(map(len, lines)), 1.5 * len(lines)
+        width, height = LETTER_WIDTH * max(map(len, lines)), 1.5 * len(lines)
         flat = FILL * points_per_m * min(across / width, up / height)
         upright = FILL * points_per_m * min(up / width, across / height)
         is_upright = flat < min(upright, 5.0)
@@ -467,7 +467,7 @@ def _middle(cells: Bool) -> tuple[int, int]:
     inside = np.zeros((int(rows.max()) - top + 3, int(columns.max()) - left + 3), np.bool_)
     inside[rows - top + 1, columns - left + 1] = True
     depth = squared_distance(inside)[rows - top + 1, columns - left + 1]
-    deep = np.flatnonzero(depth >= DEEP * depth.max())
+    deep = np.flatnonzero(depth >= MIDDLE_DEPTH * depth.max())
     rows, columns = rows[deep], columns[deep]
     distance = (rows - rows.mean()) ** 2 + (columns - columns.mean()) ** 2
     nearest = int(np.argmin(distance))

@@ -169,7 +169,7 @@ SAMPLE_US = 60_000_000
 LEGS = 1_500
 WALKED_STEPS = 4_000_000
 # Positions with a longer time between them are not connected by a line.
-JOINED_US = 5_000_000
+MAX_LEG_GAP_US = 5_000_000
 # A position so near to the way between its neighbours is on it: somewhat more than rounding.
 STRAIGHT_M = 0.003
 
@@ -251,7 +251,7 @@ def _legs_of(run: Run, plan: FloorPlan, name: str) -> tuple[F64, str]:
     keys = _rows(run, "key_frames", name, ("x", "y", "heading", "away"), "kind")
     if (keys["kind"] == "walk").any():
         step_us, steps = run.manifest["step_us"], run.manifest["steps"]
-        if steps > WALKED_STEPS or step_us > JOINED_US:
+        if steps > WALKED_STEPS or step_us > MAX_LEG_GAP_US:
             return _no_legs(), ""
         path = rebuild_path(run, plan, name, timedelta(microseconds=step_us))
         legs = _legs_between(np.stack([path.x, path.y], axis=1), path.away)
@@ -285,7 +285,7 @@ def _from_trajectories(
     xy = np.stack([rows["x"], rows["y"]], axis=1)
     index = {room.name: room.index for room in plan.rooms}
     room = np.array([index.get(word, -1) for word in rows["room"].tolist()], np.int16)
-    legs = _legs_between(xy, rows["away"])[:LEGS] if every_us <= JOINED_US else _no_legs()
+    legs = _legs_between(xy, rows["away"])[:LEGS] if every_us <= MAX_LEG_GAP_US else _no_legs()
     note = f"{reason}: positions every {_length(every_us)}"
     samples = (rows["step"], xy, rows["heading"], room)
     return BodyTrace(name, color, robot, every_us, *samples, legs, note)
@@ -340,7 +340,7 @@ def _length(us: int) -> str:
 
 BLUR_M = 0.14  # standard deviation of the spot of a body, about its own size
 REACH = 5  # radius of the blur [standard deviations]; with less, spots have square edges
-SOLID = 0.4  # the highest opacity of presence, at which the plan stays legible
+MAX_OPACITY = 0.4  # the highest opacity of presence, at which the plan stays legible
 HALF = 4.0  # time, in multiples of the mean over all cells, at which presence has half of that
 MAX_LEGS = 3_000  # drawn of a body
 CANDIDATES = 60  # moments to compare when a view is chosen
@@ -421,7 +421,7 @@ def opacity(time: F64, free: Bool) -> F64:
     if mean <= 0:
         return np.zeros_like(time)
     ratio = time / mean
-    return SOLID * ratio / (ratio + HALF)
+    return MAX_OPACITY * ratio / (ratio + HALF)
 
 
 def draw_paths(trace: BodyTrace, axes: Axes) -> None:

@@ -222,7 +222,7 @@ def draw_episodes(
     return blocks, EpisodeState(now, age)
 
 
-WHOLE = 10_000  # the survey's shares are in parts of this
+SHARE_UNIT = 10_000  # the survey's shares are in parts of this
 PLAIN = {
     "sleeping": "sleep", "food_prep": "cook", "laundry": "laundry", "travel": "travel", "tv": "tv",
 }  # fmt: skip
@@ -238,7 +238,7 @@ def activities(group: SurveyGroup) -> list[str]:
 
 def draw_works_at_home(group: SurveyGroup, draws: Draws) -> bool:
     """Draw whether a person of a group works at home."""
-    return draws.below(WHOLE) < int(group.facts["work_at_home"])
+    return draws.below(SHARE_UNIT) < int(group.facts["work_at_home"])
 
 
 def to_activities(
@@ -260,12 +260,12 @@ def to_activities(
         if category == "work":
             name = "work_at_home" if works_at_home else "work"
         elif category == "eating":
-            eats_at_home = draws.below(WHOLE) < table()["eat_at_home"]
+            eats_at_home = draws.below(SHARE_UNIT) < table()["eat_at_home"]
             hour = begin // HOUR_S % 24
             meal = next((meal for until, meal in MEALS if hour < until), "dinner")
             name = meal if eats_at_home else "outing"
         elif category == "exercise":
-            exercises_at_home = draws.below(WHOLE) < table()["exercise_at_home"]
+            exercises_at_home = draws.below(SHARE_UNIT) < table()["exercise_at_home"]
             name = "exercise" if exercises_at_home else "sport"
         else:
             name = PLAIN[category]

@@ -189,7 +189,7 @@ class PathReader:
 
 @contextmanager
 def _damage() -> Iterator[None]:
-    """Report what damaged key frames cause."""
+    """Raise an ArtifactError for what damaged key frames cause."""
     try:
         yield
     except (KeyError, ValueError, OverflowError, IndexError, MemoryError) as error:

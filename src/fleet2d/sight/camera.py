@@ -56,7 +56,7 @@ from fleet2d.sight.perception import (
 )
 
 # Squares of distances in lattice units stay far inside 64 bits.
-FARTHEST_M = 10_000
+MAX_DISTANCE_M = 10_000
 MAX_POINTS = 32
 # The view of a camera that a scenario doesn't describe: nearest and farthest distance, and width.
 DEFAULT_RANGE_M = (0.0, 4.5)
@@ -150,10 +150,10 @@ class Camera(Settings):
             raise problem(
                 f"range is [{near:g}, {far:g}]: the nearest distance must be below the farthest"
             )
-        if far > FARTHEST_M:
-            raise problem(f"range ends at {far:g} m: {FARTHEST_M:g} m is beyond any home")
-        if max(map(abs, self.offset)) > FARTHEST_M:
-            raise problem_at(("offset",), f"{FARTHEST_M:g} m from its body is beyond any home")
+        if far > MAX_DISTANCE_M:
+            raise problem(f"range ends at {far:g} m: {MAX_DISTANCE_M:g} m is beyond any home")
+        if max(map(abs, self.offset)) > MAX_DISTANCE_M:
+            raise problem_at(("offset",), f"{MAX_DISTANCE_M:g} m from its body is beyond any home")
         return self
 
     @model_validator(mode="after")

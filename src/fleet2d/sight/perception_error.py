@@ -22,7 +22,7 @@ from fleet2d.kernels.sight import NOBODY, ONE, random_shares
 from fleet2d.runtime.clock import DAY_US, HOUR_US, midnight_of
 from fleet2d.runtime.determinism import stream_key
 
-FARTHEST_M = 10_000.0
+MAX_DISTANCE_M = 10_000.0
 """Largest coordinate of a perceived position [m]."""
 MAX_VALUE = 1e6
 """Largest absolute value of other numbers."""
@@ -160,7 +160,7 @@ class CameraSightings:
         new: dict[str, Any] = {}
         for name, value in (("x", x), ("y", y)):
             if value is not None:
-                new[name] = self._numbers(name, value, FARTHEST_M, " m")
+                new[name] = self._numbers(name, value, MAX_DISTANCE_M, " m")
         if heading is not None:
             new["heading"] = self._numbers("heading", heading, MAX_VALUE)
         if posture is not None:

@@ -50,7 +50,7 @@ if TYPE_CHECKING:
 
 PART_BYTES = 64_000_000  # size at which a journal becomes a part
 PART_S_REMOTE = 60.0  # the longest time that results for a store are on this machine only
-CHANGED = (
+CHANGED_MESSAGE = (
     "a file that the variant reads, or Fleet2D itself, changed after the study began: run the study"
     " again"
 )
@@ -85,7 +85,7 @@ class StudyJob:
             return VariantOutcome("failed", error=describe_error(error))
         current, _ = identity(scenario_content(scenario), inputs)
         if current != task.identity:
-            return VariantOutcome("failed", error=CHANGED)
+            return VariantOutcome("failed", error=CHANGED_MESSAGE)
         return execute(scenario, self.metrics, self.tables)
 
     def __post_init__(self) -> None:

@@ -22,7 +22,7 @@ from fleet2d.errors import InputError
 from fleet2d.memory import rare_collections
 from fleet2d.studies.simulator import peak_rss_mb
 
-AHEAD = 2  # tasks of a worker: one runs, one waits, so that it is never idle
+TASKS_PER_WORKER = 2  # tasks of a worker: one runs, one waits, so that it is never idle
 MAX_ATTEMPTS = 3  # of a task whose worker dies each time
 MAX_STARTS = 3  # of a worker that ends before it is ready
 MEMORY_SHARE = 0.8  # share of the machine's memory that all workers may use together
@@ -267,7 +267,7 @@ class CrewExecutor(ABC, Generic[AnyWorker]):
             self._crew.remove(worker)
             tasks.leave(worker.number)
         for worker in self._crew:
-            while worker.is_ready and not worker.is_full and len(worker.tasks) < AHEAD:
+            while worker.is_ready and not worker.is_full and len(worker.tasks) < TASKS_PER_WORKER:
                 task = tasks.take(worker.number)
                 if task is None:
                     break

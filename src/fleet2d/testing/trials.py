@@ -40,7 +40,7 @@ NOTHING = ArtifactSettings(
 )
 SECTIONS = ("users", "robots", "objects", "algorithms", "metrics")
 """The sections of the scenario whose entries are left out one by one."""
-LEADS = tuple(timedelta(minutes=minutes) for minutes in (0, 1, 5, 15, 60, 240, 1440, 10_080))
+LEAD_TIMES = tuple(timedelta(minutes=minutes) for minutes in (0, 1, 5, 15, 60, 240, 1440, 10_080))
 """Times from the start of a shorter run to the failure, tried in this order."""
 MAX_SEEDS_SHOWN = 8
 
@@ -421,7 +421,7 @@ def _later_starts(case: FailingCase) -> Iterator[Variant | None]:
     simulation = case.variant.scenario.simulation
     end = simulation.start + simulation.duration
     failing = simulation.start + case.result.failing_step * simulation.step
-    for lead in LEADS:
+    for lead in LEAD_TIMES:
         start = (failing - lead).replace(second=0, microsecond=0)
         if simulation.start < start < end:
             times = {"start": start.isoformat(), "duration": end - start}

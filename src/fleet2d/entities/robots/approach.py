@@ -98,8 +98,8 @@ class BeliefBehavior(Behavior):
 
 
 # Maximum number of cells of a room tried as viewpoints, and as targets to be seen, evenly spread.
-STANDS_TRIED = 48
-TARGETS_TRIED = 400
+MAX_VIEWPOINT_CELLS = 48
+MAX_TARGET_CELLS = 400
 
 
 class Viewpoints(NamedTuple):
@@ -138,8 +138,8 @@ def viewpoints_of(actor: Actor, room: Room, enough: float, most: int) -> Viewpoi
 
 def _choose_viewpoints(actor: Actor, room: Room, enough: float, most: int) -> Viewpoints:
     plan = actor.home.plan
-    stands = spread(actor.space.cells(room.index, actor.part), STANDS_TRIED)
-    targets = spread(np.argwhere(plan.room_of_cell == room.index), TARGETS_TRIED)
+    stands = spread(actor.space.cells(room.index, actor.part), MAX_VIEWPOINT_CELLS)
+    targets = spread(np.argwhere(plan.room_of_cell == room.index), MAX_TARGET_CELLS)
     places = np.concatenate([[actor.middle(room)], centres(stands)])
     goals = centres(targets)
     visible = np.array([visible_from(actor, place, goals) for place in places])

@@ -16,12 +16,12 @@ from fleet2d.kernels.numbers import TURN
 from fleet2d.kernels.space import squared_distance
 
 # Maximum number of cells of the home that are tried as viewpoints, and as targets to be seen.
-STANDS_TRIED = 800
-TARGETS_TRIED = 2000
+MAX_VIEWPOINT_CELLS = 800
+MAX_TARGET_CELLS = 2000
 # The smallest part of the floor that a look has to show.
 WORTH = 0.002
 # Time after which it tries again to pass a shut door to floor that isn't seen yet.
-TRIES_AGAIN = timedelta(minutes=1)
+RETRY_INTERVAL = timedelta(minutes=1)
 
 
 @register("behavior", "explore")
@@ -53,8 +53,8 @@ class Explore(Behavior):
         plan = actor.home.plan
         rooms = [room.index for room in actor.reachable_rooms()]
         self.floor: Bool = np.isin(plan.room_of_cell, rooms) & plan.free
-        self.stands = spread(actor.space.cells(None, actor.part), STANDS_TRIED)
-        self.targets = spread(np.argwhere(self.floor), TARGETS_TRIED)
+        self.stands = spread(actor.space.cells(None, actor.part), MAX_VIEWPOINT_CELLS)
+        self.targets = spread(np.argwhere(self.floor), MAX_TARGET_CELLS)
         self.tried: Bool = np.zeros(len(self.targets), np.bool_)  # looked at, seen or not
         self.visible: tuple[int, dict[int, Bool]] = actor.home.version, {}  # targets, by stand
         self.stand: int | None = None  # the index of the place that it is going to
@@ -64,7 +64,7 @@ class Explore(Behavior):
 
     def wakes_at(self, now: Situation, plan: Plan) -> datetime | None:
         """Return when it tries again to pass a shut door."""
-        return now.time + TRIES_AGAIN if self.is_shut_out else None
+        return now.time + RETRY_INTERVAL if self.is_shut_out else None
 
     def give_up(self, now: Situation) -> None:
         """Leave out the place that it was going to."""

@@ -37,9 +37,9 @@ from fleet2d.search.policies import MAX_EXACT_SITES, Policy, after_empty_looks, 
 from fleet2d.search.problem import SearchProblem, search_problem
 
 # The part of a room to be shown by its viewpoints, if there are few enough of them.
-ENOUGH = 0.9
+SHARE_TO_SHOW = 0.9
 # Counted for a route that is blocked at present, as by a shut door [s].
-NO_WAY = 86_400.0
+BLOCKED_ROUTE_S = 86_400.0
 
 
 class Sites:
@@ -58,7 +58,7 @@ class Sites:
             views: The maximum number of viewpoints in a room.
         """
         rooms = actor.reachable_rooms()
-        viewpoints = [viewpoints_of(actor, room, ENOUGH, views) for room in rooms]
+        viewpoints = [viewpoints_of(actor, room, SHARE_TO_SHOW, views) for room in rooms]
         self.rooms = np.array([room.index for room in rooms], np.int64)
         self.share = np.array([of_room.share for of_room in viewpoints], np.float64)
         self._points = [of_room.points for of_room in viewpoints]
@@ -110,7 +110,7 @@ class Sites:
 
     def _seconds(self, start: tuple[int, int], goal: tuple[int, int]) -> float:
         seconds = way_seconds(self._actor, start, goal)
-        return NO_WAY if seconds is None else seconds
+        return BLOCKED_ROUTE_S if seconds is None else seconds
 
 
 DAY = timedelta(days=1)

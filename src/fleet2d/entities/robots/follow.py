@@ -12,9 +12,9 @@ from fleet2d.entities.plan import Plan
 from fleet2d.entities.robots.approach import approach, check_has_camera
 
 # Distance from where a person was lost at which it looks for the person [m].
-SOUGHT_FROM = 0.3
+SEARCH_DISTANCE_M = 0.3
 # A person who moves no farther than this between two looks rests: the interval doubles [m].
-STILL = 0.3
+STILL_M = 0.3
 MAX_INTERVAL = timedelta(seconds=32)
 
 
@@ -79,7 +79,7 @@ class Follow(Behavior):
             return None
         self.is_searching = True
         plan = now.plan().note("lost", self.person).interrupt_on("user_seen")
-        approach(now, plan, *self.last, SOUGHT_FROM)
+        approach(now, plan, *self.last, SEARCH_DISTANCE_M)
         return plan.turn_by(1.0)
 
     def _person_in_view(self, now: Situation) -> str | None:
@@ -91,7 +91,7 @@ class Follow(Behavior):
     def _follow(self, now: Situation, plan: Plan) -> Plan:
         self.is_searching = False
         (x, y), (old_x, old_y) = now.in_view[self.person or ""], self.last
-        is_resting = (x - old_x) ** 2 + (y - old_y) ** 2 <= STILL**2
+        is_resting = (x - old_x) ** 2 + (y - old_y) ** 2 <= STILL_M**2
         longest = max(MAX_INTERVAL, self.update)
         self.pause = min(2 * self.pause, longest) if is_resting else self.update
         self.last = x, y

@@ -30,7 +30,7 @@ PERSON = 0.2
 # Personal space ends at 1.2 m (Hall): within it, a place is the worse the nearer to a seat [m].
 PERSONAL = 1.2
 # Maximum number of cells of a room that count as seats, if it has no furniture to sit or lie on.
-SEATS_TRIED = 60
+MAX_SEATS = 60
 # Places to stand are tried on a grid of this pitch [m].
 PITCH = 0.5
 
@@ -129,7 +129,7 @@ class HangoutPlaces:
         if uses:
             return np.ascontiguousarray(plan.lattice.to_lattice(uses))
         cells = np.argwhere(plan.room_of_cell == room.index)
-        cells = cells[:: max(1, len(cells) // SEATS_TRIED)]
+        cells = cells[:: max(1, len(cells) // MAX_SEATS)]
         return np.ascontiguousarray(cells[:, ::-1] * SUB + CELL_CENTRE)
 
     def _same_room(self, room: Room) -> F64:
@@ -200,7 +200,7 @@ def decay(x: F64) -> F64:
 
 
 # When exploring a room: the part of it to be shown, by at most this many viewpoints.
-ENOUGH = 0.95
+SHARE_TO_SHOW = 0.95
 MAX_VIEWS = 4
 
 
@@ -314,7 +314,9 @@ class Hangout(BeliefBehavior):
     def _explore(self, now: Situation, plan: Plan, room: int) -> None:
         """Look round in a room from viewpoints that show nearly all of it, by present walls."""
         plan.note("explores", now.home.rooms[room].name)
-        for point in viewpoints_of(now.actor, now.home.rooms[room], ENOUGH, MAX_VIEWS).points:
+        for point in viewpoints_of(
+            now.actor, now.home.rooms[room], SHARE_TO_SHOW, MAX_VIEWS
+        ).points:
             if plan.reaches(*point):
                 plan.go_to_point(*point).turn_by(1.0)
 

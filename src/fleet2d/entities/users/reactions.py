@@ -28,7 +28,7 @@ STEP_M = 0.7
 MEET_M = 0.9
 CLEAR_M = 0.1  # minimum distance added to what is too close
 # How long a person waits for a robot to pass.
-PASSING = timedelta(seconds=4)
+PASSING_TIME = timedelta(seconds=4)
 DIRECTIONS = 16
 
 
@@ -128,7 +128,7 @@ class Reactions(Behavior):
         ]
         if across:
             plan.go_to_point(*draws.choice(across))
-        plan.stay(PASSING)
+        plan.stay(PASSING_TIME)
 
     def _look_at(
         self, now: Situation, plan: Plan, event: SightEvent, lasts: Distribution, draws: Draws

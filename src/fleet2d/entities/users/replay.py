@@ -48,9 +48,9 @@ if TYPE_CHECKING:
 
 
 # Coordinates are clipped to this, far outside of any home [m].
-FAR = 1e6
+COORDINATE_LIMIT_M = 1e6
 # A move shorter than this is ignored for the heading [m].
-STIR = 0.1
+MIN_HEADING_MOVE_M = 0.1
 
 
 @dataclass(frozen=True)
@@ -84,7 +84,9 @@ def place_fixes(actor: "Actor", time_us: I64, xy: F64, turns: F64, reach: float)
     """
     lattice, space = actor.home.plan.lattice, actor.space
     size = 1 << 20  # beyond any home, within 64 bits when squared
-    points: I64 = np.clip(lattice.to_lattice(np.clip(xy, -FAR, FAR)), -size, size)
+    points: I64 = np.clip(
+        lattice.to_lattice(np.clip(xy, -COORDINATE_LIMIT_M, COORDINATE_LIMIT_M)), -size, size
+    )
     fits = [
         0 <= x < size and 0 <= y < size and space.part_at(x, y) == actor.part
         for x, y in points.tolist()
@@ -165,7 +167,7 @@ class FixFollower:
     def _headings(self) -> I64:
         """Return the heading at each fix: the log's, else the direction to the next fix."""
         xy, heading = self.fixes.xy, self.fixes.heading.copy()
-        stir = STIR * self.actor.home.plan.lattice.units_per_m
+        stir = MIN_HEADING_MOVE_M * self.actor.home.plan.lattice.units_per_m
         last = 0
         moves = np.diff(xy, axis=0, append=xy[-1:])
         for i, (dx, dy) in enumerate(moves.tolist()):
@@ -229,7 +231,7 @@ class FixFollower:
 
 
 # In visits shorter than this, the body stops at the nearest point of the room [us].
-BRIEF_US = 10_000_000
+BRIEF_VISIT_US = 10_000_000
 
 
 class RoomFollower:
@@ -321,7 +323,7 @@ class RoomFollower:
         rows = self._way(plan, spot)
         lasts_us = (visit.keep - visit.first) * self.step_us
         if visit.place not in (DOOR, AWAY) and (
-            rows[-1, 0] > arrive_us - may_leave or lasts_us < BRIEF_US
+            rows[-1, 0] > arrive_us - may_leave or lasts_us < BRIEF_VISIT_US
         ):
             rows = self._way(plan, self._near(plan, spot))
         self._set_out(plan, rows, may_leave, arrive_us, before)

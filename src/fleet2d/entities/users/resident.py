@@ -45,7 +45,7 @@ T = TypeVar("T")
 # Distance between two spots, at which bodies of the usual radius of 0.2 m don't touch [m].
 SPACING = 0.6
 # Maximum number of spots of a room that a body uses.
-HABITUAL = 8
+MAX_SPOTS = 8
 
 
 class Spot(NamedTuple):
@@ -127,7 +127,7 @@ class Spots:
             )
             own = part_of(grid, self.rank, self.members)
             draws = Draws(self._actor.stream(f"spots of {room.name}"), 0)
-            self._of_room[room.index] = draws.shuffled(own)[:HABITUAL]
+            self._of_room[room.index] = draws.shuffled(own)[:MAX_SPOTS]
         return self._of_room[room.index]
 
     def at_furniture(

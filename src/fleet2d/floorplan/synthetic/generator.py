@@ -17,7 +17,7 @@ from fleet2d.floorplan.synthetic.program import (
     settle_wishes,
 )
 from fleet2d.floorplan.synthetic.slicing import (
-    PER_M,
+    UNITS_PER_M,
     Box,
     LayoutRequest,
     Wall,
@@ -280,7 +280,7 @@ def shape_cost(layout: RoomLayout, ease: float = 1.0) -> float | None:
         kind = layout.briefs[box.room].kind
         size = SIZES[kind]
         short, long = sorted(box.clear)
-        if short < size.side * PER_M:
+        if short < size.side * UNITS_PER_M:
             return None
         if kind == "hallway":
             if long > MAX_CORRIDOR * ease:
@@ -374,9 +374,9 @@ def outline_kind(turns: Sequence[bool]) -> str | None:
 
 
 # Layouts are drawn until this many are good …
-ENOUGH = 4
+ENOUGH_LAYOUTS = 4
 # … and at most this many.
-TRIES = 480
+MAX_LAYOUTS = 480
 # Layouts drawn in vain before a new list of rooms is drawn.
 PATIENCE = 20
 FRONT_DOOR = 19  # 0.95 m
@@ -453,9 +453,9 @@ def generate(seed: int, wishes: Wishes, style: Style) -> House:
     plain = Choices(seed, "outline").chance(PLAIN_PERCENT)
     candidates: list[_Candidate] = []
     briefs: list[Brief] = []
-    for number in range(TRIES):
+    for number in range(MAX_LAYOUTS):
         if number % PATIENCE == 0 and not candidates:
-            if number >= TRIES // 4 and wishes.garage is None:
+            if number >= MAX_LAYOUTS // 4 and wishes.garage is None:
                 decided = replace(decided, garage=False)
             choices = Choices(seed, f"rooms {number // PATIENCE}")
             briefs = choose_rooms(decided, choices, style.outline == "U")
@@ -468,7 +468,7 @@ def generate(seed: int, wishes: Wishes, style: Style) -> House:
         if candidate:
             candidates.append(candidate)
         # Where good layouts are rare, fewer are enough.
-        if len(candidates) >= max(ENOUGH - number // PATIENCE, 1):
+        if len(candidates) >= max(ENOUGH_LAYOUTS - number // PATIENCE, 1):
             break
     for best in sorted(candidates, key=lambda candidate: candidate.cost):
         house = _finish(best, decided, Choices(seed, "doors"))
@@ -572,6 +572,6 @@ def _failure(wishes: Wishes, style: Style) -> str:
     )
     shape = f" and the outline {style.outline}" if style.outline else ""
     return (
-        f"no synthetic home of {rooms}{shape} was found in {TRIES} layouts: ask for more or less"
-        " area, other numbers of rooms, another floorplan.outline, or take another seed"
+        f"no synthetic home of {rooms}{shape} was found in {MAX_LAYOUTS} layouts: ask for more or"
+        " less area, other numbers of rooms, another floorplan.outline, or take another seed"
     )

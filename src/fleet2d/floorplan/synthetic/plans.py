@@ -7,8 +7,8 @@ from math import fsum, sqrt
 
 from fleet2d.floorplan.synthetic.program import Brief, Choices
 from fleet2d.floorplan.synthetic.slicing import (
-    PER_M,
-    PER_M2,
+    UNITS_PER_M,
+    UNITS_PER_M2,
     WALL,
     Box,
     Cut,
@@ -240,7 +240,7 @@ def draw_wing(
         rooms = [areas[slot[0]] for slot in aft.slots if len(slot) == 1]
         middle = fsum(rooms) / len(rooms) if rooms else 14.0
         width = request.corridor + WALL
-        depths = [int(PER_M * sqrt(middle) * percent / 100) for percent in (78, 90, 102, 114)]
+        depths = [int(UNITS_PER_M * sqrt(middle) * percent / 100) for percent in (78, 90, 102, 114)]
         wings = [
             Wing(fore, aft, corridor, width, min(max(depth, 56), 112), suite, closet)
             for depth in depths
@@ -600,7 +600,7 @@ def draw_layout(request: LayoutRequest, choices: Choices) -> RoomLayout | None:
 
 def _place_at_scale(placing: Placing, briefs: Sequence[Brief], area_m2: float) -> list[Box] | None:
     """Place the rooms at the scale at which their clear areas add up to the requested area."""
-    target = area_m2 * PER_M2 * ROOMS_SHARE
+    target = area_m2 * UNITS_PER_M2 * ROOMS_SHARE
     factor = 1.0
     for _ in range(ROUNDS):
         areas = {i: gross_area(brief.area * factor) for i, brief in enumerate(briefs) if brief.area}

@@ -9,8 +9,8 @@ from typing import NamedTuple, TypeAlias
 from fleet2d.floorplan.synthetic.program import SIZES, Brief
 
 UNIT_M = 0.05
-PER_M = 20  # units per metre
-PER_M2 = PER_M * PER_M
+UNITS_PER_M = 20  # units per metre
+UNITS_PER_M2 = UNITS_PER_M * UNITS_PER_M
 WALL = 2  # 0.10 m: an inner wall
 OUTER_WALL = 6  # 0.30 m: the depth of the front door's reveal
 
@@ -172,7 +172,7 @@ Slot: TypeAlias = tuple[int, ...]
 
 def gross_area(area_m2: float) -> float:
     """Return the area [units²] that a room of a clear area [m²] takes with its walls."""
-    clear = area_m2 * PER_M2
+    clear = area_m2 * UNITS_PER_M2
     return float(clear + 2.1 * WALL * sqrt(clear) + WALL * WALL)
 
 
@@ -445,6 +445,6 @@ def is_promising(boxes: Sequence[Box], briefs: Sequence[Brief]) -> bool:
         width, height = x1 - x0 - WALL, y1 - y0 - WALL
         short, long = (width, height) if width < height else (height, width)
         size = SIZES[briefs[room].kind]
-        if short < 0.88 * PER_M * size.side or long > 1.6 * size.slender * short:
+        if short < 0.88 * UNITS_PER_M * size.side or long > 1.6 * size.slender * short:
             return False
     return True

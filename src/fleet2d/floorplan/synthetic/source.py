@@ -14,7 +14,7 @@ from fleet2d.floorplan.rooms.doorways import DoorLine
 from fleet2d.floorplan.source import FloorPlanSource
 from fleet2d.floorplan.synthetic.generator import Gap, House, Style, generate
 from fleet2d.floorplan.synthetic.program import LARGEST_M2, MAX_ROOMS_PER_TYPE, SMALLEST_M2, Wishes
-from fleet2d.floorplan.synthetic.slicing import OUTER_WALL, PER_M, UNIT_M, WALL, Box, Wall
+from fleet2d.floorplan.synthetic.slicing import OUTER_WALL, UNIT_M, UNITS_PER_M, WALL, Box, Wall
 
 Rectangle = tuple[int, int, int, int]
 
@@ -162,4 +162,4 @@ class Synthetic(FloorPlanSource):
 
 
 def _units(length: float | None) -> int | None:
-    return None if length is None else int(length * PER_M + 0.5)
+    return None if length is None else int(length * UNITS_PER_M + 0.5)
