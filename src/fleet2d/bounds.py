@@ -92,7 +92,7 @@ YAML_VALUES = Bound("VALUES", 200_000, "values")
 for each alias."""
 EXTENDED_FILES = Bound("EXTENDED_FILES", 100, "files")
 """Files of a scenario: its own and those that they extend."""
-ENTRIES = Bound("ENTRIES", 5_000, "entries")
+ENTRIES = Bound("ENTRIES", 2_500, "entries")
 """Entries of a section of a scenario, such as its users."""
 ITEMS = Bound("ITEMS", 20_000, "entries")
 """Entries of a list of mappings or texts, such as a script."""

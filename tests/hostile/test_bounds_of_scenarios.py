@@ -36,11 +36,11 @@ def bombs(n: int) -> dict[str, tuple[str, str]]:
             "users: it has",
         ),
         "wrong users": (
-            f"{BASE}users:\n" + "".join(f"  u{i}: {{type: meandr}}\n" for i in range(4900 if THOROUGH else 1500)),
+            f"{BASE}users:\n" + "".join(f"  u{i}: {{type: meandr}}\n" for i in range(2400 if THOROUGH else 1500)),
             "no behavior 'meandr'",
         ),
         "unknown modules": (
-            f"{BASE}users:\n" + "".join(f"  u{i}: 'nothing{i}:X'\n" for i in range(4900)),
+            f"{BASE}users:\n" + "".join(f"  u{i}: 'nothing{i}:X'\n" for i in range(2400)),
             "no module named 'nothing0'",
         ),
         "behaviors": (
