@@ -326,7 +326,7 @@ def update_order(algorithms: Mapping[str, Algorithm]) -> list[str]:
     """Return the algorithms in an order in which each follows those that it reads.
 
     Raises:
-        ScenarioError: One reads an unknown algorithm, or they read each other in a circle.
+        ScenarioError: One reads an unknown algorithm, or they read each other in a cycle.
     """
     for name, algorithm in algorithms.items():
         for source in algorithm.reads:
@@ -340,7 +340,7 @@ def update_order(algorithms: Mapping[str, Algorithm]) -> list[str]:
         return list(sorter.static_order())
     except CycleError as error:
         circle = " reads ".join(reversed(error.args[1]))
-        raise ScenarioError(f"algorithms read each other in a circle: {circle}") from None
+        raise ScenarioError(f"algorithms read each other in a cycle: {circle}") from None
 
 
 def _is(output: Any, word: str) -> bool:

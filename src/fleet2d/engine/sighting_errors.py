@@ -155,9 +155,9 @@ class SightingErrors:
         for name, error in camera.errors.items():
             stream = ErrorStream(owner.seed, owner.path, f"{camera.name}: errors.{name}")
             with blame(f"{camera.path}.{name}", int(sightings.step[0])):
-                given = replace(sightings, _stream=stream)
-                sightings = error.distort(given)
-                if getattr(sightings, "step", None) is not given.step:
+                before = replace(sightings, _stream=stream)
+                sightings = error.distort(before)
+                if getattr(sightings, "step", None) is not before.step:
                     raise ComponentError(
                         f"distort returned {sightings!r:.100}: return what sightings.replace(…) or"
                         " sightings.moved(…) returns, or the sightings themselves"

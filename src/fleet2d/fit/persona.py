@@ -38,7 +38,7 @@ LIE, SIT = ("sleep", "nap", "bed", "wake_up"), ("eat", "tv", "work", "read", "re
     "breakfast", "lunch", "dinner", "snack", "music", "rest", "social", "toilet")  # fmt: skip
 # A task is done on at least this share of the days, at most once a day. The standard deviation of
 # its beginning is at most SPREAD, and the gap to begins at other times more than APART [min].
-LEAST_SHARE, SPREAD, APART = 0.8, 20, 60
+MIN_SHARE, SPREAD, APART = 0.8, 20, 60
 LONG = 10  # minimum mean duration of a task [min]
 MIN_TEMPLATE_DAYS = 4  # minimum number of days of a kind from which a template is fitted
 WORKDAYS = 5
@@ -341,7 +341,7 @@ def _is_task(stretches: Sequence[Stretch], count: int, days: int) -> bool:
     """
     begins = np.array([run.begin for run in stretches], np.float64)
     return (
-        len(stretches) >= max(LEAST_SHARE * days, 2)
+        len(stretches) >= max(MIN_SHARE * days, 2)
         and count <= 1.3 * len(stretches)
         and float(np.std(begins)) <= SPREAD
         and float(np.mean([run.length for run in stretches])) >= LONG

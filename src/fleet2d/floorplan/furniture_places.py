@@ -31,8 +31,8 @@ from fleet2d.runtime.determinism import Draws
 
 # Largest distance of a wall behind a piece, to allow for the steps of jagged walls [m].
 WALL_REACH = 0.15
-# Least part of its back that a piece against a wall has there, in tenths.
-MIN_BACKED = 8
+# Minimum part of its back that must touch the wall, in tenths.
+MIN_WALL_TENTHS = 8
 # Number of places that are tried for a group before it is left out.
 ATTEMPTS = 10
 # A place may have this many points less than the best, for variety.
@@ -179,7 +179,7 @@ class RoomView:
         rows, columns = np.nonzero(possible)
         if group.wall:
             touching = _in_box(self._behind[turn], rows, columns, 1, width)
-            backed = 10 * touching >= MIN_BACKED * width
+            backed = 10 * touching >= MIN_WALL_TENTHS * width
             rows, columns = rows[backed], columns[backed]
         points = self._points(group, turn, rows, columns)
         if extra is not None:

@@ -20,7 +20,7 @@ _EDGES = 64
 
 
 def repair(shape: BaseGeometry) -> BaseGeometry:
-    """Return the area that an invalid shape encloses: all that its outlines go round is inside.
+    """Return the area that an invalid shape encloses: everything within its outlines is inside.
 
     Raises:
         FloorPlanError: It crosses itself too often; repairing would take too long.

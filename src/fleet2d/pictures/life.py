@@ -341,7 +341,8 @@ def _length(us: int) -> str:
 BLUR_M = 0.14  # standard deviation of the spot of a body, about its own size
 REACH = 5  # radius of the blur [standard deviations]; with less, spots have square edges
 MAX_OPACITY = 0.4  # the highest opacity of presence, at which the plan stays legible
-HALF = 4.0  # time, in multiples of the mean over all cells, at which presence has half of that
+# Time, in multiples of the mean over all cells, at which presence has half of that opacity.
+HALF_OPACITY_TIME = 4.0
 MAX_LEGS = 3_000  # drawn of a body
 CANDIDATES = 60  # moments to compare when a view is chosen
 MAX_PLACES = 260  # places of sightings that are drawn; more would hide the plan
@@ -421,7 +422,7 @@ def opacity(time: F64, free: Bool) -> F64:
     if mean <= 0:
         return np.zeros_like(time)
     ratio = time / mean
-    return MAX_OPACITY * ratio / (ratio + HALF)
+    return MAX_OPACITY * ratio / (ratio + HALF_OPACITY_TIME)
 
 
 def draw_paths(trace: BodyTrace, axes: Axes) -> None:

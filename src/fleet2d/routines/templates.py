@@ -87,13 +87,13 @@ def _job(persona: "Persona", name: str, task: "Task", order: list[str], dawn: in
     has_time = task.at is not None or task.between is not None
     begin = None if place or (task.after and not has_time) else starts(task, dawn)
     if task.fixed and task.at is not None:
-        begin = uniform(of_day(task.at, dawn), of_day(task.at, dawn))
+        begin = uniform(seconds_of_day(task.at, dawn), seconds_of_day(task.at, dawn))
     return Job(
         task=name,
         activity=task.activity or name,
         starts=begin,
         takes=(task.takes or activity.takes).table(),
-        until=NEVER if task.until is None else of_day(task.until, dawn),
+        until=NEVER if task.until is None else seconds_of_day(task.until, dawn),
         after=tuple(sorted(order.index(other) for other in task.after)),
         chance=round(task.probability * MILLION),
         needed=task.fixed or task.probability == 1,
@@ -127,9 +127,9 @@ def starts(timing: "Timing", dawn: int) -> Distribution:
     spread = seconds(timing.spread)
     if timing.between is not None:
         first, last = window(timing.between, dawn)
-        at = of_day(timing.at, first)
+        at = seconds_of_day(timing.at, first)
     else:
-        at = of_day(timing.at, dawn)
+        at = seconds_of_day(timing.at, dawn)
         reach = int(REACH * spread)
         first, last = max(at - reach, 0), at + reach
     begin = normal(at, spread) if spread else uniform(at, at)
@@ -138,12 +138,12 @@ def starts(timing: "Timing", dawn: int) -> Distribution:
 
 def window(between: "tuple[timedelta, timedelta]", dawn: int) -> tuple[int, int]:
     """Return a window of times of day [s]; one that ends before it begins lasts past midnight."""
-    first = of_day(between[0], dawn)
+    first = seconds_of_day(between[0], dawn)
     return first, first + seconds(between[1] - between[0]) % DAY_S
 
 
-def of_day(time: "timedelta", dawn: int) -> int:
-    """Return a time of day [s]; one before `dawn` is that of the next date."""
+def seconds_of_day(time: "timedelta", dawn: int) -> int:
+    """Return a time of day [s]; one before `dawn` belongs to the next date."""
     at = seconds(time)
     return at + DAY_S if at < dawn else at
 

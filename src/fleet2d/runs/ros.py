@@ -43,7 +43,7 @@ _LEVELS = 20  # INFO in rcl_interfaces/msg/Log
 
 
 class Topic(NamedTuple):
-    """A topic.
+    """A topic on which a run is published.
 
     Attributes:
         name: Its name, such as `/astro/odom`.
@@ -288,13 +288,13 @@ class RosMessages:
 
     def _detection_template(self, users: tuple[str, ...]) -> "Template":
         def message(times: Sequence[int], values: Sequence[float]) -> bytes:
-            eights = [values[8 * i : 8 * i + 8] for i in range(len(users))]
-            found = [
-                self._detection(self._header(time, "map"), user, eight)
-                for time, user, eight in zip(times[1:], users, eights, strict=True)
+            numbers = [values[8 * i : 8 * i + 8] for i in range(len(users))]
+            detections = [
+                self._detection(self._header(time, "map"), user, of_user)
+                for time, user, of_user in zip(times[1:], users, numbers, strict=True)
             ]
             header = self._header(times[0], "map")
-            return self._data(self._new("vision_msgs/msg/Detection3DArray", header, found))
+            return self._data(self._new("vision_msgs/msg/Detection3DArray", header, detections))
 
         return Template(message, len(users) + 1, 8 * len(users))
 

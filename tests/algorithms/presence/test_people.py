@@ -11,7 +11,7 @@ from tests.kernels.test_presence_stays import PATCHES, PLACES, ROOM, by_state, c
 from fleet2d._core import smooth
 from fleet2d.algorithms.evidence import Evidence, SightingCounts
 from fleet2d.algorithms.presence.people import (
-    STAY,
+    MEAN_STAY,
     DayEvidence,
     People,
     Prior,
@@ -68,7 +68,7 @@ def test_expected_exits_and_time_equal_pairs_of_states(seed: int, stages: int) -
 def test_before_anything_is_learned_all_is_as_likely_and_stays_last_two_hours() -> None:
     layout = StateLayout(ROOM, np.array([0.5, 0.5, 1, 0.2, 0.3, 0.5, 1]), 3, 1, np.ones(4))
     model = model_of(layout.no_moments(), layout, PRIOR)
-    assert [1 - 1 / STAY] * 4 == pytest.approx(model.stay.tolist())
+    assert [1 - 1 / MEAN_STAY] * 4 == pytest.approx(model.stay.tolist())
     assert [0, 1 / 3, 1 / 3, 1 / 3, 0] == pytest.approx(model.follow[0].tolist())
     assert layout.spread.tolist() == pytest.approx(model.spread.tolist())
     assert [0.05, 0.05, 0.05, 0] == pytest.approx(model.restless.tolist())

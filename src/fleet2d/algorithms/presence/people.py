@@ -21,8 +21,8 @@ from fleet2d.kernels.presence import (
 
 # Mean length of a stay before anything was learned, and of the first and last of several stages.
 # All in bins.
-STAY = 120.0
-SHORT, LONG = 5.0, 240.0
+MEAN_STAY = 120.0
+SHORTEST_STAGE, LONGEST_STAGE = 5.0, 240.0
 
 
 class DayEvidence(NamedTuple):
@@ -180,7 +180,7 @@ class Prior(NamedTuple):
 def model_of(moments: Moments, layout: StateLayout, prior: Prior) -> StayModel:
     """Return the most probable transitions: expected counts by expected time, with a prior.
 
-    The prior of a stage is one end after STAY bins (with several stages, 5 to 240 bins), and one
+    The prior of a stage is one end after MEAN_STAY bins (with several stages, 5 to 240), and one
     next room, distributed as rooms are entered overall; with several stages, half of it goes to the
     next stage. The prior of a room is one arrival, spread over its floor, and one change of patch
     after 1 / `restless` bins.
@@ -194,7 +194,9 @@ def model_of(moments: Moments, layout: StateLayout, prior: Prior) -> StayModel:
         The transitions, with as many dimensions.
     """
     places, stages = layout.rooms + 1, layout.stages
-    lengths = np.linspace(SHORT, LONG, stages) if stages > 1 else np.array([STAY])
+    lengths = (
+        np.linspace(SHORTEST_STAGE, LONGEST_STAGE, stages) if stages > 1 else np.array([MEAN_STAY])
+    )
     ends = moments.exits.sum(axis=-1)
     stay = 1 - (ends + 1) / (moments.time + np.tile(lengths, places))
     entered = moments.exits[..., :places].sum(axis=-2) + layout.possible / layout.possible.sum()
@@ -290,7 +292,7 @@ class People:
         places = self.layout.rooms + 1
         time = self.total.time.reshape(self.count, places, -1).sum(axis=2)
         ends = self.total.exits[..., :places].reshape(self.count, places, -1).sum(axis=2)
-        return (time + STAY) / (ends + 1)
+        return (time + MEAN_STAY) / (ends + 1)
 
     def follow(self, part: DayEvidence) -> PeoplePlaces:
         """Filter over the next part of a day; return P(room | evidence up to the stretch)."""

@@ -56,7 +56,7 @@ Move = Callable[[F64], F64]
 
 # WGS 84: half the larger axis [m], and the square of the eccentricity.
 SEMI_MAJOR_M, ECCENTRICITY_2 = 6378137.0, 0.00669437999014
-# Least width of a home [m], and largest [degrees], about 5 km.
+# Minimum width of a home [m], and largest [degrees], about 5 km.
 SMALLEST_M, LARGEST_DEGREES = 0.5, 0.05
 # The largest coordinate that is read; UTM's northings reach ten million.
 FARTHEST = 1e8
@@ -100,7 +100,7 @@ class Feature:
     level: str | None = None
 
     def text(self, *keys: str) -> str | None:
-        """Return the first of some properties that is a text, on one line; English if possible."""
+        """Return the first property with text, on one line; in English if possible."""
         for key in keys:
             value = self.properties.get(key)
             if isinstance(value, dict):  # in IMDF by language

@@ -177,7 +177,7 @@ class UseEntry(FileModel):
 
     Attributes:
         heading: Direction that the person faces.
-        approach: Place from which one steps there.
+        approach: Place from which a person steps to it.
     """
 
     x: Coordinate

@@ -223,7 +223,7 @@ def rooms_beside(lattice: Lattice, room_of_place: I16, segment: Segment) -> tupl
 
 _CENTRE = UNITS_PER_CELL // 2 + 1
 
-# Least length of an open border [cells]; a shorter one is an artifact of the cells at walls.
+# Minimum length of an open border [cells]; a shorter one is an artifact of the cells at walls.
 MIN_SIDES = 2
 
 

@@ -146,7 +146,7 @@ def turn_boxes(boxes: Sequence[Box], orientation: int) -> list[Box]:
 
 # Penalty, in slenderness, for a corridor that ends at the wall between two rooms.
 MOUTH_PENALTY = 3.0
-# Least width of a slot: a bathroom at the end of a deep strip gets larger, not narrower [units].
+# Minimum width of a slot: a bathroom at the end of a deep strip gets larger, not narrower [units].
 MIN_SLOT_WIDTH = 35.0
 
 
