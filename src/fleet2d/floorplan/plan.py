@@ -181,7 +181,7 @@ class FloorPlan:
                 bound. `none`: there are none, and rooms are segmented from the walls alone.
             objects: Furniture and devices [m].
             no_go: Areas that robots keep out of [m].
-            notes: Sentences on what was odd in the source.
+            notes: Sentences on anomalies in the source.
 
         Raises:
             FloorPlanError: There is no free space at this cell size, it would lose more area than

@@ -101,7 +101,7 @@ class RawFixes(NamedTuple):
         y: float64 (n,), NaN where there is none.
         heading: float64 (n,) [rad], NaN where there is none.
         line: The number of its line or message in the file, int64 (n,).
-        notes: What was odd in the file.
+        notes: Anomalies in the file.
     """
 
     time_us: I64

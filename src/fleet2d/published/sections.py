@@ -102,7 +102,7 @@ class ConfigReader:
         expected = "a number"
         expected += f" above {above:g}" if above > -math.inf else ""
         expected += f" of {minimum:g} or more" if minimum > -math.inf else ""
-        expected += f", {maximum:g} at maximum" if maximum < math.inf else ""
+        expected += f", {maximum:g} at most" if maximum < math.inf else ""
         is_number = isinstance(value, int | float) and not isinstance(value, bool)
         if not is_number or not (
             abs(value) < _HUGE and above < value <= maximum and value >= minimum

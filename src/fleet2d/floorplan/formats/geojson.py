@@ -117,7 +117,7 @@ def read_features(content: dict[str, Any], level: str | None, notes: list[str]) 
     Args:
         content: The content of the file.
         level: The floor, if there are several; None for the one of ordinal 0, or the first.
-        notes: Sentences on what is odd are added.
+        notes: Sentences on anomalies are added.
 
     Raises:
         FloorPlanError: It isn't such a file, a feature is damaged, or there is no such floor.

@@ -172,7 +172,7 @@ def objects_in(content: dict[str, Any], key: str) -> list[tuple[dict[str, Any], 
 
 
 def read_layers(content: dict[str, Any], notes: list[str]) -> list[PixelLayer]:
-    """Return the layers with pixels, in the file's order; what is odd is added to the notes."""
+    """Return the layers with pixels, in the file's order; anomalies are added to the notes."""
     layers: list[PixelLayer] = []
     for layer, where in objects_in(content, "layers"):
         kind = layer.get("type")
