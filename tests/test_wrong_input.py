@@ -140,7 +140,7 @@ WRONG: dict[str, tuple[dict[str, Any] | str, list[str]]] = {
     "a step longer than the run": (changed({"simulation": {"step": "1 h"}}), ["simulation.duration", "shorter than one step"]),
     "a circle": (
         changed({"algorithms": {"a": {"type": f"{OWN}:Share", "reads": ["b"]}, "b": {"type": f"{OWN}:Share", "reads": ["a"]}}}),
-        ["circle", "a reads b", "b reads a"],
+        ["cycle", "a reads b", "b reads a"],
     ),
     "reads what is missing": (
         changed({"algorithms": {"a": {"type": f"{OWN}:Share", "reads": ["ltp"]}}}),

@@ -31,7 +31,7 @@ class DoorFacts(TypedDict):
 
 
 class ObjectFacts(TypedDict):
-    """A piece of furniture: its outline [m], and what it blocks: nothing, paths or sight."""
+    """A piece of furniture: its outline [m], and whether it blocks nothing, paths or sight."""
 
     name: str
     type: str
