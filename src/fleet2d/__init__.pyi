@@ -7,8 +7,8 @@ from fleet2d.configuration.units import Duration as Duration
 from fleet2d.configuration.units import InputPath as InputPath
 from fleet2d.configuration.units import Length as Length
 from fleet2d.configuration.units import Share as Share
-from fleet2d.engine.encounters import Interrupt as Interrupt
-from fleet2d.engine.encounters import SpanView as SpanView
+from fleet2d.engine.interrupts.interrupt import Interrupt as Interrupt
+from fleet2d.engine.interrupts.interrupt import SpanView as SpanView
 from fleet2d.engine.repeat import reproduce as reproduce
 from fleet2d.engine.repeat import resume as resume
 from fleet2d.engine.simulation import Simulation as Simulation

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from tests.engine.test_home_changes import flat, home, stands
+from tests.engine.test_change_queue import flat, home, stands
 from tests.scenes import digests, run, table
 
 import fleet2d

@@ -1,167 +1,23 @@
-"""What interrupts plans besides cameras: interrupts, and robots that come near to people.
+"""Encounters of people with robots: robots that come near, drive up, stay too close, or call.
 
-Both follow from the poses alone, step by step, so they don't depend on spans. A span ends with the
-first of them, and the body decides right after it.
+They follow from the poses alone, step by step, so they don't depend on spans. A span ends with the
+first of them, and the person decides right after it.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from typing import ClassVar, NamedTuple, cast
+from typing import NamedTuple
 
 import numpy as np
 
-from fleet2d.configuration.components import Component, lookup
-from fleet2d.configuration.trust import source_files
-from fleet2d.engine.bodies import Basis, Bodies, PoseBlock, Watcher
-from fleet2d.entities.behavior import Actor, Attention, SightEvent
+from fleet2d.engine.bodies import Bodies, PoseBlock, Watcher
+from fleet2d.entities.behavior import Attention, SightEvent
 from fleet2d.entities.decisions import DecidingActor
-from fleet2d.entities.entity import Robot, User
-from fleet2d.errors import ComponentError, blame
 from fleet2d.floorplan.objects import POSTURES
 from fleet2d.kernels import I64, Bool
 from fleet2d.kernels.sight import line_of_sight
 from fleet2d.kernels.space import locate
 from fleet2d.runtime.events import Event, EventKind
-
-
-@dataclass(frozen=True)
-class SpanView:
-    """Consecutive steps in which no body decides and the home stays as it is.
-
-    Attributes:
-        actor: The body whose plan waits for the interrupt.
-        actors: All bodies: users, then robots. They are in the home `actor.home`.
-        users: The number of users.
-        first: The first step.
-        poses: The poses of all bodies, (bodies, steps): row b is that of `actors[b]`.
-    """
-
-    actor: Actor
-    actors: Sequence[Actor]
-    users: int
-    first: int
-    poses: PoseBlock
-
-
-class Interrupt(Component):
-    """A condition that ends the plans that wait for it, when it becomes true.
-
-    A plan waits for it by `plan.interrupt_on(name)`, a behavior by `listens`. It happens at a step
-    at which the condition holds, and at the step before it didn't; the behavior is asked at the
-    step after. A condition that holds when the plan begins has to end before it can happen. It has
-    no keys, and whether it holds must follow from the arguments of `holds` alone.
-    """
-
-    kind: ClassVar[str] = "interrupt"
-
-    def holds(self, span: SpanView) -> Bool:
-        """Return at which steps of a span the condition holds, bool (steps,)."""
-        raise NotImplementedError
-
-
-# The events of cameras, which are watchers of their own.
-SIGHT_EVENTS = frozenset({*User.sight_events, *Robot.sight_events})
-
-Wait = tuple[int, str]
-"""The row of a body, and the name of the interrupt for which its plan waits."""
-
-
-class Interruptions(Watcher):
-    """The plans that wait for interrupts; it does nothing while there are none."""
-
-    def __init__(self, basis: Basis) -> None:
-        self._actors, self._users = basis.actors, basis.bodies.users
-        # Whether the condition held at the last step; None: the plan has not begun yet.
-        self._held: dict[Wait, bool | None] = {}
-        self._ahead: dict[Wait, Bool] = {}  # whether it holds in the present span
-        self._last: list[Wait] = []
-        self._interrupts: dict[str, Interrupt] = {}
-        self._files: dict[type[Interrupt], list[Path]] = {}  # of each class of the user's own
-
-    def __getstate__(self) -> dict[str, object]:
-        """Leave out the interrupts, which follow from their names."""
-        return {**self.__dict__, "_interrupts": {}, "_files": {}}
-
-    @property
-    def files(self) -> list[Path]:
-        """The files of the user's own interrupts for which plans waited."""
-        for cls in {type(interrupt) for interrupt in self._interrupts.values()}:
-            if cls not in self._files and not cls.__module__.startswith("fleet2d."):
-                self._files[cls] = source_files(cls)  # it reads them: once, not at every commit
-        return [path for files in self._files.values() for path in files]
-
-    @property
-    def waits(self) -> bool:
-        """Whether a plan waits for an interrupt."""
-        return bool(self._held)
-
-    def expect(self, row: int) -> None:
-        """Wait for the interrupts that the present plan of a body names, and for no others."""
-        names = self._actors[row].plan.interrupts
-        if not names and not self._held:
-            return
-        named = {(row, name) for name in names - SIGHT_EVENTS}
-        others = {wait: held for wait, held in self._held.items() if wait[0] != row}
-        new = {wait: self._held.get(wait) for wait in named}
-        self._held = dict(sorted((others | new).items(), key=lambda item: item[0]))
-
-    def limit(self, bodies: Bodies, end: int) -> int:
-        """Return the step after the first interruption, `end` if there is none."""
-        first, steps = self.next_step, end - self.next_step
-        block, self._ahead = bodies.block(first, end), {}
-        for wait in self._held:
-            row, name = wait
-            span = SpanView(self._actors[row], self._actors, self._users, first, block)
-            with blame(self._actors[row].path, first):
-                self._ahead[wait] = _checked(name, self._interrupt(name).holds(span), steps)
-            begins = self._begins(wait)
-            if begins.any():
-                end = min(end, first + int(begins.argmax()) + 1)
-        return end
-
-    def take(self, bodies: Bodies, end: int) -> Sequence[Event]:
-        """Note which interrupts happen at step `end` - 1, and which conditions hold there."""
-        last, self.next_step = end - self.next_step - 1, end
-        self._last = [wait for wait in self._ahead if self._begins(wait)[last]]
-        for wait, holds in self._ahead.items():
-            self._held[wait] = bool(holds[last])
-        self._ahead = {}
-        return ()
-
-    def interruptions(self, events: Sequence[Event]) -> Iterator[tuple[int, SightEvent]]:
-        """Yield the interruptions at the last step, with the place of the body itself."""
-        for row, name in self._last:
-            actor = self._actors[row]
-            x, y = actor.home.plan.lattice.xy_of(actor.state.x, actor.state.y)
-            yield row, SightEvent(name, "", x, y)
-
-    def _interrupt(self, name: str) -> Interrupt:
-        if name not in self._interrupts:
-            self._interrupts[name] = cast("Interrupt", lookup("interrupt", name)())
-        return self._interrupts[name]
-
-    def _begins(self, wait: Wait) -> Bool:
-        """Return at which steps of the present span a condition becomes true."""
-        holds, held = self._ahead[wait], self._held[wait]
-        before = np.concatenate([holds[:1] if held is None else [held], holds[:-1]])
-        return holds & ~before
-
-
-def _checked(name: str, holds: Bool, steps: int) -> Bool:
-    """Return the answer of an interrupt.
-
-    Raises:
-        ComponentError: It is not an array of that many booleans.
-    """
-    shape = getattr(holds, "shape", None)
-    if shape != (steps,) or holds.dtype != np.bool_:
-        raise ComponentError(
-            f"interrupt {name}: holds() returned {holds!r}, expected an array of {steps} booleans,"
-            " one for each step of the span"
-        )
-    return holds
-
 
 # The squared distance of a person who can't be met: larger than any home [lattice units²].
 FAR = 1 << 50

@@ -13,7 +13,7 @@ from fleet2d.artifacts.table import Column, TableSpec
 from fleet2d.configuration.units import MICROSECOND
 from fleet2d.engine.bodies import Bodies
 from fleet2d.engine.cameras import Cameras
-from fleet2d.engine.home_changes import Changes
+from fleet2d.engine.change_queue import ChangeQueue
 from fleet2d.engine.learners import Learners
 from fleet2d.engine.sensors import Sensors
 from fleet2d.engine.trajectories import STEP, TIME
@@ -55,7 +55,7 @@ class RunExpectations:
         scenario: Scenario,
         actors: Sequence[DecidingActor],
         bodies: Bodies,
-        changes: Changes,
+        changes: ChangeQueue,
         sensors: Sensors,
         cameras: Sequence[Cameras],
         activities: Activities,

@@ -19,8 +19,8 @@ from typing import Any
 from fleet2d.algorithms.log import Log
 from fleet2d.configuration.trust import current_trust, restrict
 from fleet2d.engine.checkpoint import CheckpointWriter
-from fleet2d.engine.script import EngineWorld
 from fleet2d.engine.state import State
+from fleet2d.engine.world import EngineWorld
 from fleet2d.entities.behavior import Situation
 from fleet2d.errors import InputError, blame
 from fleet2d.floorplan.home import HomeChanges

@@ -8,16 +8,17 @@ from fleet2d.artifacts.store import RunStore
 from fleet2d.configuration.problems import suggest
 from fleet2d.engine.bodies import Basis, Bodies
 from fleet2d.engine.cameras import Cameras, open_cameras
+from fleet2d.engine.change_queue import ChangeQueue
 from fleet2d.engine.collisions import BlockedWays, Clearance
-from fleet2d.engine.encounters import SIGHT_EVENTS, Encounters, Interruptions
-from fleet2d.engine.home_changes import Changes
-from fleet2d.engine.interventions import Interventions
+from fleet2d.engine.encounters import Encounters
+from fleet2d.engine.interrupts.interrupt import SIGHT_EVENTS, Interruptions
+from fleet2d.engine.intervention_queue import InterventionQueue
 from fleet2d.engine.layers import LayerBook, add_layers
 from fleet2d.engine.learners import Learners
 from fleet2d.engine.recorder import Recorder, activities_of, table_specs
-from fleet2d.engine.script import schedule_script
 from fleet2d.engine.sensors import Sensors
 from fleet2d.engine.state import InView, State
+from fleet2d.engine.world import schedule_script
 from fleet2d.entities.decisions import DecidingActor
 from fleet2d.entities.objects.door import Door
 from fleet2d.errors import ComponentError, PlacementError, ScenarioError
@@ -40,7 +41,7 @@ def set_up(scenario: Scenario, clock: Clock, seed: int, store: RunStore) -> Stat
     for group in cameras:
         if any(causes_errors(entry.act, group.owner.name) for entry in scenario.script):
             group.expect_disturbances()
-    changes = Changes(basis)
+    changes = ChangeQueue(basis)
     for index, change in enumerate(scenario.changes):
         with _locate_errors(scenario, f"changes.{index}"):
             changes.declare(index, change)
@@ -75,7 +76,7 @@ def set_up(scenario: Scenario, clock: Clock, seed: int, store: RunStore) -> Stat
         recorder=recorder,
         store=store,
         events=EventStream([recorder, sensors, *([] if log is None else [log])]),
-        interventions=Interventions(clock),
+        interventions=InterventionQueue(clock),
         max_span=scenario.simulation.max_span,
         watchers=[
             clearance,

@@ -23,9 +23,8 @@ from fleet2d.configuration.problems import suggest
 from fleet2d.configuration.units import micros, parse_duration
 from fleet2d.engine.checkpoint import Checkpoint, CheckpointWriter
 from fleet2d.engine.inputs import input_files
-from fleet2d.engine.interventions import is_from_outside
+from fleet2d.engine.intervention_queue import is_from_outside
 from fleet2d.engine.loop import Loop
-from fleet2d.engine.script import repeat, request
 from fleet2d.engine.setup import set_up
 from fleet2d.engine.snapshot import (
     Constants,
@@ -35,6 +34,7 @@ from fleet2d.engine.snapshot import (
     save_snapshot,
 )
 from fleet2d.engine.state import State
+from fleet2d.engine.world import repeat, request
 from fleet2d.entities.decisions import DecidingActor
 from fleet2d.entities.plan import Plan, data_of
 from fleet2d.errors import ArtifactError, InputError, ScenarioError

@@ -12,10 +12,11 @@ from fleet2d.algorithms.observations import OBSERVATION, ROBOT
 from fleet2d.artifacts.store import RunStore
 from fleet2d.engine.bodies import Bodies, Watcher
 from fleet2d.engine.cameras import Cameras
+from fleet2d.engine.change_queue import ChangeQueue
 from fleet2d.engine.collisions import BlockedWays, Clearance
-from fleet2d.engine.encounters import Encounters, Interruptions
-from fleet2d.engine.home_changes import Changes
-from fleet2d.engine.interventions import Interventions
+from fleet2d.engine.encounters import Encounters
+from fleet2d.engine.interrupts.interrupt import Interruptions
+from fleet2d.engine.intervention_queue import InterventionQueue
 from fleet2d.engine.layers import LayerBook
 from fleet2d.engine.learners import Learners
 from fleet2d.engine.recorder import Recorder
@@ -71,7 +72,7 @@ class State:
     bodies: Bodies
     actors: list[DecidingActor]
     home: Home
-    changes: Changes
+    changes: ChangeQueue
     clearance: Clearance
     blocking: BlockedWays
     encounters: Encounters
@@ -85,7 +86,7 @@ class State:
     recorder: Recorder
     store: RunStore
     events: EventStream
-    interventions: Interventions
+    interventions: InterventionQueue
     max_span: int | None
     watchers: list[Watcher]
     settled: int = 0

@@ -14,7 +14,7 @@ def test_robot_decides_once_after_the_last_person_left_or_the_first_came(
     event: str, kind: str
 ) -> None:
     waits = {
-        "type": "tests.engine.test_encounters_interruptions:Waits",
+        "type": "tests.engine.interrupts.test_interrupt:Waits",
         "event": event,
     }
     people = {n: {"type": "schedule", "days": [{"items": OUT}]} for n in ("ana", "ben")}

@@ -1,7 +1,7 @@
 """The last person leaves the home."""
 
 from fleet2d.configuration.components import register
-from fleet2d.engine.encounters import Interrupt, SpanView
+from fleet2d.engine.interrupts.interrupt import Interrupt, SpanView
 from fleet2d.kernels import Bool
 
 

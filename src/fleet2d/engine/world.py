@@ -12,7 +12,7 @@ from typing import Any
 
 from fleet2d.configuration.problems import did_you_mean, suggest
 from fleet2d.configuration.units import format_duration, micros
-from fleet2d.engine.interventions import (
+from fleet2d.engine.intervention_queue import (
     OUTSIDE,
     SCRIPT,
     DueIntervention,

@@ -92,7 +92,7 @@ class PendingIntervention:
         return self.last >= 0 and not self.repeats
 
 
-class Interventions:
+class InterventionQueue:
     """The interventions on a run.
 
     Attributes:

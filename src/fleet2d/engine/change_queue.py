@@ -97,7 +97,7 @@ class DueChange(NamedTuple):
     passed_us: int = 0
 
 
-class Changes:
+class ChangeQueue:
     """The changes of a run.
 
     Attributes:

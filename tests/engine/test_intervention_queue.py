@@ -9,7 +9,7 @@ import pytest
 from tests.scenes import everything, scenario
 
 import fleet2d
-from fleet2d.engine.interventions import OUTSIDE, DueIntervention, read_record
+from fleet2d.engine.intervention_queue import OUTSIDE, DueIntervention, read_record
 from fleet2d.errors import InputError, PlacementError, ScenarioError
 from fleet2d.interventions.intervention import parse_intervention
 from fleet2d.runtime.events import Event

@@ -13,7 +13,7 @@ import pytest
 from tests.scenes import run, scenario, table
 
 from fleet2d import Behavior, Plan, Run, Simulation, Situation
-from fleet2d.engine.encounters import Interrupt, Interruptions, SpanView
+from fleet2d.engine.interrupts.interrupt import Interrupt, Interruptions, SpanView
 from fleet2d.errors import ComponentError, ScenarioError
 
 PERIOD = 7
