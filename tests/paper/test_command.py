@@ -20,7 +20,6 @@ def reproduce(
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
     tmp_path: Path,
-    serial: None,
 ) -> Callable[..., Result]:
     """The command in this process, in an empty folder: (exit code, stdout, stderr)."""
     monkeypatch.chdir(tmp_path)

@@ -1,4 +1,4 @@
-"""Each result in its smallest version: its tables, files and pictures, and that it is repeatable."""
+"""The results in their smallest versions: studies of months, tables, files and pictures."""
 
 import json
 from dataclasses import replace
@@ -8,27 +8,104 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fleet2d.errors import FloorPlanError, InputError
-from fleet2d.paper import months, speed
-from fleet2d.paper.command import RESULTS, check_names, reproduce
-from fleet2d.paper.months import PaperOptions, Result, Table, ignore_progress, make_directory
+from fleet2d.configuration.documents import read_document
+from fleet2d.errors import ComponentError, FloorPlanError, InputError
+from fleet2d.paper import results, speed
+from fleet2d.paper.command import check_names
 from fleet2d.paper.pictures import draw
-from fleet2d.paper.speed import FrameSeries
+from fleet2d.paper.results import (
+    ESTIMATORS,
+    NAIVE_ESTIMATOR,
+    NAIVE_GUESS,
+    RESULTS,
+    SIZES,
+    PaperOptions,
+    Result,
+    Table,
+    differences,
+    feedback,
+    interval,
+    ltp_gap,
+    rtp_gap,
+    run_months,
+    study_content,
+)
 from fleet2d.scenario.model import load_scenario
 from fleet2d.studies.design import Design, build_design
 from fleet2d.studies.specification import read_specification
+
+
+def test_intervals_hold_the_true_mean_as_often_as_they_say() -> None:
+    samples = np.random.default_rng(5).exponential(1.0, (200, 40))
+    hits = sum(low <= 1.0 <= high for _, low, high in map(interval, samples))
+    # 95 % less what 40 skewed values miss: 0.90 to 0.97, within three standard errors of 200.
+    assert 0.88 < hits / 200 < 0.98
+
+
+def test_an_interval_holds_its_mean_and_is_the_same_each_time() -> None:
+    values = [0.1, 0.4, 0.2, 0.9]
+    mean, low, high = interval(values)
+    assert mean == pytest.approx(0.4)
+    assert low < mean < high
+    assert (mean, low, high) == interval(values)
+
+
+def test_the_study_files_hold_the_sizes_of_the_paper() -> None:
+    for name in ("rtp-gap", "feedback"):
+        file = Path(results.__file__).with_name(f"{name}.yaml")
+        assert read_document(file).data == study_content(name, *SIZES[name])
+
+
+def test_robots_are_repeated_under_names_of_their_own() -> None:
+    robots = study_content("ltp-gap", 8, 2)["axes"]["robot"]["options"]
+    assert [f"robot_{number}" for number in range(8)] == list(robots)
+    assert robots["robot_7"]["robots.robot_7"] == robots["robot_1"]["robots.robot_1"]
+    assert ["robots.robot_7"] == list(robots["robot_7"])
+
+
+def test_months_that_are_there_are_not_run_again(tmp_path: Path) -> None:
+    options = PaperOptions(quick=True, seeds=2, days=1, folder=tmp_path)
+    first = run_months("ltp-gap", options)
+    again = run_months("ltp-gap", options)
+    assert 1 == len(list((tmp_path / "ltp-gap" / "parts").iterdir()))
+    assert first.variants["digest"].to_list() == again.variants["digest"].to_list()
+
+
+def test_a_month_that_fails_is_an_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "mine.py").write_text(
+        "from fleet2d import Metric\n"
+        "class Fails(Metric):\n"
+        "    def update(self, history, state):\n        raise ValueError('thirteen')\n"
+    )
+
+    def failing(name: str, seeds: int, days: int) -> dict[str, Any]:
+        own = {"type": f"{tmp_path.as_posix()}/mine:Fails"}
+        return {**study_content(name, seeds, days), "rules": [{"set": {"metrics.own": own}}]}
+
+    monkeypatch.setattr(results, "study_content", failing)
+    with pytest.raises(ComponentError, match="thirteen"):
+        run_months("ltp-gap", PaperOptions(quick=True, seeds=1, days=1))
+
+
+def test_a_request_says_how_large_or_leaves_it() -> None:
+    assert (30, 30) == PaperOptions().size("feedback")
+    assert (2, 3) == PaperOptions(quick=True).size("feedback")
+    assert (7, 3) == PaperOptions(quick=True, seeds=7).size("feedback")
+
 
 PNG = b"\x89PNG\r\n\x1a\n"
 TINY = PaperOptions(quick=True, seeds=1, days=2)
 TWO = PaperOptions(quick=True, seeds=2, days=2)
 
 
+HANGOUTS = ("hangout, 10 % of moves at random", "hangout, 10 % rounds by the clock")
+
+
 @pytest.fixture(scope="module")
-def results(serial: None) -> dict[str, Result]:
+def measured() -> dict[str, Result]:
     """The results that are months, of two days; that of most robots of one."""
-    day = replace(TINY, days=1)
-    sizes = {"ltp-gap": TWO, "rtp-gap": TINY, "feedback": day}
-    return {name: reproduce(name, size, ignore_progress) for name, size in sizes.items()}
+    all_results = (ltp_gap(TWO), rtp_gap(TINY), feedback(replace(TINY, days=1)))
+    return {result.name: result for result in all_results}
 
 
 def numbers_of(result: Result) -> dict[str, Any]:
@@ -36,21 +113,21 @@ def numbers_of(result: Result) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("name", ["ltp-gap", "rtp-gap", "feedback"])
-def test_a_result_is_kept_and_drawn(results: dict[str, Result], name: str, tmp_path: Path) -> None:
-    content = json.loads(results[name].save(tmp_path).read_text(encoding="utf-8"))
-    assert results[name].title == content["result"]
-    draw(results[name], tmp_path / "picture.png")
+def test_a_result_is_kept_and_drawn(measured: dict[str, Result], name: str, tmp_path: Path) -> None:
+    content = json.loads(measured[name].save(tmp_path).read_text(encoding="utf-8"))
+    assert measured[name].title == content["result"]
+    draw(measured[name], tmp_path / "picture.png")
     assert (tmp_path / "picture.png").read_bytes().startswith(PNG)
-    for table in results[name].tables:
+    for table in measured[name].tables:
         assert all(len(table.columns) == len(row) for row in table.rows)
 
 
-def test_a_result_is_the_same_again(results: dict[str, Result], serial: None) -> None:
-    assert numbers_of(results["ltp-gap"]) == numbers_of(reproduce("ltp-gap", TWO, ignore_progress))
+def test_a_result_is_the_same_again(measured: dict[str, Result]) -> None:
+    assert numbers_of(measured["ltp-gap"]) == numbers_of(ltp_gap(TWO))
 
 
-def test_gaps_are_of_every_room_and_day(results: dict[str, Result]) -> None:
-    numbers = results["ltp-gap"].numbers
+def test_gaps_are_of_every_room_and_day(measured: dict[str, Result]) -> None:
+    numbers = measured["ltp-gap"].numbers
     assert 2 == len(numbers["gaps"])
     assert {2} == {len(line) for robot in numbers["gaps"] for line in robot.values()}
     mean = np.mean([robot["kitchen_0"] for robot in numbers["gaps"]], axis=0)
@@ -63,27 +140,27 @@ def test_gaps_are_of_every_room_and_day(results: dict[str, Result]) -> None:
 
 
 def test_right_after_a_sighting_the_naive_guess_is_right_and_after_hours_is_not(
-    results: dict[str, Result],
+    measured: dict[str, Result],
 ) -> None:
-    top_1 = results["rtp-gap"].numbers["means"]["top_1"]
-    assert top_1[months.NAIVE_GUESS]["0-1 min"][0] > 0.9
-    assert top_1[months.NAIVE_GUESS]["over 4 h"][0] < 0.2
+    top_1 = measured["rtp-gap"].numbers["means"]["top_1"]
+    assert top_1[NAIVE_GUESS]["0-1 min"][0] > 0.9
+    assert top_1[NAIVE_GUESS]["over 4 h"][0] < 0.2
     assert top_1["hmm"]["over 4 h"][0] > 0.5
 
 
-def test_differences_are_paired_by_seed(results: dict[str, Result]) -> None:
-    tv = results["feedback"].numbers["tv"]
-    assert set(months.POLICIES) == set(tv)
-    less = months.differences(tv)
+def test_differences_are_paired_by_seed(measured: dict[str, Result]) -> None:
+    tv = measured["feedback"].numbers["tv"]
+    assert [*design_of(1).labels["robot"]] == [*tv]
+    less = differences(tv)
     for policy, by in tv.items():
-        assert months.NAIVE_ESTIMATOR not in less[policy]
+        assert NAIVE_ESTIMATOR not in less[policy]
         for name, values in less[policy].items():
-            expected = [a - b for a, b in zip(by[name], by[months.NAIVE_ESTIMATOR], strict=True)]
+            expected = [a - b for a, b in zip(by[name], by[NAIVE_ESTIMATOR], strict=True)]
             assert expected == values
 
 
 def design_of(seeds: int) -> Design:
-    return build_design(read_specification(months.feedback_study(seeds, 1)))
+    return build_design(read_specification(study_content("feedback", seeds, 1)))
 
 
 def test_a_robot_goes_by_the_estimator_of_its_column_only() -> None:
@@ -92,17 +169,17 @@ def test_a_robot_goes_by_the_estimator_of_its_column_only() -> None:
         labels, scenario = design.parameters(index), design.scenario(index).resolved()
         behaviors = scenario["robots"]["astro"]["behaviors"]
         sources = [b["source"] for b in behaviors if b["type"] == "hangout"]
-        uses_estimator = months.POLICIES[str(labels["robot"])].uses_estimator
+        uses_estimator = labels["robot"] in HANGOUTS
         assert ([labels["estimator"]] if uses_estimator else []) == sources
-        expected = {labels["estimator"]} if uses_estimator else set(months.ESTIMATORS)
+        expected = {labels["estimator"]} if uses_estimator else set(ESTIMATORS)
         assert expected == set(scenario["algorithms"])
         assert len(expected) == len(scenario["metrics"])
 
 
 def test_estimators_share_a_month_unless_the_robot_acts_on_them() -> None:
-    dependent = sum(policy.uses_estimator for policy in months.POLICIES.values())
-    runs = dependent * len(months.ESTIMATORS) + len(months.POLICIES) - dependent
-    assert 3 * runs == len(design_of(3))
+    design = design_of(3)
+    others = len(design.labels["robot"]) - len(HANGOUTS)
+    assert 3 * (len(HANGOUTS) * len(ESTIMATORS) + others) == len(design)
 
 
 # --- Speed --------------------------------------------------------------------------------------
@@ -134,12 +211,12 @@ def test_rows_are_measured_in_processes_of_their_own(
 ) -> None:
     day = "simulation.duration.days=1"
     cases = [
-        speed.SpeedRow("base", (day,), speed.PAPER_BASE),
+        speed.SpeedRow("base", (day,), "13,000 x", 13_000),
         speed.SpeedRow("impossible", (day, "robots.astro.radius=40 m")),
-        speed.SpeedRow("watched", (), speed.PAPER_WATCHED, FrameSeries("second", 1, 5)),
+        speed.SpeedRow("watched", frames={"period_s": 1, "count": 5}),
     ]
     monkeypatch.setattr(speed, "rows", lambda options, days: cases)
-    result = speed.reproduce(PaperOptions(quick=True, seeds=1), ignore_progress)
+    result = speed.measure_rows(PaperOptions(quick=True, seeds=1))
     base, impossible, watched = result.numbers["rows"]
     assert base["speedup"] == pytest.approx(86_400 / base["seconds"][0])
     assert base["process_s"] > base["seconds"][0]
@@ -153,16 +230,12 @@ def test_rows_are_measured_in_processes_of_their_own(
 
 
 def test_results_come_in_the_order_of_the_paper() -> None:
-    assert ["speed", "ltp-gap", "rtp-gap", "feedback"] == check_names([]) == list(RESULTS)
-    assert ["speed", "feedback"] == check_names(["feedback", "speed", "speed"])
+    assert ["speed", "ltp-gap", "rtp-gap", "feedback"] == check_names([], RESULTS) == list(RESULTS)
+    assert ["speed", "feedback"] == check_names(["feedback", "speed", "speed"], RESULTS)
     with pytest.raises(InputError, match="did you mean 'feedback'"):
-        check_names(["feedbak"])
-    assert (months.LTP_GAP, months.RTP_GAP) == tuple(check_names(["rtp-gap", "ltp-gap"]))
+        check_names(["feedbak"], RESULTS)
 
 
-def test_a_directory_that_cannot_be_made_is_said_before_anything_is_run(tmp_path: Path) -> None:
-    (tmp_path / "file").write_text("")
-    with pytest.raises(InputError, match="--out"):
-        make_directory(tmp_path / "file" / "paper")
+def test_numbers_that_cannot_be_written_are_an_error(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="can't be written"):
         Result("speed", "", (Table("", (), ()),)).save(tmp_path / "absent")

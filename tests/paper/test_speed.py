@@ -6,7 +6,7 @@ from matplotlib.colors import to_rgb
 from fleet2d.engine.simulation import Simulation
 from fleet2d.kernels import U8
 from fleet2d.palette import ROBOT_COLORS, USER_COLORS
-from fleet2d.paper.speed import FrameSeries, LiveView, time_frames
+from fleet2d.paper.speed import LiveView, time_frames
 
 
 def at_hour(hour: int) -> Simulation:
@@ -53,5 +53,5 @@ def test_watching_changes_nothing_in_the_run() -> None:
 
 
 def test_watching_counts_simulated_time_from_the_first_frame() -> None:
-    timing = time_frames(FrameSeries("minute", 60, 10, from_hour=1))
+    timing = time_frames(60, 10, from_hour=1)
     assert 600 == round(timing["speedup"] * timing["seconds"])

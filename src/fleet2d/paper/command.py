@@ -1,10 +1,9 @@
 """The command that repeats the measurements of the paper: `fleet2d reproduce-paper`."""
 
 import sys
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -12,9 +11,8 @@ from fleet2d.configuration.problems import suggest
 from fleet2d.errors import InputError
 
 if TYPE_CHECKING:
-    from fleet2d.paper.months import OnProgress, PaperOptions, Result
+    from fleet2d.paper.results import Result
 
-RESULTS = ("speed", "ltp-gap", "rtp-gap", "feedback")  # in the order of the paper
 WIDTH = 200  # of lines in a file [characters]
 
 
@@ -44,16 +42,29 @@ def reproduce_paper(
     ] = None,
 ) -> None:
     """Repeat the measurements of the paper, and print them beside its figures."""
-    from fleet2d.paper.months import PaperOptions, make_directory
+    from fleet2d.paper import results as months
+    from fleet2d.paper.speed import measure_rows
     from fleet2d.studies.executors import cores
 
-    names = check_names(results or [])
-    options = PaperOptions(quick, seeds, days, workers or cores(), real_map, out / "studies")
-    make_directory(out)  # an error is shown before hours of work
+    measures = dict(
+        zip(
+            months.RESULTS,
+            (measure_rows, months.ltp_gap, months.rtp_gap, months.feedback),
+            strict=True,
+        )
+    )
+
+    names = check_names(results or [], months.RESULTS)
+    options = months.PaperOptions(quick, seeds, days, workers or cores(), real_map, out / "studies")
+    try:
+        out.mkdir(parents=True, exist_ok=True)  # an error is shown before hours of work
+    except OSError as error:
+        raise InputError(
+            f"{out} can't be created: {error.strerror}; name another directory by --out"
+        ) from error
     can_draw = _can_draw()
     for name in names:
-        with _progress(name, show=sys.stderr.isatty()) as on_progress:
-            result = reproduce(name, options, on_progress)
+        result = measures[name](options)
         _print(result)
         typer.echo(result.save(out))
         if can_draw:
@@ -64,42 +75,20 @@ def reproduce_paper(
             typer.echo(target)
 
 
-def check_names(names: Sequence[str]) -> list[str]:
-    """Return the names of results in the order of the paper; all of them if `names` is empty.
+def check_names(names: Sequence[str], known: Sequence[str]) -> list[str]:
+    """Return names of results in the order of the known ones; all of them if `names` is empty.
 
     Raises:
         InputError: There is no such result.
 
     Example:
-        >>> check_names(["feedback", "speed"])
+        >>> check_names(["feedback", "speed"], ["speed", "ltp-gap", "feedback"])
         ['speed', 'feedback']
     """
     for name in names:
-        if name not in RESULTS:
-            raise InputError(f"there is no result {name!r}{suggest(name, RESULTS)}")
-    return [name for name in RESULTS if name in names or not names]
-
-
-def reproduce(name: str, options: "PaperOptions", on_progress: "OnProgress") -> "Result":
-    """Repeat the measurements of one result.
-
-    Args:
-        name: One of `RESULTS`.
-        options: The size.
-        on_progress: Receives the progress.
-
-    Raises:
-        InputError: The map can't be read, or matplotlib is missing, which drawing frames needs.
-    """
-    from fleet2d.paper import months, speed
-
-    functions = (
-        speed.reproduce,
-        months.reproduce_ltp_gap,
-        months.reproduce_rtp_gap,
-        months.reproduce_feedback,
-    )
-    return dict(zip(RESULTS, functions, strict=True))[name](options, on_progress)
+        if name not in known:
+            raise InputError(f"there is no result {name!r}{suggest(name, known)}")
+    return [name for name in known if name in names or not names]
 
 
 def _can_draw() -> bool:
@@ -112,42 +101,26 @@ def _can_draw() -> bool:
     return True
 
 
-@contextmanager
-def _progress(name: str, *, show: bool) -> "Iterator[OnProgress]":
-    """Yield a function that shows progress as a bar if `show`, else does nothing."""
-    from fleet2d.paper.months import ignore_progress
-    from fleet2d.studies.progress import progress_bar
-
-    with progress_bar(show=show) as progress:
-        if progress is None:
-            yield ignore_progress
-            return
-        task = progress.add_task(name, total=None)
-
-        def update(phase: str, done: int, total: int) -> None:
-            progress.update(task, completed=done, total=total, description=f"{name}: {phase}")
-
-        yield update
-
-
 def _print(result: "Result") -> None:
     """Print the tables of a result."""
     from rich.console import Console
     from rich.markup import escape
     from rich.table import Table
 
-    from fleet2d.paper.months import PAPER_COLUMN
+    from fleet2d.paper.results import PAPER_COLUMN
 
     console = Console(soft_wrap=True, width=None if sys.stdout.isatty() else WIDTH)
     console.print(f"\n{escape(result.title)}", highlight=False)
     for table in result.tables:
-        grid = Table(
-            title=escape(table.title), title_justify="left", title_style="", show_edge=False
-        )
+        title = escape(table.title)
+        grid = Table(title=title, title_justify="left", title_style="", show_edge=False)
         for number, head in enumerate(table.columns):
             is_text = head == PAPER_COLUMN
-            justify: Literal["left", "right"] = "left" if is_text or not number else "right"
-            grid.add_column(escape(head), justify=justify, no_wrap=not is_text)
+            grid.add_column(
+                escape(head),
+                justify="left" if is_text or not number else "right",
+                no_wrap=not is_text,
+            )
         for row in table.rows:
             grid.add_row(*map(escape, row))
         console.print(grid)

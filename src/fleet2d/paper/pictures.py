@@ -8,8 +8,8 @@ import numpy as np
 
 from fleet2d.errors import extra
 from fleet2d.metrics.rtp_score import GAPS
-from fleet2d.paper import months, speed
-from fleet2d.paper.months import Result, interval
+from fleet2d.paper import results
+from fleet2d.paper.results import Result, interval
 from fleet2d.pictures.floorplan import check_picture, drawing_style, save_figure
 
 with extra("viz", "drawing needs matplotlib"):
@@ -86,9 +86,9 @@ def draw_ltp_gap(numbers: Mapping[str, Any], axes: Axes) -> None:
 def draw_rtp_gap(numbers: Mapping[str, Any], axes: Axes) -> None:
     """Draw the share of right rooms by gap, with intervals."""
     rows = numbers["means"]["top_1"]
-    gaps = [gap for gap in GAPS if gap in rows[months.NAIVE_GUESS] and gap != NEVER_SEEN]
+    gaps = [gap for gap in GAPS if gap in rows[results.NAIVE_GUESS] and gap != NEVER_SEEN]
     for number, (name, by_gap) in enumerate(rows.items()):
-        is_naive = name == months.NAIVE_GUESS
+        is_naive = name == results.NAIVE_GUESS
         values = np.array([by_gap[gap] for gap in gaps])
         x = np.arange(len(gaps)) + 0.06 * (number - (len(rows) - 1) / 2)
         axes.errorbar(
@@ -112,9 +112,9 @@ def draw_rtp_gap(numbers: Mapping[str, Any], axes: Axes) -> None:
 def draw_feedback(numbers: Mapping[str, Any], axes: Axes) -> None:
     """Draw the mean errors of estimators under each policy, with intervals."""
     tv = numbers["tv"]
-    for number, estimator in enumerate(months.ESTIMATORS):
+    for number, estimator in enumerate(results.ESTIMATORS):
         cells = np.array([interval(by[estimator]) for by in tv.values()])
-        x = np.arange(len(tv)) + 0.16 * (number - (len(months.ESTIMATORS) - 1) / 2)
+        x = np.arange(len(tv)) + 0.16 * (number - (len(results.ESTIMATORS) - 1) / 2)
         ends = np.abs(cells[:, 1:] - cells[:, :1]).T
         label = estimator.replace("_", " ")
         axes.bar(x, cells[:, 0], 0.15, color=COLORS[number], label=label)
@@ -131,8 +131,8 @@ def _broken_lines(policy: str) -> str:
 
 
 DRAWERS: dict[str, Callable[[Mapping[str, Any], Axes], None]] = {
-    speed.NAME: draw_speed,
-    months.LTP_GAP: draw_ltp_gap,
-    months.RTP_GAP: draw_rtp_gap,
-    months.FEEDBACK: draw_feedback,
+    results.SPEED: draw_speed,
+    results.LTP_GAP: draw_ltp_gap,
+    results.RTP_GAP: draw_rtp_gap,
+    results.FEEDBACK: draw_feedback,
 }

@@ -12,51 +12,25 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass
 from multiprocessing import get_context
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fleet2d.configuration.documents import read_document
 from fleet2d.errors import InputError, extra
-from fleet2d.paper.months import PAPER_COLUMN, OnProgress, PaperOptions, Result, Table, counted
-from fleet2d.runtime.clock import DAY_S
+from fleet2d.paper.results import PAPER_COLUMN, SPEED, PaperOptions, Result, Table, counted
+from fleet2d.runtime.clock import HOUR_S
+from fleet2d.studies.progress import progress_bar
 
 if TYPE_CHECKING:
     from fleet2d.engine.simulation import Simulation
     from fleet2d.kernels import F64, U8
-
-
-SECONDS_PER_HOUR = 3600
-
-
-@dataclass(frozen=True)
-class FrameSeries:
-    """The frames of the bundled base scenario to draw.
-
-    Attributes:
-        unit: The simulated time between two frames, as a noun.
-        period_s: The same [s].
-        count: The number of frames.
-        from_hour: The hour of the first day at which they start.
-    """
-
-    unit: str
-    period_s: int
-    count: int
-    from_hour: int = 0
-
-    def shorter(self) -> "FrameSeries":
-        """Return the series with 100 frames."""
-        return replace(self, count=100)
-
-
-# An evening hour, second by second; and two days, minute by minute.
-FRAMES = (FrameSeries("second", 1, 3600, from_hour=18), FrameSeries("minute", 60, 2880))
 
 
 class LiveView:
@@ -156,32 +130,36 @@ class LiveView:
         return shapely.get_coordinates(largest.exterior)
 
 
-def time_frames(series: FrameSeries) -> dict[str, float]:
+def time_frames(period_s: int, count: int, from_hour: int = 0) -> dict[str, float]:
     """Draw frames of the base scenario; return the wall time and simulated over wall time.
 
     Set-up and simulated time before the first frame don't count.
+
+    Args:
+        period_s: The simulated time between two frames [s].
+        count: The number of frames.
+        from_hour: The hour of the first day at which they start.
     """
     from fleet2d.engine.simulation import Simulation
 
-    duration_s = series.from_hour * SECONDS_PER_HOUR + series.count * series.period_s
+    duration_s = from_hour * HOUR_S + count * period_s
     simulation = Simulation("bundled:base", f"simulation.duration={max(duration_s, 60)} s", seed=4)
-    simulation.advance(series.from_hour * SECONDS_PER_HOUR)
+    simulation.advance(from_hour * HOUR_S)
     view = LiveView(simulation)
     view.frame()
     start_s = time.perf_counter()
-    for _ in range(series.count):
-        simulation.advance(series.period_s)
+    for _ in range(count):
+        simulation.advance(period_s)
         view.frame()
     seconds = time.perf_counter() - start_s
     simulation.finish("interrupted")
-    return {"seconds": seconds, "speedup": series.count * series.period_s / seconds}
+    return {"seconds": seconds, "speedup": count * period_s / seconds}
 
 
-NAME = "speed"
 TITLE = "Section V.A: time of the base scenario and its variants"
+REAL_MAP = "real-world map"  # the row of the user's own map
 PHASES = ("setup", "simulate", "save")
-CROWDS = (2, 5, 10, 20, 50)
-QUICK_CROWDS = (2, 5)
+QUICK_FRAMES = 100
 NO_NUMBER = "–"
 NOTES = (
     "the paper builds a cache of visibility once per home, 1 h for a HouseExpo plan and 6 h for a"
@@ -190,76 +168,45 @@ NOTES = (
 )
 
 
-class PaperNumber(NamedTuple):
-    """A number quoted from the paper.
-
-    Attributes:
-        text: The quotation.
-        speedup: Simulated time over wall time, if the paper gives it.
-    """
-
-    text: str
-    speedup: float | None = None
-
-
-UNKNOWN = PaperNumber(NO_NUMBER)
-PAPER_BASE = PaperNumber("194 s: 45 load a prebuilt cache, 127 simulate; 13,000 x", 13_000)
-PAPER_CROWDS = {50: PaperNumber("28 min, and all memory", 30 * DAY_S / (28 * 60))}
-PAPER_WATCHED = PaperNumber("8 to 12 x", 10)
-PAPER_CACHE = PaperNumber("6 h to build the cache")
-
-
 @dataclass(frozen=True)
 class SpeedRow:
-    """A row of the table of speeds: a scenario to time, and the paper's number for it.
+    """A row of the table of speeds: a scenario to time, and what the paper says of it.
 
     Attributes:
         case: The name of the scenario.
         overrides: Changes of the bundled base scenario.
-        paper: The paper's number.
-        frames: The frames to draw while it runs, as if watched; None: none.
+        paper: The quotation from the paper.
+        paper_speedup: Simulated time over wall time, if the paper has a number for it.
+        frames: The arguments of `time_frames` for a home that is watched; None: unwatched.
     """
 
     case: str
     overrides: tuple[str, ...] = ()
-    paper: PaperNumber = UNKNOWN
-    frames: FrameSeries | None = None
+    paper: str = NO_NUMBER
+    paper_speedup: float | None = None
+    frames: Mapping[str, int] | None = None
 
 
 def rows(options: PaperOptions, days: int) -> list[SpeedRow]:
     """Return the rows of the table; the row of a real map is there if `options` name a map."""
-    span = f"simulation.duration.days={days}"
-    cases = [
-        SpeedRow("base: routine, presence, hangout", (span,), PAPER_BASE),
-        SpeedRow(f"{2 * days} days", (f"simulation.duration.days={2 * days}",)),
-        SpeedRow(
-            "without robot algorithms",
-            (
-                span,
-                "algorithms={}",
-                "metrics={}",
-                "robots.astro.behaviors=[{type: patrol, dwell: 10 min}]",
-            ),
-        ),
-        SpeedRow("Flashlight", (span, "sight.method=flashlight")),
-        SpeedRow("visibility polygons", (span, "sight.method=visibility_polygon"), PAPER_BASE),
-    ]
-    cases += [
-        SpeedRow(f"{count} users", (span, _people(count)), PAPER_CROWDS.get(count, UNKNOWN))
-        for count in (QUICK_CROWDS if options.quick else CROWDS)
-    ]
-    if options.map is not None:
-        cases.append(SpeedRow("real-world map", (span, *_home(options.map)), PAPER_CACHE))
-    for series in FRAMES:
-        case = f"watched: a frame each {series.unit}"
-        frames = series.shorter() if options.quick else series
-        cases.append(SpeedRow(case, (), PAPER_WATCHED, frames))
+    cases = []
+    for row in read_document(Path(__file__).with_suffix(".yaml")).data["rows"]:
+        months, users, frames = row.pop("months", 1), row.pop("users", None), row.get("frames")
+        is_missing = row["case"] == REAL_MAP and options.map is None
+        if is_missing or (not row.pop("quick", True) and options.quick):
+            continue
+        if frames and options.quick:
+            frames["count"] = QUICK_FRAMES
+        overrides = [] if frames else [f"simulation.duration.days={months * days}"]
+        overrides += row.pop("overrides", [])
+        if users:
+            user = "{type: routine, persona: works_outside}"
+            overrides.append(f"users={{{', '.join(f'user_{i}: {user}' for i in range(users))}}}")
+        if row["case"] == REAL_MAP and options.map is not None:
+            overrides += _home(options.map)
+        case = row.pop("case").format(days=months * days)
+        cases.append(SpeedRow(case, tuple(overrides), **row))
     return cases
-
-
-def _people(count: int) -> str:
-    user = "{type: routine, persona: works_outside}"
-    return "users={" + ", ".join(f"user_{i}: {user}" for i in range(count)) + "}"
 
 
 def _home(path: Path) -> tuple[str, ...]:
@@ -275,42 +222,33 @@ def _home(path: Path) -> tuple[str, ...]:
     return f"floorplan.type={kind}", f"floorplan.path={path.absolute()}"
 
 
-def reproduce(options: PaperOptions, on_progress: OnProgress) -> Result:
+def measure_rows(options: PaperOptions) -> Result:
     """Measure all rows, one process at a time."""
-    runs, days = options.size(3, 30, 1, 2)
+    runs, days = options.size(SPEED)
     cases, results = rows(options, days), []
-    with one_core():
-        for number, row in enumerate(cases):
-            on_progress(row.case, number, len(cases))
+    with _one_core(), progress_bar(show=sys.stderr.isatty()) as progress:
+        task = progress.add_task(SPEED, total=len(cases)) if progress else None
+        for row in cases:
             results.append(measure(row, runs))
-        on_progress("rows", len(cases), len(cases))
-    notes: tuple[str, ...] = NOTES
+            if progress and task is not None:
+                progress.advance(task)
+    notes = [*NOTES]
     if options.quick:
-        notes += ("quick: short runs are mostly set-up",)
+        notes.append("quick: short runs are mostly set-up")
     if options.map is None:
-        notes += ("a real-world map is left out: name one by --map (a ROS or a vacuum's map)",)
+        notes.append("a real-world map is left out: name one by --map (a ROS or a vacuum's map)")
     table = Table(
         f"{counted(days, 'day')} with 1 user, if not stated otherwise; one core, median of"
         f" {counted(runs, 'run')}",
         ("scenario", "ours [s]", "process [s]", "x real time", "memory", PAPER_COLUMN),
-        tuple(_cells(row, result) for row, result in zip(cases, results, strict=True)),
+        [_cells(row, result) for row, result in zip(cases, results, strict=True)],
         notes,
     )
-    numbers = {
-        "days": days,
-        "runs": runs,
-        "rows": [
-            {
-                "case": row.case,
-                "paper": row.paper.text,
-                "paper_speedup": row.paper.speedup,
-                "overrides": list(row.overrides),
-                **result,
-            }
-            for row, result in zip(cases, results, strict=True)
-        ],
-    }
-    return Result(NAME, TITLE, (table,), numbers)
+    numbers = {"days": days, "runs": runs, "rows": []}
+    for row, result in zip(cases, results, strict=True):
+        described = {key: value for key, value in asdict(row).items() if key != "frames"}
+        numbers["rows"].append({**described, **result})
+    return Result(SPEED, TITLE, (table,), numbers)
 
 
 def measure(row: SpeedRow, runs: int) -> dict[str, Any]:
@@ -321,7 +259,7 @@ def measure(row: SpeedRow, runs: int) -> dict[str, Any]:
         except InputError as error:
             return {"failed": str(error)}
         return {
-            "frames": row.frames.count,
+            "frames": row.frames["count"],
             "seconds": [timing["seconds"] for timing in timings],
             "speedup": statistics.median(timing["speedup"] for timing in timings),
         }
@@ -354,14 +292,14 @@ def run_once(overrides: tuple[str, ...]) -> dict[str, Any]:
     return json.loads(process.stdout)
 
 
-def _draw_once(series: FrameSeries) -> dict[str, float]:
+def _draw_once(frames: Mapping[str, int]) -> dict[str, float]:
     """Time the frames in a process of its own."""
     with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
-        return pool.submit(time_frames, series).result()
+        return pool.submit(time_frames, **frames).result()
 
 
 @contextmanager
-def one_core() -> Iterator[None]:
+def _one_core() -> Iterator[None]:
     """Pin this process and its children to one core, on systems that can."""
     if not hasattr(os, "sched_setaffinity"):
         yield
@@ -386,5 +324,5 @@ def _cells(row: SpeedRow, result: dict[str, Any]) -> tuple[str, ...]:
         "" if process is None else f"{process:.2f}",
         f"{result['speedup']:,.0f}",
         "" if peak is None else f"{peak:,.0f} MB",
-        row.paper.text,
+        row.paper,
     )
