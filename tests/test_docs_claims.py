@@ -19,7 +19,8 @@ from fleet2d.configuration.components import lookup
 from fleet2d.configuration.units import AngleDeg, Duration, Length, Share, Speed, TurnRateDeg
 from fleet2d.errors import InputError
 from fleet2d.expectations.parse import parse_expectation
-from fleet2d.floorplan.layers import CostmapSettings, LayerSettings
+from fleet2d.floorplan.costmap import CostmapSettings
+from fleet2d.floorplan.layers import LayerSettings
 from fleet2d.floorplan.synthetic.source import Synthetic
 from fleet2d.interventions.intervention import verbs
 from fleet2d.kernels.numbers import TURN

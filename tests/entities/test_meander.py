@@ -10,7 +10,7 @@ from tests.scenes import OWN, path, run, scenario
 from fleet2d.engine.simulation import Simulation
 from fleet2d.entities.body import RandomWalk
 from fleet2d.floorplan.home import Home
-from fleet2d.floorplan.objects import POSTURES
+from fleet2d.floorplan.placed_objects import POSTURES
 from fleet2d.kernels import F64
 
 

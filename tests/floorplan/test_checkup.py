@@ -13,7 +13,7 @@ from fleet2d.floorplan.checkup import Finding, checkup
 from fleet2d.floorplan.formats.native import native_document
 from fleet2d.floorplan.furniture import stand_furniture
 from fleet2d.floorplan.load import load_floorplan
-from fleet2d.floorplan.objects import PlacedObject
+from fleet2d.floorplan.placed_objects import PlacedObject
 from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
 from fleet2d.floorplan.rooms.doorways import DoorLine
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.lattice import Lattice
-from fleet2d.floorplan.objects import (
+from fleet2d.floorplan.placed_objects import (
     PlacedObject,
     UsePlace,
     describe_object,

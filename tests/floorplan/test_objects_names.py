@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import pytest
 
 from fleet2d.errors import FloorPlanError, PlacementError
-from fleet2d.floorplan.objects import distinct_names, find_named, number_names
+from fleet2d.floorplan.placed_objects import distinct_names, find_named, number_names
 
 THINGS = [SimpleNamespace(name=name) for name in ("kitchen_0", "bedroom_0")]
 

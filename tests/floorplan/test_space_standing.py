@@ -11,7 +11,7 @@ from tests.strategies import quick
 
 from fleet2d.floorplan.furniture import stand_furniture
 from fleet2d.floorplan.home import Home
-from fleet2d.floorplan.objects import PlacedObject, UsePlace
+from fleet2d.floorplan.placed_objects import PlacedObject, UsePlace
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.space import (
     SLACK,

@@ -21,9 +21,10 @@ from fleet2d.entities.behavior import Actor
 from fleet2d.entities.body import Track
 from fleet2d.entities.objects.door import Door, door_hint
 from fleet2d.errors import ComponentError, PlacementError, ScenarioError
-from fleet2d.floorplan.home import HomeChange, lattice_footprint
+from fleet2d.floorplan.home import lattice_footprint
+from fleet2d.floorplan.home_change import HomeChange
 from fleet2d.floorplan.mesh import Segment
-from fleet2d.floorplan.objects import move_object
+from fleet2d.floorplan.placed_objects import move_object
 from fleet2d.floorplan.rooms.room import PRIORITY, usual_type
 from fleet2d.floorplan.space import grow_shape
 from fleet2d.kernels import F64

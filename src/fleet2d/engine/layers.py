@@ -18,16 +18,9 @@ from fleet2d.engine.bodies import Basis, Bodies, Watcher
 from fleet2d.entities.behavior import Actor
 from fleet2d.entities.entity import Robot
 from fleet2d.errors import ComponentError
+from fleet2d.floorplan.costmap import CostmapSettings, costs_of
 from fleet2d.floorplan.home import Home
-from fleet2d.floorplan.layers import (
-    COSTMAP,
-    SEEN_LAYERS,
-    CostmapSettings,
-    Layer,
-    LayerSettings,
-    LayerType,
-    costs_of,
-)
+from fleet2d.floorplan.layers import COSTMAP, SEEN_LAYERS, Layer, LayerSettings, LayerType
 from fleet2d.floorplan.source import FloorPlanSource
 from fleet2d.kernels import F64, I64, Bool
 from fleet2d.kernels.sight import (

@@ -55,7 +55,7 @@ def sight_events(
     return sorted(events)
 
 
-Place = tuple[I64, I64, I64]  # x, y [lattice units] and heading, one element for each look
+PoseColumns = tuple[I64, I64, I64]  # x, y [lattice units] and heading, one element for each look
 
 # The user of a sighting that an error took back, until it would have become known.
 RETRACTED = -2
@@ -130,7 +130,7 @@ class SightingErrors:
             memory.noticed[:], memory.seen[:] = before.noticed, before.seen
         return rows[is_kept], differs
 
-    def _change(self, c: int, rows: I64, looks: I64, body: Place, memory: SightMemory) -> I64:
+    def _change(self, c: int, rows: I64, looks: I64, body: PoseColumns, memory: SightMemory) -> I64:
         """Return the sightings of some looks of a camera; the body is at a place in each."""
         camera = self._cameras[c]
         if camera.errors:
@@ -164,7 +164,7 @@ class SightingErrors:
                     )
         return sightings
 
-    def _sightings(self, camera: str, rows: I64, looks: I64, eye: Place) -> CameraSightings:
+    def _sightings(self, camera: str, rows: I64, looks: I64, eye: PoseColumns) -> CameraSightings:
         """Return the sightings of some looks of a camera, which is at a place in each."""
         owner = self._owner
         lattice = owner.home.plan.lattice

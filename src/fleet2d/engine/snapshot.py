@@ -31,7 +31,7 @@ from fleet2d.engine.inputs import components_of
 from fleet2d.engine.state import State
 from fleet2d.entities.body import RandomWalk, Track
 from fleet2d.errors import ArtifactError
-from fleet2d.floorplan.layers import CostedSpace
+from fleet2d.floorplan.costmap import CostedSpace
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.space import Space
 from fleet2d.kernels.space import Mesh

@@ -26,7 +26,7 @@ from fleet2d.entities.place import (
 )
 from fleet2d.errors import ComponentError, PlacementError, ScenarioError, blame
 from fleet2d.floorplan.home import Home
-from fleet2d.floorplan.objects import PlacedObject, Posture
+from fleet2d.floorplan.placed_objects import PlacedObject, Posture
 from fleet2d.floorplan.plan import Room
 from fleet2d.floorplan.space import Space
 from fleet2d.kernels import F64, I64

@@ -18,7 +18,7 @@ from fleet2d.entities.behavior import Actor, Situation
 from fleet2d.entities.body import Body, Track
 from fleet2d.entities.plan import Note, Plan
 from fleet2d.errors import NoWayError
-from fleet2d.floorplan.layers import CLOSED, route_by_cost
+from fleet2d.floorplan.costmap import CLOSED, route_by_cost
 from fleet2d.kernels import I64
 from fleet2d.kernels.motion import Breakpoints
 from fleet2d.kernels.numbers import TURN, turn_between

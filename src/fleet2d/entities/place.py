@@ -18,7 +18,7 @@ from pydantic import BeforeValidator, PlainSerializer, WithJsonSchema
 from fleet2d.configuration.problems import did_you_mean, problem
 from fleet2d.errors import PlacementError
 from fleet2d.floorplan.furniture import FURNITURE
-from fleet2d.floorplan.objects import PlacedObject
+from fleet2d.floorplan.placed_objects import PlacedObject
 from fleet2d.floorplan.plan import Room
 from fleet2d.floorplan.rooms.room import PRIORITY, usual_type
 from fleet2d.kernels import I64

@@ -13,7 +13,7 @@ from fleet2d.configuration.units import MAX_DURATION, micros
 from fleet2d.entities.body import Motion, RandomWalk, Track
 from fleet2d.entities.place import seat_at
 from fleet2d.errors import ComponentError, NoWayError
-from fleet2d.floorplan.objects import POSTURES, PlacedObject, Posture
+from fleet2d.floorplan.placed_objects import POSTURES, PlacedObject, Posture
 from fleet2d.floorplan.space import Space, straight_way
 from fleet2d.kernels import I8, I64
 from fleet2d.kernels.motion import Breakpoints, Legs, WalkRule

@@ -44,7 +44,7 @@ from fleet2d.kernels.sight import SightingColumn
 from fleet2d.runtime.clock import midnight_of
 from fleet2d.runtime.events import EventKind
 
-Place = str | tuple[float, float]
+Target = str | tuple[float, float]
 """A body, a room, an object, or a point (x, y) [m]."""
 
 BODY = ("user or robot", "bodies")
@@ -66,7 +66,7 @@ class distance(Signal):
     """
 
     body: str
-    other: Place
+    other: Target
 
     unit = "m"
     quantity = LENGTH
@@ -109,7 +109,7 @@ class distance(Signal):
 class _Outline:
     """The present outline of a room, an object or a point."""
 
-    def __init__(self, place: Place) -> None:
+    def __init__(self, place: Target) -> None:
         self._place = place
         self._known: tuple[object, I64] | None = None
 

@@ -10,7 +10,7 @@ from shapely.geometry.base import BaseGeometry
 
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.home import Home
-from fleet2d.floorplan.objects import PlacedObject, Point
+from fleet2d.floorplan.placed_objects import PlacedObject, Point
 from fleet2d.floorplan.plan import FloorPlan, Room
 from fleet2d.floorplan.rooms.room import UNKNOWN, LabelledRegion
 from fleet2d.floorplan.space import Space, grown_cells, with_approaches

@@ -9,7 +9,7 @@ import numpy as np
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.furniture import FURNITURE
 from fleet2d.floorplan.furniture_places import FurnitureGroup, Interior, Piece
-from fleet2d.floorplan.objects import number_objects
+from fleet2d.floorplan.placed_objects import number_objects
 from fleet2d.floorplan.plan import FloorPlan, Room
 from fleet2d.kernels import I64
 from fleet2d.runtime.determinism import Draws, stream_key

@@ -13,7 +13,7 @@ from fleet2d.floorplan.furniture import stand_furniture
 from fleet2d.floorplan.home import lattice_footprint
 from fleet2d.floorplan.lattice import UNITS_PER_CELL
 from fleet2d.floorplan.mesh import GRID
-from fleet2d.floorplan.objects import PlacedObject
+from fleet2d.floorplan.placed_objects import PlacedObject
 from fleet2d.floorplan.plan import FloorPlan, Room
 from fleet2d.floorplan.space import (
     BODY_RADIUS,

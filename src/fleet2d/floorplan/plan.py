@@ -19,7 +19,12 @@ from fleet2d.bounds import CORNERS, POLYGONS
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.lattice import Lattice
 from fleet2d.floorplan.mesh import build_mesh, canonical_order, free_on_lattice, part_notes
-from fleet2d.floorplan.objects import PlacedObject, describe_object, find_named, number_objects
+from fleet2d.floorplan.placed_objects import (
+    PlacedObject,
+    describe_object,
+    find_named,
+    number_objects,
+)
 from fleet2d.floorplan.rooms.division import (
     Passages,
     RegionKind,

@@ -16,9 +16,10 @@ from fleet2d.configuration.components import Component, Settings
 from fleet2d.configuration.problems import problem, problem_at, suggest
 from fleet2d.configuration.units import AngleDeg, InputPath, Length, PositiveLength
 from fleet2d.errors import FloorPlanError
+from fleet2d.floorplan.costmap import CostmapSettings
 from fleet2d.floorplan.furniture import FURNITURE, stand_furniture
-from fleet2d.floorplan.layers import CostmapSettings, LayerSettings, check_layers
-from fleet2d.floorplan.objects import Blocks, PlacedObject, number_objects
+from fleet2d.floorplan.layers import LayerSettings, check_layers
+from fleet2d.floorplan.placed_objects import Blocks, PlacedObject, number_objects
 from fleet2d.floorplan.plan import Cache, FloorPlan
 from fleet2d.floorplan.rooms.doorways import DoorLine, doorway_segments, name_doorways
 from fleet2d.floorplan.rooms.room import (

@@ -14,7 +14,7 @@ from shapely.geometry.base import BaseGeometry
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.lattice import UNITS_PER_CELL, Lattice
 from fleet2d.floorplan.mesh import Segment, build_mesh, snap_polygon
-from fleet2d.floorplan.objects import PlacedObject, UsePlace
+from fleet2d.floorplan.placed_objects import PlacedObject, UsePlace
 from fleet2d.floorplan.plan import FloorPlan, read_only
 from fleet2d.kernels import F64, I32, I64, Bool
 from fleet2d.kernels.sight import line_of_sight

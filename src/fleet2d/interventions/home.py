@@ -11,7 +11,7 @@ from fleet2d.configuration.units import InputPath
 from fleet2d.entities.objects.home_object import SensorFault
 from fleet2d.entities.place import Point
 from fleet2d.errors import ScenarioError
-from fleet2d.floorplan.home import HomeChange
+from fleet2d.floorplan.home_change import HomeChange
 from fleet2d.interventions.intervention import Intervention, Lasting, World
 
 

@@ -42,7 +42,8 @@ from fleet2d.entities.body import Pose
 from fleet2d.entities.decisions import DecidingActor
 from fleet2d.entities.objects.home_object import SensorFault
 from fleet2d.errors import ScenarioError
-from fleet2d.floorplan.home import Home, HomeChange, format_moment, parse_moment
+from fleet2d.floorplan.home import Home
+from fleet2d.floorplan.home_change import HomeChange, format_moment, parse_moment
 from fleet2d.runtime.clock import Clock, midnight_of
 from fleet2d.runtime.events import Event, EventKind
 from fleet2d.sight.camera import Disturbance

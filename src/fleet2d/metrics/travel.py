@@ -16,7 +16,7 @@ from fleet2d.floorplan.home import Home
 from fleet2d.metrics.metric import Metric
 from fleet2d.runtime.clock import DAY_S
 
-Place = tuple[float, float]
+RestPlace = tuple[float, float]
 
 
 @register("metric", "travel")
@@ -41,8 +41,8 @@ class Travel(Metric):
         """Begin counting."""
         self.metres: dict[str, float] = {}
         self.relocations: dict[str, int] = {}
-        self.last_rest: dict[str, Place] = {}  # place of the last rest
-        self.standing: dict[str, tuple[Place, int]] = {}  # place, and for how many steps
+        self.last_rest: dict[str, RestPlace] = {}  # place of the last rest
+        self.standing: dict[str, tuple[RestPlace, int]] = {}  # place, and for how many steps
         self.days = 0.0
 
     def update(self, history: History, state: Present) -> Any:
@@ -67,7 +67,7 @@ class Travel(Metric):
             self.standing[robot] = standing
         self.days += len(history) * history.step_s / DAY_S
 
-    def _rest(self, robot: str, place: Place) -> None:
+    def _rest(self, robot: str, place: RestPlace) -> None:
         if robot in self.last_rest and dist(self.last_rest[robot], place) > self.apart:
             self.relocations[robot] += 1
             self.last_rest[robot] = place

@@ -24,7 +24,7 @@ from shapely.geometry.base import BaseGeometry
 from fleet2d.errors import InputError
 from fleet2d.floorplan.checkup import Finding
 from fleet2d.floorplan.lattice import UNITS_PER_CELL
-from fleet2d.floorplan.objects import PlacedObject
+from fleet2d.floorplan.placed_objects import PlacedObject
 from fleet2d.floorplan.plan import FloorPlan, Room
 from fleet2d.floorplan.rooms.room import NO_ROOM
 from fleet2d.floorplan.space import grown_cells

@@ -23,7 +23,7 @@ from fleet2d.configuration.units import (
 )
 from fleet2d.errors import ScenarioError
 from fleet2d.floorplan.lattice import Lattice
-from fleet2d.floorplan.objects import POSTURES
+from fleet2d.floorplan.placed_objects import POSTURES
 from fleet2d.kernels import I64
 from fleet2d.kernels.numbers import BELL_STD, HALF_TURN, TURN, UNIT, cosine, sine
 from fleet2d.kernels.sight import (
@@ -41,6 +41,7 @@ from fleet2d.kernels.sight import (
 )
 from fleet2d.runtime.clock import HOUR_US
 from fleet2d.runtime.determinism import sum_in_order
+from fleet2d.sight.curve import chance, cumulative, decay
 from fleet2d.sight.fov import FieldOfView
 from fleet2d.sight.line_of_sight import LineOfSight
 from fleet2d.sight.perception import (
@@ -50,9 +51,6 @@ from fleet2d.sight.perception import (
     FalsePositives,
     Identity,
     Perception,
-    chance,
-    cumulative,
-    decay,
 )
 
 # Squares of distances in lattice units stay far inside 64 bits.

@@ -14,7 +14,7 @@ from fleet2d.configuration.components import Component
 from fleet2d.configuration.units import micros
 from fleet2d.errors import ComponentError
 from fleet2d.floorplan.home import Home
-from fleet2d.floorplan.objects import POSTURES
+from fleet2d.floorplan.placed_objects import POSTURES
 from fleet2d.kernels import F64, I16, I64, Bool
 from fleet2d.kernels.motion import rooms_at
 from fleet2d.kernels.numbers import BELL_STD, QUARTER, TURN, UNIT, half_sines, random_bells

@@ -16,7 +16,7 @@ from fleet2d.entities.objects.door import Door
 from fleet2d.errors import ArtifactError, Fleet2DError
 from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.lattice import UNITS_PER_CELL
-from fleet2d.floorplan.objects import PlacedObject, move_object
+from fleet2d.floorplan.placed_objects import PlacedObject, move_object
 from fleet2d.floorplan.plan import FloorPlan, Room
 from fleet2d.floorplan.rooms.doorways import Doorway
 from fleet2d.kernels import I16

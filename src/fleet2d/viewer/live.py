@@ -20,7 +20,7 @@ from starlette.routing import Route
 from fleet2d.engine.simulation import Simulation
 from fleet2d.entities.body import Track
 from fleet2d.errors import Fleet2DError, InputError, PlacementError
-from fleet2d.floorplan.home import HomeChange
+from fleet2d.floorplan.home_change import HomeChange
 from fleet2d.kernels.numbers import TURN
 from fleet2d.kernels.space import Mesh
 from fleet2d.runs.run import Run

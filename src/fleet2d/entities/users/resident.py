@@ -14,7 +14,7 @@ from fleet2d.entities.behavior import Behavior, Situation
 from fleet2d.entities.place import is_kind, matching_rooms
 from fleet2d.entities.plan import Plan, new_note
 from fleet2d.errors import PlacementError
-from fleet2d.floorplan.objects import POSTURES
+from fleet2d.floorplan.placed_objects import POSTURES
 from fleet2d.kernels.motion import (
     ANY_ROOM,
     NO_GAP_S,
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from fleet2d.entities.behavior import Actor
     from fleet2d.entities.place import Point, RoomChoice
     from fleet2d.floorplan.home import Home
-    from fleet2d.floorplan.objects import UsePlace
+    from fleet2d.floorplan.placed_objects import UsePlace
     from fleet2d.floorplan.plan import Room
     from fleet2d.runtime.clock import Clock
 

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from fleet2d.entities.behavior import Actor
     from fleet2d.entities.place import Point, RoomChoice
     from fleet2d.floorplan.home import Home
-    from fleet2d.floorplan.objects import PlacedObject
+    from fleet2d.floorplan.placed_objects import PlacedObject
     from fleet2d.floorplan.plan import Room
     from fleet2d.runtime.clock import Clock
 

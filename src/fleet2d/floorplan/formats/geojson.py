@@ -34,7 +34,7 @@ from fleet2d.floorplan.formats.files import (
 )
 from fleet2d.floorplan.formats.native import ObjectUse, cell_polygons, object_document
 from fleet2d.floorplan.mesh import repair
-from fleet2d.floorplan.objects import PlacedObject, distinct_names
+from fleet2d.floorplan.placed_objects import PlacedObject, distinct_names
 from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
 from fleet2d.floorplan.rooms.doorways import (
     TOUCH_M,

@@ -47,7 +47,7 @@ from fleet2d.floorplan.formats.files import (
     validate,
 )
 from fleet2d.floorplan.lattice import UNITS_PER_CELL
-from fleet2d.floorplan.objects import Blocks, PlacedObject, Posture, UsePlace
+from fleet2d.floorplan.placed_objects import Blocks, PlacedObject, Posture, UsePlace
 from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
 from fleet2d.floorplan.rooms.doorways import DoorLine
 from fleet2d.floorplan.rooms.room import UNKNOWN, room_type

@@ -32,7 +32,7 @@ from fleet2d.floorplan.formats.files import (
 )
 from fleet2d.floorplan.formats.occupancy import outline
 from fleet2d.floorplan.mesh import repair
-from fleet2d.floorplan.objects import PlacedObject, UsePlace, distinct_names
+from fleet2d.floorplan.placed_objects import PlacedObject, UsePlace, distinct_names
 from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
 from fleet2d.floorplan.rooms.room import UNKNOWN, usual_type
 from fleet2d.floorplan.source import PixelSource

@@ -13,7 +13,7 @@ from shapely.geometry.base import BaseGeometry
 
 from fleet2d.floorplan.lattice import UNITS_PER_CELL, Lattice
 from fleet2d.floorplan.mesh import Segment
-from fleet2d.floorplan.objects import Point
+from fleet2d.floorplan.placed_objects import Point
 from fleet2d.kernels import F64, I16, I64, Bool
 
 # How far beyond the end of a door line its wall may be [m].
@@ -317,8 +317,6 @@ def _crosses(first: I64, step: I64, passage: Segment) -> Bool:
     return meets_line & meets_segment
 
 
-Place = tuple[float, float]
-
 TOUCH_M = 0.02
 """Outlines no further apart than this touch, as coordinates are rounded (degrees to 1 cm)."""
 MAX_WALL_M = 0.6
@@ -344,14 +342,14 @@ class Passage:
             that is minus infinity, the side beyond `high`.
     """
 
-    start: Place
-    end: Place
+    start: Point
+    end: Point
     low: float
     high: float
     through: bool
 
     @property
-    def line(self) -> tuple[Place, Place]:
+    def line(self) -> tuple[Point, Point]:
         """The door, moved into the middle of the wall."""
         return self._beside((self.low + self.high) / 2)
 
@@ -368,7 +366,7 @@ class Passage:
             return ()
         return self._between(self.low, middle), self._between(middle, self.high)
 
-    def inside(self, depth: float) -> Place:
+    def inside(self, depth: float) -> Point:
         """Return the place at a depth [m] inside a door that leads outside (x, y) [m]."""
         at = self.high + depth if self.low == -np.inf else self.low - depth
         (x0, y0), (x1, y1) = self._beside(at)
@@ -378,14 +376,14 @@ class Passage:
         (a, b), (d, c) = self._beside(low), self._beside(high)
         return Polygon([a, b, c, d])
 
-    def _beside(self, offset: float) -> tuple[Place, Place]:
+    def _beside(self, offset: float) -> tuple[Point, Point]:
         start, end = np.array(self.start), np.array(self.end)
         shift = offset * _normal(start, end)
         (x0, y0), (x1, y1) = (start + shift).tolist(), (end + shift).tolist()
         return (x0, y0), (x1, y1)
 
 
-def door_axes(shape: BaseGeometry) -> Iterator[list[tuple[Place, Place]]]:
+def door_axes(shape: BaseGeometry) -> Iterator[list[tuple[Point, Point]]]:
     """Yield for each door in a shape its possible lines; of an area its axes, the longer first."""
     for part in shapely.get_parts(shape).tolist():
         corners = shapely.get_coordinates(part)
@@ -398,7 +396,7 @@ def door_axes(shape: BaseGeometry) -> Iterator[list[tuple[Place, Place]]]:
             yield _middle_lines(corners, along)
 
 
-def find_passage(free: MultiPolygon, start: Place, end: Place) -> Passage | None:
+def find_passage(free: MultiPolygon, start: Point, end: Point) -> Passage | None:
     """Return the passage of a door through the nearest wall, or None without a way through.
 
     Where no wall is near, in open space, the passage has no depth.
@@ -472,7 +470,7 @@ def _walls_across(free: MultiPolygon, at: F64, normal: F64) -> list[tuple[float,
     return walls
 
 
-def _middle_lines(corners: F64, along: F64) -> list[tuple[Place, Place]]:
+def _middle_lines(corners: F64, along: F64) -> list[tuple[Point, Point]]:
     """Return the middle lines of an area along a direction and across it, the longer first."""
     middle_lines = []
     axes = (along, np.array([-along[1], along[0]]))
@@ -489,6 +487,6 @@ def _normal(start: F64, end: F64) -> F64:
     return np.array([-along[1], along[0]]) / np.sqrt(along @ along)
 
 
-def _ends(start: F64, end: F64) -> tuple[Place, Place]:
+def _ends(start: F64, end: F64) -> tuple[Point, Point]:
     (x0, y0), (x1, y1) = start.tolist(), end.tolist()
     return (x0, y0), (x1, y1)

@@ -11,7 +11,7 @@ from shapely import MultiPolygon, Polygon
 
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.lattice import UNITS_PER_CELL, Lattice
-from fleet2d.floorplan.objects import number_names
+from fleet2d.floorplan.placed_objects import number_names
 from fleet2d.floorplan.rooms.doorways import open_borders
 from fleet2d.kernels import I16, I64, Bool
 from fleet2d.kernels.space import label_frames, label_parts, squared_distance

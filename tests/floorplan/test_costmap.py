@@ -10,15 +10,15 @@ from tests.scenes import flat_path
 import fleet2d
 from fleet2d._core import leg_cost
 from fleet2d.errors import InputError
-from fleet2d.floorplan.home import Home
-from fleet2d.floorplan.layers import (
+from fleet2d.floorplan.costmap import (
     CostedSpace,
     CostmapSettings,
-    LayerSettings,
     cells_within,
     costs_of,
     route_by_cost,
 )
+from fleet2d.floorplan.home import Home
+from fleet2d.floorplan.layers import LayerSettings
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.space import Space
 from fleet2d.kernels.sight import line_of_sight
