@@ -271,7 +271,7 @@ def rtp_gap(options: PaperOptions) -> Result:
 def _scores(row: Mapping[str, Any]) -> dict[str, dict[str, dict[str, float]]]:
     """Return the scores of one life by model and gap, the naive guess as one more model."""
 
-    def value(model: str, gap: str, score: str) -> float | None:
+    def value(model: str, gap: str, score: str) -> Any:
         if model == NAIVE_GUESS:
             model, score = MODELS[0], f"naive_{score}"
         return row.get(f"score_{model}.{USER}.{gap}.{score}")

@@ -244,10 +244,9 @@ def measure_rows(options: PaperOptions) -> Result:
         [_cells(row, result) for row, result in zip(cases, results, strict=True)],
         notes,
     )
-    numbers = {"days": days, "runs": runs, "rows": []}
-    for row, result in zip(cases, results, strict=True):
-        described = {key: value for key, value in asdict(row).items() if key != "frames"}
-        numbers["rows"].append({**described, **result})
+    described = [{k: v for k, v in asdict(row).items() if k != "frames"} for row in cases]
+    measured = [{**row, **result} for row, result in zip(described, results, strict=True)]
+    numbers = {"days": days, "runs": runs, "rows": measured}
     return Result(SPEED, TITLE, (table,), numbers)
 
 
