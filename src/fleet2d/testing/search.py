@@ -22,7 +22,7 @@ from fleet2d.scenario.model import Scenario, scenario_of
 from fleet2d.studies.axes import AnyAxis, Choice, Parameter, key_path
 from fleet2d.studies.executors import Executor, LostTask, TaskSchedule, WorkerTask
 from fleet2d.studies.simulator import describe_error
-from fleet2d.studies.tuning import suggested
+from fleet2d.studies.trials import suggested
 from fleet2d.testing.claim import ATTRIBUTE, Claim, Variant
 from fleet2d.testing.trials import Body, Trial, TrialResult, run_trial
 
