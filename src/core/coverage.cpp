@@ -181,12 +181,12 @@ void CoverageRecorder::add_held(i64 bin) {
         return;
     }
     if (steps == 0) return;
-    const View<i64> binned = record_.binned[bin], most = record_.most[bin];
+    const View<i64> binned = record_.binned[bin], peak = record_.peak[bin];
     if (begun_ <= bin) {
         leave_empty(bin);
         begun_ = bin + 1;
         for (i64 patch = 0; patch < patches; ++patch) binned[patch] = steps * cells[patch];
-        for (i64 patch = 0; patch < patches; ++patch) most[patch] = cells[patch];
+        for (i64 patch = 0; patch < patches; ++patch) peak[patch] = cells[patch];
         return;
     }
     if (steps == 1) {  // a robot that walks
@@ -194,13 +194,13 @@ void CoverageRecorder::add_held(i64 bin) {
     } else {
         for (i64 patch = 0; patch < patches; ++patch) binned[patch] += steps * cells[patch];
     }
-    for (i64 patch = 0; patch < patches; ++patch) most[patch] = std::max(most[patch], i64{cells[patch]});
+    for (i64 patch = 0; patch < patches; ++patch) peak[patch] = std::max(peak[patch], i64{cells[patch]});
 }
 
 void CoverageRecorder::leave_empty(i64 bin) {
     for (; begun_ < bin; ++begun_) {
         std::ranges::fill(record_.binned[begun_], 0);
-        std::ranges::fill(record_.most[begun_], 0);
+        std::ranges::fill(record_.peak[begun_], 0);
     }
 }
 

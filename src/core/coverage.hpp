@@ -32,7 +32,7 @@ struct CoverageRecord {
     View<i64, 2> counted;  // (rows, columns) the last look that counted each cell; empty for a single camera
     View<i64, 2> binned;   // (bins, patches) as `exposure`, by time: `record_coverage` sets as many anew as its steps
                            // reach; empty: not kept
-    View<i64, 2> most;     // (bins, patches) the most cells of each patch in view at a step, likewise
+    View<i64, 2> peak;     // (bins, patches) the most cells of each patch in view at a step, likewise
 
     i64 patches() const { return exposure.size(); }
     bool keeps_last() const { return last.size() > 0; }

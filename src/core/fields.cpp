@@ -146,7 +146,7 @@ private:
 
 // A power of two above the most that a step costs.
 constexpr i64 COST_BUCKETS = i64{1} << 14;
-static_assert(7 * (200 + 2 * MOST_COST) < COST_BUCKETS);
+static_assert(7 * (200 + 2 * MAX_COST) < COST_BUCKETS);
 
 // A queue of cells by cost: all costs in it differ by less than COST_BUCKETS.
 class CostQueue {

@@ -5,7 +5,7 @@
 
 namespace fleet2d {
 
-inline constexpr i64 MOST_COST = 1000;  // the highest cost of a cell [percent]
+inline constexpr i64 MAX_COST = 1000;  // the highest cost of a cell [percent]
 
 // Each cell's exact squared distance to the nearest cell that is not in `mask`, in cells, (rows,
 // columns): 0 outside the mask, and (rows + columns)² everywhere in a mask that has no outside.
@@ -31,7 +31,7 @@ Array<i32, 2> walking_distance(View<const bool, 2> mask, View<const i64, 2> goal
 // cost, (rows, columns); -1 where no path is known.
 //
 // `cost` is the extra cost of cells, (rows, columns), in percent: 100 doubles it; from 0 to
-// MOST_COST, or -1 for blocked cells. Cells farther away than `start` are not computed; with a start
+// MAX_COST, or -1 for blocked cells. Cells farther away than `start` are not computed; with a start
 // outside the grid all are (Dial, as above; all in integers).
 Array<i64, 2> cost_distance(View<const i32, 2> cost, GridCell goal, GridCell start);
 

@@ -15,8 +15,8 @@ inline constexpr i64 ONE = i64{1} << BITS;  // probability 1
 inline constexpr i64 POSTURES = 3;          // stand, sit, lie
 inline constexpr i64 MINUTES = 24 * 60;     // of a day
 inline constexpr i64 DOUBLINGS = 62;
-inline constexpr i64 MOST_GHOSTS = 20;  // in one look; more are too unlikely to have a probability
-inline constexpr i64 NOBODY = -1;       // the user behind a false positive; the identity of an unknown person
+inline constexpr i64 MAX_GHOSTS = 20;  // in one look; more are too unlikely to have a probability
+inline constexpr i64 NOBODY = -1;      // the user behind a false positive; the identity of an unknown person
 
 // What each draw about one user decides. Every entry has a random stream of its own.
 enum class UserDraw : i64 {
@@ -43,13 +43,13 @@ inline constexpr i64 GHOST_DRAWS = static_cast<i64>(GhostDraw::HEADING) + 1;
 
 // The parts of a camera's table, by their first entry.
 inline constexpr i64 BINS = 512;       // of a part by distance
-inline constexpr i64 MOST_SHOWN = 34;  // numbers of a body's points that may be in view, 0 included
+inline constexpr i64 MAX_SHOWN = 34;   // numbers of a body's points that may be in view, 0 included
 inline constexpr i64 AT_DISTANCE = 0;  // factors of the probability to notice a user, by bin of the distance
 inline constexpr i64 AT_BEARING = AT_DISTANCE + BINS;  // by 1/4096 turn left of the optical axis, + HALF_TURN
 inline constexpr i64 AT_FACING = AT_BEARING + TURN;    // by how far the user is turned away from the camera
 inline constexpr i64 AT_POSTURE = AT_FACING + HALF_TURN + 1;
 inline constexpr i64 AT_SHOWN = AT_POSTURE + POSTURES;        // by the number of the body's points in view
-inline constexpr i64 AT_LIGHT = AT_SHOWN + MOST_SHOWN;        // by the minute of the day
+inline constexpr i64 AT_LIGHT = AT_SHOWN + MAX_SHOWN;         // by the minute of the day
 inline constexpr i64 AT_STAY = AT_LIGHT + MINUTES;            // that attention outlasts 2**i steps
 inline constexpr i64 AT_RIGHT = AT_STAY + DOUBLINGS;          // that a user is recognized, by bin of the distance
 inline constexpr i64 AT_MISTAKEN = AT_RIGHT + BINS;           // that a user is mistaken for another one, likewise
@@ -68,7 +68,7 @@ struct ErrorTables {
     View<const i64, 2> table;       // (cameras, TABLE)
     View<const i64, 3> confusion;   // (cameras, users, users): which user one is mistaken for, cumulative
     View<const i64> has_ghosts;     // (cameras,): 1 if there are false positives
-    View<const i64, 2> ghosts;      // (cameras, MOST_GHOSTS): how many in one look, of all sources, cumulative
+    View<const i64, 2> ghosts;      // (cameras, MAX_GHOSTS): how many in one look, of all sources, cumulative
     View<const i64, 2> source;      // (cameras, sources): which source one is of, cumulative
     View<const i64, 3> spot;        // (cameras, sources, 3): x, y, noise as RANGE_NOISE; source 0 has none
     View<const i64, 2> looks_like;  // (cameras, users + 1): identity of a false positive, nobody last, cumulative

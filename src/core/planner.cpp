@@ -36,7 +36,7 @@ public:
             i64 preferred = 0, part = 0, rank = 0;
         };
         std::vector<Draft> drafts(plan_.jobs.size());
-        const i64 latest_bed = std::min(plan_.sleep.longest, next_wake_ - plan_.least_sleep);
+        const i64 latest_bed = std::min(plan_.sleep.longest, next_wake_ - plan_.min_sleep);
         const i64 bed = plan_.sleep.draw(draws_, latest_bed);
         JobOrder order;
         for (std::size_t i = 0; i < drafts.size(); ++i) {

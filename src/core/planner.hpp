@@ -51,7 +51,7 @@ struct Pastime {
 
 struct DayPlan {
     Distribution sleep;
-    i64 least_sleep;
+    i64 min_sleep;
     std::vector<Job> jobs;
     std::vector<Pastime> pastimes;
     i64 rest, asleep;  // activities

@@ -70,7 +70,7 @@ Array<f64, 2> follow(const StayModel& model, const Stretches& stretches, View<f6
 namespace {
 
 // The patches in which a user was perceived in a bin.
-struct Sighting {
+struct BinSightings {
     i64 begin = 0;  // the first of them among the sightings
     i64 end = 0;
     i64 patch = -1;  // the last of them; -1: none
@@ -79,8 +79,8 @@ struct Sighting {
 };
 
 // Whether two bins can be merged: with the same sighting.
-bool alike(Sighting sighting, Sighting before) {
-    return sighting.patches() < 2 && before.patches() < 2 && sighting.patch == before.patch;
+bool alike(BinSightings sightings, BinSightings before) {
+    return sightings.patches() < 2 && before.patches() < 2 && sightings.patch == before.patch;
 }
 
 }  // namespace
@@ -88,14 +88,14 @@ bool alike(Sighting sighting, Sighting before) {
 OwnedStretches merge_bins(View<const i64> minute, View<const i64> view, const PatchCounts& seen, i64 longest) {
     struct Opening {
         i64 bin;  // the first of a stretch
-        Sighting sighting;
+        BinSightings sighting;
     };
     std::vector<Opening> openings;
-    Sighting before;
+    BinSightings before;
     i64 sightings = 0;
     const i64 bins = view.size();
     for (i64 t = 0; t < bins; ++t) {
-        Sighting now{before.end, before.end, -1};
+        BinSightings now{before.end, before.end, -1};
         for (; now.end < seen.bin.size() && seen.bin[now.end] == t; ++now.end) now.patch = seen.patch[now.end];
         const bool goes_on = t > 0 && t - openings.back().bin < longest &&
                              floor_div(minute[openings.back().bin], 60) == floor_div(minute[t], 60) &&

@@ -45,7 +45,7 @@ struct Stepper {
 };
 
 // The rows that a camera may see, and which columns of each.
-struct Window {
+struct VisibleRows {
     i64 first_row, last_row;
     View<i64> low, high;  // (all rows,) the first and the last column
 
@@ -64,12 +64,12 @@ struct Window {
         i64 dy = first_row * SUB + CELL_CENTRE - y;
         if (plane.a == 0) {
             for (i64 row = first_row; row <= last_row; ++row, dy += SUB) {
-                if (plane.b * dy < plane.least) high[row] = low[row] - 1;
+                if (plane.b * dy < plane.bound) high[row] = low[row] - 1;
             }
             return;
         }
         // Of a c SUB >= bound, whose right side falls by b SUB from row to row.
-        const i64 bound = (x - CELL_CENTRE) * plane.a + plane.least - plane.b * dy;
+        const i64 bound = (x - CELL_CENTRE) * plane.a + plane.bound - plane.b * dy;
         if (plane.a > 0) {
             const i64 size = SUB * plane.a;
             Stepper least = Stepper::of(bound + size - 1, -plane.b * SUB, size);  // rounded up
@@ -119,7 +119,7 @@ i64 highest_row(const Piece& piece, i64 eye_x, i64 eye_y, i64 centre) {
 // Writes the cells of pieces that lie in a window, and aren't too near, as spans.
 class Filler {
 public:
-    Filler(i64 x, i64 y, i64 near_squared, const Window& window, std::vector<Span>& spans)
+    Filler(i64 x, i64 y, i64 near_squared, const VisibleRows& window, std::vector<Span>& spans)
         : x_(x), y_(y), near_squared_(near_squared), window_(window), spans_(spans), eye_row_(last_up_to(y)) {
         at_row_ = floor_mod(y - CELL_CENTRE, SUB) == 0 && window.first_row <= eye_row_ && eye_row_ <= window.last_row;
     }
@@ -236,7 +236,7 @@ private:
     }
 
     i64 x_, y_, near_squared_;
-    Window window_;
+    VisibleRows window_;
     std::vector<Span>& spans_;
     i64 eye_row_;
     bool at_row_;  // whether the eye is as high as the centres of its row, and the window has that row
@@ -268,12 +268,12 @@ const std::vector<Span>& CellFinder::cells_in_view(Pose camera, const Reach& rea
     // An angle wider than half a turn is seen in two parts: right of the heading, and left of it.
     const i64 parts = 2 * QUARTER < half && half < TURN ? 2 : 1;
     for (i64 part = 0; part < parts; ++part) {
-        Window window{bottom, top, low_, high_};
+        VisibleRows window{bottom, top, low_, high_};
         window.limit_to_range(x, y, reach.far_squared, columns_);
         HalfPlane from_right{0, 0}, to_left{0, 0};  // everything
         if (half < TURN) {
             from_right = left_of(part == 0 ? 2 * heading - half : 2 * heading);
-            from_right.least = part;  // the heading itself belongs to the first part
+            from_right.bound = part;  // the heading itself belongs to the first part
             const HalfPlane behind = left_of(part == parts - 1 ? 2 * heading + half : 2 * heading);
             to_left = {-behind.a, -behind.b};
             window.limit_to(from_right, x, y);

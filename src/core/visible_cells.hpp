@@ -20,10 +20,10 @@ struct Reach {
     i64 half_angle;    // 1/8192 of a turn; 4096 and more is all round
 };
 
-// The points (dx, dy) with a dx + b dy >= least.
+// The points (dx, dy) with a dx + b dy >= bound.
 struct HalfPlane {
     i64 a, b;
-    i64 least = 0;
+    i64 bound = 0;
 };
 
 // The half plane to the left of a direction [1/8192 turn], and on it.

@@ -376,7 +376,7 @@ def trace_rings(mask: numpy.typing.NDArray[numpy.bool_]) -> tuple[numpy.typing.N
         ring starts among them, int64 (rings + 1,).
     """
 
-MOST_COST: int = 1000
+MAX_COST: int = 1000
 
 def squared_distance(mask: numpy.typing.NDArray[numpy.bool_]) -> numpy.typing.NDArray[numpy.int64]:
     """
@@ -741,7 +741,7 @@ MINUTES: int = 1440
 
 DOUBLINGS: int = 62
 
-MOST_GHOSTS: int = 20
+MAX_GHOSTS: int = 20
 
 NOBODY: int = -1
 
@@ -1568,7 +1568,7 @@ class DayPlanner:
 
     Args:
         sleep: The distribution of going to bed.
-        least_sleep: The least duration of sleep.
+        min_sleep: The minimum duration of sleep.
         jobs: Of each the activity, the distribution of its beginning, or None, and of its duration; its latest end; the jobs before
             it; its chance per million; whether it is needed; -1 on waking, 1 before bed, else 0.
         pastimes: Of each the activity, the weight, the distribution of its duration, and from when to when it may begin.
@@ -1576,7 +1576,7 @@ class DayPlanner:
         asleep: The activity that is sleep.
     """
 
-    def __init__(self, sleep: tuple[Sequence[int], int, int, int, int], least_sleep: int, jobs: Sequence[tuple[int, tuple[Sequence[int], int, int, int, int] | None, tuple[Sequence[int], int, int, int, int], int, Sequence[int], int, bool, int]], pastimes: Sequence[tuple[int, int, tuple[Sequence[int], int, int, int, int], int, int]], rest: int, asleep: int) -> None: ...
+    def __init__(self, sleep: tuple[Sequence[int], int, int, int, int], min_sleep: int, jobs: Sequence[tuple[int, tuple[Sequence[int], int, int, int, int] | None, tuple[Sequence[int], int, int, int, int], int, Sequence[int], int, bool, int]], pastimes: Sequence[tuple[int, int, tuple[Sequence[int], int, int, int, int], int, int]], rest: int, asleep: int) -> None: ...
 
     def plan(self, draws: StepDraws, wake: int, next_wake: int, use: RoomUse | None = None, rooms: Sequence[Sequence[int]] = []) -> list[tuple[int, int, int, int, int]]:
         """

@@ -19,12 +19,13 @@ from fleet2d.configuration.components import (
     ShortForm,
     base_of,
     components,
+    hook,
     lookup,
     register,
     split_short_form,
 )
 from fleet2d.configuration.units import Duration, Length, Text
-from fleet2d.errors import ScenarioError
+from fleet2d.errors import InputError, ScenarioError
 
 
 class Gadget(Component):
@@ -362,3 +363,14 @@ def test_short_form_beside_behaviors_is_refused() -> None:
     assert errors(SHORT, {"type": "lamp", "behaviors": []}) == {
         "behaviors": "give 'type' (one behavior) or 'behaviors', not both"
     }
+
+
+def test_hook_that_nobody_registers_is_an_error_with_its_name() -> None:
+    with pytest.raises(InputError, match=r"'paint' as fleet2d\.run"):
+        hook("run", "paint")
+
+
+def test_methods_of_runs_and_plans_find_their_hooks() -> None:
+    names = {"run": ("draw", "html", "judge", "view"), "plan": ("draw", "png")}
+
+    assert all(callable(hook(kind, name)) for kind in names for name in names[kind])

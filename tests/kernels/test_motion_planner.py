@@ -53,7 +53,7 @@ def test_a_needed_job_that_fits_nowhere_leaves_no_day() -> None:
         ("sleep", ([9, 8], 0, 0, 0, 0), "quantiles must ascend"),
         ("sleep", ([9], 9, 2**36, 0, 0), "within 2"),
         ("sleep", ([8, 9], 8, 9, 0, (1 << 24) + 1), "positions must be among"),
-        ("least", -1, "least_sleep must be 0"),
+        ("least", -1, "min_sleep must be 0"),
         ("jobs", [(*JOB[:4], [0], *JOB[5:])], "jobs must come after earlier ones"),
         ("jobs", [(*JOB[:3], 2**41, *JOB[4:])], "jobs must end within"),
         ("jobs", [(2, None, ([-1, 9], -1, 9, 0, 1), *JOB[3:])], "jobs must take 0 s or more"),

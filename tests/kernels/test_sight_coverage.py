@@ -146,7 +146,7 @@ def by_kernel(
         reached = slice(begin // BIN, (end - 1) // BIN + 1)
         length = reached.stop - reached.start
         binned[reached] += record.binned[:length]
-        most[reached] = np.maximum(most[reached], record.most[:length])
+        most[reached] = np.maximum(most[reached], record.peak[:length])
         begin = end
     settle_coverage(setup, cache, record.last)
     lists = (record.exposure.tolist(), binned.tolist(), most.tolist())
@@ -217,7 +217,7 @@ def test_tables_that_do_not_fit_are_refused() -> None:
     full = empty_pose_cache(8, ROOMS)
     full.last[:] = 0
     bins = record._replace(
-        binned=np.zeros((2, ROOMS), np.int64), most=np.zeros((2, ROOMS), np.int64)
+        binned=np.zeros((2, ROOMS), np.int64), peak=np.zeros((2, ROOMS), np.int64)
     )
 
     steps = (window, 0, 0, 60)

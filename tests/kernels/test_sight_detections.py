@@ -20,7 +20,7 @@ from fleet2d.floorplan.lattice import Lattice
 from fleet2d.kernels import I64, U64
 from fleet2d.kernels.motion import Window
 from fleet2d.kernels.sight import (
-    MOST_GHOSTS,
+    MAX_GHOSTS,
     USER_LOST,
     USER_SEEN,
     About,
@@ -184,7 +184,7 @@ def kernel_args(
     errs = [p is not None for p in scene.perceptions] or [False] * len(eyes)
     patience = max(eye.patience for eye in eyes)
     errors = tables_of(eyes, scene)
-    burst = int((count + MOST_GHOSTS * errors.has_ghosts).sum())
+    burst = int((count + MAX_GHOSTS * errors.has_ghosts).sum())
     rule = DetectionRule(patience, STEP_US, START_US, burst, False, False)
     return stack_lenses(lenses, errs, about), errors, rule
 
@@ -192,7 +192,7 @@ def kernel_args(
 def nothing_known(eye: slow.Eye | Sequence[slow.Eye], scene: Scene) -> Carried:
     """Return what a robot carries that has seen nobody."""
     eyes, count, errors = listed(eye), len(scene.users), tables_of(listed(eye), scene)
-    bursts = count + MOST_GHOSTS * errors.has_ghosts
+    bursts = count + MAX_GHOSTS * errors.has_ghosts
     rows = max(
         int((eye.latency // eye.period + 2) * burst)
         for eye, burst in zip(eyes, bursts, strict=True)

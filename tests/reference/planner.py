@@ -83,13 +83,13 @@ class SlowPlanner:
     def __init__(
         self,
         sleep: Sequence[Any],
-        least_sleep: int,
+        min_sleep: int,
         jobs: Sequence[Any],
         pastimes: Sequence[Any],
         rest: int,
         asleep: int,
     ) -> None:
-        self.sleep, self.least_sleep = Distribution(*sleep), least_sleep
+        self.sleep, self.min_sleep = Distribution(*sleep), min_sleep
         self.jobs = [
             CoreJob(activity, starts and Distribution(*starts), Distribution(*takes), *rest)
             for activity, starts, takes, *rest in jobs
@@ -159,7 +159,7 @@ class SlowPlanner:
     def _draw_chain(
         self, draws: Draws, chosen: set[int], wake: int, next_wake: int, by_deadline: bool
     ) -> JobChain:
-        latest_bed = min(self.sleep.longest, next_wake - self.least_sleep)
+        latest_bed = min(self.sleep.longest, next_wake - self.min_sleep)
         bed = self.sleep.draw(draws, None, latest_bed)
         preferred: dict[int, int] = {}
         ranks: dict[int, tuple[int, int, int]] = {}  # part of the day, time, number

@@ -13,7 +13,7 @@ from tests.homes import home_of
 from fleet2d.floorplan.lattice import Lattice
 from fleet2d.kernels import F64, I8, I64
 from fleet2d.kernels.motion import Window
-from fleet2d.kernels.sight import MOST_GHOSTS, DetectionRule, SightMemory, detect, new_memory
+from fleet2d.kernels.sight import MAX_GHOSTS, DetectionRule, SightMemory, detect, new_memory
 from fleet2d.kernels.space import Mesh
 from fleet2d.runtime.determinism import stream_key
 from fleet2d.sight.camera import Camera, TableContext, error_tables, stack_lenses
@@ -77,7 +77,7 @@ class Watch:
                 errors.keys[0, u, i] = stream_key(self.seed, "robots.r", f"{i} {name}")
         for i in range(errors.ghost_keys.shape[1]):
             errors.ghost_keys[0, i] = stream_key(self.seed, "robots.r", f"{i} ghost")
-        burst = count + MOST_GHOSTS * int(errors.has_ghosts[0])
+        burst = count + MAX_GHOSTS * int(errors.has_ghosts[0])
         rule = DetectionRule(
             lens.patience, step_us, round(self.start_h * 3.6e9), burst, False, False
         )

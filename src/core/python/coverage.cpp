@@ -15,7 +15,7 @@ inline constexpr auto border::members_of<PoseCache> =
 template <>
 inline constexpr auto border::members_of<CoverageRecord> =
     std::tuple(&CoverageRecord::first, &CoverageRecord::last, &CoverageRecord::exposure, &CoverageRecord::counted,
-               &CoverageRecord::binned, &CoverageRecord::most);
+               &CoverageRecord::binned, &CoverageRecord::peak);
 
 template <>
 inline constexpr auto border::members_of<CoverageSetup> =
@@ -52,9 +52,9 @@ void check_record(const CoverageSetup& setup, const CoverageRecord& record) {
     require(is_grid(record.first, setup) && (!record.keeps_last() || is_grid(record.last, setup)) &&
                 (setup.cameras() <= 1 || is_grid(record.counted, setup)),
             "first, last and counted must be as large as patch_of_cell");
-    require(record.most.shape == record.binned.shape &&
+    require(record.peak.shape == record.binned.shape &&
                 (!record.keeps_bins() || record.binned.shape[1] == record.patches()),
-            "binned and most must both be (bins, patches)");
+            "binned and peak must both be (bins, patches)");
 }
 
 void check_steps(const CoverageSetup& setup, const Window& window, i64 body, i64 first, i64 end,

@@ -81,7 +81,7 @@ void check_memory(const SightMemory& memory, const Lenses& lenses, const ErrorTa
     require(memory.waiting.shape == std::array{cameras, i64{2}}, "waiting must be (cameras, 2)");
     const i64 rows = memory.backlog.shape[1];
     for (i64 c = 0; c < cameras; ++c) {
-        const i64 burst = users + (errors.has_ghosts[c] != 0 ? MOST_GHOSTS : 0) + errors.injected.size();
+        const i64 burst = users + (errors.has_ghosts[c] != 0 ? MAX_GHOSTS : 0) + errors.injected.size();
         require((lenses.latency[c] / lenses.period[c] + 1) * burst <= rows,
                 "backlog must have room for all that waits");
         for (i64 u = 0; u < users; ++u) {
@@ -122,7 +122,7 @@ for standing, 1 sitting, 2 lying.)");
            std::optional<View<const u64, 3>> shown, std::optional<View<const i64>> radii) {
             check_lenses(lenses);
             const i64 cameras = lenses.reach.shape[0], users = lenses.reach.shape[1];
-            require(lenses.bodies.shape[2] < MOST_SHOWN, "bodies must have fewer than MOST_SHOWN points");
+            require(lenses.bodies.shape[2] < MAX_SHOWN, "bodies must have fewer than MAX_SHOWN points");
             require(all_in_range(lenses.latency, 0, LATEST), "latency must be 0 or more");
             check_errors(errors, lenses.errs, users);
             check_window(window, {body, first_other}, users);

@@ -9,7 +9,7 @@
 namespace fleet2d {
 
 inline constexpr i64 LONGEST_TIME = i64{1} << 36;  // s: products with fractions of a position fit in 64 bits
-inline constexpr i64 MOST_DRAWN = i64{1} << 31;    // bounds of draws are below it
+inline constexpr i64 MAX_DRAWN = i64{1} << 31;     // bounds of draws are below it
 
 // Quantiles, the least and the largest value, and the positions of these among the quantiles.
 using DistributionRow = std::tuple<std::vector<i64>, i64, i64, i64, i64>;
@@ -22,7 +22,7 @@ inline Distribution distribution_of(const DistributionRow& row) {
     require(is_time(knots.front()) && is_time(knots.back()) && is_time(shortest) && is_time(longest),
             "times must be within 2**36 s");
     const i64 top = (static_cast<i64>(knots.size()) - 1) << Distribution::BITS;
-    require(0 <= first && first <= top && 0 <= last && last <= top && last - first < MOST_DRAWN,
+    require(0 <= first && first <= top && 0 <= last && last <= top && last - first < MAX_DRAWN,
             "positions must be among the quantiles, less than 2**31 apart");
     return {knots, shortest, longest, first, last};
 }

@@ -17,13 +17,13 @@ GridCell cell_of(View<const i32, 2> cost, Cell cell) {
 }
 
 void check_costs(View<const i32, 2> cost) {
-    require(all_in_range(cost, -1, MOST_COST + 1), "costs must be in 0 to 1000, or -1 where no way leads");
+    require(all_in_range(cost, -1, MAX_COST + 1), "costs must be in 0 to 1000, or -1 where no way leads");
 }
 
 }  // namespace
 
 void bind_fields(nb::module_& m) {
-    m.attr("MOST_COST") = MOST_COST;
+    m.attr("MAX_COST") = MAX_COST;
 
     m.def("squared_distance", &squared_distance, "mask"_a, Unlocked(),
           R"(Return each cell's exact squared distance to the nearest cell that is not in `mask`.

@@ -27,7 +27,7 @@ void bind_perception(nb::module_& m) {
     m.attr("POSTURES") = POSTURES;
     m.attr("MINUTES") = MINUTES;
     m.attr("DOUBLINGS") = DOUBLINGS;
-    m.attr("MOST_GHOSTS") = MOST_GHOSTS;
+    m.attr("MAX_GHOSTS") = MAX_GHOSTS;
     m.attr("NOBODY") = NOBODY;
     m.attr("BINS") = BINS;
     m.attr("TABLE") = TABLE;
@@ -119,7 +119,7 @@ Example:
         "steady_chance",
         [](View<const i64, 2> table, i64 camera, i64 heading, i64 dx, i64 dy, i64 faces, i64 posture, i64 shown) {
             require(0 <= posture && posture < POSTURES, "there is no such posture");
-            require(0 <= shown && shown < MOST_SHOWN, "shown must be below MOST_SHOWN");
+            require(0 <= shown && shown < MAX_SHOWN, "shown must be below MAX_SHOWN");
             check_offset(dx, dy);
             return steady_chance(table_of(table, camera), heading, dx, dy, faces, posture, shown);
         },

@@ -30,7 +30,7 @@ inline void check_errors(const ErrorTables& errors, View<const i64> errs, i64 us
             "confusion must be (cameras, users, users), keys (cameras, users, draws), looks_like (cameras, users + 1)");
     require(errors.keys.shape[2] == USER_DRAWS && errors.ghost_keys.shape[1] == GHOST_DRAWS,
             "keys and ghost_keys must have an entry for each draw");
-    require(errors.ghosts.shape[1] == MOST_GHOSTS, "ghosts must be (cameras, MOST_GHOSTS)");
+    require(errors.ghosts.shape[1] == MAX_GHOSTS, "ghosts must be (cameras, MAX_GHOSTS)");
     require(sources > 0 && errors.spot.shape[1] == sources && errors.spot.shape[2] == 3,
             "source must be (cameras, sources), spot (cameras, sources, 3)");
     require(errors.injected.shape[1] == INJECTED, "injected must be (n, INJECTED)");

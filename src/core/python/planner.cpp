@@ -36,7 +36,7 @@ Job job_of(const JobRow& row, i64 number) {
 
 Pastime pastime_of(const PastimeRow& row) {
     const auto& [activity, weight, takes, first, last] = row;
-    require(0 < weight && weight < MOST_DRAWN, "weights must be 1 to 2**31 - 1");
+    require(0 < weight && weight < MAX_DRAWN, "weights must be 1 to 2**31 - 1");
     Pastime pastime{activity, weight, distribution_of(takes), first, last};
     // Else two of them could take turns forever without any time passing.
     require(pastime.takes.shortest >= 0 && (pastime.takes.shortest > 0 || pastime.takes.longest > 1),
@@ -44,19 +44,19 @@ Pastime pastime_of(const PastimeRow& row) {
     return pastime;
 }
 
-OwnedPlan plan_of(DistributionRow sleep, i64 least_sleep, std::vector<JobRow> jobs, std::vector<PastimeRow> pastimes,
+OwnedPlan plan_of(DistributionRow sleep, i64 min_sleep, std::vector<JobRow> jobs, std::vector<PastimeRow> pastimes,
                   i64 rest, i64 asleep) {
-    DayPlan plan{distribution_of(sleep), least_sleep, {}, {}, rest, asleep};
-    require(0 <= least_sleep && is_time(least_sleep), "least_sleep must be 0 to 2**36 s");
+    DayPlan plan{distribution_of(sleep), min_sleep, {}, {}, rest, asleep};
+    require(0 <= min_sleep && is_time(min_sleep), "min_sleep must be 0 to 2**36 s");
     require(static_cast<i64>(jobs.size()) < LATEST, "jobs must be fewer than 2**20");
     for (const JobRow& row : jobs) plan.jobs.push_back(job_of(row, static_cast<i64>(plan.jobs.size())));
     i64 weights = 0;
     for (const PastimeRow& row : pastimes) {
         plan.pastimes.push_back(pastime_of(row));
         weights += plan.pastimes.back().weight;
-        require(weights < MOST_DRAWN, "the sum of all weights must be below 2**31");
+        require(weights < MAX_DRAWN, "the sum of all weights must be below 2**31");
     }
-    return {std::move(plan), {std::move(sleep), least_sleep, std::move(jobs), std::move(pastimes), rest, asleep}};
+    return {std::move(plan), {std::move(sleep), min_sleep, std::move(jobs), std::move(pastimes), rest, asleep}};
 }
 
 void check_day(i64 wake, i64 next_wake) {
@@ -109,7 +109,7 @@ A distribution is its quantiles, its least and largest value, and the positions 
 
 Args:
     sleep: The distribution of going to bed.
-    least_sleep: The least duration of sleep.
+    min_sleep: The minimum duration of sleep.
     jobs: Of each the activity, the distribution of its beginning, or None, and of its duration; its latest end; the jobs before
         it; its chance per million; whether it is needed; -1 on waking, 1 before bed, else 0.
     pastimes: Of each the activity, the weight, the distribution of its duration, and from when to when it may begin.
@@ -117,12 +117,12 @@ Args:
     asleep: The activity that is sleep.)")
         .def(
             "__init__",
-            [](OwnedPlan* self, DistributionRow sleep, i64 least_sleep, std::vector<JobRow> jobs,
+            [](OwnedPlan* self, DistributionRow sleep, i64 min_sleep, std::vector<JobRow> jobs,
                std::vector<PastimeRow> pastimes, i64 rest, i64 asleep) {
-                new (self) OwnedPlan(
-                    plan_of(std::move(sleep), least_sleep, std::move(jobs), std::move(pastimes), rest, asleep));
+                new (self)
+                    OwnedPlan(plan_of(std::move(sleep), min_sleep, std::move(jobs), std::move(pastimes), rest, asleep));
             },
-            "sleep"_a, "least_sleep"_a, "jobs"_a, "pastimes"_a, "rest"_a, "asleep"_a)
+            "sleep"_a, "min_sleep"_a, "jobs"_a, "pastimes"_a, "rest"_a, "asleep"_a)
         .def(
             "plan",
             [](const OwnedPlan& self, StepDraws& draws, i64 wake, i64 next_wake, const RoomUse* use,

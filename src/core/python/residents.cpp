@@ -17,8 +17,8 @@ namespace fleet2d {
 namespace {
 
 constexpr i64 LONGEST_STINT = i64{1} << 38;  // us: else there might be small moves by the million
-constexpr i64 MOST_POSTURES = 128;
-constexpr u64 MOST_MOVES = 3;
+constexpr i64 MAX_POSTURES = 128;
+constexpr u64 MAX_MOVES = 3;
 
 using Numbers = std::vector<i64>;
 using PlaceRow = std::tuple<i64, i64, i64>;
@@ -32,7 +32,7 @@ Point point_of(i64 x, i64 y) {
 }
 
 i64 checked_posture(i64 number) {
-    require(0 <= number && number < MOST_POSTURES, "postures must be 0 to 127");
+    require(0 <= number && number < MAX_POSTURES, "postures must be 0 to 127");
     return number;
 }
 
@@ -81,7 +81,7 @@ OwnedVenue venue_of(nb::object asked_with, i64 activity, bool away, i64 choose, 
                      std::move(asked_with),
                      {},
                      {}};
-    require(moves.size() <= MOST_MOVES, "there are three kinds of small moves");
+    require(moves.size() <= MAX_MOVES, "there are three kinds of small moves");
     for (const auto& [kind, waits] : moves) {
         require(0 <= kind && kind <= static_cast<i64>(MoveKind::FETCHES), "kinds of moves must be 0 to 2");
         require(kind != static_cast<i64>(MoveKind::SHIFTS) || venue.moves.empty(), "turns come before other moves");

@@ -411,6 +411,22 @@ def components(kind: str) -> dict[str, type[Component]]:
     return dict(sorted((plugins | _REGISTRY.get(kind, {})).items()))
 
 
+def hook(kind: str, name: str) -> Any:
+    """Return what an installed package, or Fleet2D's own, registers as an entry point.
+
+    So a module can call what builds upon it, if that is installed.
+
+    Raises:
+        InputError: Nothing is registered under that name.
+    """
+    for entry in _plugins(kind):
+        if entry.name == name:
+            return entry.load()
+    raise InputError(
+        f"no installed package registers {name!r} as fleet2d.{kind}: reinstall fleet2d"
+    )
+
+
 @cache
 def _plugins(kind: str) -> "Iterable[EntryPoint]":
     """Return the components of a kind that installed packages declare."""

@@ -24,7 +24,7 @@ from fleet2d.kernels.motion import Poses
 from fleet2d.kernels.sight import (
     FORCED_IDENTITY,
     FORCED_MISS,
-    MOST_GHOSTS,
+    MAX_GHOSTS,
     USER_LOST,
     USER_SEEN,
     About,
@@ -197,7 +197,7 @@ class Cameras(Watcher):
         if not self.activity_senses:  # later ones would not fit the tables of the run
             self._sense_activities(perceptions)
         count = len(self.others)
-        bursts = count + MOST_GHOSTS * self.errors.has_ghosts + len(self.errors.injected)
+        bursts = count + MAX_GHOSTS * self.errors.has_ghosts + len(self.errors.injected)
         self.rule = DetectionRule(
             patience=max(lens.patience for lens in lenses),
             step_us=clock.step_us,

@@ -96,7 +96,7 @@ class SeenArea(Watcher):
             exposure=np.zeros(len(patches.room), np.int64),
             counted=np.full(grid if len(lenses) > 1 else none, NEVER, np.int64),
             binned=np.zeros(none, np.int64),
-            most=np.zeros(none, np.int64),
+            peak=np.zeros(none, np.int64),
         )
         self._bin_steps = bin_steps
         # Cells in view, summed and at most, from bin _first_bin on.
@@ -138,7 +138,7 @@ class SeenArea(Watcher):
             runs = bodies.runs(self.row, first, until)
             record, bins = self._record, self._new_bins(first, until)
             if self._bin_steps:
-                record = record._replace(binned=bins[:, 0], most=bins[:, 1])
+                record = record._replace(binned=bins[:, 0], peak=bins[:, 1])
             record_coverage(self._setup, runs, 0, first, until, self._cache, record)
             if self._bin_steps:
                 self._collect_bins(first, bins)

@@ -16,7 +16,7 @@ from fleet2d.floorplan.space import Space
 from fleet2d.kernels import I32, I64, Bool
 from fleet2d.kernels.space import (
     CELL_CENTRE,
-    MOST_COST,
+    MAX_COST,
     SUB,
     cost_distance,
     descend,
@@ -42,9 +42,9 @@ class CostmapSettings(Settings):
     """
 
     clearance: Length = Field(default=0.5, ge=0, le=5)
-    wall_cost: int = Field(default=200, ge=0, le=MOST_COST)
+    wall_cost: int = Field(default=200, ge=0, le=MAX_COST)
     no_go: Literal["forbid", "cost", "ignore"] = "forbid"
-    no_go_cost: int = Field(default=500, ge=0, le=MOST_COST)
+    no_go_cost: int = Field(default=500, ge=0, le=MAX_COST)
 
 
 def costs_of(
@@ -69,7 +69,7 @@ def costs_of(
             costs[no_go] = CLOSED
         else:
             costs[no_go] += settings.no_go_cost
-    return np.minimum(costs, MOST_COST).astype(np.int32)
+    return np.minimum(costs, MAX_COST).astype(np.int32)
 
 
 def cells_within(plan: FloorPlan, areas: tuple[shapely.Polygon, ...]) -> Bool:
@@ -192,13 +192,13 @@ def route_by_cost(
     if part < 0:
         return None
     cells = space.part_of_cell == part
-    costs = np.where(cells & (cost >= 0), np.minimum(cost, MOST_COST), CLOSED).astype(np.int32)
+    costs = np.where(cells & (cost >= 0), np.minimum(cost, MAX_COST), CLOSED).astype(np.int32)
     last = _nearest(space, costs >= 0, goal)
     if cost[goal[1] // SUB, goal[0] // SUB] < 0 or last is None:
         return None
     closed = closed_cells_around(space, costs, start)
     if closed is not None:
-        costs[closed] = MOST_COST  # a body that stands there may leave
+        costs[closed] = MAX_COST  # a body that stands there may leave
     first = _nearest(space, costs >= 0, start)
     assert first is not None
     field = cost_distance(costs, last, first)

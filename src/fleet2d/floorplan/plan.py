@@ -6,7 +6,6 @@ from collections import OrderedDict
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from importlib import import_module
 from threading import Lock
 from typing import Any, Self, TypeVar
 
@@ -104,9 +103,6 @@ def read_only(array: A) -> A:
 
 
 __all__ = ["FloorPlan", "LabelledRegion", "Room"]
-
-# What shows plans builds upon them, so it is imported by its name, and only when it is used.
-_NOTEBOOK = "fleet2d.viewer.notebook"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -410,11 +406,15 @@ class FloorPlan:
         Returns:
             A matplotlib figure, or `ax`.
         """
-        return import_module(_NOTEBOOK).draw_plan(self, ax, theme)
+        from fleet2d.configuration.components import hook  # with pydantic: only to draw
+
+        return hook("plan", "draw")(self, ax, theme)
 
     def _repr_png_(self) -> bytes | None:
         """Show the plan in a notebook, where matplotlib is installed."""
-        return import_module(_NOTEBOOK).plan_png(self)
+        from fleet2d.configuration.components import hook
+
+        return hook("plan", "png")(self)
 
     def _check_entrance(self) -> None:
         if self.entrance is None:

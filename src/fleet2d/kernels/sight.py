@@ -38,7 +38,7 @@ from fleet2d._core import (
     line_of_sight as line_of_sight,
     mark_spans as mark_spans,
     MINUTES as MINUTES,
-    MOST_GHOSTS as MOST_GHOSTS,
+    MAX_GHOSTS as MAX_GHOSTS,
     NEVER as NEVER,
     NOBODY as NOBODY,
     ONE as ONE,
@@ -129,7 +129,7 @@ class ErrorTables(NamedTuple):
     table: I64  # (cameras, TABLE): the parts of TablePart, one after the other
     confusion: I64  # (cameras, users, users): which user one is mistaken for, cumulative
     has_ghosts: I64  # (cameras,): 1 if there are false positives
-    ghosts: I64  # (cameras, MOST_GHOSTS): number in one look, of all sources, cumulative
+    ghosts: I64  # (cameras, MAX_GHOSTS): number in one look, of all sources, cumulative
     source: I64  # (cameras, sources): the source of one, cumulative
     spot: I64  # (cameras, sources, 3): x, y, noise as RANGE_NOISE; source 0 is the whole view
     looks_like: I64  # (cameras, users + 1): identity of a false positive, nobody last, cumulative
@@ -224,7 +224,7 @@ class CoverageRecord(NamedTuple):
             may show; empty for one camera.
         binned: int64 (bins, patches), as `exposure`, by time: `record_coverage` overwrites the bins
             of its steps; empty: not recorded.
-        most: int64 (bins, patches), largest number of cells of each patch in view at a step,
+        peak: int64 (bins, patches), largest number of cells of each patch in view at a step,
             likewise.
     """
 
@@ -233,7 +233,7 @@ class CoverageRecord(NamedTuple):
     exposure: I64
     counted: I64
     binned: I64
-    most: I64
+    peak: I64
 
 
 class CoverageSetup(NamedTuple):

@@ -35,7 +35,7 @@ from fleet2d._core import (
     label_triangles as label_triangles,
     locate as locate,
     Mesh as Mesh,
-    MOST_COST as MOST_COST,
+    MAX_COST as MAX_COST,
     pairs_in_sight as pairs_in_sight,
     pull_taut as pull_taut,
     rasterize_cells as rasterize_cells,

@@ -132,7 +132,7 @@ class DayPlan:
         name: The name of the template.
         wake: The distribution of waking [s].
         sleep: The distribution of going to bed [s].
-        least_sleep: The minimum duration of sleep [s].
+        min_sleep: The minimum duration of sleep [s].
         jobs: The tasks.
         pastimes: What fills the time between them.
         recorded: The recorded days, if the template has some.
@@ -141,7 +141,7 @@ class DayPlan:
     name: str
     wake: Distribution
     sleep: Distribution
-    least_sleep: int
+    min_sleep: int
     jobs: tuple[Job, ...]
     pastimes: tuple[PastimeOption, ...]
     recorded: "Recording | None" = None
@@ -164,7 +164,7 @@ class DayPlan:
             (number[activity], weight, takes, first, last)
             for activity, weight, takes, first, last in self.pastimes
         ]
-        return DayPlanner(self.sleep, self.least_sleep, jobs, pastimes, number[REST], number[SLEEP])
+        return DayPlanner(self.sleep, self.min_sleep, jobs, pastimes, number[REST], number[SLEEP])
 
 
 def plan_day(

@@ -162,11 +162,11 @@ def check(persona: "Persona") -> None:
             continue
         _check_appointments(name, plan)
         next_wake = DAY_S + min(plans[n].wake.shortest for n in _days_after(persona, name))
-        if next_wake - plan.least_sleep < plan.sleep.shortest:
+        if next_wake - plan.min_sleep < plan.sleep.shortest:
             raise problem_at(
                 ("days", name, "sleep"),
                 f"sleep begins at {clock(plan.sleep.shortest)} at the earliest, lasts"
-                f" {span(plan.least_sleep)} at least, and the next day may begin at"
+                f" {span(plan.min_sleep)} at least, and the next day may begin at"
                 f" {clock(next_wake)}: that is too short a night",
             )
         _check_room(name, plan, next_wake)

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from datetime import timedelta
 from functools import partial
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fleet2d.artifacts.manifest import FILE_NAME, FLOORPLAN_NAME, Manifest
 from fleet2d.artifacts.seal import changed_tables, digest_of_file, digest_table, run_digest
 from fleet2d.artifacts.unfinished import Prefix
+from fleet2d.configuration.components import hook
 from fleet2d.configuration.problems import suggest
 from fleet2d.errors import ArtifactError, RunDirectoryError, printable
 from fleet2d.storage.files import PARTIAL, path_in
@@ -26,10 +26,6 @@ if TYPE_CHECKING:
     from fleet2d.expectations.verdict import Verdict
     from fleet2d.floorplan.plan import FloorPlan
     from fleet2d.runs.trajectory import Trajectory
-
-# What shows and judges runs builds upon them, so it is imported by its name when it is used.
-_NOTEBOOK = "fleet2d.viewer.notebook"
-_REPRODUCE = "fleet2d.engine.repeat"
 
 
 class Tables(Mapping[str, "pa.Table"]):
@@ -171,7 +167,7 @@ class Run:
                 isn't complete.
             ArtifactError: The run can't be reproduced: its tables differ from the stored ones.
         """
-        return import_module(_REPRODUCE).judge_again(self, expectation, name)
+        return hook("run", "judge")(self, expectation, name)
 
     def draw(self, at: str | int | None = None, ax: Any = None, theme: str = "light") -> Any:
         """Draw the run, or one moment of it; needs the extra `viz`.
@@ -188,7 +184,7 @@ class Run:
             InputError: `at` names no moment, there is no such theme, or matplotlib is missing.
             ArtifactError: The run stored no floor plan or no key frames.
         """
-        return import_module(_NOTEBOOK).draw_run(self, at, ax, theme)
+        return hook("run", "draw")(self, at, ax, theme)
 
     def view(self, height: int = 720) -> Any:
         """Return the page of the run as a widget, for Jupyter and marimo; needs the extra `view`.
@@ -200,11 +196,11 @@ class Run:
             InputError: anywidget is not installed.
             ArtifactError: The run stored no floor plan.
         """
-        return import_module(_NOTEBOOK).run_widget(self, height)
+        return hook("run", "view")(self, height)
 
     def _repr_html_(self) -> str:
         """Show the run in a notebook."""
-        return import_module(_NOTEBOOK).run_html(self)
+        return hook("run", "html")(self)
 
     def arrow(self, name: str) -> pa.Table:
         """Return a table as an Arrow table.

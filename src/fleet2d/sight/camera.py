@@ -29,8 +29,8 @@ from fleet2d.kernels.numbers import BELL_STD, HALF_TURN, TURN, UNIT, cosine, sin
 from fleet2d.kernels.sight import (
     BINS,
     DOUBLINGS,
+    MAX_GHOSTS,
     MINUTES,
-    MOST_GHOSTS,
     ONE,
     TABLE,
     ErrorTables,
@@ -286,7 +286,7 @@ def error_tables(
         table=np.zeros((cameras, TABLE if errs else 1), np.int64),
         confusion=np.zeros((cameras, users, users), np.int64),
         has_ghosts=np.zeros(cameras, np.int64),
-        ghosts=np.full((cameras, MOST_GHOSTS), ONE, np.int64),
+        ghosts=np.full((cameras, MAX_GHOSTS), ONE, np.int64),
         source=np.full((cameras, sources), ONE, np.int64),
         spot=np.zeros((cameras, sources, 3), np.int64),
         looks_like=np.zeros((cameras, users + 1), np.int64),
@@ -406,7 +406,7 @@ def _fill_false_positives(
         )
     # A sum of Poisson processes is one, whose points belong to each by its share of the rate.
     term, total = decay(mean), 0.0
-    for count in range(MOST_GHOSTS):
+    for count in range(MAX_GHOSTS):
         total += term
         tables.ghosts[camera, count] = chance(min(total, 1.0))
         term *= float(mean) / (count + 1)
