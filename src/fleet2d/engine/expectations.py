@@ -15,12 +15,13 @@ from fleet2d.engine.bodies import Bodies
 from fleet2d.engine.cameras import Cameras
 from fleet2d.engine.change_queue import ChangeQueue
 from fleet2d.engine.learners import Learners
+from fleet2d.engine.possible_events import possible_events
 from fleet2d.engine.sensors import Sensors
 from fleet2d.engine.trajectories import STEP, TIME
 from fleet2d.entities.decisions import DecidingActor
 from fleet2d.errors import InputError
 from fleet2d.expectations.expectation import Expectation, RunSignals
-from fleet2d.expectations.signals import Gauge, Scene, SignalBlock
+from fleet2d.expectations.signals import Gauge, MeasuredRun, Scene, SignalBlock
 from fleet2d.expectations.verdict import Verdict, check_judged, verdict_of
 from fleet2d.kernels import I64
 from fleet2d.kernels.sight import SightMemory
@@ -44,8 +45,6 @@ class ActiveExpectation(NamedTuple):
 class RunExpectations:
     """The expectations of a run, and the gauges that measure their signals.
 
-    It is what signals know of a run, see `fleet2d.expectations.signals.MeasuredRun`.
-
     Attributes:
         entries: The expectations by name.
     """
@@ -61,13 +60,25 @@ class RunExpectations:
         activities: Activities,
     ) -> None:
         self.entries: dict[str, ActiveExpectation] = {}
-        self.actors, self.bodies = actors, bodies
-        self.home, self.clock, self.doors = changes.home, changes.clock, changes.names
-        self.first = 0
+        self._run = MeasuredRun(
+            actors,
+            bodies,
+            changes.home,
+            changes.clock,
+            changes.names,
+            sensors.on,
+            {c.owner.name: ExpectedCameras(c, self) for c in cameras},
+            activities,
+        )
+        self.actors, self.bodies, self.clock = actors, bodies, changes.clock
         self._scenario, self._sensors = scenario, sensors
-        self._cameras, self._activities = cameras, activities
         self._gauges: dict[str, Gauge] = {}
         self._events: list[Event] = []
+
+    @property
+    def first(self) -> int:
+        """The first step that isn't measured yet."""
+        return self._run.first
 
     def add(self, name: str, expectation: Expectation, since: int, first: int) -> None:
         """Add an expectation.
@@ -86,52 +97,35 @@ class RunExpectations:
         expectation.check(self._scene(since))
         if name in self.entries:
             raise InputError(f"{name!r} is expected already: give this another name")
-        self.first = first
+        self._run.first, self._run.sensors_on = first, self._sensors.on
         for signal in expectation.measures():
             if str(signal) not in self._gauges:
-                self._gauges[str(signal)] = Gauge(signal, self)
+                self._gauges[str(signal)] = Gauge(signal, self._run)
         self.entries[name] = ActiveExpectation(expectation, since)
 
     def _scene(self, since: int) -> Scene:
         """Return the names of the run that expectations from a step on may use."""
-        users, plan = self.bodies.users, self.home.plan
+        users, robots = self.actors[: self.bodies.users], self.actors[self.bodies.users :]
+        home, clock = self._run.home, self.clock
+        rooms = [name for room in home.rooms for name in (room.name, room.type)]
+        names = {
+            "users": [actor.name for actor in users],
+            "robots": [actor.name for actor in robots],
+            "bodies": [actor.name for actor in self.actors],
+            "batteries": [actor.name for actor in self.actors if actor.charge is not None],
+            "rooms": rooms,
+            "places": [*rooms, *(item.name for item in home.plan.objects)],
+            "doors": self._run.doors,
+            "sensors": self._sensors.names,
+            "algorithms": list(self._scenario.algorithms),
+            "metrics": list(self._scenario.metrics),
+        }
         return Scene(
-            users=[actor.name for actor in self.actors[:users]],
-            robots=[actor.name for actor in self.actors[users:]],
-            rooms=[name for room in self.home.rooms for name in (room.name, room.type)],
-            things=[item.name for item in plan.objects],
-            doors=self.doors,
-            sensors=self._sensors.names,
-            algorithms=list(self._scenario.algorithms),
-            metrics=list(self._scenario.metrics),
-            batteries=[actor.name for actor in self.actors if actor.charge is not None],
-            cameras={c.owner.name: [o.name for o in c.others] for c in self._cameras},
-            behaviors={
-                actor.name: [_type_of(behavior) for behavior in actor.behaviors] or ["own"]
-                for actor in self.actors
-            },
-            records=[kind for a in self.actors for b in a.behaviors for kind in b.records],
-            remaining=(self.clock.steps - since) * self.clock.step_us * MICROSECOND,
+            names,
+            {name: c.names for name, c in self._run.cameras.items()},
+            possible_events(users, robots, home, self._run.doors, self._sensors.names),
+            (clock.steps - since) * clock.step_us * MICROSECOND,
         )
-
-    # What signals know of the run
-
-    @property
-    def sensors_on(self) -> Mapping[str, bool]:
-        """Whether each sensor is on at present, by name."""
-        return self._sensors.on
-
-    def row(self, name: str) -> int:
-        """Return the row of a body."""
-        return next(row for row, actor in enumerate(self.actors) if actor.name == name)
-
-    def activity_of(self, row: int) -> str | None:
-        """Return the present activity of a user; None if none is known."""
-        return self._activities.now(row)
-
-    def cameras_of(self, name: str) -> "ExpectedCameras":
-        """Return the cameras of a body."""
-        return ExpectedCameras(next(c for c in self._cameras if c.owner.name == name), self)
 
     # Measuring
 
@@ -168,14 +162,14 @@ class RunExpectations:
             self.first,
             end,
             self.bodies,
-            self.home,
+            self._run.home,
             observations,
             [(row.step, names[row.sensor], row.on) for row in readings],
             sorted(events, key=lambda event: (event.step, event.rank)),
         )
         for gauge in self._gauges.values():
             gauge.take(block)
-        self.first, self._events = end, rest
+        self._run.first, self._events = end, rest
 
     # Judging
 
@@ -247,18 +241,17 @@ class RunExpectations:
         )
 
 
-def _type_of(behavior: Any) -> str:
-    """Return the type of a built-in behavior, "own" of any other."""
-    name = str(behavior.type_name)
-    return "own" if ":" in name or "." in name else name
-
-
 @dataclass(frozen=True)
 class ExpectedCameras:
     """The cameras of a body as `fleet2d.expectations.signals.MeasuredCameras` describes them."""
 
     cameras: Cameras
     run: RunExpectations
+
+    @property
+    def names(self) -> list[str]:
+        """The bodies that they look at, by their numbers."""
+        return [other.name for other in self.cameras.others]
 
     @property
     def index(self) -> int:
@@ -269,10 +262,6 @@ class ExpectedCameras:
     def in_view(self) -> Mapping[str, object]:
         """The bodies that count as seen at present, by name."""
         return self.cameras.in_view
-
-    def number_of(self, name: str) -> int:
-        """Return the number of a body among those that they look at."""
-        return [other.name for other in self.cameras.others].index(name)
 
     def perfect(self) -> "PerfectCameras":
         """Return cameras that notice all bodies in view at each step, from the present one on."""

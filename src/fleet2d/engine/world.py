@@ -19,8 +19,8 @@ from fleet2d.engine.intervention_queue import (
     PendingIntervention,
     read_record,
 )
+from fleet2d.engine.possible_events import possible_events
 from fleet2d.engine.state import State
-from fleet2d.entities.behavior import Actor
 from fleet2d.entities.body import Pose
 from fleet2d.entities.decisions import Arbiter, DecidingActor
 from fleet2d.entities.objects.home_object import SensorFault
@@ -265,33 +265,15 @@ def steps_of(entry: Entry, clock: Clock, first: int) -> list[int]:
     return steps
 
 
-# The events that can happen
-
-# Events of every person: an order can cause them if no behavior does.
-PERSON_EVENTS = frozenset(
-    {EventKind.ACTIVITY, EventKind.CAME_HOME, EventKind.LEFT_HOME, EventKind.USES}
-)
-DOOR_EVENTS = frozenset({EventKind.OPENED, EventKind.SHUT, EventKind.LOCKED, EventKind.UNLOCKED})
-HOME_EVENTS = frozenset({EventKind.MOVED, EventKind.ROOM_CHANGED})
-
-
-def possible_events(world: EngineWorld) -> dict[str, frozenset[str]]:
-    """Return the kinds of events that can happen to each entity, by name; "" is the home."""
-    robot_events = {EventKind.CALLED}
-    kinds = {name: _kinds_of(user, world, PERSON_EVENTS) for name, user in world.users.items()}
-    kinds |= {name: _kinds_of(robot, world, robot_events) for name, robot in world.robots.items()}
-    kinds |= dict.fromkeys(world.doors, DOOR_EVENTS)
-    kinds |= dict.fromkeys(world.sensors, frozenset({EventKind.SENSOR}))
-    return {"": HOME_EVENTS} | kinds
-
-
 def check_trigger(world: EngineWorld, trigger: Trigger) -> None:
     """Refuse an event that can never happen.
 
     Raises:
         ScenarioError: It can't happen; the message lists the events that can.
     """
-    possible = possible_events(world)
+    possible = possible_events(
+        world.users.values(), world.robots.values(), world.home, world.doors, world.sensors
+    )
     if trigger.entity is not None and (not trigger.entity or trigger.entity not in possible):
         names = [name for name in possible if name]
         raise ScenarioError(
@@ -323,22 +305,3 @@ def _check_detail(trigger: Trigger, names: Iterable[str], noun: str) -> None:
         raise ScenarioError(
             f"there is no {noun} {trigger.detail!r}{suggest(trigger.detail, names)}"
         )
-
-
-def _kinds_of(actor: Actor, world: EngineWorld, always: Iterable[str]) -> frozenset[str]:
-    """Return the kinds of events that can happen to a body."""
-    kinds = {str(kind) for kind in always}
-    is_robot = actor.name in world.robots
-    if actor.entity.eyes and (world.users if is_robot else world.robots):
-        kinds |= set(actor.entity.sight_events)
-    if getattr(actor.entity, "battery", None) is not None:
-        kinds.add(EventKind.BATTERY)
-    if getattr(actor.entity, "gives_way", None) is not None:
-        kinds |= {EventKind.GIVES_WAY, EventKind.GIVES_UP}
-    if world.doors or world.home.costs_version:
-        kinds.add(EventKind.WAY_BLOCKED)
-    for behavior in actor.behaviors:
-        kinds |= behavior.records
-        if not type(behavior).__module__.startswith("fleet2d."):
-            kinds |= KINDS  # it may record any of them
-    return frozenset(kinds)

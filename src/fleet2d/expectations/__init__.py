@@ -19,6 +19,7 @@ from fleet2d.expectations.verdict import Verdict as Verdict
 from fleet2d.expectations.verdict import judge as judge
 
 if TYPE_CHECKING:
+    from fleet2d.expectations.learned import *  # noqa: F403
     from fleet2d.expectations.temporal import *  # noqa: F403
     from fleet2d.expectations.vocabulary import *  # noqa: F403
 else:  # every word, whichever module defines it

@@ -13,27 +13,25 @@ from typing import Any
 
 from fleet2d.configuration.problems import did_you_mean, problem, problem_at
 from fleet2d.errors import InputError
+from fleet2d.expectations import learned as learned  # its words
 from fleet2d.expectations import temporal, vocabulary
 from fleet2d.expectations.expectation import WORDS, Expectation
 from fleet2d.expectations.signals import Signal, WordSignal
 from fleet2d.expectations.verdict import check_judged
 
-_COMPARED: Mapping[type[ast.cmpop], Callable[[Any, Any], Any]] = {
+_OPERATORS: Mapping[type[ast.AST], Callable[[Any, Any], Any]] = {
     ast.Gt: operator.gt,
     ast.GtE: operator.ge,
     ast.Lt: operator.lt,
     ast.LtE: operator.le,
     ast.Eq: operator.eq,
     ast.NotEq: operator.ne,
-}
-_JOINED: Mapping[type[ast.AST], Callable[[Any, Any], Any]] = {
-    ast.And: operator.and_, ast.Or: operator.or_, ast.BitAnd: operator.and_,
+    ast.And: operator.and_,
+    ast.Or: operator.or_,
+    ast.BitAnd: operator.and_,
     ast.BitOr: operator.or_,
-}  # fmt: skip
-_MIRRORED: Mapping[type[ast.cmpop], type[ast.cmpop]] = {
-    ast.Gt: ast.Lt, ast.GtE: ast.LtE, ast.Lt: ast.Gt, ast.LtE: ast.GtE, ast.Eq: ast.Eq,
-    ast.NotEq: ast.NotEq,
-}  # fmt: skip
+}
+_MIRRORED = {ast.Gt: ast.Lt, ast.GtE: ast.LtE, ast.Lt: ast.Gt, ast.LtE: ast.GtE}
 
 # Texts in quotes stay as they are; times of day and numbers with units are put into quotes.
 _QUANTITY = re.compile(
@@ -120,11 +118,10 @@ class _Reader:
 
     def _joined(self, node: ast.BoolOp | ast.BinOp) -> Expectation:
         """Read parts joined by and, or, & or |."""
-        joint = _JOINED.get(type(node.op))
-        if joint is None:
+        if type(node.op) not in _OPERATORS:
             raise self._foreign(node)
         nodes = node.values if isinstance(node, ast.BoolOp) else [node.left, node.right]
-        return reduce(joint, map(self.expectation, nodes))
+        return reduce(_OPERATORS[type(node.op)], map(self.expectation, nodes))
 
     def _argument(self, node: ast.expr) -> Any:
         """Read a name, a path, a number, a text or a list."""
@@ -162,29 +159,24 @@ class _Reader:
 
     def _comparison(self, node: ast.Compare) -> Expectation:
         sides = [self.value(side) for side in (node.left, *node.comparators)]
-        joined: Expectation | None = None
-        for left, sign, right in zip(sides, node.ops, sides[1:], strict=False):
-            part = self._compared(left, sign, right, node)
-            joined = part if joined is None else joined & part
-        assert joined is not None
-        return joined
+        signs = [type(sign) for sign in node.ops]
+        pairs = zip(sides, signs, sides[1:], strict=False)
+        return reduce(operator.and_, (self._compared(*pair, node) for pair in pairs))
 
-    def _compared(self, left: Any, sign: ast.cmpop, right: Any, node: ast.Compare) -> Expectation:
-        if isinstance(left, WordSignal) and isinstance(sign, ast.In | ast.NotIn):
-            words = right if isinstance(right, tuple) else (right,)
-            return left.is_in(*words) if isinstance(sign, ast.In) else ~left.is_in(*words)
+    def _compared(self, left: Any, sign: type[ast.cmpop], right: Any, node: ast.Compare) -> Any:
+        if isinstance(left, WordSignal) and sign in (ast.In, ast.NotIn):
+            is_in = left.is_in(*(right if isinstance(right, tuple) else (right,)))
+            return is_in if sign is ast.In else ~is_in
         if isinstance(right, Signal | WordSignal) and not isinstance(left, Signal | WordSignal):
-            left, right = right, left
-            sign = _MIRRORED.get(type(sign), type(sign))()
-        compare = _COMPARED.get(type(sign))
+            left, right, sign = right, left, _MIRRORED.get(sign, sign)
         numbers = isinstance(left, Signal) and not isinstance(right, Signal | WordSignal)
-        equal = isinstance(left, WordSignal) and isinstance(sign, ast.Eq | ast.NotEq)
-        if compare is None or not (numbers or equal):
+        words = isinstance(left, WordSignal) and sign in (ast.Eq, ast.NotEq)
+        if sign not in _OPERATORS or not (numbers or words):
             raise InputError(
                 f"{ast.unparse(node)}: a signal is compared with a number, or room(…) and"
                 " activity(…) by == with a name"
             )
-        return compare(left, right)
+        return _OPERATORS[sign](left, right)
 
 
 # Fields of a scenario
@@ -220,6 +212,30 @@ def read_expectation(value: Any) -> Expectation:
 
 
 def _read_mapping(value: Mapping[str, Any]) -> Expectation:
+    name = _operator(value)
+    if name == "at_most" and "of" not in value:
+        raise InputError("at_most needs the key 'of', such as of: events(find_begins, astro)")
+    if "until" in value and name != "always":
+        raise problem_at(
+            ("until",), f"'until' can only be combined with 'always', not with {name!r}"
+        )
+    for key in _REFUSED.get(name, ("of", "per")):
+        if key in value:
+            raise problem_at((key,), f"{key!r} can't be combined with {name}")
+    part, within = _condition(value, name), {"within": value.get("within")}
+    if name == "eventually" and "after" in value:
+        return temporal.after(_part(value, "after"), part, **within)
+    if name == "at_most":
+        return temporal.at_most(value[name], part, per=value.get("per"))
+    if "until" in value:
+        whole: Expectation = temporal.until(part, _part(value, "until"), **within)
+    else:
+        whole = getattr(temporal, name)(part, **({} if name == "at_end" else within))
+    return temporal.after(_part(value, "after"), whole) if "after" in value else whole
+
+
+def _operator(value: Mapping[str, Any]) -> str:
+    """Return the only operator among the keys, which must all be known."""
     for key in value:
         if key not in KEYS:
             near = did_you_mean(key, KEYS)
@@ -229,53 +245,25 @@ def _read_mapping(value: Mapping[str, Any]) -> Expectation:
         raise InputError(
             f"expected exactly one of {', '.join(OPERATORS)}, got {', '.join(operators) or 'none'}"
         )
-    operator = operators[0]
-    if operator == "at_most":
-        return _at_most(value)
-    _refuse(value, operator, "of", "per")
-    if operator == "at_end":
-        _refuse(value, operator, "within", "until")
-    if operator == "eventually" and "after" in value:
-        _refuse(value, operator, "until")
-        part = _condition(value, operator)
-        return temporal.after(_part(value, "after"), part, within=value.get("within"))
-    whole = _whole(value, operator)
-    return temporal.after(_part(value, "after"), whole) if "after" in value else whole
+    return operators[0]
 
 
-def _whole(value: Mapping[str, Any], operator: str) -> Expectation:
-    """Apply an operator to its condition, with the time limits of the mapping."""
-    part, within = _condition(value, operator), value.get("within")
-    if operator == "at_end":
-        return temporal.at_end(part)
-    if "until" in value:
-        if operator != "always":
-            raise problem_at(
-                ("until",), f"'until' can only be combined with 'always', not with {operator!r}"
-            )
-        return temporal.until(part, _part(value, "until"), within=within)
-    return getattr(temporal, operator)(part, within=within)
+# Keys that can't be combined with an operator, if these are not "of" and "per".
+_REFUSED = {
+    "at_end": ("of", "per", "within"),
+    "at_most": ("after", "within", "during"),
+}
 
 
-def _condition(value: Mapping[str, Any], operator: str) -> Expectation:
+def _condition(value: Mapping[str, Any], name: str) -> Expectation:
     """Return the condition of an operator, with `holds_for` and `during` applied."""
-    part = _part(value, operator)
+    part = _part(value, "of" if name == "at_most" else name)
     if "holds_for" in value:
         part = temporal.holds_for(part, value["holds_for"])
     if "during" not in value:
         return part
     hours = vocabulary.during(str(value["during"]))
-    return (~hours | part) if operator == "always" else (hours & part)
-
-
-def _at_most(value: Mapping[str, Any]) -> Expectation:
-    _refuse(value, "at_most", "until", "after", "within", "during")
-    if "of" not in value:
-        raise InputError("at_most needs the key 'of', such as of: events(find_begins, astro)")
-    part = _part(value, "of")
-    if "holds_for" in value:
-        part = temporal.holds_for(part, value["holds_for"])
-    return temporal.at_most(value["at_most"], part, per=value.get("per"))
+    return (~hours | part) if name == "always" else (hours & part)
 
 
 def _part(value: Mapping[str, Any], key: str) -> Expectation:
@@ -288,12 +276,6 @@ def _part(value: Mapping[str, Any], key: str) -> Expectation:
         return parse_expectation(text)
     except InputError as error:
         raise problem_at((key,), str(error)) from None
-
-
-def _refuse(value: Mapping[str, Any], operator: str, *keys: str) -> None:
-    for key in keys:
-        if key in value:
-            raise problem_at((key,), f"{key!r} can't be combined with {operator}")
 
 
 JSON_SCHEMA: dict[str, Any] = {

@@ -12,49 +12,34 @@ from typing import Any, ClassVar, Protocol
 import numpy as np
 from pydantic_core import PydanticCustomError
 
+from fleet2d.algorithms.observations import Activities
+from fleet2d.configuration.components import components
 from fleet2d.configuration.problems import suggest
-from fleet2d.configuration.units import Quantity, format_duration
-from fleet2d.entities.behavior import Actor
+from fleet2d.configuration.units import LENGTH, SHARE, SPEED, format_duration
+from fleet2d.entities.behavior import Actor, Behavior
 from fleet2d.entities.body import Pose
 from fleet2d.errors import InputError, ScenarioError
 from fleet2d.expectations.expectation import (
-    INFINITE,
-    TINY,
     Expectation,
     RunSignals,
-    Trace,
+    Term,
     Word,
     argument_text,
-    constant,
-    joined,
     number_text,
-    shortest,
     truth,
 )
+from fleet2d.expectations.traces import INFINITE, TINY, Trace, constant, joined, shortest
 from fleet2d.floorplan.home import Home
 from fleet2d.kernels import F64, I64
 from fleet2d.kernels.motion import Window
 from fleet2d.runtime.clock import Clock
 from fleet2d.runtime.events import KINDS, SIGHTS, Event, EventKind
 
-# Names
+QUANTITIES = {"m": LENGTH, "m/s": SPEED, "share": SHARE}
+"""How the limits of a signal are written, by its unit; limits of others are plain numbers."""
 
-# Kinds of events that only one type of behavior records.
-_OF_BEHAVIORS = {
-    "dock": {EventKind.DOCKS, EventKind.CHARGED},
-    "explore": {EventKind.EXPLORED},
-    "find": {
-        EventKind.FIND_BEGINS, EventKind.FOUND, EventKind.GAVE_UP, EventKind.NOT_AT_HOME
-    },
-    "follow": {EventKind.FOLLOWS, EventKind.LOST},
-    "hangout": {EventKind.RELOCATES},
-    "opportunistic": {
-        EventKind.APPROACHES, EventKind.INTERACTS, EventKind.INTERACTION_OVER
-    },
-    "retrace": {EventKind.RETRACES, EventKind.RETRACED},
-    "scheduled": {EventKind.VISITS},
-}  # fmt: skip
-_OF_DOORS = {EventKind.OPENED, EventKind.SHUT, EventKind.LOCKED, EventKind.UNLOCKED}
+
+# Names
 
 
 @dataclass(frozen=True)
@@ -62,39 +47,18 @@ class Scene:
     """The names of a run that expectations may use, to check them before the run.
 
     Attributes:
-        users: Names of users.
-        robots: Names of robots.
-        rooms: Names and types of rooms.
-        things: Names of objects of the home.
-        doors: Names of doors.
-        sensors: Names of sensors.
-        algorithms: Names of algorithms.
-        metrics: Names of metrics.
-        batteries: Names of robots that have a battery.
+        names: The names, by what they name: users, robots, rooms (also their types), things of the
+            home, doors, sensors, algorithms, metrics, batteries (the robots that have one), and
+            bodies (users and robots).
         cameras: For each body with cameras, the names of the bodies that they look at.
-        behaviors: The types of behaviors of each body; "own" stands for a user's own classes.
-        records: Kinds of events that a user's own behaviors record.
+        events: The kinds of events that can happen to each entity; an empty name is the home.
         remaining: Time from now to the end of the run.
     """
 
-    users: Collection[str]
-    robots: Collection[str]
-    rooms: Collection[str]
-    things: Collection[str]
-    doors: Collection[str]
-    sensors: Collection[str]
-    algorithms: Collection[str]
-    metrics: Collection[str]
-    batteries: Collection[str]
+    names: Mapping[str, Collection[str]]
     cameras: Mapping[str, Collection[str]]
-    behaviors: Mapping[str, Collection[str]]
-    records: Collection[str]
+    events: Mapping[str, Set[str]]
     remaining: timedelta
-
-    @property
-    def bodies(self) -> list[str]:
-        """Names of users and robots."""
-        return [*self.users, *self.robots]
 
     def check_name(self, noun: str, name: str, known: Iterable[str], of: object) -> None:
         """Refuse an unknown name.
@@ -126,51 +90,28 @@ class Scene:
         """
         if kind == EventKind.SENSOR:
             raise ScenarioError(f"{of}: sensor readings are not events: write sensor(NAME)")
-        self.check_name("event", kind, sorted({*KINDS, *self.records}), of)
-        candidates = list(self._candidates(kind))
+        self.check_name("event", kind, sorted(KINDS.union(*self.events.values())), of)
         if entity is not None:
-            self.check_name("body or object", entity, [*self.bodies, *self.doors], of)
-        is_possible = bool(candidates) and (entity in (None, *candidates) or candidates == [""])
-        if not is_possible:
+            self.check_name("body or object", entity, filter(None, self.events), of)
+        names = [name for name, kinds in self.events.items() if kind in kinds]
+        if not names or entity not in (None, *names):
+            behaviors = _behaviors_with(kind)
+            to = f"robots with the behavior {' or '.join(behaviors)} " if behaviors else ""
+            here = ", ".join(names) or "none"
             raise ScenarioError(
-                f"{of}: no such event is possible: {kind!r} happens only to {_entities_of(kind)}"
-                f" (here: {', '.join(candidates) or 'none'})"
+                f"{of}: no such event is possible: {kind!r} happens only to {to}(here: {here})"
             )
         if kind in SIGHTS and detail is not None:
-            self.check_name("user or robot", detail, self.bodies, of)
-
-    def _candidates(self, kind: str) -> Iterable[str]:
-        """Return the names of the entities an event can happen to; an empty name is the home."""
-        if kind in (EventKind.MOVED, EventKind.ROOM_CHANGED):
-            return [""]
-        if kind in _OF_DOORS:
-            return self.doors
-        if kind in (EventKind.USER_SEEN, EventKind.USER_LOST):
-            return [name for name in self.robots if self.cameras.get(name)]
-        if kind in (EventKind.ROBOT_SEEN, EventKind.ROBOT_LOST):
-            return [name for name in self.users if self.cameras.get(name)]
-        if kind == EventKind.BATTERY:
-            return self.batteries
-        if kind == EventKind.ACTIVITY:
-            return self.users
-        for behavior, kinds in _OF_BEHAVIORS.items():
-            if kind in kinds:
-                return [n for n in self.robots if {behavior, "own"} & set(self.behaviors[n])]
-        return self.bodies
+            self.check_name("user or robot", detail, self.names["bodies"], of)
 
 
-def _entities_of(kind: str) -> str:
-    """Describe the entities to which an event can happen."""
-    if kind in _OF_DOORS:
-        return "doors"
-    if kind in SIGHTS:
-        return "robots and users with a camera and somebody to see"
-    if kind == EventKind.BATTERY:
-        return "robots with a battery"
-    if kind == EventKind.ACTIVITY:
-        return "users"
-    behaviors = [name for name, kinds in _OF_BEHAVIORS.items() if kind in kinds]
-    return f"robots with the behavior {' or '.join(behaviors)}" if behaviors else "users and robots"
+def _behaviors_with(kind: str) -> list[str]:
+    """Return the types of behaviors that record a kind of event."""
+    return [
+        name
+        for name, cls in components("behavior").items()
+        if issubclass(cls, Behavior) and kind in cls.records
+    ]
 
 
 # Measuring
@@ -200,8 +141,9 @@ class MeasuredCameras(Protocol):
     def in_view(self) -> Mapping[str, object]:
         """The bodies that count as seen at present, by name."""
 
-    def number_of(self, name: str) -> int:
-        """Return the number of a body among those that they look at."""
+    @property
+    def names(self) -> list[str]:
+        """The bodies that they look at, by their numbers."""
 
     def perfect(self) -> "ErrorFreeCameras":
         """Return cameras that notice all bodies in view at each step, from the present one on."""
@@ -214,45 +156,35 @@ class ErrorFreeCameras(Protocol):
         """Look in the steps up to `end` - 1; return the events of seeing and losing."""
 
 
-class MeasuredRun(Protocol):
-    """The run in which signals are measured."""
+@dataclass
+class MeasuredRun:
+    """The run in which signals are measured.
 
-    @property
-    def actors(self) -> Sequence[Actor]:
-        """Users, then robots; their numbers are the rows of poses."""
+    Attributes:
+        actors: Users, then robots; their numbers are the rows of poses.
+        bodies: The bodies and their poses.
+        home: The home.
+        clock: The steps of the run.
+        doors: The names of doors in the order of their numbers.
+        sensors_on: Whether each sensor is on at present, by name.
+        cameras: The cameras of each body that has some, by its name.
+        activities: The present activities of users.
+        first: The first step that will be measured.
+    """
 
-    @property
-    def bodies(self) -> MeasuredBodies:
-        """The bodies and their poses."""
-
-    @property
-    def home(self) -> Home:
-        """The home."""
-
-    @property
-    def clock(self) -> Clock:
-        """The steps of the run."""
-
-    @property
-    def first(self) -> int:
-        """The first step that will be measured."""
-
-    @property
-    def doors(self) -> Sequence[str]:
-        """The names of doors in the order of their numbers."""
-
-    @property
-    def sensors_on(self) -> Mapping[str, bool]:
-        """Whether each sensor is on at present, by name."""
+    actors: Sequence[Actor]
+    bodies: MeasuredBodies
+    home: Home
+    clock: Clock
+    doors: Sequence[str]
+    sensors_on: Mapping[str, bool]
+    cameras: Mapping[str, MeasuredCameras]
+    activities: Activities
+    first: int = 0
 
     def row(self, name: str) -> int:
         """Return the row of a body."""
-
-    def cameras_of(self, name: str) -> MeasuredCameras:
-        """Return the cameras of a body."""
-
-    def activity_of(self, row: int) -> str | None:
-        """Return the present activity of a user; None if none is known."""
+        return next(row for row, actor in enumerate(self.actors) if actor.name == name)
 
 
 @dataclass
@@ -290,7 +222,7 @@ class Gauge:
 
     def __init__(self, signal: "Measurement", run: MeasuredRun) -> None:
         self.signal = signal
-        self.words: dict[int, Set[str]] = {}
+        self.words: dict[int, tuple[str, ...]] = {}
         self.now = float("nan")
         self._traces: list[Trace] = []
         self.memory: Any = signal.start(run, self)
@@ -306,7 +238,7 @@ class Gauge:
 
     def replace_last(self, value: float) -> None:
         """Set the value at the last step that was measured."""
-        trace = joined(self._traces)
+        trace = self.trace()
         before = [trace.until(trace.end - 1)] if trace.first < trace.end - 1 else []
         self._traces = [*before, constant(value, trace.end - 1, trace.end)]
 
@@ -324,18 +256,22 @@ class Gauge:
 
 
 @dataclass(frozen=True, eq=False)
-class Measurement(Word):
+class Measurement(Word, Term):
     """Base of what is measured during a run; signals of the same text are the same signal.
 
     Attributes:
-        of: What the first field names, as a noun for messages, and as an attribute of `Scene`.
+        of: What the first field names: as a noun for messages, and in `Scene.names`; or nothing.
     """
 
-    of: ClassVar[tuple[str, str]]
+    of: ClassVar[tuple[str, str] | None] = None
 
     def trace(self, run: RunSignals) -> Trace:
         """Return its values from the first judged step on."""
         return run.traces[str(self)].since(run.first)
+
+    def measures(self) -> Iterator["Measurement"]:
+        """Yield itself."""
+        yield self
 
     def check(self, scene: Scene) -> None:
         """Refuse a signal that this run doesn't have.
@@ -343,8 +279,9 @@ class Measurement(Word):
         Raises:
             ScenarioError: A name is unknown, or the signal can never be measured.
         """
-        noun, known = self.of
-        scene.check_name(noun, getattr(self, fields(self)[0].name), getattr(scene, known), self)
+        if self.of is not None:
+            noun, known = self.of
+            scene.check_name(noun, getattr(self, fields(self)[0].name), scene.names[known], self)
 
     def start(self, run: MeasuredRun, gauge: Gauge) -> Any:
         """Return what `measure` needs from block to block, before the first one."""
@@ -368,52 +305,45 @@ class Measurement(Word):
 # Kinds of signals
 
 
-@dataclass(frozen=True, eq=False)
-class Signal(Measurement):
+class Signal(Term):
     """A number at each step; compare it by `>`, `>=`, `<`, `<=`, `==`, `!=`.
 
     Where it is missing (an algorithm without an output so far), no comparison holds.
     """
 
-    unit: ClassVar[str] = ""
-    quantity: ClassVar[Quantity | None] = None
+    def trace(self, run: RunSignals) -> Trace:
+        """Return its values from the first judged step on."""
+        raise NotImplementedError
 
     def __gt__(self, limit: float | str) -> Expectation:
         """Expect the signal above a limit."""
-        return SignalComparison(self, ">", _limit(self, limit))
+        return SignalComparison(self, ">", limit)
 
     def __ge__(self, limit: float | str) -> Expectation:
         """Expect the signal at a limit or above it."""
-        return SignalComparison(self, ">=", _limit(self, limit))
+        return SignalComparison(self, ">=", limit)
 
     def __lt__(self, limit: float | str) -> Expectation:
         """Expect the signal below a limit."""
-        return SignalComparison(self, "<", _limit(self, limit))
+        return SignalComparison(self, "<", limit)
 
     def __le__(self, limit: float | str) -> Expectation:
         """Expect the signal at a limit or below it."""
-        return SignalComparison(self, "<=", _limit(self, limit))
+        return SignalComparison(self, "<=", limit)
 
     def __eq__(self, limit: object) -> Expectation:  # type: ignore[override]
         """Expect the signal to equal a limit."""
-        return SignalComparison(self, "==", _limit(self, limit))
+        return SignalComparison(self, "==", limit)
 
     def __ne__(self, limit: object) -> Expectation:  # type: ignore[override]
         """Expect the signal to differ from a limit."""
-        return SignalComparison(self, "!=", _limit(self, limit))
+        return SignalComparison(self, "!=", limit)
 
     __hash__ = object.__hash__
 
 
-def _limit(signal: Signal, limit: object) -> float:
-    try:
-        if signal.quantity is not None:
-            return float(signal.quantity.parse(limit))
-        if isinstance(limit, int | float | np.number) and not isinstance(limit, bool):
-            return float(limit)
-    except PydanticCustomError as error:
-        raise InputError(f"{signal} is compared with {limit!r}: {error}") from None
-    raise InputError(f"{signal} is compared with {limit!r}, expected a number")
+class NumberSignal(Measurement, Signal):
+    """A number that is measured."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -422,26 +352,17 @@ class SignalComparison(Expectation):
 
     signal: Signal
     sign: str
-    limit: float
+    limit: Any  # as it is written, then a number
 
     is_call = False
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "limit", _limit(self.signal, self.limit))
 
     @property
     def unit(self) -> str:  # type: ignore[override]
         """The unit of the signal; 1 if it has none."""
         return self.signal.unit or "1"
-
-    def measures(self) -> Iterator[Measurement]:
-        """Yield the signal."""
-        yield from measured_in(self.signal)
-
-    def parts(self) -> Iterator[Expectation]:
-        """Yield the expectations that the signal is made of, if any."""
-        yield from getattr(self.signal, "parts", tuple)()
-
-    def check(self, scene: Scene) -> None:
-        """Refuse a signal that this run doesn't have."""
-        self.signal.check(scene)
 
     def robustness(self, run: RunSignals, high: bool) -> Trace:
         """Return the distance of the signal from the limit, below 0 on the wrong side."""
@@ -449,12 +370,9 @@ class SignalComparison(Expectation):
 
     def _margin(self, value: F64) -> F64:
         excess = value - self.limit
-        if self.sign in ("==", "!="):
-            margin = -np.abs(excess) if self.sign == "==" else np.abs(excess)
-        else:
-            margin = excess if self.sign.startswith(">") else -excess
-        on_limit = TINY if self.sign.endswith("=") and self.sign != "!=" else 0.0
-        margin = np.where(margin == 0, on_limit or -TINY, margin)
+        margin = np.abs(excess) if self.sign in ("==", "!=") else excess
+        margin = -margin if self.sign in ("==", "<", "<=") else margin
+        margin = np.where(margin == 0, TINY if self.sign in ("==", "<=", ">=") else -TINY, margin)
         return np.where(np.isnan(margin), -INFINITE, margin)
 
     def __str__(self) -> str:
@@ -462,13 +380,15 @@ class SignalComparison(Expectation):
         return f"{self.signal} {self.sign} {number_text(self.limit, self.signal.unit)}"
 
 
-def measured_in(signal: Measurement) -> Iterator[Measurement]:
-    """Yield the signals to measure for a signal: itself, or for a count those of its part."""
-    measures: Callable[[], Iterator[Measurement]] | None = getattr(signal, "measures", None)
-    if measures is None:
-        yield signal
-    else:
-        yield from measures()
+def _limit(signal: Signal, limit: object) -> float:
+    try:
+        if signal.unit in QUANTITIES:
+            return float(QUANTITIES[signal.unit].parse(limit))
+        if isinstance(limit, int | float | np.number) and not isinstance(limit, bool):
+            return float(limit)
+    except PydanticCustomError as error:
+        raise InputError(f"{signal} is compared with {limit!r}: {error}") from None
+    raise InputError(f"{signal} is compared with {limit!r}, expected a number")
 
 
 @dataclass(frozen=True, eq=False)
@@ -505,23 +425,17 @@ class WordComparison(Expectation):
 
     is_call = False
 
-    def measures(self) -> Iterator[Measurement]:
-        """Yield the signal."""
-        yield self.signal
-
     def check(self, scene: Scene) -> None:
         """Refuse a signal or a word that this run doesn't have."""
-        self.signal.check(scene)
+        super().check(scene)
         for word in self.words:
             self.signal.check_word(word, scene)
 
     def robustness(self, run: RunSignals, high: bool) -> Trace:
         """Return infinity where the signal has one of the words, minus infinity elsewhere."""
-        words_by_code = run.words[str(self.signal)]
-        codes = [float(code) for code, words in words_by_code.items() if words & set(self.words)]
-        return self.signal.trace(run).map(
-            lambda value: truth(np.isin(value, codes).astype(np.float64))
-        )
+        words_by_code = run.words[str(self.signal)].items()
+        codes = [float(code) for code, words in words_by_code if set(words) & set(self.words)]
+        return self.signal.trace(run).map(lambda value: truth(np.isin(value, codes)))
 
     def __str__(self) -> str:
         """Return the text that `parse_expectation` reads back."""
@@ -534,9 +448,7 @@ class WordComparison(Expectation):
 class Condition(Measurement, Expectation):
     """A signal that is true or false at each step; it is an expectation itself."""
 
-    def measures(self) -> Iterator[Measurement]:
-        """Yield itself."""
-        yield self
+    unit = ""
 
     def robustness(self, run: RunSignals, high: bool) -> Trace:
         """Return infinity where it is true, minus infinity where it is false."""

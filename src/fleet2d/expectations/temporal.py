@@ -1,6 +1,5 @@
 """The operators of expectations: when something must hold, for how long, and how often."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from datetime import timedelta
 from itertools import pairwise
@@ -10,24 +9,16 @@ import numpy as np
 
 from fleet2d.configuration.problems import did_you_mean
 from fleet2d.errors import InputError
-from fleet2d.expectations.expectation import (
+from fleet2d.expectations.expectation import Expectation, RunSignals, Word
+from fleet2d.expectations.signals import Scene, Signal
+from fleet2d.expectations.traces import (
     INFINITE,
-    Expectation,
-    RunSignals,
     Trace,
-    UnaryExpectation,
-    Word,
-    call_text,
     combine,
-    common_unit,
-    condition,
     constant,
-    duration,
     joined,
     pulses,
-    spells,
 )
-from fleet2d.expectations.signals import Measurement, Scene, Signal, SignalComparison
 from fleet2d.kernels import I64
 
 PERIODS = {"hour": timedelta(hours=1), "day": timedelta(days=1), "week": timedelta(weeks=1)}
@@ -52,29 +43,19 @@ class Violation(NamedTuple):
 
 def violations_of(robustness: Trace) -> list[Violation]:
     """Return the maximal stretches in which a robustness is below 0, in order."""
-    value = robustness.value
-    below = np.concatenate([[False], value < 0, [False]])
-    edges = np.flatnonzero(below[1:] != below[:-1])
-    steps = np.append(robustness.start, robustness.end)
+    start, value, _ = robustness
     violations = []
-    for begin, end in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+    for first, last in robustness.map(lambda value: (value < 0).astype(np.float64)).spells.tolist():
+        begin, end = np.searchsorted(start, [first, last + 1])
         worst = begin + int(np.argmin(value[begin:end]))
-        violations.append(
-            Violation(
-                int(steps[begin]), int(steps[end]) - 1, float(value[worst]), int(steps[worst])
-            )
-        )
+        violations.append(Violation(first, last, float(value[worst]), int(start[worst])))
     return violations
 
 
-@dataclass(frozen=True, eq=False)
 class Temporal(Expectation):
     """Base of expectations that say when something must hold, so that a run can be judged."""
 
-    @property
-    def is_judged(self) -> bool:
-        """True: it has a time operator."""
-        return True
+    is_judged = True
 
     def violations(self, run: RunSignals) -> list[Violation]:
         """Return the violations from the first judged step on: maximal stretches, in order."""
@@ -92,15 +73,10 @@ class Temporal(Expectation):
 
 
 @dataclass(frozen=True, eq=False)
-class Windowed(Temporal, Word):
+class Windowed(Word, Temporal):
     """Base of expectations about the time from a step on: for `within`, or to the run's end."""
 
     within: Any = field(default=None, kw_only=True)  # of type Time, then a timedelta
-
-    def __post_init__(self) -> None:
-        self._set(within=duration(self.within, "within"))
-        for part in self.parts():
-            condition(part, self.word)
 
     def check(self, scene: Scene) -> None:
         """Refuse a time beyond the run."""
@@ -114,46 +90,63 @@ class Windowed(Temporal, Word):
     def _steps(self, run: RunSignals) -> int:
         return run.end - run.first if self.within is None else run.steps_in(self.within)
 
+    def _beyond(self, run: RunSignals, neutral: float, high: bool) -> float:
+        return run.beyond(neutral, high=high, bounded=self.within is not None)
 
-@dataclass(frozen=True, eq=False)
-class always(Windowed, UnaryExpectation):
-    """Expect a condition at every step, until the end of the run or for `within`."""
+
+class Invariant(Windowed):
+    """Base of expectations that something holds at every step."""
+
+    @property
+    def operand(self) -> Expectation:
+        """What must hold at every step."""
+        raise NotImplementedError
+
+    @property
+    def unit(self) -> str:  # type: ignore[override]
+        """The unit of the operand."""
+        return self.operand.unit
 
     def robustness(self, run: RunSignals, high: bool) -> Trace:
         """Return the minimum robustness of the operand over the window starting at each step."""
-        after = run.beyond(INFINITE, high=high, bounded=self.within is not None)
-        return self.part.robustness(run, high).sliding_min(0, self._steps(run), INFINITE, after)
+        after = self._beyond(run, INFINITE, high)
+        return self.operand.robustness(run, high).sliding_min(0, self._steps(run), INFINITE, after)
 
     def violations(self, run: RunSignals) -> list[Violation]:
         """Return the stretches in which the operand doesn't hold."""
-        part = self.part.robustness(run, True)
-        return violations_of(part.until(self.last(run) + 1))
+        return violations_of(self.operand.robustness(run, True).until(self.last(run) + 1))
 
 
 @dataclass(frozen=True, eq=False)
-class never(Windowed, UnaryExpectation):
+class always(Invariant):
+    """Expect a condition at every step, until the end of the run or for `within`."""
+
+    part: Expectation
+
+    @property
+    def operand(self) -> Expectation:
+        """The condition."""
+        return self.part
+
+
+class never(always):
     """Expect a condition at no step, until the end of the run or for `within`."""
 
     @property
-    def _opposite(self) -> always:
-        return always(~self.part, within=self.within)
-
-    def robustness(self, run: RunSignals, high: bool) -> Trace:
-        """Return the negated maximum robustness of the operand over the window of each step."""
-        return self._opposite.robustness(run, high)
-
-    def violations(self, run: RunSignals) -> list[Violation]:
-        """Return the stretches in which the operand holds."""
-        return self._opposite.violations(run)
+    def operand(self) -> Expectation:
+        """The opposite of the condition."""
+        return ~self.part
 
 
 @dataclass(frozen=True, eq=False)
-class eventually(Windowed, UnaryExpectation):
+class eventually(Windowed):
     """Expect a condition at some step, before the end of the run or `within` some time."""
+
+    part: Expectation
 
     def robustness(self, run: RunSignals, high: bool) -> Trace:
         """Return the maximum robustness of the operand over the window starting at each step."""
-        after = run.beyond(-INFINITE, high=high, bounded=self.within is not None)
+        after = self._beyond(run, -INFINITE, high)
         return self.part.robustness(run, high).sliding_max(0, self._steps(run), -INFINITE, after)
 
     def slack(self, run: RunSignals) -> int | None:
@@ -164,7 +157,7 @@ class eventually(Windowed, UnaryExpectation):
 
     def spans(self, run: RunSignals) -> I64:
         """Return the stretches in which the operand holds: int64 (n, 2), first and last step."""
-        return np.array(spells(self.part.robustness(run, False)), np.int64).reshape(-1, 2)
+        return self.part.robustness(run, False).spells
 
     def slack_at(self, first: int, spans: I64, run: RunSignals) -> int | None:
         """Return how many steps before the deadline the first of some spans begins.
@@ -185,11 +178,10 @@ class eventually(Windowed, UnaryExpectation):
 
 
 @dataclass(frozen=True, eq=False)
-class at_end(Temporal, UnaryExpectation, Word):
+class at_end(Word, Temporal):
     """Expect a condition at the last step of the run."""
 
-    def __post_init__(self) -> None:
-        condition(self.part, self.word)
+    part: Expectation
 
     def robustness(self, run: RunSignals, high: bool) -> Trace:
         """Return the robustness of the operand at the last step."""
@@ -200,8 +192,7 @@ class at_end(Temporal, UnaryExpectation, Word):
 
     def violations(self, run: RunSignals) -> list[Violation]:
         """Return the last step, if the operand doesn't hold there."""
-        value = self.robustness(run, True).at(run.first)
-        return [] if value > 0 else [Violation(run.end - 1, run.end - 1, value, run.end - 1)]
+        return [v._replace(first=v.last) for v in super().violations(run)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -211,21 +202,10 @@ class until(Windowed):
     hold: Expectation
     goal: Expectation
 
-    @property
-    def unit(self) -> str:  # type: ignore[override]
-        """The unit that both have in common."""
-        return common_unit(self.hold, self.goal)
-
-    def parts(self) -> Iterator[Expectation]:
-        """Yield `hold` and `goal`."""
-        yield self.hold
-        yield self.goal
-
     def robustness(self, run: RunSignals, high: bool) -> Trace:
         """Return the maximum over later steps t of min(goal at t, minimum of `hold` before t)."""
         hold, goal = self.hold.robustness(run, high), self.goal.robustness(run, high)
-        after = run.beyond(-INFINITE, high=high, bounded=self.within is not None)
-        whole = hold.until_goal(goal, after)
+        whole = hold.until_goal(goal, self._beyond(run, -INFINITE, high))
         if self.within is None:
             return whole
         in_time = eventually(self.goal, within=self.within)
@@ -233,12 +213,9 @@ class until(Windowed):
 
     def violations(self, run: RunSignals) -> list[Violation]:
         """Return one violation, up to where `hold` failed or the goal was due."""
-        value = self.robustness(run, True).at(run.first)
-        if value > 0:
-            return []
-        failures = spells(self.hold.robustness(run, True).map(np.negative))
-        last = min([self.last(run), *(first for first, _ in failures)])
-        return [Violation(run.first, last, value, last)]
+        failures = self.hold.robustness(run, True).map(np.negative).spells[:, 0]
+        last = min([self.last(run), *failures.tolist()])
+        return [v._replace(last=last, worst=last) for v in super().violations(run)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -262,11 +239,6 @@ class after(Windowed):
         """The expectation that must hold at each step at which the trigger begins."""
         return self.part if self.within is None else eventually(self.part, within=self.within)
 
-    def parts(self) -> Iterator[Expectation]:
-        """Yield the trigger and the expected condition."""
-        yield self.trigger
-        yield self.part
-
     def last(self, run: RunSignals) -> int:
         """Return the last step that has been simulated: the trigger may begin at any."""
         return run.end - 1
@@ -277,30 +249,24 @@ class after(Windowed):
 
     def robustness(self, run: RunSignals, high: bool) -> Trace:
         """Return the minimum robustness over the occasions from each step on."""
-        value = self._on_occasions(run, high)
+        is_occasion = pulses(self.triggered(run), run.first, run.end)
+        value = self.consequence.robustness(run, high)
+        value = combine(lambda on, v: np.where(on > 0, v, INFINITE), is_occasion, value)
         later = run.beyond(INFINITE, high=high, bounded=False)
         return value.sliding_min(0, run.end - run.first, INFINITE, later)
 
-    def _on_occasions(self, run: RunSignals, high: bool) -> Trace:
-        """Return the robustness at each occasion, and infinity between occasions."""
-        is_occasion = pulses(self.triggered(run), run.first, run.end)
-        value = self.consequence.robustness(run, high)
-        return combine(lambda on, v: np.where(on > 0, v, INFINITE), is_occasion, value)
-
     def violations(self, run: RunSignals) -> list[Violation]:
         """Return the violations of each missed occasion, from the trigger to the deadline."""
-        value = self._on_occasions(run, True)
-        missed = value.start[value.value < 0]
-        ends = np.append(value.start[1:], value.end)[value.value < 0]
-        violations, expected = [], self.consequence
-        for begin, end in zip(missed.tolist(), ends.tolist(), strict=True):
-            for step in range(begin, end):
-                rest = replace(run, first=step)
-                if isinstance(expected, eventually) or not isinstance(expected, Temporal):
-                    last = expected.last(rest) if isinstance(expected, eventually) else step
-                    violations.append(Violation(step, last, value.at(step), last))
-                else:
-                    violations += expected.violations(rest)
+        steps, expected = self.triggered(run), self.consequence
+        values = expected.robustness(run, True).values(steps)
+        violations = []
+        for step, value in zip(steps[values < 0].tolist(), values[values < 0], strict=True):
+            rest = replace(run, first=step)
+            if isinstance(expected, Temporal) and not isinstance(expected, eventually):
+                violations += expected.violations(rest)
+                continue
+            last = expected.last(rest) if isinstance(expected, eventually) else step
+            violations.append(Violation(step, last, float(value), last))
         return violations
 
     def slack(self, run: RunSignals) -> int | None:
@@ -314,14 +280,11 @@ class after(Windowed):
 
 
 @dataclass(frozen=True, eq=False)
-class holds_for(UnaryExpectation, Word):
+class holds_for(Word, Expectation):
     """The condition that a condition has held for at least `duration` up to this step."""
 
+    part: Expectation
     duration: Any  # of type Time, then a timedelta
-
-    def __post_init__(self) -> None:
-        condition(self.part, self.word)
-        self._set(duration=duration(self.duration, self.word))
 
     def check(self, scene: Scene) -> None:
         """Refuse a time beyond the run."""
@@ -336,7 +299,7 @@ class holds_for(UnaryExpectation, Word):
 
 
 @dataclass(frozen=True, eq=False)
-class count(Signal):
+class count(Word, Signal):
     """How often a condition has begun: in the present hour, day or week, or in the run so far."""
 
     part: Expectation
@@ -345,24 +308,12 @@ class count(Signal):
     unit = "times"
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if self.per is not None and self.per not in PERIODS:
             raise InputError(
                 f"count: per is {self.per!r}{did_you_mean(self.per, PERIODS)} There are: hour, day,"
                 " week"
             )
-        condition(self.part, "count")
-
-    def parts(self) -> Iterator[Expectation]:
-        """Yield the expectation that is counted."""
-        yield self.part
-
-    def measures(self) -> Iterator[Measurement]:
-        """Yield the signals that the counted expectation needs."""
-        yield from self.part.measures()
-
-    def check(self, scene: Scene) -> None:
-        """Refuse a counted expectation that can't be in this run."""
-        self.part.check(scene)
 
     def trace(self, run: RunSignals) -> Trace:
         """Return the count at each step."""
@@ -371,29 +322,34 @@ class count(Signal):
         return joined([_counts(steps, a, b) for a, b in pairwise(edges)])
 
 
-class at_most(always):
+@dataclass(frozen=True, eq=False)
+class at_most(Invariant):
     """Expect a condition to begin at most `times` times: each hour, day or week, or in the run."""
 
-    def __init__(self, times: int, part: Expectation, *, per: str | None = None) -> None:
-        if type(times) is not int or times < 0:
-            raise InputError(
-                f"at_most: the number of times must be a whole number, 0 or more, not {times!r}"
-            )
-        super().__init__(SignalComparison(count(part, per=per), "<=", float(times)))
-        self._set(_text=call_text("at_most", times, part, per=per))
+    times: int
+    part: Expectation
+    per: str | None = field(default=None, kw_only=True)
 
-    def __str__(self) -> str:
-        """Return the text that `parse_expectation` reads back."""
-        return str(self._text)  # type: ignore[attr-defined]
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if type(self.times) is not int or self.times < 0:
+            raise InputError(
+                "at_most: the number of times must be a whole number, 0 or more, not"
+                f" {self.times!r}"
+            )
+        _ = self.operand  # which checks `per`
+
+    @property
+    def operand(self) -> Expectation:
+        """The condition that it hasn't begun more often."""
+        return count(self.part, per=self.per) <= self.times
 
 
 def _counts(steps: I64, first: int, end: int) -> Trace:
     """Return how many of `steps` have passed at each step from `first` on."""
-    at, passed = np.unique(steps[(steps >= first) & (steps < end)], return_counts=True)
-    start, value = np.append(first, at), np.append(0, np.cumsum(passed)).astype(np.float64)
-    if len(at) and at[0] == first:
-        start, value = start[1:], value[1:]
-    return Trace(start.astype(np.int64), value, end)
+    steps = np.sort(steps[(steps >= first) & (steps < end)])
+    start = np.union1d([first], steps).astype(np.int64)
+    return Trace(start, np.searchsorted(steps, start, side="right").astype(np.float64), end)
 
 
 def _period_begins(run: RunSignals, per: str | None) -> list[int]:

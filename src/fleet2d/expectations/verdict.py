@@ -7,8 +7,9 @@ from typing import Any, Protocol
 
 from fleet2d.configuration.units import format_duration
 from fleet2d.errors import InputError
-from fleet2d.expectations.expectation import TINY, And, Expectation, RunSignals, number_text
+from fleet2d.expectations.expectation import And, Expectation, Or, RunSignals, number_text
 from fleet2d.expectations.temporal import Temporal, Violation, after
+from fleet2d.expectations.traces import TINY
 from fleet2d.runtime.clock import DAY_S, HOUR_S, Clock
 
 
@@ -171,8 +172,10 @@ def _violations(expectation: Expectation, run: RunSignals) -> list[Violation]:
     value = expectation.robustness(run, True).at(run.first)
     if value > 0:
         return []
-    if isinstance(expectation, And):
-        return sorted(v for part in expectation.parts() for v in _violations(part, run))
+    if isinstance(expectation, And) and not isinstance(expectation, Or):
+        return sorted(
+            v for part in (expectation.one, expectation.other) for v in _violations(part, run)
+        )
     return [Violation(run.first, run.end - 1, value, run.first)]
 
 

@@ -1,11 +1,11 @@
 """The terms for what is measured in a run: one class each, named as in expectations.
 
-To add a word, derive a class from `Signal` (a number), `WordSignal` (a name) or `Condition`: its
+To add a word, derive a class from `NumberSignal`, `WordSignal` (a name) or `Condition`: its
 fields are its arguments, `check` refuses names that a run doesn't have, and `measure` returns its
 values. It can be written in texts and imported from `fleet2d.expectations` at once.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from datetime import timedelta
 from typing import Any
@@ -13,31 +13,26 @@ from typing import Any
 import numpy as np
 from pydantic_core import PydanticCustomError
 
-from fleet2d.algorithms.algorithm import to_columns
 from fleet2d.algorithms.observations import ROBOT
-from fleet2d.configuration.problems import did_you_mean, suggest
-from fleet2d.configuration.units import LENGTH, SHARE, SPEED, parse_time_of_day, weekdays_of
+from fleet2d.configuration.problems import did_you_mean
+from fleet2d.configuration.units import parse_time_of_day, weekdays_of
 from fleet2d.entities.behavior import Actor
 from fleet2d.errors import InputError, ScenarioError
-from fleet2d.expectations.expectation import (
-    RunSignals,
-    Trace,
-    constant,
-    pulses,
-    shortest,
-)
+from fleet2d.expectations.expectation import RunSignals
 from fleet2d.expectations.signals import (
     Condition,
     Gauge,
     MeasuredRun,
     Measurement,
+    NumberSignal,
     Scene,
-    Signal,
     SignalBlock,
     WordSignal,
 )
+from fleet2d.expectations.traces import Trace, constant, pulses, shortest
 from fleet2d.floorplan.home import Home, lattice_footprint
 from fleet2d.floorplan.lattice import UNITS_PER_CELL
+from fleet2d.floorplan.placed_objects import PlacedObject
 from fleet2d.kernels import I64, Bool
 from fleet2d.kernels.motion import distances_between, distances_to_shape, rooms_at, speeds
 from fleet2d.kernels.sight import SightingColumn
@@ -48,17 +43,20 @@ Target = str | tuple[float, float]
 """A body, a room, an object, or a point (x, y) [m]."""
 
 BODY = ("user or robot", "bodies")
+"""A noun for messages, and what it names in `Scene.names`."""
 
 # The charge of a battery is rounded down to thousandths; errors of floats must not lower it.
 PARTS = 1000
 ROUNDING = 1e-9
+
+DAY = timedelta(days=1)
 
 
 # Numbers
 
 
 @dataclass(frozen=True, eq=False)
-class distance(Signal):
+class distance(NumberSignal):
     """The distance of a body from another, a room, an object or a point [m].
 
     It is measured from the centre of a body to the nearest point of a room or object: 0 inside.
@@ -68,8 +66,8 @@ class distance(Signal):
     body: str
     other: Target
 
+    of = BODY
     unit = "m"
-    quantity = LENGTH
 
     def __post_init__(self) -> None:
         if not isinstance(self.other, str):
@@ -78,57 +76,53 @@ class distance(Signal):
 
     def check(self, scene: Scene) -> None:
         """Refuse unknown bodies and places."""
-        places = {*scene.rooms, *scene.things}
-        if self.body in places and self.body not in scene.bodies and self.other in scene.bodies:
+        bodies, places = (scene.names[known] for known in ("bodies", "places"))
+        if self.body in places and self.body not in bodies and self.other in bodies:
             raise ScenarioError(
                 f"{self}: name the body first: distance({self.other!r}, {self.body!r})"
             )
-        scene.check_name(BODY[0], self.body, scene.bodies, self)
+        super().check(scene)
         if isinstance(self.other, str):
-            names = [*scene.bodies, *scene.rooms, *scene.things]
-            scene.check_name("body, room or object", self.other, names, self)
+            scene.check_name("body, room or object", self.other, [*bodies, *places], self)
         if self.other == self.body:
             raise ScenarioError(f"{self}: give two different bodies")
 
     def start(self, run: MeasuredRun, gauge: Gauge) -> Any:
-        """Return the row of the other body, if it is one, else the outline of the place."""
+        """Return the rows of both bodies, the second None if it is a place; and its outline."""
         names = [actor.name for actor in run.actors]
         other = names.index(self.other) if self.other in names else None
-        return run.row(self.body), other, _Outline(self.other)
+        return run.row(self.body), other, None, None
 
     def measure(self, block: SignalBlock, gauge: Gauge) -> Trace:
         """Return the distances over a block of steps."""
-        (row, other, outline), window = gauge.memory, block.bodies.window(block.first, block.end)
-        if other is not None:
-            start, value = distances_between(window, row, other)
+        (row, other, shape, edges), home = gauge.memory, block.home
+        window = block.bodies.window(block.first, block.end)
+        if other is None:
+            if (now := self._shape(home)) != shape:
+                edges = self._edges(home, now)
+                gauge.memory = row, other, now, edges
+            start, value = distances_to_shape(window, row, edges)
         else:
-            start, value = distances_to_shape(window, row, outline(block.home))
-        return Trace(start, value / block.home.plan.lattice.units_per_m, block.end)
+            start, value = distances_between(window, row, other)
+        return Trace(start, value / home.plan.lattice.units_per_m, block.end)
 
+    def _shape(self, home: Home) -> PlacedObject | list[int] | tuple[float, float]:
+        """Return the present place: an object, the numbers of rooms, or a point."""
+        if not isinstance(self.other, str):
+            return self.other
+        rooms = [room.index for room in home.rooms if self.other in (room.name, room.type)]
+        return rooms or home.object(self.other)
 
-class _Outline:
-    """The present outline of a room, an object or a point."""
-
-    def __init__(self, place: Target) -> None:
-        self._place = place
-        self._known: tuple[object, I64] | None = None
-
-    def __call__(self, home: Home) -> I64:
-        """Return its edges from (x, y) to (x, y), int64 (n, 4) [lattice]."""
-        plan, place = home.plan, self._place
-        if not isinstance(place, str):
-            x, y = plan.lattice.to_lattice(place).tolist()
-            return np.array([[x, y, x, y]], np.int64)
-        rooms = [room.index for room in home.rooms if place in (room.name, room.type)]
-        item = None if rooms else home.object(place)
-        if self._known is None or self._known[0] is not item:
-            if item is None:
-                edges = outline(np.isin(plan.room_of_place, rooms), UNITS_PER_CELL)
-            else:
-                ring = np.array(lattice_footprint(plan, item).exterior.coords).round()
-                edges = np.concatenate([ring[:-1], ring[1:]], axis=1).astype(np.int64)
-            self._known = item, edges
-        return self._known[1]
+    @staticmethod
+    def _edges(home: Home, shape: PlacedObject | list[int] | tuple[float, float]) -> I64:
+        """Return the edges of a place from (x, y) to (x, y), int64 (n, 4) [lattice]."""
+        plan = home.plan
+        if isinstance(shape, tuple):
+            return np.tile(plan.lattice.to_lattice(shape), 2).reshape(1, 4)
+        if isinstance(shape, list):
+            return outline(np.isin(plan.room_of_place, shape), UNITS_PER_CELL)
+        ring = np.array(lattice_footprint(plan, shape).exterior.coords).round()
+        return np.concatenate([ring[:-1], ring[1:]], axis=1).astype(np.int64)
 
 
 def outline(mask: Bool, side: int) -> I64:
@@ -184,15 +178,14 @@ def _pose(pose: Any) -> I64:
     return np.array([pose.x, pose.y, pose.away], np.int64)
 
 
-class speed(_Motion, Signal):
+class speed(_Motion, NumberSignal):
     """The speed of a body: the distance from its position at the step before, per step [m/s]."""
 
     unit = "m/s"
-    quantity = SPEED
 
 
 @dataclass(frozen=True, eq=False)
-class battery(Signal):
+class battery(NumberSignal):
     """The charge of a robot, 0 to 1, rounded down to a tenth of a percent.
 
     Compare it with a share, such as "10 %".
@@ -202,7 +195,6 @@ class battery(Signal):
 
     of = ("robot with a battery", "batteries")
     unit = "share"
-    quantity = SHARE
 
     def start(self, run: MeasuredRun, gauge: Gauge) -> Any:
         """Return the course of the charge along each plan, so far the present one."""
@@ -232,139 +224,6 @@ class battery(Signal):
         return shortest(np.arange(block.first, block.end), charge, block.end)
 
 
-@dataclass(frozen=True, eq=False)
-class _Value(Signal):
-    """Base of numbers that change when algorithms or metrics are updated; missing before."""
-
-    path: str
-
-    @property
-    def name(self) -> str:
-        """The name of the algorithm or metric."""
-        return self.path.partition(".")[0]
-
-    @property
-    def parts_of_path(self) -> list[str]:
-        """The names after it, which select the number."""
-        return self.path.split(".")[1:]
-
-    def start(self, run: MeasuredRun, gauge: Gauge) -> Any:
-        """Return the home; there is no value before the first update."""
-        return run.home
-
-    def measure(self, block: SignalBlock, gauge: Gauge) -> Trace:
-        """Return the latest value."""
-        return constant(gauge.now, block.first, block.end)
-
-
-class output(_Value):
-    """A number of an algorithm's newest output, which counts from the step after it.
-
-    `ltp.kitchen` is the probability of a room by `ltp`; `rtp.ana.kitchen` that for one user;
-    `mine.sightings` a named number of an output. Missing before the first output.
-    """
-
-    def check(self, scene: Scene) -> None:
-        """Refuse an unknown algorithm."""
-        scene.check_name("algorithm", self.name, scene.algorithms, self)
-        if "." not in self.path:
-            raise ScenarioError(
-                f'{self}: select a number of the output, such as output("{self.path}.kitchen")'
-            )
-
-    def learn(
-        self, outputs: Mapping[str, Any], results: Mapping[str, Callable[[], Any]], gauge: Gauge
-    ) -> None:
-        """Read the number from a new output of the algorithm."""
-        if self.name in outputs:
-            gauge.now = self._read(outputs[self.name], gauge.memory)
-
-    def _read(self, value: Any, home: Home) -> float:
-        """Return the number of an output.
-
-        Raises:
-            ScenarioError: There is no such number in the output, or there are several.
-        """
-        types = [room.type for room in home.rooms]
-        names = {room.type: room.name for room in home.rooms if types.count(room.type) == 1}
-        columns = to_columns(value, [room.name for room in home.rooms], f"algorithms.{self.name}")
-        keep = np.ones(len(next(iter(columns.values()))), np.bool_)
-        words = {n: c for n, c in columns.items() if c.dtype.kind == "O"}
-        number = next((n for n, c in columns.items() if c.dtype.kind in "fiub"), None)
-        for part in self.parts_of_path:
-            if part in columns and part not in words:
-                number = part
-                continue
-            matches = [
-                np.isin(column.astype(str), [part, names.get(part, part)])
-                for column in words.values()
-            ]
-            rows = np.any(matches, axis=0) if matches else np.zeros_like(keep)
-            if not rows.any():
-                known = [*columns, *dict.fromkeys(w for c in words.values() for w in c.tolist())]
-                raise ScenarioError(f"{self}: there is no {part!r} in it{suggest(part, known)}")
-            keep &= rows
-        if keep.sum() != 1 or number is None:
-            how = (
-                f"select one by: {', '.join(words)}" if words else "they have no names to select by"
-            )
-            raise ScenarioError(f"{self} matches {keep.sum()} rows; {how}")
-        return float(columns[number][keep][0])
-
-
-class probability(output):
-    """An algorithm's probability of a room, for a user if it has one for each."""
-
-    word = "output"
-
-    def __init__(self, algorithm: str, room: str, user: str | None = None) -> None:
-        super().__init__(".".join(part for part in (algorithm, user, room) if part))
-
-
-class metric(_Value):
-    """A number of a metric's result so far, by the names in its result.
-
-    It changes when the metric is updated; at the last step it is the result of the whole run.
-    Missing before the first update.
-    """
-
-    def check(self, scene: Scene) -> None:
-        """Refuse an unknown metric."""
-        scene.check_name("metric", self.name, scene.metrics, self)
-
-    def learn(
-        self, outputs: Mapping[str, Any], results: Mapping[str, Callable[[], Any]], gauge: Gauge
-    ) -> None:
-        """Read the number from a new result of the metric."""
-        if self.name in results:
-            gauge.now = self._read(results[self.name]())
-
-    def finish(self, results: Mapping[str, Any], gauge: Gauge) -> None:
-        """Read the number from the result of the whole run."""
-        if self.name in results:
-            gauge.replace_last(self._read(results[self.name]))
-
-    def _read(self, result: Any) -> float:
-        """Return the number of a result; NaN while the result is empty.
-
-        Raises:
-            ScenarioError: The path leads to no number.
-        """
-        for part in self.parts_of_path:
-            if not isinstance(result, Mapping) or part not in result:
-                if isinstance(result, Mapping) and not result:
-                    return float("nan")
-                known = list(result) if isinstance(result, Mapping) else []
-                raise ScenarioError(f"{self}: there is no {part!r} in it{suggest(part, known)}")
-            result = result[part]
-        if isinstance(result, bool | int | float):
-            return float(result)
-        if isinstance(result, Mapping) and not result:
-            return float("nan")
-        keys = ", ".join(result) if isinstance(result, Mapping) else repr(result)
-        raise ScenarioError(f"{self} is not a number: extend it by one of {keys}")
-
-
 # Names
 
 
@@ -381,11 +240,11 @@ class room(WordSignal):
 
     def check_word(self, word: str, scene: Scene) -> None:
         """Refuse an unknown room."""
-        scene.check_name("room", word, scene.rooms, self)
+        scene.check_name("room", word, scene.names["rooms"], self)
 
     def start(self, run: MeasuredRun, gauge: Gauge) -> Any:
         """Return the row of the body; the words are the names and types of rooms."""
-        gauge.words = {room.index: {room.name, room.type} for room in run.home.rooms}
+        gauge.words = {room.index: (room.name, room.type) for room in run.home.rooms}
         return run.row(self.body)
 
     def measure(self, block: SignalBlock, gauge: Gauge) -> Trace:
@@ -405,7 +264,7 @@ class activity(WordSignal):
 
     def start(self, run: MeasuredRun, gauge: Gauge) -> Any:
         """Begin with the code of the present activity; -1 if none is known."""
-        now = run.activity_of(run.row(self.user))
+        now = run.activities.now(run.row(self.user))
         gauge.now = -1.0 if now is None else _code(now, gauge)
 
     def measure(self, block: SignalBlock, gauge: Gauge) -> Trace:
@@ -423,7 +282,7 @@ class activity(WordSignal):
 def _code(word: str, gauge: Gauge) -> float:
     """Return the value that stands for a word; a new one at its first use."""
     code = next((code for code, words in gauge.words.items() if word in words), len(gauge.words))
-    gauge.words.setdefault(code, {word})
+    gauge.words.setdefault(code, (word,))
     return float(code)
 
 
@@ -484,7 +343,7 @@ class seen(_CameraCondition):
 
     def start(self, run: MeasuredRun, gauge: Gauge) -> Any:
         """Begin with whether it counts as seen at present."""
-        gauge.now = float(self.body in run.cameras_of(self.by).in_view)
+        gauge.now = float(self.body in run.cameras[self.by].in_view)
 
     def measure(self, block: SignalBlock, gauge: Gauge) -> Trace:
         """Return 1 while it counts as seen."""
@@ -504,7 +363,7 @@ class in_view(_CameraCondition):
     def start(self, run: MeasuredRun, gauge: Gauge) -> Any:
         """Return cameras that make no errors; so far they have seen nobody."""
         gauge.now = 0.0
-        return run.cameras_of(self.by).perfect()
+        return run.cameras[self.by].perfect()
 
     def measure(self, block: SignalBlock, gauge: Gauge) -> Trace:
         """Return 1 while it is in view."""
@@ -518,13 +377,13 @@ class perceived(_CameraCondition):
 
     def check(self, scene: Scene) -> None:
         """Refuse users as owners: their perception isn't recorded."""
-        scene.check_name("robot", self.by, scene.robots, self)
+        scene.check_name("robot", self.by, scene.names["robots"], self)
         super().check(scene)
 
     def start(self, run: MeasuredRun, gauge: Gauge) -> Any:
         """Return the numbers of the robot and the user in observations."""
-        cameras = run.cameras_of(self.by)
-        return cameras.index, cameras.number_of(self.body)
+        cameras = run.cameras[self.by]
+        return cameras.index, cameras.names.index(self.body)
 
     def measure(self, block: SignalBlock, gauge: Gauge) -> Trace:
         """Return the number of observations at each step at which there is one."""
@@ -620,15 +479,13 @@ class during(Condition):
     days: str | None = field(default=None, kw_only=True)
 
     def __post_init__(self) -> None:
+        begin, separator, end = self.hours.partition("-")
+        if not separator:
+            raise InputError(f"during({self.hours!r}): write from when to when, like '22:00-07:00'")
         try:
-            begin, separator, end = self.hours.partition("-")
-            if not separator:
-                raise InputError(
-                    f"during({self.hours!r}): write from when to when, like '22:00-07:00'"
-                )
             first, last = parse_time_of_day(begin.strip()), parse_time_of_day(end.strip())
             names = [name.strip() for name in self.days.split(",")] if self.days else "daily"
-            length = last - first if last > first else last + timedelta(days=1) - first
+            length = last - first if last > first else last + DAY - first
             self._set(_begin=first, _length=length, _weekdays=frozenset(weekdays_of(names)))
         except PydanticCustomError as error:
             raise InputError(f"during: {error}") from None
@@ -637,14 +494,11 @@ class during(Condition):
         """Yield nothing: it follows from the clock."""
         yield from ()
 
-    def check(self, scene: Scene) -> None:
-        """Accept every run."""
-
     def trace(self, run: RunSignals) -> Trace:
         """Return 1 where the time is within these hours, 0 elsewhere."""
-        clock, day = run.clock, timedelta(days=1)
+        clock = run.clock
         begin, length, weekdays = (vars(self)[n] for n in ("_begin", "_length", "_weekdays"))
-        midnight = midnight_of(clock.time(run.first)) - day
+        midnight = midnight_of(clock.time(run.first)) - DAY
         starts, values = [run.first], [0.0]
         while midnight < clock.time(run.end):
             if midnight.weekday() in weekdays:
@@ -655,5 +509,5 @@ class during(Condition):
                     elif step < run.end:
                         starts.append(step)
                         values.append(is_within)
-            midnight += day
+            midnight += DAY
         return Trace(np.array(starts, np.int64), np.array(values), run.end)

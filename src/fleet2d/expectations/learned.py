@@ -1,0 +1,147 @@
+"""Words for what a run has learned: numbers of the outputs of algorithms, and of metrics."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from fleet2d.algorithms.algorithm import to_columns
+from fleet2d.configuration.problems import suggest
+from fleet2d.errors import ScenarioError
+from fleet2d.expectations.expectation import WORDS
+from fleet2d.expectations.signals import Gauge, MeasuredRun, NumberSignal, Scene, SignalBlock
+from fleet2d.expectations.traces import Trace, constant
+from fleet2d.floorplan.home import Home
+
+
+@dataclass(frozen=True, eq=False)
+class _Value(NumberSignal):
+    """Base of numbers that change when algorithms or metrics are updated; missing before."""
+
+    path: str
+
+    @property
+    def name(self) -> str:
+        """The name of the algorithm or metric."""
+        return self.path.partition(".")[0]
+
+    @property
+    def parts_of_path(self) -> list[str]:
+        """The names after it, which select the number."""
+        return self.path.split(".")[1:]
+
+    def start(self, run: MeasuredRun, gauge: Gauge) -> Any:
+        """Return the home; there is no value before the first update."""
+        return run.home
+
+    def measure(self, block: SignalBlock, gauge: Gauge) -> Trace:
+        """Return the latest value."""
+        return constant(gauge.now, block.first, block.end)
+
+
+class output(_Value):
+    """A number of an algorithm's newest output, which counts from the step after it.
+
+    `ltp.kitchen` is the probability of a room by `ltp`; `rtp.ana.kitchen` that for one user;
+    `mine.sightings` a named number of an output. Missing before the first output.
+    """
+
+    def check(self, scene: Scene) -> None:
+        """Refuse an unknown algorithm."""
+        scene.check_name("algorithm", self.name, scene.names["algorithms"], self)
+        if "." not in self.path:
+            raise ScenarioError(
+                f'{self}: select a number of the output, such as output("{self.path}.kitchen")'
+            )
+
+    def learn(
+        self, outputs: Mapping[str, Any], results: Mapping[str, Callable[[], Any]], gauge: Gauge
+    ) -> None:
+        """Read the number from a new output of the algorithm."""
+        if self.name in outputs:
+            gauge.now = self._read(outputs[self.name], gauge.memory)
+
+    def _read(self, value: Any, home: Home) -> float:
+        """Return the number of an output.
+
+        Raises:
+            ScenarioError: There is no such number in the output, or there are several.
+        """
+        types = [room.type for room in home.rooms]
+        names = {room.type: room.name for room in home.rooms if types.count(room.type) == 1}
+        columns = to_columns(value, [room.name for room in home.rooms], f"algorithms.{self.name}")
+        keep = np.ones(len(next(iter(columns.values()))), np.bool_)
+        words = {n: c for n, c in columns.items() if c.dtype.kind == "O"}
+        number = next((n for n, c in columns.items() if c.dtype.kind in "fiub"), None)
+        for part in self.parts_of_path:
+            if part in columns and part not in words:
+                number = part
+                continue
+            matches = [
+                np.isin(column.astype(str), [part, names.get(part, part)])
+                for column in words.values()
+            ]
+            rows = np.any(matches, axis=0) if matches else np.zeros_like(keep)
+            if not rows.any():
+                known = [*columns, *dict.fromkeys(w for c in words.values() for w in c.tolist())]
+                raise ScenarioError(f"{self}: there is no {part!r} in it{suggest(part, known)}")
+            keep &= rows
+        if keep.sum() != 1 or number is None:
+            how = (
+                f"select one by: {', '.join(words)}" if words else "they have no names to select by"
+            )
+            raise ScenarioError(f"{self} matches {keep.sum()} rows; {how}")
+        return float(columns[number][keep][0])
+
+
+def probability(algorithm: str, room: str, user: str | None = None) -> output:
+    """Return an algorithm's probability of a room, for a user if it has one for each."""
+    return output(".".join(part for part in (algorithm, user, room) if part))
+
+
+WORDS["probability"] = probability
+
+
+class metric(_Value):
+    """A number of a metric's result so far, by the names in its result.
+
+    It changes when the metric is updated; at the last step it is the result of the whole run.
+    Missing before the first update.
+    """
+
+    def check(self, scene: Scene) -> None:
+        """Refuse an unknown metric."""
+        scene.check_name("metric", self.name, scene.names["metrics"], self)
+
+    def learn(
+        self, outputs: Mapping[str, Any], results: Mapping[str, Callable[[], Any]], gauge: Gauge
+    ) -> None:
+        """Read the number from a new result of the metric."""
+        if self.name in results:
+            gauge.now = self._read(results[self.name]())
+
+    def finish(self, results: Mapping[str, Any], gauge: Gauge) -> None:
+        """Read the number from the result of the whole run."""
+        if self.name in results:
+            gauge.replace_last(self._read(results[self.name]))
+
+    def _read(self, result: Any) -> float:
+        """Return the number of a result; NaN while the result is empty.
+
+        Raises:
+            ScenarioError: The path leads to no number.
+        """
+        for part in self.parts_of_path:
+            if not isinstance(result, Mapping) or part not in result:
+                if isinstance(result, Mapping) and not result:
+                    return float("nan")
+                known = list(result) if isinstance(result, Mapping) else []
+                raise ScenarioError(f"{self}: there is no {part!r} in it{suggest(part, known)}")
+            result = result[part]
+        if isinstance(result, bool | int | float):
+            return float(result)
+        if isinstance(result, Mapping) and not result:
+            return float("nan")
+        keys = ", ".join(result) if isinstance(result, Mapping) else repr(result)
+        raise ScenarioError(f"{self} is not a number: extend it by one of {keys}")
