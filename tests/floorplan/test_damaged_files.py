@@ -19,8 +19,8 @@ from tests.thorough import examples
 
 from fleet2d.configuration.components import components, lookup
 from fleet2d.errors import FloorPlanError
-from fleet2d.floorplan.formats.drawing import read_image
-from fleet2d.floorplan.formats.ros import read_ros
+from fleet2d.floorplan.formats.drawing import Image
+from fleet2d.floorplan.formats.ros import Ros
 from fleet2d.floorplan.load import load_floorplan
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.source import FloorPlanSource
@@ -74,6 +74,14 @@ def png(width: int, height: int, rows: bytes) -> bytes:
 
 
 every_format = pytest.mark.parametrize("kind", FORMATS)
+
+
+def read_ros(path: Path) -> FloorPlan:
+    return Ros.model_construct(path=path).load()
+
+
+def read_image(path: Path, resolution: float) -> FloorPlan:
+    return Image.model_construct(path=path, resolution=resolution).load()
 
 
 def refusal(read: Callable[..., object], path: Path, *arguments: Any) -> str:

@@ -61,11 +61,7 @@ def load_floorplan(
         return read_bundled(str(plan), usual)
     seed = SYNTHETIC.fullmatch(str(plan))
     if seed is not None:
-        home = lookup("floorplan", "synthetic").model_validate(
-            {"seed": int(seed[1]), "cell": usual}
-        )
-        assert isinstance(home, FloorPlanSource)
-        return home.load()
+        return _load_by("synthetic", seed=int(seed[1]), cell=usual)
     if not path.exists() and path.suffix == "" and path.name == str(plan):
         raise FloorPlanError(
             f"there is no floor plan file {str(plan)!r}, and no bundled home of that name"
@@ -85,8 +81,13 @@ def _load_document(path: Path, cell: float | None) -> FloorPlan:
         raise _unknown_format(path)
     if kind == "native":
         return native_plan(content, path, DEFAULT_CELL_M if cell is None else cell)
-    settings: dict[str, Any] = {"path": path} if cell is None else {"path": path, "cell": cell}
-    source = lookup("floorplan", kind).model_construct(**settings)
+    return _load_by(kind, path=path, cell=cell)
+
+
+def _load_by(kind: str, **settings: Any) -> FloorPlan:
+    """Read a floor plan by its type and settings; those that are None have their defaults."""
+    own = {key: value for key, value in settings.items() if value is not None}
+    source = lookup("floorplan", kind).model_construct(**own)
     assert isinstance(source, FloorPlanSource)
     return source.load()
 
@@ -214,9 +215,7 @@ def _load_image(path: Path, resolution: float | None, cell: float | None) -> Flo
             f" robot, such as {path.with_suffix('.yaml').name}; of a drawing, give the metres per"
             " pixel as resolution"
         )
-    from fleet2d.floorplan.formats.drawing import read_image
-
-    return read_image(path, resolution, cell)
+    return _load_by("image", path=path, resolution=resolution, cell=cell)
 
 
 _NUMBER = r"[-+.\deE]+"

@@ -24,7 +24,6 @@ from fleet2d.floorplan.plan import Cache, FloorPlan
 from fleet2d.floorplan.rooms.doorways import DoorLine, doorway_segments, name_doorways
 from fleet2d.floorplan.rooms.room import (
     LabelledRegion,
-    Region,
     Room,
     cells_in,
     make_rooms,
@@ -94,7 +93,9 @@ def correct_rooms(plan: FloorPlan, corrections: Sequence[RoomCorrection]) -> Flo
         if correction.polygon is not None:
             painted = _draw(plan, painted, correction, len(regions), where)
             types = (usual_type(correction.type),) if correction.type else ()
-            regions.append(Region(types, Polygon(), correction.name, None if types else "room"))
+            regions.append(
+                LabelledRegion(types, Polygon(), correction.name, None if types else "room")
+            )
         else:
             index = _region_at(plan, painted, correction, where)
             regions[index] = _rename(regions[index], correction)
@@ -124,18 +125,18 @@ def _make_valid(shape: Polygon | MultiPolygon) -> MultiPolygon:
     return MultiPolygon([part for part in parts if part.geom_type == "Polygon"])
 
 
-def _as_region(room: Room) -> Region:
-    return Region(room.labels, Polygon(), room.name, room.type)
+def _as_region(room: Room) -> LabelledRegion:
+    return LabelledRegion(room.labels, Polygon(), room.name, room.type)
 
 
-def _rename(region: Region, correction: RoomCorrection) -> Region:
+def _rename(region: LabelledRegion, correction: RoomCorrection) -> LabelledRegion:
     """Return a region with another name or type; a name of type and number follows the type."""
     if correction.type is None:
         return replace(region, name=correction.name)
     kind = usual_type(correction.type)
-    is_numbered = region.name is not None and region.name.rpartition("_")[0] == region.type
-    name = correction.name or (None if is_numbered and kind != region.type else region.name)
-    return Region((kind,), region.shape, name, kind)
+    is_numbered = region.name is not None and region.name.rpartition("_")[0] == region.main_type
+    name = correction.name or (None if is_numbered and kind != region.main_type else region.name)
+    return LabelledRegion((kind,), region.shape, name, kind)
 
 
 def _region_at(plan: FloorPlan, painted: I64, correction: RoomCorrection, where: str) -> int:

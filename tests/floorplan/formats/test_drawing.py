@@ -8,7 +8,7 @@ from pydantic import ValidationError
 
 from fleet2d.configuration.components import lookup
 from fleet2d.errors import FloorPlanError
-from fleet2d.floorplan.formats.drawing import Image, read_image
+from fleet2d.floorplan.formats.drawing import Image
 from fleet2d.floorplan.load import load_floorplan
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.kernels import U8
@@ -20,6 +20,12 @@ HOME[10:70, 10:110] = WALL
 HOME[14:66, 14:58] = PAPER  # 52 x 44 pixels
 HOME[14:66, 62:106] = PAPER  # as large
 HOME[34:46, 58:62] = PAPER  # a door between them
+
+
+def read_image(
+    path: Path, resolution: float, cell: float | None = None, **settings: Any
+) -> FloorPlan:
+    return Image.model_construct(path=path, resolution=resolution, cell=cell, **settings).load()
 
 
 def draw(folder: Path, pixels: U8 = HOME) -> Path:

@@ -9,7 +9,7 @@ from pydantic import ValidationError
 
 from fleet2d.configuration.components import lookup
 from fleet2d.errors import FloorPlanError
-from fleet2d.floorplan.formats.geojson import GeoJson, geojson_document, read_geojson
+from fleet2d.floorplan.formats.geojson import GeoJson, geojson_document
 from fleet2d.floorplan.load import load_floorplan, save_floorplan
 from fleet2d.floorplan.plan import FloorPlan
 
@@ -60,6 +60,10 @@ SAMPLE: tuple[str, dict[str, Any]] = ("flat.geojson", {
         },
     ],
 })  # fmt: skip
+
+
+def read_geojson(path: Path, **settings: Any) -> FloorPlan:
+    return GeoJson.model_construct(path=path, **settings).load()
 
 
 def box(x0: float, y0: float, x1: float, y1: float) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from pydantic import ValidationError
 import fleet2d
 from fleet2d.configuration.components import lookup
 from fleet2d.errors import FloorPlanError
-from fleet2d.floorplan.formats.ros import Ros, read_ros
+from fleet2d.floorplan.formats.ros import Ros
 from fleet2d.floorplan.load import load_floorplan
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.space import Space
@@ -36,6 +36,10 @@ SAMPLE: tuple[str, dict[str, Any]] = (
         "mode": "trinary",
     },
 )
+
+
+def read_ros(path: Path, cell: float | None = None, **settings: Any) -> FloorPlan:
+    return Ros.model_construct(path=path, cell=cell, **settings).load()
 
 
 def pgm(pixels: U8) -> bytes:

@@ -1,7 +1,6 @@
 """Floor plans drawn as a picture: dark walls on light ground, at a known scale."""
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,20 +11,15 @@ from fleet2d.configuration.units import InputPath, PositiveLength, Share
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.formats.files import in_file
 from fleet2d.floorplan.formats.occupancy import (
-    RAY_WIDTH_M,
-    SPECK_AREA_M2,
     GreyPicture,
     OccupancyMap,
     OccupancySource,
-    free_space,
     read_grey,
 )
 from fleet2d.floorplan.lattice import MAX_CELL_M, MIN_CELL_M
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.kernels import Bool
 from fleet2d.kernels.space import label_parts
-
-THRESHOLD = 0.5
 
 
 @register("floorplan", "image")
@@ -40,7 +34,7 @@ class Image(OccupancySource):
 
     path: InputPath
     resolution: PositiveLength = Field(le=MAX_CELL_M)
-    threshold: Share = THRESHOLD
+    threshold: Share = 0.5
 
     @classmethod
     def usual_cell(cls, settings: Mapping[str, Any]) -> float:
@@ -49,57 +43,27 @@ class Image(OccupancySource):
         return max(side, MIN_CELL_M)
 
     def load(self) -> FloorPlan:
-        """Read the drawing."""
-        return read_image(
-            self.path, self.resolution, self.cell, threshold=self.threshold, **self.cleaning
-        )
+        """Read the drawing.
 
+        Light pixels that are connected to the edge of the picture are outside, and so are pixels
+        that aren't opaque. Of the rest, the largest connected part is the home, as in the map of a
+        robot. The lower left corner of the picture is the origin.
 
-def read_image(
-    path: Path,
-    resolution: float,
-    cell: float | None = None,
-    *,
-    threshold: float = THRESHOLD,
-    speck_area_m2: float = SPECK_AREA_M2,
-    ray_width: float = RAY_WIDTH_M,
-) -> FloorPlan:
-    """Read a floor plan that is drawn as dark walls on light ground.
-
-    Light pixels that are connected to the edge of the picture are outside, and so are pixels that
-    aren't opaque. Of the rest, the largest connected part is the home, as in the map of a robot.
-
-    Args:
-        path: The picture, PNG or PGM.
-        resolution: Side of a pixel [m]. The lower left corner of the picture is the origin.
-        cell: Side of a grid cell [m]; None for the side of a pixel.
-        threshold: Share of white below which a pixel is wall.
-        speck_area_m2: Groups of dark pixels smaller than this become free [m²]; see `free_space`.
-        ray_width: Free space narrower than this doesn't lead on [m]; see `free_space`.
-
-    Raises:
-        FloorPlanError: It can't be read, or no light space is enclosed by dark walls.
-    """
-    picture = read_grey(path)
-    with in_file(path):
-        if not 0 < resolution <= MAX_CELL_M:
-            raise FloorPlanError(
-                f"resolution is {resolution:g} m per pixel: above 0 and at most {MAX_CELL_M:g} m is"
-                " expected"
-            )
-        light = _light(picture, threshold)
-        inside = _inside(light)
-        raw = OccupancyMap(inside[::-1], ~light[::-1], resolution)
-        free, notes = free_space(raw, speck_area_m2=speck_area_m2, ray_width=ray_width)
-        return FloorPlan.build(
-            path.stem,
-            free,
-            cell=max(resolution, MIN_CELL_M) if cell is None else cell,
-            doorways=None,
-            regions_are="none",
-            source=f"drawing, {path.name}",
-            notes=notes,
-        )
+        Raises:
+            FloorPlanError: It can't be read, or no light space is enclosed by dark walls.
+        """
+        picture = read_grey(self.path)
+        with in_file(self.path):
+            if not 0 < self.resolution <= MAX_CELL_M:
+                raise FloorPlanError(
+                    f"resolution is {self.resolution:g} m per pixel: above 0 and at most"
+                    f" {MAX_CELL_M:g} m is expected"
+                )
+            light = _light(picture, self.threshold)
+            raw = OccupancyMap(_inside(light)[::-1], ~light[::-1], self.resolution)
+            notes: list[str] = []
+            free = self.free_space(raw, notes)
+            return self.build(free, self.resolution, f"drawing, {self.path.name}", notes)
 
 
 def _light(picture: GreyPicture, threshold: float) -> Bool:

@@ -8,7 +8,6 @@ import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -361,7 +360,6 @@ def _shift(bounds: F64, notes: list[str]) -> Move:
     return lambda xy: np.round(xy - corner, 6)
 
 
-WALL_M = 0.1
 # Distance of the entrance from a door that leads outside, and how far an entrance may be moved.
 INSIDE_M, ENTRANCE_REACH_M = 0.3, 1.0
 # Side of an object that is drawn as a point.
@@ -402,49 +400,30 @@ class GeoJson(FloorPlanSource):
 
     path: InputPath
     units: Units = "auto"
-    wall_m: Length = Field(default=WALL_M, ge=0, le=1)
+    wall_m: Length = Field(default=0.1, ge=0, le=1)
     level: str | None = Field(default=None, coerce_numbers_to_str=True)
 
     def load(self) -> FloorPlan:
-        """Read the plan."""
-        return read_geojson(
-            self.path, self.cell, units=self.units, wall_m=self.wall_m, level=self.level
-        )
+        """Read the plan.
 
+        Free space is the areas of kind `free` or, if there are none, the rooms, without the walls.
+        A file with neither free areas nor walls gets walls where rooms touch. Doors lead through
+        walls.
 
-def read_geojson(
-    path: Path,
-    cell: float = 0.05,
-    *,
-    units: Units = "auto",
-    wall_m: float = WALL_M,
-    level: str | None = None,
-) -> FloorPlan:
-    """Read a GeoJSON floor plan.
-
-    Free space is the areas of kind `free` or, if there are none, the rooms, without the walls. A
-    file with neither free areas nor walls gets walls where rooms touch. Doors lead through walls.
-
-    Args:
-        path: The GeoJSON file, a FeatureCollection.
-        cell: Side of a grid cell [m].
-        units: Units of the coordinates; auto determines them by the file's member `units`, else
-            by its extent.
-        wall_m: Thickness of walls that are drawn as lines, and of those where rooms touch [m].
-        level: The floor, by its id, name or ordinal; None for the one of ordinal 0.
-
-    Raises:
-        FloorPlanError: The file can't be read, isn't such a plan, or has no free space.
-    """
-    content = read_json(path)
-    with in_file(path):
-        notes: list[str] = []
-        raw = read_features(content, level, notes)
-        features, move = in_metres(raw, content, units, notes)
-        name = content.get("name")
-        return _Draft(features, move, wall_m, notes).plan(
-            name if isinstance(name, str) and name else path.stem, cell, path.name
-        )
+        Raises:
+            FloorPlanError: The file can't be read, isn't such a plan, or has no free space.
+        """
+        content = read_json(self.path)
+        with in_file(self.path):
+            notes: list[str] = []
+            raw = read_features(content, self.level, notes)
+            features, move = in_metres(raw, content, self.units, notes)
+            name = content.get("name")
+            return _Draft(features, move, self.wall_m, notes).plan(
+                name if isinstance(name, str) and name else self.path.stem,
+                self.cell,
+                self.path.name,
+            )
 
 
 @dataclass
@@ -665,7 +644,7 @@ def _parts(shape: BaseGeometry) -> list[Polygon]:
 
 
 def geojson_document(plan: FloorPlan) -> dict[str, Any]:
-    """Return a plan as a GeoJSON FeatureCollection, in metres; `read_geojson` reads it."""
+    """Return a plan as a GeoJSON FeatureCollection, in metres; `GeoJson` reads it."""
     to_metres = plan.lattice.to_metres
     features = [_feature(shapely.transform(p, to_metres), "free") for p in plan.polygons]
     for room in plan.rooms:

@@ -17,8 +17,10 @@ from pydantic import Field
 from shapely import Polygon
 
 from fleet2d.bounds import PICTURE_BYTES, PIXELS, read_bytes
-from fleet2d.configuration.units import Length
+from fleet2d.configuration.units import InputPath, Length
 from fleet2d.errors import FloorPlanError
+from fleet2d.floorplan.lattice import MIN_CELL_M
+from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.source import PixelSource
 from fleet2d.kernels import F64, Bool
 from fleet2d.kernels.space import count_steps, label_parts, squared_distance, trace_rings
@@ -201,8 +203,6 @@ def _check_rows(content: bytes) -> None:
         raise FloorPlanError(f"holds {rows} rows, but its header says {height}: it is cut off")
 
 
-SPECK_AREA_M2 = 0.02
-RAY_WIDTH_M = 0.3
 # Tolerance of decimal lengths in pixels: 0.3 m are six pixels of 0.05 m, and not 5.999….
 TINY = 1e-9
 
@@ -215,15 +215,31 @@ class OccupancySource(PixelSource):
             of a chair or lettering, become free; 0 keeps all.
         ray_width: Free space narrower than this doesn't lead on: it cuts off rays through windows
             and gaps in walls; 0 keeps all that is connected.
+        path: The file.
     """
 
-    speck_area_m2: float = Field(default=SPECK_AREA_M2, ge=0)
-    ray_width: Length = Field(default=RAY_WIDTH_M, ge=0)
+    speck_area_m2: float = Field(default=0.02, ge=0)
+    ray_width: Length = Field(default=0.3, ge=0)
 
-    @property
-    def cleaning(self) -> dict[str, float]:
-        """The settings of `free_space`, by parameter."""
-        return {"speck_area_m2": self.speck_area_m2, "ray_width": self.ray_width}
+    path: InputPath
+
+    def free_space(self, raw: "OccupancyMap", notes: list[str]) -> Polygon:
+        """Return the home in a map [m], and add a note for each change; see `free_space`."""
+        free, changes = free_space(raw, speck_area_m2=self.speck_area_m2, ray_width=self.ray_width)
+        notes += changes
+        return free
+
+    def build(self, free: Polygon, pixel: float, source: str, notes: list[str]) -> FloorPlan:
+        """Return the floor plan of free space [m] whose rooms and doorways the walls determine."""
+        return FloorPlan.build(
+            self.path.stem,
+            free,
+            cell=max(pixel, MIN_CELL_M) if self.cell is None else self.cell,
+            source=source,
+            doorways=None,
+            regions_are="none",
+            notes=notes,
+        )
 
 
 @dataclass(frozen=True)

@@ -16,12 +16,9 @@ from fleet2d.configuration.units import InputPath, Length
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.formats.files import MAX_COORDINATE_M, in_file, read_yaml, shown_value
 from fleet2d.floorplan.formats.occupancy import (
-    RAY_WIDTH_M,
-    SPECK_AREA_M2,
     GreyPicture,
     OccupancyMap,
     OccupancySource,
-    free_space,
     read_grey,
 )
 from fleet2d.floorplan.lattice import MAX_CELL_M, MIN_CELL_M
@@ -56,7 +53,7 @@ class Ros(OccupancySource):
     @classmethod
     def usual_cell(cls, settings: Mapping[str, Any]) -> float:
         """Return the map's resolution."""
-        return _settings(read_yaml(settings["path"])).usual_cell
+        return max(_settings(read_yaml(settings["path"])).resolution, MIN_CELL_M)
 
     def files(self) -> list[Path]:
         """Return the YAML file and the image."""
@@ -64,48 +61,19 @@ class Ros(OccupancySource):
         return [self.path, _image_file(settings.image, self.path)[0]]
 
     def load(self) -> FloorPlan:
-        """Read the map."""
-        return read_ros(self.path, self.cell, simplify=self.simplify, **self.cleaning)
+        """Read the map.
 
-
-def read_ros(
-    path: Path,
-    cell: float | None = None,
-    *,
-    speck_area_m2: float = SPECK_AREA_M2,
-    ray_width: float = RAY_WIDTH_M,
-    simplify: float = 0.0,
-) -> FloorPlan:
-    """Read a map of the ROS map_server.
-
-    Args:
-        path: The YAML file.
-        cell: Side of a grid cell [m]; None for the map's resolution.
-        speck_area_m2: Groups of pixels smaller than this become free [m²]; see `free_space`.
-        ray_width: Free space narrower than this doesn't lead on [m]; see `free_space`.
-        simplify: How far straightened walls may be from the sides of the pixels [m].
-
-    Raises:
-        FloorPlanError: A file can't be read, isn't such a map, or has no free space.
-    """
-    content = read_yaml(path)
-    with in_file(path):
-        settings = _settings(content)
-        file, notes = _image_file(settings.image, path)
-        raw = _occupancy(settings, read_grey(file), notes)
-        free, done = free_space(raw, speck_area_m2=speck_area_m2, ray_width=ray_width)
-        notes += done
-        if simplify > 0:
-            free = _simplify(free, simplify, notes)
-        return FloorPlan.build(
-            path.stem,
-            free,
-            cell=settings.usual_cell if cell is None else cell,
-            source=f"ROS map, {path.name}",
-            doorways=None,
-            regions_are="none",
-            notes=notes,
-        )
+        Raises:
+            FloorPlanError: A file can't be read, isn't such a map, or has no free space.
+        """
+        content = read_yaml(self.path)
+        with in_file(self.path):
+            settings = _settings(content)
+            file, notes = _image_file(settings.image, self.path)
+            free = self.free_space(_occupancy(settings, read_grey(file), notes), notes)
+            if self.simplify > 0:
+                free = _simplify(free, self.simplify, notes)
+            return self.build(free, settings.resolution, f"ROS map, {self.path.name}", notes)
 
 
 # --- The YAML file -----------------------------------------------------------------------------
@@ -122,10 +90,6 @@ class _MapSettings:
     occupied_thresh: float
     free_thresh: float
     raw: bool
-
-    @property
-    def usual_cell(self) -> float:
-        return max(self.resolution, MIN_CELL_M)
 
 
 def _settings(content: dict[str, Any]) -> _MapSettings:

@@ -20,7 +20,6 @@ from fleet2d.floorplan.rooms.room import (
     NO_ROOM,
     LabelledRegion,
     Patch,
-    Region,
     Room,
     assign_rooms,
     cells_in,
@@ -454,7 +453,7 @@ def label_rooms(
     for rest in range(first, first + labels.rests):
         is_small = sizes[rest - first] * lattice.cell**2 <= HALLWAY_MAX_M2
         is_hallway = is_small and len(neighbors.get(rest, ())) >= HALLWAY_ROOMS
-        merged.append(Region((), Polygon(), own_type=HALLWAY if is_hallway else None))
+        merged.append(LabelledRegion((), Polygon(), type=HALLWAY if is_hallway else None))
     room_of_cell, rooms = make_rooms(lattice, painted, merged)
     notes += [
         f"{room.name} is a guess: no label covers its {room.area_m2:.1f} m2, which lead to"
@@ -465,7 +464,7 @@ def label_rooms(
     return room_of_cell, rooms, notes
 
 
-def _merge_labels(regions: list[Region], into: Mapping[int, int]) -> list[str]:
+def _merge_labels(regions: list[LabelledRegion], into: Mapping[int, int]) -> list[str]:
     """Add the labels of regions to those that cover them; return a sentence for each."""
     notes = []
     for box, other in into.items():
@@ -473,7 +472,7 @@ def _merge_labels(regions: list[Region], into: Mapping[int, int]) -> list[str]:
             other = into[other]
         if other != box:
             types = tuple(dict.fromkeys(regions[other].types + regions[box].types))
-            regions[other] = replace(regions[other], types=types)
+            regions[other] = replace(regions[other], labels=types)
             names, all_names = (" and ".join(regions[k].types) for k in (box, other))
             notes.append(f"a region {names} lies under smaller ones: it is one room, {all_names}")
     return notes
@@ -491,7 +490,7 @@ def number_rooms(lattice: Lattice, room_of_cell: I64) -> tuple[I16, tuple[Room, 
     """
     count = int(room_of_cell.max()) + 1
     kind = ROOM if count > 1 else None
-    regions = [Region((), Polygon(), own_type=kind) for _ in range(count)]
+    regions = [LabelledRegion((), Polygon(), type=kind) for _ in range(count)]
     return (*make_rooms(lattice, room_of_cell, regions), [])
 
 

@@ -1,9 +1,11 @@
 """Rooms: their types, the regions that a file labels, and the cells of which each consists."""
 
+import json
 import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import shapely
@@ -18,94 +20,17 @@ from fleet2d.kernels.space import label_frames, label_parts, squared_distance
 
 UNKNOWN = "unknown"
 
-# HouseExpo's 25 categories, as `room_type` spells them. The order decides the type of a room with
-# several labels: living spaces come first, special types before general ones (a child's room is a
-# bedroom), and catch-alls last.
-PRIORITY = (
-    "kitchen",
-    "child_room",
-    "guest_room",
-    "bedroom",
-    "living_room",
-    "bathroom",
-    "dining_room",
-    "office",
-    "toilet",
-    "laundry",
-    "gym",
-    "garage",
-    "boiler_room",
-    "wardrobe",
-    "storage",
-    "entryway",
-    "lobby",
-    "hallway",
-    "hall",
-    "balcony",
-    "loggia",
-    "terrace",
-    "passenger_elevator",
-    "freight_elevator",
-    "aeration",
+ALSO_CALLED: dict[str, list[str]] = json.loads(
+    Path(__file__).with_name("types.json").read_text(encoding="utf-8")
 )
+"""The types of rooms, HouseExpo's 25 categories, each with its other names, as people and apps use
+them in English, German, French, Spanish, Italian and Dutch."""
+PRIORITY = tuple(ALSO_CALLED)
+"""The types of rooms in the order that decides the type of a room with several labels: living
+spaces come first, special types before general ones (a child's room is a bedroom), and catch-alls
+last."""
 _LAST = ("room", UNKNOWN)
-
-ALSO_CALLED = {
-    "kitchen": ("kitchenette", "küche", "cuisine", "cocina", "cucina", "keuken"),
-    "child_room": (
-        *("children_s_room", "kids_room", "nursery", "kinderzimmer", "chambre_d_enfant"),
-        *("cuarto_de_niños", "cameretta", "kinderkamer"),
-    ),
-    "guest_room": ("gästezimmer", "chambre_d_amis", "habitación_de_invitados", "logeerkamer"),
-    "bedroom": (
-        *("schlafzimmer", "chambre", "dormitorio", "habitación", "camera", "camera_da_letto"),
-        "slaapkamer",
-    ),
-    "living_room": (
-        *("lounge", "family_room", "wohnzimmer", "salon", "séjour", "salón", "sala_de_estar"),
-        *("soggiorno", "salotto", "woonkamer"),
-    ),
-    "bathroom": (
-        *("bath", "bad", "badezimmer", "salle_de_bain", "salle_de_bains", "baño"),
-        *("cuarto_de_baño", "bagno", "badkamer"),
-    ),
-    "dining_room": (
-        *("dining_area", "esszimmer", "essbereich", "salle_à_manger", "comedor"),
-        *("sala_da_pranzo", "eetkamer"),
-    ),
-    "office": (
-        *("study", "home_office", "büro", "arbeitszimmer", "bureau", "oficina", "despacho"),
-        *("ufficio", "kantoor", "werkkamer"),
-    ),
-    "toilet": ("wc", "restroom", "gäste_wc", "toilette", "toilettes", "aseo", "gabinetto"),
-    "laundry": (
-        *("laundry_room", "utility_room", "waschküche", "buanderie", "lavadero", "lavanderia"),
-        "wasruimte",
-    ),
-    "gym": ("fitness_room", "fitnessraum"),
-    "garage": ("car_port", "carport", "garaje", "box_auto"),
-    "boiler_room": ("heizungsraum", "chaufferie"),
-    "wardrobe": (
-        *("closet", "walk_in_closet", "cloakroom", "dressing", "ankleide", "garderobe"),
-        *("vestidor", "cabina_armadio", "inloopkast"),
-    ),
-    "storage": (
-        *("storage_room", "pantry", "abstellraum", "vorratskammer", "cellier", "débarras"),
-        *("trastero", "despensa", "ripostiglio", "berging"),
-    ),
-    "entryway": ("entrance", "entry", "foyer", "eingang", "entrée", "entrada", "ingresso"),
-    "hallway": (
-        *("corridor", "flur", "diele", "couloir", "pasillo", "corridoio", "gang"),
-        "overloop",
-    ),
-    "balcony": ("balkon", "balcon", "balcón", "balcone"),
-    "terrace": ("patio", "deck", "terrasse", "terraza", "terrazza", "terras"),
-}
-"""Other names of room types, as people and apps use them, in English, German, French, Spanish,
-Italian and Dutch."""
-_TYPE_OF = {kind: kind for kind in PRIORITY} | {
-    name: kind for kind, names in ALSO_CALLED.items() for name in names
-}
+_TYPE_OF = {name: kind for kind, names in ALSO_CALLED.items() for name in (kind, *names)}
 
 
 def room_type(label: str) -> str:
@@ -176,7 +101,8 @@ class LabelledRegion:
 
     Attributes:
         labels: Its labels, as spelled in the file; none for a region of unknown use.
-        shape: Its outline [m]; it may reach over walls and over other regions.
+        shape: Its outline [m], or [lattice] once it is snapped; it may reach over walls and over
+            other regions. Empty for one that is only cells.
         name: Name of the room, or None to be numbered by type (`bedroom_0`).
         type: Type of the room, or None for the one of its labels that leads.
     """
@@ -191,27 +117,10 @@ class LabelledRegion:
         """The labels as room types, each once."""
         return tuple(dict.fromkeys(room_type(label) for label in self.labels))
 
-
-@dataclass(frozen=True)
-class Region:
-    """A region on the lattice, with the regions of the same shape merged into it.
-
-    Attributes:
-        types: Its labels as room types, each once.
-        shape: Its outline [lattice], even coordinates; empty for one that is only cells.
-        name: Name of the room, or None to be numbered by type.
-        own_type: Type of the room, or None for the one of its types that leads.
-    """
-
-    types: tuple[str, ...]
-    shape: Polygon | MultiPolygon
-    name: str | None = None
-    own_type: str | None = None
-
     @property
-    def type(self) -> str:
+    def main_type(self) -> str:
         """The type of the room."""
-        return self.own_type or leading_type(self.types)
+        return self.type or leading_type(self.types)
 
 
 @dataclass(frozen=True)
@@ -242,12 +151,12 @@ class Patch:
         return np.concatenate([first + low, first + high])
 
 
-def snap_regions(lattice: Lattice, regions: Sequence[LabelledRegion]) -> list[Region]:
+def snap_regions(lattice: Lattice, regions: Sequence[LabelledRegion]) -> list[LabelledRegion]:
     """Return the regions on the lattice; regions of equal shape become one, with all labels."""
     return _merge_equal([_snap(lattice, region) for region in regions])
 
 
-def paint_regions(free: Bool, regions: list[Region]) -> I64:
+def paint_regions(free: Bool, regions: list[LabelledRegion]) -> I64:
     """Return the index of the region of each cell, int64 (rows, columns).
 
     The smallest region wins. Free cells outside all regions have `len(regions)`, others -1.
@@ -295,14 +204,14 @@ def cells_in(free: Bool, shape: Polygon | MultiPolygon) -> Patch:
     return Patch(window, _inside(free[window], window, shape))
 
 
-def _snap(lattice: Lattice, region: LabelledRegion) -> Region:
+def _snap(lattice: Lattice, region: LabelledRegion) -> LabelledRegion:
     shape = shapely.transform(region.shape, lambda xy: lattice.to_walls(xy).astype(np.float64))
-    return Region(region.types, shapely.normalize(shape), region.name, region.type)
+    return LabelledRegion(region.types, shapely.normalize(shape), region.name, region.type)
 
 
-def _merge_equal(regions: list[Region]) -> list[Region]:
+def _merge_equal(regions: list[LabelledRegion]) -> list[LabelledRegion]:
     """Join regions of exactly the same shape, at the place of the first."""
-    by_shape: dict[bytes, Region] = {}
+    by_shape: dict[bytes, LabelledRegion] = {}
     for region in regions:
         key = shapely.to_wkb(region.shape)
         first = by_shape.get(key)
@@ -310,8 +219,8 @@ def _merge_equal(regions: list[Region]) -> list[Region]:
             by_shape[key] = region
             continue
         types = tuple(dict.fromkeys(first.types + region.types))
-        by_shape[key] = Region(
-            types, first.shape, first.name or region.name, first.own_type or region.own_type
+        by_shape[key] = LabelledRegion(
+            types, first.shape, first.name or region.name, first.type or region.type
         )
     return list(by_shape.values())
 
@@ -373,7 +282,7 @@ def assign_rooms(
     notes = [dropped_note(lattice, merged[k]) for k in range(len(merged)) if counts[k] == 0]
     if counts[-1]:
         notes += _gap_notes(lattice, painted, len(merged))
-        merged = [*merged, Region((), Polygon())]
+        merged = [*merged, LabelledRegion((), Polygon())]
     room_of_cell, rooms = make_rooms(lattice, painted, merged)
     return room_of_cell, rooms, notes
 
@@ -383,7 +292,7 @@ def _gap_notes(lattice: Lattice, painted: I64, regions: int) -> list[str]:
 
     Args:
         lattice: The plan's lattice.
-        painted: Region of each cell, `regions` for free cells of none, -1 where not free.
+        painted: LabelledRegion of each cell, `regions` for free cells of none, -1 where not free.
         regions: Number of regions.
     """
     part = label_parts(painted == regions, False)
@@ -409,13 +318,13 @@ def _gap_notes(lattice: Lattice, painted: I64, regions: int) -> list[str]:
 
 
 def make_rooms(
-    lattice: Lattice, painted: I64, merged: Sequence[Region]
+    lattice: Lattice, painted: I64, merged: Sequence[LabelledRegion]
 ) -> tuple[I16, tuple[Room, ...]]:
     """Return the rooms of the regions that have cells, and the room of each cell.
 
     Args:
         lattice: The plan's lattice.
-        painted: Region of each cell, -1 where not free, (rows, columns).
+        painted: LabelledRegion of each cell, -1 where not free, (rows, columns).
         merged: The regions.
     """
     counts = np.bincount(painted[painted != NO_ROOM], minlength=len(merged))
@@ -428,7 +337,7 @@ def make_rooms(
     index_of[with_cells] = np.arange(len(with_cells))
     room_of_cell = index_of[painted]
     regions = [merged[k] for k in with_cells]
-    names = number_names([r.name for r in regions], [r.type for r in regions], "room")
+    names = number_names([r.name for r in regions], [r.main_type for r in regions], "room")
     frames = label_frames(room_of_cell.astype(np.int32), len(with_cells))
     rooms = tuple(
         _room(lattice, room_of_cell, frames[i], i, names[i], region)
@@ -443,7 +352,7 @@ def _room(
     frame: I64,
     index: int,
     name: str,
-    region: Region,
+    region: LabelledRegion,
 ) -> Room:
     row0, column0, row1, column1 = frame.tolist()
     inside = room_of_cell[row0:row1, column0:column1] == index
@@ -457,7 +366,7 @@ def _room(
     return Room(
         index=index,
         name=name,
-        type=region.type,
+        type=region.main_type,
         labels=region.types,
         cells=cells,
         area_m2=cells * lattice.cell**2,
@@ -468,7 +377,7 @@ def _room(
 
 def dropped_note(
     lattice: Lattice,
-    region: Region,
+    region: LabelledRegion,
     reason: str = "has no free cell that isn't in a smaller room: it is not a room",
 ) -> str:
     """Return the sentence which says that a region is not a room, and why."""
