@@ -118,6 +118,7 @@ def matching_rooms(
     rooms: Sequence[Room],
     reachable: Sequence[Room],
     objects: Sequence[PlacedObject] = (),
+    never_in: RoomChoice = (),
 ) -> tuple[str, list[Room]]:
     """Return the first name that matches a reachable room, and all reachable rooms it matches.
 
@@ -126,13 +127,15 @@ def matching_rooms(
         rooms: All rooms of the home.
         reachable: The rooms that the body can get to.
         objects: Furniture, which a place may name as well; only for the message.
+        never_in: Rooms and kinds of rooms that 'any' leaves out, as long as there are others.
 
     Raises:
         PlacementError: No name matches a reachable room; the message lists the rooms.
     """
     for name in names:
         if name == ANY:
-            return ANY, list(reachable)
+            others = [r for r in reachable if r.name not in never_in and r.type not in never_in]
+            return ANY, others or list(reachable)
         matches = [room for room in reachable if name in (room.name, room.type)]
         if matches:
             return name, matches

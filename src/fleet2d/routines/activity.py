@@ -136,11 +136,28 @@ AnyDurationDistribution = Annotated[DurationDistribution, SchemaForms("text", "n
 """A distribution of durations, in any form."""
 
 
+# Kinds of rooms in which people do nothing unless an activity names them.
+NOT_LIVED_IN = (
+    "bathroom",
+    "toilet",
+    "laundry",
+    "garage",
+    "boiler_room",
+    "wardrobe",
+    "storage",
+    "passenger_elevator",
+    "freight_elevator",
+    "aeration",
+)
+
+
 class Activity(Settings):
     """Something that people do: where, how, how long, and how much they move meanwhile.
 
     Attributes:
         rooms: Rooms or kinds of rooms to try, in turn.
+        never_in: Rooms or kinds of rooms that `any` leaves out; by default those that nobody lives
+            in, like bathrooms and storage rooms. In a home with no others it is done there.
         objects: Kinds of furniture to use, tried in turn; none: a spot in the room.
         posture: Posture if there is no such furniture.
         away: Whether it is done out of the home.
@@ -158,6 +175,7 @@ class Activity(Settings):
     """
 
     rooms: tuple[str, ...] = ("any",)
+    never_in: tuple[str, ...] = NOT_LIVED_IN
     objects: tuple[str, ...] = ()
     posture: Literal["stand", "sit", "lie"] = "stand"
     away: bool = False

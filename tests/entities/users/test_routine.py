@@ -355,3 +355,21 @@ def test_what_is_done_behind_a_door_is_done_again_once_it_is_unlocked() -> None:
     assert work["time"].dt.hour.min() >= 11
     blocked = events[events["event"] == "way_blocked"]
     assert blocked["time"].dt.hour.max() < 11
+
+
+def test_people_without_a_household_are_told_once_that_they_share_seats() -> None:
+    """Two users of one flat stood on one place for 140 minutes a day, without a word."""
+    users = {name: {"type": "routine"} for name in ("ana", "ben", "cleo")}
+    notes = told_of_households(scenario("1 h", users=users))
+    assert notes == {
+        "ben": "household: none, and ana has none either: they may use the same seat or spot at the"
+        " same time. People who live together have, in place of a persona, household: {members:"
+        " {ana: works_outside, ben: works_outside}}"
+    }
+    assert told_of_households(family("1 h")) == {}
+
+
+def told_of_households(content: dict[str, Any]) -> dict[str, str]:
+    """What each user is told of households."""
+    actors = Simulation(content).actors
+    return {name: n for name, actor in actors.items() for n in actor.notes if "household" in n}

@@ -621,9 +621,9 @@ class ResidentBehavior(Behavior):
         if activity.away:
             return Venue(activity, [], [], [], (), None)
         rooms = (
-            self._own_rooms(actor, activity.rooms)
+            self._own_rooms(actor, activity.rooms, activity.never_in)
             if activity.choose == "own"
-            else self._all_rooms(actor, activity.rooms)
+            else self._all_rooms(actor, activity.rooms, activity.never_in)
         )
         small_moves = [
             (kind, max(1, seconds(mean)))
@@ -634,34 +634,40 @@ class ResidentBehavior(Behavior):
             activity,
             rooms,
             self.spots.at_furniture(activity.objects, rooms, activity.posture),
-            self._own_rooms(actor, activity.fetches_from) if activity.fetches else [],
+            self._own_rooms(actor, activity.fetches_from, activity.never_in)
+            if activity.fetches
+            else [],
             tuple(small_moves),
             activity.fetch_takes.table() if activity.fetches else None,
         )
 
     def _bed(self, actor: "Actor", sleep: Activity, sleeps_in: int, side: tuple[int, int]) -> Venue:
         """Return the venue of sleep for a member of a household, whose bed it may share."""
-        rooms = _match(actor, sleep.rooms)[1]
+        rooms = _match(actor, sleep.rooms, sleep.never_in)[1]
         room = rooms[sleeps_in % len(rooms)]
         seats = self.spots.at_furniture(sleep.objects, [room], sleep.posture, side)
         return self._venue(actor, sleep)._replace(rooms=[room], seats=seats)
 
-    def _all_rooms(self, actor: "Actor", names: "RoomChoice") -> list["Room"]:
+    def _all_rooms(
+        self, actor: "Actor", names: "RoomChoice", never_in: "RoomChoice"
+    ) -> list["Room"]:
         """Return the reachable rooms of all kinds that a list names."""
         rooms = [r for name in names for r in self.reachable_rooms if name in (r.name, r.type)]
-        return list(dict.fromkeys(rooms)) or _match(actor, names)[1]
+        return list(dict.fromkeys(rooms)) or _match(actor, names, never_in)[1]
 
-    def _own_rooms(self, actor: "Actor", names: "RoomChoice") -> list["Room"]:
+    def _own_rooms(
+        self, actor: "Actor", names: "RoomChoice", never_in: "RoomChoice"
+    ) -> list["Room"]:
         """Return the rooms of the first name that matches: of several of a kind, one for good."""
-        name, rooms = _match(actor, names)
+        name, rooms = _match(actor, names, never_in)
         if name == "any" or not rooms:
             return rooms
         return [Draws(actor.stream(f"room of {name}"), 0).choice(rooms)]
 
 
-def _match(actor: "Actor", names: "RoomChoice") -> tuple[str, list["Room"]]:
+def _match(actor: "Actor", names: "RoomChoice", never_in: "RoomChoice") -> tuple[str, list["Room"]]:
     try:
-        return matching_rooms(names, actor.home.rooms, actor.reachable_rooms())
+        return matching_rooms(names, actor.home.rooms, actor.reachable_rooms(), never_in=never_in)
     except PlacementError as error:
         if is_kind(actor, names):
             return "", []

@@ -234,9 +234,8 @@ class Seating:
         if activity.away or activity.exclusive or not is_shared:
             return (), 0
         household, member = self._lives.household, self._members[rank]
-        rooms = self._rooms(
-            rank, activity.rooms, household.bedrooms()[member] if name == SLEEP else None
-        )
+        bedroom = household.bedrooms()[member] if name == SLEEP else None
+        rooms = self._rooms(rank, activity, bedroom)
         share = household.side_of_bed(member) if name == SLEEP else (rank, self._count)
         indices = frozenset(room.index for room in rooms)
         seats = self._seats(activity, indices, self._count)
@@ -248,10 +247,15 @@ class Seating:
         seats = seats_at(self._home, activity.objects, rooms, activity.posture, wanted)
         return list({self._spot[seat]: seat for seat in reversed(seats)}.values())[::-1]
 
-    def _rooms(self, rank: int, names: tuple[str, ...], bedroom: int | None) -> "Sequence[Room]":
+    def _rooms(self, rank: int, activity: "Activity", bedroom: int | None) -> "Sequence[Room]":
         """Return the rooms of an activity, as `ResidentBehavior` chooses them for this member."""
         try:
-            name, rooms = matching_rooms(names, self._home.rooms, usual_rooms(self._home))
+            name, rooms = matching_rooms(
+                activity.rooms,
+                self._home.rooms,
+                usual_rooms(self._home),
+                never_in=activity.never_in,
+            )
         except PlacementError:  # then rest replaces the activity
             return ()
         if bedroom is not None:
@@ -340,6 +344,7 @@ class Routine(ResidentBehavior):
         spots, sleeps_in, side = Spots(actor), None, (0, 1)
         if self.household is None:
             self.life = Life(self.resolved_persona, actor.seed, actor.path)
+            self._note_strangers(actor)
         else:
             members = list(self.household.members)
             if actor.name not in members:
@@ -354,6 +359,22 @@ class Routine(ResidentBehavior):
             side = self.household.side_of_bed(actor.name)
         actor.speed *= self.resolved_persona.pace
         self.settle(actor, self._activities(), spots, sleeps_in, side)
+
+    def _note_strangers(self, actor: "Actor") -> None:
+        """Note, once per scenario, that people without a household may share a seat."""
+        others = [
+            name
+            for name, body in actor.people.items()
+            for behavior in getattr(body, "behaviors", ())
+            if body is not actor and isinstance(behavior, Routine) and behavior.household is None
+        ]
+        if len(others) == 1:
+            members = f"{others[0]}: works_outside, {actor.name}: works_outside"
+            actor.notes.append(
+                f"household: none, and {others[0]} has none either: they may use the same seat or"
+                " spot at the same time. People who live together have, in place of a persona,"
+                f" household: {{members: {{{members}}}}}"
+            )
 
     def _join_household(self, actor: "Actor") -> None:
         """Share the days and places of the members, or prepare them if it is the first of them."""
