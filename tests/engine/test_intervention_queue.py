@@ -1,7 +1,7 @@
 """Interventions: what is done to a run from outside, kept in its manifest and done again."""
 
 import copy
-from datetime import timedelta
+from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any
 
@@ -9,9 +9,17 @@ import pytest
 from tests.scenes import everything, scenario
 
 import fleet2d
-from fleet2d.engine.intervention_queue import OUTSIDE, DueIntervention, read_record
+from fleet2d.engine.intervention_queue import (
+    OUTSIDE,
+    SCRIPT,
+    DueIntervention,
+    Interventions,
+    PendingIntervention,
+    read_record,
+)
 from fleet2d.errors import InputError, PlacementError, ScenarioError
-from fleet2d.interventions.intervention import parse_intervention
+from fleet2d.interventions.intervention import Trigger, parse_intervention
+from fleet2d.runtime.clock import Clock
 from fleet2d.runtime.events import Event
 
 
@@ -215,3 +223,22 @@ def test_interventions_are_read_as_they_are_written() -> None:
     step, fields = read_record(content)
     act = parse_intervention(fields)
     assert content == DueIntervention(step, OUTSIDE, 0, act).record
+
+
+def test_a_lasting_intervention_lasts_its_time_after_each_event() -> None:
+    """The end of the first ended those that had begun meanwhile, too."""
+    interventions = Interventions(Clock(datetime(2026, 1, 5), 1_000_000, 3600))
+    dark = parse_intervention({"fault": "astro", "dark": True, "duration": "1 min"})
+    trigger = Trigger(event="user_seen")
+    interventions.waiting.append(
+        PendingIntervention(trigger, True, 0, 0, dark, SCRIPT, 0, "script.0")
+    )
+    for step in (9, 49):
+        interventions.take_events([Event(step, "astro", "user_seen", "ana")])
+
+    active = {}
+    for step in (10, 50, 69, 70, 109, 110):
+        list(interventions.take(step))
+        active[step] = len(interventions.lasting)
+
+    assert {10: 1, 50: 2, 69: 2, 70: 1, 109: 1, 110: 0} == active

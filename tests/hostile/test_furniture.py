@@ -30,17 +30,22 @@ KINDS = ("bedroom", "living_room", "kitchen", "bathroom", "office", "dining_room
 
 
 def parts_cut_off(empty: FloorPlan, plan: FloorPlan) -> list[tuple[float, float]]:
-    """Return radius and area [m²] of what furniture cuts off from the spaces of the empty home."""
+    """Return radius and area [m²] of what furniture cuts off from the spaces of the empty home.
+
+    Areas are those of the outlines between which bodies move: cells of 0.2 m measured 0.26 m² as
+    0.16 m², and cells of 0.05 m 0.24 m² as 0.26 m².
+    """
     cut = []
     for radius in RADII:
         try:
             before = Space(empty, radius)
         except FloorPlanError:
             continue  # no such body fits into the empty home
-        after = Home(plan).space(radius)
-        for part in range(before.parts):
-            rest = after.part_of_cell[(before.part_of_cell == part) & (after.part_of_cell >= 0)]
-            areas = np.sort(np.bincount(rest, minlength=1))[:-1] * plan.lattice.cell**2
+        after = np.array(Home(plan).space(radius).polygons)
+        inside = shapely.point_on_surface(after)
+        for part in before.polygons:
+            areas = np.sort(shapely.area(after[shapely.contains(part, inside)]))[:-1]
+            areas /= plan.lattice.units_per_m**2
             cut += [(radius, float(area)) for area in areas if area >= CUT_OFF_M2]
     return cut
 
@@ -115,15 +120,24 @@ def test_turned_homes_stay_connected(degrees: float, cell: float, shared_data: P
     assert furnished >= 3
 
 
-@pytest.mark.parametrize("number", some(range(40), 4))
-def test_slanted_rooms_stay_connected(number: int) -> None:
+def slanted_room(number: int, kind: str) -> FloorPlan:
     rng = np.random.default_rng(number)
     corners = rng.integers(4, 8)
     angle, away = np.sort(rng.uniform(0, 2 * np.pi, corners)), rng.uniform(2, 4.5, corners)
     room = Polygon(np.stack([away * np.cos(angle), away * np.sin(angle)], axis=1))
-    room = room if number % 2 else room.convex_hull
+    room = room if number % 2 and room.is_valid else room.convex_hull
+    return FloorPlan.build("slanted", room, [LabelledRegion((kind,), room.buffer(0.1))])
+
+
+def test_two_nooks_that_are_one_are_not_cut_off() -> None:
+    """Rounded against bodies they were two of less than 0.25 m²: exactly, one of 0.3 m²."""
+    check(slanted_room(14, "bedroom"))
+
+
+@pytest.mark.parametrize("number", some(range(40), 4))
+def test_slanted_rooms_stay_connected(number: int) -> None:
     for kind in some(sorted(RULES), 4):
-        plan = FloorPlan.build("slanted", room, [LabelledRegion((kind,), room.buffer(0.1))])
+        plan = slanted_room(number, kind)
         for seed in some(range(4), 4):
             check(plan, seed)
 

@@ -301,8 +301,11 @@ class Page:
                 self.frames += 1
 
 
-def test_ctrl_c_with_an_open_page_is_one_line_and_loses_nothing(tmp_path: Path) -> None:
-    """It printed the traceback of the server, and not where the run was."""
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_with_an_open_page_is_one_line_and_loses_nothing(
+    number: signal.Signals, tmp_path: Path
+) -> None:
+    """Ctrl-C printed the traceback of the server; SIGTERM ended it before the run was closed."""
     page = Page(tmp_path / "run")
     deadline = time.monotonic() + 20
     while True:  # until the server listens
@@ -319,7 +322,7 @@ def test_ctrl_c_with_an_open_page_is_one_line_and_loses_nothing(tmp_path: Path) 
     page.order("resume")
     while not page.frames:
         time.sleep(0.01)
-    page.process.send_signal(signal.SIGINT)
+    page.process.send_signal(number)
     _, errors = page.process.communicate(timeout=20)
     assert 130 == page.process.returncode
     (line,) = errors.splitlines()

@@ -3,6 +3,7 @@
 Each planted file leaves the file `ran` if its code runs.
 """
 
+import importlib
 import io
 import os
 import pickle
@@ -214,6 +215,43 @@ def test_checkpoint_imports_no_other_module_of_a_trusted_folder(folder: Path) ->
     finally:
         sys.path.remove(str(package))
         sys.modules.pop("pack", None)
+
+
+def test_checkpoint_names_only_classes_of_listed_files(folder: Path) -> None:
+    """A loaded module of another scenario, or of an installed package, was nameable unlisted."""
+    (folder / "other.py").write_text(OWN)
+    (folder / "parts.py").write_text("class Part:\n    pass\n")
+    (folder / "mine.py").write_text(f"from .parts import Part\n{OWN}")
+    package = folder / "installed" / "pack"
+    package.mkdir(parents=True)
+    (package / "__init__.py").write_text(f"from pack.used import Used\n{OWN}")
+    (package / "used.py").write_text("class Used:\n    pass\n")
+    (package / "unused.py").write_text(OWN)
+    sys.path.append(str(package.parent))
+    try:
+        importlib.import_module("pack.unused")
+        other: Any = import_class(f"{folder}/other:Own")
+        with restrict(Trust.of(["mine.py", "parts.py", package / "__init__.py"])):
+            scenario = load_scenario(
+                None, f"algorithms.a.type='{folder}/mine:Own'", "algorithms.b.type='pack:Own'"
+            )
+            top = other.__module__.partition(".")[0]
+            for module, name, is_nameable in (
+                (other.__module__, "Own", False),
+                ("other", "Own", False),
+                ("pack.unused", "Own", False),
+                ("mine", "Own", True),
+                (f"{top}.parts", "Part", True),
+                ("pack", "Own", True),
+                ("pack.used", "Used", True),
+            ):
+                expected = "holds no state" if is_nameable else "can't be part of a state"
+                with pytest.raises(ArtifactError, match=expected):
+                    read_state(io.BytesIO(Named(module, name).content()), {"scenario": scenario})
+    finally:
+        sys.path.remove(str(package.parent))
+        for name in ("pack", "pack.used", "pack.unused"):
+            sys.modules.pop(name, None)
 
 
 def test_command_line_runs_the_listed_source(tmp_path: Path) -> None:

@@ -19,6 +19,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from dataclasses import dataclass, field
+from functools import lru_cache
 from importlib.abc import MetaPathFinder
 from importlib.machinery import ModuleSpec, PathFinder, SourceFileLoader
 from pathlib import Path
@@ -274,7 +275,7 @@ def _source_of(folder: Path, name: str) -> Path | None:
     return next(filter(Path.is_file, candidates), None)
 
 
-def with_imports(files: Iterable[Path], folder: Path) -> list[Path]:
+def with_imports(files: Iterable[Path], folder: Path, within: Path | None = None) -> list[Path]:
     """Return files of modules, and the files in their folder that they import, each once.
 
     Imports are read from the text: nothing is run. An import by a computed name is not found.
@@ -282,6 +283,7 @@ def with_imports(files: Iterable[Path], folder: Path) -> list[Path]:
     Args:
         files: The files of the modules.
         folder: The folder in which imports are searched first.
+        within: The folder that holds the imported files that count; None: anywhere.
 
     Example:
         >>> import tempfile
@@ -294,7 +296,9 @@ def with_imports(files: Iterable[Path], folder: Path) -> list[Path]:
     known = dict.fromkeys(files)
     queue = list(known)
     while queue:
-        new = dict.fromkeys(_imports_of(queue.pop(), folder)).keys() - known.keys()
+        imported = _imports_of(queue.pop(), folder)
+        inside = (file for file in imported if within is None or file.is_relative_to(within))
+        new = dict.fromkeys(inside).keys() - known.keys()
         known |= dict.fromkeys(sorted(new))
         queue += sorted(new)
     return list(known)
@@ -569,6 +573,37 @@ def source_files(cls: type) -> list[Path]:
     with suppress(TypeError, OSError):  # a class of an interactive session
         source = inspect.getsourcefile(cls)
     return [Path(source)] if source and Path(source).is_file() else []
+
+
+def is_listed(module: str, classes: Iterable[type]) -> bool:
+    """Return whether a module is in a file that is shown to the user before it may run.
+
+    Those are the files that were named, and those of a scenario's own classes with the files beside
+    them, or in their installed package, that they import.
+
+    Args:
+        module: The name of a module; one that isn't loaded isn't listed.
+        classes: The classes of the scenario's components.
+    """
+    place = getattr(sys.modules.get(module), "__file__", None)
+    if place is None:
+        return False
+    file, trust = Path(place).resolve(), _TRUST.get()
+    if trust is not None and file in trust.files:
+        return True
+    return any(file in map(Path.resolve, _files_with_package(cls)) for cls in classes)
+
+
+@lru_cache
+def _files_with_package(cls: type) -> tuple[Path, ...]:
+    """Return the files of a class, and of the modules of its package that it imports."""
+    files = source_files(cls)
+    if is_scenario_module(cls.__module__) or cls in _BESIDE or not files:
+        return tuple(files)
+    parts = cls.__module__.split(".")
+    depth = len(parts) - (files[0].stem != "__init__")
+    package = files[0].parents[min(depth, len(files[0].parents) - 1)] / parts[0]
+    return tuple(with_imports(files, package.parent, package))
 
 
 def is_scenario_module(name: str) -> bool:

@@ -135,7 +135,10 @@ class InterventionQueue:
                 if due.ends:
                     self._forget(due.act)
                 else:
-                    self.lasting.append(due.act)
+                    # A copy: what happens at each event begins again before it has ended.
+                    act = due.act.model_copy()
+                    self.lasting.append(act)
+                    due = due._replace(act=act)
             yield due
             if due.ends:
                 continue

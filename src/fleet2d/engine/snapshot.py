@@ -14,11 +14,12 @@ import io
 import json
 import pickle
 import sys
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import dataclass, field
 from pathlib import Path
 from types import BuiltinFunctionType, FunctionType
-from typing import Any, BinaryIO, Literal
+from typing import Any, BinaryIO, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +27,12 @@ from numpy.typing import NDArray
 from fleet2d import __version__
 from fleet2d.artifacts.manifest import plain
 from fleet2d.artifacts.table import ColumnChunk
-from fleet2d.configuration.trust import is_scenario_module, public_name
+from fleet2d.configuration.trust import (
+    current_trust,
+    is_listed,
+    is_scenario_module,
+    public_name,
+)
 from fleet2d.engine.inputs import components_of
 from fleet2d.engine.state import State
 from fleet2d.entities.body import RandomWalk, Track
@@ -356,7 +362,7 @@ class _StateWriter(pickle.Pickler):
         self._shared = shared
         if shared is None:
             self.dispatch_table = REDUCERS
-        self._packages = {} if shared is not None else _packages_of(constants)
+        self._code = _OwnCode() if shared is not None else _OwnCode.of(constants)
         self._checked: set[int] = set()  # references to classes that are allowed, by id
 
     def persistent_id(self, obj: Any) -> object:
@@ -381,7 +387,7 @@ class _StateWriter(pickle.Pickler):
     def _check_reference(self, obj: Any) -> None:
         """Refuse a name that the reader would refuse."""
         module, name = obj.__module__ or "builtins", obj.__qualname__
-        if not may_refer(module, name, self._packages) and obj is not type(None):
+        if not may_refer(module, name, self._code) and obj is not type(None):
             raise ArtifactError(
                 f"the state of the run can't be written: it refers to {module}.{name}"
             )
@@ -393,7 +399,7 @@ class _StateReader(pickle.Unpickler):
     def __init__(self, file: BinaryIO, constants: Constants, shared: list[object] | None) -> None:
         super().__init__(file)
         self._constants, self._shared = constants, shared
-        self._packages = {} if shared is not None else _packages_of(constants)
+        self._code = _OwnCode() if shared is not None else _OwnCode.of(constants)
 
     def state(self) -> State:
         """Return the state."""
@@ -416,12 +422,12 @@ class _StateReader(pickle.Unpickler):
             return super().find_class(module, name)
         if not is_scenario_module(module):  # it may be one under another name in this process
             top, dot, rest = public_name(module).partition(".")
-            module = self._packages.get(top, top) + dot + rest
+            module = self._code.packages.get(top, top) + dot + rest
         is_other_store = module in _STORES and "store" in self._constants
         # A file imports nothing of the user's: the scenario has imported what was listed.
         is_ours = module.partition(".")[0] == "fleet2d" or name in _ALLOWED.get(module, ())
         is_missing = not is_ours and module not in sys.modules
-        if is_other_store or is_missing or not may_refer(module, name, self._packages):
+        if is_other_store or is_missing or not may_refer(module, name, self._code):
             raise ArtifactError(
                 f"the file refers to {module}.{name}, which can't be part of a state"
             )
@@ -439,13 +445,48 @@ class _StateReader(pickle.Unpickler):
         return value
 
 
-def may_refer(module: str, name: str, packages: Collection[str] = ()) -> bool:
+@dataclass(frozen=True)
+class _OwnCode:
+    """The code outside Fleet2D whose classes a state may hold.
+
+    Attributes:
+        packages: The packages that the scenario's components come from: the name of each in this
+            process by its public name, since it may be installed in one process, and come from the
+            folder of the scenario in another.
+        classes: The classes of the scenario's components; None: all classes of these packages and
+            of scenarios' folders, in which all code is the user's own.
+    """
+
+    packages: Mapping[str, str] = field(default_factory=dict)
+    classes: frozenset[type] | None = None
+
+    @classmethod
+    def of(cls, constants: Constants) -> Self:
+        """Return that of the scenario of a run."""
+        scenario = constants.get("scenario")
+        types = map(type, components_of(scenario)) if isinstance(scenario, Scenario) else ()
+        own = frozenset(kind for kind in types if not kind.__module__.startswith("fleet2d."))
+        packages = {}
+        for kind in own:
+            public = public_name(kind.__module__)
+            package = public.partition(".")[0]
+            packages[package] = kind.__module__.removesuffix(public) + package
+        return cls(packages, None if current_trust() is None else own)
+
+    def may_hold(self, module: str) -> bool:
+        """Whether the classes of a module that is no part of Fleet2D may be part of a state."""
+        if self.classes is not None:
+            return is_listed(module, self.classes)
+        return module.partition(".")[0] in self.packages or is_scenario_module(module)
+
+
+def may_refer(module: str, name: str, code: _OwnCode | None = None) -> bool:
     """Whether the file of a state may refer to a name.
 
     Args:
         module: The module of the name.
         name: The qualified name in that module.
-        packages: The packages of the scenario's own components.
+        code: The user's own code; None: there is none.
 
     Example:
         >>> may_refer("fleet2d.engine.state", "State"), may_refer("os", "system")
@@ -455,25 +496,6 @@ def may_refer(module: str, name: str, packages: Collection[str] = ()) -> bool:
         return True
     if f"{module}.".startswith(tuple(f"{package}." for package in _NO_STATE)):
         return False
-    top = module.partition(".")[0]
-    return top == "fleet2d" or top in packages or is_scenario_module(module)
-
-
-def _packages_of(constants: Constants) -> dict[str, str]:
-    """Return the packages outside Fleet2D that a scenario's components come from.
-
-    Returns:
-        The name of each in this process by its public name: in one process it may be installed, in
-        another it may come from the folder of the scenario.
-    """
-    scenario = constants.get("scenario")
-    if not isinstance(scenario, Scenario):
-        return {}
-    packages = {}
-    for component in components_of(scenario):
-        module = type(component).__module__
-        public = public_name(module)
-        package = public.partition(".")[0]
-        packages[package] = module.removesuffix(public) + package
-    packages.pop("fleet2d", None)
-    return packages
+    if module.partition(".")[0] == "fleet2d":
+        return True
+    return (_OwnCode() if code is None else code).may_hold(module)

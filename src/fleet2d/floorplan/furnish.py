@@ -82,6 +82,7 @@ def furnish(plan: FloorPlan, seed: int = 0, density: float = 1.0) -> FloorPlan:
             _furnish_room(interior, room, seed, density, kinds)
     if all(thing.type != "charger" for thing in plan.objects):
         _place_charger(interior, seed)
+    interior.remove_obstructions()
     return replace(plan, objects=number_objects(interior.objects))
 
 

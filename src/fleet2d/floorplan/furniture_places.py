@@ -1,8 +1,11 @@
 """A home while furniture is put into it: places for pieces, and the routes that must stay open."""
 
 import math
+from bisect import bisect_left
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cache
+from itertools import chain
 
 import numpy as np
 import shapely
@@ -320,6 +323,8 @@ THIN_RADIUS = 0.1
 """The radius of the thinnest body whose routes furniture leaves open [m]."""
 NARROW_RADII = (0.225, 0.2, 0.175, 0.15, 0.125)
 """Radii between those two, which matter in homes with passages that not every body fits through."""
+RADII = (BODY_RADIUS, *NARROW_RADII, THIN_RADIUS)
+"""All of them: the bodies for which the finished home is checked [m]."""
 CUT_OFF_M2 = 0.25
 """Furniture may cut off less than this of a body's space, such as a corner behind a bed [m²]."""
 
@@ -333,12 +338,14 @@ class Interior:
     Attributes:
         plan: The home.
         objects: The objects in it, those of the plan first.
+        groups: The furniture that was put into it, group by group.
         standing: Cells where the middle of a body can be, bool (rows, columns).
     """
 
     def __init__(self, plan: FloorPlan) -> None:
         self.plan = plan
         self.objects: list[PlacedObject] = []
+        self.groups: list[list[PlacedObject]] = []
         space = Space(plan, BODY_RADIUS)
         self.standing: Bool = space.part_of_cell >= 0
         self.whole = whole_cells(plan)
@@ -347,7 +354,7 @@ class Interior:
         self._views: dict[int, RoomView] = {}
         self._main: dict[int, Bool] = {}
         self._approached = np.zeros_like(self.whole)
-        self._spaces = _body_spaces(plan, space)
+        self._empty = self._spaces = _body_spaces(plan, space.polygons)
         for thing in plan.objects:
             window, covered = grown_cells(plan.lattice, thing.footprint, 0.0)
             self.occupied[window] |= covered
@@ -384,6 +391,34 @@ class Interior:
             self._views[room.index] = RoomView(self.plan, room, self.whole, self.doors)
         return self._views[room.index]
 
+    def remove_obstructions(self) -> None:
+        """Remove the groups that cut a space in two, by the geometry in which bodies move.
+
+        While groups are placed, spaces are cut out of each other, rounded against bodies: two small
+        pieces of floor may in fact be connected, and too large to be cut off together.
+        """
+        plan, fixed = self.plan, len(self.plan.objects)
+
+        @cache
+        def before(radius: float) -> list[Polygon]:
+            return self._empty.get(radius) or _exact_space(plan, plan.objects, radius)
+
+        def is_open(count: int) -> bool:
+            things = [*plan.objects, *chain.from_iterable(self.groups[:count])]
+            for radius in RADII:
+                large = _large(plan, _exact_space(plan, things, radius))
+                if len(large) > 1:
+                    inside = shapely.point_on_surface(large)
+                    if any(shapely.contains(part, inside).sum() > 1 for part in before(radius)):
+                        return False
+            return True
+
+        while not is_open(len(self.groups)):
+            # The more furniture, the less is connected: find the first group too many.
+            first = bisect_left(range(1, len(self.groups) + 1), True, key=lambda n: not is_open(n))
+            del self.groups[first]
+        self.objects = [*self.objects[:fixed], *chain.from_iterable(self.groups)]
+
     def _add(self, view: RoomView, things: list[PlacedObject]) -> bool:
         """Add objects if they stand in free space, are usable and cut no route; return whether."""
         for thing in things:
@@ -405,6 +440,7 @@ class Interior:
             self.standing[view.window] = before
             return False
         self._spaces = spaces
+        self.groups.append(usable)
         for thing in usable:
             self._record(thing)
         return True
@@ -485,25 +521,28 @@ class Interior:
                 self._approached[row, column] = bool(self.standing[row, column])
 
 
-def _body_spaces(plan: FloorPlan, space: Space) -> BodySpaces:
+def _body_spaces(plan: FloorPlan, widest: list[Polygon]) -> BodySpaces:
     """Return the spaces of bodies among the walls and objects of a plan.
 
     Args:
         plan: The plan.
-        space: The space of a body of `BODY_RADIUS` between its walls.
+        widest: The space of a body of `BODY_RADIUS` between its walls.
     """
-
-    def among_objects(radius: float) -> list[Polygon]:
-        polygons = space.polygons
-        if radius != BODY_RADIUS:
-            polygons = shrink(plan.polygons, radius * plan.lattice.units_per_m)
-        blocked = _blocked(plan, plan.objects, radius)
-        return [piece for polygon in polygons for piece in _pieces(polygon, blocked)]
-
-    spaces = {radius: among_objects(radius) for radius in (BODY_RADIUS, THIN_RADIUS)}
+    thin = _exact_space(plan, plan.objects, THIN_RADIUS)
+    if plan.objects:
+        widest = _exact_space(plan, plan.objects, BODY_RADIUS)
+    spaces = {BODY_RADIUS: widest, THIN_RADIUS: thin}
     if _has_narrow_places(plan, spaces):
-        spaces |= {radius: among_objects(radius) for radius in NARROW_RADII}
+        spaces |= {radius: _exact_space(plan, plan.objects, radius) for radius in NARROW_RADII}
     return spaces
+
+
+def _exact_space(plan: FloorPlan, things: Iterable[PlacedObject], radius: float) -> list[Polygon]:
+    """Return the space of a body among objects, exactly as `Space` computes it [lattice]."""
+    reach = radius * plan.lattice.units_per_m
+    solid = [lattice_footprint(plan, thing) for thing in things if thing.blocks != "nothing"]
+    blocked = [grow_shape(shapely.get_coordinates(shape), reach) for shape in solid]
+    return shrink(plan.polygons, reach, blocked)
 
 
 def _has_narrow_places(plan: FloorPlan, spaces: BodySpaces) -> bool:
@@ -593,8 +632,10 @@ def door_cells(plan: FloorPlan, standing: Bool) -> Bool:
     reach, beside = count_cells(cell, DOOR_CLEARANCE), count_cells(cell, 2 * BODY_RADIUS)
     cells = np.zeros_like(plan.free)
     for turn in range(4):
-        rooms, can_stand = np.rot90(plan.room_of_cell, turn), np.rot90(standing, turn)
-        free, zone = np.rot90(plan.free, turn), np.rot90(cells, turn)
+        rooms = np.ascontiguousarray(np.rot90(plan.room_of_cell, turn))
+        can_stand = np.ascontiguousarray(np.rot90(standing, turn))
+        free = np.ascontiguousarray(np.rot90(plan.free, turn))
+        zone = np.zeros_like(free)
         border = np.zeros_like(free)
         border[1:] = free[1:] & free[:-1] & (rooms[1:] != rooms[:-1])
         crossed = border.copy()
@@ -607,6 +648,7 @@ def door_cells(plan: FloorPlan, standing: Bool) -> Bool:
             zone |= seeds
             seeds[1:] = seeds[:-1] & free[1:]
             seeds[0] = False
+        cells |= np.rot90(zone, -turn)
     if plan.entrance is not None:
         xs, ys = plan.lattice.centre_axes()
         x, y = plan.lattice.point_at(plan.entrance)

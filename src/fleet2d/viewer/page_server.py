@@ -2,6 +2,7 @@
 
 import asyncio
 import secrets
+import signal
 import socket
 import threading
 import webbrowser
@@ -21,7 +22,7 @@ from starlette.routing import Route
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from fleet2d import __version__
-from fleet2d.errors import ArtifactError, Fleet2DError, InputError, extra
+from fleet2d.errors import ArtifactError, Fleet2DError, InputError, end_by_signal, extra
 from fleet2d.runs.run import open_run
 from fleet2d.viewer.contract import Problem, SessionFacts
 from fleet2d.viewer.page_data import PageData, compact_json
@@ -341,12 +342,17 @@ class PageServer:
         self._server = _Server(config, live)
 
     def show(self, *, open_browser: bool, announce: Callable[[str], None]) -> None:
-        """Announce the address of the page, open a browser if requested, serve until Ctrl-C."""
+        """Announce the address, open a browser if requested, serve until Ctrl-C or SIGTERM."""
         announce(self.address)
         if open_browser:
             webbrowser.open(self.address)
-        with suppress(KeyboardInterrupt):
-            self.run()
+        # The server raises a signal again when it has ended: whoever called it still has to close.
+        before = signal.signal(signal.SIGTERM, end_by_signal)
+        try:
+            with suppress(KeyboardInterrupt):
+                self.run()
+        finally:
+            signal.signal(signal.SIGTERM, before)
 
     def run(self) -> None:
         """Serve until Ctrl-C."""
