@@ -13,7 +13,7 @@ from fleet2d.engine.intervention_queue import (
     OUTSIDE,
     SCRIPT,
     DueIntervention,
-    Interventions,
+    InterventionQueue,
     PendingIntervention,
     read_record,
 )
@@ -227,7 +227,7 @@ def test_interventions_are_read_as_they_are_written() -> None:
 
 def test_a_lasting_intervention_lasts_its_time_after_each_event() -> None:
     """The end of the first ended those that had begun meanwhile, too."""
-    interventions = Interventions(Clock(datetime(2026, 1, 5), 1_000_000, 3600))
+    interventions = InterventionQueue(Clock(datetime(2026, 1, 5), 1_000_000, 3600))
     dark = parse_intervention({"fault": "astro", "dark": True, "duration": "1 min"})
     trigger = Trigger(event="user_seen")
     interventions.waiting.append(
