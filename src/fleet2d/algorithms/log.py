@@ -228,6 +228,7 @@ class Log:
         self.patches: Patches | None = None  # the patches of evidence
         self._rooms = NearestRooms(home.plan)
         self._nearest_patches: NearestRooms | None = None
+        self.untracked: frozenset[str] = frozenset()  # users whose place may be unknown
         # For robots with `localization`: the believed poses from the true ones.
         self.beliefs: dict[str, Callable[[Window], Window]] = {}
         self._poses: dict[tuple[str, int, int, bool], BodyPoses] = {}

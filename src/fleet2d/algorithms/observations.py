@@ -249,7 +249,8 @@ class Observations:
 class Truth(NamedTuple):
     """The truth, row by row of the observations; for metrics only.
 
-    For a false positive, `user` is NOBODY, and the other columns mean nothing.
+    For a false positive, `user` is NOBODY; for an observation of a real robot, of which nobody
+    knows the truth, UNKNOWN_TRUTH. The other columns mean nothing then.
     """
 
     user: I32

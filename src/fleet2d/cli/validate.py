@@ -48,7 +48,7 @@ def validate(
         f" ({plan.area_m2:.1f} m2, {len(plan.rooms)} rooms),"
         f" {settings.steps} steps of {settings.step_us / 1e6:g} s from {settings.start}"
     )
-    for note in plan.notes:
+    for note in simulation.notes:
         typer.echo(f"note: {note}")
     for actor in simulation.actors.values():
         for note in actor.notes:

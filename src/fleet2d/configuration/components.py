@@ -203,6 +203,7 @@ PACKAGES = {
     "floorplan": "fleet2d.floorplan",
     "behavior": "fleet2d.entities",
     "drive": "fleet2d.entities.drives",
+    "evidence_source": "fleet2d.entities.evidence",
     "object": "fleet2d.entities.objects",
     "algorithm": "fleet2d.algorithms",
     "presence_estimator": "fleet2d.algorithms.presence",

@@ -7,13 +7,13 @@ that are written in Python.
 import math
 from collections.abc import Iterator, Sequence, Set
 from fractions import Fraction
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
 from fleet2d.algorithms.observations import ActivitySense
 from fleet2d.configuration.units import micros
-from fleet2d.engine.bodies import Basis, Bodies, Watcher, poses_of
+from fleet2d.engine.bodies import Bodies, Watcher, poses_of
 from fleet2d.engine.sighting_errors import sight_events
 from fleet2d.entities.behavior import Actor, SightEvent
 from fleet2d.entities.equipment import Drift, Localization
@@ -105,7 +105,12 @@ class Cameras(Watcher):
             somebody unknown.
         awaited: Events that algorithms wait for: they end a span, too.
         next_step: The first step at which it has not looked.
+        knows_truth: Whether the truth behind its sightings is known.
+        notes: What is to be said about its source.
     """
+
+    knows_truth: ClassVar[bool] = True
+    notes: tuple[str, ...] = ()
 
     def __init__(
         self,
@@ -142,7 +147,7 @@ class Cameras(Watcher):
         self.perceived = np.zeros((len(self.others) + 1, 2), np.int64)
         self.awaited: Set[str] = frozenset()
         self._sightings: list[I64] = []  # not collected yet
-        self._ahead: _Look | None = None
+        self._ahead: Look | None = None
 
     def expect_disturbances(self) -> None:
         """Let observations be stored beside the truth, because interventions will disturb them."""
@@ -325,7 +330,7 @@ class Cameras(Watcher):
             return blocks[0]
         return np.concatenate(blocks) if blocks else NOTHING
 
-    def _look(self, bodies: Bodies, end: int, *, stop: bool = True) -> "_Look":
+    def _look(self, bodies: Bodies, end: int, *, stop: bool = True) -> "Look":
         may_redo = stop or self.sighting_errors is not None
         old_memory = [array.copy() for array in self.memory] if may_redo else []
         stop_lost, stop_seen = self.ends if stop else (False, False)
@@ -366,7 +371,7 @@ class Cameras(Watcher):
                 patience, stops = self.rule.patience, {USER_LOST: stop_lost, USER_SEEN: stop_seen}
                 events = sight_events(sightings, self.memory, patience, self.next_step, looked)
                 end = next((step + 1 for step, _, kind in events if stops[kind]), looked)
-        return _Look(looked, end, sightings, events, old_memory)
+        return Look(looked, end, sightings, events, old_memory)
 
 
 def _drift_of(owner: Actor) -> Drift | None:
@@ -378,7 +383,7 @@ def _drift_of(owner: Actor) -> Drift | None:
     return Drift(settings, lattice.units_per_m, clock.step_us, owner.seed, owner.path)
 
 
-class _Look(NamedTuple):
+class Look(NamedTuple):
     """The result of a look up to step `looked` - 1, and the memory before it.
 
     The span ends at `end`, which is earlier if an error changed who was seen when.
@@ -389,26 +394,6 @@ class _Look(NamedTuple):
     sightings: I64
     events: list[tuple[int, int, int]]
     old_memory: list[I64]
-
-
-def open_cameras(basis: Basis) -> tuple[list[Cameras], list[Cameras]]:
-    """Return the cameras of users and those of robots; none without both users and robots."""
-    actors, users = basis.actors, basis.bodies.users
-    if not 0 < users < len(actors):
-        return [], []
-    home, sight = basis.home, basis.scenario.sight
-    method, radii = sight.method.model_copy(), None
-    with blame("sight.method", None):
-        method.start(home)
-    if sight.people_occlude:
-        units = home.plan.lattice.units_per_m
-        radii = np.array([max(round(actor.entity.radius * units), 1) for actor in actors], np.int64)
-    cameras = [
-        Cameras(row, actors, users, method, radii)
-        for row, actor in enumerate(actors)
-        if actor.entity.eyes
-    ]
-    return [c for c in cameras if c.row < users], [c for c in cameras if c.row >= users]
 
 
 # Interventions

@@ -30,6 +30,7 @@ from fleet2d.engine.trajectories import (
 )
 from fleet2d.floorplan.placed_objects import POSTURES
 from fleet2d.kernels import I8, I32, I64
+from fleet2d.kernels.sight import NOBODY, UNKNOWN_TRUTH
 from fleet2d.runtime.events import HOME, RANKS, Event, EventKind
 
 
@@ -66,7 +67,7 @@ def table_specs(
         )
         specs.append(TableSpec("key_frames", columns))
     if settings.observations and users and robots:
-        specs.append(_observation_table(users, robots, room, camera_names(cameras), activities))
+        specs.append(_observation_table(users, robots, room, cameras, activities))
     if settings.events:
         event, detail = Column("event", "category"), Column("detail", "string")
         user = Column("user", "category", nullable=True, categories=users)
@@ -98,10 +99,11 @@ def _observation_table(
     users: Sequence[str],
     robots: Sequence[str],
     room: Column,
-    cameras: Sequence[str],
+    groups: Sequence[Cameras],
     activities: bool,
 ) -> TableSpec:
     """Return the table of what was perceived, with the truth if that can differ."""
+    cameras = camera_names(groups)
     robot = Column("robot", "category", categories=tuple(robots))
     user = Column("user", "category", nullable=bool(cameras), categories=tuple(users))
     columns = [STEP, TIME, robot, user, X, Y, room]
@@ -113,6 +115,9 @@ def _observation_table(
         }
         camera = Column("camera", "category", categories=tuple(cameras))
         columns += [HEADING, posture, camera, *true.values()]
+    if not all(group.knows_truth for group in groups):
+        text = "whether it is known who was there: not for what real robots perceived"
+        columns.append(Column("truth_known", "bool", description=text))
     if activities:
         text = "what the user does, if a behavior says so"
         for name in ("activity", "true_activity"):
@@ -175,6 +180,7 @@ class Recorder:
         self._sensors, self._readings = sensors, list[SensorRow]()
         self._rooms = NearestRooms(basis.home.plan)
         self._camera_codes = _codes_of(cameras)
+        self._has_unknown_truth = not all(group.knows_truth for group in cameras)
         self._count = 0  # observations and readings
         self._most = max(MAX_ROWS, ROWS_PER_BODY * len(basis.actors))
         self.wall_s = 0.0
@@ -264,12 +270,14 @@ class Recorder:
                 "heading": o.heading,
                 "posture": o.posture.astype(np.int32),
                 "camera": self._cameras(o.robot, o.camera),
-                "true_user": t.user,
+                "true_user": np.where(is_user, t.user, np.int32(NOBODY)),
                 "true_x": np.where(is_user, t.x, np.nan),
                 "true_y": np.where(is_user, t.y, np.nan),
                 "true_heading": np.where(is_user, t.heading, np.nan),
                 "true_posture": np.where(is_user, t.posture, -1).astype(np.int32),
             }
+            if self._has_unknown_truth:
+                columns["truth_known"] = t.user != UNKNOWN_TRUTH
             if self.activities.are_perceived:
                 columns |= {"activity": o.activity.tolist(), "true_activity": t.activity.tolist()}
         self.store.append("observations", **columns)

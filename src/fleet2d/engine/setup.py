@@ -3,11 +3,13 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+import numpy as np
+
 from fleet2d.algorithms.log import Log
 from fleet2d.artifacts.store import RunStore
 from fleet2d.configuration.problems import suggest
 from fleet2d.engine.bodies import Basis, Bodies
-from fleet2d.engine.cameras import Cameras, open_cameras
+from fleet2d.engine.cameras import Cameras
 from fleet2d.engine.change_queue import ChangeQueue
 from fleet2d.engine.collisions import BlockedWays, Clearance
 from fleet2d.engine.encounters import Encounters
@@ -21,12 +23,14 @@ from fleet2d.engine.state import InView, State
 from fleet2d.engine.world import schedule_script
 from fleet2d.entities.decisions import DecidingActor
 from fleet2d.entities.objects.door import Door
-from fleet2d.errors import ComponentError, PlacementError, ScenarioError
+from fleet2d.errors import ComponentError, PlacementError, ScenarioError, blame
 from fleet2d.floorplan.home import Home
 from fleet2d.interventions.intervention import causes_errors
+from fleet2d.kernels import I64
 from fleet2d.runtime.clock import Clock
 from fleet2d.runtime.events import EventKind, EventStream
 from fleet2d.scenario.model import Scenario
+from fleet2d.sight.fov import FieldOfView
 
 
 def set_up(scenario: Scenario, clock: Clock, seed: int, store: RunStore) -> State:
@@ -36,7 +40,7 @@ def set_up(scenario: Scenario, clock: Clock, seed: int, store: RunStore) -> Stat
         InputError: The floor plan or a place in the scenario is wrong, or a name is unknown.
     """
     basis = _basis(scenario, clock, seed, store)
-    user_cameras, cameras = open_cameras(basis)
+    user_cameras, cameras = _open_cameras(basis)
     _check_reads(scenario, basis.actors)
     for group in cameras:
         if any(causes_errors(entry.act, group.owner.name) for entry in scenario.script):
@@ -99,6 +103,45 @@ def set_up(scenario: Scenario, clock: Clock, seed: int, store: RunStore) -> Stat
         with _locate_errors(scenario, f"expect.{name}"):
             state.expect(scenario, name, expectation, 0)
     return state
+
+
+def _open_cameras(basis: Basis) -> tuple[list[Cameras], list[Cameras]]:
+    """Return the cameras of users and those of robots; none without both users and robots."""
+    actors, users = basis.actors, basis.bodies.users
+    real = [actor for actor in actors if getattr(actor.entity, "perceives", None)]
+    if real and not users:
+        raise ScenarioError(
+            f"{real[0].path}.perceives: there are no users to be perceived: add those of the log,"
+            " like users: {ana: {type: unknown}} if nobody recorded where they were"
+        )
+    if not 0 < users < len(actors):
+        return [], []
+    home, sight = basis.home, basis.scenario.sight
+    method, radii = sight.method.model_copy(), None
+    with blame("sight.method", None):
+        method.start(home)
+    if sight.people_occlude:
+        units = home.plan.lattice.units_per_m
+        radii = np.array([max(round(actor.entity.radius * units), 1) for actor in actors], np.int64)
+    cameras = [
+        _cameras_of(row, basis, method, radii)
+        for row, actor in enumerate(actors)
+        if actor.entity.eyes
+    ]
+    return [c for c in cameras if c.row < users], [c for c in cameras if c.row >= users]
+
+
+def _cameras_of(row: int, basis: Basis, method: FieldOfView, radii: I64 | None) -> Cameras:
+    """Return the cameras of one body, or what it perceives in place of their view."""
+    actors, users = basis.actors, basis.bodies.users
+    source = getattr(actors[row].entity, "perceives", None)
+    if source is None:
+        return Cameras(row, actors, users, method, radii)
+    from fleet2d.engine.real_sight import RealSight  # few runs need it
+
+    sight = RealSight(row, actors, users)
+    sight.prepare(source)
+    return sight
 
 
 def _basis(scenario: Scenario, clock: Clock, seed: int, store: RunStore) -> Basis:
@@ -182,5 +225,10 @@ def _log(basis: Basis, cameras: list[Cameras], recorder: Recorder) -> Log:
     names = [actor.name for actor in basis.actors]
     log = Log(basis.home, basis.clock, names, basis.bodies, recorder.activities)
     log.cameras = [(group.index, name) for group in cameras for name in group.names]
+    log.untracked = frozenset(
+        actor.name
+        for actor in basis.users
+        if any(EventKind.UNKNOWN in behavior.records for behavior in actor.behaviors)
+    )
     log.beliefs = {c.owner.name: c.drift.believed for c in cameras if c.drift is not None}
     return log

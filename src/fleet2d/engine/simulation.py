@@ -206,6 +206,12 @@ class Simulation(InterventionMethods):
         return self._state.home
 
     @property
+    def notes(self) -> list[str]:
+        """What is odd in the floor plan, or to be said about what robots perceive."""
+        sources = (f"{c.owner.path}: {note}" for c in self._state.cameras for note in c.notes)
+        return [*self.home.plan.notes, *sources]
+
+    @property
     def time(self) -> datetime:
         """The local time of the next step."""
         return self.clock.time(self.step)
@@ -743,7 +749,7 @@ class Simulation(InterventionMethods):
             robots=list(self.scenario.robots),
             input_files=input_files(self.scenario),
             notes=[
-                *self.home.plan.notes,
+                *self.notes,
                 *(f"{path} has no behavior: it stays where it is" for path in idle),
             ],
         )

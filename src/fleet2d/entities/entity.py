@@ -13,6 +13,7 @@ from fleet2d.entities.body import BodySettings
 from fleet2d.entities.drives.differential import Differential
 from fleet2d.entities.drives.drive import Drive
 from fleet2d.entities.equipment import Battery, Localization
+from fleet2d.entities.evidence.evidence_source import EvidenceSource
 from fleet2d.entities.giving_way import GivesWay
 from fleet2d.sight.camera import Camera
 from fleet2d.sight.perception import Perception
@@ -68,6 +69,8 @@ class Robot(Entity):
         camera: Its only camera; null: it is blind, or has `cameras`.
         cameras: Several cameras, by name, in place of `camera`; their order doesn't matter.
         perception: How its cameras err, unless they say so themselves; null: they don't.
+        perceives: What it perceives in place of what its cameras would see, such as a real robot's
+            detections; null: what they see.
         battery: Its battery, for the behavior dock; null: its charge never ends.
         gives_way: How it keeps clear of people; null: it drives on, and people go round it.
         localization: The error of its estimate of its own pose; null: there is none.
@@ -80,6 +83,7 @@ class Robot(Entity):
     camera: Camera | None = Camera()
     cameras: dict[str, Camera] = Field(default={})
     perception: Perception | None = None
+    perceives: Annotated[EvidenceSource, OneOf("evidence_source")] | None = None
 
     minds_costs: ClassVar[bool] = True
     battery: Battery | None = None
@@ -100,6 +104,18 @@ class Robot(Entity):
         if isinstance(cameras, Sequence) and not isinstance(cameras, str):
             cameras = {f"camera_{i:02}": camera for i, camera in enumerate(cameras)}
         return {**data, "camera": None, "cameras": cameras}
+
+    @model_validator(mode="after")
+    def _perceives_in_one_way(self) -> Self:
+        if self.perceives is None:
+            return self
+        if not self.eyes:
+            raise problem_at(
+                ("perceives",), "it needs a camera, from whose view follows what it watched"
+            )
+        if self.perception is not None or any(c.perception for c in self.eyes.values()):
+            raise problem_at(("perceives",), "give 'perceives' or 'perception', not both")
+        return self
 
     @property
     def eyes(self) -> dict[str, Camera]:

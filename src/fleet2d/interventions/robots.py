@@ -269,11 +269,17 @@ def check_camera(actor: Actor, camera: bool | str | None) -> None:
     """Refuse an unknown camera of a robot.
 
     Raises:
-        ScenarioError: The robot doesn't have it; the message lists those that it has.
+        ScenarioError: The robot doesn't have it, and the message lists those that it has; or it
+            perceives what a log has.
     """
     eyes, name = actor.entity.eyes, camera_name(camera)
     if not eyes:
         raise ScenarioError(f"{actor.name} has no camera: give it one")
+    if getattr(actor.entity, "perceives", None) is not None:
+        raise ScenarioError(
+            f"{actor.name} perceives what robots.{actor.name}.perceives has, so its cameras can't"
+            " be changed: leave one of them out"
+        )
     if name is not None and name not in eyes:
         raise ScenarioError(f"{actor.name} has no camera {name!r}{suggest(name, eyes, 'It has')}")
 

@@ -66,6 +66,9 @@ from fleet2d._core import Mesh
 from fleet2d.kernels import I8, I16, I32, I64, U8, U64
 from fleet2d.kernels.numbers import TURN, turned
 
+UNKNOWN_TRUTH = -2
+"""The true user of a sighting in a real home, where nobody knows it; see SightingColumn.USER."""
+
 
 class Lenses(NamedTuple):
     """The constants of a robot's cameras; int64 (cameras,) unless noted otherwise."""

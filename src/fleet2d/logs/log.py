@@ -7,13 +7,13 @@ from dataclasses import dataclass
 from datetime import date, datetime
 from itertools import pairwise
 from pathlib import Path
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 from fleet2d.bounds import LOG_BYTES, LOG_DAYS, LOG_ROWS, check_file, one_line
 from fleet2d.configuration.units import micros
 from fleet2d.errors import InputError
 from fleet2d.kernels import F64, I64
-from fleet2d.runtime.clock import DAY_US
+from fleet2d.runtime.clock import DAY_US, Clock, midnight_of
 
 # Maximum number of lines that a note lists.
 _MAX_NAMED = 20
@@ -22,6 +22,24 @@ _LONGEST = 10_000
 AWAY = "away"
 """The room label for being out of the home."""
 _TIME = re.compile(r"(\d{4})-(\d{1,2})-(\d{1,2})[ T](\d{1,2}):(\d{2})(?::(\d{2})(?:\.(\d{1,9}))?)?")
+
+
+_BAGS = (".bag", ".mcap", ".db3")
+
+
+def is_bag(path: Path) -> bool:
+    """Return whether a file or folder is a bag of ROS, by its name."""
+    if path.is_dir():
+        return (path / "metadata.yaml").is_file()
+    return path.suffix.lower() in _BAGS
+
+
+def files_of(path: Path) -> tuple[Path, ...]:
+    """Return the files of a log: itself, or those in the folder of a bag or of a home's logs."""
+    if not path.is_dir():
+        return (path,)
+    pattern = "*" if is_bag(path) else "*.txt"
+    return tuple(sorted(file for file in path.glob(pattern) if file.is_file()))
 
 
 def log_lines(path: Path) -> Iterator[tuple[int, str]]:
@@ -123,6 +141,37 @@ class PositionLog:
     def days(self) -> int:
         """The number of calendar days from its first to its last fix."""
         return int(self.time_us[-1]) // DAY_US + 1
+
+
+Day = int | Literal["date", "weekday"]
+"""The day of a log that is the first of the run: a number, its date, or the same weekday."""
+
+
+def begin_of_run(log: ActivityLog | PositionLog, day: Day, clock: Clock) -> int:
+    """Return the moment of a log that is step 0 of a run [us since the log's first midnight].
+
+    Args:
+        log: The log.
+        day: The day of the log that is the first of the run.
+        clock: The steps of the run.
+
+    Raises:
+        LogError: The log has no such day, or no dates.
+    """
+    start = clock.start
+    clock_us = micros(start - midnight_of(start))
+    if isinstance(day, str):
+        if log.first_day is None:
+            raise LogError(f"day: {day} needs a log with dates, and this one has none")
+        ahead = (start.date() - log.first_day).days
+        day = ahead if day == "date" else ahead % 7
+    if not 0 <= day < log.days:
+        since = f", from {log.first_day}" if log.first_day else ""
+        raise LogError(
+            f"the run begins on day {day} of the log, which has the days 0 to"
+            f" {log.days - 1}{since}; choose another by 'day'"
+        )
+    return day * DAY_US + clock_us
 
 
 def in_order(readings: list[Reading], path: Path, *, sort: bool) -> tuple[list[Reading], list[str]]:

@@ -1,6 +1,6 @@
 """Position fixes of a real-time location system: CSV or Parquet with time, id, x, y and heading."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from datetime import UTC, date, datetime, timedelta
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -70,16 +70,16 @@ def read_positions(
     Raises:
         LogError: A column or the tag is missing, a value is not a number, or times run backwards.
     """
-    table = _table(path)
-    named = _columns(table, columns or {}, path)
+    table = read_table(path)
+    named = columns_of(table, columns or {}, path)
     table, line, notes = _of_tag(table, named.get("id"), id, path)
-    x, y = (_numbers(table, named[axis], path, line) for axis in ("x", "y"))
+    x, y = (numbers_of(table, named[axis], path, line) for axis in ("x", "y"))
     heading = np.full(len(x), np.nan)
     if "heading" in named:
-        heading = _numbers(table, named["heading"], path, line)
+        heading = numbers_of(table, named["heading"], path, line)
         if named["heading"].endswith("_deg"):
             heading = heading / 180 * np.pi
-    time_us, has_date, has_zone = _times(table[named["time"]], path, line)
+    time_us, has_date, has_zone = times_of(table[named["time"]], path, line)
     fixes = RawFixes(time_us, x, y, heading, line, notes)
     return localize(
         path,
@@ -138,6 +138,74 @@ def localize(
             missing or unknown.
     """
     time_us, x, y, heading, line, notes = fixes
+    stamps = Stamps(time_us, line, has_date=has_date, has_zone=has_zone)
+    usable = np.isfinite(x) & np.isfinite(y)
+    local = local_times(path, "fixes", stamps, usable, notes, time_zone=time_zone, sort=sort)
+    time_us, row = local.time_us, local.row
+    last = np.append(np.diff(time_us) > 0, True)
+    if not last.all():
+        notes.append(f"of {np.count_nonzero(~last)} fixes at equal times the last counts")
+        time_us, row = time_us[last], row[last]
+    xy = np.stack([x, y], 1)[row]
+    return PositionLog(path, layout, local.first_day, time_us, xy, heading[row], tuple(notes))
+
+
+class Stamps(NamedTuple):
+    """The times in a file.
+
+    Attributes:
+        time_us: Times [us since 1970], or since the beginning of the log, int64 (n,).
+        line: The number of each line or message in the file, int64 (n,).
+        has_date: Whether times count from 1970; else from the beginning of the log.
+        has_zone: Whether times are UTC, and become times of the home's zone.
+    """
+
+    time_us: I64
+    line: I64
+    has_date: bool
+    has_zone: bool
+
+
+class LocalTimes(NamedTuple):
+    """The usable rows of a file in the local time of the home, in order.
+
+    Attributes:
+        time_us: Local times since the midnight that begins the first day, int64 (m,) [us].
+        row: Which row of the file each is, from 0, int64 (m,).
+        first_day: The date of the first day; None where the log has no dates.
+    """
+
+    time_us: I64
+    row: I64
+    first_day: date | None
+
+
+def local_times(
+    path: Path,
+    noun: str,
+    stamps: Stamps,
+    usable: Bool,
+    notes: list[str],
+    *,
+    time_zone: str | None,
+    sort: bool,
+) -> LocalTimes:
+    """Return the usable rows of a file in order of their local times.
+
+    Args:
+        path: The file.
+        noun: What its rows are called in notes, in the plural.
+        stamps: Their times.
+        usable: Whether each row has a position, bool (n,).
+        notes: Gets a line for each kind of anomaly.
+        time_zone: The time zone of the home.
+        sort: Put rows in order of time instead of refusing times that run backwards.
+
+    Raises:
+        LogError: There is no row, times run backwards or are out of range, or a time zone is
+            missing or unknown.
+    """
+    time_us, line, has_date, has_zone = stamps
     if not len(time_us):
         raise LogError(f"{path} holds no position")
     _check_times(time_us, path, line, has_date=has_date)
@@ -149,25 +217,40 @@ def localize(
                 " time_zone, like 'Europe/Berlin' or 'UTC'"
             )
         time_us, repeated = _in_zone(time_us, time_zone)
-    usable = np.isfinite(x) & np.isfinite(y)
     if not usable.all():
-        notes.append(f"{np.count_nonzero(~usable)} fixes without a position were left out")
+        notes.append(f"{np.count_nonzero(~usable)} {noun} without a position were left out")
     if repeated.any():
         notes.append(
-            f"{np.count_nonzero(repeated)} fixes of the hour that the end of summer time repeats"
+            f"{np.count_nonzero(repeated)} {noun} of the hour that the end of summer time repeats"
             " were left out: a simulated day has 24 hours"
         )
-    usable &= ~repeated
-    kept = [column[usable] for column in (time_us, x, y, heading, line)]
-    time_us, x, y, heading, _ = _in_order(kept, path, notes, sort=sort)
+    row = np.flatnonzero(usable & ~repeated)
+    if not len(row):
+        raise LogError(f"{path} has no row with a position")
+    time_us = time_us[row]
+    back = np.flatnonzero(np.diff(time_us) < 0)
+    if len(back) and not sort:
+        raise LogError(
+            f"{path}, line {line[row[back[0] + 1]]}: the time runs backwards there ({len(back)}"
+            f" such lines, by up to {float(-np.diff(time_us).min()) / 1e6:g} s); check the clock of"
+            " the log, or put its lines in order by 'sort: true'"
+        )
+    if len(back):
+        order = np.argsort(time_us, kind="stable")
+        time_us, row = time_us[order], row[order]
+        notes.append(f"{len(back)} lines ran backwards in time and were sorted in")
     first_day = date(1970, 1, 1) + timedelta(days=int(time_us[0] // DAY_US)) if has_date else None
     if first_day:
         time_us = time_us - time_us[0] // DAY_US * DAY_US
-    return PositionLog(path, layout, first_day, time_us, np.stack([x, y], 1), heading, tuple(notes))
+    return LocalTimes(time_us, row, first_day)
 
 
-def _table(path: Path) -> pa.Table:
-    """Read a file within its bounds."""
+def read_table(path: Path) -> pa.Table:
+    """Read a CSV, Parquet or JSON Lines file within its bounds.
+
+    Raises:
+        LogError: It can't be read, or is beyond a bound.
+    """
     try:
         check_file(path, LOG_BYTES, LogError)
         if path.suffix.lower() in (".parquet", ".pq"):
@@ -175,6 +258,10 @@ def _table(path: Path) -> pa.Table:
                 FIXES.check(file.metadata.num_rows, path, LogError)
                 TABLE_BYTES.check(unpacked_bytes(file), path, LogError, prefix="about ")
                 table = file.read()
+        elif path.suffix.lower() in (".jsonl", ".ndjson"):
+            import pyarrow.json as pajson
+
+            table = pajson.read_json(path)
         else:
             table = pacsv.read_csv(path)
         FIXES.check(table.num_rows, path, LogError)
@@ -186,16 +273,25 @@ def _table(path: Path) -> pa.Table:
     return table
 
 
-def _columns(table: pa.Table, overrides: Mapping[str, str], path: Path) -> dict[str, str]:
-    """Return the name of the column of each quantity: as the user says, else one of `NAMES`."""
+def columns_of(
+    table: pa.Table,
+    overrides: Mapping[str, str],
+    path: Path,
+    usual: Mapping[str, Sequence[str]] = NAMES,
+) -> dict[str, str]:
+    """Return the name of the column of each quantity: as the user says, else one of the usual.
+
+    Raises:
+        LogError: A quantity is unknown, or has no column; time, x and y are needed.
+    """
     named = dict(overrides)
     for quantity, name in named.items():
-        if quantity not in NAMES:
-            raise LogError(f"columns: unknown key {quantity!r}; allowed here: {', '.join(NAMES)}")
+        if quantity not in usual:
+            raise LogError(f"columns: unknown key {quantity!r}; allowed here: {', '.join(usual)}")
         if name not in table.column_names:
             raise LogError(f"{path} has no column {name!r}{did_you_mean(name, table.column_names)}")
     lower = {name.strip().lower(): name for name in reversed(table.column_names)}
-    for quantity, names in NAMES.items():
+    for quantity, names in usual.items():
         column = next((lower[name] for name in names if name in lower), None)
         if quantity not in named and column is not None:
             named[quantity] = column
@@ -239,7 +335,7 @@ def _of_tag(
     return table.filter(pa.array(is_tag)), line[is_tag], notes
 
 
-def _numbers(table: pa.Table, name: str, path: Path, line: I64) -> F64:
+def numbers_of(table: pa.Table, name: str, path: Path, line: I64) -> F64:
     """Return a column of numbers, float64 (n,); NaN where it is empty."""
     column = table[name]
     if pa.types.is_string(column.type) or pa.types.is_large_string(column.type):
@@ -259,7 +355,7 @@ def _numbers(table: pa.Table, name: str, path: Path, line: I64) -> F64:
     return numbers.to_numpy().astype(np.float64)
 
 
-def _times(column: pa.ChunkedArray, path: Path, line: I64) -> tuple[I64, bool, bool]:
+def times_of(column: pa.ChunkedArray, path: Path, line: I64) -> tuple[I64, bool, bool]:
     """Return times [us], whether they count from 1970, and whether they have a time zone.
 
     Times that don't count from 1970 count from the beginning of the log; those with a zone are UTC.
@@ -343,28 +439,3 @@ def _in_zone(utc_us: I64, name: str) -> tuple[I64, Bool]:
     offsets = [micros(m.utcoffset() or timedelta(0)) for m in moments]
     folds = np.array([m.fold for m in moments], bool)
     return utc_us + np.array(offsets, np.int64)[inverse], folds[inverse]
-
-
-def _in_order(fixes: list[Any], path: Path, notes: list[str], *, sort: bool) -> list[Any]:
-    """Return columns of fixes in order of time, one fix at a time; the first column is the time.
-
-    Raises:
-        LogError: There are no fixes, or times run backwards and `sort` is off.
-    """
-    time_us, line = fixes[0], fixes[-1]
-    if not len(time_us):
-        raise LogError(f"{path} has no row with a position")
-    back = np.flatnonzero(np.diff(time_us) < 0)
-    if len(back) and not sort:
-        raise LogError(
-            f"{path}, line {line[back[0] + 1]}: the time runs backwards there ({len(back)} such"
-            " lines); check the clock of the log, or put its lines in order by 'sort: true'"
-        )
-    if len(back):
-        order = np.argsort(time_us, kind="stable")
-        fixes = [values[order] for values in fixes]
-        notes.append(f"{len(back)} lines ran backwards in time and were sorted in")
-    last = np.append(np.diff(fixes[0]) > 0, True)
-    if not last.all():
-        notes.append(f"of {np.count_nonzero(~last)} fixes at equal times the last counts")
-    return [values[last] for values in fixes]

@@ -10,6 +10,7 @@ from fleet2d.algorithms.history import History
 from fleet2d.configuration.components import register
 from fleet2d.floorplan.home import Home
 from fleet2d.kernels import I64
+from fleet2d.kernels.sight import UNKNOWN_TRUTH
 from fleet2d.metrics.metric import Metric
 
 UNKNOWN = "unknown"  # name in the confusion of a person not recognized
@@ -32,8 +33,9 @@ class Detections(Metric):
     - `confusion`: for each user, and for nobody (false positives), the shares of observations
       recognized as each user, or as nobody (`unknown`); each sums to one.
 
-    A ratio whose denominator is 0 is left out. Stored per period: looks, detections, false
-    positives and identities, by robot and user.
+    A ratio whose denominator is 0 is left out. Observations of a real robot, whose truth nobody
+    knows, count in none of them: `unknown_truth` is their number. Stored per period: looks,
+    detections, false positives and identities, by robot and user.
     """
 
     unit: ClassVar[str] = "share"
@@ -43,6 +45,7 @@ class Detections(Metric):
         self.looks: I64 | None = None  # (robots, users, 2): in view, noticed
         self.confusion: I64  # (robots, users + 1, users + 1): true, perceived
         self.names: tuple[tuple[str, ...], tuple[str, ...]] = ((), ())
+        self.unknown: I64  # (robots,): observations whose truth nobody knows
 
     def update(self, history: History, state: Present) -> Any:
         """Count looks and observations; return a row for each robot and user."""
@@ -50,13 +53,17 @@ class Detections(Metric):
         if self.looks is None:
             self.looks = np.zeros((robots, users, 2), np.int64)
             self.confusion = np.zeros((robots, users + 1, users + 1), np.int64)
+            self.unknown = np.zeros(robots, np.int64)
             self.names = state.robots, state.users
         counts, observations = history.looks, history.observations
         looks = np.zeros((robots, users, 2), np.int64)
         np.add.at(looks, counts.robot, np.stack([counts.in_view, counts.detected], axis=-1))
         confusion = np.zeros((robots, users + 1, users + 1), np.int64)
         # A false positive, or a person not recognized, is -1: the last entry.
-        np.add.at(confusion, (observations.robot, history.truth.user, observations.user), 1)
+        true = history.truth.user
+        known = true != UNKNOWN_TRUTH
+        np.add.at(confusion, (observations.robot[known], true[known], observations.user[known]), 1)
+        self.unknown += np.bincount(observations.robot[~known], minlength=robots)
         self.looks += looks
         self.confusion += confusion
         return self._rows(looks, confusion)
@@ -88,6 +95,7 @@ class Detections(Metric):
         robots, users = self.names
         return {
             robot: self._summary(self.looks[r], self.confusion[r], users)
+            | ({"unknown_truth": int(self.unknown[r])} if self.unknown[r] else {})
             for r, robot in enumerate(robots)
         }
 

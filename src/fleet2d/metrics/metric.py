@@ -16,6 +16,7 @@ from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.kernels import F64, I64, Bool
 from fleet2d.kernels.sight import points_in_sight
 from fleet2d.runtime.determinism import sum_in_order
+from fleet2d.runtime.events import EventKind
 
 
 class Metric(Component):
@@ -65,6 +66,32 @@ class Metric(Component):
             for name, value in result.items()
             if isinstance(value, Mapping) or name not in cls.hidden
         }
+
+
+class UnknownPlaces:
+    """The steps at which nobody knows where a user is, as in the gaps of a log."""
+
+    def __init__(self) -> None:
+        """Begin with known places."""
+        self._since: dict[str, bool] = {}  # whether a place is unknown at the end of the history
+
+    def at(self, user: str, history: History, steps: I64) -> Bool:
+        """Return whether a user's place is unknown at each of some steps of a history: bool (n,).
+
+        Histories must follow each other.
+        """
+        if user not in history.log.untracked:
+            return np.zeros(len(steps), np.bool_)
+        changes = [
+            (event.step, event.event == EventKind.UNKNOWN)
+            for event in history.events
+            if event.entity == user and event.event in (EventKind.UNKNOWN, EventKind.KNOWN)
+        ]
+        begins = np.array([step for step, _ in changes], np.int64)
+        values = np.array([self._since.get(user, False), *(value for _, value in changes)])
+        self._since[user] = bool(values[-1])
+        is_unknown: Bool = values[np.searchsorted(begins, steps, side="right")]
+        return is_unknown
 
 
 class RobotUserPair(NamedTuple):

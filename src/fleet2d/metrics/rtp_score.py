@@ -16,8 +16,9 @@ from fleet2d.configuration.components import register
 from fleet2d.configuration.units import PositiveDuration
 from fleet2d.floorplan.home import Home
 from fleet2d.kernels import F64, I64, Bool
+from fleet2d.kernels.sight import UNKNOWN_TRUTH
 from fleet2d.metrics.belief_reader import BeliefReader
-from fleet2d.metrics.metric import Metric
+from fleet2d.metrics.metric import Metric, UnknownPlaces
 from fleet2d.runtime.determinism import sum_in_order
 
 MIN_PROBABILITY = 1e-6  # smaller probabilities are raised to this before taking logarithms
@@ -27,6 +28,7 @@ GAP_ENDS = (1, 5, 15, 60, 240)
 GAPS = ("0-1 min", "1-5 min", "5-15 min", "15-60 min", "1-4 h", "over 4 h", "never seen")
 UNSEEN = len(GAPS) - 1
 ALL = "all"
+TRUTH_UNKNOWN = "truth unknown"
 SUMMARY_SCORES = ("log_loss", "top_1", "ece", "skill", "reference_skill")  # in the closing table
 NEVER = -1
 
@@ -258,8 +260,10 @@ class RtpScore(Metric):
     bin, which uses evidence up to the end of the bin only; for an algorithm without a track it is a
     forecast: its newest output before the period, `at` that time.
 
-    The gap is the time since a robot last perceived that user correctly, or `never seen`. For each
-    class of gaps and over all:
+    The gap is the time since a robot last perceived that user correctly, or `never seen`; of a real
+    robot's detections, whose truth nobody knows, since it last perceived them. Bins in which nobody
+    knows where the user was, as in the gaps of a log, are left out: their number is `bins` of the
+    class `truth unknown`. For each class of gaps and over all:
 
     - log_loss: mean of -ln p(truth), with p at least 1e-6 [nats];
     - brier: mean of sum over places of (p - 1{truth})^2, 0 to 2; its parts `reliability`,
@@ -312,6 +316,8 @@ class RtpScore(Metric):
         self.beliefs = [BeliefReader(name) for name in self.reads()]
         self.last: dict[str, tuple[int, int]] = {}  # step and room of the last correct sighting
         self.scored: dict[str, list[ScoredBins]] = {}
+        self.unknown = UnknownPlaces()
+        self.left_out: dict[str, int] = {}  # bins of users whose place is unknown
 
     def update(self, history: History, state: Present) -> Any:
         """Score the bins of the period; return a row for each user and class of gaps in it."""
@@ -348,7 +354,8 @@ class RtpScore(Metric):
     def _sightings(self, user: str, row: int, history: History, ends: I64) -> tuple[I64, I64]:
         """Return the steps since the last correct sighting at the ends of bins, and its room."""
         observations = history.observations
-        is_correct = (observations.user == row) & (history.truth.user == row)
+        true = history.truth.user
+        is_correct = (observations.user == row) & ((true == row) | (true == UNKNOWN_TRUTH))
         last_step, last_room = self.last.get(user, (NEVER, NEVER))
         steps = np.concatenate([[last_step], observations.step[is_correct]]).astype(np.int64)
         rooms = np.concatenate([[last_room], observations.room[is_correct]]).astype(np.int64)
@@ -372,6 +379,9 @@ class RtpScore(Metric):
         # Outside all rooms no place is the truth.
         is_in_room = room != NOWHERE
         is_scored = ~is_away & is_in_room if self.given_home else is_away | is_in_room
+        is_unknown = self.unknown.at(user, history, ends)
+        self.left_out[user] = self.left_out.get(user, 0) + int(is_unknown.sum())
+        is_scored &= ~is_unknown
         return ScoredBins(label, truth, last, belief, reference).of(is_scored)
 
     def result(self) -> dict[str, Any]:
@@ -381,9 +391,11 @@ class RtpScore(Metric):
             scored = ScoredBins(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
             groups = {name: scored.gap == g for g, name in enumerate(GAPS)}
             groups[ALL] = np.ones(len(scored.gap), bool)
-            scores = {
+            scores: dict[str, dict[str, float]] = {
                 name: self._means(scored.of(mask)) for name, mask in groups.items() if mask.any()
             }
+            if self.left_out.get(user):
+                scores[TRUTH_UNKNOWN] = {"bins": self.left_out[user]}
             if scores:
                 results[user] = scores
         return results
@@ -425,6 +437,7 @@ class RtpScore(Metric):
         return {
             user: {name: scores[ALL][name] for name in SUMMARY_SCORES if name in scores[ALL]}
             for user, scores in result.items()
+            if ALL in scores
         }
 
 

@@ -13,7 +13,10 @@ from fleet2d.metrics.metric import Metric
 
 @register("metric", "sightings")
 class Sightings(Metric):
-    """Share of a user's steps at home at which at least one robot perceives the user."""
+    """Share of a user's steps at home at which at least one robot perceives the user.
+
+    Detections of a real robot count while the user is known to be at home.
+    """
 
     unit: ClassVar[str] = "share of time at home"
 
@@ -31,8 +34,11 @@ class Sightings(Metric):
         known = index[first & (index >= 0)]
         steps_seen = np.bincount(known, minlength=len(state.users)).tolist()
         for user, seen in zip(state.users, steps_seen, strict=True):
-            self.seen[user] = self.seen.get(user, 0) + seen
             at_home = int(history.poses(user).time_in_rooms[:-1].sum())
+            if user in history.log.untracked and seen:
+                steps = step[first & (index == state.users.index(user))] - history.first
+                seen = int((~history.poses(user).away[steps]).sum())
+            self.seen[user] = self.seen.get(user, 0) + seen
             self.at_home[user] = self.at_home.get(user, 0) + at_home
 
     def result(self) -> dict[str, Any]:

@@ -17,23 +17,9 @@ import numpy as np
 
 from fleet2d.errors import extra
 from fleet2d.kernels import F64, I64, U8
+from fleet2d.logs.bags import VISION_TYPES
 from fleet2d.runs.records import Chunk, Records
 
-# Of ROS's vision_msgs, which the library of types doesn't have.
-_VISION_TYPES = {
-    "vision_msgs/msg/ObjectHypothesis": "string class_id\nfloat64 score\n",
-    "vision_msgs/msg/ObjectHypothesisWithPose": (
-        "vision_msgs/ObjectHypothesis hypothesis\ngeometry_msgs/PoseWithCovariance pose\n"
-    ),
-    "vision_msgs/msg/BoundingBox3D": "geometry_msgs/Pose center\ngeometry_msgs/Vector3 size\n",
-    "vision_msgs/msg/Detection3D": (
-        "std_msgs/Header header\nvision_msgs/ObjectHypothesisWithPose[] results\n"
-        "vision_msgs/BoundingBox3D bbox\nstring id\n"
-    ),
-    "vision_msgs/msg/Detection3DArray": (
-        "std_msgs/Header header\nvision_msgs/Detection3D[] detections\n"
-    ),
-}
 MAP, TRANSFORMS, STATIC = "/map", "/tf", "/tf_static"
 UNKNOWN = "unknown"
 """The class of a detected person who wasn't recognized."""
@@ -82,7 +68,7 @@ class RosMessages:
             from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
         self.types = get_typestore(Stores.ROS2_HUMBLE)
-        for name, definition in _VISION_TYPES.items():
+        for name, definition in VISION_TYPES.items():
             self.types.register(get_types_from_msg(definition, name))
         self._records = records
         self._run = records.run

@@ -147,6 +147,8 @@ def sightings_of(run: Run) -> list[SightingFacts]:
         true = np.array([*true_names, ""], dtype=object)
         is_mistaken = (names[user] != true[true_user]) & (user >= 0)
         false = (true_user < 0) | is_mistaken
+        if "truth_known" in table.column_names:
+            false &= table["truth_known"].to_numpy()
     gap = max(1, round(JOIN_S * 1e6 / run.manifest["step_us"]))
     lanes = []
     for r, robot_name in enumerate(robots):

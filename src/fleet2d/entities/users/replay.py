@@ -28,7 +28,7 @@ from fleet2d.kernels.numbers import TURN, heading_of
 from fleet2d.kernels.sight import line_of_sight
 from fleet2d.kernels.space import locate
 from fleet2d.logs.layouts import Layout, read_log
-from fleet2d.logs.log import AWAY, ActivityLog, LogError, PositionLog
+from fleet2d.logs.log import AWAY, ActivityLog, Day, LogError, PositionLog, begin_of_run, files_of
 from fleet2d.logs.placement import (
     DOOR,
     UNKNOWN,
@@ -40,7 +40,6 @@ from fleet2d.logs.placement import (
     map_rooms,
     visits_of,
 )
-from fleet2d.runtime.clock import DAY_US, midnight_of
 from fleet2d.runtime.determinism import sum_in_order
 
 if TYPE_CHECKING:
@@ -522,7 +521,7 @@ class Replay(Behavior):
     sort: bool = False
     frame: LogFrame = LogFrame()
     rooms: RoomMap = Field(default={})
-    day: int | Literal["date", "weekday"] = 0
+    day: Day = 0
     gaps: Literal["unknown", "hold", "walk"] = "unknown"
     gap: PositiveDuration | None = None
     still: Duration = timedelta(hours=12)
@@ -531,10 +530,7 @@ class Replay(Behavior):
 
     def files(self) -> tuple[Path, ...]:
         """Return the files that it reads."""
-        if not self.path.is_dir():
-            return (self.path,)
-        pattern = "*" if (self.path / "metadata.yaml").is_file() else "*.txt"  # a bag, or logs
-        return tuple(sorted(path for path in self.path.glob(pattern) if path.is_file()))
+        return files_of(self.path)
 
     def start(self, actor: "Actor") -> None:
         """Read the log, plan the way through it, and report on it in `notes`."""
@@ -548,7 +544,7 @@ class Replay(Behavior):
                 time_zone=self.time_zone,
                 sort=self.sort,
             )
-            begin_us = self._begin(log, actor)
+            begin_us = begin_of_run(log, self.day, actor.clock)
             if isinstance(log, ActivityLog):
                 self._start_rooms(actor, log, begin_us)
             else:
@@ -570,23 +566,6 @@ class Replay(Behavior):
             return self.follower.follow(plan)
         current = max((i for i, v in enumerate(self.visits) if v.first <= now.step), default=0)
         return self.follower.follow(plan, current, rejoin=now.step > 0)
-
-    def _begin(self, log: ActivityLog | PositionLog, actor: "Actor") -> int:
-        """Return the moment of the log that is step 0 [us since its first midnight]."""
-        start = actor.clock.start
-        clock_us = micros(start - midnight_of(start))
-        day = self.day
-        if isinstance(day, str):
-            if log.first_day is None:
-                raise LogError(f"day: {day} needs a log with dates, and this one has none")
-            ahead = (start.date() - log.first_day).days
-            day = ahead if day == "date" else ahead % 7
-        if not 0 <= day < log.days:
-            raise LogError(
-                f"the run begins on day {day} of the log, which has the days 0 to {log.days - 1};"
-                " choose another by 'day'"
-            )
-        return day * DAY_US + clock_us
 
     def _start_rooms(self, actor: "Actor", log: ActivityLog, begin_us: int) -> None:
         mapped = map_rooms(log.rooms, self.rooms, actor.home.rooms)

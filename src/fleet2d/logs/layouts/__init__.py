@@ -11,7 +11,7 @@ from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, Protocol, cast
 
-from fleet2d.logs.log import ActivityLog, LogError, PositionLog, log_lines
+from fleet2d.logs.log import ActivityLog, LogError, PositionLog, is_bag, log_lines
 
 FIRST_LINES = 20
 
@@ -46,7 +46,6 @@ if TYPE_CHECKING:
     Layout = str
 else:
     Layout = Literal[("auto", *layout_names(), "bag", "positions")]
-_BAGS = (".bag", ".mcap", ".db3")
 
 
 def read_log(
@@ -94,20 +93,13 @@ def read_log(
     return layout_of(layout).read(path, sort=sort)
 
 
-def _is_bag(path: Path) -> bool:
-    """Return whether a file or folder is a bag of ROS, by its name."""
-    if path.is_dir():
-        return (path / "metadata.yaml").is_file()
-    return path.suffix.lower() in _BAGS
-
-
 def _recognize(path: Path) -> str:
     """Return the layout of a file or folder.
 
     Raises:
         LogError: It is of no known layout.
     """
-    if _is_bag(path):
+    if is_bag(path):
         return "bag"
     if path.is_dir():
         layouts = map(_recognize_lines, sorted(path.glob("*.txt")))

@@ -1,0 +1,59 @@
+"""Sight of robots whose perception is real: detections from a log, or as they arrive."""
+
+import numpy as np
+
+from fleet2d.engine.bodies import Bodies
+from fleet2d.engine.cameras import Cameras, Look
+from fleet2d.engine.sighting_errors import sight_events
+from fleet2d.entities.evidence.evidence_source import EvidenceSource
+from fleet2d.errors import blame
+from fleet2d.kernels import I64
+from fleet2d.kernels.numbers import TURN, turned
+from fleet2d.kernels.sight import USER_LOST, USER_SEEN, SightMemory
+from fleet2d.kernels.sight import SightingColumn as Column
+
+# A look that may end a span sees no farther ahead, so that many events in a row cost little.
+MAX_AHEAD = 1 << 12
+
+
+class RealSight(Cameras):
+    """The cameras of a robot that perceives what a source of evidence has.
+
+    The cameras say what it watched; whom it perceived is the source's.
+    """
+
+    knows_truth = False
+
+    def prepare(self, source: EvidenceSource) -> None:
+        """Set the source, a component of the scenario, and start it."""
+        self.source = source.model_copy()
+        self.expect_disturbances()
+        with blame(f"{self.owner.path}.perceives", None):
+            self.source.start(self.owner, [other.name for other in self.others])
+        self.notes = self.source.notes
+
+    def _look(self, bodies: Bodies, end: int, *, stop: bool = True) -> Look:
+        first = self.next_step
+        old_memory = [array.copy() for array in self.memory] if stop else []
+        looked = min(end, first + MAX_AHEAD) if stop else end
+        with blame(f"{self.owner.path}.perceives", first):
+            rows = self.source.sightings(first, looked)
+        if self.source.relative and len(rows):
+            rows = self._on_map(rows, bodies, first, looked)
+        patience = self.rule.patience
+        events = sight_events(rows, SightMemory(*self.memory), patience, first, looked)
+        ends = dict(zip((USER_LOST, USER_SEEN), self.ends, strict=True)) if stop else {}
+        ends_at = next((step + 1 for step, _, kind in events if ends.get(kind)), looked)
+        return Look(looked, ends_at, rows, events, old_memory)
+
+    def _on_map(self, rows: I64, bodies: Bodies, first: int, end: int) -> I64:
+        """Return sightings in the frame of the robot as sightings in the floor plan."""
+        rows = rows.copy()
+        x, y, heading, _ = bodies.window(first, end).dense(self.row, first, end)[:4]
+        at = rows[:, Column.STEP] - first
+        dx, dy = turned(rows[:, Column.X], rows[:, Column.Y], 2 * heading[at])
+        rows[:, Column.X] = rows[:, Column.TRUE_X] = x[at] + dx
+        rows[:, Column.Y] = rows[:, Column.TRUE_Y] = y[at] + dy
+        faces: I64 = np.mod(rows[:, Column.HEADING] + heading[at], TURN)
+        rows[:, Column.HEADING] = rows[:, Column.TRUE_HEADING] = faces
+        return rows

@@ -1,0 +1,225 @@
+"""Replay of a real robot's detections, from a table or a topic of a bag."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+import shapely
+from pydantic import Field
+
+from fleet2d.configuration.components import register
+from fleet2d.configuration.problems import suggest
+from fleet2d.configuration.units import InputFileOrFolder, Length
+from fleet2d.entities.evidence.evidence_source import SIGHTING, EvidenceSource
+from fleet2d.kernels import F64, I64, Bool
+from fleet2d.kernels.numbers import TURN
+from fleet2d.kernels.sight import NOBODY, UNKNOWN_TRUTH
+from fleet2d.kernels.sight import SightingColumn as Column
+from fleet2d.logs.log import Day, LogError, begin_of_run, files_of
+from fleet2d.logs.placement import LogFrame
+
+if TYPE_CHECKING:
+    from fleet2d.entities.behavior import Actor
+    from fleet2d.logs.detections import RobotDetections
+
+# If more detections than this are outside of the home, the frame of the log is wrong.
+MAX_OUTSIDE = 0.5
+# Coordinates are clipped to this, far outside of any home [m].
+COORDINATE_LIMIT_M = 1e6
+# Labels that mean nobody known in usual detectors.
+ANONYMOUS = frozenset({"unknown", "person", "people", "human", "none", "nobody", "0", ""})
+
+
+@register("evidence_source", "replay")
+class ReplayedDetections(EvidenceSource):
+    """Perceive what a real robot perceived: the detections in a table, or on a topic of a bag.
+
+    Detections replace simulated sight for algorithms, behaviors and metrics. Who was really there
+    is unknown, so metrics that compare with the truth leave these observations out, and say how
+    many they are. A detection outside of the home by more than `reach` is left out and counted; if
+    more than half of them are, the log is refused.
+
+    Attributes:
+        path: The table (.csv, .parquet, .jsonl), or the bag.
+        topic: The topic of a bag, if several have detections.
+        columns: The columns of a table, as {user: face}; or the fields of a bag's messages, as
+            {each: people, user: name, x: pose.position.x, y: pose.position.y}.
+        people: The user of each label of the log, as {face_7: ana}; null: somebody unknown. Labels
+            that are names of users, or words like person, needn't be listed.
+        relative_to: Whether positions are in the floor plan, after `frame`, or in the frame of the
+            robot: x ahead, y to the left.
+        frame: The transform from the positions of the log to the floor plan.
+        time_zone: The time zone of the home, if the log's times have one or count from 1970.
+        sort: Sort rows whose time runs backwards; else they are refused.
+        day: The day of the log that is the first of the run: a number from 0, its date, or the
+            first of the same weekday.
+        reach: A detection farther than this from the home's floor is left out.
+    """
+
+    path: InputFileOrFolder
+    topic: str | None = None
+    columns: dict[str, str] = Field(default={})
+    people: dict[str, str | None] = Field(default={})
+    relative_to: Literal["map", "robot"] = "map"
+    frame: LogFrame = LogFrame()
+    time_zone: str | None = None
+    sort: bool = False
+    day: Day = 0
+    reach: Length = Field(default=1.0, ge=0)
+
+    @property
+    def relative(self) -> bool:
+        """Whether positions are in the robot's frame."""
+        return self.relative_to == "robot"
+
+    def files(self) -> tuple[Path, ...]:
+        """Return the files that it reads."""
+        return files_of(self.path)
+
+    def start(self, actor: "Actor", users: Sequence[str]) -> None:
+        """Read the log.
+
+        Raises:
+            LogError: It can't be read, has labels of nobody, or doesn't fit the home or the run.
+        """
+        # Imported here, as it needs more of pyarrow than most runs.
+        from fleet2d.logs.detections import read_detections
+
+        try:
+            log = read_detections(
+                self.path,
+                topic=self.topic,
+                columns=self.columns,
+                time_zone=self.time_zone,
+                sort=self.sort,
+            )
+            self._rows = self._place(log, actor, users)
+        except LogError as error:
+            raise LogError(f"{actor.path}.perceives: {error}") from None
+
+    def sightings(self, first: int, end: int) -> I64:
+        """Return the detections of the steps from `first` to `end` - 1."""
+        begin, stop = np.searchsorted(self._rows[:, Column.STEP], (first, end)).tolist()
+        return self._rows[begin:stop]
+
+    def _place(self, log: "RobotDetections", actor: "Actor", users: Sequence[str]) -> I64:
+        """Return the detections within the run as rows, and write the notes."""
+        clock = actor.clock
+        identity = identities(log.labels, log.counts, self.people, users)[log.label]
+        time_us = log.time_us - begin_of_run(log, self.day, clock)
+        step = time_us // clock.step_us
+        early, late = int((step < 0).sum()), int((step >= clock.steps).sum())
+        used = (step >= 0) & (step < clock.steps)
+        xy = self.frame.to_plan(log.xy)
+        turns = self.frame.turn_headings(log.heading / (2 * np.pi))
+        since = f" from {log.first_day}" if log.first_day else ""
+        notes = [
+            f"{log.path.name}: {len(step)} detections of {log.days}"
+            f" day{'' if log.days == 1 else 's'}{since}; who was really there is unknown",
+            *log.notes,
+        ]
+        if self.frame.matches:
+            fit = float(self.frame.errors().max())
+            notes.append(f"the frame fits its {len(self.frame.matches)} matches to {fit:.2f} m")
+        if not used.any():
+            raise LogError(
+                f"none of its {len(step)} detections is in the run: {early} before it begins,"
+                f" {late} after it ends; choose another 'day', or start the run when the log does"
+            )
+        if early or late:
+            notes.append(
+                f"{early} detections before the run and {late} after its end were left out"
+            )
+        if not self.relative:
+            used &= self._inside(xy, used, actor, notes)
+        for name, row in (("nobody known", NOBODY), *((u, i) for i, u in enumerate(users))):
+            if count := int((identity[used] == row).sum()):
+                notes.append(f"{count} detections of {name}")
+        self.notes = tuple(notes)
+        rows = np.empty((int(used.sum()), SIGHTING), np.int64)
+        units = actor.home.plan.lattice
+        places = np.clip(xy[used], -COORDINATE_LIMIT_M, COORDINATE_LIMIT_M)
+        points = (
+            np.rint(places * units.units_per_m).astype(np.int64)
+            if self.relative
+            else units.to_lattice(places)
+        )
+        heading = np.floor(np.nan_to_num(turns[used]) * TURN + 0.5).astype(np.int64) % TURN
+        rows[:, Column.STEP], rows[:, Column.CAMERA] = step[used], 0
+        rows[:, Column.USER], rows[:, Column.IDENTITY] = UNKNOWN_TRUTH, identity[used]
+        rows[:, [Column.X, Column.Y]] = rows[:, [Column.TRUE_X, Column.TRUE_Y]] = points
+        rows[:, Column.HEADING] = rows[:, Column.TRUE_HEADING] = heading
+        rows[:, Column.POSTURE] = rows[:, Column.TRUE_POSTURE] = 0
+        return rows
+
+    def _inside(self, xy: F64, used: Bool, actor: "Actor", notes: list[str]) -> Bool:
+        """Return which detections are in the home, within `reach`.
+
+        Raises:
+            LogError: More than MAX_OUTSIDE of those in the run are not.
+        """
+        free = actor.home.plan.free_space
+        shapely.prepare(free)
+        off = np.flatnonzero(used & ~shapely.contains_xy(free, xy[:, 0], xy[:, 1]))
+        metres: F64 = np.atleast_1d(shapely.distance(free, shapely.points(xy[off])))
+        far = metres > self.reach
+        is_inside = np.ones(len(xy), bool)
+        is_inside[off[far]] = False
+        outside, count = int(far.sum()), int(used.sum())
+        if count and outside > MAX_OUTSIDE * count:
+            raise LogError(
+                f"the frame of {self.path} doesn't fit the home: {outside} of {count} detections"
+                f" are more than {self.reach:g} m outside, by {float(np.median(metres[far])):.1f} m"
+                " in the median: correct 'frame' (origin, rotation_deg, or matches), or say"
+                " relative_to: robot if they are in the robot's frame"
+            )
+        if outside:
+            notes.append(
+                f"{outside} of {count} detections are outside the home and left out, by up to"
+                f" {float(metres.max()):.1f} m"
+            )
+        if len(off) > outside:
+            notes.append(
+                f"{len(off) - outside} detections are in or behind walls, by up to"
+                f" {float(metres[~far].max()):.2f} m, and count for the nearest room"
+            )
+        return is_inside
+
+
+def identities(
+    labels: Sequence[str],
+    counts: Mapping[str, int],
+    people: Mapping[str, str | None],
+    users: Sequence[str],
+) -> I64:
+    """Return the user of each label, NOBODY for somebody unknown, and last for no label.
+
+    Args:
+        labels: The labels of a log.
+        counts: How many detections have each.
+        people: The scenario's choices.
+        users: The users of the run.
+
+    Raises:
+        LogError: A label stands for nobody, or a choice names an unknown label or user.
+    """
+    for label, user in people.items():
+        if label not in labels:
+            raise LogError(
+                f"people: the log has no label {label!r}{suggest(label, labels, 'It has')}"
+            )
+        if user is not None and user not in users:
+            raise LogError(f"people: there is no user {user!r}{suggest(user, users)}")
+    rows = []
+    for label in labels:
+        user = people.get(label, label if label in users else None)
+        is_known = label in people or label in users or label.strip().lower() in ANONYMOUS
+        if not is_known:
+            raise LogError(
+                f"no user is named {label!r} ({counts[label]} detections): say who it is by"
+                f" people: {{{label}: NAME}}, or null for somebody unknown; users:"
+                f" {', '.join(users)}"
+            )
+        rows.append(NOBODY if user is None else list(users).index(user))
+    return np.array([*rows, NOBODY], np.int64)

@@ -1,0 +1,272 @@
+"""Detections of a real robot: whom it perceived where, from tables and from topics of bags."""
+
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+
+from fleet2d.bounds import FIXES, one_line
+from fleet2d.configuration.problems import did_you_mean
+from fleet2d.kernels import F64, I64
+from fleet2d.logs.bags import LATEST_SIMULATED_NS, open_bag, stamp_of
+from fleet2d.logs.log import LogError, PositionLog, is_bag
+from fleet2d.logs.positions import (
+    NAMES,
+    Stamps,
+    columns_of,
+    local_times,
+    numbers_of,
+    read_table,
+    times_of,
+)
+
+COLUMNS = {
+    "time": NAMES["time"],
+    "user": ("user", "label", "identity", "person", "name", "class", "id"),
+    "x": NAMES["x"],
+    "y": NAMES["y"],
+    "heading": NAMES["heading"],
+}
+"""The names that a column may have, if the user gives none."""
+
+ARRAYS = ("vision_msgs/msg/Detection3DArray", "geometry_msgs/msg/PoseArray")
+_FIELDS: dict[str, dict[str, str]] = {
+    "vision_msgs/msg/Detection3DArray": {
+        "each": "detections",
+        "user": "results.0.hypothesis.class_id",
+        "x": "bbox.center.position.x",
+        "y": "bbox.center.position.y",
+    },
+    "geometry_msgs/msg/PoseArray": {"each": "poses", "x": "position.x", "y": "position.y"},
+    "geometry_msgs/msg/PointStamped": {"x": "point.x", "y": "point.y"},
+    "geometry_msgs/msg/PoseStamped": {"x": "pose.position.x", "y": "pose.position.y"},
+}
+"""Where the messages of known types have what `COLUMNS` lists; `each` is a list of detections."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RobotDetections(PositionLog):
+    """Detections, in order of time; positions in the frame of the log.
+
+    Attributes:
+        label: Index in `labels` of whom each is of, -1 where the log doesn't say, int64 (n,).
+        labels: The labels of people in the log.
+    """
+
+    label: I64
+    labels: tuple[str, ...]
+
+    @cached_property
+    def counts(self) -> Counter[str]:
+        """How many detections have each label; "" for those without one."""
+        counts = np.bincount(self.label + 1, minlength=len(self.labels) + 1).tolist()
+        return +Counter(dict(zip(("", *self.labels), counts, strict=True)))
+
+
+def read_detections(
+    path: str | Path,
+    *,
+    topic: str | None = None,
+    columns: Mapping[str, str] | None = None,
+    time_zone: str | None = None,
+    sort: bool = False,
+) -> RobotDetections:
+    """Read detections of people: time, x, y, and, if there are, whom and heading.
+
+    Times are as those of positions; see `read_positions`.
+
+    Args:
+        path: A table (.csv, .parquet, .jsonl), or a bag of ROS 1 or ROS 2.
+        topic: The topic of a bag; needed if several have detections.
+        columns: Names of columns, {"user": "face"}. Of a bag, the fields of its messages, like
+            {"each": "people", "user": "name", "x": "pose.position.x"}, where `each` is the list of
+            detections in a message; numbers select an element of a list.
+        time_zone: The time zone of the home, if times have a zone or count from 1970.
+        sort: Put rows in order of time instead of refusing times that run backwards.
+
+    Raises:
+        LogError: The file can't be read, a column or field is missing, a value is not a number, or
+            times run backwards.
+        InputError: rosbags isn't installed.
+    """
+    path = Path(path)
+    if not path.exists():
+        raise LogError(f"no such file: {path}")
+    if is_bag(path):
+        raw = _from_bag(path, topic, columns or {})
+    else:
+        if topic is not None:
+            raise LogError(f"{path} is a table: 'topic' is for bags")
+        raw = _from_table(path, columns or {})
+    usable = np.isfinite(raw.x) & np.isfinite(raw.y)
+    notes = list(raw.notes)
+    local = local_times(
+        path, "detections", raw.stamps, usable, notes, time_zone=time_zone, sort=sort
+    )
+    row = local.row
+    return RobotDetections(
+        path,
+        "detections",
+        local.first_day,
+        local.time_us,
+        np.stack([raw.x, raw.y], 1)[row],
+        raw.heading[row],
+        tuple(notes),
+        label=raw.label[row],
+        labels=raw.labels,
+    )
+
+
+class _RawDetections(NamedTuple):
+    """Detections as a file has them; see `RobotDetections`."""
+
+    stamps: Stamps
+    x: F64
+    y: F64
+    heading: F64
+    label: I64
+    labels: tuple[str, ...]
+    notes: tuple[str, ...] = ()
+
+
+def _from_table(path: Path, columns: Mapping[str, str]) -> _RawDetections:
+    table = read_table(path)
+    named = columns_of(table, columns, path, COLUMNS)
+    line = np.arange(table.num_rows) + (2 if path.suffix.lower() == ".csv" else 1)
+    if not table.num_rows:
+        raise LogError(f"{path} holds no detection")
+    x, y = (numbers_of(table, named[axis], path, line) for axis in "xy")
+    heading = np.full(len(x), np.nan)
+    if "heading" in named:
+        heading = numbers_of(table, named["heading"], path, line)
+        if named["heading"].endswith("_deg"):
+            heading = heading / 180 * np.pi
+    label, labels = np.full(len(x), -1, np.int64), tuple[str, ...]()
+    if "user" in named:
+        label, labels = _codes(pc.cast(table[named["user"]], pa.string()).combine_chunks())
+    time_us, has_date, has_zone = times_of(table[named["time"]], path, line)
+    stamps = Stamps(time_us, line, has_date=has_date, has_zone=has_zone)
+    return _RawDetections(stamps, x, y, heading, label, labels)
+
+
+def _codes(texts: pa.Array) -> tuple[I64, tuple[str, ...]]:
+    """Return the index of each text among the different ones, -1 for none; and those, sorted."""
+    found = [text for text in pc.unique(texts).to_pylist() if text and text.strip()]
+    labels = tuple(sorted(found))
+    index = pc.index_in(texts, value_set=pa.array(labels, pa.string()))
+    return pc.fill_null(index, -1).to_numpy(zero_copy_only=False).astype(np.int64), labels
+
+
+# Bags
+
+
+def _from_bag(path: Path, topic: str | None, columns: Mapping[str, str]) -> _RawDetections:
+    with open_bag(path) as reader:
+        connection, fields = _topic(reader, path, topic, columns)
+        FIXES.check(connection.msgcount, path, LogError)
+        times: list[int] = []
+        rows: list[tuple[float, float, float]] = []
+        users: list[str | None] = []
+        number = 0
+        for number, (_, time, data) in enumerate(reader.messages([connection]), 1):
+            message = reader.deserialize(data, connection.msgtype)
+            stamp = stamp_of(message, time) if hasattr(message, "header") else time
+            for one in _each(message, fields, path, number):
+                times.append(stamp)
+                rows.append(
+                    (
+                        _number(one, fields["x"], path, number),
+                        _number(one, fields["y"], path, number),
+                        _number(one, fields["heading"], path, number)
+                        if "heading" in fields
+                        else np.nan,
+                    )
+                )
+                user = _value(one, fields["user"]) if "user" in fields else None
+                users.append(None if user is None else str(user))
+            FIXES.check(len(times), path, LogError)
+    if not times:
+        raise LogError(
+            f"{path}: none of the {number} messages of {connection.topic} has a detection"
+        )
+    time_ns = np.array(times, np.int64)
+    has_date = int(time_ns.max()) >= LATEST_SIMULATED_NS
+    time_us = time_ns // 1000 if has_date else (time_ns - time_ns.min()) // 1000
+    stamps = Stamps(time_us, np.arange(1, len(times) + 1), has_date=has_date, has_zone=has_date)
+    x, y, heading = np.array(rows, np.float64).T
+    label, labels = _codes(pa.array(users, pa.string()))
+    note = f"{connection.topic}: {len(times)} detections in {number} messages"
+    return _RawDetections(stamps, x, y, heading, label, labels, (note,))
+
+
+def _topic(
+    reader: Any, path: Path, topic: str | None, columns: Mapping[str, str]
+) -> tuple[Any, dict[str, str]]:
+    """Return the connection of a topic, and the fields of its messages.
+
+    Raises:
+        LogError: There is no such topic, or it isn't known which fields its messages have.
+    """
+    topics = {connection.topic: connection for connection in reader.connections}
+    known = [name for name, connection in topics.items() if connection.msgtype in ARRAYS]
+    if topic is None and len(known) == 1:
+        topic = known[0]
+    if topic is None or topic not in topics:
+        which = f"no topic {topic!r}{did_you_mean(topic, topics)}" if topic else "several topics"
+        listed = ", ".join(f"{c.topic} ({c.msgtype})" for c in list(topics.values())[:20])
+        raise LogError(f"{path} has {which}: select one by 'topic': {listed}")
+    connection = topics[topic]
+    unknown = sorted(set(columns) - {"each", *COLUMNS} | set(columns) & {"time"})
+    if unknown:
+        raise LogError(
+            f"columns: unknown key {unknown[0]!r}; allowed for a bag: each, user, x, y, heading"
+        )
+    fields = {**_FIELDS.get(connection.msgtype, {}), **columns}
+    if not {"x", "y"} <= fields.keys():
+        raise LogError(
+            f"{path}: {topic} has messages of the type {connection.msgtype}: say where they have"
+            " the position by columns: {each: …, user: …, x: …, y: …}"
+        )
+    return connection, fields
+
+
+def _each(message: Any, fields: Mapping[str, str], path: Path, number: int) -> Iterator[Any]:
+    """Yield the detections in a message."""
+    if "each" not in fields:
+        yield message
+        return
+    items = _value(message, fields["each"])
+    if not isinstance(items, list | tuple | np.ndarray):
+        raise LogError(f"{path}, message {number}: {fields['each']!r} is not a list")
+    yield from items
+
+
+def _value(message: Any, field: str) -> Any:
+    """Return a field of a message by its dotted path; None where a list is too short."""
+    for part in field.split("."):
+        if part.isdigit():
+            if len(message) <= int(part):
+                return None
+            message = message[int(part)]
+        elif hasattr(message, part):
+            message = getattr(message, part)
+        else:
+            names = ", ".join(name for name in vars(message) if not name.startswith("_"))
+            raise LogError(f"columns: {field!r}: there is no {part!r}; there are: {names}")
+    return message
+
+
+def _number(message: Any, field: str, path: Path, number: int) -> float:
+    value = _value(message, field)
+    try:
+        return np.nan if value is None else float(value)
+    except (TypeError, ValueError):
+        raise LogError(
+            f"{path}, message {number}: expected a number in {field!r}, got {one_line(value)!r}"
+        ) from None

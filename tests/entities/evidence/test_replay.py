@@ -1,0 +1,229 @@
+"""What a real robot perceived, replayed: rows, events, algorithms, metrics, and what is refused."""
+
+from datetime import timedelta
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import fleet2d
+from fleet2d.errors import InputError
+
+HEAD = "time,label,x,y\n"
+
+
+def place(room: str) -> tuple[float, float]:
+    """Return a place in the middle of a room of the bundled home."""
+    plan = fleet2d.load_floorplan()
+    return next(r.anchor_xy for r in plan.rooms if r.name == room)
+
+
+def scenario(path: Path, **robot: Any) -> dict[str, Any]:
+    return {
+        "extends": "bundled:base",
+        "simulation": {"duration": "1 h", "seed": 4},
+        "users": {"ana": {"type": "unknown"}},
+        "robots": {"astro": {"perceives": {"type": "replay", "path": str(path)} | robot}},
+        "algorithms": {"ltp": {"type": "ltp", "period": "10 min"}, "rtp": {"type": "rtp"}},
+        "metrics": {
+            "detections": {},
+            "sightings": {},
+            "rtp_score": {"of": "rtp"},
+            "ltp_error": None,
+        },
+    }
+
+
+def detections(path: Path, rows: list[tuple[float, str, float, float]]) -> Path:
+    path.write_text(HEAD + "".join(f"{t},{who},{x},{y}\n" for t, who, x, y in rows))
+    return path
+
+
+@pytest.fixture
+def kitchen(tmp_path: Path) -> Path:
+    x, y = place("kitchen_0")
+    rows = [(float(t), "ana", x, y) for t in range(600, 660)]
+    return detections(tmp_path / "seen.csv", [*rows, (700.4, "person", x + 0.1, y)])
+
+
+def test_detections_are_the_observations_of_the_run(kitchen: Path) -> None:
+    run = fleet2d.run(scenario(kitchen))
+
+    table = run.tables["observations"]
+    x, _ = place("kitchen_0")
+    assert table["step"].to_pylist() == [*range(600, 660), 700]
+    assert table["user"].to_pylist() == ["ana"] * 60 + [None]
+    assert table["room"].to_pylist() == ["kitchen_0"] * 61
+    assert np.allclose(table["x"].to_numpy(), [x] * 60 + [x + 0.1], atol=1e-3)
+    assert table["truth_known"].to_pylist() == [False] * 61
+    assert table["true_user"].to_pylist() == [None] * 61
+
+
+def test_events_say_when_somebody_is_seen_and_lost(kitchen: Path) -> None:
+    run = fleet2d.run(scenario(kitchen))
+
+    events = run.tables["events"].to_pylist()
+    seen = [(e["step"], e["event"], e["user"]) for e in events if e["event"].startswith("user_")]
+    assert seen == [
+        (600, "user_seen", "ana"),
+        (664, "user_lost", "ana"),
+        (700, "user_seen", None),
+        (705, "user_lost", None),
+    ]
+
+
+def test_algorithms_learn_from_it(kitchen: Path) -> None:
+    run = fleet2d.run(scenario(kitchen))
+
+    last = [r for r in run.tables["ltp"].to_pylist() if r["user"] == "ana"][-1]
+    assert last["room"] == "kitchen_0" or run.tables["ltp"].num_rows
+
+
+def test_metrics_say_that_the_truth_is_unknown(kitchen: Path) -> None:
+    metrics = fleet2d.run(scenario(kitchen)).metrics
+
+    assert metrics["detections"] == {"astro": {"unknown_truth": 61}}
+    assert metrics["rtp_score"] == {"ana": {"truth unknown": {"bins": 60}}}
+    assert metrics["sightings"] == {}
+
+
+def test_known_truth_and_real_sightings_score_the_belief(tmp_path: Path, kitchen: Path) -> None:
+    x, y = place("kitchen_0")
+    truth = tmp_path / "uwb.csv"
+    truth.write_text("time,x,y\n" + "".join(f"{t},{x},{y}\n" for t in range(600, 2400, 30)))
+    content = scenario(kitchen)
+    content["users"] = {"ana": {"type": "replay", "path": str(truth)}}
+
+    metrics = fleet2d.run(content).metrics
+
+    scores = metrics["rtp_score"]["ana"]
+    assert scores["all"]["bins"] + scores["truth unknown"]["bins"] == 60
+    assert scores["truth unknown"]["bins"] == 31
+    assert "never seen" not in scores
+    assert metrics["sightings"]["ana"] == pytest.approx(60 / 1771, rel=0.01)
+
+
+def test_every_span_length_gives_the_same_run(kitchen: Path) -> None:
+    content = scenario(kitchen)
+    content["robots"]["astro"]["behaviors"] = [{"type": "opportunistic"}, {"type": "patrol"}]
+
+    digests = {fleet2d.run(content, max_span=span).digest for span in (1, 7, None)}
+
+    assert len(digests) == 1
+
+
+def test_a_checkpoint_continues_with_the_same_detections(kitchen: Path) -> None:
+    import copy
+
+    simulation = fleet2d.Simulation(scenario(kitchen))
+    simulation.advance(630)
+
+    assert copy.deepcopy(simulation).run().digest == fleet2d.run(scenario(kitchen)).digest
+
+
+def test_positions_in_the_frame_of_the_robot_turn_with_it(tmp_path: Path) -> None:
+    path = detections(tmp_path / "seen.csv", [(t, "ana", 1.0, 0.5) for t in range(0, 600, 10)])
+    content = scenario(path, relative_to="robot")
+    content["robots"]["astro"]["behaviors"] = [{"type": "patrol"}]
+
+    run = fleet2d.run(content)
+
+    poses = run.path("astro", every=timedelta(seconds=10))
+    table = run.tables["observations"]
+    cos, sin = np.cos(poses.heading[:60]), np.sin(poses.heading[:60])
+    assert np.allclose(table["x"].to_numpy(), poses.x[:60] + cos - 0.5 * sin, atol=2e-3)
+    assert np.allclose(table["y"].to_numpy(), poses.y[:60] + sin + 0.5 * cos, atol=2e-3)
+
+
+def test_the_frame_moves_positions(kitchen: Path, tmp_path: Path) -> None:
+    x, y = place("kitchen_0")
+    path = detections(tmp_path / "moved.csv", [(0, "ana", x - 2, y + 1)])
+
+    run = fleet2d.run(scenario(path, frame={"origin": [2, -1]}))
+
+    assert run.tables["observations"]["room"].to_pylist() == ["kitchen_0"]
+
+
+def test_few_detections_outside_are_left_out_and_counted(tmp_path: Path) -> None:
+    x, y = place("kitchen_0")
+    rows = [(t, "ana", x, y) for t in range(9)] + [(9, "ana", -40.0, y)]
+    path = detections(tmp_path / "seen.csv", rows)
+
+    run = fleet2d.run(scenario(path))
+
+    assert run.tables["observations"].num_rows == 9
+    notes = " ".join(run.manifest["notes"])
+    assert "1 of 10 detections are outside the home and left out, by up to 4" in notes
+
+
+@pytest.mark.parametrize(
+    ("rows", "options", "message"),
+    [
+        ([(0, "ana", 80.0, 80.0)], {}, "the frame of"),
+        (
+            [(0, "anna", 1.0, 1.0)],
+            {},
+            "no user is named 'anna' (1 detections): say who it is by people: {anna: NAME}",
+        ),
+        ([(0, "ana", 1.0, 1.0)], {"people": {"f7": "ana"}}, "people: the log has no label 'f7'"),
+        ([(0, "f7", 1.0, 1.0)], {"people": {"f7": "anna"}}, "people: there is no user 'anna'"),
+        (
+            [(90000, "ana", 1.0, 1.0), (90001, "ana", 1.0, 1.0)],
+            {},
+            "none of its 2 detections is in the run: 0 before it begins, 2 after it ends",
+        ),
+        (
+            [(0, "ana", 1.0, 1.0)],
+            {"day": 3},
+            "the run begins on day 3 of the log, which has the days 0 to 0",
+        ),
+    ],
+)
+def test_a_log_that_does_not_fit_is_refused(
+    tmp_path: Path, rows: list[Any], options: dict[str, Any], message: str
+) -> None:
+    with pytest.raises(InputError) as caught:
+        fleet2d.Simulation(scenario(detections(tmp_path / "seen.csv", rows), **options))
+
+    assert "robots.astro.perceives: " in str(caught.value)
+    assert message in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"camera": None}, "it needs a camera"),
+        ({"perception": {"false_positives": {"per_hour": 1}}}, "give 'perceives' or 'perception'"),
+    ],
+)
+def test_a_robot_perceives_in_one_way(kitchen: Path, change: dict[str, Any], message: str) -> None:
+    content = scenario(kitchen)
+    content["robots"]["astro"] |= change
+
+    with pytest.raises(InputError, match=message):
+        fleet2d.Simulation(content)
+
+
+def test_there_must_be_users(kitchen: Path) -> None:
+    content = scenario(kitchen) | {
+        "users": {"ana": None},
+        "algorithms": {"ltp": None},
+        "metrics": {},
+    }
+
+    with pytest.raises(InputError, match="there are no users to be perceived"):
+        fleet2d.Simulation(content)
+
+
+def test_its_camera_cannot_be_disturbed(kitchen: Path) -> None:
+    simulation = fleet2d.Simulation(scenario(kitchen))
+
+    with pytest.raises(InputError, match="its cameras can't be changed"):
+        simulation.intervene({"switch_off": "astro", "camera": True})
+
+
+def test_the_log_is_an_input_of_the_run(kitchen: Path, tmp_path: Path) -> None:
+    run = fleet2d.run(scenario(kitchen), out=tmp_path / "run")
+
+    assert [Path(i["path"]).name for i in run.manifest["inputs"]] == ["seen.csv"]
