@@ -10,7 +10,14 @@ import pytest
 
 import fleet2d
 from fleet2d.errors import InputError
-from fleet2d.studies.answers import effects, paired, variance_ratio, variance_shares
+from fleet2d.studies.answers import (
+    effects,
+    holm,
+    paired,
+    unit_differences,
+    variance_ratio,
+    variance_shares,
+)
 
 COLUMNS = ("method", "robot", "home", "seed")
 
@@ -151,3 +158,45 @@ def test_hanging_out_or_not_has_the_variance_in_pairs_that_is_promised(tmp_path:
         unpaired = np.concatenate([on - np.roll(off, shift) for shift in range(1, len(on))])
         assert 18 == row["pairs"] == len(on)
         assert unpaired.var() / (on - off).var() == pytest.approx(row["variance_ratio"], rel=0.15)
+
+
+def test_p_values_are_corrected_for_the_number_of_comparisons() -> None:
+    frame = pl.concat(
+        [variants(effect=0.04), variants(effect=0.03).with_columns(method=pl.lit("newer"))]
+    ).unique(["method", "robot", "home", "seed"], maintain_order=True)
+    first, second = compare(frame)
+    assert first["p_holm"] >= first["p"]
+    assert holm([first["p"], second["p"]]) == [first["p_holm"], second["p_holm"]]
+
+
+def test_an_effect_is_told_in_deviations_and_relative_to_the_reference() -> None:
+    frame = pl.DataFrame(
+        {"method": method, "robot": "patrol", "home": home, "seed": 0, "score": score}
+        for method, scores in (("old", [2.0, 4.0, 6.0]), ("new", [3.0, 6.0, 9.0]))
+        for home, score in enumerate(scores)
+    )
+    (row,) = compare(frame)
+    assert (4.0, 0.5) == (row["reference"], row["relative"])
+    assert row["effect_size"] == pytest.approx(2.0)  # differences 1, 2, 3
+
+
+def test_differences_of_each_home_have_the_mean_of_all() -> None:
+    frame = variants()
+    rows = unit_differences(frame, COLUMNS, "score", {"method": "old"}, "home")
+    assert ["method", "home", "difference"] == rows.columns
+    assert 8 == len(rows)
+    (row,) = compare(frame)
+    assert row["difference"] == pytest.approx(rows["difference"].mean())
+
+
+def test_what_no_axis_explains_is_the_residual() -> None:
+    table = variance_shares(variants(noise=3.0), COLUMNS, "score")
+    assert "residual" == table["source"][-1]
+    assert table["share"][-1] > 0.1
+    assert 1 == pytest.approx(table["share"].sum())
+
+
+def test_shares_of_nothing_are_zero_and_no_rounding_errors() -> None:
+    table = variance_shares(variants(effect=0, noise=0), COLUMNS, "score")
+    shares = dict(table.iter_rows())
+    assert 0 == shares["robot"] == shares["residual"] == shares["method × robot"]

@@ -13,8 +13,8 @@ import numpy as np
 from fleet2d.configuration.documents import read_document
 from fleet2d.errors import ComponentError, InputError
 from fleet2d.metrics.rtp_score import ALL, GAPS
-from fleet2d.studies.answers import estimate
 from fleet2d.studies.api import study
+from fleet2d.studies.intervals import estimate
 
 if TYPE_CHECKING:
     from fleet2d.studies.reader import Study
@@ -235,7 +235,7 @@ def rtp_gap(options: PaperOptions) -> Result:
 
     Real-time presence by several models and by the naive guess (the room of the last sighting) is
     scored every minute: the share of right rooms, and the log loss, which is a proper score. The
-    result is the mean over seeds with its bootstrap interval; each seed is a month of another life
+    result is the mean over seeds with its interval; each seed is a month of another life
     with a robot on patrol.
     """
     seeds, days = options.size(RTP_GAP)
@@ -297,7 +297,7 @@ def feedback(options: PaperOptions) -> Result:
 
     Every estimator of long-term presence is measured under every policy of the robot with the same
     seeds. The error is the total variation distance between the estimate at the end and the true
-    shares of time at home: mean and 95 % bootstrap interval over seeds, and the same of the
+    shares of time at home: mean and 95 % interval over seeds, and the same of the
     difference to the naive estimator with each seed. A robot that hangs out uses the estimator of
     the column; with other policies all estimators watch the same robot.
     """

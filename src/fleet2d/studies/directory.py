@@ -3,9 +3,9 @@
 import hashlib
 import json
 import os
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Self
 
@@ -69,6 +69,21 @@ class Counts:
 
 
 @dataclass(frozen=True)
+class MetricFacts:
+    """What readers should know of a metric.
+
+    Attributes:
+        description: What it measures, in one line.
+        unit: The unit of its numbers.
+        units: The units of those that differ, by the last part of their names.
+    """
+
+    description: str = ""
+    unit: str = ""
+    units: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
 class Meta:
     """The content of `study.json`.
 
@@ -81,6 +96,9 @@ class Meta:
         tables: The names of the tables to keep.
         compare: The comparisons that the report shows.
         source: The study file's text, for readers.
+        metrics: The metrics of the scenarios, by name.
+        tags: Words to find the study by.
+        notes: Remarks of its author.
     """
 
     name: str
@@ -91,6 +109,15 @@ class Meta:
     tables: tuple[str, ...]
     compare: tuple[PairedComparison, ...] = ()
     source: str = ""
+    metrics: Mapping[str, MetricFacts] = field(default_factory=dict)
+    tags: tuple[str, ...] = ()
+    notes: str = ""
+
+    def unit(self, metric: str) -> str:
+        """Return the unit of a metric such as `ltp_error.ana.tv`; empty if unknown."""
+        entry, *_, last = metric.split(".")
+        facts = self.metrics.get(entry, MetricFacts())
+        return facts.units.get(last, facts.unit)
 
 
 class StudyDirectory:

@@ -26,6 +26,7 @@ from fleet2d.studies.directory import (
     VARIANTS,
     Counts,
     Meta,
+    MetricFacts,
     StudyDirectory,
 )
 from fleet2d.studies.executors import Event, Executor, LostTask, TaskSchedule, WorkerTask
@@ -117,11 +118,13 @@ class CheckedStudy:
         specification: The study.
         plan: Its variants.
         scenarios: Their scenarios, as the content of a file.
+        metrics: What readers should know of their metrics, by name.
     """
 
     specification: Specification
     plan: StudyPlan
     scenarios: ScenarioFile
+    metrics: Mapping[str, MetricFacts]
 
     @property
     def job(self) -> StudyJob:
@@ -145,7 +148,7 @@ def check_study(source: str | Path | Mapping[str, Any] | Specification) -> Check
 
     plan = make_plan(build_design(specification), on_scenario)
     names.check(specification.file)
-    return CheckedStudy(specification, plan, scenarios)
+    return CheckedStudy(specification, plan, scenarios, names.facts)
 
 
 @dataclass
@@ -296,6 +299,9 @@ def _write_plan(directory: StudyDirectory, checked: CheckedStudy, plan: StudyPla
         file.keep.tables,
         file.compare,
         source.read_text(encoding="utf-8") if source else "",
+        checked.metrics,
+        file.tags,
+        file.notes,
     )
     directory.write_meta(meta)
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from fleet2d.errors import extra
 from fleet2d.runtime.clock import DAY_US
-from fleet2d.studies.answers import estimate
+from fleet2d.studies.intervals import estimate
 from fleet2d.studies.parts import VARIANT
 
 if TYPE_CHECKING:
@@ -75,8 +75,15 @@ MAX_LABELS = 24
 MOMENTS = 60  # maximum number of points of a line over time
 
 
-def draw_comparison(table: "pl.DataFrame", axis: str, reference: Any, metric: str) -> Figure:
-    """Draw differences to a reference with their intervals, one row for each value of an axis."""
+def draw_comparison(table: "pl.DataFrame", axis: str, reference: Any, label: str) -> Figure:
+    """Draw differences to a reference with their intervals, one row for each value of an axis.
+
+    Args:
+        table: The comparison; its columns before `mean` are the axis and those within it.
+        axis: The axis.
+        reference: Its reference value.
+        label: The metric with its unit.
+    """
     rows = table.to_dicts()[::-1]
     figure, axes = _figure(0.42 * len(rows) + 1.1)
     for y, row in enumerate(rows):
@@ -85,19 +92,59 @@ def draw_comparison(table: "pl.DataFrame", axis: str, reference: Any, metric: st
         axes.plot([row["low"], row["high"]], [y, y], color=color, lw=2.2, solid_capstyle="butt")
         axes.plot(row["difference"], y, "o", color=color, ms=6)
     axes.axvline(0, color=DARK, lw=0.8)
-    statistics = {"mean", "reference", "difference", "low", "high", "pairs", "verdict"}
-    inner_axes = [
-        column for column in table.columns
-        if column not in {axis, *statistics} and not column.startswith(("n_", "variance_"))
-    ]  # fmt: skip
+    inner_axes = table.columns[1 : table.get_column_index("mean")]
     labels = [", ".join([str(row[axis]), *(f"{c} {row[c]}" for c in inner_axes)]) for row in rows]
     axes.set_yticks(range(len(rows)), labels)
     axes.set_ylim(-0.6, len(rows) - 0.4)
-    axes.set_xlabel(f"{metric}: difference to {axis} = {reference}")
+    axes.set_xlabel(f"{label}: difference to {axis} = {reference}")
     return figure
 
 
-def draw_means(tables: "dict[str, pl.DataFrame]", metric: str) -> Figure:
+def draw_unit_differences(rows: "pl.DataFrame", axis: str, unit: str, label: str) -> Figure:
+    """Draw the difference in each unit, the smallest first; one panel for each value of an axis."""
+    tables = rows.partition_by(axis, maintain_order=True)[:MAX_LINES]
+    figure = Figure(figsize=(8.0, 2.6), dpi=DPI, layout="constrained")
+    panels = np.atleast_1d(figure.subplots(1, len(tables), sharey=True))
+    for panel, table in zip(panels, tables, strict=True):
+        _tidy(panel)
+        table = table.sort("difference", unit)
+        panel.axhline(0, color=DARK, lw=0.8)
+        values = table["difference"].to_numpy()
+        x = np.arange(len(values))
+        panel.vlines(x, 0, values, color=PALE, lw=1.5)
+        panel.plot(x, values, "o", color=COLORS[0], ms=4)
+        _label(panel, [str(name) for name in table[unit].to_list()], len(tables))
+        panel.set_title(f"{axis} = {table[axis][0]}", fontsize=8)
+        panel.set_xlabel(unit)
+    _label_y(panels[0], f"difference of {label}")
+    return figure
+
+
+def draw_interaction(table: "pl.DataFrame", first: str, second: str, label: str) -> Figure:
+    """Draw the means of the cells of two axes with intervals, a line for each value of the second.
+
+    Lines that aren't parallel show that the effect of one axis depends on the other.
+    """
+    figure, axes = _figure(3.0)
+    labels = table[first].unique(maintain_order=True).to_list()
+    lines = table.partition_by(second, maintain_order=True)[:MAX_LINES]
+    for number, line in enumerate(lines):
+        x = np.array([labels.index(value) for value in line[first].to_list()], np.float64)
+        x += 0.08 * (number - (len(lines) - 1) / 2)
+        mean = line["mean"].to_numpy()
+        ends = np.nan_to_num(np.abs(line.select("low", "high").to_numpy() - mean[:, None])).T
+        axes.errorbar(
+            x, mean, yerr=ends, fmt="o-", color=COLORS[number], lw=1.2, ms=4, elinewidth=1,
+            label=str(line[second][0]),
+        )  # fmt: skip
+    _label(axes, [str(value) for value in labels])
+    axes.set_xlabel(first)
+    _label_y(axes, label)
+    axes.legend(frameon=False, fontsize=8, title=second, title_fontsize=8)
+    return figure
+
+
+def draw_means(tables: "dict[str, pl.DataFrame]", label: str) -> Figure:
     """Draw the mean of a metric by the values of each axis, one panel for each axis."""
     figure = Figure(figsize=(8.0, 2.8), dpi=DPI, layout="constrained")
     panels = np.atleast_1d(figure.subplots(1, max(len(tables), 1), sharey=True))
@@ -117,33 +164,33 @@ def draw_means(tables: "dict[str, pl.DataFrame]", metric: str) -> Figure:
         if not is_numeric:
             _label(panel, [str(row[axis]) for row in rows])
         panel.set_xlabel(axis)
-    panels[0].set_ylabel(metric)
+    _label_y(panels[0], label)
     return figure
 
 
-def draw_distribution(frame: "pl.DataFrame", metric: str, axis: str | None) -> Figure:
+def draw_distribution(frame: "pl.DataFrame", metric: str, label: str, axis: str | None) -> Figure:
     """Draw the metric of every variant with median and quartiles, by the values of an axis."""
     import polars as pl
 
     labels = [None] if axis is None else frame[axis].unique(maintain_order=True).to_list()
     figure, axes = _figure(2.8)
     generator = np.random.Generator(np.random.Philox(key=1))
-    for x, label in enumerate(labels):
-        group = frame if axis is None else frame.filter(pl.col(axis).eq_missing(label))
+    for x, value in enumerate(labels):
+        group = frame if axis is None else frame.filter(pl.col(axis).eq_missing(value))
         values = group[metric].to_numpy()
         shift = generator.uniform(-0.22, 0.22, len(values))
         axes.plot(x + shift, values, ".", color=PALE, ms=4, zorder=1)
         low, middle, high = np.quantile(values, [0.25, 0.5, 0.75])
         axes.plot([x, x], [low, high], color=COLORS[0], lw=5, alpha=0.5, solid_capstyle="butt")
         axes.plot([x - 0.16, x + 0.16], [middle, middle], color=DARK, lw=1.6)
-    _label(axes, ["all" if label is None else str(label) for label in labels])
+    _label(axes, ["all" if value is None else str(value) for value in labels])
     axes.set_xlabel(axis or "")
-    axes.set_ylabel(metric)
+    _label_y(axes, label)
     return figure
 
 
 def draw_course(
-    frame: "pl.DataFrame", metric: str, axis: str | None, units: Sequence[str]
+    frame: "pl.DataFrame", label: str, axis: str | None, units: Sequence[str]
 ) -> Figure:
     """Draw a metric with its interval over simulated days, one line for each value of an axis."""
     import polars as pl
@@ -152,22 +199,22 @@ def draw_course(
     days = frame[DAY].unique().sort().to_numpy()
     moments = days[np.unique(np.linspace(0, len(days) - 1, MOMENTS).round().astype(int))]
     figure, axes = _figure(3.0)
-    for number, label in enumerate(labels[:MAX_LINES]):
-        group = frame if axis is None else frame.filter(pl.col(axis).eq_missing(label))
+    for number, value in enumerate(labels[:MAX_LINES]):
+        group = frame if axis is None else frame.filter(pl.col(axis).eq_missing(value))
         points = []
         for day in moments:
             rows = group.filter(pl.col(DAY) == day).group_by(list(units) or ["variant"])
             cells = rows.agg(pl.col(VALUE).mean()).drop_nulls()
             if len(cells):
                 levels = {unit: cells[unit].to_list() for unit in units}
-                mean = estimate(cells[VALUE].to_numpy(), levels, resamples=300)
+                mean = estimate(cells[VALUE].to_numpy(), levels)
                 points.append((day, mean.mean, mean.low, mean.high))
         x, means, low, high = np.array(points).T
         color = COLORS[number % len(COLORS)]
         axes.fill_between(x, low, high, color=color, alpha=0.15, lw=0)
-        axes.plot(x, means, color=color, lw=1.5, label=str(label))
+        axes.plot(x, means, color=color, lw=1.5, label=str(value))
     axes.set_xlabel("simulated time [days]")
-    axes.set_ylabel(metric)
+    _label_y(axes, label)
     if axis is not None:
         axes.legend(frameon=False, fontsize=8, title=axis, title_fontsize=8)
     return figure
@@ -185,12 +232,17 @@ def _tidy(axes: Axes) -> None:
     axes.tick_params(labelsize=8)
 
 
-def _label(axes: Axes, labels: Sequence[str]) -> None:
+def _label_y(axes: Axes, label: str) -> None:
+    """Label the y axis, with the unit on a line of its own."""
+    axes.set_ylabel(label.replace(" [", "\n["), fontsize=9)
+
+
+def _label(axes: Axes, labels: Sequence[str], panels: int = 1) -> None:
     """Label the x axis at 0, 1, 2 …; of many labels only every n-th is written."""
-    stride = max(1, -(-len(labels) // MAX_LABELS))
+    stride = max(1, -(-len(labels) * panels // MAX_LABELS))
     ticks = range(0, len(labels), stride)
     longest = max(map(len, labels), default=0)
-    is_slanted = longest * len(labels) > 90
+    is_slanted = longest * len(labels) * panels > 90
     axes.set_xticks(
         ticks, [labels[i] for i in ticks], rotation=30 if is_slanted else 0,
         ha="right" if is_slanted else "center",

@@ -31,7 +31,7 @@ from fleet2d.studies.design import (
     input_hash,
     scenario_content,
 )
-from fleet2d.studies.directory import PLAN, SCENARIOS, StudyDirectory
+from fleet2d.studies.directory import PLAN, SCENARIOS, MetricFacts, StudyDirectory
 from fleet2d.studies.executors import Executor, LostTask, SerialExecutor, TaskSchedule, WorkerTask
 from fleet2d.studies.parts import VARIANT
 from fleet2d.studies.simulator import check_setup, is_kept, measure
@@ -90,6 +90,9 @@ class KnownNames:
     """The names of tables, metrics and bodies in the variants of a study.
 
     A study that keeps or compares what no variant has would end without it, silently.
+
+    Attributes:
+        facts: What readers should know of each metric.
     """
 
     def __init__(self) -> None:
@@ -97,6 +100,7 @@ class KnownNames:
         self._tables = {"trajectories", *SWITCHES}
         self._metrics: dict[str, bool] = {}  # by name, whether it comes with Fleet2D
         self._bodies = {"anyone"}
+        self.facts: dict[str, MetricFacts] = {}
 
     def add(self, scenario: Scenario) -> None:
         """Add the names of a scenario."""
@@ -104,7 +108,11 @@ class KnownNames:
         self._tables |= {"sensors"} if scenario.objects else set()
         self._bodies |= {*scenario.users, *scenario.robots}
         for name, metric in scenario.metrics.items():
-            self._metrics[name] = type(metric).__module__.startswith("fleet2d.")
+            kind = type(metric)
+            self._metrics[name] = kind.__module__.startswith("fleet2d.")
+            if name not in self.facts:
+                description = (kind.__doc__ or "").strip().partition("\n")[0]
+                self.facts[name] = MetricFacts(description, kind.unit, kind.units)
 
     def check(self, file: StudyFile) -> None:
         """Check the names in a study file.

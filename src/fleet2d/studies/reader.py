@@ -263,7 +263,9 @@ class Study:
                 are averaged.
 
         Returns:
-            A row for each other value: mean, reference, difference, low and high (95 %), pairs,
+            A row for each other value: mean, reference, difference, low and high (95 %), relative
+            (to the size of the reference), effect_size (in standard deviations of the units'
+            differences), p, p_holm (corrected for the rows of this table), pairs, n_UNIT,
             variance_ratio (of unpaired to paired differences), and a verdict in words.
 
         Raises:
@@ -272,6 +274,16 @@ class Study:
         return answers.paired(
             self._with_metric(metric), self.columns, metric, against, self._units(by), within
         )
+
+    def differences(self, metric: str, against: Mapping[str, Any], unit: str) -> "pl.DataFrame":
+        """Return the mean difference to the reference in each unit, such as each home.
+
+        Raises:
+            InputError: There is no such metric, axis or value.
+        """
+        answers.check_axes((*against, unit), self.columns)
+        frame = self._with_metric(metric)
+        return answers.unit_differences(frame, self.columns, metric, against, unit)
 
     def summary(
         self, metric: str, axes: Sequence[str], by: Sequence[str] | None = None

@@ -1,17 +1,21 @@
-"""The report of a study: one self-contained HTML page, and its figures as files."""
+"""The report of a study: one self-contained HTML page, its figures, and its tables as files."""
 
 import base64
 import html
+import itertools
 import math
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from datetime import timedelta
+from functools import cached_property
 from pathlib import Path
 from statistics import median_high
 from typing import TYPE_CHECKING, Any
 
 from fleet2d.errors import ArtifactError, InputError
-from fleet2d.studies.answers import FEW_UNITS
+from fleet2d.studies.answers import FEW_UNITS, RESIDUAL, holm
 from fleet2d.studies.figures import over_time
+from fleet2d.studies.intervals import LEVEL
 from fleet2d.studies.specification import PairedComparison
 
 if TYPE_CHECKING:
@@ -23,20 +27,50 @@ if TYPE_CHECKING:
 
 MAX_METRICS = 12
 MAX_SHARES = 8
+MAX_INTERACTIONS = 3  # pairs of axes with a table of cell means, for each metric
+MAX_CELLS = 60  # of such a table
+LONG_NAME, SHORT_NAME = 16, 6  # from how many characters on names are shortened, and to how many
+INTERVAL = f"{LEVEL:.0%} interval"
+HEADINGS = {
+    "p_holm": "p (Holm)", "effect_size": "effect size", "low": INTERVAL,
+}  # fmt: skip
+NOT_SHOWN = ("high", "variance_ratio", "verdict")  # columns that stand elsewhere on the page
+GLOSSARY = {
+    "mean": "mean over the units, such as homes and seeds, each of equal weight",
+    "reference": "the same of the value that all others are compared with",
+    "difference": "mean difference to the reference over pairs with the same home, people and seed",
+    INTERVAL: f"contains the true value in about {LEVEL:.0%} of such studies; see Methods",
+    "relative": "difference over the size of the reference",
+    "effect size": "difference over the standard deviation of the units' differences (Cohen's d)",
+    "p": "probability of such a difference, or a larger one, if there were none",
+    "p (Holm)": "the same, corrected for the number of comparisons in this report",
+    "pairs": "pairs of runs; then the number of units of each kind",
+    "deviation": "standard deviation of single runs",
+    "variants": "number of runs",
+    "effect": "mean of the value less the mean of all values of its axis, within units",
+    "share": f"share of the variance of runs; {RESIDUAL}: what axes and their pairs don't explain",
+}
 STYLE = """
-body{font:15px/1.5 system-ui,sans-serif;max-width:56em;margin:2em auto;padding:0 1em;color:#2d3138}
+body{font:15px/1.5 system-ui,sans-serif;max-width:60em;margin:2em auto;padding:0 1em;color:#2d3138}
 h1{font-size:1.6em}
 h2{font-size:1.25em;margin-top:2.2em;border-top:1px solid #d8dbe0;padding-top:1em}
 h3{font-size:1em;margin:1.4em 0 .3em}table{border-collapse:collapse;font-size:.85em;margin:.6em 0}
 th,td{padding:.2em .8em .2em 0;text-align:right;border-bottom:1px solid #e6e8ec}
+td{white-space:nowrap}td.text{white-space:normal}
 th:first-child,td:first-child,td.text,th.text{text-align:left}img{max-width:100%}
+th[title]{text-decoration:underline dotted #b0b5bd}dt{font-weight:600;float:left;margin-right:.5em}
 .warning{background:#fdf3e1;padding:.5em .8em;border-left:4px solid #c26a12}
+.files{font-size:.75em;color:#6b7078;margin:-.3em 0 1em}
 code,pre{font-size:.85em;background:#f4f5f7}pre{padding:.8em;overflow:auto}
+@page{margin:16mm}
+@media print{body{max-width:none;margin:0;font-size:10pt}h2,h3{break-after:avoid}
+table,img,dl{break-inside:avoid}pre{white-space:pre-wrap}.files{display:none}
+.warning{border:1px solid #c26a12}}
 """
 
 
 def write_report(study: "Study", folder: Path) -> Path:
-    """Write `report.html` and its figures into a folder; return the page.
+    """Write `report.html`, `figures/NAME.svg`, `tables/NAME.csv` and `.tex`; return the page.
 
     Raises:
         ArtifactError: No variant is complete.
@@ -47,7 +81,8 @@ def write_report(study: "Study", folder: Path) -> Path:
     if not study.counts.complete:
         raise ArtifactError(f"{study.location} has no complete variant: run it first")
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        for name in ("figures", "tables"):
+            (folder / name).mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(
             f"{folder} can't be created: {error.strerror}; name another --out"
@@ -66,21 +101,25 @@ def write_report(study: "Study", folder: Path) -> Path:
 
 
 class _Page:
-    """The sections of a report; figures are written to files on the way."""
+    """The sections of a report; figures and tables are written to files on the way."""
 
     def __init__(self, study: "Study", folder: Path) -> None:
-        self.study, self.folder = study, folder
-        self.units = tuple(c for c in study.meta.populations if study.variants[c].n_unique() > 1)
+        self.study, self.meta, self.folder = study, study.meta, folder
+        labels = {
+            column: study.complete[column].unique(maintain_order=True).drop_nulls().to_list()
+            for column in study.columns
+        }
+        self.counts = {column: len(values) for column, values in labels.items()}
+        self.units = tuple(c for c in self.meta.populations if self.counts[c] > 1)
         self.axes = tuple(
-            c
-            for c in study.columns
-            if c not in study.meta.populations and study.variants[c].drop_nulls().n_unique() > 1
+            c for c in study.columns if c not in self.meta.populations and self.counts[c] > 1
         )
+        self.names = {c: short_names(labels[c]) for c in self.meta.populations}
 
     def sections(self) -> Iterator[str]:
         """Yield the page, section by section."""
         yield from self._head()
-        for number, comparison in enumerate(self.study.meta.compare):
+        for number, comparison in enumerate(self.meta.compare):
             yield from self._comparison(number, comparison)
         metrics = self._metrics()
         for metric in metrics:
@@ -88,14 +127,18 @@ class _Page:
         more = len(self.study.metrics) - len(metrics)
         if more:
             yield f"<p>{more} more numbers are in <code>variants.parquet</code>.</p>"
+        yield from self._methods()
         yield from self._failures()
-        yield from self._source()
+        if self.meta.source:
+            yield f"<h2>The study file</h2><pre>{html.escape(self.meta.source)}</pre>"
 
     def _head(self) -> Iterator[str]:
-        counts, meta = self.study.counts, self.study.meta
+        counts, meta = self.study.counts, self.meta
         yield f"<h1>{html.escape(meta.name)}</h1>"
-        if meta.description:
-            yield f"<p>{html.escape(meta.description)}</p>"
+        for text in filter(None, (meta.description, meta.notes)):
+            yield f"<p>{html.escape(text)}</p>"
+        if meta.tags:
+            yield f"<p>Tags: {html.escape(', '.join(meta.tags))}.</p>"
         yield (
             f"<p>{counts.complete} of {counts.total} variants complete, {counts.failed} failed."
             f" {html.escape(meta.code)}.</p>"
@@ -103,38 +146,64 @@ class _Page:
         rows = []
         for column in self.study.columns:
             labels = self.study.variants[column].unique(maintain_order=True).to_list()
-            values = ", ".join(map(_text, labels[:12])) + (", …" if len(labels) > 12 else "")
-            rows.append([column, str(len(labels)), values])
-        yield _table(["axis", "values", "which"], rows, text=(0, 2))
+            kind = "units of intervals" if column in meta.populations else "compared"
+            values = ", ".join(_text(self._name(column, label)) for label in labels[:12])
+            rows.append([column, kind, str(len(labels)), values + ", …" * (len(labels) > 12)])
+        yield _table(["axis", "its values are", "number", "which"], rows, text=(0, 1, 3))
         yield from self._warnings(counts.total - counts.complete)
+        yield '<p><a href="#methods">How answers were computed, and what columns mean</a></p>'
 
     def _warnings(self, missing: int) -> Iterator[str]:
         if missing:
             yield _warning(f"{missing} variants have no results: the answers below leave them out.")
         for column in self.units:
-            count = self.study.variants[column].n_unique()
-            if count < FEW_UNITS:
+            if (count := self.counts[column]) < FEW_UNITS:
                 yield _warning(
                     f"There are only {count} values of {column}: intervals are wide and uncertain."
                     f" {FEW_UNITS} or more are better."
                 )
-        for column in self.study.meta.populations:
+        for column in self.meta.populations:
             if column not in self.units:
                 yield _warning(f"There is only one {column}: answers hold for that one only.")
 
-    def _comparison(self, number: int, comparison: PairedComparison) -> Iterator[str]:
-        from fleet2d.studies.figures import draw_comparison
+    @cached_property
+    def _comparisons(self) -> "list[pl.DataFrame | InputError]":
+        """The table of each comparison, or why there is none; p values corrected over all."""
+        import polars as pl
 
-        metric, against = comparison.metric, comparison.against
+        tables: list[pl.DataFrame | InputError] = []
+        for c in self.meta.compare:
+            try:
+                tables.append(self.study.paired(c.metric, c.against, c.by, c.within))
+            except InputError as error:
+                tables.append(error)
+        found = [table for table in tables if isinstance(table, pl.DataFrame)]
+        corrected = iter(holm([p for table in found for p in table["p"].to_list()]))
+        return [
+            table.with_columns(p_holm=pl.Series(list(itertools.islice(corrected, len(table)))))
+            if isinstance(table, pl.DataFrame)
+            else table
+            for table in tables
+        ]
+
+    def _comparison(self, number: int, comparison: PairedComparison) -> Iterator[str]:
+        from fleet2d.studies.figures import draw_comparison, draw_unit_differences
+
+        metric, against, name = comparison.metric, comparison.against, f"compare-{number + 1}"
         ((axis, reference),) = against.items()
         yield f"<h2>{html.escape(f'{metric} by {axis}, against {_text(reference)}')}</h2>"
-        try:
-            table = self.study.paired(metric, against, comparison.by, comparison.within)
-        except InputError as error:
-            yield _warning(str(error))
+        yield self._describe(metric)
+        table = self._comparisons[number]
+        if isinstance(table, InputError):
+            yield _warning(str(table))
             return
-        yield self._figure(draw_comparison(table, axis, reference, metric), f"compare-{number + 1}")
-        yield _frame(table.drop("variance_ratio"), text=(axis, "verdict", *comparison.within))
+        label = self._label(metric)
+        yield self._figure(draw_comparison(table, axis, reference, label), name)
+        within = (axis, *comparison.within)
+        yield self._frame(table, name, within)
+        for row in table.to_dicts():
+            labels = ", ".join(_text(row[column]) for column in within)
+            yield f"<p><b>{html.escape(labels)}</b>: {html.escape(row['verdict'])}.</p>"
         ratios = [r for r in table["variance_ratio"].to_list() if r and math.isfinite(r)]
         if ratios:
             yield (
@@ -142,64 +211,207 @@ class _Page:
                 f" variance is {_number(1 / median_high(ratios))} of that of"
                 " unpaired differences.</p>"
             )
+        unit = self.units[0] if self.units else None
+        if unit is not None and unit != axis:
+            rows = self._shortened(self.study.differences(metric, against, unit))
+            yield f"<h3>in each {html.escape(unit)}</h3>"
+            yield self._figure(draw_unit_differences(rows, axis, unit, label), f"{name}-{unit}")
 
     def _metrics(self) -> list[str]:
         """Return the metrics of the report, those of comparisons first."""
-        compared = [comparison.metric for comparison in self.study.meta.compare]
+        compared = [comparison.metric for comparison in self.meta.compare]
         ordered = dict.fromkeys([*compared, *self.study.metrics])
         return [name for name in ordered if name in self.study.metrics][:MAX_METRICS]
 
     def _metric(self, metric: str) -> Iterator[str]:
         from fleet2d.studies.figures import draw_course, draw_distribution, draw_means
 
-        study, name = self.study, _file_name(metric)
-        frame = study._with_metric(metric)
+        study, name, label = self.study, _file_name(metric), self._label(metric)
+        frame = self._shortened(study._with_metric(metric))
         if not len(frame):
             return
-        yield f"<h2>{html.escape(metric)}</h2>"
+        yield f"<h2>{html.escape(metric)}</h2>{self._describe(metric)}"
         if lacking := study.counts.complete - len(frame):
             yield _warning(f"{lacking} complete variants have no such number.")
         axes = self.axes or self.units[:1]
-        tables = {axis: study.summary(metric, [axis], self.units) for axis in axes}
+        tables = {a: self._shortened(study.summary(metric, [a], self.units)) for a in axes}
         if tables:
-            yield self._figure(draw_means(tables, metric), f"{name}-means")
+            yield self._figure(draw_means(tables, label), f"{name}-means")
         for axis, table in tables.items():
-            yield f"<h3>by {html.escape(axis)}</h3>{_frame(table, text=(axis,))}"
+            yield f"<h3>by {html.escape(axis)}</h3>"
+            yield self._frame(table, f"{name}-by-{_file_name(axis)}", (axis,))
         main = axes[0] if axes else None
         yield "<h3>distribution over variants</h3>"
-        yield self._figure(draw_distribution(frame, metric, main), f"{name}-distribution")
+        yield self._figure(draw_distribution(frame, metric, label, main), f"{name}-distribution")
         course = over_time(study, metric)
         if course is not None and course["day"].n_unique() > 1:
             yield "<h3>over time</h3>"
-            yield self._figure(draw_course(course, metric, main, self.units), f"{name}-time")
+            yield self._figure(draw_course(course, label, main, self.units), f"{name}-time")
         effects = study.effects(metric, self.units)
         if len(effects):
-            yield f"<h3>main effects</h3>{_frame(effects, text=('axis', 'value'))}"
+            yield "<h3>main effects</h3>"
+            yield self._frame(effects, f"{name}-effects", ("axis", "value"))
+        yield from self._interactions(metric, label)
         shares = study.shares(metric)
         if len(shares):
             yield "<h3>share of the variance, by axis and by interaction</h3>"
-            yield _frame(shares.head(MAX_SHARES), text=("source",))
+            largest = shares.head(MAX_SHARES - 1).extend(shares.tail(1)).unique(maintain_order=True)
+            yield self._frame(largest, f"{name}-variance", ("source",))
+
+    def _interactions(self, metric: str, label: str) -> Iterator[str]:
+        from fleet2d.studies.figures import draw_interaction
+
+        pairs = itertools.combinations(self.axes, 2)
+        small = [p for p in pairs if self.counts[p[0]] * self.counts[p[1]] <= MAX_CELLS]
+        for first, second in small[:MAX_INTERACTIONS]:
+            name = f"{_file_name(metric)}-{_file_name(first)}-{_file_name(second)}"
+            table = self.study.summary(metric, [first, second], self.units)
+            yield f"<h3>{html.escape(f'{first} × {second}')}</h3>"
+            yield self._figure(draw_interaction(table, first, second, label), name)
+            yield self._frame(table, name, (first, second))
+
+    def _methods(self) -> Iterator[str]:
+        """Yield a paragraph that can be cited, and the names of the units."""
+        times = self.study.complete["simulated_s"]
+        combinations = math.prod(self.counts[axis] for axis in self.axes)
+        units = " and ".join(f"{self.counts[c]} values of {c}" for c in self.units)
+        sizes = ", ".join(f"{self.counts[axis]} values of {axis}" for axis in self.axes)
+        number = sum(len(t) for t in self._comparisons if not isinstance(t, InputError))
+        text = (
+            f"{combinations} combination{'s' * (combinations > 1)} of settings"
+            f"{f' ({sizes})' * bool(sizes)} {'were' if combinations > 1 else 'was'} simulated by"
+            f" {self.meta.code.partition(',')[0].capitalize()}"
+            f"{f' over {units}' * bool(units)}: {len(times)} runs of"
+            f" {timedelta(seconds=times.median())} (h:mm:ss) each in the median."
+            " Runs with the same home, people and seed share the people's lives to the second, so"
+            " settings were compared in pairs."
+        )
+        if self.units:
+            text += (
+                f" Means weigh units equally. {INTERVAL}s treat {' and '.join(self.units)} as"
+                " random and crossed: standard errors come from a random-effects analysis of"
+                " variance with Satterthwaite's degrees of freedom, and each end of an interval is"
+                " the wider of Student's t and Hall's (1992) transformation of it, which corrects"
+                " for skewness. p values belong to the same intervals."
+            )
+        if number:
+            text += (
+                f" Those of the {number} comparisons of this report were also corrected by Holm's"
+                " (1979) method. Effect sizes are Cohen's d of paired differences."
+            )
+        yield f'<h2 id="methods">Methods</h2><p>{html.escape(text)}</p>'
+        terms = "".join(f"<dt>{term}</dt><dd>{text}</dd>" for term, text in GLOSSARY.items())
+        yield f"<h3>columns of tables</h3><dl>{terms}</dl>"
+        for column, names in self.names.items():
+            rows = [[short, label] for label, short in names.items() if short != label]
+            if rows:
+                yield f"<h3>names of {html.escape(column)}</h3>"
+                yield _table(["in this report", "name"], rows, text=(0, 1))
 
     def _failures(self) -> Iterator[str]:
         failures = self.study.failures
         if len(failures):
             yield "<h2>Failures</h2>"
             table = failures.select("variant", *self.study.columns, "error").head(50)
-            yield _frame(table, text=(*self.study.columns, "error"))
+            yield self._frame(table, "failures", (*self.study.columns, "error"))
 
-    def _source(self) -> Iterator[str]:
-        if self.study.meta.source:
-            yield f"<h2>The study file</h2><pre>{html.escape(self.study.meta.source)}</pre>"
+    def _describe(self, metric: str) -> str:
+        """Return a paragraph of what a metric is, and its unit."""
+        facts, unit = self.meta.metrics.get(metric.split(".")[0]), self.meta.unit(metric)
+        description = facts.description if facts else ""
+        text = f"{description} {f'Unit: {unit}.' if unit else ''}".strip()
+        return f"<p>{html.escape(text)}</p>" if text else ""
+
+    def _label(self, metric: str) -> str:
+        """Return a metric with its unit, as axes of figures name it."""
+        unit = self.meta.unit(metric)
+        return f"{metric} [{unit}]" if unit else metric
+
+    def _name(self, column: str, label: Any) -> Any:
+        """Return a label as the report shows it."""
+        return self.names.get(column, {}).get(label, label)
+
+    def _shortened(self, frame: "pl.DataFrame") -> "pl.DataFrame":
+        """Return a frame with the short names of units."""
+        import polars as pl
+
+        changes = [
+            pl.col(column).replace(names)
+            for column, names in self.names.items()
+            if column in frame.columns and any(short != label for label, short in names.items())
+        ]
+        return frame.with_columns(changes)
 
     def _figure(self, figure: "Figure", name: str) -> str:
         """Write a figure to a file; return it as an HTML image."""
         from fleet2d.pictures.floorplan import save_figure
 
-        path = self.folder / "figures" / f"{name}.svg"
-        path.parent.mkdir(exist_ok=True)
+        path = self.folder / "figures" / f"{_file_name(name)}.svg"
         save_figure(figure, path)
         data = base64.b64encode(path.read_bytes()).decode()
         return f'<img alt="{html.escape(name)}" src="data:image/svg+xml;base64,{data}">'
+
+    def _frame(self, frame: "pl.DataFrame", name: str, text: Sequence[str] = ()) -> str:
+        """Write a data frame as CSV and LaTeX; return it as HTML. `text`: its columns of text."""
+        frame.write_csv(self.folder / "tables" / f"{name}.csv")
+        columns = [c for c in frame.columns if c not in NOT_SHOWN]
+        head = [HEADINGS.get(c, c.removeprefix("n_").replace("_", " ")) for c in columns]
+        rows = [[_cell(c, row) for c in columns] for row in frame.to_dicts()]
+        texts = tuple(i for i, c in enumerate(columns) if c in text)
+        latex = latex_table(head, rows, texts)
+        (self.folder / "tables" / f"{name}.tex").write_text(latex, encoding="utf-8")
+        files = f'<p class="files"><a href="tables/{name}.csv">CSV</a>, '
+        files += f'<a href="tables/{name}.tex">LaTeX</a></p>'
+        return _table(head, rows, texts) + files
+
+
+def short_names(labels: Sequence[Any]) -> dict[Any, Any]:
+    """Return for each label a name to show: of long ones the shortest start or end that is unique.
+
+    >>> short_names(["658e5214673c7a4e25b458e56bdb6144", "65ae5214673c7a4e25b458e56bdb6144"])
+    {'658e5214673c7a4e25b458e56bdb6144': '658e52', '65ae5214673c7a4e25b458e56bdb6144': '65ae52'}
+    >>> short_names(["flat", 3])
+    {'flat': 'flat', 3: 3}
+    """
+    texts = [str(label) for label in labels]
+    longest = max(map(len, texts), default=0)
+    if longest <= LONG_NAME:
+        return dict(zip(labels, labels, strict=True))
+    lengths = range(SHORT_NAME, longest + 1)
+    starts = ([text[:n] for text in texts] for n in lengths)
+    ends = ([f"…{text[-n:]}" for text in texts] for n in lengths)
+    unique = (next(n for n in names if len(set(n)) == len(set(texts))) for names in (starts, ends))
+    shortest = min(unique, key=lambda names: max(map(len, names)))
+    return dict(zip(labels, shortest, strict=True))
+
+
+def latex_table(
+    head: Sequence[str], rows: Sequence[Sequence[str]], text: Sequence[int] = ()
+) -> str:
+    r"""Return a table of LaTeX, for the package booktabs; `text`: its columns of text.
+
+    >>> print(latex_table(["speed", "95 % interval"], [["0.3", "1 to 2"]], (0,)))
+    \begin{tabular}{lr}
+    \toprule
+    speed & 95 \% interval \\
+    \midrule
+    0.3 & 1 to 2 \\
+    \bottomrule
+    \end{tabular}
+    <BLANKLINE>
+    """
+    kinds = "".join("l" if i in text else "r" for i in range(len(head)))
+    lines = [" & ".join(map(_latex, cells)) + r" \\" for cells in (head, *rows)]
+    lines.insert(1, r"\midrule")
+    body = "\n".join(lines)
+    return f"\\begin{{tabular}}{{{kinds}}}\n\\toprule\n{body}\n\\bottomrule\n\\end{{tabular}}\n"
+
+
+def _latex(text: str) -> str:
+    special = {**{c: f"\\{c}" for c in "&%$#_{}"}, "~": r"\textasciitilde{}"}
+    special |= {"^": r"\textasciicircum{}", "\\": r"\textbackslash{}"}
+    special |= {"×": r"$\times$", "–": "--", "−": "$-$", "<": "$<$"}
+    return "".join(special.get(c, c) for c in text)
 
 
 def _file_name(metric: str) -> str:
@@ -210,24 +422,34 @@ def _warning(text: str) -> str:
     return f'<p class="warning">{html.escape(text)}</p>'
 
 
-def _frame(frame: "pl.DataFrame", text: Sequence[str] = ()) -> str:
-    """Return a data frame as an HTML table; `text` names its columns of text."""
-    text_columns = tuple(i for i, column in enumerate(frame.columns) if column in text)
-    rows = [[_text(value) for value in row] for row in frame.rows()]
-    return _table([column.replace("_", " ") for column in frame.columns], rows, text_columns)
-
-
 def _table(head: Sequence[str], rows: Sequence[Sequence[str]], text: Sequence[int] = ()) -> str:
     """Return an HTML table; `text` holds the indices of its columns of text."""
 
+    def hint(value: str) -> str:
+        return f' title="{GLOSSARY[value]}"' if value in GLOSSARY else ""
+
     def cells(tag: str, values: Sequence[str]) -> str:
         return "".join(
-            f"<{tag}{' class=text' if i in text else ''}>{html.escape(value)}</{tag}>"
+            f"<{tag}{' class=text' * (i in text)}{hint(value) * (tag == 'th')}>"
+            f"{html.escape(value)}</{tag}>"
             for i, value in enumerate(values)
         )
 
     body = "".join(f"<tr>{cells('td', row)}</tr>" for row in rows)
     return f"<table><tr>{cells('th', head)}</tr>{body}</table>"
+
+
+def _cell(column: str, row: Mapping[str, Any]) -> str:
+    """Return a cell of a table of answers as text."""
+    value = row[column]
+    if column == "low":
+        is_known = math.isfinite(value) and math.isfinite(row["high"])
+        return f"{_number(value)} to {_number(row['high'])}" if is_known else "–"
+    if value is None or (isinstance(value, float) and not math.isfinite(value)):
+        return "–"
+    if column in ("p", "p_holm"):
+        return "< 0.001" if value < 0.001 else f"{value:.3f}"
+    return f"{value:.1%}".replace("%", " %") if column in ("relative", "share") else _text(value)
 
 
 def _text(value: Any) -> str:

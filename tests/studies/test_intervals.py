@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from fleet2d.studies.answers import MeanEstimate, estimate
+from fleet2d.studies.intervals import MeanEstimate, estimate, student_quantile
 
 STUDIES = 400
 
@@ -23,7 +23,7 @@ def coverage(homes: int, seeds: int, home: float, seed: float, noise: float, ske
         of_seed = generator.normal(0, seed, seeds)
         values = 1 + of_home[home_of] + of_seed[seed_of]
         values = values + generator.normal(0, noise, len(values))
-        mean = estimate(values, {"home": home_of, "seed": seed_of}, resamples=300)
+        mean = estimate(values, {"home": home_of, "seed": seed_of})
         hits += mean.low <= 1 <= mean.high
     return hits / STUDIES
 
@@ -110,5 +110,40 @@ def test_how_many_homes_would_do_is_what_shows_it_four_times_in_five() -> None:
     for _ in range(300):
         of_home = generator.normal(abs(mean.mean), math.sqrt(spread.components["home"]), count)
         noise = generator.normal(0, math.sqrt(spread.residual), (count, 4))
-        clear += estimate((of_home[:, None] + noise).mean(axis=1), resamples=200).is_clear
+        clear += estimate((of_home[:, None] + noise).mean(axis=1)).is_clear
     assert 0.7 < clear / 300 < 0.97  # known spread, so rather more than less
+
+
+@pytest.mark.parametrize("homes", [8, 15, 30])
+def test_they_hold_the_mean_of_homes_with_a_long_tail(homes: int) -> None:
+    generator = np.random.default_rng(homes)
+    samples = np.exp(generator.normal(0, 1, (STUDIES, homes)))
+    means = [estimate(values) for values in samples]
+    hits = [mean.low <= np.exp(0.5) <= mean.high for mean in means]
+    by_student = [
+        abs(mean.mean - np.exp(0.5)) <= student_quantile(mean.freedom) * mean.error
+        for mean in means
+    ]
+    assert np.mean(hits) > 0.88
+    assert np.mean(hits) > np.mean(by_student) + 0.03
+
+
+def test_p_values_are_below_five_percent_where_intervals_exclude_zero() -> None:
+    generator = np.random.default_rng(3)
+    for _ in range(300):
+        mean = estimate(generator.exponential(1, 8) - generator.uniform(0, 1))
+        assert (mean.p_value < 0.05) == mean.is_clear
+
+
+def test_p_values_of_one_value_or_of_equal_ones() -> None:
+    assert math.isnan(estimate([0.5]).p_value)
+    assert (0.0, 1.0) == (estimate([0.5, 0.5]).p_value, estimate([0.0, 0.0]).p_value)
+
+
+def test_a_study_of_the_size_that_is_needed_detects_the_effect() -> None:
+    spread = study_of(6, 0.7).spread
+    homes = spread.needed(0.7, "home", seed=10)
+    assert homes is not None
+    assert spread.detectable({"home": homes, "seed": 10}) <= 0.7
+    assert spread.detectable({"home": homes - 1, "seed": 10}) > 0.7
+    assert spread.needed(0.1, "seed") is None  # homes differ: seeds alone don't do

@@ -1,0 +1,258 @@
+"""Means with intervals over units such as homes and seeds, p values, and the power of a study.
+
+At each end an interval is the wider of two: Student's t, and Hall's transformation of it, which
+corrects for skewness (Hall 1992, On the removal of skewness by transformation). The standard error
+is that of a random-effects analysis of variance of crossed units. How often these and other
+intervals contain the true mean is measured by `benchmarks/interval_coverage.py`.
+"""
+
+import math
+from bisect import bisect_left
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from fleet2d.errors import extra
+from fleet2d.kernels import F64, I64
+from fleet2d.runtime.determinism import sum_in_order
+
+LEVEL = 0.95
+POWER = 0.8
+MAX_NEEDED_UNITS = 10_000  # units of a level
+MIN_FREEDOM = 2.0  # below which the skewness of units can't be estimated
+MIN_SKEWNESS = 1e-6  # below which Hall's transformation is the identity
+
+
+@dataclass(frozen=True)
+class Spread:
+    """The variance of values, by level.
+
+    Attributes:
+        units: The number of units of each level, such as homes.
+        components: The variance between the units of a level.
+        residual: The variance of a single value beyond that.
+        values: The number of values.
+    """
+
+    units: Mapping[str, int]
+    components: Mapping[str, float]
+    residual: float
+    values: int
+
+    def detectable(self, units: Mapping[str, int], power: float = POWER) -> float:
+        """Return the smallest mean that a study of some size tells from zero, with a power.
+
+        Args:
+            units: The number of units of each level, 2 or more.
+            power: The share of such studies in which the interval excludes zero.
+
+        Example:
+            >>> spread = Spread({"home": 5}, {"home": 1.0}, 0.0, 5)
+            >>> round(spread.detectable({"home": 30}), 2)
+            0.53
+        """
+        parts = [(self.components[level] / n, n - 1) for level, n in units.items()]
+        parts.append((self.residual / math.prod(units.values()), max(units.values()) - 1))
+        variance = sum_in_order(part for part, _ in parts)
+        if not variance:
+            return 0.0
+        freedom = variance**2 / sum_in_order(part**2 / df for part, df in parts)
+        return math.sqrt(variance) * (student_quantile(freedom) + _normal_quantile(power))
+
+    def needed(self, size: float, level: str, power: float = POWER, **units: int) -> int | None:
+        """Return how many units of a level tell a mean of `size` from zero; None: no number does.
+
+        Args:
+            size: The mean.
+            level: The level.
+            power: The share of such studies in which the interval excludes zero.
+            **units: The number of units of other levels, if they are to differ from the present.
+        """
+        others = {**self.units, **units}
+
+        def is_enough(count: int) -> bool:
+            return self.detectable({**others, level: count}, power) <= abs(size)
+
+        if not is_enough(MAX_NEEDED_UNITS):
+            return None
+        return bisect_left(range(MAX_NEEDED_UNITS), True, lo=2, key=is_enough)
+
+
+@dataclass(frozen=True)
+class MeanEstimate:
+    """A mean, with its interval.
+
+    Attributes:
+        mean: The mean.
+        low: The lower end of the interval; NaN if there is one value only.
+        high: The upper end.
+        error: The standard error.
+        freedom: Degrees of freedom.
+        skewness: The skewness of the mean, estimated from that of the units.
+        spread: The variance of the values by level.
+    """
+
+    mean: float
+    low: float = math.nan
+    high: float = math.nan
+    error: float = math.nan
+    freedom: float = math.nan
+    skewness: float = 0.0
+    spread: Spread = field(default_factory=lambda: Spread({}, {}, 0.0, 1))
+
+    @property
+    def is_clear(self) -> bool:
+        """Whether the interval excludes zero."""
+        return self.low > 0 or self.high < 0
+
+    @property
+    def p_value(self) -> float:
+        """The p value of a mean of zero: below 5 % exactly if the 95 % interval excludes zero."""
+        if not self.error > 0:
+            return math.nan if math.isnan(self.low) else float(self.mean == 0)
+        with extra("study", "intervals need scipy"):
+            from scipy.special import stdtr
+        ratio = self.mean / self.error
+        nearest = min(abs(ratio), abs(_transformed(ratio, self.skewness)))
+        return float(2 * stdtr(self.freedom, -nearest))
+
+    def needed(self) -> dict[str, int]:
+        """Return for each level how many units are needed to show that the mean isn't zero.
+
+        Each number is for one level while the others stay as they are; levels of which no number
+        is enough are missing. The power is 80 %.
+        """
+        counts = {
+            level: self.spread.needed(self.mean, level)
+            for level, current in self.spread.units.items()
+            if current >= 2
+        }
+        return {
+            level: max(count, self.spread.units[level] + 1)
+            for level, count in counts.items()
+            if count is not None
+        }
+
+
+def estimate(
+    values: Sequence[float] | F64,
+    levels: Mapping[str, Sequence[Any]] | None = None,
+    *,
+    level: float = LEVEL,
+) -> MeanEstimate:
+    """Return the mean of values and its interval over the units that they belong to.
+
+    Args:
+        values: One for each combination of units, such as home and seed.
+        levels: For each level the unit of each value; None: each value is a unit of its own.
+        level: The share of studies whose interval contains the true mean.
+
+    Example:
+        >>> score = estimate([1.0, 2.0, 4.0], {"seed": [0, 1, 2]})
+        >>> round(score.mean, 2), score.spread.units
+        (2.33, {'seed': 3})
+    """
+    data: F64 = np.asarray(values, np.float64)
+    if not len(data):
+        return MeanEstimate(math.nan)
+    codes = _codes(levels if levels else {"value": range(len(data))}, len(data))
+    mean = float(data.mean())
+    if not codes:
+        return MeanEstimate(mean)
+    spread, variance, freedom, third_moment = _analyse(data, codes)
+    if variance <= 0 or not np.ptp(data):
+        return MeanEstimate(mean, mean, mean, 0.0, freedom, 0.0, spread)
+    error = math.sqrt(variance)
+    skewness = third_moment / (error * variance) if freedom >= MIN_FREEDOM else 0.0
+    quantile = student_quantile(freedom, level)
+    low = mean - error * max(quantile, _inverse(quantile, skewness))
+    high = mean - error * min(-quantile, _inverse(-quantile, skewness))
+    return MeanEstimate(mean, low, high, error, freedom, skewness, spread)
+
+
+def _transformed(ratio: float, skewness: float) -> float:
+    """Return a t statistic corrected for the skewness of the mean, by Hall's transformation."""
+    return ratio + skewness / 3 * ratio**2 + skewness**2 / 27 * ratio**3 + skewness / 6
+
+
+def _inverse(quantile: float, skewness: float) -> float:
+    """Return the t statistic that Hall's transformation turns into a quantile."""
+    if abs(skewness) < MIN_SKEWNESS:
+        return quantile
+    return 3 / skewness * (math.cbrt(1 + skewness * (quantile - skewness / 6)) - 1)
+
+
+def _codes(levels: Mapping[str, Sequence[Any]], count: int) -> dict[str, I64]:
+    """Return the number of the unit of each value, by level: int64 (values,).
+
+    Levels with one unit are left out, as are levels with a unit for each value unless there is no
+    other: the units of the other levels vary with it.
+    """
+    codes = {}
+    for name, labels in levels.items():
+        texts = np.array([repr(label) for label in labels])
+        units, numbers = np.unique(texts, return_inverse=True)
+        if len(units) > 1:
+            codes[name] = numbers.astype(np.int64)
+    crossed = {name: numbers for name, numbers in codes.items() if numbers.max() + 1 < count}
+    return crossed or dict(list(codes.items())[-1:])
+
+
+def _analyse(data: F64, codes: Mapping[str, I64]) -> tuple[Spread, float, float, float]:
+    """Return variance components; variance, degrees of freedom and third moment of the mean."""
+    count, units = len(data), {name: int(numbers.max()) + 1 for name, numbers in codes.items()}
+    unit_means = {
+        name: np.bincount(numbers, data) / np.bincount(numbers) for name, numbers in codes.items()
+    }
+    third = sum_in_order(_third_moment(means) / len(means) ** 2 for means in unit_means.values())
+    if len(codes) == 1:
+        ((name, numbers),) = codes.items()
+        means = unit_means[name]
+        variance = float(means.var(ddof=1)) / len(means)
+        within_units = float(((data - means[numbers]) ** 2).sum()) / max(count - len(means), 1)
+        between_units = max(0.0, float(means.var(ddof=1)) - within_units * len(means) / count)
+        spread = Spread(units, {name: between_units}, within_units, count)
+        return spread, variance, len(means) - 1.0, third
+    residuals, squares = data - data.mean(), {}
+    for name, numbers in codes.items():
+        means = unit_means[name]
+        squares[name] = float(means.var(ddof=1)) / len(means)
+        residuals = residuals - (means[numbers] - data.mean())
+    residual_freedom = max(count - 1 - sum(n - 1 for n in units.values()), 1)
+    residual = float((residuals**2).sum()) / residual_freedom
+    share = residual / count
+    variance = max(sum_in_order(squares.values()) - (len(codes) - 1) * share, share)
+    parts = [(square, units[name] - 1.0) for name, square in squares.items()]
+    parts.append(((len(codes) - 1) * share, float(residual_freedom)))
+    freedom = variance**2 / max(sum_in_order(part**2 / df for part, df in parts), 1e-300)
+    freedom = max(freedom, min(units.values()) - 1.0)
+    components = {name: max(0.0, (squares[name] - share) * units[name]) for name in codes}
+    return Spread(units, components, residual, count), variance, freedom, third
+
+
+def _third_moment(values: F64) -> float:
+    """Return the unbiased third central moment of values; 0 for fewer than three."""
+    count = len(values)
+    if count < 3:
+        return 0.0
+    cubes = float(((values - values.mean()) ** 3).sum())
+    return cubes * count / ((count - 1) * (count - 2))
+
+
+def _normal_quantile(share: float) -> float:
+    from statistics import NormalDist
+
+    return NormalDist().inv_cdf(share)
+
+
+def student_quantile(freedom: float, level: float = LEVEL) -> float:
+    """Return the quantile of Student's t that a two-sided interval of a level uses.
+
+    Raises:
+        InputError: scipy is missing.
+    """
+    with extra("study", "intervals need scipy"):
+        from scipy.special import stdtrit
+    return float(stdtrit(freedom, (1 + level) / 2))

@@ -1,0 +1,102 @@
+"""The report of a study: one page that explains its numbers, its figures, and its tables as files."""
+
+import re
+from pathlib import Path
+
+import polars as pl
+import pytest
+from tests.studies.scenes import SPEED, base, run, small
+
+from fleet2d.studies.reader import Study
+from fleet2d.studies.report import short_names, write_report
+
+SIGHTINGS = "sightings.ana"
+LONG = "a_home_with_a_name_that_is_too_long_"
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory: pytest.TempPathFactory) -> Study:
+    """Two speeds and two dwells in two homes of long names, with three seeds."""
+    folder = tmp_path_factory.mktemp("study")
+    home = base()["floorplan"]
+    homes = {
+        LONG + name: {"floorplan": home, "users.ana.radius": r}
+        for name, r in (("a", 0.2), ("b", 0.25))
+    }
+    keys = {
+        "axes": {
+            SPEED: [0.3, 0.6],
+            "dwell": {"key": "robots.astro.dwell", "values": [0, "1 min"]},
+            "home": {"options": homes, "population": True},
+        },
+        "keep": {"tables": ["room_share"]},
+        "compare": [
+            {"metric": SIGHTINGS, "against": {SPEED: 0.3}},
+            {"metric": "distance.astro", "against": {SPEED: 0.3}, "within": ["dwell"]},
+        ],
+        "description": "Does a fast robot see more?",
+        "tags": ["speed", "pilot"],
+        "notes": "The camera has no noise.",
+    }
+    return run(small(**keys), folder / "speeds")[1]
+
+
+@pytest.fixture(scope="module")
+def page(study: Study, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_report(study, tmp_path_factory.mktemp("report"))
+
+
+def test_a_report_is_one_page_with_its_figures(study: Study, page: Path, tmp_path: Path) -> None:
+    text = page.read_text()
+    assert "Does a fast robot see more?" in text
+    assert "against 0.3" in text
+    assert "There are only 3 values of seed" in text
+    assert "http" not in text.replace("http://www.w3.org", "")
+    figures = {path.stem for path in (page.parent / "figures").iterdir()}
+    assert {"compare-1", "compare-1-home", "sightings_ana-means"} <= figures
+    assert {"sightings_ana-distribution", "room_share_ana_kitchen_0-time"} <= figures
+    assert "sightings_ana-robots_astro_speed-dwell" in figures
+    assert text == write_report(study, tmp_path / "again").read_text()
+    for path in page.parent.rglob("*.*"):
+        assert (
+            path.read_bytes() == (tmp_path / "again" / path.relative_to(page.parent)).read_bytes()
+        )
+
+
+def test_a_report_says_what_is_measured_in_which_unit_and_how(page: Path) -> None:
+    text = page.read_text()
+    assert "Unit: share of time at home." in text
+    assert "distance.astro [m a day]" in (page.parent / "figures/compare-2.svg").read_text()
+    assert "2 values of home and 3 values of seed: 24 runs of 0:02:00" in text
+    assert "Those of the 3 comparisons of this report" in text
+    assert "Hall&#x27;s (1992)" in text
+    assert "speed, pilot" in text
+    assert "The camera has no noise." in text
+
+
+def test_homes_of_long_names_have_short_ones_that_are_listed(page: Path) -> None:
+    text = page.read_text()
+    assert f"<td class=text>…long_a</td><td class=text>{LONG}a</td>" in text
+
+
+def test_tables_are_files_of_csv_and_latex(page: Path) -> None:
+    table = pl.read_csv(page.parent / "tables/compare-2.csv")
+    assert [SPEED, "dwell", "mean", "reference", "difference"] == table.columns[:5]
+    assert {"p", "p_holm", "effect_size", "verdict", "n_home"} <= set(table.columns)
+    latex = (page.parent / "tables/compare-2.tex").read_text()
+    assert r"\begin{tabular}{ll" in latex
+    assert r"95\% interval" in latex
+    assert re.search(r"[^\\]&", latex)
+    assert not re.search(r"(?<!\\)_", latex)
+
+
+def test_p_values_are_corrected_over_all_comparisons(study: Study, page: Path) -> None:
+    tables = [pl.read_csv(page.parent / f"tables/compare-{n}.csv") for n in (1, 2)]
+    smallest = min(table["p"].min() for table in tables)  # type: ignore[type-var]
+    corrected = min(table["p_holm"].min() for table in tables)  # type: ignore[type-var]
+    assert corrected == pytest.approx(min(1, 3 * smallest))  # type: ignore[operator]
+
+
+def test_short_names_are_unique() -> None:
+    names = short_names(["658e5214673c7a4e25b458e5", "658e5214673d7a4e25b458e6", "short"])
+    assert ["…b458e5", "…b458e6", "…short"] == list(names.values())
