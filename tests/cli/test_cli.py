@@ -283,18 +283,59 @@ def test_show_draws_a_run_in_its_home(fleet2d: Cli) -> None:
     assert [] == package.open_run("run").verify()
 
 
-def test_show_without_matplotlib_says_what_to_install(tmp_path: Path) -> None:
-    (tmp_path / "matplotlib.py").write_text("raise ImportError('No module named matplotlib')")
+def without_matplotlib(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    (folder / "matplotlib.py").write_text("raise ImportError('No module named matplotlib')")
     script = "import sys; sys.path.insert(0, sys.argv.pop(1)); from fleet2d.cli import main; main()"
-    done = subprocess.run(
-        [sys.executable, "-c", script, str(tmp_path), "show", "--out", str(tmp_path / "x.png")],
+    return subprocess.run(
+        [sys.executable, "-c", script, str(folder), *arguments],
         capture_output=True, text=True, check=False,
-        env={**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path), *sys.path])},
+        env={**os.environ, "PYTHONPATH": os.pathsep.join([str(folder), *sys.path])},
     )  # fmt: skip
+
+
+@pytest.mark.parametrize("command", [["show"], ["validate", "family_home"]])
+def test_picture_without_matplotlib_says_what_to_install(
+    tmp_path: Path, command: list[str]
+) -> None:
+    done = without_matplotlib(tmp_path, *command, "--out", str(tmp_path / "x.png"))
+
     assert done.returncode in (1, 2), done.stderr
     assert "Traceback" not in done.stderr
     for word in ("matplotlib", "fleet2d[viz]"):
         assert word in done.stderr
+
+
+def test_validate_checks_a_floor_plan_without_matplotlib(tmp_path: Path) -> None:
+    done = without_matplotlib(tmp_path, "validate", "family_home")
+
+    assert 0 == done.returncode, done.stderr
+    assert "ok: nothing wrong" in done.stdout
+    assert 'no picture: drawing needs matplotlib: pip install "fleet2d[viz]"' in done.stdout
+
+
+def test_run_and_validate_say_what_is_wrong_with_a_home_from_a_file(
+    fleet2d: Cli, tmp_path: Path
+) -> None:
+    plan = {
+        "format": "fleet2d-floorplan",
+        "version": 1,
+        "free": [
+            {"outline": [[0, 0], [4, 0], [4, 4], [0, 4]]},
+            {"outline": [[5, 0], [8, 0], [8, 4], [5, 4]]},
+        ],
+        "rooms": [
+            {"type": "kitchen", "polygon": [[0, 0], [4, 0], [4, 4], [0, 4]]},
+            {"type": "office", "polygon": [[5, 0], [8, 0], [8, 4], [5, 4]]},
+        ],
+    }
+    (tmp_path / "plan.json").write_text(json.dumps(plan))
+    home = ("floorplan.type=native", f"floorplan.path={tmp_path / 'plan.json'}", "users={}")
+    short = ("simulation.duration=1 min", "algorithms={}", "metrics={}")
+    said = "a body of radius 0.15 m can't get to office_0"
+
+    assert said in fleet2d("validate", str(tmp_path / "plan.json"))[1]
+    assert said in fleet2d("validate", *home)[1]
+    assert said in fleet2d("run", *home, *short)[1]
 
 
 # --- reproduce ---------------------------------------------------------------------------------

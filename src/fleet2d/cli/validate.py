@@ -61,15 +61,24 @@ def validate(
 def _check_floorplan(
     source: str, out: Path | None, radius: float, resolution: float | None
 ) -> None:
-    """Print the findings of a floor plan and draw them; exit with 2 if it is unlivable."""
+    """Print the findings of a floor plan and draw them; exit with 2 if it is unlivable.
+
+    Without matplotlib there is no picture, which is an error only if one is asked for.
+    """
     from fleet2d.floorplan.checkup import checkup
     from fleet2d.floorplan.load import load_floorplan
-    from fleet2d.pictures.floorplan import draw_checkup
 
     plan = load_floorplan(source, resolution=resolution)
     findings = checkup(plan, radius)
-    target = out or Path(f"{file_name(plan.name) or 'plan'}-checkup.png")
-    draw_checkup(plan, findings, target)
+    picture = str(out or Path(f"{file_name(plan.name) or 'plan'}-checkup.png"))
+    try:
+        from fleet2d.pictures.floorplan import draw_checkup
+    except InputError as error:
+        if out is not None:
+            raise
+        picture = f"no picture: {error}"
+    else:
+        draw_checkup(plan, findings, Path(picture))
     typer.echo(f"{plan.name}: {plan.area_m2:.1f} m2, {_count(plan.rooms, 'room')}")
     for number, finding in enumerate(findings, start=1):
         typer.echo(f"{number:>3} {finding.severity}: {finding.text}")
@@ -78,7 +87,7 @@ def _check_floorplan(
         typer.echo(f"ok: nothing wrong{odd}")
     for note in plan.notes:
         typer.echo(f"note: {note}")
-    typer.echo(target)
+    typer.echo(picture)
     if any(finding.severity == "unlivable" for finding in findings):
         raise typer.Exit(2)
 

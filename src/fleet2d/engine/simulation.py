@@ -38,6 +38,7 @@ from fleet2d.engine.world import repeat, request
 from fleet2d.entities.decisions import DecidingActor
 from fleet2d.entities.plan import Plan, data_of
 from fleet2d.errors import ArtifactError, InputError, ScenarioError
+from fleet2d.floorplan.checkup import errors_in
 from fleet2d.floorplan.formats.native import native_document
 from fleet2d.floorplan.home import Home
 from fleet2d.interventions.intervention import Intervention
@@ -207,9 +208,18 @@ class Simulation(InterventionMethods):
 
     @property
     def notes(self) -> list[str]:
-        """What is odd in the floor plan, or to be said about what robots perceive."""
+        """What is odd in the floor plan or won't work in it, and about what robots perceive."""
         sources = (f"{c.owner.path}: {note}" for c in self._state.cameras for note in c.notes)
-        return [*self.home.plan.notes, *sources]
+        return [*self.home.plan.notes, *self._home_errors, *sources]
+
+    @property
+    def _home_errors(self) -> Sequence[str]:
+        """What will not work in a home from a file; other homes have been checked."""
+        if not self.scenario.floorplan.files():
+            return ()
+        home = self.home
+        radii = tuple(robot.radius for robot in self.scenario.robots.values())
+        return home.cached(("errors", radii), lambda: errors_in(home, radii))
 
     @property
     def time(self) -> datetime:

@@ -1,6 +1,6 @@
 """The check-up of a floor plan: errors and anomalies, and their places."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -98,10 +98,26 @@ def checkup(plan: FloorPlan, radius: float = 0.15) -> list[Finding]:
         *_labels(plan),
         *_doors(plan),
         *_standing_in_walls(plan),
-        *_routes(plan, radius),
+        *_routes(Home(plan), radius),
         *_uses(plan),
     ]
     return sorted(findings, key=lambda finding: _ORDER.index(finding.severity))
+
+
+def errors_in(home: Home, radii: Iterable[float]) -> list[str]:
+    """Return the sentences of a check-up about what will not work in a run, without anomalies.
+
+    Parts that nothing joins are left out, since the plan has a note on them.
+
+    Args:
+        home: The home of the run.
+        radii: The radii of its robots [m].
+    """
+    plan, open_home = home.plan, Home(home.plan, home.doors)
+    findings = [*_scale(plan), *_doors(plan), *_standing_in_walls(plan)]
+    for radius in sorted(set(radii)):
+        findings += _routes(open_home, radius)
+    return [finding.text for finding in findings if finding.severity != "odd"]
 
 
 def _scale(plan: FloorPlan) -> Iterator[Finding]:
@@ -272,11 +288,11 @@ def _doors(plan: FloorPlan) -> Iterator[Finding]:
 # --- Routes ---------------------------------------------------------------------------------------
 
 
-def _routes(plan: FloorPlan, radius: float) -> Iterator[Finding]:
+def _routes(home: Home, radius: float) -> Iterator[Finding]:
     """Find the places that a robot can't get to, because of walls or of furniture."""
-    body = f"a body of radius {radius:g} m"
+    plan, body = home.plan, f"a body of radius {radius:g} m"
     try:
-        space = Home(plan).space(radius)
+        space = home.space(radius)
     except FloorPlanError:
         yield Finding("space", "unlivable", f"{body} fits nowhere in {plan.name}")
         return

@@ -123,9 +123,78 @@ def test_drawing_that_encloses_nothing_is_refused(tmp_path: Path, pixels: U8, me
     if pixels.shape == HOME.shape:
         pixels[:, 56:66] = PAPER
     with pytest.raises(FloorPlanError, match=message) as caught:
-        read(tmp_path, pixels)
+        read(tmp_path, pixels, close_gaps=0)
 
     assert "flat.pgm" in str(caught.value)
+
+
+def with_gap(width: int) -> U8:
+    """Return the home with a gap in its outer wall [pixels]."""
+    pixels = HOME.copy()
+    pixels[10:14, 30 : 30 + width] = PAPER
+    return pixels
+
+
+@pytest.mark.parametrize(("pixels", "closed"), [(1, "0.2"), (4, "0.3"), (11, "0.9"), (20, "1.2")])
+def test_gap_in_an_outer_wall_is_closed_if_the_home_would_be_lost(
+    tmp_path: Path, pixels: int, closed: str
+) -> None:
+    whole = read(tmp_path)
+
+    plan = read(tmp_path, with_gap(pixels))
+
+    assert whole.area_m2 == pytest.approx(plan.area_m2, abs=0.3)
+    assert f"gaps in the outer walls are closed up to a width of {closed} m" in plan.notes[0]
+    assert len(whole.rooms) == len(plan.rooms)
+
+
+def test_gap_that_loses_less_than_half_of_the_home_stays_open(tmp_path: Path) -> None:
+    pixels = with_gap(8)
+    pixels[34:46, 58:62] = WALL  # the door between the rooms is shut
+
+    plan = read(tmp_path, pixels)
+
+    assert 52 * 44 * 0.05**2 == pytest.approx(plan.area_m2)  # the other room
+    assert not any("gaps in the outer walls" in note for note in plan.notes)
+
+
+def test_inside_of_an_object_is_no_home(tmp_path: Path) -> None:
+    pixels = with_gap(30)
+    pixels[20:30, 80:90] = WALL
+    pixels[21:29, 81:89] = PAPER  # an armchair
+
+    with pytest.raises(FloorPlanError, match="inside of an object at") as caught:
+        read(tmp_path, pixels)
+
+    assert "floorplan.close_gaps" in str(caught.value)
+    assert read(tmp_path, pixels, close_gaps=1.6).area_m2 > 11
+
+
+def test_grey_ground_around_white_floor_is_outside(tmp_path: Path) -> None:
+    pixels = HOME.copy()
+    outside = np.ones_like(HOME, np.bool_)
+    outside[10:70, 10:110] = False
+    pixels[outside] = 200
+    pixels[30:40, 10:14] = PAPER  # a window: nothing but the shade tells what is outside
+
+    plan = read(tmp_path, pixels)
+
+    assert read(tmp_path).area_m2 + 4 * 10 * 0.05**2 == pytest.approx(plan.area_m2)
+    assert "grey 200 is taken for unknown" in plan.notes[0]
+
+
+@pytest.mark.parametrize("name", ["house13_floor_2", "house17_floor_0", "house35_floor_2"])
+def test_scanned_floor_with_gaps_is_whole(shared_data: Path, name: str) -> None:
+    folder = shared_data / "captured" / "floors"
+    if not folder.exists():
+        pytest.skip(f"there is no {folder}")
+    scale = float((folder / f"{name}.yaml").read_text().split("scale:")[1])
+
+    plan = read_image(folder / f"{name}.png", scale)
+
+    assert plan.area_m2 > 40
+    with pytest.raises(FloorPlanError, match="inside of an object"):
+        read_image(folder / f"{name}.png", scale, close_gaps=0)
 
 
 def test_component_is_found_and_its_settings_have_an_effect(tmp_path: Path) -> None:

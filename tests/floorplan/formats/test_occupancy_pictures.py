@@ -6,7 +6,7 @@ import pytest
 from numpy.typing import NDArray
 
 from fleet2d.errors import FloorPlanError
-from fleet2d.floorplan.formats.occupancy import read_grey
+from fleet2d.floorplan.formats.raster import read_grey
 
 SHADES = np.arange(12, dtype=np.uint8).reshape(3, 4) * 20
 

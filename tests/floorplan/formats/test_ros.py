@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 import shapely
+import yaml
 from pydantic import ValidationError
 
 import fleet2d
@@ -211,7 +212,7 @@ def test_pixels_are_free_below_free_thresh_only(
     pixels = ROOM.copy()
     pixels[20:30, 20:30] = 155  # a chance of 100/255 = 0.392 of being occupied
 
-    plan = read_ros(write(tmp_path, pixels, free_thresh=free_thresh))
+    plan = read_ros(write(tmp_path, pixels, free_thresh=free_thresh), unknown_grey="none")
 
     assert free == (plan.area_m2 > 2.4)
 
@@ -228,10 +229,64 @@ def test_occupied_thresh_tells_obstacles_from_unknown(tmp_path: Path) -> None:
     assert "2.00 m of the walls are where free space meets unknown" in strict.notes[0]
 
 
-def test_unknown_grey_that_the_threshold_makes_free_is_noted(tmp_path: Path) -> None:
-    plan = read_ros(write(tmp_path, free_thresh=0.25), ray_width=0.0)
+@pytest.mark.parametrize(
+    ("unknown", "free_thresh"), [(UNKNOWN, 0.25), (UNKNOWN, 0.3), (220, 0.196), (150, 0.45)]
+)
+def test_grey_of_unknown_is_not_floor_though_the_threshold_says_so(
+    tmp_path: Path, unknown: int, free_thresh: float
+) -> None:
+    pixels = np.where(ROOM == UNKNOWN, unknown, ROOM).astype(np.uint8)
+    expected = read_ros(write(tmp_path))
 
-    assert "free_thresh is 0.25: so 152 pixels of the grey" in plan.notes[0]
+    plan = read_ros(write(tmp_path, pixels, free_thresh=free_thresh))
+
+    assert expected == plan
+    assert f"grey {unknown} is taken for unknown" in plan.notes[0]
+
+
+def test_grey_of_unknown_in_the_middle_of_a_map_is_no_floor(tmp_path: Path) -> None:
+    pixels = ROOM.copy()
+    pixels[[0, -1]], pixels[:, [0, -1]] = OCCUPIED, OCCUPIED
+    pixels[20:26, 30:36] = UNKNOWN  # in the floor
+
+    plan = read_ros(write(tmp_path, pixels, free_thresh=0.25), unknown_grey="auto")
+
+    assert plan.area_m2 == pytest.approx(2.5 - 36 * 0.05**2)
+
+
+def test_unknown_grey_names_the_shade_or_takes_all_for_floor(tmp_path: Path) -> None:
+    pixels = ROOM.copy()
+    pixels[20:26, 30:36] = 230
+
+    plain = read_ros(write(tmp_path, pixels, free_thresh=0.25), unknown_grey="none")
+    named = read_ros(write(tmp_path, pixels, free_thresh=0.25), unknown_grey=230)
+
+    assert plain.area_m2 == pytest.approx(2.5)
+    assert not any("unknown_grey" in note for note in plain.notes)
+    assert named.area_m2 == pytest.approx(2.5 - 36 * 0.05**2)
+
+
+@pytest.mark.parametrize("ground", [254, 240, 215])
+def test_ground_around_the_home_is_refused_with_what_to_type(tmp_path: Path, ground: int) -> None:
+    pixels = np.full((60, 80), ground, np.uint8)
+    pixels[20:40, 20:40] = OCCUPIED
+
+    message = refusal(write(tmp_path, pixels))
+
+    assert "it is the ground around the home" in message
+    assert f"floorplan.unknown_grey={ground}" in message
+
+
+@pytest.mark.parametrize("name", ["aws_small_house", "turtlebot3_house"])
+def test_real_maps_are_the_same_at_the_threshold_of_other_map_savers(
+    shared_data: Path, tmp_path: Path, name: str
+) -> None:
+    folder = shared_data / "ros_maps" / name
+    keys = yaml.safe_load((folder / "map.yaml").read_text(encoding="utf-8"))
+    keys |= {"free_thresh": 0.25, "image": str((folder / keys["image"]).resolve())}
+    (tmp_path / "map.yaml").write_text(yaml.safe_dump(keys), encoding="utf-8")
+
+    assert read_ros(tmp_path / "map.yaml") == read_ros(folder / "map.yaml")
 
 
 def test_scale_mode_takes_what_is_between_for_unknown(tmp_path: Path) -> None:
@@ -400,7 +455,7 @@ def test_missing_file_and_folder_are_refused(tmp_path: Path) -> None:
 
 
 def test_map_too_large_for_the_cells_is_refused(tmp_path: Path) -> None:
-    path = write(tmp_path, np.full((20, 17_000), FREE, np.uint8))
+    path = write(tmp_path, np.pad(np.full((18, 17_000), FREE, np.uint8), 1))
 
     assert "too large for cells of 0.05 m" in refusal(path)
 

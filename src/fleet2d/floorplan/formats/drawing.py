@@ -1,5 +1,6 @@
 """Floor plans drawn as a picture: dark walls on light ground, at a known scale."""
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -7,19 +8,20 @@ import numpy as np
 from pydantic import Field, TypeAdapter
 
 from fleet2d.configuration.components import register
-from fleet2d.configuration.units import InputPath, PositiveLength, Share
+from fleet2d.configuration.units import InputPath, Length, PositiveLength, Share
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.formats.files import in_file
-from fleet2d.floorplan.formats.occupancy import (
-    GreyPicture,
-    OccupancyMap,
-    OccupancySource,
-    read_grey,
-)
+from fleet2d.floorplan.formats.occupancy import OBJECT_M2, OccupancyMap, OccupancySource
+from fleet2d.floorplan.formats.raster import GreyPicture, read_grey
 from fleet2d.floorplan.lattice import MAX_CELL_M, MIN_CELL_M
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.kernels import Bool
-from fleet2d.kernels.space import label_parts
+from fleet2d.kernels.space import label_parts, squared_distance
+
+# Widths of gaps in outer walls that are tried in turn [m], from pixels to a door.
+GAPS = (0.1, 0.2, 0.3, 0.45, 0.6, 0.9, 1.2)
+# Share of the floor that closing gaps must keep.
+MOST = 0.8
 
 
 @register("floorplan", "image")
@@ -30,11 +32,14 @@ class Image(OccupancySource):
         path: The picture, PNG or PGM.
         resolution: Side of a pixel, as a drawing has no scale.
         threshold: Share of white below which a pixel is wall.
+        close_gaps: Width of the widest gap in outer walls that is closed, if the home would lose
+            more than half of its floor through gaps; 0 closes none.
     """
 
     path: InputPath
     resolution: PositiveLength = Field(le=MAX_CELL_M)
     threshold: Share = 0.5
+    close_gaps: Length = Field(default=1.2, ge=0, le=5)
 
     @classmethod
     def usual_cell(cls, settings: Mapping[str, Any]) -> float:
@@ -60,9 +65,12 @@ class Image(OccupancySource):
                     f" {MAX_CELL_M:g} m is expected"
                 )
             light = _light(picture, self.threshold)
-            raw = OccupancyMap(_inside(light)[::-1], ~light[::-1], self.resolution)
             notes: list[str] = []
-            free = self.free_space(raw, notes)
+            inside = self.known(picture, light, self.resolution, notes, saved=False)
+            if inside is light:
+                inside = _inside(light, self.close_gaps, self.resolution, notes)
+            raw = OccupancyMap(inside[::-1], ~light[::-1], self.resolution)
+            free = self.home(raw, picture, notes)
             return self.build(free, self.resolution, f"drawing, {self.path.name}", notes)
 
 
@@ -71,14 +79,38 @@ def _light(picture: GreyPicture, threshold: float) -> Bool:
     return light if picture.clear is None else light | picture.clear
 
 
-def _inside(light: Bool) -> Bool:
-    """Return the light pixels that are not connected to the edge of the picture.
+def _inside(light: Bool, close_gaps: float, pixel: float, notes: list[str]) -> Bool:
+    """Return the light pixels inside the outer walls, whose gaps are closed if they lose the home.
+
+    Gaps are closed if the largest enclosed space would have less than half of the area without
+    them: at the smallest of `GAPS` that keeps most of it.
+
+    Args:
+        light: Pixels that aren't wall, bool (rows, columns).
+        close_gaps: Width of the widest gap that is closed [m]; 0 closes none.
+        pixel: Side of a pixel [m].
+        notes: A note is added if gaps are closed.
 
     Raises:
-        FloorPlanError: There are none.
+        FloorPlanError: No space is enclosed.
     """
-    part = label_parts(np.pad(light, 1, constant_values=True), False)[1:-1, 1:-1]
-    inside: Bool = light & (part != 0)  # the first part is the margin
+    inside = _enclosed(light, 0)
+    widths = [width for width in (*GAPS, close_gaps) if pixel < width <= close_gaps]
+    if widths:
+        home = _largest(inside)
+        at_most = _largest(_enclosed(light, widths[-1] / pixel))
+        if home < at_most / 2 and at_most * pixel**2 >= OBJECT_M2:
+            for width in widths:
+                closed = _enclosed(light, width / pixel)
+                if _largest(closed) >= MOST * at_most:
+                    row, column = _first_gap(light, inside, closed)
+                    lost, whole = home * pixel**2, at_most * pixel**2
+                    notes.append(
+                        f"gaps in the outer walls are closed up to a width of {width:g} m, since"
+                        f" only {lost:.1f} m2 of {whole:.1f} m2 would be inside; one is at pixel"
+                        f" ({column}, {row}); close_gaps: 0 leaves them open"
+                    )
+                    return closed
     if inside.any():
         return inside
     if not light.any():
@@ -88,3 +120,33 @@ def _inside(light: Bool) -> Bool:
         " Draw the outer walls without gaps, the front door shut; if walls are grey, set threshold"
         " higher"
     )
+
+
+def _enclosed(light: Bool, gap: float) -> Bool:
+    """Return the light pixels that a disc from outside doesn't reach; `gap` is its diameter."""
+    ground = np.pad(light, 1, constant_values=True)
+    if gap > 0:
+        # Beyond the margin is ground, too.
+        wide = np.pad(light, math.ceil(gap) + 1, constant_values=True)
+        core = squared_distance(wide) >= (gap / 2) ** 2
+        reached = label_parts(core, False) == 0
+        margin = math.ceil(gap)
+        outside = squared_distance(~reached) < (gap / 2) ** 2
+        return light & ~outside[margin + 1 : -margin - 1, margin + 1 : -margin - 1]
+    part = label_parts(ground, False)[1:-1, 1:-1]
+    enclosed: Bool = light & (part != 0)  # the first part is the margin
+    return enclosed
+
+
+def _largest(mask: Bool) -> int:
+    """Return the number of pixels of the largest connected part."""
+    part = label_parts(mask, False)
+    return int(np.bincount(part[mask], minlength=1).max())
+
+
+def _first_gap(light: Bool, inside: Bool, closed: Bool) -> tuple[int, int]:
+    """Return the (row, column) of a pixel at which the ground met what is inside now."""
+    ground = np.pad(light & ~closed, 1)
+    beside = ground[:-2, 1:-1] | ground[2:, 1:-1] | ground[1:-1, :-2] | ground[1:-1, 2:]
+    row, column = np.argwhere(closed & ~inside & beside)[0].tolist()
+    return row, column

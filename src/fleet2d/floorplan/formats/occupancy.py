@@ -1,210 +1,38 @@
-"""Grey pictures of floors, and the free space in them: read, cleaned of noise, traced."""
+"""The free space in maps and drawings of pixels: cleaned of noise, checked, traced."""
 
-import io
 import math
-import re
-import warnings
-import zlib
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from pathlib import Path
-from typing import Any
+from typing import Annotated, Literal
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 from pydantic import Field
 from shapely import Polygon
 
-from fleet2d.bounds import PICTURE_BYTES, PIXELS, read_bytes
 from fleet2d.configuration.units import InputPath, Length
 from fleet2d.errors import FloorPlanError
+from fleet2d.floorplan.formats.raster import GreyPicture
 from fleet2d.floorplan.lattice import MIN_CELL_M
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.source import PixelSource
 from fleet2d.kernels import F64, Bool
 from fleet2d.kernels.space import count_steps, label_parts, squared_distance, trace_rings
 
-MAX_SIDE = 2**15
-"""Pixels along a side of a picture: each step in cleaning it needs further rows round it."""
-
-_PNG = b"\x89PNG\r\n\x1a\n"
-_CHANNELS = {2: 3, 4: 2, 6: 4}  # by colour type; 1 for the others
-# Three numbers, each after white space and comments; then one white space.
-_PGM_HEADER = re.compile(
-    rb"P([25])" + rb"(?:\s|#[^\r\n]*[\r\n])+(\d{1,9})" * 3 + rb"(?:#[^\r\n]*)?\s"
-)
-_SPACE = re.compile(rb"\s")
-_PIECE = 1 << 18  # bytes that are split into words at once
-_PGM_COMMENT = re.compile(rb"#[^\r\n]*")
-
-
-@dataclass(frozen=True)
-class GreyPicture:
-    """A picture in shades of grey.
-
-    Attributes:
-        values: Shades, uint8 or uint16 (rows, columns), the first row on top.
-        white: The value of white; black is 0.
-        clear: Pixels that are not fully opaque, bool (rows, columns), or None if all are.
-    """
-
-    values: NDArray[np.integer[Any]]
-    white: int
-    clear: Bool | None = None
-
-
-def read_grey(path: Path) -> GreyPicture:
-    """Read a PGM (P2 or P5, 8 or 16 bits) or PNG file, by its content.
-
-    Raises:
-        FloorPlanError: It can't be read, is damaged, too large or of another kind, or is a PNG and
-            Pillow is not installed.
-    """
-    try:
-        content = read_bytes(path, PICTURE_BYTES, FloorPlanError)
-    except OSError as error:
-        raise FloorPlanError(f"the image {path} can't be read: {error.strerror}") from None
-    try:
-        if content.startswith((b"P2", b"P5")):
-            return _read_pgm(content)
-        if content.startswith(_PNG):
-            return _read_png(content)
-    except FloorPlanError as error:
-        raise FloorPlanError(f"the image {path} {error}") from error
-    raise FloorPlanError(
-        f"the image {path} is neither PGM (P2, P5) nor PNG: convert it to one of them"
-    )
-
-
-# --- PGM ---------------------------------------------------------------------------------------
-
-
-def _read_pgm(content: bytes) -> GreyPicture:
-    header = _PGM_HEADER.match(content)
-    if header is None:
-        raise FloorPlanError("has no PGM header: width, height and white are missing")
-    columns, rows, white = (int(number) for number in header.groups()[1:])
-    _check_size(columns, rows)
-    if not 0 < white < 65536:
-        raise FloorPlanError(f"has {white} for white: PGM allows 1 to 65535")
-    body = content[header.end() :]
-    if header[1] == b"2":
-        values = _plain_values(body, columns, rows)
-    else:
-        values = _packed_values(body, columns, rows, 1 if white < 256 else 2)
-    if values.max() > white:
-        raise FloorPlanError(f"has a pixel of {values.max()}, above its white, {white}")
-    picture = values.reshape(rows, columns)
-    return GreyPicture(picture.astype(np.uint8 if white < 256 else np.uint16), white)
-
-
-def _packed_values(body: bytes, columns: int, rows: int, depth: int) -> NDArray[np.integer[Any]]:
-    expected = columns * rows * depth
-    # Some writers end the file with a line break; anything more means that the size is wrong.
-    if len(body) < expected or body[expected:].strip():
-        _refuse_count(len(body) / depth, columns, rows)
-    return np.frombuffer(body[:expected], np.uint8 if depth == 1 else ">u2")
-
-
-def _plain_values(body: bytes, columns: int, rows: int) -> NDArray[np.integer[Any]]:
-    values, count = np.empty(columns * rows, np.int64), 0
-    for words in _in_pieces(_PGM_COMMENT.sub(b"", body)):
-        wrong = next((word for word in words if not word.isdigit() or len(word) > 9), None)
-        if wrong is not None:
-            text = wrong[:20].decode("latin-1")
-            raise FloorPlanError(f"has the pixel {text!r}: not a whole number")
-        fitting = words[: len(values) - count]
-        values[count : count + len(fitting)] = np.array(fitting, "S9").astype(np.int64)
-        count += len(words)
-    if count != len(values):
-        _refuse_count(count, columns, rows)
-    return values
-
-
-def _in_pieces(text: bytes) -> Iterator[list[bytes]]:
-    """Yield the words of a text in pieces, since all of them could fill the memory."""
-    begin = 0
-    while begin < len(text):
-        space = _SPACE.search(text, begin + _PIECE)
-        end = space.start() if space else len(text)
-        yield text[begin:end].split()
-        begin = end
-
-
-def _refuse_count(count: float, columns: int, rows: int) -> None:
-    what = "it is cut off" if count < columns * rows else "its header is wrong"
-    raise FloorPlanError(
-        f"holds {count:.0f} pixels, but its header says {columns} x {rows} = {columns * rows}:"
-        f" {what}"
-    )
-
-
-def _check_size(columns: int, rows: int) -> None:
-    if columns * rows == 0:
-        raise FloorPlanError(f"is {columns} x {rows} pixels: it is empty")
-    PIXELS.check(columns * rows, f"is {columns} x {rows}: it", FloorPlanError)
-    if max(columns, rows) > MAX_SIDE:
-        raise FloorPlanError(f"is {columns} x {rows} pixels: at most {MAX_SIDE} a side are read")
-
-
-# --- PNG ---------------------------------------------------------------------------------------
-
-
-def _read_png(content: bytes) -> GreyPicture:
-    try:
-        from PIL import Image
-    except ImportError:
-        raise FloorPlanError(
-            'is PNG, which only Pillow can read: pip install "fleet2d[viz]", or convert the'
-            " image to PGM"
-        ) from None
-    if len(content) >= 24:  # else it is cut off, as Pillow says
-        _check_size(*(int.from_bytes(content[at : at + 4], "big") for at in (16, 20)))
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # see _check_size
-            picture = Image.open(io.BytesIO(content), formats=["PNG"])
-        _check_size(*picture.size)
-        _check_rows(content)
-        if picture.mode.startswith("I"):  # 16 bits, grey only
-            return GreyPicture(np.asarray(picture).astype(np.uint16), 65535)
-        channels = np.asarray(picture.convert("RGBA"))
-    except Image.DecompressionBombError as error:
-        raise FloorPlanError(f"is too large: {error}") from error
-    except (OSError, SyntaxError, ValueError, zlib.error) as error:
-        raise FloorPlanError(f"is a damaged PNG: {error}") from error
-    # The mean of the colours, times three to keep it whole.
-    shades = channels[..., :3].sum(axis=-1, dtype=np.uint16)
-    clear = channels[..., 3] < 255
-    return GreyPicture(shades, 3 * 255, clear if clear.any() else None)
-
-
-def _check_rows(content: bytes) -> None:
-    """Refuse a PNG with fewer rows than its header says, which Pillow would fill with black.
-
-    Raises:
-        FloorPlanError: There are too few rows.
-        zlib.error: The data can't be unpacked.
-    """
-    width, height = (int.from_bytes(content[at : at + 4], "big") for at in (16, 20))
-    bits, colours, interlaced = content[24], content[25], content[28]
-    if interlaced:
-        return
-    row = 1 + (width * bits * _CHANNELS.get(colours, 1) + 7) // 8
-    packed, at = [], len(_PNG)
-    while at + 8 <= len(content):
-        length = int.from_bytes(content[at : at + 4], "big")
-        if content[at + 4 : at + 8] == b"IDAT":
-            packed.append(content[at + 8 : at + 8 + length])
-        at += 12 + length
-    rows = len(zlib.decompressobj().decompress(b"".join(packed), height * row)) // row
-    if rows < height:
-        raise FloorPlanError(f"holds {rows} rows, but its header says {height}: it is cut off")
-
-
 # Tolerance of decimal lengths in pixels: 0.3 m are six pixels of 0.05 m, and not 5.999….
 TINY = 1e-9
+
+
+UnknownGrey = Literal["auto", "none"] | Annotated[int, Field(ge=0, le=255)]
+"""The shade that stands for unknown, from 0 to 255; `auto` to find it, `none` for no such shade."""
+
+# The grey that map savers write for unknown.
+SAVED_UNKNOWN = 205
+# The ground around a home covers at least this share of the edge of a picture.
+EDGE_SHARE = 0.5
+# Area of lighter floor from which on a light grey may be unknown [m²].
+FLOOR_M2 = 2.0
+# A home smaller than this, and than this share of all that is drawn, is the inside of an object.
+OBJECT_M2, OBJECT_SHARE = 8.0, 0.15
 
 
 class OccupancySource(PixelSource):
@@ -215,19 +43,74 @@ class OccupancySource(PixelSource):
             of a chair or lettering, become free; 0 keeps all.
         ray_width: Free space narrower than this doesn't lead on: it cuts off rays through windows
             and gaps in walls; 0 keeps all that is connected.
+        unknown_grey: Shade of what is unknown or outside though it is as light as floor, from 0 to
+            255; auto: the one that most of the edge has; none: there is no such shade.
         path: The file.
     """
 
     speck_area_m2: float = Field(default=0.02, ge=0)
     ray_width: Length = Field(default=0.3, ge=0)
+    unknown_grey: UnknownGrey = "auto"
 
     path: InputPath
 
-    def free_space(self, raw: "OccupancyMap", notes: list[str]) -> Polygon:
-        """Return the home in a map [m], and add a note for each change; see `free_space`."""
+    def known(
+        self, picture: GreyPicture, free: Bool, pixel: float, notes: list[str], *, saved: bool
+    ) -> Bool:
+        """Return the free pixels that aren't of the grey of unknown, nor darker than it.
+
+        Args:
+            picture: The picture.
+            free: Pixels that are free by their shade, bool (rows, columns).
+            pixel: Side of a pixel [m].
+            notes: A note is added if pixels are taken for unknown.
+            saved: Whether the grey that map savers write may stand for unknown anywhere.
+        """
+        if self.unknown_grey == "none":
+            return free
+        edge, share = picture.edge_grey()
+        greys = [edge] if share >= EDGE_SHARE else []
+        greys += [SAVED_UNKNOWN] if saved else []
+        if self.unknown_grey != "auto":
+            greys = [self.unknown_grey]
+        for grey in greys:
+            known: Bool = free & (picture.greys > grey)
+            unknown = int(np.count_nonzero(free & (picture.greys == grey)))
+            if unknown and np.count_nonzero(known) * pixel**2 >= FLOOR_M2:
+                notes.append(
+                    f"grey {grey} is taken for unknown, though it is as light as floor: {unknown}"
+                    " pixels; unknown_grey: none takes it for floor"
+                )
+                return known
+        return free
+
+    def home(self, raw: "OccupancyMap", picture: GreyPicture, notes: list[str]) -> Polygon:
+        """Return the home in an occupancy map [m], and add a note for each change.
+
+        Raises:
+            FloorPlanError: There is none, or what was found is the ground around it or the inside
+                of an object.
+        """
         free, changes = free_space(raw, speck_area_m2=self.speck_area_m2, ray_width=self.ray_width)
+        self._refuse_outside(raw, free, picture)
+        _refuse_object(raw, free)
         notes += changes
         return free
+
+    def _refuse_outside(self, raw: "OccupancyMap", free: Polygon, picture: GreyPicture) -> None:
+        """Raise FloorPlanError if free space covers most of the edge of the picture."""
+        rows, columns = raw.free.shape
+        length = 2 * (rows + columns) * raw.pixel
+        corners = np.array([(0, 0), (columns, 0), (columns, rows), (0, rows)], np.float64)
+        edge = Polygon(raw.to_metres(corners)).exterior
+        if float(edge.buffer(raw.pixel / 4).intersection(free.exterior).length) < length / 2:
+            return
+        grey, share = picture.edge_grey()
+        raise FloorPlanError(
+            "the free space runs along most of the edge of the picture: it is the ground around the"
+            f" home, not the home. {share:.0%} of the edge has grey {grey}: if that is unknown, set"
+            f" floorplan.unknown_grey={grey}; if dark pixels are floor, set negate"
+        )
 
     def build(self, free: Polygon, pixel: float, source: str, notes: list[str]) -> FloorPlan:
         """Return the floor plan of free space [m] whose rooms and doorways the walls determine."""
@@ -239,6 +122,22 @@ class OccupancySource(PixelSource):
             doorways=None,
             regions_are="none",
             notes=notes,
+        )
+
+
+def _refuse_object(raw: "OccupancyMap", free: Polygon) -> None:
+    """Raise FloorPlanError if a home is far smaller than what is drawn around it."""
+    if free.area >= OBJECT_M2 or not raw.occupied.any():
+        return
+    rows, columns = np.nonzero(raw.occupied)
+    drawn = shapely.MultiPoint(np.stack([columns, rows], axis=1)).convex_hull
+    drawn_m2 = drawn.area * raw.pixel**2
+    if free.area < OBJECT_SHARE * drawn_m2:
+        x, y = shapely.get_coordinates(free.representative_point())[0].tolist()
+        raise FloorPlanError(
+            f"the largest space that walls enclose has {free.area:.1f} m2, of {drawn_m2:.0f} m2"
+            f" that are drawn: it is the inside of an object at ({x:.2f}, {y:.2f}) m, not a home."
+            " Close the gaps in the outer walls, or set floorplan.close_gaps to the widest [m]"
         )
 
 

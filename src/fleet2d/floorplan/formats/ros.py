@@ -15,18 +15,11 @@ from fleet2d.configuration.components import register
 from fleet2d.configuration.units import InputPath, Length
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.formats.files import MAX_COORDINATE_M, in_file, read_yaml, shown_value
-from fleet2d.floorplan.formats.occupancy import (
-    GreyPicture,
-    OccupancyMap,
-    OccupancySource,
-    read_grey,
-)
+from fleet2d.floorplan.formats.occupancy import OccupancyMap, OccupancySource
+from fleet2d.floorplan.formats.raster import GreyPicture, read_grey
 from fleet2d.floorplan.lattice import MAX_CELL_M, MIN_CELL_M
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.kernels import Bool
-
-# The grey that map savers write for unknown; above this free_thresh it would count as free.
-UNKNOWN_GREY = 205 / 255
 
 _KEYS = {
     "image": "image: map.pgm",
@@ -70,10 +63,29 @@ class Ros(OccupancySource):
         with in_file(self.path):
             settings = _settings(content)
             file, notes = _image_file(settings.image, self.path)
-            free = self.free_space(_occupancy(settings, read_grey(file), notes), notes)
+            picture = read_grey(file)
+            free = self.home(self._occupancy(settings, picture, notes), picture, notes)
             if self.simplify > 0:
                 free = _simplify(free, self.simplify, notes)
             return self.build(free, settings.resolution, f"ROS map, {self.path.name}", notes)
+
+    def _occupancy(
+        self, settings: "_MapSettings", picture: GreyPicture, notes: list[str]
+    ) -> OccupancyMap:
+        """Divide pixels into free, occupied and unknown ones as map_server does."""
+        shades = np.arange(picture.white + 1) / picture.white
+        chance = shades if settings.negate else 1 - shades
+        if settings.raw:  # percent; values above 100 are unknown
+            percent = np.rint(shades * 255)
+            chance = np.where(percent <= 100, percent / 100, np.nan)
+        occupied = _opaque(chance > settings.occupied_thresh, picture)
+        free = _opaque(chance < settings.free_thresh, picture)
+        if not (settings.negate or settings.raw):
+            free = self.known(picture, free, settings.resolution, notes, saved=True)
+        x, y, yaw = settings.origin
+        # Rounded, so that the last bit of a machine's cosine doesn't matter, and for quarter turns.
+        turn = (round(math.cos(yaw), 12), round(math.sin(yaw), 12))
+        return OccupancyMap(free[::-1], occupied[::-1], settings.resolution, (x, y), turn)
 
 
 # --- The YAML file -----------------------------------------------------------------------------
@@ -186,29 +198,6 @@ def _is_file(path: Path) -> bool:
         return path.is_file()
     except OSError:  # its name is too long to be one
         return False
-
-
-def _occupancy(settings: _MapSettings, picture: GreyPicture, notes: list[str]) -> OccupancyMap:
-    """Divide pixels into free, occupied and unknown ones as map_server does."""
-    shades = np.arange(picture.white + 1) / picture.white
-    chance = shades if settings.negate else 1 - shades
-    if settings.raw:  # percent; values above 100 are unknown
-        percent = np.rint(shades * 255)
-        chance = np.where(percent <= 100, percent / 100, np.nan)
-    occupied = _opaque(chance > settings.occupied_thresh, picture)
-    free = _opaque(chance < settings.free_thresh, picture)
-    grey = round(UNKNOWN_GREY * picture.white)
-    if not settings.negate and chance[grey] < settings.free_thresh and picture.white >= 255:
-        pixels = int(np.count_nonzero(picture.values == grey))
-        if pixels:
-            notes.append(
-                f"free_thresh is {settings.free_thresh:g}: so {pixels} pixels of the grey that map"
-                " savers write for unknown count as free; 0.196 makes them unknown"
-            )
-    x, y, yaw = settings.origin
-    # Rounded, so that the last bit of a machine's cosine doesn't matter, and for quarter turns.
-    turn = (round(math.cos(yaw), 12), round(math.sin(yaw), 12))
-    return OccupancyMap(free[::-1], occupied[::-1], settings.resolution, (x, y), turn)
 
 
 def _opaque(shades: Bool, picture: GreyPicture) -> Bool:
