@@ -1244,6 +1244,37 @@ def smooth_people(model: tuple[Any, ...], day: tuple[Any, ...], longest: int, pr
         ValueError: Arrays aren't of the same people, rooms and patches, or hold numbers of patches or bins that aren't.
     """
 
+TRACE_FEATURES: int = 30
+
+def trace_size(home: tuple[Any, ...]) -> int:
+    """Return the size of the memory of `trace_evidence`."""
+
+def trace_evidence(memory: numpy.typing.NDArray[numpy.float64], home: tuple[Any, ...], evidence: tuple[Any, ...]) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    Add evidence of a person to what it has left behind, and return it as features of each place.
+
+    Args:
+        memory: float64 (trace_size(home),), zeros before the first bin; it is updated.
+        home: The rooms, see `fleet2d.kernels.presence`.
+        evidence: The evidence of one person in consecutive bins.
+
+    Returns:
+        float64 (bins, rooms + 1, TRACE_FEATURES), away last.
+    """
+
+def place_probabilities(network: tuple[Any, ...], places: numpy.typing.NDArray[numpy.float64], features: numpy.typing.NDArray[numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    Return the probability of each place by a network over the set of places.
+
+    Args:
+        network: The weights, see `fleet2d.kernels.presence`.
+        places: float64 (places, hidden), what the first layer makes of what doesn't change.
+        features: float64 (bins, places, features), the last one the logarithm of the belief that is corrected.
+
+    Returns:
+        float64 (bins, places), rows sum to one.
+    """
+
 def smooth(model: tuple[Any, ...], stretches: tuple[Any, ...], prior: numpy.typing.NDArray[numpy.float64], future: numpy.typing.NDArray[numpy.float64], moments: tuple[Any, ...]) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
     """
     Return the distribution over rooms in each stretch, given all evidence.

@@ -21,7 +21,16 @@ import fleet2d
 from fleet2d import _core
 from fleet2d.floorplan.lattice import Lattice
 from fleet2d.kernels.motion import Breakpoints, WalkRule, empty_poses
-from fleet2d.kernels.presence import Moments, PeopleEvidence, StayModel, Stretches
+from fleet2d.kernels.presence import (
+    Moments,
+    PeopleEvidence,
+    PlaceNetwork,
+    StayModel,
+    Stretches,
+    TracedEvidence,
+    TracedRooms,
+    trace_size,
+)
 from fleet2d.kernels.sight import (
     NEVER,
     CoverageRecord,
@@ -348,6 +357,16 @@ def stretches() -> Stretches:
     return Stretches(np.array([1, 2, 1]), np.arange(3), shown, begin, patch, np.ones(2))
 
 
+def traced_rooms() -> TracedRooms:
+    return TracedRooms(np.array([0.25, 0.75]), np.array([[0.0, 0.4], [0.4, 0.0]]))
+
+
+def traced() -> TracedEvidence:
+    seen, belief = np.array([[0.0, 1], [0, 0], [0.5, 0]]), np.full((3, 3), 1 / 3)
+    day, minute = np.full(3, 739_000), np.array([5, 6, 7])
+    return TracedEvidence(day, minute, 1 - seen, seen, np.zeros((3, 2), np.uint8), belief)
+
+
 def moments() -> Moments:
     return Moments(np.zeros(3), np.zeros((3, 4)), np.zeros(4), np.zeros(3), np.zeros(3))
 
@@ -567,6 +586,13 @@ CALLS: dict[str, Args] = {
     "follow": lambda: (model(), stretches(), np.full((2, 1, 4), 0.125), np.full(4, -1)),
     "smooth": lambda: (model(), stretches(), np.full((1, 4), 0.25), np.ones((1, 4)), moments()),
     "follow_people": lambda: (people(), evidence(), 2, np.full((5, 1, 4), 0.25)),
+    "trace_size": lambda: (traced_rooms(),),
+    "trace_evidence": lambda: (np.zeros(trace_size(traced_rooms())), traced_rooms(), traced()),
+    "place_probabilities": lambda: (
+        PlaceNetwork(np.ones((4, 3)), np.ones((3, 3)), np.ones((3, 3)), np.ones(3), np.ones(3)),
+        np.zeros((2, 3)),
+        np.ones((5, 2, 4)),
+    ),
     "smooth_people": lambda: (
         people(),
         evidence(),
@@ -804,6 +830,7 @@ WRITTEN = {
     "follow": [(2,), (3,)],
     "smooth": [(4, i) for i in range(5)],
     "follow_people": [(3,)],
+    "trace_evidence": [(0,)],
     "smooth_people": [(5, i) for i in range(5)],
 }
 """The arrays that are written to, by function."""

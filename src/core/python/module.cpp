@@ -32,6 +32,7 @@ NB_MODULE(_core, m) {
     bind_legs(m);
     bind_stays(m);
     bind_people(m);
+    bind_traces(m);
     bind_smoothing(m);
     bind_timelines(m);
     bind_signals(m);

@@ -29,6 +29,7 @@ void bind_evidence(nanobind::module_& m);
 void bind_legs(nanobind::module_& m);
 void bind_stays(nanobind::module_& m);
 void bind_people(nanobind::module_& m);
+void bind_traces(nanobind::module_& m);
 void bind_smoothing(nanobind::module_& m);
 void bind_signals(nanobind::module_& m);
 void bind_flows(nanobind::module_& m);

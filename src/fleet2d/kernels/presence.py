@@ -12,15 +12,19 @@ import numpy as np
 # Names that are imported as themselves are part of this module.
 # isort: off
 from fleet2d._core import (
+    TRACE_FEATURES as TRACE_FEATURES,
     advance as advance,
     earth_mover as earth_mover,
     follow as follow,
     follow_people as follow_people,
     gather_views as gather_views,
     list_sightings as list_sightings,
+    place_probabilities as place_probabilities,
     resampled as resampled,
     smooth_people as smooth_people,
     sum_places as sum_places,
+    trace_evidence as trace_evidence,
+    trace_size as trace_size,
 )
 # isort: on
 
@@ -159,3 +163,57 @@ class PeoplePlaces(NamedTuple):
         """Return the probability of one person's places in each bin: float64 (bins, rooms + 1)."""
         own = slice(self.begin[person], self.begin[person + 1])
         return np.repeat(self.probability[own], self.bins[own], axis=0)
+
+
+class TracedRooms(NamedTuple):
+    """The rooms of a home, as `trace_evidence` takes them.
+
+    Attributes:
+        share: float64 (rooms,), the share of each room in the floor of all.
+        distance: float64 (rooms, rooms), from middle to middle [10 m].
+    """
+
+    share: F64
+    distance: F64
+
+
+class TracedEvidence(NamedTuple):
+    """Evidence of one person in consecutive bins.
+
+    Attributes:
+        day: int64 (bins,), the day of each bin, as `date.toordinal` counts.
+        minute: int64 (bins,), its beginning [minutes since midnight].
+        watched: float64 (bins, rooms), the share of the room in view.
+        seen: float64 (bins, rooms), the share of the steps at which the person was perceived there.
+        unknown: uint8 (bins, rooms), 1 where an unknown person was perceived.
+        belief: float64 (bins, rooms + 1), the belief of another model, away last.
+    """
+
+    day: I64
+    minute: I64
+    watched: F64
+    seen: F64
+    unknown: U8
+    belief: F64
+
+
+class PlaceNetwork(NamedTuple):
+    """The weights of a network over the set of places, in which all places share their weights.
+
+    With x the features of a place and z what doesn't change of it, a = max(x first + z, 0), b =
+    max(a second + mean(a) context + bias, 0), and the score of the place is b score + x_last; the
+    mean is over all places. Probabilities are the softmax of the scores.
+
+    Attributes:
+        first: float64 (features, hidden).
+        second: float64 (hidden, hidden).
+        context: float64 (hidden, hidden).
+        bias: float64 (hidden,).
+        score: float64 (hidden,).
+    """
+
+    first: F64
+    second: F64
+    context: F64
+    bias: F64
+    score: F64

@@ -11,6 +11,7 @@ from tests.algorithms.presence.worlds import (
     any_evidence,
     evidence,
     evidence_of,
+    home_of,
     patrol,
     person,
     pieces,
@@ -37,7 +38,7 @@ MINUTE = 60_000_000
 
 def followed(model: Model, bins: Evidence, rooms: int, users: int, length: int = 60) -> Presence:
     """What a model believes at the end; its track is of all bins."""
-    model.begin(rooms, users, MONDAY.toordinal())
+    model.begin(home_of(rooms), [f"u{i}" for i in range(users)], MONDAY)
     beliefs = [model.observe(part) for part in pieces(bins, length)]
     home, away = (np.concatenate(parts) for parts in zip(*beliefs, strict=True))
     users_ = [f"u{i}" for i in range(users)]
@@ -176,7 +177,7 @@ def test_learning_continues_from_a_learned_state(cls: type[Model]) -> None:
     bins = any_evidence(8, bins=2000)
     one, other = cls(), cls()
     followed(one, bins, 3, 2)
-    other.begin(3, 2, MONDAY.toordinal())
+    other.begin(home_of(3), ["u0", "u1"], MONDAY)
     other.recall(one.remember())
     home, _ = other.observe(any_evidence(9).between(20, 21))
     assert np.abs(home.sum(axis=2) - 1).max() < 1e-9

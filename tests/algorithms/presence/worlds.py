@@ -2,10 +2,14 @@
 
 from collections.abc import Callable
 from datetime import datetime
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 
 from fleet2d.algorithms.evidence import Evidence, PatchEvidence, SightingCounts, times_of_bins
+from fleet2d.floorplan.home import Home
+from fleet2d.floorplan.rooms.room import Room
 from fleet2d.kernels import F64, I64
 from fleet2d.runtime.clock import Clock
 
@@ -16,6 +20,25 @@ DETECTION = 0.95
 
 Policy = Callable[[int, int, bool, I64, np.random.Generator], int]
 """From bin, room now, whether the person was seen, sightings per room so far, to the next room."""
+
+
+def home_of(rooms: int) -> Home:
+    """A home of rooms of 3 by 4 m in a row, of the kinds that most homes have."""
+    kinds = ["bedroom", "kitchen", "living_room", "bathroom", "hallway", "office"]
+    boxes = [
+        Room(
+            i,
+            f"room_{i}",
+            kinds[i % 6],
+            (),
+            4800,
+            12.0,
+            (3 * i + 1.5, 2.0),
+            (3 * i, 0, 3 * i + 3, 4),
+        )
+        for i in range(rooms)
+    ]
+    return cast("Home", SimpleNamespace(rooms=tuple(boxes)))
 
 
 def transitions(rooms: int, seed: int, dwell: float = 40.0) -> F64:

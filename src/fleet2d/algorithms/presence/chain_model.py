@@ -16,6 +16,7 @@ from fleet2d.algorithms.presence.model import Model
 from fleet2d.algorithms.presence.people import DayEvidence, StateLayout
 from fleet2d.configuration.components import register
 from fleet2d.configuration.units import Share
+from fleet2d.floorplan.home import Home
 from fleet2d.kernels import F64, I64, Bool
 from fleet2d.kernels.presence import StayModel, Stretches, advance, follow
 from fleet2d.runtime.clock import DAY_MINUTES
@@ -134,6 +135,18 @@ class ChainPresence(Presence):
             home, away = track.home, track.away
         super().__init__(users, home[-1], away[-1], time, track=track)
 
+    def corrected(self) -> "ChainPresence":
+        """Return the same with forecasts that begin with the present belief of the track."""
+        assert self.track is not None
+        people = []
+        for row, person in enumerate(self._people):
+            away = self.track.away[-1, row]
+            belief = np.append(self.track.home[-1, row] * (1 - away), away)
+            stages = person.now.reshape(len(belief), -1)
+            spread = normalized(stages) * belief[:, np.newaxis]
+            people.append(person._replace(now=spread.ravel()))
+        return ChainPresence(self.users, people, self.time, self._bin_us, self.track)
+
     def at(self, time: datetime) -> "ChainPresence":
         """Return the forecast of a later time, in whole bins; of an earlier one, itself."""
         bins = min((time - self.time) // timedelta(microseconds=self._bin_us), MAX_HORIZON)
@@ -219,14 +232,13 @@ class Filter(Model):
     stages: ClassVar[int] = 1
     negative: ClassVar[bool] = True
 
-    def begin(self, rooms: int, users: int, day: int) -> None:
+    def begin(self, home: Home, users: Sequence[str], start: datetime) -> None:
         """Prepare for a run."""
-        super().begin(rooms, users, day)
-        self.day = day
+        super().begin(home, users, start)
         self.learner = Likelihood(
             detection=self.detection, restless=self.restless, stages=self.stages
         )
-        self.learner.begin(rooms, users)
+        self.learner.begin(self.rooms, self.users)
         self.followers: list[Follower] = []
 
     def observe(self, evidence: Evidence) -> tuple[F64, F64]:

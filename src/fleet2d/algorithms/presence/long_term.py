@@ -29,8 +29,7 @@ class PresenceAlgorithm(Algorithm):
 
     def start(self, home: Home) -> None:
         """Begin without evidence."""
-        self.rooms = len(home.rooms)
-        self.has_begun = False
+        self.home, self.has_begun = home, False
         self.learned_state: Mapping[str, Any] | None = None
 
     @property
@@ -38,20 +37,20 @@ class PresenceAlgorithm(Algorithm):
         """The component that learns: an estimator, or a model."""
         raise NotImplementedError
 
-    def _prepare(self, learner: Any, users: int, start: datetime) -> None:
+    def _prepare(self, learner: Any, users: Sequence[str], start: datetime) -> None:
         """Begin a run with what was learned in another one."""
         raise NotImplementedError
 
     def _begin_once(self, state: Present) -> None:
         if not self.has_begun:
-            self._prepare(self._learner, len(state.users), state.start)
+            self._prepare(self._learner, state.users, state.start)
             self.has_begun = True
 
     def check_learned(self, users: Sequence[str], start: datetime) -> None:
         """Restore the learned state in a copy, which raises if it doesn't fit the users."""
         if self.learned_state is not None:
             check_numbers("", self.learned_state, self.type_name)
-            self._prepare(self._learner.model_copy(deep=True), len(users), start)
+            self._prepare(self._learner.model_copy(deep=True), users, start)
 
     def remember(self) -> dict[str, Any]:
         """Return the learned state, from which another run can start."""
@@ -119,9 +118,9 @@ class LongTermPresence(PresenceAlgorithm):
     def _learner(self) -> Estimator:
         return self.estimator
 
-    def _prepare(self, learner: Estimator, users: int, start: datetime) -> None:
+    def _prepare(self, learner: Estimator, users: Sequence[str], start: datetime) -> None:
         half_life = None if self.half_life is None else self.half_life / DAY
-        learner.begin(self.rooms, users, half_life)
+        learner.begin(len(self.home.rooms), len(users), half_life)
         if self.learned_state is not None:
             learner.recall(self.learned_state, start.toordinal())
 

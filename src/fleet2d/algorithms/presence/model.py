@@ -11,6 +11,7 @@ from fleet2d.algorithms.evidence import Evidence
 from fleet2d.algorithms.presence.belief import HOURS, BeliefSeries, Presence, WeeklyPresence
 from fleet2d.algorithms.presence.estimator import Estimator
 from fleet2d.configuration.components import Component, OneOf, register
+from fleet2d.floorplan.home import Home
 from fleet2d.kernels import F64
 
 NEVER = -1
@@ -24,15 +25,15 @@ class Model(Component):
 
     kind: ClassVar[str] = "presence_model"
 
-    def begin(self, rooms: int, users: int, day: int) -> None:
+    def begin(self, home: Home, users: Sequence[str], start: datetime) -> None:
         """Prepare for a run.
 
         Args:
-            rooms: Number of rooms.
-            users: Number of users.
-            day: First day of the run, as `date.toordinal` counts.
+            home: The home: its rooms, with their kinds and floor, and the ways between them.
+            users: Names of the users.
+            start: Local time at which the run begins; each bin of evidence has its own.
         """
-        self.rooms, self.users = rooms, users
+        self.rooms, self.users, self.day = len(home.rooms), len(users), start.toordinal()
 
     def observe(self, evidence: Evidence) -> tuple[F64, F64]:
         """Process the next bins of evidence; return the belief after each bin.
@@ -74,10 +75,10 @@ class LastSeen(Model):
     away. The naive baseline: right just after a sighting, and overconfident later.
     """
 
-    def begin(self, rooms: int, users: int, day: int) -> None:
+    def begin(self, home: Home, users: Sequence[str], start: datetime) -> None:
         """Prepare for a run."""
-        super().begin(rooms, users, day)
-        self.last = np.full(users + 1, NEVER)
+        super().begin(home, users, start)
+        self.last = np.full(self.users + 1, NEVER)
 
     def observe(self, evidence: Evidence) -> tuple[F64, F64]:
         """Return the last room of each user after each bin."""
@@ -102,11 +103,10 @@ class LongTerm(Model):
 
     estimator: Annotated[Estimator, OneOf("presence_estimator")] = cast("Any", "likelihood")
 
-    def begin(self, rooms: int, users: int, day: int) -> None:
+    def begin(self, home: Home, users: Sequence[str], start: datetime) -> None:
         """Prepare for a run."""
-        super().begin(rooms, users, day)
-        self.day = day
-        self.estimator.begin(rooms, users)
+        super().begin(home, users, start)
+        self.estimator.begin(self.rooms, self.users)
 
     def observe(self, evidence: Evidence) -> tuple[F64, F64]:
         """Return the belief before these bins, repeated for each of them."""

@@ -1,5 +1,6 @@
 """Real-time presence: where each user is now, given all evidence so far."""
 
+from collections.abc import Sequence
 from datetime import datetime, timedelta
 from typing import Annotated, Any, cast
 
@@ -48,21 +49,21 @@ class RealTimePresence(PresenceAlgorithm):
     def _learner(self) -> Model:
         return self.model
 
-    def _prepare(self, learner: Model, users: int, start: datetime) -> None:
-        learner.begin(self.rooms, users, start.toordinal())
+    def _prepare(self, learner: Model, users: Sequence[str], start: datetime) -> None:
+        learner.begin(self.home, users, start)
         if self.learned_state is not None:
             learner.recall(self.learned_state)
 
     def _check(self, home: Any, away: Any, bins: int, state: Present) -> None:
         """Refuse a model's belief if it has wrong shapes or isn't a distribution."""
-        users = len(state.users) + 1
+        users, rooms = len(state.users) + 1, len(self.home.rooms)
         shapes = np.shape(home), np.shape(away)
-        expected = (bins, users, self.rooms), (bins, users)
+        expected = (bins, users, rooms), (bins, users)
         if shapes != expected:
             raise ComponentError(
                 f"the model {self.model.type_name} returned arrays of shapes {shapes[0]} and"
                 f" {shapes[1]}, expected {expected[0]} (rooms, given at home) and {expected[1]}"
-                f" (away) for {bins} bins, {users - 1} users and anyone, and {self.rooms} rooms"
+                f" (away) for {bins} bins, {users - 1} users and anyone, and {rooms} rooms"
             )
         is_valid = are_distributions(home, away)
         if not is_valid.all():

@@ -1,0 +1,243 @@
+"""A learned model of real-time presence: a network over all places that corrects `routine`."""
+
+from collections.abc import Mapping, Sequence
+from datetime import datetime
+from functools import cache
+from pathlib import Path
+from typing import Any, NamedTuple, Self
+
+import numpy as np
+
+from fleet2d.algorithms.algorithm import array_of
+from fleet2d.algorithms.evidence import Evidence
+from fleet2d.algorithms.presence.belief import BeliefSeries, Presence
+from fleet2d.algorithms.presence.chain_model import ChainPresence, RoutineModel, split
+from fleet2d.algorithms.presence.estimator import natural_log
+from fleet2d.bounds import one_line
+from fleet2d.configuration.components import register
+from fleet2d.configuration.units import InputPath
+from fleet2d.errors import InputError
+from fleet2d.floorplan.home import Home
+from fleet2d.kernels import F64
+from fleet2d.kernels.presence import (
+    TRACE_FEATURES,
+    PlaceNetwork,
+    TracedEvidence,
+    TracedRooms,
+    place_probabilities,
+    trace_evidence,
+    trace_size,
+)
+
+WEIGHTS = Path(__file__).with_name("learned.npz")
+FORMAT = "fleet2d presence network 1"  # changes with the features, and with the network
+MAX_BYTES = 1_000_000
+MAX_HIDDEN = 256
+MIN_SHARE = 1e-9
+# Kinds of rooms that mean the same; other kinds are one more group, and being away another.
+GROUPS = (
+    ("bedroom", "child_room", "guest_room"),
+    ("bathroom", "toilet"),
+    ("kitchen",),
+    ("living_room",),
+    ("dining_room",),
+    ("office",),
+    ("hallway", "hall", "entryway", "lobby"),
+)
+PLACE_FEATURES = len(GROUPS) + 5
+
+
+class PlaceFacts(NamedTuple):
+    """What is known of the places of a home, which mean the same in all homes.
+
+    Attributes:
+        features: float64 (rooms + 1, PLACE_FEATURES), away last: the group of the kind of room, the
+            logarithm of its area [m²], its share of the floor, and one by the rooms of that group.
+        rooms: Shares of the floor, and distances.
+    """
+
+    features: F64
+    rooms: TracedRooms
+
+    @classmethod
+    def of(cls, kinds: Sequence[str], area_m2: Sequence[float], xy: Sequence[Any]) -> Self:
+        """Return what is known of rooms: their kinds, areas, and middles [m].
+
+        Example:
+            >>> facts = PlaceFacts.of(["kitchen", "loft"], [12.0, 4.0], [(0, 0), (3, 4)])
+            >>> facts.features[:, 2].tolist(), facts.rooms.distance.tolist()
+            ([1.0, 0.0, 0.0], [[0.0, 0.5], [0.5, 0.0]])
+        """
+        groups = [
+            next((k for k, names in enumerate(GROUPS) if kind in names), len(GROUPS))
+            for kind in kinds
+        ]
+        area = np.maximum(area_m2, 0.01)
+        count, features = len(groups), np.zeros((len(groups) + 1, PLACE_FEATURES))
+        features[np.arange(count), groups] = 1
+        features[count, len(GROUPS) + 1] = 1
+        features[:count, -3] = natural_log(area)
+        features[:count, -2] = share = area / area.sum()
+        features[:count, -1] = 1 / np.bincount(groups)[groups]
+        middle = np.array(xy, np.float64)
+        gaps = middle[:, None] - middle[None]
+        return cls(features, TracedRooms(share, np.sqrt((gaps * gaps).sum(axis=2)) / 10))
+
+    @classmethod
+    def of_home(cls, home: Home) -> Self:
+        """Return what is known of the rooms of a home."""
+        columns = zip(*((r.type, r.area_m2, r.anchor_xy) for r in home.rooms), strict=True)
+        return cls.of(*columns)
+
+
+class Weights(NamedTuple):
+    """A trained network.
+
+    Attributes:
+        places: float64 (PLACE_FEATURES, hidden), the part of the first layer for `PlaceFacts`.
+        start: float64 (hidden,), the bias of the first layer.
+        network: The rest.
+    """
+
+    places: F64
+    start: F64
+    network: PlaceNetwork
+
+    @classmethod
+    def read(cls, path: Path) -> Self:
+        """Read the weights of a file that `save` wrote.
+
+        Raises:
+            InputError: The file is damaged, no file of weights, or of another version.
+        """
+        try:
+            if path.stat().st_size > MAX_BYTES:
+                raise ValueError(f"it is larger than {MAX_BYTES:,} bytes")
+            with path.open("rb") as opened, np.load(opened, allow_pickle=False) as file:
+                arrays = {name: file[name] for name in file.files}
+        except Exception as error:  # noqa: BLE001 - a damaged archive raises almost anything
+            raise InputError(
+                f"{path} can't be read as weights of a model of presence ({one_line(error, 100)}):"
+                " give a file that `fleet2d train rtp` wrote"
+            ) from None
+        form = str(arrays.get("format", "nothing"))
+        if form != FORMAT:
+            raise InputError(
+                f"{path} holds {form[:60]!r}, expected {FORMAT!r}: train it again with this version"
+            )
+        hidden = np.size(arrays.get("bias", ()))
+        shapes = {
+            "places": (PLACE_FEATURES, hidden),
+            "start": (hidden,),
+            "first": (TRACE_FEATURES, hidden),
+            "second": (hidden, hidden),
+            "context": (hidden, hidden),
+            "bias": (hidden,),
+            "score": (hidden,),
+        }
+        for name, shape in shapes.items():
+            part = arrays.get(name, np.zeros(()))
+            fits = part.shape == shape and part.dtype == np.float32 and 0 < hidden <= MAX_HIDDEN
+            if not fits or not np.isfinite(part).all():
+                raise InputError(
+                    f"{path} lacks finite weights {name!r} of shape {shape}: it is damaged"
+                )
+        values = {name: arrays[name].astype(np.float64) for name in shapes}
+        places, start = values.pop("places"), values.pop("start")
+        return cls(places, start, PlaceNetwork(**values))
+
+    def save(self, path: Path) -> None:
+        """Write the weights to a .npz file, as float32."""
+        arrays = {"places": self.places, "start": self.start, **self.network._asdict()}
+        with path.open("wb") as file:
+            np.savez(
+                file,
+                format=np.array(FORMAT),
+                **{name: array.astype(np.float32) for name, array in arrays.items()},
+            )
+
+    def of_places(self, features: F64) -> F64:
+        """Return what the first layer makes of places: float64 (places, hidden)."""
+        total = np.tile(self.start, (len(features), 1))
+        for k, row in enumerate(self.places):  # in order: the same on every machine
+            total += features[:, k, np.newaxis] * row
+        return total
+
+
+@cache
+def shipped_weights() -> Weights:
+    """Return the weights that ship with Fleet2D."""
+    return Weights.read(WEIGHTS)
+
+
+@register("presence_model", "learned")
+class LearnedModel(RoutineModel):
+    """The belief of `routine`, corrected by a network that was trained on simulated homes.
+
+    For each room, and for being away, the network gets what the evidence of a user has left there
+    (when the user was last seen and where, what was looked at and empty since, sightings by hour of
+    the day, moves between rooms), what the place is (kind, area), and the belief of `routine`. All
+    places share the weights, so homes may have any number of rooms, and each user is followed
+    alone. It was trained to have the lowest log loss, so its probabilities are calibrated where
+    homes and people are like those of the training.
+
+    It is right where `routine` is too sure, or too slow to give up a room. It fails where people
+    live unlike those it was trained on; docs/datasets.md has the numbers.
+
+    Attributes:
+        weights: A file that `fleet2d train rtp` wrote; left out: the weights that ship.
+    """
+
+    weights: InputPath | None = None
+
+    def begin(self, home: Home, users: Sequence[str], start: datetime) -> None:
+        """Prepare for a run."""
+        super().begin(home, users, start)
+        self.facts = PlaceFacts.of_home(home)
+        read = shipped_weights() if self.weights is None else Weights.read(self.weights)
+        self.network, self.places = read.network, read.of_places(self.facts.features)
+        self.traces = np.zeros((max(self.users, 1), trace_size(self.facts.rooms)))
+
+    def observe(self, evidence: Evidence) -> tuple[F64, F64]:
+        """Return the corrected belief after each bin."""
+        home, away = super().observe(evidence)
+        unknown = evidence.sightings.unknown
+        places = []
+        for person, memory in enumerate(self.traces):
+            chance = away[:, person, np.newaxis]
+            prior = np.concatenate([home[:, person] * (1 - chance), chance], axis=1)
+            features = trace_evidence(memory, self.facts.rooms, traced(evidence, person, prior))
+            places.append(place_probabilities(self.network, self.places, features))
+        return split(places, self.users, unknown)
+
+    def presence(
+        self, users: Sequence[str], time: datetime, bin_us: int, track: BeliefSeries
+    ) -> Presence:
+        """Return the present belief; forecasts begin with it, and go on as those of `routine`."""
+        forecast = super().presence(users, time, bin_us, track)
+        assert isinstance(forecast, ChainPresence)
+        return forecast.corrected()
+
+    def remember(self) -> dict[str, Any]:
+        """Return the learned state, as arrays in mappings."""
+        return {**super().remember(), "traces": self.traces}
+
+    def recall(self, learned: Mapping[str, Any]) -> None:
+        """Restore what `remember` returned; called after `begin`."""
+        super().recall(learned)
+        self.traces = array_of(learned, "traces", self.traces.shape)
+
+
+def traced(evidence: Evidence, person: int, belief: F64) -> TracedEvidence:
+    """Return the evidence of one person.
+
+    Args:
+        evidence: The evidence of all.
+        person: Row of the user; without users, 0 is anybody.
+        belief: float64 (bins, rooms + 1), the belief to be corrected, away last.
+    """
+    bin_, room, steps = evidence.sightings.of_user(person)
+    seen = np.zeros(evidence.watched.shape)
+    seen[bin_, room] = steps / evidence.bin_steps
+    unknown = evidence.sightings.unknown.astype(np.uint8)
+    return TracedEvidence(evidence.day, evidence.minute, evidence.watched, seen, unknown, belief)

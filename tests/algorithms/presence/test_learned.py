@@ -1,0 +1,142 @@
+"""The learned model: any home, no leak, better than what it corrects, and files that aren't its own."""
+
+import copy
+import io
+from datetime import datetime, timedelta
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tests.algorithms.presence.worlds import MONDAY, any_evidence, evidence_of, home_of
+
+import fleet2d
+from fleet2d.algorithms.presence.belief import BeliefSeries
+from fleet2d.algorithms.presence.learned import WEIGHTS, LearnedModel, Weights
+from fleet2d.errors import InputError
+
+LEARNED = {"rtp": {"type": "rtp", "model": "learned"}}
+
+
+def begun(rooms: int = 3, users: int = 2) -> LearnedModel:
+    model = LearnedModel()
+    model.begin(home_of(rooms), [f"u{i}" for i in range(users)], MONDAY)
+    return model
+
+
+@pytest.mark.parametrize("rooms", [1, 2, 40])
+@pytest.mark.parametrize("users", [0, 1, 8])
+def test_homes_and_households_of_any_size(rooms: int, users: int) -> None:
+    model = begun(rooms, users)
+    bins = any_evidence(1, users=users, bins=150, rooms=rooms)
+
+    home, away = model.observe(bins)
+
+    assert (150, users + 1, rooms) == home.shape
+    assert np.abs(home.sum(axis=2) - 1).max() < 1e-9
+    assert ((away >= 0) & (away <= 1)).all()
+
+
+def test_a_robot_that_never_looks_is_sure_of_nothing() -> None:
+    bins = evidence_of(np.zeros((1440, 5)), np.zeros((1440, 2, 5), np.int64))
+
+    home, away = begun(5, 1).observe(bins)
+
+    belief = np.append(home[-1, 0] * (1 - away[-1, 0]), away[-1, 0])
+    assert belief.max() < 0.9
+
+
+def test_forecasts_begin_with_the_present_belief() -> None:
+    model = begun(4, 1)
+    home, away = model.observe(any_evidence(5, users=1, bins=300, rooms=4))
+    now = model.presence(["u0"], MONDAY, 60_000_000, BeliefSeries(0, 1, home, away))
+
+    soon, late = (now.at(MONDAY + timedelta(minutes=minutes)) for minutes in (1, 10_000))
+
+    assert np.abs(soon.with_away("u0") - now.with_away("u0")).max() < 0.2
+    assert np.abs(late.with_away("u0") - now.with_away("u0")).max() > 0.01
+
+
+def test_it_is_better_than_what_it_corrects_in_an_unseen_home() -> None:
+    routine = {"type": "rtp", "model": "routine"}
+    run = fleet2d.run(
+        "bundled:base",
+        "simulation.duration=5 d",
+        "floorplan={type: synthetic, seed: 77, furnish: true}",
+        "robots.astro.behaviors=[{type: patrol, order: random, dwell: 10 min}]",
+        seed=5,
+        algorithms={**LEARNED, "routine": routine},
+        metrics={"rtp_score": {"of": "rtp", "reference": "routine"}},
+    )
+    scores = run.metrics["rtp_score"]["ana"]["all"]
+
+    assert scores["log_loss"] < 0.9 * scores["reference_log_loss"]
+    assert scores["ece"] < 0.1
+
+
+def test_a_branch_and_a_learned_state_go_on_alike(tmp_path: Path) -> None:
+    simulation = fleet2d.Simulation("simulation.duration=8 h", seed=3, algorithms=LEARNED)
+    simulation.run_until(timedelta(hours=5))
+    branch = copy.deepcopy(simulation)
+
+    assert simulation.run().digest == branch.run().digest
+
+
+def test_its_file_is_small() -> None:
+    assert WEIGHTS.stat().st_size < 1_000_000
+
+
+def changed(**arrays: object) -> bytes:
+    """The shipped file with other arrays."""
+    with np.load(WEIGHTS) as file:
+        content = {**{name: file[name] for name in file.files}, **arrays}
+    buffer = io.BytesIO()
+    np.savez(buffer, **{name: value for name, value in content.items() if value is not None})
+    return buffer.getvalue()
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (WEIGHTS.read_bytes()[:-40], "can't be read as weights"),
+        (b"not a model", "can't be read as weights"),
+        (b"", "can't be read as weights"),
+        (changed(format=np.array("fleet2d presence network 0")), "train it again"),
+        (changed(format=None), "holds 'nothing'"),
+        (changed(bias=np.zeros(3, np.float32)), "it is damaged"),
+        (changed(score=np.full(32, np.nan, np.float32)), "lacks finite weights 'score'"),
+        (changed(places=np.array([{}], object)), "can't be read as weights"),
+    ],
+)
+def test_files_that_are_damaged_or_foreign_are_refused(
+    tmp_path: Path, content: bytes, words: str
+) -> None:
+    (tmp_path / "own.npz").write_bytes(content)
+
+    with pytest.raises(InputError, match=words):
+        Weights.read(tmp_path / "own.npz")
+
+
+def test_weights_are_read_as_they_were_saved(tmp_path: Path) -> None:
+    weights = Weights.read(WEIGHTS)
+
+    weights.save(tmp_path / "copy.npz")
+
+    again = Weights.read(tmp_path / "copy.npz")
+    assert np.array_equal(weights.network.first, again.network.first)
+    assert np.array_equal(weights.places, again.places)
+
+
+def test_a_run_names_a_missing_file(tmp_path: Path) -> None:
+    missing = {"type": "rtp", "model": {"type": "learned", "weights": str(tmp_path / "no.npz")}}
+    with pytest.raises(InputError, match=r"no\.npz"):
+        fleet2d.run("simulation.duration=1 h", seed=1, algorithms={"rtp": missing})
+
+
+def test_the_time_of_the_run_is_no_leak() -> None:
+    """Evidence is dated by its own bins: the start of the run is only where it begins."""
+    bins = any_evidence(7, users=1, bins=50)
+    one, other = LearnedModel(), LearnedModel()
+    one.begin(home_of(3), ["u0"], MONDAY)
+    other.begin(home_of(3), ["u0"], datetime(2020, 1, 1))
+
+    assert np.array_equal(one.observe(bins)[0], other.observe(bins)[0])
