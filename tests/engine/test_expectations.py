@@ -159,7 +159,7 @@ def test_rooms_moves_and_absence_are_those_of_the_trajectories() -> None:
 
 
 def test_what_holds_for_so_long_is_violated_from_then_on() -> None:
-    long = [(a + 19, b) for a, b in stretches(moves("astro") == 0) if b - a >= 19]
+    long = [(a + 20, b) for a, b in stretches(moves("astro") == 0) if b - a >= 20]
 
     assert long
     assert long == violations("long")

@@ -17,9 +17,12 @@ from fleet2d.expectations import (
     events,
     eventually,
     holds_for,
+    implies,
     metric,
     moving,
     never,
+    once,
+    since,
     until,
 )
 from fleet2d.expectations.expectation import Expectation, RunSignals
@@ -31,7 +34,11 @@ CLOCK = Clock(datetime(2026, 1, 5), 1_000_000, 1000)
 BUILD = {
     "is": lambda name: moving(name),
     "above": lambda name, limit: metric(name) > limit,
+    "less": lambda one, other: metric(one) < metric(other),
     "not": lambda part: ~part,
+    "implies": lambda one, other: implies(one, other),
+    "once": lambda part, steps: once(part, within=steps),
+    "since": lambda hold, goal, steps: since(hold, goal, within=steps),
     "and": lambda one, other: one & other,
     "or": lambda one, other: one | other,
     "always": lambda part, steps: always(part, within=steps),
@@ -41,17 +48,17 @@ BUILD = {
     "holds_for": lambda part, steps: holds_for(part, steps),
 }
 atoms: st.SearchStrategy[Any] = st.sampled_from(
-    [("is", "a"), ("is", "b"), ("above", "x", 0.5), ("above", "y", -0.5)]
+    [("is", "a"), ("is", "b"), ("above", "x", 0.5), ("above", "y", -0.5), ("less", "x", "y")]
 )
 some = st.integers(0, 6)
-limit = st.none() | some
+limit = st.none() | some | st.tuples(some, some).map(lambda pair: tuple(sorted(pair)))
 formulas = st.recursive(
     atoms,
     lambda part: st.one_of(
         st.tuples(st.just("not"), part),
-        st.tuples(st.sampled_from(["and", "or"]), part, part),
-        st.tuples(st.sampled_from(["always", "eventually"]), part, limit),
-        st.tuples(st.sampled_from(["until", "after"]), part, part, limit),
+        st.tuples(st.sampled_from(["and", "or", "implies"]), part, part),
+        st.tuples(st.sampled_from(["always", "eventually", "once"]), part, limit),
+        st.tuples(st.sampled_from(["until", "since", "after"]), part, part, limit),
         st.tuples(st.just("holds_for"), part, st.integers(1, 4)),
     ),
     max_leaves=4,
@@ -62,12 +69,13 @@ numbers = st.lists(st.sampled_from([-2.0, -1.0, 0.0, 1.0, 2.0]), min_size=14, ma
 
 def built(formula: Any) -> Any:
     """Return a formula of the twin as an expectation."""
-    if not isinstance(formula, tuple):
+    if not isinstance(formula, tuple) or isinstance(formula[0], int):
         return formula
     word, *parts = formula
-    if word == "above":
+    if word in ("above", "less"):
         return BUILD[word](*parts)
-    return BUILD[word](*[p if isinstance(p, str) else built(p) for p in parts])
+    names = [p if isinstance(p, str) or not isinstance(p, tuple) else built(p) for p in parts]
+    return BUILD[word](*names)
 
 
 def trace_of(values: list[float], end: int) -> Trace:
@@ -150,12 +158,17 @@ def test_after_names_each_occasion_that_was_missed_and_by_how_much() -> None:
     assert (verdict.holds, verdict.slack_s) == (True, 1.0)
 
 
-def test_undecided_expectations_at_the_end_do_not_count() -> None:
+def test_occasions_cut_by_the_end_of_the_run_do_not_count() -> None:
     a = [0] * 12 + [1, 0]
     expectation = after(moving("a"), moving("b"), within=3)
     verdict = verdict_of("", expectation, known_of({"a": a, "b": [0] * 14}, 14, over=True))
 
-    assert (verdict.holds, verdict.slack_s) == (True, None)
+    assert (verdict.holds, verdict.slack_s, verdict.occasions) == (None, None, 0)
+    assert verdict.untested == "its trigger came only too near to the end"
+    assert str(verdict).endswith("is untested: its trigger came only too near to the end")
+    whole = after(moving("a"), moving("b"), within=1)
+    verdict = verdict_of("", whole, known_of({"a": a, "b": [0] * 13 + [1]}, 14, over=True))
+    assert (verdict.holds, verdict.occasions) == (True, 1)
 
 
 def test_an_expectation_is_decided_as_soon_as_nothing_can_change_it() -> None:

@@ -1,8 +1,10 @@
 """What expectations are worth at each step, step by step, in slow and obvious Python."""
 
 from math import inf
+from sys import float_info
 from typing import Any
 
+Steps = int | tuple[int, int] | None
 Formula = tuple[Any, ...]
 """("is", name), ("above", name, limit), ("not", f), ("and", f, g), ("always", f, steps or None), …"""
 
@@ -30,40 +32,56 @@ def robustness(
     def of(part: Formula, at: int, best: bool = high) -> float:
         return robustness(part, signals, at, end, over=over, high=best)
 
-    def later(steps: int | None) -> tuple[range, bool]:
+    def later(steps: Steps) -> tuple[range, bool]:
         """Return the known steps of a window, and whether it goes on beyond them."""
-        last = end - 1 if steps is None else step + steps
-        unknown = not over if steps is None else last >= end
-        return range(step, min(last, end - 1) + 1), unknown
+        low, high = steps if isinstance(steps, tuple) else (0, steps)
+        last = end - 1 if high is None else step + high
+        unknown = not over if high is None else last >= end
+        return range(step + low, min(last, end - 1) + 1), unknown
+
+    def earlier(steps: Steps) -> range:
+        """Return the steps of a window in the past, the latest first."""
+        low, high = steps if isinstance(steps, tuple) else (0, steps)
+        return range(step - low, -1 if high is None else max(-1, step - high - 1), -1)
 
     match formula:
         case ("is", name):
             return inf if signals[name][step] > 0 else -inf
         case ("above", name, limit):
             return signals[name][step] - limit
+        case ("less", one, other):
+            return signals[other][step] - signals[one][step] or -float_info.min  # never 0
         case ("not", part):
             return -of(part, step, not high)
         case ("and", one, other):
             return min(of(one, step), of(other, step))
         case ("or", one, other):
             return max(of(one, step), of(other, step))
+        case ("implies", one, other):
+            return max(-of(one, step, not high), of(other, step))
+        case ("once", part, steps):
+            return max((of(part, t) for t in earlier(steps)), default=-inf)
+        case ("since", hold, goal, steps):
+            ways = [
+                min([of(goal, t), *(of(hold, u) for u in range(t + 1, step + 1))])
+                for t in earlier(steps)
+            ]
+            return max(ways, default=-inf)
         case ("always", part, steps):
             window, unknown = later(steps)
             beyond = [inf if high else -inf] if unknown else []
-            return min([*(of(part, t) for t in window), *beyond])
+            return min([*(of(part, t) for t in window), *beyond], default=inf)
         case ("eventually", part, steps):
             window, unknown = later(steps)
             beyond = [inf if high else -inf] if unknown else []
-            return max([*(of(part, t) for t in window), *beyond])
+            return max([*(of(part, t) for t in window), *beyond], default=-inf)
         case ("until", hold, goal, steps):
             window, unknown = later(steps)
-            held, ways = inf, []
-            for t in window:
-                ways.append(min(held, of(goal, t)))
-                held = min(held, of(hold, t))
+            ways = [min([of(goal, t), *(of(hold, u) for u in range(step, t))]) for t in window]
             # Beyond what is known the goal may come, as long as it was held until then.
+            held = min((of(hold, u) for u in range(step, end)), default=inf)
             ways += [min(held, inf if high else -inf)] if unknown else []
-            return max(ways)
+            return max(ways, default=-inf)
         case ("after", trigger, part, steps):
             is_on = [of(trigger, t, False) > 0 for t in range(end)]
             begins = [t for t in range(end) if is_on[t] and (t == 0 or not is_on[t - 1])]
@@ -71,7 +89,7 @@ def robustness(
             coming = [of(whole, t) for t in begins if t >= step]
             return min([*coming, *([] if over else [inf if high else -inf])], default=inf)
         case ("holds_for", part, steps):
-            if step - steps + 1 < 0:
+            if step - steps < 0:
                 return -inf
-            return min(of(part, t) for t in range(step - steps + 1, step + 1))
+            return min(of(part, t) for t in range(step - steps, step + 1))
     raise AssertionError(formula)

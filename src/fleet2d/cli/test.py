@@ -54,7 +54,7 @@ class ScenarioCase:
     @property
     def fails(self) -> bool:
         """Whether the run failed or violates an expectation."""
-        return bool(self.error) or not all(v.holds for v in self.verdicts.values())
+        return bool(self.error) or any(v.fails for v in self.verdicts.values())
 
     @property
     def name(self) -> str:
@@ -84,12 +84,13 @@ def write_junit(path: Path, cases: "Sequence[ScenarioCase]") -> None:
     for source in dict.fromkeys(case.source for case in cases):
         cases_of_source = [case for case in cases if case.source == source]
         suite = ET.SubElement(root, "testsuite", name=_xml_text(source))
-        failures = errors = 0
+        failures = errors = skipped = 0
         for case in cases_of_source:
-            failures += sum(not verdict.holds for verdict in case.verdicts.values())
+            failures += sum(verdict.fails for verdict in case.verdicts.values())
+            skipped += sum(v.holds is None and not v.fails for v in case.verdicts.values())
             errors += bool(case.error)
             _add_case(suite, case)
-        counts = {"tests": len(suite), "failures": failures, "errors": errors, "skipped": 0}
+        counts = {"tests": len(suite), "failures": failures, "errors": errors, "skipped": skipped}
         for name, count in counts.items():
             suite.set(name, str(count))
         suite.set("time", f"{sum(case.wall_s for case in cases_of_source):.3f}")
@@ -117,7 +118,9 @@ def _add_case(suite: ET.Element, case: "ScenarioCase") -> None:
             error.text = _xml_text(case.error)
             return
         verdict = case.verdicts[name]
-        if not verdict.holds:
+        if verdict.holds is None and not verdict.fails:
+            ET.SubElement(test, "skipped", message=_xml_text(str(verdict)))
+        if verdict.fails:
             failure = ET.SubElement(test, "failure", message=_xml_text(str(verdict)))
             files = "".join(f"\nstored: {path}" for path in case.files)
             failure.text = _xml_text(f"{verdict}\nto see it: {case.commands(verdict)}{files}")
@@ -133,16 +136,27 @@ def print_cases(cases: "Sequence[ScenarioCase]") -> None:
     from rich.table import Table
 
     console = Console()
-    table = Table("scenario", "expectation", "held", "at least by", show_edge=False)
+    has_untested = any(v.holds is None for case in cases for v in case.verdicts.values())
+    columns = ["untested"] if has_untested else []
+    has_occasions = any(v.occasions is not None for case in cases for v in case.verdicts.values())
+    columns += ["occasions"] if has_occasions else []
+    table = Table("scenario", "expectation", "held", *columns, "at least by", show_edge=False)
     for source in dict.fromkeys(case.source for case in cases):
         cases_of_source = [case for case in cases if case.source == source]
         label = source
         for name in cases_of_source[0].scenario.expect:
             verdicts = [case.verdicts[name] for case in cases_of_source if name in case.verdicts]
-            count = sum(verdict.holds for verdict in verdicts)
-            table.add_row(label, name, f"{count} of {len(cases_of_source)}", _lowest(verdicts))
+            held = f"{sum(v.holds is True for v in verdicts)} of {len(cases_of_source)}"
+            numbers = [str(sum(v.holds is None for v in verdicts) or "")] if has_untested else []
+            if has_occasions:
+                occasions = [v.occasions for v in verdicts if v.occasions is not None]
+                numbers.append(str(sum(occasions)) if occasions else "")
+            table.add_row(label, name, held, *numbers, _lowest(verdicts))
             label = ""
     console.print(table)
+    verdicts = [v for case in cases for v in case.verdicts.values()]
+    for note in dict.fromkeys(note for verdict in verdicts for note in verdict.notes):
+        console.print(f"note: {note}", highlight=False, markup=False, soft_wrap=True)
     for case in cases:
         _print_failure(console, case)
     failed = sum(case.fails for case in cases)
@@ -154,7 +168,7 @@ def _print_failure(console: "Console", case: "ScenarioCase") -> None:
     prefix = f"{case.source}, seed {case.seed}: "
     lines = [f"{prefix}{case.error}"] if case.error else []
     for verdict in case.verdicts.values():
-        if not verdict.holds:
+        if verdict.fails:
             lines += [f"{prefix}{verdict}", f"  to see it: {case.commands(verdict)}"]
     lines += [f"  stored: {path}" for path in case.files]
     for line in lines:

@@ -1,7 +1,7 @@
 """Expectations of a run: measured during the run, judged at any time and at its end."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,8 +14,9 @@ from fleet2d.configuration.units import MICROSECOND
 from fleet2d.engine.bodies import Bodies
 from fleet2d.engine.cameras import Cameras
 from fleet2d.engine.change_queue import ChangeQueue
+from fleet2d.engine.intervention_queue import InterventionQueue
 from fleet2d.engine.learners import Learners
-from fleet2d.engine.possible_events import possible_events
+from fleet2d.engine.possible_events import possible_details, possible_events
 from fleet2d.engine.sensors import Sensors
 from fleet2d.engine.trajectories import STEP, TIME
 from fleet2d.entities.decisions import DecidingActor
@@ -36,10 +37,19 @@ CERTAIN = 2**53
 
 
 class ActiveExpectation(NamedTuple):
-    """An expectation and the step from which it holds."""
+    """An expectation and the step from which it holds.
+
+    Attributes:
+        expectation: The expectation, about names of the run.
+        since: The step.
+        text: The expectation as it was written.
+        notes: Notes on it for readers.
+    """
 
     expectation: Expectation
     since: int
+    text: str
+    notes: tuple[str, ...]
 
 
 class RunExpectations:
@@ -58,6 +68,7 @@ class RunExpectations:
         sensors: Sensors,
         cameras: Sequence[Cameras],
         activities: Activities,
+        interventions: InterventionQueue,
     ) -> None:
         self.entries: dict[str, ActiveExpectation] = {}
         self._run = MeasuredRun(
@@ -71,7 +82,7 @@ class RunExpectations:
             activities,
         )
         self.actors, self.bodies, self.clock = actors, bodies, changes.clock
-        self._scenario, self._sensors = scenario, sensors
+        self._scenario, self._sensors, self._queue = scenario, sensors, interventions
         self._gauges: dict[str, Gauge] = {}
         self._events: list[Event] = []
 
@@ -93,15 +104,17 @@ class RunExpectations:
             ScenarioError: It names something unknown or an impossible event, or lasts too long.
             InputError: It has no time, or there is another one of that name.
         """
-        check_judged(expectation)
-        expectation.check(self._scene(since))
+        expectation, scene = check_judged(expectation), self._scene(since)
+        text = str(expectation)
+        expectation = expectation.resolved(scene)
+        expectation.check(scene)
         if name in self.entries:
             raise InputError(f"{name!r} is expected already: give this another name")
         self._run.first, self._run.sensors_on = first, self._sensors.on
         for signal in expectation.measures():
             if str(signal) not in self._gauges:
                 self._gauges[str(signal)] = Gauge(signal, self._run)
-        self.entries[name] = ActiveExpectation(expectation, since)
+        self.entries[name] = ActiveExpectation(expectation, since, text, tuple(scene.notes))
 
     def _scene(self, since: int) -> Scene:
         """Return the names of the run that expectations from a step on may use."""
@@ -124,6 +137,8 @@ class RunExpectations:
             names,
             {name: c.names for name, c in self._run.cameras.items()},
             possible_events(users, robots, home, self._run.doors, self._sensors.names),
+            possible_details(users, robots, self._queue.acts),
+            home.plan.bounds,
             (clock.steps - since) * clock.step_us * MICROSECOND,
         )
 
@@ -195,7 +210,8 @@ class RunExpectations:
             ended,
             self.clock,
         )
-        return verdict_of(name, entry.expectation, signals)
+        verdict = verdict_of(name, entry.expectation, signals, entry.text)
+        return replace(verdict, notes=entry.notes)
 
     def finish(self, results: Mapping[str, Any], store: RunStore, *, ended: bool) -> dict[str, Any]:
         """Store the table of violations; return the content of all verdicts for the manifest.

@@ -176,6 +176,13 @@ class InterventionQueue:
         self.lasting = [active for active in self.lasting if active is not act]
 
     @property
+    def acts(self) -> list[Mapping[str, Any]]:
+        """All interventions, done and scheduled, as `dump_intervention` writes them."""
+        scheduled = [due.act for due in self._queue if not due.ends]
+        waiting = [waiting.act for waiting in self.waiting]
+        return [*self.done, *map(dump_intervention, [*scheduled, *waiting])]
+
+    @property
     def kinds(self) -> frozenset[str]:
         """The kinds of events that interventions wait for."""
         return frozenset(w.trigger.event for w in self.waiting if not w.is_over)

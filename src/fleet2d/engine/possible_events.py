@@ -1,6 +1,7 @@
-"""The events that can happen in a run, for scripts and expectations that name one."""
+"""The events that can happen in a run, and their details: for scripts and expectations."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 from fleet2d.entities.behavior import Actor
 from fleet2d.floorplan.home import Home
@@ -13,6 +14,13 @@ PERSON_EVENTS = frozenset(
 DOOR_EVENTS = frozenset({EventKind.OPENED, EventKind.SHUT, EventKind.LOCKED, EventKind.UNLOCKED})
 HOME_EVENTS = frozenset({EventKind.MOVED, EventKind.ROOM_CHANGED})
 SENSOR_EVENTS = frozenset({EventKind.SENSOR})
+# Events whose detail names a user, or a robot.
+ABOUT_USERS = (
+    EventKind.USER_SEEN, EventKind.USER_LOST, EventKind.FIND_BEGINS, EventKind.FOUND,
+    EventKind.GAVE_UP, EventKind.NOT_AT_HOME, EventKind.FOLLOWS, EventKind.LOST,
+    EventKind.APPROACHES, EventKind.INTERACTS, EventKind.INTERACTION_OVER,
+)  # fmt: skip
+ABOUT_ROBOTS = (EventKind.ROBOT_SEEN, EventKind.ROBOT_LOST)
 
 
 def possible_events(
@@ -46,6 +54,40 @@ def _kinds_of(
         kinds.add(EventKind.WAY_BLOCKED)
     for behavior in actor.behaviors:
         kinds |= behavior.records
-        if not type(behavior).__module__.startswith("fleet2d."):
-            kinds |= KINDS  # it may record any of them
+    if _is_own(actor):
+        kinds |= KINDS  # it may record any of them
     return frozenset(kinds)
+
+
+def possible_details(
+    users: Iterable[Actor], robots: Iterable[Actor], acts: Iterable[Mapping[str, Any]]
+) -> dict[str, list[str]]:
+    """Return the details that events can have where all are known: by kind, or kind and entity.
+
+    Args:
+        users: The users.
+        robots: The robots.
+        acts: The interventions that are scheduled or done: `fleet2d.interventions` as data.
+    """
+    users, robots, acts = list(users), list(robots), list(acts)
+    people, names = [user.name for user in users], [robot.name for robot in robots]
+    details: dict[str, list[str]] = {}
+    if not any(_is_own(robot) for robot in robots):
+        details |= dict.fromkeys(ABOUT_USERS, people)
+        details[EventKind.CALLED] = ["dock", *(f"find {name}" for name in people)]
+    details |= dict.fromkeys(ABOUT_ROBOTS, names)
+    for user in users:
+        # A log may hold any activities, and so may a class of the user's own.
+        if not _is_own(user) and "replay" not in {b.type_name for b in user.behaviors}:
+            told = [a["what"] for a in acts if a["do"] == "activity" and a["entity"] == user.name]
+            known = [name for behavior in user.behaviors for name in behavior.activities()]
+            details[f"{EventKind.ACTIVITY} {user.name}"] = [*known, *told]
+    own = [details.get(f"{EventKind.ACTIVITY} {name}") for name in people]
+    if all(activities is not None for activities in own):
+        details[EventKind.ACTIVITY] = [name for activities in own for name in activities or ()]
+    return details
+
+
+def _is_own(actor: Actor) -> bool:
+    """Whether a body has a behavior that isn't Fleet2D's."""
+    return any(not type(b).__module__.startswith("fleet2d.") for b in actor.behaviors)

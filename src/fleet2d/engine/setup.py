@@ -95,7 +95,8 @@ def set_up(scenario: Scenario, clock: Clock, seed: int, store: RunStore) -> Stat
     )
     for group in [*user_cameras, *cameras]:
         group.owner.in_view = InView(state, group)
-    for index, entry in enumerate(scenario.script):
+    # What waits for an event comes last: the event may be one that another entry causes.
+    for index, entry in sorted(enumerate(scenario.script), key=lambda i: i[1].on is not None):
         path = f"script.{index}"
         with _locate_errors(scenario, path), _prefix_errors(path):
             schedule_script(state, entry, index)

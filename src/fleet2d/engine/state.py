@@ -130,6 +130,7 @@ class State:
                 self.sensors,
                 [*self.user_cameras, *self.cameras],
                 self.recorder.activities,
+                self.interventions,
             )
             self.events.sinks.append(self.expectations)
         self.expectations.add(name, expectation, since, self.settled)

@@ -19,7 +19,7 @@ from fleet2d.engine.intervention_queue import (
     PendingIntervention,
     read_record,
 )
-from fleet2d.engine.possible_events import possible_events
+from fleet2d.engine.possible_events import possible_details, possible_events
 from fleet2d.engine.state import State
 from fleet2d.entities.body import Pose
 from fleet2d.entities.decisions import Arbiter, DecidingActor
@@ -81,6 +81,11 @@ class EngineWorld:
     def algorithms(self) -> Sequence[str]:
         """The names of the algorithms."""
         return self._state.learners.known
+
+    @property
+    def acts(self) -> Sequence[Mapping[str, Any]]:
+        """All interventions, done and scheduled, as data."""
+        return self._state.interventions.acts
 
     @property
     def lasting(self) -> Sequence[object]:
@@ -292,16 +297,14 @@ def check_trigger(world: EngineWorld, trigger: Trigger) -> None:
         raise ScenarioError(
             f"{trigger.event!r} can never happen {place}{suggest(trigger.event, kinds, 'What can')}"
         )
-    if trigger.event in (EventKind.USER_SEEN, EventKind.USER_LOST):
-        _check_detail(trigger, world.users, "user")
-    if trigger.event in (EventKind.ROBOT_SEEN, EventKind.ROBOT_LOST):
-        _check_detail(trigger, world.robots, "robot")
-
-
-def _check_detail(trigger: Trigger, names: Iterable[str], noun: str) -> None:
-    """Refuse an unknown body to come into view; the empty name is one that isn't recognized."""
-    names = list(names)
-    if trigger.detail and trigger.detail not in names:
+    details = possible_details(world.users.values(), world.robots.values(), world.acts)
+    own = f"{trigger.event} {trigger.entity}"  # such as the activities of one user
+    known = details.get(own if own in details else trigger.event)
+    # An empty detail is somebody who isn't recognized.
+    if known is None or not trigger.detail or trigger.detail.startswith("come "):
+        return
+    if trigger.detail not in known:
         raise ScenarioError(
-            f"there is no {noun} {trigger.detail!r}{suggest(trigger.detail, names)}"
+            f"there is no {trigger.event!r} with the detail {trigger.detail!r}"
+            f"{suggest(trigger.detail, known)}"
         )

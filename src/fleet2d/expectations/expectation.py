@@ -8,9 +8,9 @@ holds there or not. Robustness and signals are traces: stretches of steps with e
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from datetime import timedelta
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 from pydantic_core import PydanticCustomError
@@ -27,6 +27,13 @@ if TYPE_CHECKING:
 Time = str | float | timedelta
 """How long: text such as "2 min", seconds, or a timedelta."""
 MIXED = "mixed"
+
+
+class Window(NamedTuple):
+    """A time that begins some time later and ends later still, both included: 1 min..2 min."""
+
+    begin: timedelta
+    end: timedelta
 
 
 @dataclass(frozen=True)
@@ -65,6 +72,14 @@ class RunSignals:
         """Return the number of whole steps in a duration."""
         return micros(duration) // self.clock.step_us
 
+    def reach(self, within: timedelta | Window | None) -> tuple[int, int]:
+        """Return how many steps later a time begins and ends; None is up to the run's end."""
+        if within is None:
+            return 0, self.end - self.first
+        if isinstance(within, Window):
+            return -self.steps_in(-within.begin), self.steps_in(within.end)
+        return 0, self.steps_in(within)
+
 
 class Term:
     """A part of an expectation: a signal, or a condition. The terms that it has are its fields."""
@@ -77,6 +92,44 @@ class Term:
         for each in fields(self):  # type: ignore[arg-type]
             if isinstance(value := getattr(self, each.name), Term):
                 yield value
+
+    def named(self) -> "Iterator[str | Term]":
+        """Yield what names something in its signals, but not in the conditions that it has."""
+        for part in self.parts():
+            if not isinstance(part, Expectation):
+                yield from part.named()
+
+    def with_name(self, old: "str | Term", new: str) -> Self:
+        """Return the same about another name."""
+
+        def renamed(value: Any) -> Any:
+            is_old = value is old or (
+                isinstance(value, str) and isinstance(old, str) and value == old
+            )
+            return (
+                new if is_old else value.with_name(old, new) if isinstance(value, Term) else value
+            )
+
+        return self._rebuilt(renamed)
+
+    def resolved(self, scene: "Scene") -> Any:
+        """Return the same about names of the run, in place of `anyone` and the like.
+
+        A condition about `anyone` holds if it does for one person, that about `everyone` if it does
+        for all; that about `nearest(ana)` is about the one who is nearest at each step.
+
+        Raises:
+            ScenarioError: There is nobody.
+        """
+        return self._rebuilt(
+            lambda value: value.resolved(scene) if isinstance(value, Term) else value
+        )
+
+    def _rebuilt(self, change: Callable[[Any], Any]) -> Self:
+        """Return a copy with changed fields, itself if none changes."""
+        values = {each.name: getattr(self, each.name) for each in fields(self)}  # type: ignore[arg-type]
+        changes = {name: new for name, old in values.items() if (new := change(old)) is not old}
+        return replace(self, **changes) if changes else self  # type: ignore[type-var]
 
     def check(self, scene: "Scene") -> None:
         """Refuse what the run doesn't have, part by part.
@@ -116,6 +169,17 @@ class Expectation(Term, ABC):
             run: The measured signals of the run.
             high: Whether the best case is assumed for steps that aren't known yet, or the worst.
         """
+
+    def resolved(self, scene: "Scene") -> "Expectation":
+        """Return the same about names of the run; see `Term.resolved`."""
+        for name in self.named():
+            if (meant := scene.meant(name, self)) is not None:
+                return meant.resolved(scene)
+        return super().resolved(scene)
+
+    def untested(self, run: RunSignals) -> str:
+        """Return why the run has put it to no test, for a message; empty if it has."""
+        return ""
 
     def occasions(self, run: RunSignals) -> I64:
         """Return the steps at which it certainly begins to hold."""
@@ -157,6 +221,10 @@ class Not(Expectation):
         """Return the negated robustness of the operand, whose worst case is its best case."""
         return self.part.robustness(run, not high).map(np.negative)
 
+    def untested(self, run: RunSignals) -> str:
+        """Return why the operand was not tested."""
+        return self.part.untested(run)
+
     def __str__(self) -> str:
         """Return the text that `parse_expectation` reads back."""
         return f"not {bracketed(self.part)}"
@@ -176,6 +244,11 @@ class And(Expectation):
         """Return the minimum of both parts, or the maximum for `Or`."""
         parts = (part.robustness(run, high) for part in (self.one, self.other))
         return combine(type(self).choose, *parts)
+
+    def untested(self, run: RunSignals) -> str:
+        """Return why one of the parts was not tested; of `Or`, if none was."""
+        reasons = [part.untested(run) for part in (self.one, self.other)]
+        return "" if self.word == "or" and "" in reasons else "".join(reasons[:1]) or reasons[1]
 
     def __str__(self) -> str:
         """Return the text that `parse_expectation` reads back."""
@@ -237,9 +310,10 @@ class Word:
                     f"{self.word}: {value} is not a condition, which holds or doesn't: compare it,"
                     ' as in distance("ana", "astro") > 0.5, or room("ana") == "kitchen"'
                 )
-            if each.name in ("within", "duration") and value is not None:
-                label = each.name if each.kw_only else self.word
-                self._set(**{each.name: _duration(value, label)})
+            if each.name == "duration":
+                self._set(duration=_duration(value, self.word))
+            elif each.name == "within" and value is not None:
+                self._set(within=_window(value))
 
     def __str__(self) -> str:
         """Return the text that `parse_expectation` reads back."""
@@ -263,6 +337,26 @@ def _duration(value: Any, label: str) -> timedelta:
         raise InputError(f"{label}: {error}") from None
 
 
+def _window(value: Any) -> timedelta | Window:
+    """Read a time limit: a duration, or two, as "1..2 min" or a pair.
+
+    Raises:
+        InputError: It can't be read, or ends before it begins.
+    """
+    ends = value.split("..") if isinstance(value, str) else value
+    if not isinstance(ends, tuple | list) or len(ends) == 1:
+        return _duration(value, "within")
+    if len(ends) != 2:
+        raise InputError(f"within: expected a time like 2 min, or two like 1..2 min, got {value!r}")
+    begin, end = ends
+    if isinstance(value, str) and not begin.strip()[-1:].isalpha():
+        begin += end.strip().lstrip("0123456789. ")  # 1..2 min
+    window = Window(_duration(begin, "within"), _duration(end, "within"))
+    if window.begin > window.end:
+        raise InputError(f"within: {value} ends before it begins")
+    return window
+
+
 def argument_text(value: Any) -> str:
     """Write an argument of a call.
 
@@ -273,6 +367,8 @@ def argument_text(value: Any) -> str:
         return f'"{value}"'
     if isinstance(value, timedelta):
         return f'"{format_duration(value)}"'
+    if isinstance(value, Window):
+        return f'"{format_duration(value.begin)}..{format_duration(value.end)}"'
     if isinstance(value, tuple):
         return f"({', '.join(map(argument_text, value))})"
     return number_text(value, "") if isinstance(value, float) else str(value)

@@ -10,7 +10,14 @@ from fleet2d.algorithms.algorithm import to_columns
 from fleet2d.configuration.problems import suggest
 from fleet2d.errors import ScenarioError
 from fleet2d.expectations.expectation import WORDS
-from fleet2d.expectations.signals import Gauge, MeasuredRun, NumberSignal, Scene, SignalBlock
+from fleet2d.expectations.signals import (
+    Gauge,
+    MeasuredRun,
+    NumberSignal,
+    Scene,
+    SignalBlock,
+    WordSignal,
+)
 from fleet2d.expectations.traces import Trace, constant
 from fleet2d.floorplan.home import Home
 
@@ -145,3 +152,64 @@ class metric(_Value):
             return float("nan")
         keys = ", ".join(result) if isinstance(result, Mapping) else repr(result)
         raise ScenarioError(f"{self} is not a number: extend it by one of {keys}")
+
+
+@dataclass(frozen=True, eq=False)
+class likeliest(WordSignal):
+    """The room that an algorithm's newest output gives the highest probability, for a user or not.
+
+    None before the first output.
+    """
+
+    algorithm: str
+    user: str | None = None
+
+    of = ("algorithm", "algorithms")
+    noun = "room"
+
+    def check(self, scene: Scene) -> None:
+        """Refuse an unknown algorithm or user."""
+        super().check(scene)
+        if self.user is not None:
+            scene.check_name("user", self.user, scene.names["users"], self)
+
+    def check_word(self, word: str, scene: Scene) -> None:
+        """Refuse an unknown room."""
+        scene.check_room(word, self)
+
+    def start(self, run: MeasuredRun, gauge: Gauge) -> Any:
+        """Return the names of rooms; there is no value before the first update."""
+        gauge.words = {room.index: (room.name, room.type) for room in run.home.rooms}
+        gauge.now = -1.0
+        return [room.name for room in run.home.rooms]
+
+    def measure(self, block: SignalBlock, gauge: Gauge) -> Trace:
+        """Return the number of the room."""
+        return constant(gauge.now, block.first, block.end)
+
+    def learn(
+        self, outputs: Mapping[str, Any], results: Mapping[str, Callable[[], Any]], gauge: Gauge
+    ) -> None:
+        """Take the room from a new output of the algorithm, the first of equals.
+
+        Raises:
+            ScenarioError: The output has no numbers of rooms, or none for the user.
+        """
+        if self.algorithm not in outputs:
+            return
+        names = gauge.memory
+        columns = to_columns(outputs[self.algorithm], names, f"algorithms.{self.algorithm}")
+        number = next((c for c in columns.values() if c.dtype.kind == "f"), None)
+        if "room" not in columns or number is None:
+            raise ScenarioError(f"{self}: its output has no numbers of rooms")
+        rooms, keep = columns["room"], np.ones(len(number), np.bool_)
+        if self.user is not None:
+            if "user" not in columns:
+                raise ScenarioError(
+                    f"{self}: its output doesn't tell users apart: leave out the user"
+                )
+            keep = columns["user"].astype(str) == self.user
+        keep &= np.isin(rooms.astype(str), names)
+        if keep.any():
+            best = int(np.argmax(np.where(keep, number, -np.inf)))
+            gauge.now = float(names.index(str(rooms[best])))

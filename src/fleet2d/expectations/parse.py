@@ -30,14 +30,23 @@ _OPERATORS: Mapping[type[ast.AST], Callable[[Any, Any], Any]] = {
     ast.Or: operator.or_,
     ast.BitAnd: operator.and_,
     ast.BitOr: operator.or_,
+    ast.Add: operator.add,
+    ast.Sub: operator.sub,
+    ast.Mult: operator.mul,
+    ast.Div: operator.truediv,
 }
+_ARITHMETIC = (ast.Add, ast.Sub, ast.Mult, ast.Div)
 _MIRRORED = {ast.Gt: ast.Lt, ast.GtE: ast.LtE, ast.Lt: ast.Gt, ast.LtE: ast.GtE}
 
-# Texts in quotes stay as they are; times of day and numbers with units are put into quotes.
+# Texts in quotes stay as they are; kinds of rooms, times and numbers with units get quotes.
+_UNIT = (
+    r"(?:%|(?:m/s|km/h|cm/s|cm|mm|m|min|minutes?|s|seconds?|h|hours?|d|days?|w|weeks?)(?![\w(]))"
+)
+_NUMBER = r"\d+(?:\.\d+)?"
 _QUANTITY = re.compile(
-    r"""("[^"]*"|'[^']*')|(\d{1,2}:\d\d(?:\s*-\s*\d{1,2}:\d\d)?)"""
-    r"""|(?<![\w.])(\d+(?:\.\d+)?)\s*(%|(?:m/s|km/h|cm/s|cm|mm|m|min|minutes?|s|seconds?|h|hours?"""
-    r"""|d|days?|w|weeks?)(?![\w(]))"""
+    r"""(?P<quoted>"[^"]*"|'[^']*')|(?P<kind>\bany\s+[a-z_]\w*)"""
+    r"""|(?P<time>\d{1,2}:\d\d(?:\s*-\s*\d{1,2}:\d\d)?)"""
+    rf"""|(?<![\w.])(?P<number>(?:{_NUMBER}\s*{_UNIT}?\s*\.\.\s*)?{_NUMBER}\s*{_UNIT})"""
 )
 _LONGEST = 2000
 _DEEPEST = 40
@@ -68,9 +77,7 @@ def parse_expectation(text: str) -> Expectation:
 
 
 def _quoted(match: re.Match[str]) -> str:
-    if match[1]:
-        return match[1]
-    return f'"{match[2]}"' if match[2] else f'"{match[3]} {match[4]}"'
+    return match[0] if match["quoted"] else f'"{" ".join(match[0].split())}"'
 
 
 class _Reader:
@@ -114,20 +121,30 @@ class _Reader:
                 return self._joined(node)
             case ast.UnaryOp(op=ast.Not() | ast.Invert()):
                 return ~self.expectation(node.operand)
+            case ast.UnaryOp(op=ast.USub()):
+                operand = self.value(node.operand)
+                if isinstance(operand, int | float | Signal):
+                    return -operand
         return self._argument(node)
 
-    def _joined(self, node: ast.BoolOp | ast.BinOp) -> Expectation:
-        """Read parts joined by and, or, & or |."""
+    def _joined(self, node: ast.BoolOp | ast.BinOp) -> Any:
+        """Read parts joined by and, or, &, | or arithmetic."""
         if type(node.op) not in _OPERATORS:
             raise self._foreign(node)
         nodes = node.values if isinstance(node, ast.BoolOp) else [node.left, node.right]
-        return reduce(_OPERATORS[type(node.op)], map(self.expectation, nodes))
+        if not isinstance(node.op, _ARITHMETIC):
+            return reduce(_OPERATORS[type(node.op)], map(self.expectation, nodes))
+        operands = [self.value(each) for each in nodes]
+        if not any(isinstance(operand, Signal) for operand in operands):
+            raise self._foreign(node)
+        try:
+            return _OPERATORS[type(node.op)](*operands)
+        except TypeError:
+            raise InputError(f"{ast.unparse(node)}: only numbers can be computed with") from None
 
     def _argument(self, node: ast.expr) -> Any:
         """Read a name, a path, a number, a text or a list."""
         match node:
-            case ast.UnaryOp(op=ast.USub(), operand=ast.Constant(value=int() | float() as value)):
-                return -value
             case ast.Constant(value=str() | int() | float() | None as value):
                 return value
             case ast.Name(id=name):
@@ -169,12 +186,12 @@ class _Reader:
             return is_in if sign is ast.In else ~is_in
         if isinstance(right, Signal | WordSignal) and not isinstance(left, Signal | WordSignal):
             left, right, sign = right, left, _MIRRORED.get(sign, sign)
-        numbers = isinstance(left, Signal) and not isinstance(right, Signal | WordSignal)
+        numbers = isinstance(left, Signal) and not isinstance(right, WordSignal)
         words = isinstance(left, WordSignal) and sign in (ast.Eq, ast.NotEq)
         if sign not in _OPERATORS or not (numbers or words):
             raise InputError(
-                f"{ast.unparse(node)}: a signal is compared with a number, or room(…) and"
-                " activity(…) by == with a name"
+                f"{ast.unparse(node)}: a signal is compared with a number or another signal, or"
+                " room(…) and activity(…) by == with a name"
             )
         return _OPERATORS[sign](left, right)
 
@@ -182,7 +199,9 @@ class _Reader:
 # Fields of a scenario
 
 OPERATORS = ("always", "never", "eventually", "at_end", "at_most")
-KEYS = (*OPERATORS, "until", "after", "within", "holds_for", "during", "of", "per")
+KEYS = (
+    *OPERATORS, "until", "after", "within", "holds_for", "during", "of", "per", "may_be_untested",
+)  # fmt: skip
 
 
 def read_expectation(value: Any) -> Expectation:
@@ -212,6 +231,14 @@ def read_expectation(value: Any) -> Expectation:
 
 
 def _read_mapping(value: Mapping[str, Any]) -> Expectation:
+    may_be_untested = value.get("may_be_untested", False)
+    if not isinstance(may_be_untested, bool):
+        raise problem_at(("may_be_untested",), f"expected true or false, got {may_be_untested!r}")
+    expectation = _read_operator(value)
+    return temporal.may_be_untested(expectation) if may_be_untested else expectation
+
+
+def _read_operator(value: Mapping[str, Any]) -> Expectation:
     name = _operator(value)
     if name == "at_most" and "of" not in value:
         raise InputError("at_most needs the key 'of', such as of: events(find_begins, astro)")

@@ -4,9 +4,11 @@ A signal is one class: its word, the names that it may use (of a `Scene`), and i
 a block of steps. Those that there are stand in `fleet2d.expectations.vocabulary`.
 """
 
+import operator
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence, Set
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from datetime import timedelta
+from functools import reduce
 from typing import Any, ClassVar, Protocol
 
 import numpy as np
@@ -20,21 +22,31 @@ from fleet2d.entities.behavior import Actor, Behavior
 from fleet2d.entities.body import Pose
 from fleet2d.errors import InputError, ScenarioError
 from fleet2d.expectations.expectation import (
+    MIXED,
     Expectation,
     RunSignals,
     Term,
+    Window,
     Word,
     argument_text,
     number_text,
     truth,
 )
-from fleet2d.expectations.traces import INFINITE, TINY, Trace, constant, joined, shortest
+from fleet2d.expectations.traces import INFINITE, TINY, Trace, combine, constant, joined, shortest
 from fleet2d.floorplan.home import Home
+from fleet2d.floorplan.rooms.room import PRIORITY, usual_type
 from fleet2d.kernels import F64, I64
-from fleet2d.kernels.motion import Window
+from fleet2d.kernels.motion import Window as PoseRuns
 from fleet2d.runtime.clock import Clock
-from fleet2d.runtime.events import KINDS, SIGHTS, Event, EventKind
+from fleet2d.runtime.events import KINDS, Event, EventKind
 
+ANY_KIND = "any "
+"""The beginning of a kind of rooms: `any bathroom`."""
+QUANTIFIERS: Mapping[str, Callable[[Any, Any], Any]] = {
+    "anyone": operator.or_,
+    "everyone": operator.and_,
+}
+"""What names one of the users, or all of them, and how conditions about them are combined."""
 QUANTITIES = {"m": LENGTH, "m/s": SPEED, "share": SHARE}
 """How the limits of a signal are written, by its unit; limits of others are plain numbers."""
 
@@ -52,13 +64,51 @@ class Scene:
             bodies (users and robots).
         cameras: For each body with cameras, the names of the bodies that they look at.
         events: The kinds of events that can happen to each entity; an empty name is the home.
+        details: The details that events of a kind can have, where they are known, by the kind; of
+            activities for each user.
+        bounds: The least and the greatest coordinates of the home (x, y, x, y) [m].
         remaining: Time from now to the end of the run.
+        notes: Notes for readers, about kinds of rooms that the home doesn't have.
     """
 
     names: Mapping[str, Collection[str]]
     cameras: Mapping[str, Collection[str]]
     events: Mapping[str, Set[str]]
+    details: Mapping[str, Collection[str]]
+    bounds: tuple[float, float, float, float]
     remaining: timedelta
+    notes: list[str] = field(default_factory=list)
+
+    def meant(self, name: "str | Term", of: Expectation) -> Expectation | None:
+        """Return a condition about the bodies that a name stands for; None for one body.
+
+        Raises:
+            ScenarioError: There is nobody.
+        """
+        if isinstance(name, str):
+            if name not in QUANTIFIERS or name in self.names["bodies"]:
+                return None
+            others = [user for user in self.names["users"] if user not in of.named()]
+            if not others:
+                raise ScenarioError(f"{of}: there is no {name}: the scenario has no other user")
+            return reduce(QUANTIFIERS[name], (of.with_name(name, user) for user in others))
+        assert isinstance(name, WordSignal)
+        name.check(self)
+        cases = ((name == other) & of.with_name(name, other) for other in name.choices(self))
+        return reduce(operator.or_, cases)
+
+    def check_room(self, name: str, of: object, others: Iterable[str] = ()) -> None:
+        """Refuse an unknown room; a kind of room that this home doesn't have is noted.
+
+        Raises:
+            ScenarioError: It is neither a room nor a kind of rooms, nor among the others.
+        """
+        known = [*others, *self.names["rooms"]]
+        kind = name.removeprefix(ANY_KIND)
+        if kind in known or usual_type(kind) not in PRIORITY or kind[-1:].isdigit():
+            self.check_name("body, room or object" if others else "room", kind, known, of)
+        elif (note := f"{of}: this home has no {kind}") not in self.notes:
+            self.notes.append(note)
 
     def check_name(self, noun: str, name: str, known: Iterable[str], of: object) -> None:
         """Refuse an unknown name.
@@ -70,12 +120,13 @@ class Scene:
         if name not in names:
             raise ScenarioError(f"{of}: there is no {noun} {name!r}{suggest(name, names)}")
 
-    def check_within(self, within: timedelta | None, of: object) -> None:
+    def check_within(self, within: timedelta | Window | None, of: object) -> None:
         """Refuse a time that is longer than the run.
 
         Raises:
             ScenarioError: The time is longer than what remains of the run.
         """
+        within = within.end if isinstance(within, Window) else within
         if within is not None and within > self.remaining:
             raise ScenarioError(
                 f"{of}: {format_duration(within)} is beyond the run, which goes on for"
@@ -101,8 +152,12 @@ class Scene:
             raise ScenarioError(
                 f"{of}: no such event is possible: {kind!r} happens only to {to}(here: {here})"
             )
-        if kind in SIGHTS and detail is not None:
-            self.check_name("user or robot", detail, self.names["bodies"], of)
+        if detail is None or detail.startswith("come "):
+            return
+        own = f"{kind} {entity}"  # such as the activities of one user
+        known = self.details.get(own if own in self.details else kind)
+        if known is not None and detail:
+            self.check_name(f"{kind} with the detail", detail, known, of)
 
 
 def _behaviors_with(kind: str) -> list[str]:
@@ -120,10 +175,10 @@ def _behaviors_with(kind: str) -> list[str]:
 class MeasuredBodies(Protocol):
     """The bodies of a run and their poses, each by its row."""
 
-    def window(self, first: int, end: int) -> Window:
+    def window(self, first: int, end: int) -> PoseRuns:
         """Return the runs of equal pose of all bodies in the steps from `first` to `end` - 1."""
 
-    def runs(self, row: int, first: int, end: int) -> Window:
+    def runs(self, row: int, first: int, end: int) -> PoseRuns:
         """Return the runs of equal pose of one body in these steps."""
 
     def pose_at(self, row: int, step: int) -> Pose:
@@ -273,6 +328,12 @@ class Measurement(Word, Term):
         """Yield itself."""
         yield self
 
+    def named(self) -> Iterator[str | Term]:
+        """Yield its arguments that are names, or signals that stand for names."""
+        for each in fields(self):
+            if isinstance(value := getattr(self, each.name), str | WordSignal):
+                yield value
+
     def check(self, scene: Scene) -> None:
         """Refuse a signal that this run doesn't have.
 
@@ -315,19 +376,19 @@ class Signal(Term):
         """Return its values from the first judged step on."""
         raise NotImplementedError
 
-    def __gt__(self, limit: float | str) -> Expectation:
+    def __gt__(self, limit: "float | str | Signal") -> Expectation:
         """Expect the signal above a limit."""
         return SignalComparison(self, ">", limit)
 
-    def __ge__(self, limit: float | str) -> Expectation:
+    def __ge__(self, limit: "float | str | Signal") -> Expectation:
         """Expect the signal at a limit or above it."""
         return SignalComparison(self, ">=", limit)
 
-    def __lt__(self, limit: float | str) -> Expectation:
+    def __lt__(self, limit: "float | str | Signal") -> Expectation:
         """Expect the signal below a limit."""
         return SignalComparison(self, "<", limit)
 
-    def __le__(self, limit: float | str) -> Expectation:
+    def __le__(self, limit: "float | str | Signal") -> Expectation:
         """Expect the signal at a limit or below it."""
         return SignalComparison(self, "<=", limit)
 
@@ -341,23 +402,120 @@ class Signal(Term):
 
     __hash__ = object.__hash__
 
+    def __add__(self, other: "float | str | Signal") -> "Signal":
+        """Return the sum of the signal and another."""
+        return Arithmetic(self, "+", other)
+
+    def __radd__(self, other: "float | str") -> "Signal":
+        """Return the same with the operands exchanged."""
+        return Arithmetic(other, "+", self)
+
+    def __sub__(self, other: "float | str | Signal") -> "Signal":
+        """Return the signal less another."""
+        return Arithmetic(self, "-", other)
+
+    def __rsub__(self, other: "float | str") -> "Signal":
+        """Return the same with the operands exchanged."""
+        return Arithmetic(other, "-", self)
+
+    def __mul__(self, other: "float | str | Signal") -> "Signal":
+        """Return the product of the signal and another."""
+        return Arithmetic(self, "*", other)
+
+    def __rmul__(self, other: "float | str") -> "Signal":
+        """Return the same with the operands exchanged."""
+        return Arithmetic(other, "*", self)
+
+    def __truediv__(self, other: "float | str | Signal") -> "Signal":
+        """Return the signal divided by another."""
+        return Arithmetic(self, "/", other)
+
+    def __rtruediv__(self, other: "float | str") -> "Signal":
+        """Return the same with the operands exchanged."""
+        return Arithmetic(other, "/", self)
+
+    def __neg__(self) -> "Signal":
+        """Return the negated signal."""
+        return Arithmetic(-1.0, "*", self)
+
 
 class NumberSignal(Measurement, Signal):
     """A number that is measured."""
 
 
+def operand_text(value: "float | Signal", unit: str) -> str:
+    """Return a number or a signal as it stands in an expression."""
+    return str(value) if isinstance(value, Signal) else number_text(value, unit)
+
+
+def values_of(value: "float | Signal", run: RunSignals) -> Trace:
+    """Return a number or a signal at each step."""
+    if isinstance(value, Signal):
+        return value.trace(run)
+    return constant(value, run.first, run.end)
+
+
+@dataclass(frozen=True, eq=False)
+class Arithmetic(Signal):
+    """The sum, difference, product or quotient of signals and numbers."""
+
+    one: Any  # a signal or a number
+    sign: str
+    other: Any
+
+    def __post_init__(self) -> None:
+        for name, value, beside in (("one", self.one, self.other), ("other", self.other, self.one)):
+            if not isinstance(value, Signal):
+                unit = beside.unit if self.sign in "+-" else ""
+                object.__setattr__(self, name, _number(value, unit, beside))
+        if self.sign in "+-":
+            _check_units(self.one, self.other, self)
+
+    @property
+    def unit(self) -> str:  # type: ignore[override]
+        """The unit of the result: that of the operands if it is clear, else `MIXED`."""
+        units = [each.unit for each in (self.one, self.other) if isinstance(each, Signal)]
+        if len(units) == 1 and (self.sign != "/" or isinstance(self.one, Signal)):
+            return units[0]
+        if self.sign in "+-":
+            return units[0]
+        return "" if self.sign == "/" and len(set(units)) == 1 and len(units) == 2 else MIXED
+
+    def trace(self, run: RunSignals) -> Trace:
+        """Return the result at each step; missing where an operand is, and for 0 / 0."""
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return combine(_SIGNS[self.sign], values_of(self.one, run), values_of(self.other, run))
+
+    def __str__(self) -> str:
+        """Return the text that `parse_expectation` reads back."""
+        unit = self.unit if self.sign in "+-" else ""
+        return f"({operand_text(self.one, unit)} {self.sign} {operand_text(self.other, unit)})"
+
+
+_SIGNS: Mapping[str, Callable[[F64, F64], F64]] = {
+    "+": np.add, "-": np.subtract, "*": np.multiply, "/": np.divide,
+}  # fmt: skip
+
+
 @dataclass(frozen=True, eq=False)
 class SignalComparison(Expectation):
-    """A comparison of a signal with a limit; its robustness is the distance from the limit."""
+    """A comparison of a signal with a limit, or with another signal.
+
+    Its robustness is the distance from the limit.
+    """
 
     signal: Signal
     sign: str
-    limit: Any  # as it is written, then a number
+    limit: Any  # as it is written, then a number or a signal
 
     is_call = False
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "limit", _limit(self.signal, self.limit))
+        if isinstance(self.limit, Signal):
+            _check_units(self.signal, self.limit, self)
+        else:
+            limit = _number(self.limit, self.signal.unit, self.signal)
+            object.__setattr__(self, "limit", limit)
 
     @property
     def unit(self) -> str:  # type: ignore[override]
@@ -366,10 +524,11 @@ class SignalComparison(Expectation):
 
     def robustness(self, run: RunSignals, high: bool) -> Trace:
         """Return the distance of the signal from the limit, below 0 on the wrong side."""
-        return self.signal.trace(run).map(self._margin)
+        return combine(self._margin, self.signal.trace(run), values_of(self.limit, run))
 
-    def _margin(self, value: F64) -> F64:
-        excess = value - self.limit
+    def _margin(self, value: F64, limit: F64) -> F64:
+        with np.errstate(invalid="ignore"):  # both may be infinite
+            excess = value - limit
         margin = np.abs(excess) if self.sign in ("==", "!=") else excess
         margin = -margin if self.sign in ("==", "<", "<=") else margin
         margin = np.where(margin == 0, TINY if self.sign in ("==", "<=", ">=") else -TINY, margin)
@@ -377,31 +536,55 @@ class SignalComparison(Expectation):
 
     def __str__(self) -> str:
         """Return the text that `parse_expectation` reads back."""
-        return f"{self.signal} {self.sign} {number_text(self.limit, self.signal.unit)}"
+        return f"{self.signal} {self.sign} {operand_text(self.limit, self.signal.unit)}"
 
 
-def _limit(signal: Signal, limit: object) -> float:
+def _number(value: object, unit: str, beside: object) -> float:
+    """Return a number in the unit of the signal beside it.
+
+    Raises:
+        InputError: It can't be read, or is no share from 0 to 1.
+    """
     try:
-        if signal.unit in QUANTITIES:
-            return float(QUANTITIES[signal.unit].parse(limit))
-        if isinstance(limit, int | float | np.number) and not isinstance(limit, bool):
-            return float(limit)
+        if unit in QUANTITIES:
+            number = float(QUANTITIES[unit].parse(value))
+            if unit == "share" and not 0 <= number <= 1:
+                raise InputError(
+                    f"{beside} is compared with {value}: a share is a number from 0 to 1, or from"
+                    f" 0 % to 100 %{f', such as {value} %' if 1 < number <= 100 else ''}"
+                )
+            return number
+        if isinstance(value, int | float | np.number) and not isinstance(value, bool):
+            return float(value)
     except PydanticCustomError as error:
-        raise InputError(f"{signal} is compared with {limit!r}: {error}") from None
-    raise InputError(f"{signal} is compared with {limit!r}, expected a number")
+        raise InputError(f"{beside} is compared with {value!r}: {error}") from None
+    raise InputError(f"{beside} is compared with {value!r}, expected a number")
+
+
+def _check_units(one: object, other: object, of: object) -> None:
+    units = {signal.unit for signal in (one, other) if isinstance(signal, Signal)} - {MIXED}
+    if len(units) > 1:
+        names = " and ".join(sorted(unit or "a plain number" for unit in units))
+        raise InputError(f"{of}: the signals have different units: {names}")
 
 
 @dataclass(frozen=True, eq=False)
 class WordSignal(Measurement):
-    """A word at each step, such as a room; compare it by `==`, `!=` and `is_in`."""
+    """A word at each step, such as a room; compare it by `==`, `!=` and `is_in`.
+
+    Attributes:
+        noun: What its words name, such as "room".
+    """
+
+    noun: ClassVar[str]
 
     def __eq__(self, word: object) -> Expectation:  # type: ignore[override]
-        """Expect the signal to be a word."""
-        return self.is_in(word)
+        """Expect the signal to be a word, or that of another signal."""
+        return SameWord(self, word) if isinstance(word, WordSignal) else self.is_in(word)
 
     def __ne__(self, word: object) -> Expectation:  # type: ignore[override]
         """Expect the signal to be another word, or none."""
-        return ~self.is_in(word)
+        return ~(self == word)
 
     __hash__ = object.__hash__
 
@@ -414,6 +597,14 @@ class WordSignal(Measurement):
 
     def check_word(self, word: str, scene: Scene) -> None:
         """Refuse a word that the signal can never have."""
+
+    def choices(self, scene: Scene) -> Collection[str]:
+        """Return the bodies that it can stand for.
+
+        Raises:
+            ScenarioError: It doesn't stand for a body.
+        """
+        raise ScenarioError(f"{self} is not a body: expected a name, or nearest(…)")
 
 
 @dataclass(frozen=True, eq=False)
@@ -433,8 +624,9 @@ class WordComparison(Expectation):
 
     def robustness(self, run: RunSignals, high: bool) -> Trace:
         """Return infinity where the signal has one of the words, minus infinity elsewhere."""
+        expected = {word.removeprefix(ANY_KIND) for word in self.words}
         words_by_code = run.words[str(self.signal)].items()
-        codes = [float(code) for code, words in words_by_code if set(words) & set(self.words)]
+        codes = [float(code) for code, words in words_by_code if expected & set(words)]
         return self.signal.trace(run).map(lambda value: truth(np.isin(value, codes)))
 
     def __str__(self) -> str:
@@ -442,6 +634,42 @@ class WordComparison(Expectation):
         if len(self.words) == 1:
             return f'{self.signal} == "{self.words[0]}"'
         return f"{self.signal} in [{', '.join(map(argument_text, self.words))}]"
+
+
+@dataclass(frozen=True, eq=False)
+class SameWord(Expectation):
+    """The condition that two signals have the same word; without a word none has."""
+
+    one: WordSignal
+    other: WordSignal
+
+    is_call = False
+
+    def __post_init__(self) -> None:
+        if self.one.noun != self.other.noun:
+            nouns = f"{self.one.noun} and {self.other.noun} are"
+            raise InputError(f"{self}: {nouns} compared, which are never the same")
+
+    def robustness(self, run: RunSignals, high: bool) -> Trace:
+        """Return infinity where the words are the same, minus infinity elsewhere."""
+        names: dict[str, float] = {}
+        one, other = (self._numbers(signal, run, names) for signal in (self.one, self.other))
+        return combine(lambda a, b: truth((a == b) & (a >= 0)), one, other)
+
+    @staticmethod
+    def _numbers(signal: WordSignal, run: RunSignals, names: dict[str, float]) -> Trace:
+        """Return a number at each step that is the same for the same name; -1 for none."""
+        numbers = {
+            float(code): names.setdefault(words[0], float(len(names)))
+            for code, words in run.words[str(signal)].items()
+        }
+        return signal.trace(run).map(
+            lambda value: np.array([numbers.get(code, -1.0) for code in value.tolist()])
+        )
+
+    def __str__(self) -> str:
+        """Return the text that `parse_expectation` reads back."""
+        return f"{self.one} == {self.other}"
 
 
 @dataclass(frozen=True, eq=False)

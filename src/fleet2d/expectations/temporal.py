@@ -1,5 +1,6 @@
 """The operators of expectations: when something must hold, for how long, and how often."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from datetime import timedelta
 from itertools import pairwise
@@ -9,7 +10,7 @@ import numpy as np
 
 from fleet2d.configuration.problems import did_you_mean
 from fleet2d.errors import InputError
-from fleet2d.expectations.expectation import Expectation, RunSignals, Word
+from fleet2d.expectations.expectation import And, Expectation, Not, RunSignals, Word
 from fleet2d.expectations.signals import Scene, Signal
 from fleet2d.expectations.traces import (
     INFINITE,
@@ -18,7 +19,9 @@ from fleet2d.expectations.traces import (
     constant,
     joined,
     pulses,
+    shortest,
 )
+from fleet2d.expectations.vocabulary import during
 from fleet2d.kernels import I64
 
 PERIODS = {"hour": timedelta(hours=1), "day": timedelta(days=1), "week": timedelta(weeks=1)}
@@ -73,28 +76,29 @@ class Temporal(Expectation):
 
 
 @dataclass(frozen=True, eq=False)
-class Windowed(Word, Temporal):
-    """Base of expectations about the time from a step on: for `within`, or to the run's end."""
+class Windowed(Word, Expectation):
+    """Base of expectations about a time from each step on, or up to it: `within`, or all of it."""
 
-    within: Any = field(default=None, kw_only=True)  # of type Time, then a timedelta
+    within: Any = field(default=None, kw_only=True)  # as it is written, then a timedelta or Window
 
     def check(self, scene: Scene) -> None:
         """Refuse a time beyond the run."""
         scene.check_within(self.within, self)
         super().check(scene)
 
-    def last(self, run: RunSignals) -> int:
-        """Return the last step of the window that is known."""
-        return min(run.first + self._steps(run), run.end - 1)
-
-    def _steps(self, run: RunSignals) -> int:
-        return run.end - run.first if self.within is None else run.steps_in(self.within)
-
     def _beyond(self, run: RunSignals, neutral: float, high: bool) -> float:
         return run.beyond(neutral, high=high, bounded=self.within is not None)
 
 
-class Invariant(Windowed):
+class Limited(Windowed, Temporal):
+    """Base of expectations about the time from a step on: for `within`, or to the run's end."""
+
+    def last(self, run: RunSignals) -> int:
+        """Return the last step of the window that is known."""
+        return min(run.first + run.reach(self.within)[1], run.end - 1)
+
+
+class Invariant(Limited):
     """Base of expectations that something holds at every step."""
 
     @property
@@ -109,12 +113,25 @@ class Invariant(Windowed):
 
     def robustness(self, run: RunSignals, high: bool) -> Trace:
         """Return the minimum robustness of the operand over the window starting at each step."""
+        low, high_end = run.reach(self.within)
         after = self._beyond(run, INFINITE, high)
-        return self.operand.robustness(run, high).sliding_min(0, self._steps(run), INFINITE, after)
+        return self.operand.robustness(run, high).sliding_min(low, high_end, INFINITE, after)
 
     def violations(self, run: RunSignals) -> list[Violation]:
         """Return the stretches in which the operand doesn't hold."""
-        return violations_of(self.operand.robustness(run, True).until(self.last(run) + 1))
+        first, end = run.first + run.reach(self.within)[0], self.last(run) + 1
+        if first >= end:
+            return []
+        return violations_of(self.operand.robustness(run, True).until(end).since(first))
+
+    def untested(self, run: RunSignals) -> str:
+        """Return why there was nothing to expect: its hours, or its condition, never came."""
+        texts = []
+        for premise in premises(self.operand):
+            if len(premise.robustness(run, False).until(self.last(run) + 1).spells):
+                return ""
+            texts.append(str(premise))
+        return f"{' and '.join(texts)} never came" if texts else ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,15 +156,16 @@ class never(always):
 
 
 @dataclass(frozen=True, eq=False)
-class eventually(Windowed):
+class eventually(Limited):
     """Expect a condition at some step, before the end of the run or `within` some time."""
 
     part: Expectation
 
     def robustness(self, run: RunSignals, high: bool) -> Trace:
         """Return the maximum robustness of the operand over the window starting at each step."""
+        low, high_end = run.reach(self.within)
         after = self._beyond(run, -INFINITE, high)
-        return self.part.robustness(run, high).sliding_max(0, self._steps(run), -INFINITE, after)
+        return self.part.robustness(run, high).sliding_max(low, high_end, -INFINITE, after)
 
     def slack(self, run: RunSignals) -> int | None:
         """Return how many steps before the time limit it was fulfilled."""
@@ -170,7 +188,9 @@ class eventually(Windowed):
         Returns:
             The steps; None while a span may still begin in time.
         """
-        deadline, index = first + self._steps(run), int(np.searchsorted(spans[:, 1], first))
+        low, high_end = run.reach(self.within)
+        first, deadline = first + low, first + high_end
+        index = int(np.searchsorted(spans[:, 1], first))
         if index == len(spans) and deadline >= run.end:
             return None
         begin = max(int(spans[index, 0]), first) if index < len(spans) else run.end
@@ -196,7 +216,7 @@ class at_end(Word, Temporal):
 
 
 @dataclass(frozen=True, eq=False)
-class until(Windowed):
+class until(Limited):
     """Expect `hold` at every step until `goal` holds, and `goal` in time."""
 
     hold: Expectation
@@ -205,11 +225,8 @@ class until(Windowed):
     def robustness(self, run: RunSignals, high: bool) -> Trace:
         """Return the maximum over later steps t of min(goal at t, minimum of `hold` before t)."""
         hold, goal = self.hold.robustness(run, high), self.goal.robustness(run, high)
-        whole = hold.until_goal(goal, self._beyond(run, -INFINITE, high))
-        if self.within is None:
-            return whole
-        in_time = eventually(self.goal, within=self.within)
-        return combine(np.minimum, whole, in_time.robustness(run, high))
+        after = self._beyond(run, -INFINITE, high)
+        return _until(hold, goal, None if self.within is None else run.reach(self.within), after)
 
     def violations(self, run: RunSignals) -> list[Violation]:
         """Return one violation, up to where `hold` failed or the goal was due."""
@@ -218,8 +235,82 @@ class until(Windowed):
         return [v._replace(last=last, worst=last) for v in super().violations(run)]
 
 
+def _until(hold: Trace, goal: Trace, reach: tuple[int, int] | None, after: float) -> Trace:
+    """Return the robustness of "`hold` until `goal`" from each step on.
+
+    Args:
+        hold: What holds before the goal.
+        goal: The goal, over the same steps.
+        reach: How many steps later the goal is due, at first and at last; None: some time.
+        after: Value that is assumed from the end on.
+    """
+    whole = hold.until_goal(goal, after)
+    if reach is None:
+        return whole
+    low, high = reach
+    in_time = goal.sliding_max(low, high, -INFINITE, after)
+    if low == 0:
+        return combine(np.minimum, whole, in_time)
+    before = hold.sliding_min(0, low - 1, INFINITE, INFINITE)
+    return combine(
+        lambda *values: np.minimum.reduce(values),
+        before,
+        whole.sliding_max(low, low, -INFINITE, after),
+        in_time,
+    )
+
+
 @dataclass(frozen=True, eq=False)
-class after(Windowed):
+class since(Windowed):
+    """The condition that `goal` has held, by `within` ago, and `hold` at every step after it."""
+
+    hold: Expectation
+    goal: Expectation
+
+    def robustness(self, run: RunSignals, high: bool) -> Trace:
+        """Return the robustness of `until` for the time that runs backward."""
+        hold, goal = (part.robustness(run, high).reversed for part in (self.hold, self.goal))
+        reach = None if self.within is None else run.reach(self.within)
+        return _until(hold, goal, reach, -INFINITE).reversed
+
+
+@dataclass(frozen=True, eq=False)
+class once(Windowed):
+    """The condition that a condition has held at some step up to this one, or `within` the last."""
+
+    part: Expectation
+
+    def robustness(self, run: RunSignals, high: bool) -> Trace:
+        """Return the maximum robustness of the operand over the window that ends at each step."""
+        low, high_end = run.reach(self.within)
+        return self.part.robustness(run, high).sliding_max(-high_end, -low, -INFINITE, -INFINITE)
+
+
+@dataclass(frozen=True, eq=False)
+class implies(Word, Expectation):
+    """The condition that `part` holds wherever `premise` does."""
+
+    premise: Expectation
+    part: Expectation
+
+    def robustness(self, run: RunSignals, high: bool) -> Trace:
+        """Return the maximum of the negated premise and the part."""
+        return (~self.premise | self.part).robustness(run, high)
+
+
+def premises(operand: Expectation) -> list[Expectation]:
+    """Return the conditions that must come true for an expectation of `operand` to be tested."""
+    if isinstance(operand, implies):
+        return [operand.premise]
+    if isinstance(operand, during):
+        return [operand]
+    parts = [operand.part] if isinstance(operand, Not) else []
+    parts += [operand.one, operand.other] if isinstance(operand, And) else []
+    return [premise for part in parts for premise in premises(part)]
+
+
+@dataclass(frozen=True, eq=False)
+class after(Limited):
     """Expect a condition each time that `trigger` begins: immediately, or `within` some time.
 
     Each event counts by itself; conditions that last, such as being in a room, count each time that
@@ -246,6 +337,21 @@ class after(Windowed):
     def triggered(self, run: RunSignals) -> I64:
         """Return the steps at which the trigger begins: int64 (n,), ascending."""
         return np.unique(self.trigger.occasions(run))
+
+    def judged(self, run: RunSignals) -> I64:
+        """Return those at which the rest of the run can't change whether the condition holds."""
+        steps = self.triggered(run)
+        best, worst = (
+            self.consequence.robustness(run, high).values(steps) for high in (True, False)
+        )
+        return steps[(best < 0) | (worst > 0)]
+
+    def untested(self, run: RunSignals) -> str:
+        """Return why no occasion was judged."""
+        if len(self.judged(run)):
+            return ""
+        cut = len(self.triggered(run))
+        return "its trigger came only too near to the end" if cut else "its trigger never happened"
 
     def robustness(self, run: RunSignals, high: bool) -> Trace:
         """Return the minimum robustness over the occasions from each step on."""
@@ -292,34 +398,114 @@ class holds_for(Word, Expectation):
         super().check(scene)
 
     def robustness(self, run: RunSignals, high: bool) -> Trace:
-        """Return the minimum robustness of the operand over the steps of the duration."""
-        steps = max(1, -(-self.duration // timedelta(microseconds=run.clock.step_us)))
-        part = self.part.robustness(run, high)
-        return part.sliding_min(1 - steps, 0, -INFINITE, INFINITE)
+        """Return the minimum robustness of the operand over the duration that ends at each step."""
+        steps = -run.steps_in(-self.duration)
+        return self.part.robustness(run, high).sliding_min(-steps, 0, -INFINITE, INFINITE)
 
 
 @dataclass(frozen=True, eq=False)
-class count(Word, Signal):
-    """How often a condition has begun: in the present hour, day or week, or in the run so far."""
+class Total(Word, Signal):
+    """Base of what is summed over the present hour, day or week, or over the run so far.
+
+    Compared outside of any time operator, it counts at the end of the run.
+    """
 
     part: Expectation
     per: str | None = field(default=None, kw_only=True)
-
-    unit = "times"
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.per is not None and self.per not in PERIODS:
             raise InputError(
-                f"count: per is {self.per!r}{did_you_mean(self.per, PERIODS)} There are: hour, day,"
-                " week"
+                f"{self.word}: per is {self.per!r}{did_you_mean(self.per, PERIODS)} There are:"
+                " hour, day, week"
             )
 
     def trace(self, run: RunSignals) -> Trace:
-        """Return the count at each step."""
-        steps = self.part.occasions(run)
+        """Return the sum at each step."""
+        sum_in = self.sums(run)
         edges = [run.first, *_period_begins(run, self.per), run.end]
-        return joined([_counts(steps, a, b) for a, b in pairwise(edges)])
+        return joined([sum_in(a, b) for a, b in pairwise(edges)])
+
+    def sums(self, run: RunSignals) -> Callable[[int, int], Trace]:
+        """Return a function that sums over the steps from one to before another."""
+        raise NotImplementedError
+
+
+class count(Total):
+    """How often a condition has begun: in the present hour, day or week, or in the run so far."""
+
+    unit = "times"
+
+    def sums(self, run: RunSignals) -> Callable[[int, int], Trace]:
+        """Return how many occasions have passed."""
+        steps = self.part.occasions(run)
+        return lambda first, end: _counts(steps, first, end)
+
+
+@dataclass(frozen=True, eq=False)
+class share(Total):
+    """The share of the time in which a condition holds: in the present period, or so far.
+
+    With `of`, only the time in which that condition holds counts; missing before there is some.
+    """
+
+    of: Expectation | None = field(default=None, kw_only=True)
+
+    unit = "share"
+
+    def sums(self, run: RunSignals) -> Callable[[int, int], Trace]:
+        """Return the share of the steps that have passed."""
+        part = self.part if self.of is None else self.part & self.of
+        steps = np.arange(run.first, run.end, dtype=np.int64)
+        holds = part.robustness(run, False).values(steps) > 0
+        counts = (
+            np.ones(len(steps))
+            if self.of is None
+            else self.of.robustness(run, True).values(steps) > 0
+        )
+
+        def share_in(first: int, end: int) -> Trace:
+            inside = slice(first - run.first, end - run.first)
+            with np.errstate(invalid="ignore"):
+                value = np.cumsum(holds[inside]) / np.cumsum(counts[inside])
+            return shortest(steps[inside], value, end)
+
+        return share_in
+
+
+@dataclass(frozen=True, eq=False)
+class may_be_untested(Word, Temporal):
+    """An expectation that may end without a test, such as `after` without its trigger."""
+
+    part: Expectation
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not isinstance(self.part, Temporal):
+            raise InputError(f"{self.word}: expected an operator like after(…), got {self.part}")
+
+    @property
+    def operator(self) -> Temporal:
+        """The expectation itself."""
+        assert isinstance(self.part, Temporal)
+        return self.part
+
+    def robustness(self, run: RunSignals, high: bool) -> Trace:
+        """Return that of the expectation."""
+        return self.part.robustness(run, high)
+
+    def violations(self, run: RunSignals) -> list[Violation]:
+        """Return those of the expectation."""
+        return self.operator.violations(run)
+
+    def slack(self, run: RunSignals) -> int | None:
+        """Return that of the expectation."""
+        return self.operator.slack(run)
+
+    def untested(self, run: RunSignals) -> str:
+        """Return why the expectation was not tested."""
+        return self.part.untested(run)
 
 
 @dataclass(frozen=True, eq=False)

@@ -88,6 +88,12 @@ class Trace(NamedTuple):
         return Trace(*until(start, self.values(start), goal.values(start), after), self.end)
 
     @property
+    def reversed(self) -> "Trace":
+        """The same values in the opposite order, over the same steps."""
+        start = self.first + self.end - self.ends[::-1]
+        return Trace(start, self.value[::-1].copy(), self.end)
+
+    @property
     def spells(self) -> I64:
         """The maximal stretches in which it is above 0: int64 (n, 2), first and last step."""
         above = np.concatenate([[False], self.value > 0, [False]])

@@ -1,14 +1,22 @@
 """Verdicts: whether an expectation holds, by how much, and when it was violated."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
 from typing import Any, Protocol
 
 from fleet2d.configuration.units import format_duration
 from fleet2d.errors import InputError
-from fleet2d.expectations.expectation import And, Expectation, Or, RunSignals, number_text
-from fleet2d.expectations.temporal import Temporal, Violation, after
+from fleet2d.expectations.expectation import And, Expectation, Not, Or, RunSignals, number_text
+from fleet2d.expectations.signals import SignalComparison
+from fleet2d.expectations.temporal import (
+    Temporal,
+    Total,
+    Violation,
+    after,
+    at_end,
+    may_be_untested,
+)
 from fleet2d.expectations.traces import TINY
 from fleet2d.runtime.clock import DAY_S, HOUR_S, Clock
 
@@ -20,7 +28,8 @@ class Verdict:
     Attributes:
         name: Name of the expectation.
         expectation: Its text.
-        holds: Whether it holds; during a run, whether it isn't violated yet.
+        holds: Whether it holds; during a run, whether it isn't violated yet. None: it was never put
+            to the test, see `untested`.
         decided: Whether the rest of the run can't change `holds`.
         robustness: Margin by which it holds (above 0) or fails (below 0) [unit]; infinite for
             conditions that are only true or false.
@@ -28,16 +37,20 @@ class Verdict:
             and empty for conditions that are only true or false.
         slack_s: With a time limit: time to spare on the worst occasion [s]; below 0 if it was late,
             by at least that much if it never happened. None without a time limit.
-        occasions: How often the trigger of `after` happened; None for other expectations.
+        occasions: How often the trigger of `after` happened, as far as that was judged; None for
+            other expectations.
         violations: The violations, in order of time.
         first: The first judged step.
         end: One past the last step that is known.
         clock: The clock of the run.
+        untested: Why the run didn't put it to the test, such as that its trigger never happened.
+        may_be_untested: Whether that is all right.
+        notes: Notes on it, such as that the home lacks a kind of rooms.
     """
 
     name: str
     expectation: str
-    holds: bool
+    holds: bool | None
     decided: bool
     robustness: float
     unit: str
@@ -47,10 +60,18 @@ class Verdict:
     first: int
     end: int
     clock: Clock
+    untested: str = ""
+    may_be_untested: bool = False
+    notes: tuple[str, ...] = ()
 
     def __bool__(self) -> bool:
-        """Return `holds`."""
-        return self.holds
+        """Whether it holds, or may be untested."""
+        return not self.fails
+
+    @property
+    def fails(self) -> bool:
+        """Whether it is violated, or untested where it must not be."""
+        return self.holds is False or (self.holds is None and not self.may_be_untested)
 
     @property
     def worst(self) -> Violation | None:
@@ -64,13 +85,15 @@ class Verdict:
 
     def __str__(self) -> str:
         """Return a sentence: whether it held, and if not, when and by how much."""
+        if self.holds is None:
+            return f"{self.name} is untested: {self.untested}"
         if self.holds:
             return f"{self.name} {'held' if self.decided else 'holds so far'}{self._by_how_much()}"
         return f"{self.name} is violated: {self.expectation}{self._when()}"
 
     def _by_how_much(self) -> str:
         if self.occasions == 0:
-            return ", because its trigger never happened"
+            return ", as its trigger hasn't happened yet"
         parts = []
         if math.isfinite(self.robustness):
             parts.append(f"by {amount(self.robustness, self.unit)}")
@@ -111,6 +134,8 @@ class Verdict:
             "violations": len(self.violations),
             "first": self.first,
             "says": str(self),
+            **({"untested": self.untested} if self.holds is None else {}),
+            **({"notes": list(self.notes)} if self.notes else {}),
         }
 
 
@@ -143,26 +168,29 @@ def judge(expectation: Expectation, run: Judged, name: str = "") -> Verdict:
     return run.judge(expectation, name)
 
 
-def verdict_of(name: str, expectation: Expectation, run: RunSignals) -> Verdict:
-    """Return the verdict on an expectation from the signals of a run."""
+def verdict_of(name: str, expectation: Expectation, run: RunSignals, text: str = "") -> Verdict:
+    """Return the verdict on an expectation from the signals of a run; `text` is how it was put."""
     best = expectation.robustness(run, True).at(run.first)
     worst = best if run.ended else expectation.robustness(run, False).at(run.first)
-    decided = run.ended or best < 0 or worst > 0
-    violations = tuple(_violations(expectation, run)) if best < 0 else ()
     slack = expectation.slack(run) if isinstance(expectation, Temporal) else None
+    untested = expectation.untested(run) if run.ended and best > 0 else ""
+    inner = expectation.part if isinstance(expectation, may_be_untested) else expectation
+    text = text or str(expectation)
     return Verdict(
-        name or str(expectation),
-        str(expectation),
-        best > 0,
-        decided,
+        name or text,
+        text,
+        None if untested else best > 0,
+        run.ended or best < 0 or worst > 0,
         worst if worst > 0 else best,
         expectation.unit,
         None if slack is None else slack * run.clock.step_us / 1e6,
-        len(expectation.triggered(run)) if isinstance(expectation, after) else None,
-        violations,
+        len(inner.judged(run)) if isinstance(inner, after) else None,
+        tuple(_violations(expectation, run)) if best < 0 else (),
         run.first,
         run.end,
         run.clock,
+        untested,
+        inner is not expectation,
     )
 
 
@@ -180,7 +208,7 @@ def _violations(expectation: Expectation, run: RunSignals) -> list[Violation]:
 
 
 def check_judged(expectation: object) -> Expectation:
-    """Return the expectation if it has a time operator.
+    """Return the expectation if it has a time operator; sums count at the end without one.
 
     Raises:
         InputError: It doesn't, or it is not an expectation.
@@ -190,12 +218,23 @@ def check_judged(expectation: object) -> Expectation:
             f"{expectation!r} is not an expectation: write one like"
             ' always(distance("ana", "astro") > 0.5)'
         )
+    expectation = _sums_at_end(expectation)
     if not expectation.is_judged:
         raise InputError(
             f"{expectation} has no time operator: write always(…), never(…), eventually(…),"
             " at_end(…), until(…), after(…) or at_most(…)"
         )
     return expectation
+
+
+def _sums_at_end(expectation: Expectation) -> Expectation:
+    if isinstance(expectation, And):
+        one, other = _sums_at_end(expectation.one), _sums_at_end(expectation.other)
+        return replace(expectation, one=one, other=other)
+    if isinstance(expectation, Not):
+        return ~_sums_at_end(expectation.part)
+    is_sum = isinstance(expectation, SignalComparison) and isinstance(expectation.signal, Total)
+    return at_end(expectation) if is_sum else expectation
 
 
 def amount(value: float, unit: str) -> str:

@@ -5,7 +5,7 @@ fields are its arguments, `check` refuses names that a run doesn't have, and `me
 values. It can be written in texts and imported from `fleet2d.expectations` at once.
 """
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass, field
 from datetime import timedelta
 from typing import Any
@@ -20,6 +20,7 @@ from fleet2d.entities.behavior import Actor
 from fleet2d.errors import InputError, ScenarioError
 from fleet2d.expectations.expectation import RunSignals
 from fleet2d.expectations.signals import (
+    ANY_KIND,
     Condition,
     Gauge,
     MeasuredRun,
@@ -29,18 +30,18 @@ from fleet2d.expectations.signals import (
     SignalBlock,
     WordSignal,
 )
-from fleet2d.expectations.traces import Trace, constant, pulses, shortest
+from fleet2d.expectations.traces import Trace, combine, constant, pulses, shortest
 from fleet2d.floorplan.home import Home, lattice_footprint
 from fleet2d.floorplan.lattice import UNITS_PER_CELL
 from fleet2d.floorplan.placed_objects import PlacedObject
-from fleet2d.kernels import I64, Bool
+from fleet2d.kernels import F64, I64, Bool
 from fleet2d.kernels.motion import distances_between, distances_to_shape, rooms_at, speeds
 from fleet2d.kernels.sight import SightingColumn
 from fleet2d.runtime.clock import midnight_of
 from fleet2d.runtime.events import EventKind
 
-Target = str | tuple[float, float]
-"""A body, a room, an object, or a point (x, y) [m]."""
+Target = str | tuple[float, float] | WordSignal
+"""A body, also as `nearest(…)`, a room, an object, or a point (x, y) [m]."""
 
 BODY = ("user or robot", "bodies")
 """A noun for messages, and what it names in `Scene.names`."""
@@ -70,7 +71,7 @@ class distance(NumberSignal):
     unit = "m"
 
     def __post_init__(self) -> None:
-        if not isinstance(self.other, str):
+        if isinstance(self.other, tuple | list):
             x, y = self.other
             self._set(other=(float(x), float(y)))
 
@@ -82,15 +83,17 @@ class distance(NumberSignal):
                 f"{self}: name the body first: distance({self.other!r}, {self.body!r})"
             )
         super().check(scene)
-        if isinstance(self.other, str):
-            scene.check_name("body, room or object", self.other, [*bodies, *places], self)
+        if isinstance(self.other, tuple):
+            _check_point(self.other, scene, self)
+        else:
+            scene.check_room(str(self.other), self, [*bodies, *places])
         if self.other == self.body:
             raise ScenarioError(f"{self}: give two different bodies")
 
     def start(self, run: MeasuredRun, gauge: Gauge) -> Any:
         """Return the rows of both bodies, the second None if it is a place; and its outline."""
         names = [actor.name for actor in run.actors]
-        other = names.index(self.other) if self.other in names else None
+        other = names.index(str(self.other)) if self.other in names else None
         return run.row(self.body), other, None, None
 
     def measure(self, block: SignalBlock, gauge: Gauge) -> Trace:
@@ -108,10 +111,12 @@ class distance(NumberSignal):
 
     def _shape(self, home: Home) -> PlacedObject | list[int] | tuple[float, float]:
         """Return the present place: an object, the numbers of rooms, or a point."""
-        if not isinstance(self.other, str):
+        if isinstance(self.other, tuple):
             return self.other
-        rooms = [room.index for room in home.rooms if self.other in (room.name, room.type)]
-        return rooms or home.object(self.other)
+        kind = str(self.other).removeprefix(ANY_KIND)
+        rooms = [room.index for room in home.rooms if kind in (room.name, room.type)]
+        is_object = any(item.name == self.other for item in home.objects)
+        return home.object(kind) if is_object and not rooms else rooms
 
     @staticmethod
     def _edges(home: Home, shape: PlacedObject | list[int] | tuple[float, float]) -> I64:
@@ -123,6 +128,15 @@ class distance(NumberSignal):
             return outline(np.isin(plan.room_of_place, shape), UNITS_PER_CELL)
         ring = np.array(lattice_footprint(plan, shape).exterior.coords).round()
         return np.concatenate([ring[:-1], ring[1:]], axis=1).astype(np.int64)
+
+
+def _check_point(point: tuple[float, float], scene: Scene, of: object) -> None:
+    (x, y), (x0, y0, x1, y1) = point, scene.bounds
+    if not (x0 <= x <= x1 and y0 <= y <= y1):
+        raise ScenarioError(
+            f"{of}: ({x:g}, {y:g}) m is outside the home, which reaches from ({x0:g}, {y0:g}) to"
+            f" ({x1:g}, {y1:g}) m"
+        )
 
 
 def outline(mask: Bool, side: int) -> I64:
@@ -237,10 +251,11 @@ class room(WordSignal):
     body: str
 
     of = BODY
+    noun = "room"
 
     def check_word(self, word: str, scene: Scene) -> None:
         """Refuse an unknown room."""
-        scene.check_name("room", word, scene.names["rooms"], self)
+        scene.check_room(word, self)
 
     def start(self, run: MeasuredRun, gauge: Gauge) -> Any:
         """Return the row of the body; the words are the names and types of rooms."""
@@ -261,6 +276,13 @@ class activity(WordSignal):
     user: str
 
     of = ("user", "users")
+    noun = "activity"
+
+    def check_word(self, word: str, scene: Scene) -> None:
+        """Refuse an activity that the user never does."""
+        known = scene.details.get(f"{EventKind.ACTIVITY} {self.user}")
+        if known is not None:
+            scene.check_name(f"activity of {self.user}", word, known, self)
 
     def start(self, run: MeasuredRun, gauge: Gauge) -> Any:
         """Begin with the code of the present activity; -1 if none is known."""
@@ -284,6 +306,55 @@ def _code(word: str, gauge: Gauge) -> float:
     code = next((code for code, words in gauge.words.items() if word in words), len(gauge.words))
     gauge.words.setdefault(code, (word,))
     return float(code)
+
+
+@dataclass(frozen=True, eq=False)
+class nearest(WordSignal):
+    """The robot that is nearest to a user, or the user who is nearest to a robot.
+
+    It can also stand for a body: `room(nearest(ana)) == room(ana)`. None while all are away.
+    """
+
+    body: str
+
+    of = BODY
+    noun = "body"
+
+    def choices(self, scene: Scene) -> Collection[str]:
+        """Return the robots for a user, the users for a robot.
+
+        Raises:
+            ScenarioError: There are none.
+        """
+        names = scene.names["robots" if self.body in scene.names["users"] else "users"]
+        if not names:
+            raise ScenarioError(f"{self}: there is nobody whom it could name")
+        return names
+
+    def check_word(self, word: str, scene: Scene) -> None:
+        """Refuse a body that it can't name."""
+        scene.check_name("body", word, self.choices(scene), self)
+
+    def start(self, run: MeasuredRun, gauge: Gauge) -> Any:
+        """Return the rows of the body and of those that it may be near to."""
+        row = run.row(self.body)
+        is_user = type(run.actors[row].entity)
+        rows = [i for i, actor in enumerate(run.actors) if not isinstance(actor.entity, is_user)]
+        gauge.words = {i: (run.actors[i].name,) for i in rows}
+        return row, rows
+
+    def measure(self, block: SignalBlock, gauge: Gauge) -> Trace:
+        """Return the row of the nearest one, the first of equals; -1 if there is none."""
+        row, rows = gauge.memory
+        window = block.bodies.window(block.first, block.end)
+        traces = [Trace(*distances_between(window, row, other), block.end) for other in rows]
+
+        def first_of(*distances: F64) -> F64:
+            table = np.stack(distances)
+            at = np.array(rows, np.float64)[table.argmin(axis=0)]
+            return np.where(np.isfinite(table.min(axis=0)), at, -1.0)
+
+        return combine(first_of, *traces)
 
 
 # Conditions
@@ -485,6 +556,10 @@ class during(Condition):
         try:
             first, last = parse_time_of_day(begin.strip()), parse_time_of_day(end.strip())
             names = [name.strip() for name in self.days.split(",")] if self.days else "daily"
+            if first == last:
+                raise InputError(
+                    f"during: {self.hours} is no time: write 00:00-24:00 for the whole day"
+                )
             length = last - first if last > first else last + DAY - first
             self._set(_begin=first, _length=length, _weekdays=frozenset(weekdays_of(names)))
         except PydanticCustomError as error:

@@ -104,10 +104,11 @@ class ExpectationResult:
     Attributes:
         name: The name of the expectation, or its text.
         text: By how much it held or failed, and when.
-        holds: Whether it held.
+        holds: Whether it held, or may be untested.
         margin: Margin by which it held, below 0 if it failed, from -1 to 1: comparable between
             expectations of different units.
         step: The first step of a violation; None if it held, or if it failed at no single step.
+        untested: Whether the run didn't put it to the test.
     """
 
     name: str
@@ -115,6 +116,7 @@ class ExpectationResult:
     holds: bool
     margin: float
     step: int | None = None
+    untested: bool = False
 
 
 def result_of(verdict: Verdict) -> ExpectationResult:
@@ -127,11 +129,12 @@ def result_of(verdict: Verdict) -> ExpectationResult:
     if not math.isfinite(value) and verdict.slack_s is not None:
         value, unit = verdict.slack_s, "s"
     margin = comparable(value, SCALES.get(unit, 1.0))
-    if (margin > 0) != verdict.holds:  # it was fulfilled just in time, or just too late
-        margin = math.copysign(SMALLEST_MARGIN, 1.0 if verdict.holds else -1.0)
+    if (margin > 0) != (verdict.holds is not False):  # fulfilled just in time, or just too late
+        margin = -math.copysign(SMALLEST_MARGIN, margin)
     repeated = f"{verdict.expectation} is violated: {verdict.expectation}"  # without a name
     text = str(verdict).replace(repeated, f"{verdict.expectation} is violated")
-    return ExpectationResult(verdict.name, text, verdict.holds, margin, step)
+    untested = verdict.holds is None
+    return ExpectationResult(verdict.name, text, not verdict.fails, margin, step, untested)
 
 
 def comparable(value: float, scale: float) -> float:
