@@ -14,6 +14,7 @@ from fleet2d.studies.answers import (
     effects,
     holm,
     paired,
+    power_table,
     unit_differences,
     variance_ratio,
     variance_shares,
@@ -200,3 +201,28 @@ def test_shares_of_nothing_are_zero_and_no_rounding_errors() -> None:
     table = variance_shares(variants(effect=0, noise=0), COLUMNS, "score")
     shares = dict(table.iter_rows())
     assert 0 == shares["robot"] == shares["residual"] == shares["method × robot"]
+
+
+def power(frame: pl.DataFrame, effect: float | None) -> pl.DataFrame:
+    against = {"method": "old"}
+    units = ("home", "seed")
+    return power_table(frame, COLUMNS, "score", against, units, effect=effect, power=0.8)
+
+
+def test_more_homes_and_seeds_detect_smaller_differences() -> None:
+    table = power(variants(), None)
+    assert ["method", "seed", "home", "detectable"] == table.columns
+    assert table.sort("home", "seed")["detectable"][0] == table["detectable"].max()
+    by_home = table.filter(pl.col("seed") == 5).sort("home")["detectable"].to_list()
+    assert sorted(by_home, reverse=True) == by_home
+
+
+def test_an_effect_needs_the_more_homes_the_smaller_it_is() -> None:
+    few, many = (power(variants(noise=1.0), effect)["home"] for effect in (0.5, 0.1))
+    assert all(a is not None and (b is None or a <= b) for a, b in zip(few, many, strict=True))
+    assert few[0] < 1000
+
+
+def test_the_power_of_one_pair_is_unknown() -> None:
+    with pytest.raises(InputError, match="run a small study"):
+        power(variants(homes=1, seeds=1).filter(pl.col("robot") == "patrol"), 0.5)

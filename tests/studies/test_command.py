@@ -112,3 +112,25 @@ def test_a_search_prints_what_it_found_and_how_it_does_elsewhere(fleet2d: Cli) -
     assert "trials: 3 complete, 0 pruned, 0 fail" in out
     assert f"  {SPEED}=" in out
     assert "distance.astro on the homes held out:" in out
+
+
+def test_power_says_how_many_seeds_detect_an_effect(fleet2d: Cli) -> None:
+    fleet2d("study", "run", "speeds.yaml", *SERIAL)
+    against = ("--against", f"{SPEED}=0.3")
+    arguments = ("study", "power", "studies/speeds", "distance.astro", *against)
+    code, out, _ = fleet2d(*arguments, "--effect", "10")
+    first, *rows = out.splitlines()
+    assert (0, "distance.astro [m a day]: to detect 10, with a power of 80 %; – is never") == (
+        code, first,
+    )  # fmt: skip
+    assert [SPEED, "seed"] == rows[0].split()
+    code, out, _ = fleet2d(*arguments)
+    assert (0, [SPEED, "seed", "detectable"]) == (code, out.splitlines()[1].split())
+
+
+def test_power_needs_a_comparison_that_the_study_has(fleet2d: Cli) -> None:
+    fleet2d("study", "run", "speeds.yaml", *SERIAL)
+    power = ("study", "power", "studies/speeds", "distance.astro")
+    assert "give --against AXIS=VALUE" in fleet2d(*power)[2]
+    assert "There are: 0.3, 0.6" in fleet2d(*power, "--against", f"{SPEED}=3")[2]
+    assert "did you mean" in fleet2d(*power, "--against", "robots.astro.spede=0.3")[2]

@@ -317,3 +317,20 @@ def test_an_objective_that_no_variant_can_have_is_refused(tmp_path: Path) -> Non
 def test_an_objective_that_no_run_has_is_named(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"no trial succeeded.*no metric 'distance.happiness'"):
         tuned(tmp_path, objectives={"distance.happiness": "maximize"}, trials=1)
+
+
+def test_a_copy_of_a_home_is_not_held_out_of_a_search_on_the_home(tmp_path: Path) -> None:
+    home = Path(__file__).parents[2] / "examples" / "small_flat.json"
+    paths = [tmp_path / name for name in ("first.json", "second.json", "third.json")]
+    for path in paths[:2]:
+        path.write_bytes(home.read_bytes())
+    paths[2].write_text(home.read_text() + "\n")
+    study = search(held_out={"home": ["second"]})
+    study["axes"] = {"home": {"floorplans": [str(path) for path in paths]}}
+    with pytest.raises(ScenarioError, match="the same but for the names of files"):
+        tune(study, tmp_path / "tune", SerialExecutor())
+    assert not (tmp_path / "tune").exists()
+    study["axes"]["home"]["floorplans"] = [str(path) for path in paths[1:]]
+    assert (
+        1 == tune(study, tmp_path / "tune", SerialExecutor()).held_out.variants["home"].n_unique()
+    )

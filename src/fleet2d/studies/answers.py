@@ -93,6 +93,67 @@ def unit_differences(
     return pl.concat(tables)
 
 
+SIZES = (2, 3, 5, 8, 10, 15, 20, 30, 50, 100)
+
+
+def power_table(
+    frame: "pl.DataFrame",
+    columns: Sequence[str],
+    metric: str,
+    against: Mapping[str, Any],
+    by: Sequence[str],
+    *,
+    effect: float | None,
+    power: float,
+) -> "pl.DataFrame":
+    """Return the differences that studies of some sizes detect, or the sizes that an effect needs.
+
+    Args:
+        frame: The complete variants of a study whose units vary as those of the next one will.
+        columns: The columns of all axes.
+        metric: The number to compare.
+        against: The axis and its reference value.
+        by: The columns of the units: homes, people, seeds.
+        effect: The difference to detect; None: return what can be detected.
+        power: The share of studies that detect it.
+
+    Returns:
+        With an effect: for each value of the axis and each number of the other units, how many
+        units of the first kind are needed, null if no number is enough. Without: for each value
+        and size, the column `detectable`.
+
+    Raises:
+        InputError: There is no such axis or value, or less than two units.
+    """
+    import polars as pl
+
+    ((axis, reference),) = against.items()
+    check_axes((axis, *by), columns)
+    rows: list[dict[str, Any]] = []
+    for value, pairs in _all_pairs(frame, columns, metric, axis, reference):
+        units = by_units(pairs, by, ("difference",))
+        difference = estimate(units["difference"].to_numpy(), {c: units[c].to_list() for c in by})
+        if not difference.spread.units:
+            continue
+        spread = difference.spread
+        first, *others = spread.units
+        for counts in itertools.product(SIZES, repeat=len(others)):
+            sizes = dict(zip(others, counts, strict=True))
+            label = {axis: value, **sizes}
+            if effect is not None:
+                rows.append({**label, first: spread.needed(effect, first, power, **sizes)})
+                continue
+            for count in SIZES:
+                detectable = spread.detectable({**sizes, first: count}, power)
+                rows.append({**label, first: count, "detectable": detectable})
+    if not rows:
+        raise InputError(
+            f"no two units of {metric} differ in {' or '.join(by)}: the power follows from how much"
+            " units vary; run a small study with some homes and seeds first"
+        )
+    return pl.DataFrame(rows, infer_schema_length=None)
+
+
 def _all_pairs(
     frame: "pl.DataFrame", columns: Sequence[str], metric: str, axis: str, reference: Any
 ) -> "Iterator[tuple[Any, pl.DataFrame]]":

@@ -4,13 +4,14 @@ import gc
 import json
 import signal
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
+from fleet2d.configuration.problems import suggest
 from fleet2d.errors import InputError, end_by_signal
 from fleet2d.options import TrustFiles, TrustFolders, restrict_to
 from fleet2d.studies.storage import printable
@@ -159,6 +160,61 @@ def report(
             "give --out, a local folder for the report: the study is in a remote store"
         )
     _print(write_report(open_study(location), out or Path(location) / "report"))
+
+
+@studying.command()
+def power(
+    location: Where,
+    metric: Annotated[str, typer.Argument(help="A number, such as ltp_error.ana.tv.")],
+    against: Annotated[
+        str | None,
+        typer.Option(help="AXIS=VALUE, the reference; left out: as the study compares the metric."),
+    ] = None,
+    effect: Annotated[
+        float | None, typer.Option(help="The difference to detect; left out: what sizes detect.")
+    ] = None,
+    share: Annotated[
+        float, typer.Option("--power", min=0.5, max=0.999, help="Share of studies that detect it.")
+    ] = 0.8,
+) -> None:
+    """Print how many homes and seeds an effect needs, from how much they vary in a small study."""
+    import polars as pl
+
+    from fleet2d.studies.reader import open_study
+
+    study = open_study(location)
+    table = study.power(metric, _reference(study, metric, against), effect, power=share)
+    unit = study.meta.unit(metric)
+    aim = "the smallest difference that shows" if effect is None else f"to detect {effect:g}"
+    name = f"{metric} [{unit}]" if unit else metric
+    _print(f"{name}: {aim}, with a power of {100 * share:g} %; – is never")
+    with pl.Config(
+        tbl_hide_dataframe_shape=True, tbl_hide_column_data_types=True, tbl_rows=-1, tbl_cols=-1,
+        tbl_formatting="NOTHING", float_precision=4,
+    ):  # fmt: skip
+        _print(str(table).replace("null", "–"))
+
+
+def _reference(study: "Study", metric: str, against: str | None) -> Mapping[str, Any]:
+    """Return the axis and the reference value of a comparison.
+
+    Raises:
+        InputError: `against` is not AXIS=VALUE, or the study compares no such metric.
+    """
+    if against is None:
+        for comparison in study.meta.compare:
+            if comparison.metric == metric:
+                return comparison.against
+        raise InputError(f"the study doesn't compare {metric!r}: give --against AXIS=VALUE")
+    from fleet2d.studies.answers import check_axes
+
+    axis, _, text = against.partition("=")
+    check_axes([axis], study.columns)
+    labels = study.arrow_variants.column(axis).unique().to_pylist()
+    by_text = {str(label): label for label in labels if label is not None}
+    if text not in by_text:
+        raise InputError(f"--against: {axis} has no value {text!r}{suggest(text, by_text)}")
+    return {axis: by_text[text]}
 
 
 def _print_plan(checked: "CheckedStudy", workers: int | None) -> None:

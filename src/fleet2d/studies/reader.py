@@ -10,6 +10,7 @@ from fleet2d.configuration.trust import Trust, restrict_stored
 from fleet2d.errors import ArtifactError, InputError, extra
 from fleet2d.studies import answers
 from fleet2d.studies.directory import Counts, StudyDirectory
+from fleet2d.studies.intervals import POWER
 from fleet2d.studies.parts import (
     RESULT_COLUMNS,
     TABLES,
@@ -284,6 +285,32 @@ class Study:
         answers.check_axes((*against, unit), self.columns)
         frame = self._with_metric(metric)
         return answers.unit_differences(frame, self.columns, metric, against, unit)
+
+    def power(
+        self,
+        metric: str,
+        against: Mapping[str, Any],
+        effect: float | None = None,
+        *,
+        power: float = POWER,
+        by: Sequence[str] | None = None,
+    ) -> "pl.DataFrame":
+        """Return how many homes and seeds detect an effect, from how much they vary in this study.
+
+        Args:
+            metric: A number, such as `ltp_error.ana.tv`.
+            against: The axis and its reference value, as in {"robot": "patrol"}.
+            effect: The difference to detect; None: return the difference that each size detects.
+            power: The share of studies whose interval would exclude zero.
+            by: Columns of the units; None: homes, people and seeds.
+
+        Raises:
+            InputError: There is no such metric, axis or value, or less than two units.
+        """
+        frame, units = self._with_metric(metric), self._units(by)
+        return answers.power_table(
+            frame, self.columns, metric, against, units, effect=effect, power=power
+        )
 
     def summary(
         self, metric: str, axes: Sequence[str], by: Sequence[str] | None = None

@@ -17,12 +17,20 @@ from fleet2d.errors import (
     extra,
 )
 from fleet2d.studies.axes import OptionsAxis, rounded
-from fleet2d.studies.design import Design, code_version, content_hash, matches
+from fleet2d.studies.design import (
+    Design,
+    FileHashes,
+    code_version,
+    content_hash,
+    matches,
+    scenario_content,
+)
 from fleet2d.studies.directory import StudyDirectory
 from fleet2d.studies.driver import CheckedStudy, RunOptions, check_study, run_study
 from fleet2d.studies.executors import Executor, LostTask
 from fleet2d.studies.plan import StudyPlan
 from fleet2d.studies.reader import Study, open_study
+from fleet2d.studies.simulator import files_of
 from fleet2d.studies.specification import (
     PairedComparison,
     Specification,
@@ -190,7 +198,32 @@ def _training(plan: StudyPlan, settings: TuneSettings) -> list[tuple[int, str]]:
     ]
     if not training:
         raise ScenarioError("tune.held_out names all values: the search would have none to run on")
+    _check_content(plan, settings)
     return training
+
+
+def _check_content(plan: StudyPlan, settings: TuneSettings) -> None:
+    """Refuse to hold out what the training has under another name, such as a copy of a home's file.
+
+    Raises:
+        ScenarioError: A held-out variant and one of the training differ by names of files only.
+    """
+    files, first_of = FileHashes(), dict[str, tuple[bool, int]]()
+    first_seed = {variant.template: variant for variant in reversed(plan.variants)}
+    for variant in reversed(first_seed.values()):
+        scenario = plan.design.scenario(variant.index)
+        content = scenario_content(scenario)
+        text = json.dumps({**content, "simulation": {**content["simulation"], "seed": None}})
+        for path in files_of(scenario):
+            text = text.replace(json.dumps(str(path)), json.dumps(files[path]))
+        is_held_out = matches(settings.held_out, plan.parameters(variant))
+        was_held_out, other = first_of.setdefault(text, (is_held_out, variant.index))
+        if is_held_out != was_held_out:
+            raise ScenarioError(
+                f"tune.held_out: {plan.design.describe(variant.index)} and"
+                f" {plan.design.describe(other)} are the same but for the names of files, and only"
+                " one of them is held out: hold out both, or leave one out"
+            )
 
 
 def _check_identity(
