@@ -131,7 +131,7 @@ Count = Annotated[int, AfterValidator(check_count)]
 """A number of values that fits into one study."""
 
 
-Method = Literal["random", "latin_hypercube"]
+Method = Literal["random", "latin_hypercube", "orthogonal", "sobol"]
 DIGITS = 6  # significant digits of a sampled number, so that tables print the very value
 
 
@@ -206,14 +206,29 @@ def shares(method: Method, count: int, dimensions: int, seed: int) -> F64:
     """Return points of the unit cube: float64 (count, dimensions), the same at each call.
 
     Raises:
-        InputError: scipy is missing, which Latin hypercubes need.
+        InputError: scipy is missing, which all methods but `random` need.
+        ScenarioError: The method has no such number of points, or of dimensions.
     """
     generator = np.random.Generator(np.random.Philox(seed))
     if method == "random":
         return generator.random((count, dimensions))
-    with extra("study", "a Latin hypercube needs scipy"):
+    with extra("study", f"{method} samples need scipy"):
         from scipy.stats import qmc
-    return qmc.LatinHypercube(dimensions, rng=generator).random(count)
+    if method == "sobol":
+        power = round(math.log2(count))
+        if count != 2**power:
+            raise ScenarioError(
+                f"sobol points are balanced in powers of two only: count {2**power}, not {count}"
+            )
+        return qmc.Sobol(dimensions, rng=generator).random_base2(power)
+    try:
+        strength = 2 if method == "orthogonal" else 1
+        return qmc.LatinHypercube(dimensions, strength=strength, rng=generator).random(count)
+    except ValueError:
+        raise ScenarioError(
+            "orthogonal samples come in squares of primes (25, 49, 121, 169, …), of at most one"
+            f" parameter more than the prime: not {count} of {dimensions}"
+        ) from None
 
 
 def draw(
@@ -463,12 +478,13 @@ class OptionsAxis(Axis):
 
 
 class SampleAxis(Axis):
-    """Random or Latin-hypercube samples of several parameters at once.
+    """Samples of several parameters at once: random, or evenly spread.
 
     Attributes:
         sample: The parameters, by column.
         count: The number of samples.
-        method: The sampling method, `latin_hypercube` or `random`.
+        method: `latin_hypercube`: each parameter is spread evenly; `orthogonal`: each pair of
+            parameters, too; `sobol`: all together; or `random`.
         seed: The seed of the samples.
     """
 
@@ -485,7 +501,7 @@ class SampleAxis(Axis):
         """Return a choice for each sample.
 
         Raises:
-            InputError: scipy is missing, which Latin hypercubes need.
+            InputError: scipy is missing, or the method has no such number of samples.
         """
         choices = []
         labels = {

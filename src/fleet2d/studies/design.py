@@ -354,6 +354,8 @@ def _check_conditions(specification: Specification, design: Design) -> None:
             for i, comparison in enumerate(file.compare)
         ),
     ]
+    if file.adapt is not None:
+        conditions.append((("adapt", "against"), file.adapt.against))
     if file.tune is not None:
         conditions.append((("tune", "held_out"), file.tune.held_out))
     for location, condition in conditions:

@@ -13,6 +13,7 @@ from fleet2d.configuration.problems import did_you_mean
 from fleet2d.configuration.trust import Trust, current_trust, restrict
 from fleet2d.errors import Fleet2DError
 from fleet2d.scenario.model import Scenario
+from fleet2d.studies.adaptive import AdaptiveSchedule
 from fleet2d.studies.design import (
     Design,
     FileHashes,
@@ -23,6 +24,7 @@ from fleet2d.studies.design import (
     scenario_content,
 )
 from fleet2d.studies.directory import (
+    PLAN,
     VARIANTS,
     Counts,
     Meta,
@@ -39,6 +41,7 @@ from fleet2d.studies.plan import (
     StudyPlan,
     check_setups,
     make_plan,
+    plan_table,
     reconcile,
     write_catalogue,
 )
@@ -198,11 +201,18 @@ def run_study(
         counts = Counts(len(variants), len(variants) - len(tasks), 0)
         options.observer.on_start(counts, executor.workers)
         failed, is_checked = 0, False
+        adapt = checked.specification.file.adapt
+        schedule = TaskSchedule(() if adapt else tasks)
         try:
-            with closing(executor.run(checked.job, TaskSchedule(tasks))) as events:
+            if adapt is not None:
+                schedule = AdaptiveSchedule(
+                    adapt, reconciled.plan, tasks, directory, options.observer.on_note
+                )
+            with closing(executor.run(checked.job, schedule)) as events:
                 for event in events:
                     record = _record(event)
                     keeper.add(record)
+                    schedule.on_end()
                     options.observer.on_result(record)
                     failed += not record.is_complete
                     if record.is_complete and not is_checked:
@@ -213,6 +223,8 @@ def run_study(
         finally:
             keeper.pause()
         keeper.finish()
+        if isinstance(schedule, AdaptiveSchedule) and not schedule:
+            directory.storage.write_table(PLAN, plan_table(schedule.plan))
         table = directory.write_variants()
     _note_missing(checked, table, options.observer)
     return Counts.of(table.column("status").to_pylist())

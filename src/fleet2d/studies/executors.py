@@ -73,7 +73,14 @@ class TaskSchedule:
         self._groups: dict[str, deque[WorkerTask]] = {}
         self._owners: dict[Hashable, str] = {}
         for task in tasks:
-            self._groups.setdefault(task.home, deque()).append(task)
+            self.add(task)
+
+    def add(self, task: WorkerTask) -> None:
+        """Add a task to the group of its home."""
+        self._groups.setdefault(task.home, deque()).append(task)
+
+    def on_end(self) -> None:
+        """Note that a task has ended, with results or without."""
 
     def __len__(self) -> int:
         """Return the number of tasks that no worker has."""

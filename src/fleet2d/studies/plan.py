@@ -128,11 +128,13 @@ class KnownNames:
                 )
         for pattern in file.keep.metrics:
             self._check_metric("keep.metrics", pattern)
-        for comparison in file.compare:
-            self._check_metric("compare", comparison.metric)
-            if not is_kept(comparison.metric, file.keep.metrics):
+        used = [("compare", comparison.metric) for comparison in file.compare]
+        used += [("adapt", file.adapt.metric)] if file.adapt else []
+        for key, metric in used:
+            self._check_metric(key, metric)
+            if not is_kept(metric, file.keep.metrics):
                 raise ScenarioError(
-                    f"compare: the metric {comparison.metric!r} isn't kept: add it to keep.metrics"
+                    f"{key}: the metric {metric!r} isn't kept: add it to keep.metrics"
                 )
         for name in file.tune.objectives if file.tune else ():
             self._check_metric("tune.objectives", name)

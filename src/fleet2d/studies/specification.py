@@ -113,6 +113,30 @@ class PairedComparison(Settings):
     within: tuple[str, ...] = ()
 
 
+class AdaptSettings(Settings):
+    """How many seeds the values of an axis get, decided while the study runs.
+
+    Attributes:
+        metric: The number that decides, such as ltp_error.ana.tv.
+        against: The axis and its reference value.
+        seeds: The number of seeds of each round; after a round it is decided who gets the next.
+        width: No more seeds once the interval of every difference is at most this wide.
+        goal: `minimize` or `maximize`: no more seeds for values clearly worse than the reference.
+    """
+
+    metric: str
+    against: dict[str, Any] = Field(min_length=1, max_length=1)
+    seeds: int = Field(default=5, ge=2)
+    width: float | None = Field(default=None, gt=0)
+    goal: Literal["minimize", "maximize"] | None = None
+
+    @model_validator(mode="after")
+    def _decides_something(self) -> Self:
+        if self.width is None and self.goal is None:
+            raise problem("give width, or goal, or both: else every value gets all seeds")
+        return self
+
+
 def _numbers_or_count(value: Any) -> Any:
     if isinstance(value, int) and not isinstance(value, bool):
         if value < 1:
@@ -136,6 +160,7 @@ class StudyFile(Settings):
         exclude: Combinations to leave out: {axis: value, …}.
         keep: The metrics and tables to keep of each run.
         compare: The comparisons that the report shows.
+        adapt: When values of an axis get no more seeds.
         tune: The search of `fleet2d tune`.
     """
 
@@ -152,6 +177,7 @@ class StudyFile(Settings):
     exclude: tuple[dict[str, Any], ...] = ()
     keep: Keep = Keep()
     compare: tuple[PairedComparison, ...] = ()
+    adapt: AdaptSettings | None = None
     tune: TuneSettings | None = None
 
     @model_validator(mode="before")
@@ -194,6 +220,8 @@ class StudyFile(Settings):
             for key in ("against", "by", "within"):
                 columns = getattr(comparison, key) or ()
                 _check_columns(columns, [*known, SEED], ("compare", i, key), "axes")
+        if self.adapt is not None:
+            _check_columns(self.adapt.against, known, ("adapt", "against"), "axes")
         return self
 
     @property
