@@ -94,10 +94,13 @@ def test_more_events_at_once_than_are_kept_leave_the_last() -> None:
 def test_a_function_listens_and_stays_behind_when_a_stream_is_copied() -> None:
     heard: list[Event] = []
     sink = Sink()
-    stream = EventStream([sink, Listener(heard.extend)])
+    stream = EventStream([sink])
+    stream.listeners.append(Listener(heard.extend, {event(1).event}))
     stream.emit([event(1)])
+    stream.deliver(2)
     for copied in (copy.deepcopy(stream), pickle.loads(pickle.dumps(stream))):
         copied.emit([event(2)])
+        copied.deliver(3)
         assert [event(1), event(2)] == copied.since(0)
         assert [[event(1)], [event(2)]] == copied.sinks[0].taken
     assert [event(1)] == heard == stream.since(0)

@@ -163,7 +163,8 @@ def move(state: State, span: Span) -> None:
     awaited = state.learners.awaited | state.awaited
     if awaited:
         noted = state.next_note(span.first, awaited)
-        end = end if noted is None else min(end, noted + 1)
+        emitted = state.events.next_awaited(span.first)
+        end = min(end, *(step + 1 for step in (noted, emitted) if step is not None), end)
     span.end = end
 
 
@@ -189,6 +190,7 @@ def record(state: State, span: Span) -> None:
     )
     if span.settles:
         state.settle(span.end)
+        state.events.deliver(span.end)
 
 
 def learn(state: State, span: Span) -> None:

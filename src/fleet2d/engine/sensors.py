@@ -50,7 +50,7 @@ class Sensors(Watcher):
         self.home, self.users = home, basis.bodies.users
         self.stuck: dict[str, SensorFault] = {}
         self.awaited = False
-        self._rows: list[SensorRow] = []
+        self._readings: list[tuple[int, SensorReading]] = []  # not collected yet
         self.sensors: list[Sensor] = []
         self.names: list[str] = []
         for name, item in basis.scenario.objects.items():
@@ -99,10 +99,7 @@ class Sensors(Watcher):
             for number, state in enumerate(self._states):
                 new = self._read(number, state, view, end)
                 readings += [(number, reading) for reading in new]
-        self._rows += [
-            SensorRow(reading.step, number, reading.on, self._activity(reading.user, reading.step))
-            for number, reading in in_order(readings)
-        ]
+        self._readings += in_order(readings)
         return ()
 
     def _read(
@@ -120,9 +117,15 @@ class Sensors(Watcher):
         return [] if fault == "silent" else readings
 
     def collect(self) -> list[SensorRow]:
-        """Return the readings since the last call, by step and sensor."""
-        rows, self._rows = self._rows, []
-        return rows
+        """Return the readings since the last call, by step and sensor.
+
+        The events up to their steps must be known by then: activities are among them.
+        """
+        readings, self._readings = self._readings, []
+        return [
+            SensorRow(r.step, number, r.on, self._activity(r.user, r.step))
+            for number, r in readings
+        ]
 
     def events_of(self, rows: Iterable[SensorRow]) -> list[Event]:
         """Return readings as events, with the sensor and its state in the words of the table."""

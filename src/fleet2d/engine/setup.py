@@ -79,7 +79,10 @@ def set_up(scenario: Scenario, clock: Clock, seed: int, store: RunStore) -> Stat
         log=log,
         recorder=recorder,
         store=store,
-        events=EventStream([recorder, sensors, *([] if log is None else [log])]),
+        events=EventStream(
+            [recorder, sensors, *([] if log is None else [log])],
+            [*(actor.name for actor in basis.actors), *scenario.objects],
+        ),
         interventions=InterventionQueue(clock),
         max_span=scenario.simulation.max_span,
         watchers=[

@@ -279,9 +279,42 @@ class Simulation(InterventionMethods):
         self._state.settle(self.step)
         return self._state.events.since(since)
 
-    def listen(self, function: Callable[[Sequence[Event]], None]) -> None:
-        """Call a function with new events as they become known: not always in order of step."""
-        self._state.events.sinks.append(Listener(function))
+    def listen(
+        self, function: Callable[[Sequence[Event]], None], kinds: Iterable[str] | None = None
+    ) -> None:
+        """Call a function with events at once and in order, before the next step is simulated.
+
+        The function may intervene. It gets all that is stored in `events`, in the order of that
+        table, and readings of sensors, with the event `sensor` and the state as detail.
+
+        Args:
+            function: Called with one or more events of one step, or of a few.
+            kinds: The kinds of events that it gets; None: all.
+
+        Raises:
+            InputError: There is no such kind of event.
+
+        Example:
+            >>> import fleet2d
+            >>> simulation = fleet2d.Simulation(None, "simulation.duration=8 h", seed=4)
+            >>> steps = []
+            >>> simulation.listen(lambda events: steps.extend(e.step for e in events))
+            >>> run = simulation.run()
+            >>> steps == run.tables["events"]["step"].to_pylist()
+            True
+        """
+        state, known = self._state, self._event_kinds()
+        names = known if kinds is None else frozenset(kinds)
+        for name in names:
+            _check_name("event", name, known)
+        state.settle(self.step)  # what happened before it listened
+        state.events.listeners.append(Listener(function, names))
+        state.wait_for(state.requested)
+
+    def _event_kinds(self) -> frozenset[str]:
+        """Return the kinds of events that may happen in this run."""
+        behaviors = (b for actor in self._state.actors for b in actor.behaviors)
+        return frozenset({*EventKind}.union(*(behavior.records for behavior in behaviors)))
 
     @property
     def interventions(self) -> list[dict[str, Any]]:
@@ -412,8 +445,7 @@ class Simulation(InterventionMethods):
         self, event: str, entity: str | None, timeout: str | timedelta | None
     ) -> Event | None:
         state, end = self._state, self.clock.steps
-        kinds = {*EventKind, *(n for a in state.actors for b in a.behaviors for n in b.records)}
-        _check_name("event", event, kinds)
+        _check_name("event", event, self._event_kinds())
         if entity is not None:
             _check_name("entity", entity, [*self.actors, *self.scenario.objects])
         if timeout is not None:
@@ -679,6 +711,7 @@ class Simulation(InterventionMethods):
 
     def _take(self, state: State) -> None:
         self._state, self._store = state, state.store
+        state.wait_for(state.requested)  # not for events that only listeners of another run await
 
     def _header(self) -> dict[str, Any]:
         wall_s = self._wall_s
@@ -724,6 +757,7 @@ class Simulation(InterventionMethods):
         state = self._state
         with suppress(Exception) if status == "failed" else nullcontext():
             state.settle(self.step)
+            state.events.deliver(self.step)
         if state.log and status != "failed":
             state.count_looks()
             try:

@@ -64,7 +64,8 @@ class State:
         interventions: The interventions, done and scheduled.
         driven: Rows of the bodies that are driven from outside.
         requested: Event kinds that end a span because a caller waits for them.
-        awaited: Event kinds that end a span: `requested`, and those that interventions wait for.
+        awaited: Event kinds that end a span: `requested`, and those that interventions and
+            listeners wait for.
         expectations: The expectations of the run; None if there are none.
         notes_emitted: Number of notes of each body's present plan that have happened.
     """
@@ -110,7 +111,9 @@ class State:
 
     def wait_for(self, kinds: frozenset[str]) -> None:
         """Let spans end at events of these kinds, besides those that components wait for."""
-        self.requested, self.awaited = kinds, kinds | self.interventions.kinds
+        listened = frozenset[str]().union(*(kinds for _, kinds in self.events.listeners))
+        self.requested, self.awaited = kinds, kinds | self.interventions.kinds | listened
+        self.events.awaited = self.awaited
         awaited = self.awaited | self.learners.awaited
         for cameras in [*self.user_cameras, *self.cameras]:
             cameras.awaited = awaited
@@ -177,16 +180,17 @@ class State:
 
     def next_note(self, step: int, kinds: Set[str]) -> int | None:
         """Return the next step from `step` on at which a plan has an event of these kinds."""
-        steps = [
-            actor.clock.step_at_or_after(note.time_us)
-            for actor, begin in zip(self.actors, self.notes_emitted, strict=True)
-            for note in actor.plan.notes[begin:]
-            if note.event in kinds
-        ]
+        steps = []
+        for actor, begin in zip(self.actors, self.notes_emitted, strict=True):
+            for note in islice(actor.plan.notes, begin, None):
+                at = actor.clock.step_at_or_after(note.time_us)
+                if note.event in kinds and at >= step:
+                    steps.append(at)
+                    break
         logged = None if self.log is None else self.log.next_event(step, kinds)
         if logged is not None:
             steps.append(logged)
-        return min((s for s in steps if s >= step), default=None)
+        return min(steps, default=None)
 
     # Watching
 
@@ -214,8 +218,11 @@ class State:
         for watcher in self.watchers:
             self.take(watcher, end)
         observations, readings = self._observations(), self.sensors.collect()
-        if EventKind.SENSOR in self.awaited:
-            self.interventions.take_events(self.sensors.events_of(readings))
+        if readings:
+            events = self.sensors.events_of(readings)
+            self.events.emit_readings(events)
+            if EventKind.SENSOR in self.awaited:
+                self.interventions.take_events(events)
         self.recorder.take(first, end, observations, readings)
         if self.expectations is not None:
             self.expectations.take(end, observations, readings)

@@ -2,7 +2,7 @@
 
 from array import array
 from collections import defaultdict, deque
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence, Set
 from enum import StrEnum
 from functools import partial
 from itertools import chain, islice
@@ -117,36 +117,53 @@ class EventSink(Protocol):
         """Receive events, in the order in which they became known, not by step."""
 
 
-class Listener:
-    """A function that receives the events of a run."""
+class Listener(NamedTuple):
+    """A function that receives the events of a run in order.
 
-    def __init__(self, function: Callable[[Sequence[Event]], None]) -> None:
-        self.function = function
+    Attributes:
+        function: The function.
+        kinds: The kinds of events that it receives.
+    """
 
-    def take_events(self, events: Sequence[Event]) -> None:
-        """Call the function."""
-        self.function(events)
+    function: Callable[[Sequence[Event]], None]
+    kinds: Set[str]
 
 
 class EventStream:
     """The events of a run, passed on to all sinks.
 
+    Sinks receive events as they become known, listeners all events of a stretch of steps in order,
+    also readings of sensors, which have a table of their own.
+
     Attributes:
         sinks: The receivers.
+        listeners: The functions of callers.
+        awaited: Kinds of events that end a span.
         CAPACITY: Number of the newest events that `since` can return.
     """
 
     CAPACITY = 1 << 16
 
-    def __init__(self, sinks: Iterable[EventSink] = ()) -> None:
+    def __init__(self, sinks: Iterable[EventSink] = (), entities: Iterable[str] = ()) -> None:
+        """Begin without events.
+
+        Args:
+            sinks: The receivers.
+            entities: The bodies and objects of the run, in the order of its tables.
+        """
         self.sinks = list(sinks)
+        self.listeners: list[Listener] = []
+        self.awaited: Set[str] = frozenset()
+        self._row = {name: row for row, name in enumerate([HOME, *entities])}
+        self._unheard: list[Event] = []  # by the listeners
+        self._awaited_steps: list[int] = []  # of awaited events since the last span began
         self._recent: deque[Event] = deque(maxlen=self.CAPACITY)
         self._first_step = 0  # all events from this step on are in `_recent`
 
     def __getstate__(self) -> dict[str, object]:
         """Leave out the functions: they belong to the caller, not to the run."""
-        sinks = [sink for sink in self.sinks if not isinstance(sink, Listener)]
-        return {**self.__dict__, "sinks": sinks, "_recent": _packed(self._recent)}
+        recent = _packed(self._recent)
+        return {**self.__dict__, "listeners": [], "_unheard": [], "_recent": recent}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         """Restore the events."""
@@ -157,13 +174,40 @@ class EventStream:
         """Pass events on to all sinks."""
         if not events:
             return
+        self._keep(events)
+        for sink in self.sinks:
+            sink.take_events(events)
+
+    def emit_readings(self, events: Sequence[Event]) -> None:
+        """Pass readings of sensors on to listeners, as events."""
+        if events:
+            self._keep(events)
+
+    def next_awaited(self, step: int) -> int | None:
+        """Return the first step from `step` on with an awaited event that was emitted already."""
+        steps, self._awaited_steps = self._awaited_steps, []
+        return min((s for s in steps if s >= step), default=None)
+
+    def deliver(self, end: int) -> None:
+        """Call the listeners with the events of the steps before `end`, in the order of tables."""
+        row = self._row
+        due = [event for event in self._unheard if event.step < end]
+        self._unheard = [event for event in self._unheard if event.step >= end]
+        due.sort(key=lambda e: (e.step, row.get(e.entity, len(row)), e.rank))
+        for function, kinds in self.listeners:
+            if events := [event for event in due if event.event in kinds]:
+                function(events)
+
+    def _keep(self, events: Sequence[Event]) -> None:
         excess = len(self._recent) + len(events) - self.CAPACITY
         if excess > 0:
             oldest = islice(chain(self._recent, events), excess)
             self._first_step = max(self._first_step, max(map(STEP, oldest)) + 1)
         self._recent.extend(events)
-        for sink in self.sinks:
-            sink.take_events(events)
+        if self.listeners:
+            self._unheard += events
+        if self.awaited:
+            self._awaited_steps += [e.step for e in events if e.event in self.awaited]
 
     def since(self, step: int) -> list[Event]:
         """Return the events from a step on, in the order of their steps.

@@ -25,6 +25,7 @@ from fleet2d.kernels.numbers import TURN
 from fleet2d.kernels.space import Mesh
 from fleet2d.runs.run import Run
 from fleet2d.runtime.clock import DAY_S
+from fleet2d.runtime.events import EventKind
 from fleet2d.viewer.contract import LiveBody, LiveEvent, LiveFrame, LiveOrder, MarkFacts
 from fleet2d.viewer.home_facts import walls_facts
 from fleet2d.viewer.page_data import compact_json
@@ -135,7 +136,7 @@ class LiveEngine:
                 detail="" if event.detail in users else event.detail,
             )
             for event in recorded
-            if event.step < self._events_until
+            if event.step < self._events_until and event.event != EventKind.SENSOR
         ]
 
     def marks(self) -> list[MarkFacts]:
