@@ -1,16 +1,20 @@
 """Sight of robots whose perception is real: detections from a log, or as they arrive."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from fleet2d.engine.bodies import Bodies
 from fleet2d.engine.cameras import Cameras, Look
 from fleet2d.engine.sighting_errors import sight_events
-from fleet2d.entities.evidence.evidence_source import EvidenceSource
+from fleet2d.entities.evidence.evidence_source import SIGHTING, EvidenceSource
+from fleet2d.entities.evidence.live import LiveDetections
 from fleet2d.errors import blame
 from fleet2d.kernels import I64
 from fleet2d.kernels.numbers import TURN, turned
-from fleet2d.kernels.sight import USER_LOST, USER_SEEN, SightMemory
+from fleet2d.kernels.sight import NOBODY, UNKNOWN_TRUTH, USER_LOST, USER_SEEN, SightMemory
 from fleet2d.kernels.sight import SightingColumn as Column
+from fleet2d.sight.camera import FalseSighting
 
 # A look that may end a span sees no farther ahead, so that many events in a row cost little.
 MAX_AHEAD = 1 << 12
@@ -31,6 +35,21 @@ class RealSight(Cameras):
         with blame(f"{self.owner.path}.perceives", None):
             self.source.start(self.owner, [other.name for other in self.others])
         self.notes = self.source.notes
+
+    def receive(self, step: int, sightings: Sequence[FalseSighting]) -> None:
+        """Take in what a real robot perceived at a step that it has not looked at."""
+        source, lattice = self.source, self.owner.home.plan.lattice
+        assert isinstance(source, LiveDetections)
+        index = {other.name: row for row, other in enumerate(self.others)} | {"": NOBODY}
+        rows = np.zeros((len(sightings), SIGHTING), np.int64)
+        places = np.array([(s.x, s.y) for s in sightings])
+        points = np.rint(places * lattice.units_per_m) if source.relative else None
+        rows[:, Column.STEP], rows[:, Column.USER] = step, UNKNOWN_TRUTH
+        rows[:, Column.IDENTITY] = [index[sighting.user] for sighting in sightings]
+        rows[:, [Column.X, Column.Y]] = lattice.to_lattice(places) if points is None else points
+        rows[:, Column.HEADING] = [sighting.heading for sighting in sightings]
+        rows[:, Column.TRUE_X], rows[:, Column.TRUE_Y] = rows[:, Column.X], rows[:, Column.Y]
+        source.receive(rows)
 
     def _look(self, bodies: Bodies, end: int, *, stop: bool = True) -> Look:
         first = self.next_step

@@ -38,7 +38,7 @@ from fleet2d.interventions.intervention import (
 )
 from fleet2d.runtime.clock import Clock
 from fleet2d.runtime.events import KINDS, Event, EventKind
-from fleet2d.sight.camera import Disturbance
+from fleet2d.sight.camera import Disturbance, FalseSighting
 
 
 class EngineWorld:
@@ -116,6 +116,27 @@ class EngineWorld:
         for area in self._state.layers.areas:
             if area.row == row:
                 area.darken(dark)
+
+    @property
+    def live_sensors(self) -> Sequence[str]:
+        """The names of the sensors whose states arrive from outside."""
+        sensors = self._state.sensors
+        pairs = zip(sensors.names, sensors.sensors, strict=True)
+        return [name for name, sensor in pairs if sensor.type_name == "live_sensor"]
+
+    def perceives_live(self, robot: str) -> bool:
+        """Whether a robot perceives what arrives from outside."""
+        source = getattr(self.robots[robot].entity, "perceives", None)
+        return source is not None and source.type_name == "live"
+
+    def perceive(self, robot: str, sightings: Sequence[FalseSighting]) -> None:
+        """Let a robot perceive people at the present step."""
+        from fleet2d.engine.real_sight import RealSight
+
+        row = self.robots[robot].row
+        for cameras in self._state.cameras:
+            if isinstance(cameras, RealSight) and cameras.row == row:
+                cameras.receive(self.step, sightings)
 
     def stick(self, sensor: str, says: SensorFault | None) -> None:
         """Set the fault of a sensor from the present step on; None: it works."""

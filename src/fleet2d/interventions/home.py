@@ -1,6 +1,6 @@
 """Interventions on the home: its doors, furniture, rooms and sensors; and on algorithms."""
 
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -125,6 +125,43 @@ class SetRoomType(HomeIntervention):
         return HomeChange(room=self.name, type=self.type)
 
 
+@register("intervention", "report")
+class Report(Intervention):
+    """Let a real sensor report its state: one of the type `live_sensor`.
+
+    Attributes:
+        sensor: The sensor.
+        says: Whether it is on or off from now on.
+    """
+
+    subject: ClassVar[str] = "sensor"
+    sensor: str
+    says: Literal["on", "off"]
+
+    def check(self, world: World) -> None:
+        """Refuse an unknown sensor, and one that is simulated."""
+        check_sensor(world, self.sensor)
+        if self.sensor not in world.live_sensors:
+            raise ScenarioError(
+                f"{self.sensor} is simulated: only a sensor of the type live_sensor reports what"
+                " arrives"
+            )
+
+    def begin(self, world: World) -> None:
+        """Set its state."""
+        world.stick(self.sensor, self.says)
+
+
+def check_sensor(world: World, sensor: str) -> None:
+    """Refuse an unknown sensor.
+
+    Raises:
+        ScenarioError: There is none of that name.
+    """
+    if sensor not in world.sensors:
+        raise ScenarioError(f"there is no sensor {sensor!r}{suggest(sensor, world.sensors)}")
+
+
 @register("intervention", "stick")
 class Stick(Lasting):
     """Let a sensor report a fixed state: a false alarm if it is short, a fault if it is long.
@@ -140,10 +177,7 @@ class Stick(Lasting):
 
     def check(self, world: World) -> None:
         """Refuse an unknown sensor."""
-        if self.sensor not in world.sensors:
-            raise ScenarioError(
-                f"there is no sensor {self.sensor!r}{suggest(self.sensor, world.sensors)}"
-            )
+        check_sensor(world, self.sensor)
 
     def begin(self, world: World) -> None:
         """Apply the latest active intervention on the sensor."""

@@ -46,7 +46,7 @@ from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.home_change import HomeChange, format_moment, parse_moment
 from fleet2d.runtime.clock import Clock, midnight_of
 from fleet2d.runtime.events import Event, EventKind
-from fleet2d.sight.camera import Disturbance
+from fleet2d.sight.camera import Disturbance, FalseSighting
 
 
 class World(Protocol):
@@ -96,6 +96,16 @@ class World(Protocol):
 
     def disturb(self, robot: str, disturbances: Sequence[Disturbance]) -> None:
         """Set all disturbances of the cameras of a robot from the present step on."""
+
+    @property
+    def live_sensors(self) -> Sequence[str]:
+        """The names of the sensors whose states arrive from outside."""
+
+    def perceives_live(self, robot: str) -> bool:
+        """Whether a robot perceives what arrives from outside."""
+
+    def perceive(self, robot: str, sightings: Sequence[FalseSighting]) -> None:
+        """Let a robot perceive people at the present step."""
 
     def stick(self, sensor: str, says: SensorFault | None) -> None:
         """Set the fault of a sensor from the present step on; None: it works."""

@@ -4,7 +4,7 @@ from typing import Self
 
 from pydantic import Field, model_validator
 
-from fleet2d.configuration.components import register
+from fleet2d.configuration.components import Settings, register
 from fleet2d.configuration.problems import problem, suggest
 from fleet2d.configuration.units import AngleDeg, Share
 from fleet2d.entities.behavior import Actor, Command
@@ -16,6 +16,9 @@ from fleet2d.runtime.events import EventKind
 from fleet2d.sight.camera import Disturbance, FalseSighting
 from fleet2d.sight.perception import Perception
 
+UNKNOWN = "unknown"
+# Coordinates beyond this are no places of a home [m].
+MAX_PLACE_M = 1e4
 # The behavior of Fleet2D that responds to each command.
 RESPONDERS = {"come": "come", "find": "find", "dock": "dock"}
 
@@ -260,6 +263,57 @@ class Fault(Lasting):
         self.begin(world)  # which applies all active faults, without this one
 
 
+class RealDetection(Settings):
+    """A person whom a real robot detects.
+
+    Attributes:
+        user: The person, or 'unknown'.
+        x: Its place along x [m].
+        y: Its place along y [m].
+        heading_deg: Its heading, counter-clockwise from +x.
+    """
+
+    user: str = UNKNOWN
+    x: float = Field(ge=-MAX_PLACE_M, le=MAX_PLACE_M)
+    y: float = Field(ge=-MAX_PLACE_M, le=MAX_PLACE_M)
+    heading_deg: AngleDeg = 0.0
+
+
+@register("intervention", "perceive")
+class Perceive(RobotIntervention):
+    """Let a robot perceive people now, as a real robot did: one whose `perceives` is `live`.
+
+    Attributes:
+        detections: The people, as {user: ana, x: 1.5, y: 2}.
+    """
+
+    detections: tuple[RealDetection, ...] = Field(min_length=1)
+
+    def check(self, world: World) -> None:
+        """Refuse a robot that perceives in another way, and unknown people."""
+        super().check(world)
+        if not world.perceives_live(self.entity):
+            raise ScenarioError(
+                f"{self.entity} perceives what its cameras see: set"
+                f" robots.{self.entity}.perceives=live"
+            )
+        for detection in self.detections:
+            if detection.user != UNKNOWN:
+                user(world, detection.user)
+
+    def begin(self, world: World) -> None:
+        """Let it perceive them."""
+        world.perceive(
+            self.entity,
+            [
+                FalseSighting(
+                    "" if d.user == UNKNOWN else d.user, d.x, d.y, heading_of(d.heading_deg) or 0
+                )
+                for d in self.detections
+            ],
+        )
+
+
 def camera_name(camera: bool | str | None) -> str | None:
     """Return the name of a camera; None for all."""
     return camera if isinstance(camera, str) else None
@@ -303,9 +357,6 @@ def disturb(world: World, name: str) -> None:
     acts = (act for act in world.lasting if getattr(act, "entity", None) == name)
     disturbances = (getattr(act, "disturbance", None) for act in acts)
     world.disturb(name, [item for item in disturbances if item is not None])
-
-
-UNKNOWN = "unknown"
 
 
 class PerceptionIntervention(Lasting):

@@ -1,36 +1,19 @@
 """Poses of ROS 1 and ROS 2 bags: odometry, pose topics and frames of `/tf`, without ROS."""
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from fleet2d.bounds import FIXES, LOG_BYTES, check_file, one_line
+from fleet2d.bounds import FIXES
 from fleet2d.configuration.problems import did_you_mean
-from fleet2d.errors import Fleet2DError, extra
 from fleet2d.kernels import F64, I64
 from fleet2d.logs.log import LogError, PositionLog
 from fleet2d.logs.positions import RawFixes, localize
+from fleet2d.storage.bags import LATEST_SIMULATED_NS, open_bag, planar, stamp_of
 
 TRANSFORMS = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
-
-VISION_TYPES = {
-    "vision_msgs/msg/ObjectHypothesis": "string class_id\nfloat64 score\n",
-    "vision_msgs/msg/ObjectHypothesisWithPose": (
-        "vision_msgs/ObjectHypothesis hypothesis\ngeometry_msgs/PoseWithCovariance pose\n"
-    ),
-    "vision_msgs/msg/BoundingBox3D": "geometry_msgs/Pose center\ngeometry_msgs/Vector3 size\n",
-    "vision_msgs/msg/Detection3D": (
-        "std_msgs/Header header\nvision_msgs/ObjectHypothesisWithPose[] results\n"
-        "vision_msgs/BoundingBox3D bbox\nstring id\n"
-    ),
-    "vision_msgs/msg/Detection3DArray": (
-        "std_msgs/Header header\nvision_msgs/Detection3D[] detections\n"
-    ),
-}
-"""The definitions of ROS's vision_msgs, which the library of types doesn't have."""
 
 # From a message to its pose: with a position and an orientation.
 _POSES: dict[str, Callable[[Any], Any]] = {
@@ -38,34 +21,6 @@ _POSES: dict[str, Callable[[Any], Any]] = {
     "geometry_msgs/msg/PoseStamped": lambda message: message.pose,
     "geometry_msgs/msg/PoseWithCovarianceStamped": lambda message: message.pose.pose,
 }
-LATEST_SIMULATED_NS = 10**17
-"""Stamps below are of a simulated clock [ns]: three years."""
-
-
-@contextmanager
-def open_bag(path: Path) -> Iterator[Any]:
-    """Open a ROS 1 or ROS 2 bag for reading.
-
-    Raises:
-        LogError: It can't be read, or is beyond a bound.
-        InputError: rosbags isn't installed.
-    """
-    for file in path.iterdir() if path.is_dir() else (path,):
-        check_file(file, LOG_BYTES, LogError)
-    with extra("ros", "bags need rosbags"):
-        from rosbags.highlevel import AnyReader
-        from rosbags.typesys import Stores, get_types_from_msg, get_typestore
-
-    types = get_typestore(Stores.ROS2_HUMBLE)  # of bags without definitions of their own
-    for name, definition in VISION_TYPES.items():
-        types.register(get_types_from_msg(definition, name))
-    try:
-        with AnyReader([path], default_typestore=types) as reader:
-            yield reader
-    except Fleet2DError:
-        raise
-    except Exception as error:
-        raise LogError(f"{path} can't be read as a bag: {one_line(error, 200)}") from error
 
 
 class _PlanarPoses(NamedTuple):
@@ -107,7 +62,7 @@ def read_bag(
         LogError: The bag can't be read, or has no such topic or frame.
         InputError: rosbags isn't installed.
     """
-    with open_bag(path) as reader:
+    with open_bag(path, LogError) as reader:
         poses, source = _poses(reader, path, id)
     has_date = bool(len(poses.time)) and int(poses.time.max()) >= LATEST_SIMULATED_NS
     time_us = poses.time // 1000
@@ -134,7 +89,7 @@ def _poses(reader: Any, path: Path, name: str | None) -> tuple[_PlanarPoses, str
             message = reader.deserialize(data, connection.msgtype)
             frame = message.header.frame_id
             pose = pose_of(message)
-            rows.append((stamp_of(message, time), *_planar(pose.position, pose.orientation)))
+            rows.append((stamp_of(message, time), *planar(pose.position, pose.orientation)))
         return _columns(rows), f"{name}: {len(rows)} poses in the frame {frame!r}"
     links = _links(reader, path)
     if name is None or name not in links:
@@ -148,19 +103,6 @@ def _poses(reader: Any, path: Path, name: str | None) -> tuple[_PlanarPoses, str
         raise LogError(f"{path} has {which}: select one by 'id': {', '.join(known[:20])}")
     poses, root = _in_root(links, name, path)
     return poses, f"{name}: {len(poses.time)} poses in the frame {root!r}"
-
-
-def stamp_of(message: Any, time: int) -> int:
-    """Return the stamp of a message [ns]; the time at which it was recorded if it has none."""
-    stamp = message.header.stamp
-    return int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec) or time
-
-
-def _planar(place: Any, turn: Any) -> tuple[float, float, float]:
-    """Return x, y and the heading of a pose in space."""
-    x, y, z, w = (float(value) for value in (turn.x, turn.y, turn.z, turn.w))
-    heading = np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
-    return float(place.x), float(place.y), float(heading)
 
 
 def _columns(rows: list[tuple[int, float, float, float]]) -> _PlanarPoses:
@@ -190,7 +132,7 @@ def _transforms(
 ) -> Iterator[tuple[str, str, tuple[int, float, float, float]]]:
     for connection, time, data in reader.messages(connections) if connections else ():
         for one in reader.deserialize(data, connection.msgtype).transforms:
-            pose = _planar(one.transform.translation, one.transform.rotation)
+            pose = planar(one.transform.translation, one.transform.rotation)
             names = one.child_frame_id.lstrip("/"), one.header.frame_id.lstrip("/")
             # A link that never changes holds at all times.
             stamp = 0 if connection.topic == "/tf_static" else stamp_of(one, time)

@@ -14,8 +14,7 @@ import pyarrow.compute as pc
 from fleet2d.bounds import FIXES, one_line
 from fleet2d.configuration.problems import did_you_mean
 from fleet2d.kernels import F64, I64
-from fleet2d.logs.bags import LATEST_SIMULATED_NS, open_bag, stamp_of
-from fleet2d.logs.log import LogError, PositionLog, is_bag
+from fleet2d.logs.log import LogError, PositionLog
 from fleet2d.logs.positions import (
     NAMES,
     Stamps,
@@ -25,6 +24,7 @@ from fleet2d.logs.positions import (
     read_table,
     times_of,
 )
+from fleet2d.storage.bags import LATEST_SIMULATED_NS, is_bag, open_bag, stamp_of
 
 COLUMNS = {
     "time": NAMES["time"],
@@ -167,7 +167,7 @@ def _codes(texts: pa.Array) -> tuple[I64, tuple[str, ...]]:
 
 
 def _from_bag(path: Path, topic: str | None, columns: Mapping[str, str]) -> _RawDetections:
-    with open_bag(path) as reader:
+    with open_bag(path, LogError) as reader:
         connection, fields = _topic(reader, path, topic, columns)
         FIXES.check(connection.msgcount, path, LogError)
         times: list[int] = []

@@ -14,6 +14,7 @@ from fleet2d.configuration.units import micros
 from fleet2d.errors import InputError
 from fleet2d.kernels import F64, I64
 from fleet2d.runtime.clock import DAY_US, Clock, midnight_of
+from fleet2d.storage.bags import is_bag
 
 # Maximum number of lines that a note lists.
 _MAX_NAMED = 20
@@ -22,16 +23,6 @@ _LONGEST = 10_000
 AWAY = "away"
 """The room label for being out of the home."""
 _TIME = re.compile(r"(\d{4})-(\d{1,2})-(\d{1,2})[ T](\d{1,2}):(\d{2})(?::(\d{2})(?:\.(\d{1,9}))?)?")
-
-
-_BAGS = (".bag", ".mcap", ".db3")
-
-
-def is_bag(path: Path) -> bool:
-    """Return whether a file or folder is a bag of ROS, by its name."""
-    if path.is_dir():
-        return (path / "metadata.yaml").is_file()
-    return path.suffix.lower() in _BAGS
 
 
 def files_of(path: Path) -> tuple[Path, ...]:

@@ -17,8 +17,8 @@ import numpy as np
 
 from fleet2d.errors import extra
 from fleet2d.kernels import F64, I64, U8
-from fleet2d.logs.bags import VISION_TYPES
 from fleet2d.runs.records import Chunk, Records
+from fleet2d.storage.bags import VISION_TYPES
 
 MAP, TRANSFORMS, STATIC = "/map", "/tf", "/tf_static"
 UNKNOWN = "unknown"

@@ -11,7 +11,7 @@ from fleet2d.configuration.components import register
 from fleet2d.configuration.units import InputPath, Length, PositiveLength, Share
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.formats.files import in_file
-from fleet2d.floorplan.formats.occupancy import OBJECT_M2, OccupancyMap, OccupancySource
+from fleet2d.floorplan.formats.occupancy import OBJECT_M2, OccupancyMap, PictureSource
 from fleet2d.floorplan.formats.raster import GreyPicture, read_grey
 from fleet2d.floorplan.lattice import MAX_CELL_M, MIN_CELL_M
 from fleet2d.floorplan.plan import FloorPlan
@@ -25,7 +25,7 @@ MOST = 0.8
 
 
 @register("floorplan", "image")
-class Image(OccupancySource):
+class Image(PictureSource):
     """A drawing: dark walls on light ground.
 
     Attributes:

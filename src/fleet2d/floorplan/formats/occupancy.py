@@ -43,16 +43,36 @@ class OccupancySource(PixelSource):
             of a chair or lettering, become free; 0 keeps all.
         ray_width: Free space narrower than this doesn't lead on: it cuts off rays through windows
             and gaps in walls; 0 keeps all that is connected.
-        unknown_grey: Shade of what is unknown or outside though it is as light as floor, from 0 to
-            255; auto: the one that most of the edge has; none: there is no such shade.
         path: The file.
     """
 
     speck_area_m2: float = Field(default=0.02, ge=0)
     ray_width: Length = Field(default=0.3, ge=0)
-    unknown_grey: UnknownGrey = "auto"
 
     path: InputPath
+
+    def build(self, free: Polygon, pixel: float, source: str, notes: list[str]) -> FloorPlan:
+        """Return the floor plan of free space [m] whose rooms and doorways the walls determine."""
+        return FloorPlan.build(
+            self.path.stem,
+            free,
+            cell=max(pixel, MIN_CELL_M) if self.cell is None else self.cell,
+            source=source,
+            doorways=None,
+            regions_are="none",
+            notes=notes,
+        )
+
+
+class PictureSource(OccupancySource):
+    """A source whose pixels are shades of grey in a picture.
+
+    Attributes:
+        unknown_grey: Shade of what is unknown or outside though it is as light as floor, from 0 to
+            255; auto: the one that most of the edge has; none: there is no such shade.
+    """
+
+    unknown_grey: UnknownGrey = "auto"
 
     def known(
         self, picture: GreyPicture, free: Bool, pixel: float, notes: list[str], *, saved: bool
@@ -93,7 +113,7 @@ class OccupancySource(PixelSource):
         """
         free, changes = free_space(raw, speck_area_m2=self.speck_area_m2, ray_width=self.ray_width)
         self._refuse_outside(raw, free, picture)
-        _refuse_object(raw, free)
+        refuse_object(raw, free)
         notes += changes
         return free
 
@@ -112,20 +132,8 @@ class OccupancySource(PixelSource):
             f" floorplan.unknown_grey={grey}; if dark pixels are floor, set negate"
         )
 
-    def build(self, free: Polygon, pixel: float, source: str, notes: list[str]) -> FloorPlan:
-        """Return the floor plan of free space [m] whose rooms and doorways the walls determine."""
-        return FloorPlan.build(
-            self.path.stem,
-            free,
-            cell=max(pixel, MIN_CELL_M) if self.cell is None else self.cell,
-            source=source,
-            doorways=None,
-            regions_are="none",
-            notes=notes,
-        )
 
-
-def _refuse_object(raw: "OccupancyMap", free: Polygon) -> None:
+def refuse_object(raw: "OccupancyMap", free: Polygon) -> None:
     """Raise FloorPlanError if a home is far smaller than what is drawn around it."""
     if free.area >= OBJECT_M2 or not raw.occupied.any():
         return

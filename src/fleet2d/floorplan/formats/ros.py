@@ -15,7 +15,7 @@ from fleet2d.configuration.components import register
 from fleet2d.configuration.units import InputPath, Length
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.formats.files import MAX_COORDINATE_M, in_file, read_yaml, shown_value
-from fleet2d.floorplan.formats.occupancy import OccupancyMap, OccupancySource
+from fleet2d.floorplan.formats.occupancy import OccupancyMap, PictureSource
 from fleet2d.floorplan.formats.raster import GreyPicture, read_grey
 from fleet2d.floorplan.lattice import MAX_CELL_M, MIN_CELL_M
 from fleet2d.floorplan.plan import FloorPlan
@@ -32,7 +32,7 @@ _KEYS = {
 
 
 @register("floorplan", "ros")
-class Ros(OccupancySource):
+class Ros(PictureSource):
     """A map of the ROS map_server.
 
     Attributes:

@@ -11,7 +11,8 @@ from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, Protocol, cast
 
-from fleet2d.logs.log import ActivityLog, LogError, PositionLog, is_bag, log_lines
+from fleet2d.logs.log import ActivityLog, LogError, PositionLog, log_lines
+from fleet2d.storage.bags import is_bag
 
 FIRST_LINES = 20
 

@@ -1,0 +1,25 @@
+"""Live sensors: real ones, whose states arrive while the run goes on."""
+
+import numpy as np
+from pydantic import Field
+
+from fleet2d.configuration.components import register
+from fleet2d.entities.objects.home_object import Sensor, SensorView
+from fleet2d.floorplan.home import Home
+from fleet2d.kernels import I64
+
+
+@register("object", "live_sensor")
+class LiveSensor(Sensor):
+    """A real sensor: it is on or off as an intervention `report` says; see `fleet2d live`.
+
+    Attributes:
+        room: The room that its readings name.
+    """
+
+    room: str = Field(min_length=1)
+
+    def sense(self, view: SensorView, home: Home) -> tuple[I64, I64]:
+        """Return no steps: only reports switch it."""
+        none = np.zeros(0, np.int64)
+        return none, none

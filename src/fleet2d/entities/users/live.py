@@ -1,0 +1,18 @@
+"""Live: a body that is moved by what arrives from outside while the run goes on."""
+
+from fleet2d.configuration.components import register
+from fleet2d.entities.behavior import Behavior, Situation
+from fleet2d.entities.plan import Plan
+
+
+@register("behavior", "live")
+class Live(Behavior):
+    """Be where a real person or robot is, or go where another program says: see `fleet2d live`.
+
+    What arrives is an intervention: `put` for a pose, `send` for a goal. Until something arrives,
+    and when nothing does any more, the body stands.
+    """
+
+    def decide(self, now: Situation) -> Plan:
+        """Stand."""
+        return now.plan().stay()

@@ -1,0 +1,123 @@
+"""Maps in ROS bags: the last OccupancyGrid of a topic."""
+
+import math
+from collections import deque
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+
+from fleet2d.configuration.components import register
+from fleet2d.configuration.problems import suggest
+from fleet2d.configuration.units import InputFileOrFolder
+from fleet2d.errors import FloorPlanError
+from fleet2d.floorplan.formats.occupancy import (
+    OccupancyMap,
+    OccupancySource,
+    free_space,
+    refuse_object,
+)
+from fleet2d.floorplan.lattice import MIN_CELL_M
+from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.kernels import I8
+from fleet2d.storage.bags import open_bag, planar
+
+GRID = "nav_msgs/msg/OccupancyGrid"
+# Chances of being occupied, in percent, as map_server divides them.
+FREE_BELOW, OCCUPIED_ABOVE = 20, 65
+
+
+class _Grid(NamedTuple):
+    """An occupancy grid: percent, -1 for unknown, the first row at the bottom."""
+
+    percent: I8  # (rows, columns)
+    resolution: float  # side of a cell [m]
+    origin: tuple[float, float, float]  # x, y [m] and heading [rad] of its lower left corner
+    topic: str
+    maps: int  # messages of the topic
+
+
+@register("floorplan", "bag")
+class BagMap(OccupancySource):
+    """The map in a bag of ROS 1 or ROS 2: the last OccupancyGrid, as a SLAM robot publishes it.
+
+    Cells of less than 20 % are free, of more than 65 % wall; those between, and unknown ones, are
+    neither. The floor plan has the frame of the map.
+
+    Attributes:
+        path: The bag: a file, or the folder of a ROS 2 bag.
+        topic: The topic of the map, if the bag has several maps and none on `/map`.
+    """
+
+    suffixes: ClassVar[tuple[str, ...]] = (".bag", ".mcap", ".db3")
+
+    path: InputFileOrFolder
+    topic: str | None = None
+
+    @classmethod
+    def usual_cell(cls, settings: Mapping[str, Any]) -> float:
+        """Return the map's resolution."""
+        grid = _read(Path(settings["path"]), settings.get("topic"))
+        return max(grid.resolution, MIN_CELL_M)
+
+    def files(self) -> list[Path]:
+        """Return the files of the bag."""
+        if not self.path.is_dir():
+            return [self.path]
+        return sorted(file for file in self.path.iterdir() if file.is_file())
+
+    def load(self) -> FloorPlan:
+        """Read the map.
+
+        Raises:
+            FloorPlanError: The bag can't be read, or has no map, or the map has no home.
+        """
+        grid = _read(self.path, self.topic)
+        x, y, heading = grid.origin
+        # Rounded, so that the last bit of a machine's cosine doesn't matter, and for quarter turns.
+        turn = (round(math.cos(heading), 12), round(math.sin(heading), 12))
+        free, occupied = grid.percent < FREE_BELOW, grid.percent > OCCUPIED_ABOVE
+        raw = OccupancyMap(free & (grid.percent >= 0), occupied, grid.resolution, (x, y), turn)
+        home, notes = free_space(raw, speck_area_m2=self.speck_area_m2, ray_width=self.ray_width)
+        refuse_object(raw, home)
+        rows, columns = grid.percent.shape
+        notes.append(
+            f"{grid.topic}: the last of {grid.maps} maps, {columns} × {rows} cells of"
+            f" {grid.resolution:g} m, its corner at ({x:.2f}, {y:.2f}) m turned by"
+            f" {math.degrees(heading):.1f} degrees"
+        )
+        return self.build(home, grid.resolution, f"map of a bag, {self.path.name}", notes)
+
+
+def _read(path: Path, topic: str | None) -> _Grid:
+    """Return the last map of a topic.
+
+    Raises:
+        FloorPlanError: The bag can't be read, or has no such map; or its map is damaged.
+    """
+    with open_bag(path, FloorPlanError) as reader:
+        topics = {c.topic: c for c in reader.connections if c.msgtype == GRID and c.msgcount}
+        if topic is None and len(topics) > 1 and "/map" in topics:
+            topic = "/map"
+        if topic is None and len(topics) == 1:
+            topic = next(iter(topics))
+        if topic is None or topic not in topics:
+            if not topics:
+                names = ", ".join(sorted({c.topic for c in reader.connections})[:20])
+                raise FloorPlanError(f"{path} has no map, no {GRID} among {names}")
+            which = f"no map {topic!r}{suggest(topic, topics)}" if topic else "several maps"
+            raise FloorPlanError(f"{path} has {which}: select one by 'topic': {', '.join(topics)}")
+        connection = topics[topic]
+        (_, _, data), *_ = deque(reader.messages([connection]), maxlen=1)
+        message = reader.deserialize(data, connection.msgtype)
+    info = message.info
+    rows, columns, side = int(info.height), int(info.width), float(np.float32(info.resolution))
+    cells = np.asarray(message.data, np.int8)
+    if len(cells) != rows * columns or not rows * columns or not 0 < side <= 1:
+        raise FloorPlanError(
+            f"{path}: the map of {topic} is damaged: {len(cells)} cells for {columns} × {rows} of"
+            f" {side:g} m"
+        )
+    origin = planar(info.origin.position, info.origin.orientation)
+    return _Grid(cells.reshape(rows, columns), round(side, 6), origin, topic, connection.msgcount)

@@ -1,0 +1,105 @@
+"""What arrives from outside, as interventions: detections, readings; recorded and repeated."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import fleet2d
+from fleet2d.errors import InputError
+
+LIVE: dict[str, Any] = {
+    "extends": "bundled:base",
+    "simulation": {"duration": "10 min", "seed": 4},
+    "users": {"ana": {"type": "live"}},
+    "robots": {"astro": {"perceives": "live"}},
+    "objects": {"front_door": {"type": "live_sensor", "room": "hallway"}},
+}
+
+
+def place(room: str) -> tuple[float, float]:
+    return next(r.anchor_xy for r in fleet2d.load_floorplan().rooms if r.name == room)
+
+
+def drive(simulation: fleet2d.Simulation) -> None:
+    x, y = place("kitchen_0")
+    simulation.intervene({"put": "ana", "to": [x, y]})
+    for k in range(3):
+        seen = [{"user": "ana", "x": x, "y": y}, {"user": "unknown", "x": x + 0.1, "y": y}]
+        simulation.intervene({"perceive": "astro", "detections": seen[: 1 + k]})
+        simulation.intervene({"report": "front_door", "says": "off" if k == 1 else "on"})
+        simulation.advance(10)
+
+
+def test_detections_are_observed_at_the_step_of_their_arrival() -> None:
+    simulation = fleet2d.Simulation(LIVE)
+    drive(simulation)
+    table = simulation.run().tables["observations"]
+
+    assert table["step"].to_pylist() == [0, 10, 10, 20, 20]
+    assert table["user"].to_pylist() == ["ana", "ana", None, "ana", None]
+    assert set(table["room"].to_pylist()) == {"kitchen_0"}
+    assert table["truth_known"].to_pylist() == [False] * 5
+
+
+def test_readings_are_those_reported() -> None:
+    simulation = fleet2d.Simulation(LIVE)
+    drive(simulation)
+    table = simulation.run().tables["sensors"]
+
+    assert list(zip(table["step"].to_pylist(), table["state"].to_pylist(), strict=True)) == [
+        (0, "ON"),
+        (10, "OFF"),
+        (20, "ON"),
+    ]
+
+
+def test_a_live_body_stands_where_it_was_put() -> None:
+    simulation = fleet2d.Simulation(LIVE)
+    drive(simulation)
+    path = simulation.run().path("ana")
+
+    assert {(round(x, 2), round(y, 2)) for x, y in zip(path.x, path.y, strict=True)} == {
+        tuple(round(v, 2) for v in place("kitchen_0"))
+    }
+
+
+def test_a_live_run_is_reproduced(tmp_path: Path) -> None:
+    simulation = fleet2d.Simulation(LIVE, out=tmp_path / "live")
+    drive(simulation)
+    run = simulation.run()
+
+    assert fleet2d.reproduce(tmp_path / "live").digest == run.digest
+
+
+@pytest.mark.parametrize(
+    ("act", "message"),
+    [
+        ({"perceive": "astro", "detections": []}, "at least 1"),
+        ({"perceive": "astro", "detections": [{"user": "anna", "x": 1, "y": 1}]}, "anna"),
+        ({"perceive": "ana", "detections": [{"x": 1, "y": 1}]}, "ana"),
+        (
+            {"report": "front_dor", "says": "on"},
+            "there is no sensor 'front_dor': did you mean 'front_door'",
+        ),
+    ],
+)
+def test_what_is_wrong_is_refused(act: dict[str, Any], message: str) -> None:
+    simulation = fleet2d.Simulation(LIVE)
+
+    with pytest.raises(InputError) as caught:
+        simulation.intervene(act)
+    assert message in str(caught.value)
+
+
+def test_simulated_robots_and_sensors_refuse_what_arrives() -> None:
+    content = LIVE | {
+        "robots": {},
+        "objects": {"front_door": {"type": "motion_sensor", "at": place("kitchen_0")}},
+    }
+    simulation = fleet2d.Simulation(content)
+
+    with pytest.raises(InputError, match=r"robots\.astro\.perceives=live"):
+        simulation.intervene({"perceive": "astro", "detections": [{"x": 1, "y": 1}]})
+    with pytest.raises(InputError, match="front_door is simulated"):
+        simulation.intervene({"report": "front_door", "says": "on"})
