@@ -7,7 +7,7 @@ import pytest
 
 from fleet2d.errors import InputError
 from fleet2d.kernels import Bool
-from fleet2d.testing.claim import RateTest, rate_test
+from fleet2d.testing.claim import Claim, RateTest, SetUpError, rate_interval, rate_test, seeds_for
 
 DECISIONS = 10_000
 CLAIMS = [(100, 0.95), (30, 0.9), (60, 0.5), (40, 1.0), (300, 0.98)]
@@ -94,3 +94,36 @@ def test_a_claim_of_every_seed_ends_with_the_first_failure() -> None:
 def test_wrong_numbers_are_refused(settings: dict[str, float], words: str) -> None:
     with pytest.raises(InputError, match=words):
         rate_test(**settings)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("rate", [0.5, 0.8, 0.97])
+def test_the_interval_of_a_rate_holds_it_in_95_of_100_cases(rate: float) -> None:
+    held = np.random.Generator(np.random.Philox(5)).binomial(40, rate, 2000)
+    inside = [low <= rate <= high for low, high in (rate_interval(int(k), 40) for k in held)]
+
+    assert np.mean(inside) >= 0.95
+    assert rate_interval(0, 10)[0] == 0.0
+    assert rate_interval(10, 10)[1] == 1.0
+    assert rate_interval(10, 10)[0] == pytest.approx(0.025 ** (1 / 10))
+
+
+@pytest.mark.parametrize(("holds", "other"), [(1.0, 0.9), (0.9, 0.7), (0.95, 0.8)])
+def test_so_many_seeds_would_do_and_one_less_would_not(holds: float, other: float) -> None:
+    needed = seeds_for(holds, other)
+
+    assert needed is not None
+    assert rate_test(needed, holds).alternative >= other
+    assert rate_test(needed - 1, holds).alternative < other
+
+
+def test_a_claim_that_shows_nothing_is_refused_with_the_seeds_that_would_do() -> None:
+    with pytest.raises(
+        SetUpError,
+        match=r"99 % can't be told from 90 % with 5 seeds, which show nothing.*; 63 would do",
+    ):
+        Claim(None, seeds=tuple(range(5)), holds=0.99).prepare()
+    with pytest.raises(
+        SetUpError, match=r"95 % can't be told from 90 % with 50 seeds; \d+ would do"
+    ):
+        Claim(None, seeds=tuple(range(50)), holds=0.95, width=0.05).prepare()
+    Claim(None, seeds=tuple(range(50)), holds=0.95, width=0.2).prepare()

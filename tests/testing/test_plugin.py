@@ -83,7 +83,8 @@ def test_seeds():
     assert {"passed": 2} == result.outcomes
     assert "test_suite.py::test_all: held in 12 of 12 seeds" in result.text
     report = ET.parse("report.xml")
-    assert [{"name": "fleet2d", "value": "held in 12 of 12 seeds"}] == [
+    shown = "held in 12 of 12 seeds; at least 77.9 % was shown"
+    assert [{"name": "fleet2d", "value": shown}] == [
         element.attrib for element in report.iter("property")
     ]
 
@@ -171,6 +172,7 @@ trials = []
        "other": {"vera": {"type": "meander", "speed": 0.5}}}, axes={"robots.astro.speed": [0.3, 0.6]})
 def test_axes(trial):
     trials.append((*trial.scenario.users, trial.scenario.robots["astro"].speed, trial.seed))
+    assert trial.step == 0
 def test_trials():
     assert trials[:4] == [("ana", .3, 0), ("vera", .3, 1), ("ana", .6, 2), ("vera", .6, 3)]
     assert trials[4:] == [("ana", .3, 4), ("vera", .3, 5), ("ana", .6, 6), ("vera", .6, 7)]
@@ -200,12 +202,63 @@ def test_errors_of_a_test_are_reported(suite: pytest.Pytester, code: str, words:
     assert "plugin.py" not in result.text
 
 
+def test_a_trial_without_expectation_or_assertion_is_untested(suite: Suite) -> None:
+    result = suite("""
+def helps(trial):
+    assert trial.step == 5
+@trial("flat.yaml")
+def test_nothing(trial):
+    trial.advance(5)
+@trial("flat.yaml", may_be_untested=True)
+def test_allowed(trial):
+    trial.advance(5)
+@trial("flat.yaml")
+def test_helped(trial):
+    trial.advance(5)
+    helps(trial)
+@trial("flat.yaml", seeds=25, holds=.9)
+def test_trigger(trial):
+    trial.expect("after(events(called, astro), moving(astro), within=1 min)")
+@trial("flat.yaml")
+def test_trigger_may_be_missing(trial):
+    trial.expect("may_be_untested(after(events(called, astro), moving(astro), within=1 min))")
+""", "--junit-xml=report.xml", "--fleet2d-shrink=0")  # fmt: skip
+
+    assert {"passed": 3, "failed": 2} == result.outcomes
+    assert "nothing is tested: there is no expectation, and no assert" in result.text
+    assert "is untested: its trigger never happened" in result.text
+    failures = [f.attrib["message"] for f in ET.parse("report.xml").iter("failure")]
+    assert any("untested" in message for message in failures)
+
+
+def test_wrong_names_are_one_line(suite: Suite) -> None:
+    result = suite("""
+@trial("flat.yaml", sedes=3)
+def test_key(trial): pass
+@trial("flat.yaml", seeds=0)
+def test_seeds(trial): pass
+@trial("flat.yaml")
+def test_body(trial):
+    trial.call("astr", dock=True)
+""", "-rN")  # fmt: skip
+    section = result.text.partition("= FAILURES =")[2].partition("\n=")[0].splitlines()[1:]
+    lines = [line for line in section if line and not line.startswith("_")]
+
+    assert {"failed": 3} == result.outcomes
+    assert "did you mean 'seed'" in result.text
+    assert "seeds=0: expected 1 or more seeds" in result.text
+    place = "test_suite.py:11: trial.call(\"astr\", dock=True): there is no robot 'astr'"
+    assert place in result.text
+    assert 3 == len(lines), lines
+
+
 def test_trials_run_in_several_processes(suite: Suite, tmp_path: Path) -> None:
     code = """
 @pytest.mark.parametrize("number", range(4))
 @trial("flat.yaml", seeds=5)
 def test_many(trial, number):
     trial.advance(3)
+    assert trial.step == 3
 """
     (tmp_path / "test_suite.py").write_text(HEAD + code)
     done = process("-m", "pytest", *LOAD, "-n", "2", "-p", "no:cacheprovider", cwd=tmp_path)

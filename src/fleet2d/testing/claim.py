@@ -15,7 +15,10 @@ from fleet2d.runtime.determinism import sum_in_order
 from fleet2d.scenario.model import Scenario, load_scenario
 
 MAX_SEEDS = 10_000
-BISECTIONS = 14
+BISECTIONS, INTERVAL_BISECTIONS = 14, 40
+MAX_SEARCHED_SEEDS = 2_000
+MIN_SHOWN, MAX_FAILURE_RATIO = 0.5, 10.0
+"""A claim shows nothing if it can't refuse a robot that holds half as often, or fails ten times."""
 ATTRIBUTE = "fleet2d_claim"
 """The attribute of a test function that holds its claim."""
 HOME, HOUSEHOLD = "home", "household"
@@ -106,6 +109,69 @@ def rate_test(seeds: int, holds: float = 1.0, error: float = 0.05) -> RateTest:
             f" {max(fewest, seeds + 1)} seeds or more"
         )
     return best
+
+
+def seeds_for(holds: float, alternative: float, error: float = 0.05) -> int | None:
+    """Return how many seeds distinguish a claimed rate from a lower one; None if too many.
+
+    Example:
+        >>> seeds_for(1.0, 0.9), seeds_for(0.9, 0.7)
+        (29, 50)
+    """
+    if holds == 1:
+        return math.ceil(math.log(error) / math.log(alternative))
+    low, high = 1, 2
+    while _alternative(high, holds, error) < alternative:
+        low, high = high, 2 * high
+        if high > MAX_SEARCHED_SEEDS:
+            return None
+    while high - low > 1:
+        middle = (low + high) // 2
+        enough = _alternative(middle, holds, error) >= alternative
+        low, high = (low, middle) if enough else (middle, high)
+    return high
+
+
+def _alternative(seeds: int, holds: float, error: float) -> float:
+    try:
+        return rate_test(seeds, holds, error).alternative
+    except InputError:
+        return 0.0
+
+
+def rate_interval(held: int, number: int, error: float = 0.05) -> tuple[float, float]:
+    """Return the interval of rates that some trials leave open (Clopper and Pearson, 1934).
+
+    Args:
+        held: The number of trials that held.
+        number: The number of trials.
+        error: The largest probability that the interval doesn't hold the true rate.
+
+    Example:
+        >>> low, high = rate_interval(9, 10)
+        >>> round(low, 3), round(high, 3)
+        (0.555, 0.997)
+    """
+    counts = range(number + 1)
+    logs = [
+        math.lgamma(number + 1) - math.lgamma(k + 1) - math.lgamma(number - k + 1) for k in counts
+    ]
+
+    def at_least(count: int, rate: float) -> float:
+        """Return the probability of that many trials that hold, or more, at a rate."""
+        log_rate, log_rest = math.log(rate), math.log1p(-rate)
+        terms = (logs[k] + k * log_rate + (number - k) * log_rest for k in counts[count:])
+        return math.fsum(map(math.exp, terms))
+
+    def rate_of(count: int, probability: float) -> float:
+        low, high = 0.0, 1.0
+        for _ in range(INTERVAL_BISECTIONS):
+            middle = (low + high) / 2
+            low, high = (middle, high) if at_least(count, middle) < probability else (low, middle)
+        return (low + high) / 2
+
+    low = rate_of(held, error / 2) if held else 0.0
+    return low, rate_of(held + 1, 1 - error / 2) if held < number else 1.0
 
 
 def _bounded(seeds: int, holds: float, other: float, error: float) -> RateTest:
@@ -219,6 +285,9 @@ class Claim:
         holds: The claimed rate.
         error: Largest probability of a wrong decision.
         only: The only seed to run; None: all.
+        width: The largest difference between the claimed rate and the next that is refused.
+        may_be_untested: Whether trials count that test nothing.
+        problem: What is wrong with the arguments; empty if nothing is.
     """
 
     source: Any
@@ -230,6 +299,9 @@ class Claim:
     holds: float = 1.0
     error: float = 0.05
     only: int | None = None
+    width: float | None = None
+    may_be_untested: bool = False
+    problem: str = ""
 
     @cached_property
     def scenario(self) -> Scenario:
@@ -253,10 +325,36 @@ class Claim:
         Raises:
             SetUpError: One of them is wrong.
         """
+        if self.problem:
+            raise SetUpError(self.problem)
         try:
             _ = self.variants, self.rate
         except InputError as error:
             raise SetUpError(str(error)) from error
+        if self.only is None:
+            self._check_power()
+
+    def _check_power(self) -> None:
+        """Refuse a claim that tells too little, with the number of seeds that would do.
+
+        Raises:
+            SetUpError: The trials can't show what is claimed.
+        """
+        rate = self.rate
+        least = rate.holds * MIN_SHOWN, 1 - MAX_FAILURE_RATIO * (1 - rate.holds)
+        wanted = max(least) if self.width is None else rate.holds - self.width
+        if rate.seeds == 1 or (rate.holds == 1 and self.width is None):
+            return
+        if rate.alternative < wanted:
+            needed = seeds_for(rate.holds, wanted, rate.error)
+            hint = f"{needed} would do" if needed else f"not even {MAX_SEARCHED_SEEDS:,} would do"
+            other = percent(rate.alternative)
+            shows = f", which show nothing: a robot that holds in {other} would be accepted, too"
+            shows = shows if self.width is None else ""
+            raise SetUpError(
+                f"{percent(rate.holds)} can't be told from {percent(wanted)} with {rate.seeds}"
+                f" seeds{shows}; {hint}"
+            )
 
     @property
     def varies(self) -> bool:
@@ -306,7 +404,16 @@ class Claim:
             yield variant.with_seed(seed)
 
 
-def trial(
+def percent(share: float) -> str:
+    """Return a share in percent, with at most one decimal.
+
+    >>> percent(0.95), percent(0.8464)
+    ('95 %', '84.6 %')
+    """
+    return f"{round(100 * share, 1):g} %"
+
+
+def trial(  # noqa: PLR0913 - all that a test may say of its trials
     scenario: str | Path | Mapping[str, Any] | Scenario | None = None,
     *overrides: str,
     seeds: int | Sequence[int] | None = None,
@@ -315,6 +422,8 @@ def trial(
     homes: int | str | Path | Sequence[str | Path] | None = None,
     households: Mapping[str, Mapping[str, Any]] | None = None,
     axes: Mapping[str, Any] | None = None,
+    width: float | None = None,
+    may_be_untested: bool = False,
     **settings: Any,
 ) -> Callable[[Test], Test]:
     """Turn a function with an argument `trial` into a test: pytest calls it once for each trial.
@@ -331,6 +440,10 @@ def trial(
         homes: Number of synthetic homes, or files, folders and patterns of floor plans.
         households: The users by name of household: `{"couple": {"ana": …, "ben": …}}`.
         axes: Further axes, as the `axes` of a study file.
+        width: How far below `holds` the next rate may lie that is refused: with 0.1, 95 % is told
+            from 85 %, or there are too few seeds.
+        may_be_untested: Whether a trial counts that has no expectation and no `assert`, or none
+            whose occasion came.
         settings: Keys of `simulation` or of the scenario, such as ``seed=4``.
 
     Example:
@@ -342,14 +455,24 @@ def trial(
         ...     assert trial.state["astro"] != before
     """
     numbers = range(seeds) if isinstance(seeds, int) else seeds or ()
-    if isinstance(seeds, int) and seeds < 1:
-        raise InputError(f"seeds={seeds}: expected 1 or more seeds")
+    too_few = isinstance(seeds, int) and seeds < 1
+    problem = f"seeds={seeds}: expected 1 or more seeds" if too_few else ""
 
     def decorate(function: Test) -> Test:
         source = _beside(function, scenario)
         varied = {**_homes(homes, function), **(axes or {})}
         claim = Claim(
-            source, overrides, settings, varied, households or {}, tuple(numbers), holds, error
+            source,
+            overrides,
+            settings,
+            varied,
+            households or {},
+            tuple(numbers),
+            holds,
+            error,
+            width=width,
+            may_be_untested=may_be_untested,
+            problem=problem,
         )
         setattr(function, ATTRIBUTE, claim)
         return function

@@ -125,7 +125,7 @@ def _check_expects(subject: "Subject", target: str) -> None:
 
 def describe_failure(failure: "FailingPoint", job: "TryJob", target: str, out: Path) -> list[str]:
     """Write the failing scenario, and its run beside it; return the lines of a report."""
-    from fleet2d.testing.trials import describe_trial
+    from fleet2d.testing.failures import describe_trial
 
     trial = job.run(failure.point, failure.seed)
     command = f"fleet2d test {out}"

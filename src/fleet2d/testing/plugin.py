@@ -4,6 +4,7 @@ pytest loads it by the entry point of the package; nothing else in Fleet2D impor
 """
 
 import functools
+import traceback
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -69,18 +70,22 @@ def pytest_pyfunc_call(pyfuncitem: pytest.Function) -> bool | None:
         if TRIAL in pyfuncitem.fixturenames and _is_own_fixture(pyfuncitem):
             pytest.fail("a test with `trial` needs @fleet2d.testing.trial(…)", pytrace=False)
         return None
-    from fleet2d.testing.claim import SetUpError
-    from fleet2d.testing.trials import FailureFolder, explain, run_claim
+    from fleet2d.errors import Fleet2DError
+    from fleet2d.testing.failures import FailureFolder, explain
+    from fleet2d.testing.trials import run_claim
 
     # pytest shows the lines of the test, but not those of its call to `fail`.
     __tracebackhide__ = _is_error
     claim = _with_options(claim, pyfuncitem.config)
     body = _body(pyfuncitem)
+    problem, result = "", None
     try:
         claim.prepare()
         result = run_claim(claim, body)
-    except SetUpError as error:
-        pytest.fail(str(error), pytrace=False)
+    except Fleet2DError as error:
+        problem = f"{_place_of(error, pyfuncitem.path)}{error}"
+    if result is None:
+        pytest.fail(problem, pytrace=False)
     pyfuncitem.user_properties.append((PROPERTY, result.text))
     if not result.holds:
         tries = pyfuncitem.config.getoption("--fleet2d-shrink")
@@ -92,6 +97,12 @@ def pytest_pyfunc_call(pyfuncitem: pytest.Function) -> bool | None:
         failure.add_note(text)  # pytest shows the compared values
         raise failure
     return True
+
+
+def _place_of(error: BaseException, path: Path) -> str:
+    """Return the line of a test's file at which an error occurred, with its code."""
+    frames = [f for f in traceback.extract_tb(error.__traceback__) if Path(f.filename) == path]
+    return f"{path.name}:{frames[-1].lineno}: {frames[-1].line}: " if frames else ""
 
 
 def _is_error(info: Any) -> bool:

@@ -1,0 +1,364 @@
+"""Failures of trials: their reports, and the same failures in smaller runs."""
+
+import re
+import shlex
+import shutil
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from datetime import datetime, timedelta
+from pathlib import Path
+from typing import Any
+
+from fleet2d.errors import Fleet2DError
+from fleet2d.runtime.clock import Clock
+from fleet2d.scenario.model import Scenario, load_scenario
+from fleet2d.testing.claim import Variant
+from fleet2d.testing.trials import (
+    ASSERT,
+    MISSED,
+    MISSED_BY_THE_END,
+    Body,
+    ClaimResult,
+    ExpectationResult,
+    TrialResult,
+    names_in,
+    run_trial,
+)
+
+LEAD_TIMES = tuple(timedelta(minutes=minutes) for minutes in (0, 1, 5, 15, 60, 240, 1440, 10_080))
+"""Times from the start of a shorter run to the failure, tried in this order."""
+MAX_SEEDS_SHOWN = 8
+
+
+@dataclass(frozen=True)
+class FailingCase:
+    """A failing run, reduced so far.
+
+    Attributes:
+        variant: The scenario.
+        without: Numbers of the interventions that are left out.
+        result: The result of the run.
+        failure: The failure that it is about.
+    """
+
+    variant: Variant
+    without: frozenset[int]
+    result: TrialResult
+    failure: ExpectationResult
+
+    @property
+    def text(self) -> str:
+        """A summary: the time, the people, and the number of interventions."""
+        simulation = self.variant.scenario.simulation
+        end = simulation.start + simulation.duration
+        people = ", ".join(self.variant.scenario.users) or "nobody"
+        number = f"{self.interventions} of {self.result.interventions} interventions"
+        return (
+            f"{simulation.start:%a %d %b %H:%M:%S} to {end:%a %d %b %H:%M:%S}, with {people}"
+            f"{f', {number}' if self.result.interventions else ''}"
+        )
+
+    @property
+    def interventions(self) -> int:
+        """Number of remaining interventions."""
+        return self.result.interventions - len(self.without)
+
+    @property
+    def step(self) -> int:
+        """The step at which it fails."""
+        step = self.failure.step
+        return max(0, self.result.steps - 1) if step is None else step
+
+
+class Shrinker:
+    """Tries smaller versions of a failing run.
+
+    A smaller version counts if the same expectation fails in the same way. What didn't come about
+    must have been asked for in it: interventions that name what the expectation names stay. The
+    time before stays, too, while an algorithm learns on which the failure depends.
+    """
+
+    def __init__(self, body: Body, tries: int) -> None:
+        """Prepare.
+
+        Args:
+            body: The test.
+            tries: Largest number of runs.
+        """
+        self._body, self.tries = body, tries
+
+    def shrink(self, result: TrialResult) -> FailingCase | None:
+        """Return the smallest version that it finds of a failing run; None if there is none."""
+        failure = result.first_failure
+        if failure is None or failure.untested:
+            return None
+        whole = case = FailingCase(result.variant, frozenset(), result, failure)
+        for reduce in (self._sooner, self._unlearned, self._later, self._undone, self._fewer):
+            case = reduce(case)
+        case = self._sooner(case)
+        return None if case is whole else case
+
+    def _sooner(self, case: FailingCase) -> FailingCase:
+        """End the run at the failure."""
+        simulation = case.variant.scenario.simulation
+        if case.step + 1 >= simulation.steps or case.failure.kind == MISSED_BY_THE_END:
+            return case
+        length = (case.step + 1) * simulation.step
+        return self._within(case, simulation.start, simulation.start + length) or case
+
+    def _unlearned(self, case: FailingCase) -> FailingCase:
+        """Leave out the algorithms and metrics that aren't needed to fail."""
+        without = _edited(case.variant, algorithms={}, metrics={})
+        if case.variant.scenario.algorithms and (smaller := self._try(case, without)):
+            return smaller
+        return self._left_out(case, ("algorithms", "metrics"))
+
+    def _later(self, case: FailingCase) -> FailingCase:
+        """Move the start of the run as close to the failure as possible, to the minute."""
+        if case.variant.scenario.algorithms or case.failure.kind == MISSED_BY_THE_END:
+            return case  # what they have learned by then may be the cause
+        whole, short = case, timedelta(0)
+        for lead in LEAD_TIMES:
+            if smaller := self._started(whole, lead):
+                case = smaller
+                break
+            short = lead
+        else:
+            return case
+        while lead - short > timedelta(minutes=1) and self.tries > 0:
+            middle = (short + (lead - short) / 2) // timedelta(minutes=1) * timedelta(minutes=1)
+            smaller = self._started(whole, middle)
+            short, lead = (short, middle) if smaller else (middle, lead)
+            case = smaller or case
+        return case
+
+    def _started(self, case: FailingCase, lead: timedelta) -> FailingCase | None:
+        """Return the run that begins some time before the failure, if it fails, too."""
+        simulation = case.variant.scenario.simulation
+        end = simulation.start + simulation.duration
+        failing = simulation.start + case.step * simulation.step
+        start = (failing - lead).replace(second=0, microsecond=0)
+        if not simulation.start < start < end:
+            return None
+        smaller = self._within(case, start, end)
+        return smaller and self._sooner(smaller)
+
+    def _within(self, case: FailingCase, start: datetime, end: datetime) -> FailingCase | None:
+        """Return the part of the run between two times, if it fails, too."""
+        entries = case.variant.scenario.script
+        script = _script_within(case.variant.scenario, start, end)
+        if any(
+            content is None and self._is_about(case, names_in(entry.act))
+            for entry, content in zip(entries, script, strict=True)
+        ):
+            return None
+        times = {"start": start.isoformat(), "duration": end - start}
+        content = {"script": list(filter(None, script))} if entries else {}
+        return self._try(case, _edited(case.variant, simulation=times, **content))
+
+    def _undone(self, case: FailingCase) -> FailingCase:
+        """Leave out interventions, the last first."""
+        for number in reversed(range(case.result.interventions)):
+            if not self._is_about(case, case.result.acts[number]):
+                case = self._try(case, case.variant, case.without | {number}) or case
+        for number in reversed(range(len(case.variant.scenario.script))):
+            script = case.variant.scenario.resolved()["script"]
+            if not self._is_about(case, names_in(script.pop(number))):
+                case = self._try(case, _edited(case.variant, script=script)) or case
+        return case
+
+    @staticmethod
+    def _is_about(case: FailingCase, names: frozenset[str]) -> bool:
+        """Whether an intervention, by its names, may be what asked for that which didn't come."""
+        is_missing = case.failure.kind in (MISSED, MISSED_BY_THE_END)
+        return is_missing and bool(case.failure.names & names)
+
+    def _fewer(self, case: FailingCase) -> FailingCase:
+        """Leave out the people, robots, objects and changes not needed to fail."""
+        case = self._left_out(case, ("robots", "users", "objects"))
+        if case.variant.scenario.changes:
+            case = self._try(case, _edited(case.variant, changes=[])) or case
+        return case
+
+    def _left_out(self, case: FailingCase, sections: tuple[str, ...]) -> FailingCase:
+        """Leave out the entries of some sections one by one."""
+        for section in sections:
+            for name in getattr(case.variant.scenario, section):
+                content = case.variant.scenario.resolved()[section]
+                del content[name]
+                case = self._try(case, _edited(case.variant, **{section: content})) or case
+        return case
+
+    def _try(
+        self, case: FailingCase, variant: Variant | None, without: frozenset[int] | None = None
+    ) -> FailingCase | None:
+        """Return a version if it fails as the case does; None otherwise."""
+        if variant is None or self.tries <= 0:
+            return None
+        self.tries -= 1
+        without = case.without if without is None else without
+        try:
+            result = run_trial(variant, self._body, without=without)
+        except Exception:  # noqa: BLE001 - a version that can't be simulated doesn't count
+            return None
+        failure = same_failure(case.failure, result)
+        return FailingCase(variant, without, result, failure) if failure else None
+
+
+def same_failure(failure: ExpectationResult, result: TrialResult) -> ExpectationResult | None:
+    """Return the failure of a run that is of the same expectation and kind; None if none is."""
+    same = (f for f in result.failures if (f.name, f.kind) == (failure.name, failure.kind))
+    return next(same, None)
+
+
+def _script_within(
+    scenario: Scenario, start: datetime, end: datetime
+) -> list[dict[str, Any] | None]:
+    """Return the entries of a script for another time; None for those that aren't in it."""
+    simulation = scenario.simulation
+    clock = Clock(start, simulation.step_us, (end - start) // simulation.step)
+    entries: list[dict[str, Any] | None] = []
+    for entry, content in zip(scenario.script, scenario.resolved()["script"], strict=True):
+        at, is_in = entry.at, True
+        if isinstance(at, timedelta):  # from the start on
+            at = at - (start - simulation.start)
+            is_in, content = timedelta(0) <= at < end - start, {**content, "at": at}
+        elif isinstance(at, datetime):
+            is_in = start <= at < end
+        elif at is not None:
+            is_in = any(at.moments(clock))
+        entries.append(content if is_in else None)
+    return entries
+
+
+def _edited(variant: Variant, **sections: Any) -> Variant | None:
+    """Return a variant with some keys changed; None if that is not a valid scenario."""
+    content = variant.scenario.resolved()
+    for name, value in sections.items():
+        content[name] = {**content[name], **value} if name == "simulation" else value
+    try:
+        return replace(variant, scenario=load_scenario(content))
+    except Fleet2DError:
+        return None
+
+
+@dataclass(frozen=True)
+class FailureFolder:
+    """The folder for the artifacts of a failing test.
+
+    Attributes:
+        parent: The folder for all tests.
+        test: The node id of the test in pytest.
+    """
+
+    parent: Path
+    test: str
+
+    def create(self) -> Path:
+        """Return the test's own folder, without the artifacts of earlier failures."""
+        name = re.sub(r"[^\w.-]+", "-", self.test).strip("-")
+        folder = self.parent / name
+        shutil.rmtree(folder, ignore_errors=True)
+        folder.mkdir(parents=True, exist_ok=True)
+        return folder
+
+
+def explain(result: ClaimResult, body: Body, place: FailureFolder, tries: int) -> str:
+    """Store a failing run, and the smallest similar one, and return a report.
+
+    Args:
+        result: The result of a claim that was refused.
+        body: The test.
+        place: Where to store the runs.
+        tries: Largest number of runs to make it smaller.
+    """
+    folder, trial = place.create(), result.shown
+    command = f"pytest {shlex.quote(place.test)} --fleet2d-seed {trial.variant.seed}"
+    lines = [result.text, *_by_expectation(result), ""]
+    lines += describe_trial(trial, body, folder, tries, command)
+    text = "\n".join(lines)
+    (folder / "failure.txt").write_text(text + "\n", encoding="utf-8")
+    return text
+
+
+def describe_trial(
+    trial: TrialResult, body: Body, folder: Path, tries: int, command: str
+) -> Iterable[str]:
+    """Store a failing run, and the smallest similar one; yield the lines of a report.
+
+    Args:
+        trial: The result of the run.
+        body: The test.
+        folder: Where to store the runs.
+        tries: Largest number of runs to make it smaller.
+        command: The command that repeats the run.
+    """
+    yield f"{trial.variant.text}:"
+    yield from _failures(trial)
+    yield from _store(trial.variant, frozenset(), body, folder / "run", trial)
+    yield f"  again: {command}"
+    case = Shrinker(body, tries).shrink(trial)
+    if case is not None:
+        yield ""
+        yield f"smaller: {case.text}"
+        yield from _failures(case.result)
+        out = folder / "smaller"
+        yield from _store(case.variant, case.without, body, out, case.result)
+        yield f"  again: fleet2d reproduce {shlex.quote(str(out))}"
+
+
+def _by_expectation(result: ClaimResult) -> Iterable[str]:
+    """Yield a line for each expectation that failed: in which runs, and the worst."""
+    failures: dict[str, list[tuple[TrialResult, ExpectationResult]]] = {}
+    for trial in result.failed:
+        for failure in trial.failures:
+            failures.setdefault(failure.name, []).append((trial, failure))
+    for name, cases in failures.items():
+        if len(result.trials) == 1:
+            continue
+        seeds = [trial.variant.text for trial, _ in cases]
+        shown = "; ".join(seeds[:MAX_SEEDS_SHOWN]) + "; …" * (len(seeds) > MAX_SEEDS_SHOWN)
+        worst, failure = min(cases, key=lambda case: case[1].margin)
+        yield f"  {name}: failed in {len(cases)} of {len(result.trials)} ({shown})"
+        if len(cases) > 1 and name != ASSERT:
+            yield f"    worst in {worst.variant.text}: {failure.text}"
+
+
+def _failures(trial: TrialResult) -> Iterable[str]:
+    """Yield a line for each failure of a run: what failed, when, by how much."""
+    simulation = trial.variant.scenario.simulation
+    clock = Clock(simulation.start, simulation.step_us, simulation.steps)
+    for failure in trial.failures:
+        at = ""
+        if failure.step is not None:
+            at = f" at {clock.time(failure.step):%a %d %b %H:%M:%S} (step {failure.step})"
+        first = failure.text.splitlines()[0]
+        yield f"  {first}" if failure.name != ASSERT else f"  assert failed{at}: {first}"
+
+
+def _store(
+    variant: Variant, without: frozenset[int], body: Body, out: Path, trial: TrialResult
+) -> Iterable[str]:
+    """Repeat a run and store it; yield its path, its picture, and the commands to see it."""
+    failure = trial.first_failure
+    try:
+        again = run_trial(variant, body, out=out, without=without)
+    except Fleet2DError as error:
+        yield f"  the run could not be stored: {error}"
+        return
+    if failure is not None and same_failure(failure, again) is None:
+        yield "  it didn't fail again: the test depends on more than the scenario and the seed"
+    step = trial.failing_step
+    yield f"  run: {out}"
+    try:
+        from fleet2d.runs.run import open_run
+        from fleet2d.viewer.figures import draw_moment
+
+        picture = out.with_suffix(".png")
+        run = open_run(out)
+        draw_moment(run, min(step, run.manifest["steps"] - 1), picture)
+        yield f"  picture: {picture}"
+    except Fleet2DError as error:  # such as that matplotlib is not installed
+        yield f"  no picture: {error}"
+    path = shlex.quote(str(out))
+    yield f"  see it: fleet2d view {path}, or fleet2d show {path} --at 'step {step}'"
