@@ -7,6 +7,9 @@ from fleet2d.configuration.units import Duration as Duration
 from fleet2d.configuration.units import InputPath as InputPath
 from fleet2d.configuration.units import Length as Length
 from fleet2d.configuration.units import Share as Share
+from fleet2d.datasets.generate import dataset as dataset
+from fleet2d.datasets.reader import Dataset as Dataset
+from fleet2d.datasets.reader import open_dataset as open_dataset
 from fleet2d.engine.interrupts.interrupt import Interrupt as Interrupt
 from fleet2d.engine.interrupts.interrupt import SpanView as SpanView
 from fleet2d.engine.repeat import reproduce as reproduce

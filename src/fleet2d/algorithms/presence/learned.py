@@ -170,8 +170,58 @@ def shipped_weights() -> Weights:
     return Weights.read(WEIGHTS)
 
 
+class CorrectedRoutine(RoutineModel):
+    """Base of models that correct the belief of `routine`, from features of each place.
+
+    A subclass writes `correct`.
+    """
+
+    def begin(self, home: Home, users: Sequence[str], start: datetime) -> None:
+        """Prepare for a run."""
+        super().begin(home, users, start)
+        self.facts = PlaceFacts.of_home(home)
+        self.traces = np.zeros((max(self.users, 1), trace_size(self.facts.rooms)))
+
+    def correct(self, features: F64) -> F64:
+        """Return the probability of each place: float64 (bins, places), rows sum to one.
+
+        Args:
+            features: float64 (bins, places, TRACE_FEATURES), away last; the last feature is the
+                logarithm of the belief of `routine`.
+        """
+        raise NotImplementedError
+
+    def observe(self, evidence: Evidence) -> tuple[F64, F64]:
+        """Return the corrected belief after each bin."""
+        home, away = super().observe(evidence)
+        places = []
+        for person, memory in enumerate(self.traces):
+            chance = away[:, person, np.newaxis]
+            prior = np.concatenate([home[:, person] * (1 - chance), chance], axis=1)
+            of_person = traced(evidence, person, prior)
+            places.append(self.correct(trace_evidence(memory, self.facts.rooms, of_person)))
+        return split(places, self.users, evidence.sightings.unknown)
+
+    def presence(
+        self, users: Sequence[str], time: datetime, bin_us: int, track: BeliefSeries
+    ) -> Presence:
+        """Return the present belief; forecasts begin with it, and go on as those of `routine`."""
+        forecast = super().presence(users, time, bin_us, track)
+        assert isinstance(forecast, ChainPresence)
+        return forecast.corrected()
+
+    def remember(self) -> dict[str, Any]:
+        """Return the learned state, as arrays in mappings."""
+        return {**super().remember(), "traces": self.traces}
+
+    def recall(self, learned: Mapping[str, Any]) -> None:
+        """Restore what `remember` returned; called after `begin`."""
+        super().recall(learned)
+        self.traces = array_of(learned, "traces", self.traces.shape)
+
+
 @register("presence_model", "learned")
-class LearnedModel(RoutineModel):
+class LearnedModel(CorrectedRoutine):
     """The belief of `routine`, corrected by a network that was trained on simulated homes.
 
     For each room, and for being away, the network gets what the evidence of a user has left there
@@ -193,39 +243,12 @@ class LearnedModel(RoutineModel):
     def begin(self, home: Home, users: Sequence[str], start: datetime) -> None:
         """Prepare for a run."""
         super().begin(home, users, start)
-        self.facts = PlaceFacts.of_home(home)
         read = shipped_weights() if self.weights is None else Weights.read(self.weights)
         self.network, self.places = read.network, read.of_places(self.facts.features)
-        self.traces = np.zeros((max(self.users, 1), trace_size(self.facts.rooms)))
 
-    def observe(self, evidence: Evidence) -> tuple[F64, F64]:
-        """Return the corrected belief after each bin."""
-        home, away = super().observe(evidence)
-        unknown = evidence.sightings.unknown
-        places = []
-        for person, memory in enumerate(self.traces):
-            chance = away[:, person, np.newaxis]
-            prior = np.concatenate([home[:, person] * (1 - chance), chance], axis=1)
-            features = trace_evidence(memory, self.facts.rooms, traced(evidence, person, prior))
-            places.append(place_probabilities(self.network, self.places, features))
-        return split(places, self.users, unknown)
-
-    def presence(
-        self, users: Sequence[str], time: datetime, bin_us: int, track: BeliefSeries
-    ) -> Presence:
-        """Return the present belief; forecasts begin with it, and go on as those of `routine`."""
-        forecast = super().presence(users, time, bin_us, track)
-        assert isinstance(forecast, ChainPresence)
-        return forecast.corrected()
-
-    def remember(self) -> dict[str, Any]:
-        """Return the learned state, as arrays in mappings."""
-        return {**super().remember(), "traces": self.traces}
-
-    def recall(self, learned: Mapping[str, Any]) -> None:
-        """Restore what `remember` returned; called after `begin`."""
-        super().recall(learned)
-        self.traces = array_of(learned, "traces", self.traces.shape)
+    def correct(self, features: F64) -> F64:
+        """Return the probability of each place by the network."""
+        return place_probabilities(self.network, self.places, features)
 
 
 def traced(evidence: Evidence, person: int, belief: F64) -> TracedEvidence:

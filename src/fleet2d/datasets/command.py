@@ -1,0 +1,134 @@
+"""The commands `fleet2d dataset`, `fleet2d train rtp` and `fleet2d leaderboard`."""
+
+import json
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from fleet2d.errors import InputError
+from fleet2d.options import TrustFiles, TrustFolders, restrict_to
+
+if TYPE_CHECKING:
+    from fleet2d.datasets.windows import Windows
+
+Folder = Annotated[Path, typer.Argument(metavar="DIR", help="A data set.")]
+training = typer.Typer(help="Train models on data sets.", no_args_is_help=True)
+
+
+@training.callback()
+def _commands() -> None:
+    """Train models on data sets."""
+
+
+def dataset(
+    source: Annotated[Path, typer.Argument(metavar="FILE.yaml", help="What it is drawn from.")],
+    out: Annotated[Path, typer.Option(help="The folder to write.")],
+    workers: Annotated[
+        int | None, typer.Option(min=1, help="Processes at a time; left out: one per core.")
+    ] = None,
+    verify: Annotated[
+        bool, typer.Option("--verify", help="Compare the files of a made one with its manifest.")
+    ] = False,
+    trust: TrustFiles = None,
+    trust_dir: TrustFolders = None,
+) -> None:
+    """Make a data set of labelled evidence, or the rest of one that was interrupted."""
+    from fleet2d.datasets.generate import dataset as make
+    from fleet2d.datasets.reader import open_dataset
+
+    with restrict_to(trust, trust_dir):
+        made = open_dataset(out) if verify else make(source, out, workers=workers)
+    if verify:
+        differing = made.verify()
+        for name in differing:
+            typer.echo(f"{out / name} is missing, or differs from what was written", err=True)
+        if differing:
+            raise typer.Exit(1)
+    size = sum(file["bytes"] for file in made.manifest["files"].values())
+    runs = ", ".join(f"{name} {count}" for name, count in made.manifest["splits"].items())
+    typer.echo(f"{out}: {runs} runs, {size / 1e6:.1f} MB")
+
+
+@training.command()
+def rtp(
+    on: Annotated[Path, typer.Option(metavar="DIR", help="A data set, or a stored run.")],
+    out: Annotated[Path, typer.Option(help="The file of weights to write.")] = Path("learned.npz"),
+    start: Annotated[
+        str | None,
+        typer.Option("--from", help="Weights to go on from: a file, or `learned`, the shipped."),
+    ] = None,
+    hidden: Annotated[int, typer.Option(min=1, max=256, help="Width of the layers.")] = 32,
+    epochs: Annotated[int, typer.Option(min=1, help="How often each window is used.")] = 20,
+    seed: Annotated[int, typer.Option(min=0, help="Of the first weights.")] = 0,
+) -> None:
+    """Train the network of `model: learned`, or fit one to the days of a run."""
+    from fleet2d.algorithms.presence.learned import Weights, shipped_weights
+    from fleet2d.datasets.training import TrainingSettings, fine_tune, train
+
+    began = time.process_time()
+    train_on, check_on = _windows(on)
+    weights: Weights | None = None
+    if start is not None:
+        weights = shipped_weights() if start == "learned" else Weights.read(Path(start))
+        made = fine_tune(weights, train_on)
+    else:
+        settings = TrainingSettings(hidden=hidden, epochs=epochs, seed=seed)
+        made = train(train_on, check_on, settings, on_epoch=_print_epoch)
+    made.save(out)
+    count = sum(len(part.truth) for part in train_on)
+    typer.echo(f"{out}: {count:,} windows, {time.process_time() - began:.0f} s")
+
+
+def _print_epoch(epoch: int, loss: float, checked: float) -> None:
+    typer.echo(f"epoch {epoch + 1}: log loss {loss:.3f}, validation {checked:.3f}", err=True)
+
+
+def _windows(on: Path) -> "tuple[list[Windows], list[Windows]]":
+    """Return the windows to train on, and to validate with, of a data set or of a run."""
+    from fleet2d.datasets.reader import MANIFEST, open_dataset
+    from fleet2d.datasets.tasks import TRAIN, windows
+    from fleet2d.datasets.windows import windows_of_run
+
+    if not (on / MANIFEST).is_file() and (on / "manifest.json").is_file():
+        from fleet2d.runs.run import open_run
+
+        return windows_of_run(open_run(on)), []
+    data = open_dataset(on)
+    if TRAIN not in data.splits:
+        raise InputError(f"{on} has no split {TRAIN!r}: splits are {', '.join(data.splits)}")
+    check = windows(data, "validation") if "validation" in data.splits else ()
+    return list(windows(data, TRAIN)), list(check)
+
+
+def leaderboard(
+    directory: Folder,
+    task: Annotated[
+        list[str] | None, typer.Option(help="A task, several times for more; left out: all.")
+    ] = None,
+    split: Annotated[str, typer.Option(help="The split to score on.")] = "test",
+    weights: Annotated[
+        list[Path] | None, typer.Option(help="A file of weights to score, too, for rtp.")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+) -> None:
+    """Score the baselines of each task on a data set, and networks of your own."""
+    from fleet2d.algorithms.presence.learned import Weights
+    from fleet2d.datasets.reader import open_dataset
+    from fleet2d.datasets.tasks import leaderboard as score
+
+    models = {path.stem: Weights.read(path) for path in weights or []}
+    entries = score(open_dataset(directory), task or (), split, models)
+    if as_json:
+        rows: list[dict[str, Any]] = [
+            {"task": e.task, "model": e.model, "count": e.cases, **e.scores} for e in entries
+        ]
+        typer.echo(json.dumps({"split": split, "entries": rows}))
+        return
+    for name in dict.fromkeys(entry.task for entry in entries):
+        own = [entry for entry in entries if entry.task == name]
+        typer.echo(f"{name} ({own[0].cases:,} cases of {split})")
+        for metric in own[0].scores:
+            cells = "  ".join(f"{entry.model} {entry.scores[metric]:.3f}" for entry in own)
+            typer.echo(f"  {metric:22} {cells}")

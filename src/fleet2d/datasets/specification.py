@@ -1,0 +1,265 @@
+"""The file of a data set: homes, households and splits; and the runs that are drawn from it."""
+
+import hashlib
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from datetime import timedelta
+from itertools import combinations
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydantic import Field, ValidationError
+
+from fleet2d.configuration.components import Settings
+from fleet2d.configuration.documents import Document, read_document
+from fleet2d.configuration.trust import check_code
+from fleet2d.configuration.units import PositiveDuration
+from fleet2d.errors import InputError, ScenarioError
+from fleet2d.runtime.determinism import Draws, stream_key
+from fleet2d.scenario.model import explain, load_scenario
+from fleet2d.studies.axes import AnyAxis, Choice
+
+NAMES = ("ana", "ben", "cleo", "dan", "eva", "finn", "gina", "hugo")
+EVIDENCE, STAYS, BELIEF = "evidence", "stays", "belief_"
+MAX_SEED = 1 << 31
+
+
+class SplitSettings(Settings):
+    """The runs of one split, and what they are drawn from.
+
+    Attributes:
+        runs: The number of runs.
+        homes: Homes, as axes of a study have them: {synthetic: 40, first: 100}, {floorplans: …}.
+        households: Households: a list of the personas of their members, or of users by name.
+    """
+
+    runs: int = Field(ge=1, le=1_000_000)
+    homes: tuple[AnyAxis, ...] = Field(min_length=1)
+    households: tuple[tuple[Any, ...] | dict[str, Any], ...] = Field(min_length=1)
+
+
+class DatasetFile(Settings):
+    """A data set: what its runs are drawn from, and what is stored of them.
+
+    Attributes:
+        name: Its name, the title of the data card.
+        description: What it is for.
+        licence: The licence of its content, stated on the data card.
+        base: A scenario: a file, bundled:NAME, or its sections. Its users are replaced.
+        seed: The seed of all draws.
+        splits: The splits by name: train, validation, test.
+        vary: Axes of which each run has one value, drawn with equal chances.
+        beliefs: Models of real-time presence whose belief is stored, by name.
+        every: Time between stored beliefs.
+        labels: Time between labels.
+        runs_per_shard: The number of runs in a file.
+    """
+
+    name: str = "data set"
+    description: str = ""
+    licence: str = "CC0-1.0"
+    base: Any = None
+    seed: int = Field(default=0, ge=0)
+    splits: dict[str, SplitSettings] = Field(min_length=1)
+    vary: dict[str, AnyAxis] = Field(default={})
+    beliefs: tuple[str, ...] = ()
+    every: PositiveDuration = timedelta(minutes=7)
+    labels: PositiveDuration = timedelta(minutes=1)
+    runs_per_shard: int = Field(default=16, ge=1)
+
+
+@dataclass(frozen=True)
+class PlannedRun:
+    """A run of a data set.
+
+    Attributes:
+        number: Its number, from 0 on.
+        split: The split.
+        labels: What was drawn for it: home, household, and the columns of `vary`.
+        scenario: The scenario, as plain data.
+    """
+
+    number: int
+    split: str
+    labels: Mapping[str, Any]
+    scenario: Mapping[str, Any]
+
+    @property
+    def seed(self) -> int:
+        """The seed of the run, which no other run of the data set has."""
+        return int(self.scenario["simulation"]["seed"])
+
+
+@dataclass(frozen=True)
+class DatasetPlan:
+    """A data set that is checked, and its runs.
+
+    Attributes:
+        file: The settings.
+        runs: The runs, those of a split one after the other.
+    """
+
+    file: DatasetFile
+    runs: tuple[PlannedRun, ...]
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 of all that its content depends on, but the code."""
+        content = [[run.split, dict(run.labels), run.scenario] for run in self.runs]
+        text = json.dumps([content, str(self.file.labels)], sort_keys=True, default=str)
+        return hashlib.sha256(text.encode()).hexdigest()
+
+    def shards(self) -> Iterator[tuple[str, int, tuple[PlannedRun, ...]]]:
+        """Yield the split, the number and the runs of each shard."""
+        for split in self.file.splits:
+            runs = tuple(run for run in self.runs if run.split == split)
+            size = self.file.runs_per_shard
+            for number, first in enumerate(range(0, len(runs), size)):
+                yield split, number, runs[first : first + size]
+
+
+def plan_dataset(source: str | Path | Mapping[str, Any]) -> DatasetPlan:
+    """Read the file of a data set, check that its splits don't overlap, and draw its runs.
+
+    Args:
+        source: A YAML file, or the same as a mapping.
+
+    Raises:
+        ScenarioError: The file is wrong, or its base is no scenario.
+        InputError: Splits overlap; the message names the homes, households or personas.
+    """
+    document = (
+        Document(dict(source)) if isinstance(source, Mapping) else read_document(Path(source))
+    )
+    try:
+        file = DatasetFile.model_validate(document.data)
+    except ValidationError as error:
+        raise explain(error, document) from None
+    check_code("the data set", [document.data])
+    try:
+        base = load_scenario(file.base).resolved()
+    except ScenarioError as error:
+        raise ScenarioError(f"base: {error}") from None
+    base["users"] = {}
+    homes = {
+        name: [choice for axis in split.homes for choice in axis.choices("home")]
+        for name, split in file.splits.items()
+    }
+    _check_splits(file, homes)
+    runs: list[PlannedRun] = []
+    for split, settings in file.splits.items():
+        for k in range(settings.runs):
+            runs.append(_draw(file, base, len(runs), split, homes[split], k))
+    for run in {run.split: run for run in runs}.values():
+        load_scenario(run.scenario)  # a mistake is reported before the first run
+    return DatasetPlan(file, tuple(runs))
+
+
+def _draw(
+    file: DatasetFile,
+    base: Mapping[str, Any],
+    number: int,
+    split: str,
+    homes: list[Choice],
+    k: int,
+) -> PlannedRun:
+    """Draw a run: homes and households in turn, in a random order, the rest at random."""
+    draws = Draws(np.uint64(stream_key(file.seed, f"datasets.{split}", "run")), k)
+    settings = file.splits[split]
+    home = homes[k % len(homes)]
+    household = draws.choice(settings.households)
+    varied = [draws.choice(axis.choices(name)) for name, axis in file.vary.items()]
+    scenario: dict[str, Any] = json.loads(json.dumps(dict(base), default=str))
+    for keys, value in [change for choice in (home, *varied) for change in choice.changes]:
+        _set(scenario, keys, value)
+    scenario["users"] = members_of(household)
+    scenario["simulation"]["seed"] = (file.seed * 1_000_003 + number) % MAX_SEED
+    scenario["algorithms"] = {
+        **scenario.get("algorithms", {}),
+        EVIDENCE: {"type": "evidence_table"},
+        **{
+            f"{BELIEF}{model}": {
+                "type": "rtp",
+                "model": model,
+                "period": f"{_seconds(file.every)} s",
+            }
+            for model in file.beliefs
+        },
+    }
+    scenario["metrics"] = {STAYS: {}}
+    labels = {
+        "home": home.words.partition("= ")[2],
+        "household": " + ".join(personas_of(household)),
+    }
+    for choice in varied:
+        labels.update({name: str(label) for name, label in choice.labels.items()})
+    return PlannedRun(number, split, labels, scenario)
+
+
+def _set(scenario: dict[str, Any], keys: tuple[str, ...], value: Any) -> None:
+    for key in keys[:-1]:
+        scenario = scenario.setdefault(key, {})
+    scenario[keys[-1]] = value
+
+
+def _seconds(duration: timedelta) -> float:
+    return duration.total_seconds()
+
+
+def members_of(household: Any) -> dict[str, Any]:
+    """Return the section `users` of a household: a list of personas, or users by name.
+
+    Example:
+        >>> members_of(["retired"])
+        {'ana': {'type': 'routine', 'persona': 'retired'}}
+    """
+    if isinstance(household, Mapping):
+        return dict(household)
+    if len(household) > len(NAMES):
+        raise InputError(
+            f"a household of {len(household)} personas: name its users, as in {{ana: …}}, where"
+            f" there are more than {len(NAMES)}"
+        )
+    pairs = zip(NAMES, household, strict=False)
+    return {name: {"type": "routine", "persona": persona} for name, persona in pairs}
+
+
+def personas_of(household: Any) -> list[str]:
+    """Return what tells the people of a household: their personas, logs, or types."""
+    return [
+        str(user.get("persona") or user.get("path") or user.get("type"))
+        if isinstance(user, Mapping)
+        else str(user)
+        for user in members_of(household).values()
+    ]
+
+
+def _check_splits(file: DatasetFile, homes: Mapping[str, list[Choice]]) -> None:
+    """Refuse splits that share a home, a household or a persona.
+
+    Raises:
+        InputError: They do; the message names what they share.
+    """
+    people = {
+        name: {who for household in split.households for who in personas_of(household)}
+        for name, split in file.splits.items()
+    }
+    plans = {
+        name: {json.dumps(choice.changes, default=str): choice.words for choice in choices}
+        for name, choices in homes.items()
+    }
+    problems = []
+    for one, other in combinations(file.splits, 2):
+        shared_homes = [plans[one][key] for key in plans[one] if key in plans[other]]
+        shared_people = sorted(people[one] & people[other])
+        for kind, shared in (("home", shared_homes), ("persona", shared_people)):
+            if shared:
+                names = ", ".join(shared[:5]) + (" …" if len(shared) > 5 else "")
+                problems.append(f"{one} and {other} share {len(shared)} {kind}(s): {names}")
+    if problems:
+        raise InputError(
+            "the splits overlap, so what is learned on one would be known to the other: "
+            + "; ".join(problems)
+        )

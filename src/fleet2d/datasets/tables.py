@@ -1,0 +1,241 @@
+"""The tables of a data set, made from one run: evidence, labels, beliefs, rooms, and the run."""
+
+from collections.abc import Mapping, Sequence
+from datetime import timedelta
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+import pyarrow as pa
+
+from fleet2d.algorithms.presence.belief import ANYONE, AWAY
+from fleet2d.datasets.specification import BELIEF, EVIDENCE, STAYS, PlannedRun
+from fleet2d.kernels import I64
+
+if TYPE_CHECKING:
+    from fleet2d.runs.run import Run
+
+TIME = pa.timestamp("us")
+SCHEMAS: Mapping[str, pa.Schema] = {
+    "runs": pa.schema(
+        [
+            ("run", pa.int32()),
+            ("split", pa.string()),
+            ("home", pa.string()),
+            ("household", pa.string()),
+            ("varied", pa.string()),
+            ("users", pa.list_(pa.string())),
+            ("seed", pa.int64()),
+            ("start", TIME),
+            ("days", pa.float64()),
+            ("digest", pa.string()),
+        ]
+    ),
+    "rooms": pa.schema(
+        [
+            ("run", pa.int32()),
+            ("room", pa.string()),
+            ("kind", pa.string()),
+            ("area_m2", pa.float64()),
+            ("x", pa.float64()),
+            ("y", pa.float64()),
+        ]
+    ),
+    "evidence": pa.schema(
+        [
+            ("run", pa.int32()),
+            ("time", TIME),
+            ("step", pa.int32()),
+            ("room", pa.string()),
+            ("kind", pa.string()),
+            ("user", pa.string()),
+            ("watched", pa.float32()),
+            ("seen", pa.int16()),
+        ]
+    ),
+    "labels": pa.schema(
+        [
+            ("run", pa.int32()),
+            ("time", TIME),
+            ("step", pa.int32()),
+            ("user", pa.string()),
+            ("place", pa.string()),
+            ("next_place", pa.string()),
+            ("next_step", pa.int32()),
+            ("activity", pa.string()),
+        ]
+    ),
+    "beliefs": pa.schema(
+        [
+            ("run", pa.int32()),
+            ("time", TIME),
+            ("step", pa.int32()),
+            ("model", pa.string()),
+            ("user", pa.string()),
+            ("place", pa.string()),
+            ("probability", pa.float32()),
+        ]
+    ),
+}
+"""The columns of each table.
+
+`step` and `time` are those of the last step that a row may know of: of a bin of evidence its last,
+of a belief the one at which it was held, of a label the one whose truth it tells. So evidence up to
+a step, joined with the labels of that step, has no knowledge of the future.
+"""
+
+
+class Whereabouts(NamedTuple):
+    """Where a user truly was, and what the user did.
+
+    Attributes:
+        begin: int64 (stays,), the first step of each stay, ascending.
+        place: str (stays,), the name of the room, or away; consecutive ones differ.
+        end: One past the last step.
+        since: int64 (activities,), the first step of each activity.
+        activity: str (activities,).
+    """
+
+    begin: I64
+    place: Any
+    end: int
+    since: I64
+    activity: Any
+
+    def at(self, steps: I64) -> dict[str, Any]:
+        """Return the labels of some steps: place, next place and the step at which it begins."""
+        k = np.searchsorted(self.begin, steps, side="right") - 1
+        is_last = k + 1 == len(self.begin)
+        following = np.minimum(k + 1, len(self.begin) - 1)
+        a = np.searchsorted(self.since, steps, side="right") - 1
+        names = np.array([*self.activity, None], object)  # the last, at -1, is before the first
+        return {
+            "place": self.place[k],
+            "next_place": np.where(is_last, None, self.place[following]),
+            "next_step": np.where(is_last, np.nan, self.begin[following]),
+            "activity": names[a],
+        }
+
+
+def tables_of(run: "Run", planned: PlannedRun, labels: timedelta) -> dict[str, pa.Table]:
+    """Return the tables of a run of a data set.
+
+    Args:
+        run: The run, in memory or stored.
+        planned: What was planned for it.
+        labels: Time between labels.
+    """
+    manifest = run.manifest
+    start, step_us = np.datetime64(manifest["start"], "us"), int(manifest["step_us"])
+    users = list(manifest["scenario"]["users"])
+    number = planned.number
+
+    def table(name: str, columns: Mapping[str, Any], rows: int) -> pa.Table:
+        given = {"run": np.full(rows, number, np.int32), **columns}
+        if "step" in columns:
+            given["time"] = start + np.asarray(columns["step"], np.int64) * step_us
+        schema = SCHEMAS[name]
+        arrays = [pa.array(given[f.name], f.type, from_pandas=True) for f in schema]
+        return pa.table(arrays, schema=schema)
+
+    rooms = run.plan.rooms
+    made = {
+        "runs": table("runs", _run_row(planned, users, start, run), 1),
+        "rooms": table(
+            "rooms",
+            {
+                "room": [room.name for room in rooms],
+                "kind": [room.type for room in rooms],
+                "area_m2": [room.area_m2 for room in rooms],
+                "x": [room.anchor_xy[0] for room in rooms],
+                "y": [room.anchor_xy[1] for room in rooms],
+            },
+            len(rooms),
+        ),
+    }
+    bin_steps = max(1, 60_000_000 // step_us)
+    if EVIDENCE in run.tables:
+        columns = columns_of(run, EVIDENCE, ["bin", "room", "kind", "user", "watched", "seen"])
+        columns["step"] = columns.pop("bin") + bin_steps - 1
+    else:
+        columns = {name: [] for name in ("step", "room", "kind", "user", "watched", "seen")}
+    made["evidence"] = table("evidence", columns, len(columns["step"]))
+    every = max(1, labels // timedelta(microseconds=step_us))
+    steps = np.arange(every - 1, int(manifest["steps"]), every)
+    parts = {user: whereabouts(run, user).at(steps) for user in users}
+    joined = {
+        name: np.concatenate([part[name] for part in parts.values()])
+        for name in ("place", "next_place", "next_step", "activity")
+        if parts
+    } or {name: np.array([]) for name in ("place", "next_place", "next_step", "activity")}
+    joined |= {"step": np.tile(steps, len(users)), "user": np.repeat(users, len(steps))}
+    made["labels"] = table("labels", joined, len(steps) * len(users))
+    made["beliefs"] = pa.concat_tables(
+        [SCHEMAS["beliefs"].empty_table()]
+        + [
+            table("beliefs", columns, len(columns["step"]))
+            for columns in _beliefs(run, [name for name in run.tables if name.startswith(BELIEF)])
+        ]
+    )
+    return made
+
+
+def _run_row(planned: PlannedRun, users: Sequence[str], start: Any, run: "Run") -> dict[str, Any]:
+    fixed = {"home", "household"}
+    varied = [f"{name}={value}" for name, value in planned.labels.items() if name not in fixed]
+    return {
+        "split": [planned.split],
+        "home": [str(planned.labels["home"])],
+        "household": [str(planned.labels["household"])],
+        "varied": ["; ".join(varied)],
+        "users": [list(users)],
+        "seed": [planned.seed],
+        "start": np.array([start]),
+        "days": [float(run.manifest["simulated_s"]) / 86_400],
+        "digest": [run.digest],
+    }
+
+
+def columns_of(run: "Run", name: str, columns: Sequence[str]) -> dict[str, Any]:
+    """Return columns of a table of a run as arrays; texts as objects."""
+    table = run.arrow(name).select(list(columns))
+    return {
+        field.name: table[field.name].combine_chunks().to_numpy(zero_copy_only=False)
+        if not pa.types.is_dictionary(field.type)
+        else np.asarray(table[field.name].cast(pa.string()).to_pylist(), object)
+        for field in table.schema
+    }
+
+
+def whereabouts(run: "Run", user: str) -> Whereabouts:
+    """Return where a user truly was, from the tables `stays` and `events` of a run."""
+    stays = columns_of(run, STAYS, ["user", "place", "begin", "end"])
+    own = stays["user"] == user
+    place, begin, end = stays["place"][own], stays["begin"][own], stays["end"][own]
+    is_new = np.append(True, place[1:] != place[:-1])[: len(place)]
+    since, activity = np.zeros(0, np.int64), np.zeros(0, object)
+    if "events" in run.tables:
+        events = columns_of(run, "events", ["step", "entity", "event", "detail"])
+        is_own = (events["entity"] == user) & (events["event"] == "activity")
+        since, activity = events["step"][is_own], events["detail"][is_own]
+    return Whereabouts(begin[is_new], place[is_new], int(end[-1]), since, activity)
+
+
+def _beliefs(run: "Run", names: Sequence[str]) -> list[dict[str, Any]]:
+    made = []
+    for name in names:
+        columns = columns_of(run, name, ["step", "user", "room", "share"])
+        places = int(np.argmax(columns["room"] == AWAY)) + 1  # rooms in order, and last away
+        share = columns["share"].reshape(-1, places)
+        joint = share.copy()
+        joint[:, :-1] *= 1 - share[:, -1:]
+        own = np.repeat(columns["user"].reshape(-1, places)[:, 0] != ANYONE, places)
+        made.append(
+            {
+                "step": columns["step"][own],
+                "model": np.full(int(own.sum()), name.removeprefix(BELIEF), object),
+                "user": columns["user"][own],
+                "place": columns["room"][own],
+                "probability": joint.ravel()[own],
+            }
+        )
+    return made

@@ -1,0 +1,290 @@
+"""Tasks on a data set, each with its metrics and baselines, and the leaderboard that they fill.
+
+- `rtp`: where a person is now, given the evidence so far, at each label with a stored belief: log
+  loss [nats], accuracy and calibration error, over all and by the gap since the last sighting.
+- `ltp`: the share of time in each room, at home: total variation distance to the true shares.
+- `next_room`: the kind of place where a person goes next, for each stay: log loss, accuracy.
+- `time_to_return`: when a person who is away comes back: mean absolute error [min].
+- `activity`: what a person does, given the kind of room and the hour: log loss, accuracy.
+
+Baselines learn from `train` and are scored on another split.
+"""
+
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from fleet2d.algorithms.presence.belief import ANYONE, AWAY
+from fleet2d.algorithms.presence.learned import Weights, shipped_weights
+from fleet2d.datasets.reader import Dataset
+from fleet2d.datasets.tables import SCHEMAS
+from fleet2d.datasets.training import predict
+from fleet2d.datasets.windows import Windows, windows_of
+from fleet2d.errors import InputError
+from fleet2d.kernels import F64, I64
+from fleet2d.metrics.rtp_score import GAP_ENDS, GAPS, calibration_error, log_loss, top_k
+
+TRAIN = "train"
+Cases = list[tuple[tuple[str, ...], str]]
+"""What is known of each case, and its outcome."""
+SMOOTHING = 1.0  # added to each count of a baseline
+
+
+class Entry(NamedTuple):
+    """A row of the leaderboard.
+
+    Attributes:
+        task: The task.
+        model: What was scored.
+        scores: Numbers by metric.
+        cases: Number of scored cases.
+    """
+
+    task: str
+    model: str
+    scores: Mapping[str, float]
+    cases: int
+
+
+def windows(data: Dataset, split: str) -> Iterator[Windows]:
+    """Yield the windows of a split, as `windows_of`."""
+    yield from windows_of({name: data.arrow(name, split) for name in SCHEMAS})
+
+
+def leaderboard(
+    data: Dataset,
+    tasks: Sequence[str] = (),
+    split: str = "test",
+    models: Mapping[str, Weights] | None = None,
+) -> list[Entry]:
+    """Score the baselines of tasks on a split.
+
+    Args:
+        data: The data set.
+        tasks: Names of tasks; none: all.
+        split: The split to score on.
+        models: Further networks for `rtp`, by name.
+
+    Raises:
+        InputError: There is no such task or split.
+    """
+    unknown = [task for task in tasks if task not in TASKS]
+    if unknown:
+        raise InputError(f"there is no task {unknown[0]!r}: tasks are {', '.join(TASKS)}")
+    names = tasks or [t for t in TASKS if t == "rtp" or TRAIN in data.splits]
+    return [
+        entry
+        for task in names
+        for entry in (
+            _score_rtp(data, split, models or {}) if task == "rtp" else TASKS[task](data, split)
+        )
+    ]
+
+
+def rtp_scores(belief: F64, truth: I64, gap: F64) -> dict[str, float]:
+    """Return log loss, accuracy and calibration error, and log loss and accuracy by gap.
+
+    Args:
+        belief: float64 (n, places).
+        truth: int64 (n,).
+        gap: float64 (n,), minutes since the newest sighting.
+    """
+    loss, hit = log_loss(belief, truth), top_k(belief, truth, 1)
+    scores = {
+        "log_loss": float(loss.mean()),
+        "accuracy": float(hit.mean()),
+        "ece": calibration_error(belief, truth),
+    }
+    classes = np.searchsorted(GAP_ENDS, gap)
+    for k, name in enumerate(GAPS[: len(GAP_ENDS) + 1]):
+        own = classes == k
+        if own.any():
+            scores[f"log_loss {name}"] = float(loss[own].mean())
+            scores[f"accuracy {name}"] = float(hit[own].mean())
+    return scores
+
+
+def _score_rtp(data: Dataset, split: str, models: Mapping[str, Weights]) -> list[Entry]:
+    parts = list(windows(data, split))
+    networks = {"learned": shipped_weights(), **models}
+    beliefs: dict[str, list[F64]] = {}
+    for part in parts:
+        for name, belief in part.beliefs.items():
+            beliefs.setdefault(name, []).append(belief)
+        for name, weights in networks.items():
+            beliefs.setdefault(name, []).append(predict(weights, part))
+    if not parts:
+        return []
+    width = max(belief.shape[1] for own in beliefs.values() for belief in own)
+    truth = np.concatenate([part.truth for part in parts])
+    gap = np.concatenate([part.gap for part in parts])
+    return [
+        Entry("rtp", name, rtp_scores(_padded(own, width), truth, gap), len(truth))
+        for name, own in beliefs.items()
+    ]
+
+
+def _padded(beliefs: Sequence[F64], width: int) -> F64:
+    """Return beliefs of homes with fewer places with zeros for those that they lack."""
+    return np.concatenate([np.pad(b, ((0, 0), (0, width - b.shape[1]))) for b in beliefs])
+
+
+def _score_ltp(data: Dataset, split: str) -> list[Entry]:
+    """Score shares of rooms from all evidence of a run, against the true ones."""
+    errors: dict[str, list[float]] = {"uniform": [], "sighting_share": [], "exposure_ratio": []}
+    rooms, evidence = _groups(data, "rooms", split), _groups(data, "evidence", split)
+    for (run, user), labels in _groups(data, "labels", split, "user").items():
+        names = rooms[(run,)]["room"].tolist()
+        at_home = labels["place"][labels["place"] != AWAY].tolist()
+        if not at_home:
+            continue
+        truth = np.array([at_home.count(name) for name in names]) / len(at_home)
+        rows = evidence.get((run,))
+        seen, watched = np.zeros(len(names)), np.zeros(len(names))
+        if rows is not None:
+            room = np.array([names.index(name) for name in rows["room"]])
+            is_look, is_user = rows["user"] == ANYONE, rows["user"] == user
+            np.add.at(watched, room[is_look], rows["watched"][is_look])
+            np.add.at(seen, room[is_user], rows["seen"][is_user] / 60)
+        guesses = {
+            "uniform": np.ones(len(names)),
+            "sighting_share": seen,
+            "exposure_ratio": (seen + 0.01) / (watched + 1),
+        }
+        for name, guess in guesses.items():
+            share = guess / guess.sum() if guess.any() else np.full(len(names), 1 / len(names))
+            errors[name].append(float(np.abs(share - truth).sum() / 2))
+    return [Entry("ltp", n, {"tv": float(np.mean(e))}, len(e)) for n, e in errors.items() if e]
+
+
+def _score_next_room(data: Dataset, split: str) -> list[Entry]:
+    def cases(part: str) -> Cases:
+        found: Cases = []
+        for labels in _with_kinds(data, part):
+            is_last = np.append(labels["next_step"][1:] != labels["next_step"][:-1], True)
+            is_last &= ~np.isnan(labels["next_step"].astype(float))
+            rows = zip(labels["kind"][is_last], labels["next_kind"][is_last], strict=True)
+            found += [((kind,), following) for kind, following in rows]
+        return found
+
+    return _score_tables("next_room", cases(TRAIN), cases(split), "kind of room")
+
+
+def _score_activity(data: Dataset, split: str) -> list[Entry]:
+    def cases(part: str) -> Cases:
+        found: Cases = []
+        for labels in _with_kinds(data, part):
+            hour = labels["time"].astype("datetime64[h]").astype(int) % 24
+            rows = zip(labels["kind"], hour.astype(str), labels["activity"], strict=True)
+            found += [((kind, h), what) for kind, h, what in rows if kind != AWAY and what]
+        return found
+
+    return _score_tables("activity", cases(TRAIN), cases(split), "kind of room and hour")
+
+
+def _score_time_to_return(data: Dataset, split: str) -> list[Entry]:
+    def cases(part: str) -> tuple[I64, F64]:
+        hours, minutes = [], []
+        for labels in _with_kinds(data, part):
+            until = labels["next_step"].astype(float) - labels["step"]
+            own = (labels["kind"] == AWAY) & ~np.isnan(until)
+            hours.append(labels["time"][own].astype("datetime64[h]").astype(int) % 24)
+            step_s = (labels["time"][1] - labels["time"][0]) / np.timedelta64(1, "s")
+            step_s /= max(int(labels["step"][1] - labels["step"][0]), 1)
+            minutes.append(until[own] * step_s / 60)
+        return np.concatenate(hours), np.concatenate(minutes)
+
+    (hour, known), (asked, truth) = cases(TRAIN), cases(split)
+    if not len(known) or not len(truth):
+        return []
+    overall = float(np.median(known))
+    by_hour = [
+        float(np.median(known[hour == h])) if (hour == h).any() else overall for h in range(24)
+    ]
+    guesses = {"median": np.full(len(truth), overall), "median by hour": np.take(by_hour, asked)}
+    return [
+        Entry("time_to_return", name, {"mae_min": float(np.abs(g - truth).mean())}, len(truth))
+        for name, g in guesses.items()
+    ]
+
+
+def _score_tables(
+    task: str,
+    known: Cases,
+    asked: Cases,
+    given: str,
+) -> list[Entry]:
+    """Score the shares of each outcome in the training: overall, and given what is known."""
+    outcomes = sorted({what for _, what in [*known, *asked]})
+    if not known or not asked:
+        return []
+    overall = Counter(what for _, what in known)
+    base = np.array([overall[what] + SMOOTHING for what in outcomes])
+    base /= base.sum()
+    counts: dict[tuple[str, ...], Counter[str]] = {}
+    for condition, what in known:
+        counts.setdefault(condition, Counter())[what] += 1
+    tables = {
+        condition: (np.array([own[what] for what in outcomes]) + SMOOTHING * base)
+        / (sum(own.values()) + SMOOTHING)
+        for condition, own in counts.items()
+    }
+    truth = np.array([outcomes.index(what) for _, what in asked])
+    beliefs = {
+        "most common": np.tile(base, (len(truth), 1)),
+        f"by {given}": np.array([tables.get(condition, base) for condition, _ in asked]),
+    }
+    return [
+        Entry(
+            task,
+            name,
+            {
+                "log_loss": float(log_loss(belief, truth).mean()),
+                "accuracy": float(top_k(belief, truth, 1).mean()),
+            },
+            len(truth),
+        )
+        for name, belief in beliefs.items()
+    ]
+
+
+def _with_kinds(data: Dataset, split: str) -> Iterator[dict[str, Any]]:
+    """Yield the labels of each user of each run, with the kinds of present and next places."""
+    rooms = _groups(data, "rooms", split)
+    for (run, _), labels in _groups(data, "labels", split, "user").items():
+        own = rooms[(run,)]
+        kinds = {**dict(zip(own["room"], own["kind"], strict=True)), AWAY: AWAY, None: None}
+        labels["kind"] = np.array([kinds[place] for place in labels["place"]], object)
+        labels["next_kind"] = np.array([kinds[place] for place in labels["next_place"]], object)
+        yield labels
+
+
+def _groups(data: Dataset, table: str, split: str, *also: str) -> dict[Any, dict[str, Any]]:
+    """Return the rows of a table as arrays by run, and by further columns, in order."""
+    rows = data.arrow(table, split)
+    columns = {name: rows[name].to_numpy(zero_copy_only=False) for name in rows.column_names}
+    numbers = [np.unique(columns[name], return_inverse=True)[1] for name in ("run", *also)]
+    order = np.lexsort(numbers[::-1])
+    changes = np.any([np.diff(number[order], prepend=-1) != 0 for number in numbers], axis=0)
+    parts = np.split(order, np.flatnonzero(changes)[1:]) if len(order) else []
+    return {
+        tuple(columns[name][part[0]] for name in ("run", *also)): {
+            name: values[part] for name, values in columns.items()
+        }
+        for part in parts
+    }
+
+
+def _rtp(data: Dataset, split: str) -> list[Entry]:
+    return _score_rtp(data, split, {})
+
+
+TASKS: Mapping[str, Callable[[Dataset, str], list[Entry]]] = {
+    "rtp": _rtp,
+    "ltp": _score_ltp,
+    "next_room": _score_next_room,
+    "time_to_return": _score_time_to_return,
+    "activity": _score_activity,
+}

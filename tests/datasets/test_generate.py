@@ -1,0 +1,164 @@
+"""Making data sets: the same content always, resumable, and read by other programs."""
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from tests.datasets.small import SOURCE, make
+
+import fleet2d
+from fleet2d.datasets.reader import Dataset
+from fleet2d.errors import Fleet2DError, InputError
+
+
+def records(data: Dataset) -> dict[str, str]:
+    return {name: file["sha256"] for name, file in data.manifest["files"].items()}
+
+
+def test_tables_are_there_for_every_split(data: Dataset) -> None:
+    assert ("train", "test") == data.splits
+    runs = data.arrow("runs", "train").to_pydict()
+    assert [0, 1, 2] == runs["run"]
+    assert [0.25] * 3 == runs["days"]
+    labels = data.arrow("labels", "train").to_pydict()
+    users = sum(len(names) for names in runs["users"])
+    assert users * 360 == len(labels["place"])
+    assert {"routine", "last_seen"} == set(data.arrow("beliefs", "test")["model"].to_pylist())
+
+
+def test_labels_are_the_truth_of_their_step(data: Dataset) -> None:
+    labels = data.polars("labels", "test").collect()
+    places, following = labels["place"].to_list(), labels["next_place"].to_list()
+    steps, next_steps = labels["step"].to_list(), labels["next_step"].to_list()
+
+    for k in range(len(places) - 1):
+        if next_steps[k] is None or next_steps[k] > steps[k + 1]:
+            assert places[k] == places[k + 1]
+        elif next_steps[k + 1] != next_steps[k]:
+            assert following[k] != places[k]
+    assert following[-1] is None
+
+
+def test_the_content_is_the_same_for_any_number_of_workers(data: Dataset, tmp_path: Path) -> None:
+    assert records(data) == records(make(tmp_path / "two", workers=2))
+
+
+def test_an_interrupted_data_set_goes_on(data: Dataset, tmp_path: Path) -> None:
+    out = tmp_path / "killed"
+    source = tmp_path / "small.json"
+    source.write_text(json.dumps(SOURCE))
+    code = (
+        "import fleet2d, json, sys;"
+        " fleet2d.dataset(json.load(open(sys.argv[1])), sys.argv[2], workers=1)"
+    )
+    process = subprocess.Popen([sys.executable, "-c", code, str(source), str(out)])
+    for _ in range(2000):
+        if list((out / "unfinished").glob("*.arrow")) or process.poll() is not None:
+            break
+        time.sleep(0.01)
+    os.kill(process.pid, signal.SIGKILL)
+    process.wait()
+    with pytest.raises(InputError, match="run the same command again"):
+        fleet2d.open_dataset(out)
+    with pytest.raises(InputError, match="of another file"):
+        fleet2d.dataset({**SOURCE, "seed": 5}, out)
+
+    assert records(data) == records(make(out))
+    assert not (out / "unfinished").exists()
+
+
+def test_a_complete_one_is_opened_and_another_refused(data: Dataset) -> None:
+    assert records(make(data.root)) == records(data)
+    with pytest.raises(InputError, match="holds another data set"):
+        fleet2d.dataset({**SOURCE, "seed": 5}, data.root)
+
+
+def test_a_folder_with_other_files_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "thesis.txt").write_text("mine")
+    with pytest.raises(InputError, match="not empty"):
+        make(tmp_path)
+    assert ["thesis.txt"] == [path.name for path in tmp_path.iterdir()]
+
+
+@pytest.mark.parametrize("damage", ["cut", "changed", "gone"])
+def test_damaged_shards_are_found(data: Dataset, tmp_path: Path, damage: str) -> None:
+    root = tmp_path / "copy"
+    shutil.copytree(data.root, root)
+    path = root / "train" / "labels-00001.parquet"
+    content = path.read_bytes()
+    if damage == "gone":
+        path.unlink()
+    else:
+        path.write_bytes(
+            content[:-100] if damage == "cut" else content[:99] + b"\0" + content[100:]
+        )
+    again = fleet2d.open_dataset(root)
+
+    assert ["train/labels-00001.parquet"] == again.verify()
+    if damage != "changed":
+        with pytest.raises(InputError, match=r"labels-00001\.parquet"):
+            again.arrow("labels", "train")
+
+
+def test_a_day_takes_little_room(data: Dataset) -> None:
+    """Bytes of evidence and labels for a day of one person, beside the fixed part of each file."""
+    table = data.arrow("labels", "train")
+    assert table.nbytes > 0
+    size = sum(
+        file["bytes"]
+        for name, file in data.manifest["files"].items()
+        if name.startswith(("train/evidence", "train/labels"))
+    )
+    days = sum(data.arrow("runs", "train")["days"].to_pylist())
+    assert size / days < 150_000
+
+
+def test_the_card_says_what_is_in_it(data: Dataset) -> None:
+    card = (data.root / "README.md").read_text()
+
+    assert card.startswith("---\nlicense: cc0-1.0\n")
+    assert "| train | 3 | 0.75 | 2 |" in card
+    assert "household: " in card
+    assert (data.root / "pictures" / "place.png").stat().st_size > 1000
+
+
+def test_duckdb_and_polars_read_it(data: Dataset) -> None:
+    duckdb = pytest.importorskip("duckdb")
+    pattern = str(data.root / "train" / "labels-*.parquet")
+
+    [(count,)] = duckdb.sql(f"SELECT count(*) FROM '{pattern}'").fetchall()
+
+    assert count == data.polars("labels", "train").collect().height
+
+
+@pytest.mark.parametrize(("table", "split"), [("label", "train"), ("labels", "tests")])
+def test_unknown_tables_and_splits_are_named(data: Dataset, table: str, split: str) -> None:
+    with pytest.raises(InputError, match="tables beliefs, evidence, labels, rooms, runs"):
+        data.arrow(table, split)
+
+
+def test_a_failed_run_keeps_the_others(tmp_path: Path) -> None:
+    """A household that can't live in a home: the message names the scenario, and nothing is lost."""
+    bad: dict[str, Any] = json.loads(json.dumps(SOURCE))
+    bad["vary"] = {
+        "place": {
+            "options": {"none": {"robots.astro.behaviors": [{"type": "patrol", "rooms": ["pool"]}]}}
+        }
+    }
+    with pytest.raises(Fleet2DError):
+        fleet2d.dataset(bad, tmp_path / "bad", workers=1)
+    with pytest.raises(InputError):
+        fleet2d.open_dataset(tmp_path / "bad")
+
+
+def test_steps_of_evidence_are_the_last_of_their_bins(data: Dataset) -> None:
+    steps = np.array(data.arrow("evidence", "train")["step"].to_pylist())
+    assert set((steps + 1) % 60) == {0}
