@@ -86,6 +86,23 @@ def test_without_a_failure_the_smallest_margin_is_reported(folder: Path) -> None
     assert "narrowest: margin" in done.output
 
 
+def test_it_goes_on_after_its_first_find_and_says_what_fails_apart(folder: Path) -> None:
+    axes = ["--over", OVER, "--over", "where={key: robots.astro.dwell, values: [1 min, 2 min]}"]
+    done = falsify("flat.yaml", *axes, "--budget", "40", "--finds", "3", "--out", "found.yaml")
+
+    assert 1 == done.exit_code, done.output
+    assert "3 of " in done.output
+    assert "  comes missed: at try " in done.output
+    assert all((folder / name).is_file() for name in ("found.yaml", "found-2.yaml", "found-3.yaml"))
+    assert 1 == done.output.count("smaller:"), "failures of one kind are made smaller once"
+    assert "where = 1 min" in done.output.partition("never failed:")[2]
+    assert "where = 2 min" not in done.output.partition("never failed:")[2]
+    for name in ("found-2.yaml", "found-3.yaml"):
+        simulation = fleet2d.Simulation(name)
+        simulation.run()
+        assert not simulation.verdicts()["comes"].holds
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [

@@ -41,6 +41,9 @@ def falsify(
     out: Annotated[
         Path, typer.Option(help="The scenario to write that fails; a run beside it.")
     ] = Path("falsified.yaml"),
+    finds: Annotated[
+        int, typer.Option(min=1, help="How many runs that fail to look for; see what they share.")
+    ] = 1,
     seed: Annotated[int, typer.Option(min=0, help="Of the search.")] = 0,
     workers: Annotated[
         int | None, typer.Option(min=1, help="Processes; left out: one per core.")
@@ -59,18 +62,36 @@ def falsify(
     space = read_space(parse_over(over))
     space.check(subject.base, subject.folder)
     job = TryJob(subject, space)
-    search = FailureSearch(job, tries, seed=seed)
+    search = FailureSearch(job, tries, seed=seed, finds=finds)
     shows_progress = sys.stderr.isatty() and not quiet
-    failure = search.run(
-        make_executor("local", workers), seconds, _progress if shows_progress else None
-    )
-    if failure is None:
+    search.run(make_executor("local", workers), seconds, _progress if shows_progress else None)
+    if search.failure is None:
         _print_no_failure(search, job)
         return
-    for line in describe_failure(failure, job, target, out):
-        if not quiet:
-            typer.echo(line)
+    lines: list[str] = []
+    described: set[str] = set()
+    for number, failure in enumerate(search.failures):
+        path = out if number == 0 else out.with_stem(f"{out.stem}-{number + 1}")
+        # Of failures of one kind only the first is made smaller.
+        shrink = 0 if failure.what in described else SHRINK_TRIES
+        described.add(failure.what)
+        lines += [*describe_failure(failure, job, target, path, shrink), ""]
+    if finds > 1:
+        lines += summary(search)
+    for line in [] if quiet else lines:
+        typer.echo(line)
     raise typer.Exit(FAILURE_FOUND)
+
+
+def summary(search: "FailureSearch") -> list[str]:
+    """Return what failed, told apart, and which values never did."""
+    tries: dict[str, list[str]] = {}
+    for failure in search.failures:
+        tries.setdefault(failure.what, []).append(str(failure.number))
+    lines = [f"{len(search.failures)} of {search.tries} runs failed:"]
+    lines += [f"  {what}: at try {', '.join(numbers)}" for what, numbers in tries.items()]
+    never = search.never_failed()
+    return [*lines, "never failed:", *(f"  {line}" for line in never)] if never else lines
 
 
 def parse_budget(text: str) -> tuple[int, float | None]:
@@ -123,7 +144,9 @@ def _check_expects(subject: "Subject", target: str) -> None:
     subject.body()
 
 
-def describe_failure(failure: "FailingPoint", job: "TryJob", target: str, out: Path) -> list[str]:
+def describe_failure(
+    failure: "FailingPoint", job: "TryJob", target: str, out: Path, shrink: int = SHRINK_TRIES
+) -> list[str]:
     """Write the failing scenario, and its run beside it; return the lines of a report."""
     from fleet2d.testing.failures import describe_trial
 
@@ -135,7 +158,7 @@ def describe_failure(failure: "FailingPoint", job: "TryJob", target: str, out: P
     lines = [f"fails at try {failure.number}: {point}, seed {failure.seed}"]
     folder = out.with_suffix("")
     folder.mkdir(parents=True, exist_ok=True)
-    lines += describe_trial(trial, job.subject.body(), folder, SHRINK_TRIES, command)
+    lines += describe_trial(trial, job.subject.body(), folder, shrink, command)
     reason = trial.failures[0].text.splitlines()[0]
     out.write_text(_scenario_text(failure, job, target, out, reason), encoding="utf-8")
     return [*lines, "", f"written: {out}"]

@@ -220,12 +220,15 @@ class TryJob:
         return run_trial(Variant(scenario, {"seed": seed}), self._body)
 
     def __call__(self, task: WorkerTask) -> bytes:
-        """Return (margin, error), pickled; one of them is None."""
+        """Return (margin, what failed, error), pickled; margin or error is None."""
         assert isinstance(task, TryTask)
         try:
-            return pickle.dumps((self.run(task.point, task.seed).margin, None))
+            result = self.run(task.point, task.seed)
         except Exception as error:  # noqa: BLE001 - some points give no valid home; reported
-            return pickle.dumps((None, describe_error(error)))
+            return pickle.dumps((None, "", describe_error(error)))
+        failure = result.first_failure
+        what = " ".join(filter(None, [failure.name, failure.kind])) if failure else ""
+        return pickle.dumps((result.margin, what, None))
 
 
 class TrySchedule(TaskSchedule):
@@ -248,7 +251,7 @@ class TrySchedule(TaskSchedule):
 
     def __bool__(self) -> bool:
         """Return whether there are runs to come."""
-        if self._search.failure is not None:
+        if self._search.is_over:
             return False
         is_late = self._deadline is not None and time.monotonic() > self._deadline
         return bool(self._returned) or (self.started < self._budget and not is_late)
@@ -278,35 +281,70 @@ class FailingPoint:
         point: The point.
         seed: Seed of the run.
         margin: Margin of the run, below 0.
+        what: The expectation that failed first, and in which way.
     """
 
     number: int
     point: dict[str, Any]
     seed: int
     margin: float
+    what: str
 
 
 class FailureSearch:
-    """A search for a run in which an expectation fails.
+    """A search for runs in which an expectation fails.
 
     Attributes:
-        failure: The first failure; None until there is one.
-        tries: Number of finished runs.
+        failures: The failures.
+        points: The points of all finished runs.
         narrowest: The smallest margin so far, and its point.
         errors: Errors of runs that couldn't be simulated, with how often they happened.
     """
 
-    def __init__(self, job: TryJob, budget: int, *, seed: int = 0, is_guided: bool = True) -> None:
+    def __init__(
+        self, job: TryJob, budget: int, *, seed: int = 0, finds: int = 1, is_guided: bool = True
+    ) -> None:
         """Prepare a search; with is_guided=False all points are random, for comparison."""
-        self._job, self._budget, self._seed = job, budget, seed
+        self._job, self._budget, self._seed, self._finds = job, budget, seed, finds
         self._generator = random.Random(seed)  # noqa: S311 - a search, not a secret
         self._random = max(MIN_RANDOM_POINTS, round(RANDOM_SHARE * budget)) if is_guided else budget
         self._study = _optuna(seed, self._random) if is_guided else None
         self._suggested: dict[int, Any] = {}
-        self.failure: FailingPoint | None = None
-        self.tries = 0
+        self.failures: list[FailingPoint] = []
+        self.points: list[Settings] = []
         self.narrowest: tuple[float, dict[str, Any]] | None = None
         self.errors: dict[str, int] = {}
+
+    @property
+    def tries(self) -> int:
+        """Number of finished runs."""
+        return len(self.points)
+
+    @property
+    def failure(self) -> FailingPoint | None:
+        """The first failure; None until there is one."""
+        return next(iter(self.failures), None)
+
+    @property
+    def is_over(self) -> bool:
+        """Whether it has as many failures as it looks for."""
+        return len(self.failures) >= self._finds
+
+    def never_failed(self) -> list[str]:
+        """Return which values never failed, a line for each dimension that has some."""
+        failing = [failure.point for failure in self.failures]
+        lines = []
+        for name in self._job.space.ranges:
+            bad = [point[name] for point in failing]
+            good = sorted(point[name] for point in self.points)
+            sides = [v for v in good if v < min(bad)], [v for v in good if v > max(bad)]
+            parts = [f"{v[0]:.4g} to {v[-1]:.4g} ({len(v)} runs)" for v in sides if v]
+            lines += [f"{name}: {', '.join(parts)}"] if parts else []
+        for name, choices in self._job.space.choices.items():
+            tried = {point[name] for point in self.points} - {point[name] for point in failing}
+            texts = [choices[number].words for number in sorted(tried)]
+            lines += [", ".join(texts)] if texts else []
+        return lines
 
     def run(
         self,
@@ -314,7 +352,7 @@ class FailureSearch:
         seconds: float | None = None,
         observer: Callable[["FailureSearch"], None] | None = None,
     ) -> FailingPoint | None:
-        """Search until a run fails, or the budget is used up.
+        """Search until enough runs have failed, or the budget is used up.
 
         Args:
             executor: Executes the runs.
@@ -327,15 +365,15 @@ class FailureSearch:
         try:
             for event in events:
                 assert isinstance(event.task, TryTask)
-                margin, error = (
-                    (None, event.reason)
+                margin, what, error = (
+                    (None, "", event.reason)
                     if isinstance(event, LostTask)
                     else pickle.loads(event.payload)  # noqa: S301 - by this program's workers
                 )
-                self._add(event.task, margin, error)
+                self._add(event.task, margin, what, error)
                 if observer is not None:
                     observer(self)
-                if self.failure is not None:
+                if self.is_over:
                     break
         finally:
             events.close()
@@ -351,8 +389,8 @@ class FailureSearch:
             point = self._job.space.ask(trial)
         return TryTask(number, number, "", point=point, seed=self._seed + number)
 
-    def _add(self, task: TryTask, margin: float | None, error: str | None) -> None:
-        self.tries += 1
+    def _add(self, task: TryTask, margin: float | None, what: str, error: str | None) -> None:
+        self.points.append(task.point)
         trial = self._suggested.pop(task.number, None)
         if margin is None:
             text = error or "it could not be run"
@@ -365,7 +403,7 @@ class FailureSearch:
             state = TrialState.FAIL if margin is None else None
             self._study.tell(trial, margin, state=state)
         if margin is not None and margin < 0:
-            self.failure = FailingPoint(self.tries, task.point, task.seed, margin)
+            self.failures.append(FailingPoint(self.tries, task.point, task.seed, margin, what))
 
 
 def _optuna(seed: int, startup: int) -> "optuna.Study":
