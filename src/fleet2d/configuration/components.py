@@ -213,6 +213,10 @@ PACKAGES = {
     "sight": "fleet2d.sight",
     "perception_error": "fleet2d.sight",
     "intervention": "fleet2d.interventions",
+    "answers": "fleet2d.interactions",
+    "answer_part": "fleet2d.interactions",
+    "attitude": "fleet2d.interactions",
+    "timing_policy": "fleet2d.algorithms.timing",
 }
 """Where the built-in components of each kind live."""
 

@@ -5,6 +5,7 @@ from typing import Any
 
 from fleet2d.entities.behavior import Actor
 from fleet2d.floorplan.home import Home
+from fleet2d.interactions.interaction import REQUEST_EVENTS
 from fleet2d.runtime.events import KINDS, EventKind
 
 # Events of every person: an order can cause them if no behavior does.
@@ -52,6 +53,8 @@ def _kinds_of(
         kinds |= {EventKind.GIVES_WAY, EventKind.GIVES_UP}
     if may_block:
         kinds.add(EventKind.WAY_BLOCKED)
+    if actor.requests is not None:
+        kinds |= REQUEST_EVENTS
     for behavior in actor.behaviors:
         kinds |= behavior.records
     if _is_own(actor):

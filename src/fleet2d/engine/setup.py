@@ -12,8 +12,9 @@ from fleet2d.engine.bodies import Basis, Bodies
 from fleet2d.engine.cameras import Cameras
 from fleet2d.engine.change_queue import ChangeQueue
 from fleet2d.engine.collisions import BlockedWays, Clearance
+from fleet2d.engine.conversations import Conversations
 from fleet2d.engine.encounters import Encounters
-from fleet2d.engine.interrupts.interrupt import SIGHT_EVENTS, Interruptions
+from fleet2d.engine.interrupts.interrupt import WATCHED_EVENTS, Interruptions
 from fleet2d.engine.intervention_queue import InterventionQueue
 from fleet2d.engine.layers import LayerBook, add_layers
 from fleet2d.engine.learners import Learners
@@ -62,6 +63,7 @@ def set_up(scenario: Scenario, clock: Clock, seed: int, store: RunStore) -> Stat
     log = _log(basis, cameras, recorder) if learners.all else None
     clearance, blocking = Clearance(basis.users, basis.robots), BlockedWays(basis)
     encounters, interruptions = Encounters(basis.users, basis.robots), Interruptions(basis)
+    conversations = Conversations.of(basis)
     state = State(
         bodies=basis.bodies,
         actors=basis.actors,
@@ -70,6 +72,7 @@ def set_up(scenario: Scenario, clock: Clock, seed: int, store: RunStore) -> Stat
         clearance=clearance,
         blocking=blocking,
         encounters=encounters,
+        conversations=conversations,
         interruptions=interruptions,
         sensors=sensors,
         user_cameras=user_cameras,
@@ -91,6 +94,7 @@ def set_up(scenario: Scenario, clock: Clock, seed: int, store: RunStore) -> Stat
             *user_cameras,
             *cameras,
             encounters,
+            conversations,
             interruptions,
             sensors,
             *layers.areas,
@@ -212,7 +216,7 @@ def _prefix_errors(path: str) -> Iterator[None]:
 def _check_reads(scenario: Scenario, actors: list[DecidingActor]) -> None:
     """Refuse behaviors that read an unknown algorithm, or listen to an unknown event."""
     for actor in actors:
-        for name in sorted({name for b in actor.behaviors for name in b.listens} - SIGHT_EVENTS):
+        for name in sorted({name for b in actor.behaviors for name in b.listens} - WATCHED_EVENTS):
             try:
                 actor.entity.check_interrupt(name)
             except ComponentError as error:

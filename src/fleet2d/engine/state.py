@@ -14,6 +14,7 @@ from fleet2d.engine.bodies import Bodies, Watcher
 from fleet2d.engine.cameras import Cameras
 from fleet2d.engine.change_queue import ChangeQueue
 from fleet2d.engine.collisions import BlockedWays, Clearance
+from fleet2d.engine.conversations import Conversations
 from fleet2d.engine.encounters import Encounters
 from fleet2d.engine.interrupts.interrupt import Interruptions
 from fleet2d.engine.intervention_queue import InterventionQueue
@@ -49,7 +50,8 @@ class State:
         home: The present home: doors, furniture, rooms, layers.
         changes: The changes of the home.
         watchers: All followers of the bodies, in their order.
-        clearance, blocking, encounters, interruptions, sensors: Some of the watchers.
+        clearance, blocking, encounters, conversations, interruptions, sensors: Some of the
+            watchers.
         user_cameras: The cameras of users.
         cameras: The cameras of robots.
         layers: What robots have seen of the home, and when layers are stored.
@@ -77,6 +79,7 @@ class State:
     clearance: Clearance
     blocking: BlockedWays
     encounters: Encounters
+    conversations: Conversations
     interruptions: Interruptions
     sensors: Sensors
     user_cameras: list[Cameras]
@@ -149,6 +152,7 @@ class State:
         self.emit_notes(row, step)
         self.recorder.before_plan(row, step)
         self.encounters.before_plan(row, self.actors[row], step)
+        self.conversations.before_plan(row, self.actors[row], step)
 
     def begin_plan(self, row: int, step: int) -> None:
         """Record the beginning of a body's new plan."""

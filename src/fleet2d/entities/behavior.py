@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from fleet2d.entities.place import RoomChoice
     from fleet2d.floorplan.home import Home
     from fleet2d.floorplan.plan import Room
+    from fleet2d.interactions.interaction import RequestQueue
 
 
 DAY = timedelta(days=1)
@@ -223,6 +224,11 @@ class Situation:
         """What the body was called to do, until a behavior takes it up."""
         return self.actor.command
 
+    @property
+    def requests(self) -> "RequestQueue | None":
+        """What the robot wants of people at present; None: the scenario has no interactions."""
+        return self.actor.requests
+
     def take_command(self, do: str) -> Command | None:
         """Return the body's command and remove it, if it is of a kind; else None."""
         command = self.actor.command
@@ -286,6 +292,8 @@ class Behavior(Component):
     records: ClassVar[frozenset[str]] = frozenset()
     # Events of its cameras at which it may interrupt the behaviors after it.
     listens: ClassVar[frozenset[str]] = frozenset()
+    # Whether it does nothing in a scenario in which its robot wants nothing of people.
+    serves_requests: ClassVar[bool] = False
     # Kinds of commands that it carries out: find, come, dock, or a name of its own.
     answers: ClassVar[frozenset[str]] = frozenset()
 
@@ -355,6 +363,7 @@ class Actor(Body):
     Attributes:
         behaviors: Its own copies of the behaviors of its configuration, the first one first.
         charge: The charge of its battery; None without a battery.
+        requests: What it wants of people; None without interactions.
         command: What it was called to do, until a behavior takes it up.
         in_view: Returns the people that its cameras have in view, and the last place of each [m].
         plan: The plan that it follows.
@@ -368,6 +377,7 @@ class Actor(Body):
         super().__post_init__()
         self.in_view: Callable[[], Mapping[str, Point]] = dict  # set if it has cameras
         behaviors = getattr(self.entity, "behaviors", ())
+        self.requests: RequestQueue | None = None  # set if the scenario has interactions
         self.behaviors = [behavior.model_copy(deep=True) for behavior in behaviors]
         with blame(self.path, None):
             self._state = self._first_pose()

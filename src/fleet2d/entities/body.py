@@ -100,6 +100,8 @@ class BodySettings(Settings):
     uses_furniture: ClassVar[bool] = False
     # What happens when its cameras lose somebody, and when they see somebody.
     sight_events: ClassVar[tuple[str, str]]
+    # What it hears about what it wants of people.
+    request_events: ClassVar[frozenset[str]] = frozenset()
 
     @property
     def eyes(self) -> dict[str, Camera]:
@@ -113,7 +115,7 @@ class BodySettings(Settings):
             ComponentError: There is none of that name, or it needs a camera.
         """
         own = self.sight_events if self.eyes else ()
-        if name in own:
+        if name in own or name in self.request_events:
             return
         try:
             lookup("interrupt", name)
@@ -169,6 +171,9 @@ class PlaceAt(NamedTuple):
     approach: tuple[int, int]
 
 
+Arrangement = tuple[int, int, frozenset[int]]
+
+
 @dataclass(eq=False)
 class Body:
     """A body in a run.
@@ -183,6 +188,7 @@ class Body:
         people: All users of the scenario by name; None for one that isn't built yet.
         notes: Which kinds of rooms and furniture the home lacks, so that keys were left out.
         part: The connected part of its space that it is in.
+        kept_out: Indices of the rooms that it was told to keep out of.
         row: Its row among the bodies of the run.
         drive: How it moves along routes; None: as `Differential`, which the core computes.
     """
@@ -198,7 +204,8 @@ class Body:
 
     def __post_init__(self) -> None:
         lattice = self.home.plan.lattice
-        self._space: tuple[tuple[int, int], Space] = self.arrangement, self._present_space()
+        self.kept_out: frozenset[int] = frozenset()
+        self._space: tuple[Arrangement, Space] = self.arrangement, self._present_space()
         self.speed = self.entity.speed * lattice.units_per_m  # units per second
         self.turn_rate = self.entity.turn_rate_deg / 360 * TURN  # headings per second
         drive: Drive | None = getattr(self.entity, "drive", None)
@@ -234,7 +241,7 @@ class Body:
     @property
     def space(self) -> Space:
         """Where its body can be at present."""
-        (version, costs_version), space = self._space  # nearly always up to date
+        (version, costs_version, _), space = self._space  # nearly always up to date
         if version == self.home.version and not (costs_version or self.entity.minds_costs):
             return space
         if self._space[0] != self.arrangement:
@@ -243,13 +250,21 @@ class Body:
         return self._space[1]
 
     @property
-    def arrangement(self) -> tuple[int, int]:
-        """The versions of the home and its route costs: the space is recomputed for others."""
-        return self.home.version, self.home.costs_version if self.entity.minds_costs else 0
+    def arrangement(self) -> Arrangement:
+        """What its space depends on: the versions of home and costs, rooms to keep out of."""
+        costs = self.home.costs_version if self.entity.minds_costs else 0
+        return self.home.version, costs, self.kept_out
+
+    @property
+    def may_block_routes(self) -> bool:
+        """Whether routes may be closed to it that were open before, or will be."""
+        return self.home.may_block_routes or bool(self.kept_out)
 
     def _present_space(self) -> Space:
         entity = self.entity
-        space = self.home.space(entity.radius, opens_doors=entity.opens_doors)
+        space = self.home.space(
+            entity.radius, opens_doors=entity.opens_doors, without=self.kept_out
+        )
         return self.home.costed(space) if entity.minds_costs else space
 
     def _present_part(self) -> int:

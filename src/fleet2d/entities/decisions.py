@@ -56,8 +56,9 @@ class Arbiter:
         self.active: int | None = None
         self.wake_step: int | None = None
         self._cool_at: dict[int, datetime] = {}  # when the cooldown of each is over
-        # By behavior: the plan to resume, the step of its interruption, and its own interrupts.
-        self._interrupted: dict[int, tuple[Plan, int, frozenset[str]]] = {}
+        # By behavior: the plan to resume, the step of its interruption, its own interrupts, and the
+        # rooms that the body kept out of.
+        self._interrupted: dict[int, tuple[Plan, int, frozenset[str], frozenset[int]]] = {}
         self.own: frozenset[str] = frozenset()
         self.off: frozenset[int] = frozenset()
         # Events at which only behaviors before the active one are asked.
@@ -177,7 +178,7 @@ class Arbiter:
             return
         is_interrupted = number is not None and number < last and not plan.is_over(now.step)
         if is_interrupted and self.behaviors[last].resumes:
-            self._interrupted[last] = plan, now.step, self.own
+            self._interrupted[last] = plan, now.step, self.own, now.actor.kept_out
         else:
             self._cool_down(last, now)
 
@@ -191,7 +192,9 @@ class Arbiter:
         """Return the rest of the interrupted plan of a behavior, if there is one."""
         if number not in self._interrupted:
             return None
-        interrupted, step, interrupts = self._interrupted.pop(number)
+        interrupted, step, interrupts, kept_out = self._interrupted.pop(number)
+        if kept_out != now.actor.kept_out:
+            return None  # its way may lead through a room that the body keeps out of now
         plan = resumed(now.actor, now.plan(), interrupted, step)
         if plan is not None:
             plan.interrupts = interrupts
@@ -505,7 +508,7 @@ class DecidingActor(Actor):
         try:
             return behavior.decide(now)
         except (PlacementError, NoWayError) as error:
-            if not (self.home.may_block_routes or self.home.version or self.is_displaced):
+            if not (self.may_block_routes or self.home.version or self.is_displaced):
                 raise
             plan, reason = now.plan(), str(error)
             if self._blocked != (reason, now.step):  # else the row was written before the wait

@@ -15,6 +15,8 @@ from fleet2d.entities.drives.drive import Drive
 from fleet2d.entities.equipment import Battery, Localization
 from fleet2d.entities.evidence.evidence_source import EvidenceSource
 from fleet2d.entities.giving_way import GivesWay
+from fleet2d.interactions.answers import AnswersField
+from fleet2d.interactions.interaction import REQUEST_EVENTS
 from fleet2d.sight.camera import Camera
 from fleet2d.sight.perception import Perception
 
@@ -39,10 +41,12 @@ class User(Entity):
     Attributes:
         opens_doors: Opens doors in the way; else a shut door is a wall to it.
         camera: The user's field of view; with it, robots that come into view are events.
+        answers: How the person answers robots that want something; null: as most people do.
     """
 
     opens_doors: bool = True
     camera: Camera | None = None
+    answers: AnswersField | None = None
     sight_events: ClassVar[tuple[str, str]] = ("robot_lost", "robot_seen")
     uses_furniture: ClassVar[bool] = True
 
@@ -90,6 +94,7 @@ class Robot(Entity):
     gives_way: GivesWay | None = None
     localization: Localization | None = None
     sight_events: ClassVar[tuple[str, str]] = ("user_lost", "user_seen")
+    request_events: ClassVar[frozenset[str]] = REQUEST_EVENTS
 
     @model_validator(mode="before")
     @classmethod

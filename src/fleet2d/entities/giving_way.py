@@ -15,7 +15,7 @@ from pydantic import Field
 from fleet2d.configuration.components import Settings
 from fleet2d.configuration.units import Length, PositiveDuration, micros
 from fleet2d.entities.behavior import Actor, Situation
-from fleet2d.entities.body import Body, Track
+from fleet2d.entities.body import Arrangement, Body, Track
 from fleet2d.entities.plan import Note, Plan
 from fleet2d.errors import NoWayError
 from fleet2d.floorplan.costmap import CLOSED, route_by_cost
@@ -163,7 +163,7 @@ class Surroundings(NamedTuple):
 
     people: I64
     users: I64
-    arrangement: tuple[int, int]
+    arrangement: Arrangement
 
     def is_unchanged_since(self, other: "Surroundings") -> bool:
         """Return whether no person and no object has moved."""

@@ -11,6 +11,7 @@ from shapely import Polygon
 
 from fleet2d.errors import FloorPlanError, PlacementError
 from fleet2d.floorplan.costmap import CostedSpace
+from fleet2d.floorplan.lattice import UNITS_PER_CELL
 from fleet2d.floorplan.layers import COSTMAP, Layers
 from fleet2d.floorplan.mesh import Gates, Segment, build_mesh, snap_polygon
 from fleet2d.floorplan.placed_objects import PlacedObject, UsePlace, find_named
@@ -103,15 +104,18 @@ class Home:
             self._walls = self.version, self._shapes.walls(self.shut, _tall(self.objects))
         return self._walls[1]
 
-    def space(self, radius: float, *, opens_doors: bool = False) -> Space:
+    def space(
+        self, radius: float, *, opens_doors: bool = False, without: frozenset[int] = NO_DOORS
+    ) -> Space:
         """Return the present space of bodies of a radius, built at its first use.
 
         Args:
             radius: The radius of the body [m].
             opens_doors: Whether the body passes shut doors that aren't locked.
+            without: Indices of the rooms that the body keeps out of.
         """
         shut = self.shut & self.locked if opens_doors else self.shut
-        return self._shapes.space(radius, shut, self.objects)
+        return self._shapes.space(radius, shut, self.objects, without)
 
     @property
     def costs_version(self) -> int:
@@ -264,9 +268,13 @@ class _Shapes:
         return entry[1]
 
     def space(
-        self, radius: float, shut: Collection[int], objects: tuple[PlacedObject, ...]
+        self,
+        radius: float,
+        shut: Collection[int],
+        objects: tuple[PlacedObject, ...],
+        without: frozenset[int],
     ) -> Space:
-        return self.space_of(radius, frozenset(shut), _solid(objects))
+        return self.space_of(radius, frozenset(shut), _solid(objects), without)
 
     def _make_walls(self, shut: frozenset[int], tall: tuple[PlacedObject, ...]) -> Mesh:
         if not self.door_lines:
@@ -291,16 +299,24 @@ class _Shapes:
         return build_mesh(polygons, plan.lattice.columns, plan.lattice.rows, corners)
 
     def _make_space(
-        self, radius: float, shut: frozenset[int], solid: tuple[PlacedObject, ...]
+        self,
+        radius: float,
+        shut: frozenset[int],
+        solid: tuple[PlacedObject, ...],
+        without: frozenset[int],
     ) -> Space:
+        rooms = [room for room in self.plan.rooms if room.index in without]
         space = Space(
             self.plan,
             radius,
             walls=self.walls(shut, _tall(solid)),
-            obstacles=[lattice_footprint(self.plan, thing) for thing in solid],
+            obstacles=[
+                *(lattice_footprint(self.plan, thing) for thing in solid),
+                *(shape for room in rooms for shape in _outlines(self.plan, room)),
+            ],
             shut=[self.door_lines[door] for door in sorted(shut)],
         )
-        space.key = radius, shut, solid
+        space.key = radius, shut, solid, without
         return space
 
 
@@ -321,6 +337,15 @@ def _shapes_of(plan: FloorPlan, door_lines: Sequence[Segment]) -> _Shapes:
 def lattice_footprint(plan: FloorPlan, thing: PlacedObject) -> Polygon:
     """Return the floor that an object covers [lattice], on even units as walls are."""
     return Polygon(plan.lattice.to_walls(np.asarray(thing.footprint.exterior.coords)[:-1]))
+
+
+def _outlines(plan: FloorPlan, room: Room) -> list[Polygon]:
+    """Return the outlines of the cells of a room [lattice]."""
+    rows, columns = np.nonzero(plan.room_of_cell == room.index)
+    x, y = columns * UNITS_PER_CELL, rows * UNITS_PER_CELL
+    cells = shapely.box(x, y, x + UNITS_PER_CELL, y + UNITS_PER_CELL)
+    parts: list[Polygon] = shapely.get_parts(shapely.union_all(cells)).tolist()
+    return parts
 
 
 def _tall(objects: tuple[PlacedObject, ...]) -> tuple[PlacedObject, ...]:

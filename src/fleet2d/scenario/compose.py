@@ -14,7 +14,7 @@ from fleet2d.configuration.problems import suggest
 from fleet2d.errors import ScenarioError
 
 BUNDLED = Path(__file__).parent / "bundled"
-ENTRIES = ("users", "robots", "objects", "algorithms", "metrics", "expect")
+ENTRIES = ("users", "robots", "objects", "interactions", "algorithms", "metrics", "expect")
 """The sections whose entries have names and can be deleted with null."""
 
 _SLOTS = (

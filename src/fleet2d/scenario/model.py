@@ -47,6 +47,7 @@ from fleet2d.errors import ScenarioError
 from fleet2d.floorplan.home_change import HomeChange
 from fleet2d.floorplan.load import advise_type
 from fleet2d.floorplan.source import FloorPlanSource
+from fleet2d.interactions.interaction import Interaction
 from fleet2d.interventions.intervention import Entry
 from fleet2d.metrics.metric import Metric
 from fleet2d.scenario.compose import compose, slot_kind
@@ -162,6 +163,7 @@ class Scenario(Settings):
         users: The people, by name.
         robots: The robots, by name.
         objects: Doors and sensors, by name.
+        interactions: What robots want of people, by name.
         changes: Changes of the home during the run, and when they happen.
         script: Interventions on people, robots and the home, and when they happen.
         sight: The method that computes what is in view.
@@ -179,6 +181,7 @@ class Scenario(Settings):
     objects: Annotated[dict[str, Annotated[HomeObject, OneOf("object")]], CheckNames] = Field(
         default={}
     )
+    interactions: Annotated[dict[str, Interaction], CheckNames] = Field(default={})
     changes: tuple[HomeChange, ...] = ()
     script: tuple[Entry, ...] = ()
     sight: SightSettings = SightSettings()
@@ -215,6 +218,32 @@ class Scenario(Settings):
                             ("robots", robot, "behaviors", i),
                             f"there is no user {user!r}{suggest(user, self.users)}",
                         )
+        return self
+
+    @model_validator(mode="after")
+    def _interactions_name_bodies(self) -> Self:
+        for name, interaction in self.interactions.items():
+            known: dict[str, Mapping[str, Any]] = {"to": self.users, "by": self.robots}
+            if interaction.by is None and not self.robots:
+                raise problem_at(("interactions", name), "there is no robot that could do it")
+            for key, bodies in known.items():
+                body = getattr(interaction, key)
+                if body is not None and body not in bodies:
+                    noun = "user" if key == "to" else "robot"
+                    raise problem_at(
+                        ("interactions", name, key),
+                        f"there is no {noun} {body!r}{suggest(body, bodies)}",
+                    )
+        first = next(iter(self.robots), None)
+        wanting = {interaction.by or first for interaction in self.interactions.values()}
+        for robot, entity in self.robots.items():
+            for i, behavior in enumerate(entity.behaviors):
+                if behavior.serves_requests and robot not in wanting:
+                    raise problem_at(
+                        ("robots", robot, "behaviors", i),
+                        f"{robot} wants nothing of anybody: write a section `interactions`, and"
+                        f" `by: {robot}` in its entries if there are several robots",
+                    )
         return self
 
     @property

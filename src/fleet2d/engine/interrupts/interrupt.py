@@ -56,8 +56,8 @@ class Interrupt(Component):
         raise NotImplementedError
 
 
-# The events of cameras, which are watchers of their own.
-SIGHT_EVENTS = frozenset({*User.sight_events, *Robot.sight_events})
+# The events of cameras and conversations, which are watchers of their own.
+WATCHED_EVENTS = frozenset({*User.sight_events, *Robot.sight_events, *Robot.request_events})
 
 Wait = tuple[int, str]
 """The row of a body, and the name of the interrupt for which its plan waits."""
@@ -97,7 +97,7 @@ class Interruptions(Watcher):
         names = self._actors[row].plan.interrupts
         if not names and not self._held:
             return
-        named = {(row, name) for name in names - SIGHT_EVENTS}
+        named = {(row, name) for name in names - WATCHED_EVENTS}
         others = {wait: held for wait, held in self._held.items() if wait[0] != row}
         new = {wait: self._held.get(wait) for wait in named}
         self._held = dict(sorted((others | new).items(), key=lambda item: item[0]))

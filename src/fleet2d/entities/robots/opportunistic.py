@@ -10,6 +10,7 @@ from fleet2d.configuration.units import Duration, Length, Share
 from fleet2d.entities.behavior import Actor, Behavior, Situation
 from fleet2d.entities.plan import Plan
 from fleet2d.entities.robots.approach import approach, check_has_camera
+from fleet2d.interactions.interaction import Request
 
 
 @register("behavior", "opportunistic")
@@ -18,7 +19,9 @@ class Opportunistic(Behavior):
 
     The behavior that it interrupts goes on afterwards. It goes to where the person was perceived; a
     person who walks on in the meantime isn't followed. Events: `approaches`, `interacts`, with the
-    name of the person as perceived, and `interaction_over`.
+    name of the person as perceived, and `interaction_over`. If the robot wants something of the
+    person (`interactions:`), it asks for it (`asks`), and carries out what is accepted
+    (`delivered`).
 
     Attributes:
         users: Users that it approaches; left out: everybody, recognized or not.
@@ -28,7 +31,9 @@ class Opportunistic(Behavior):
         again: Minimum time between two approaches to the same person.
     """
 
-    records: ClassVar[frozenset[str]] = frozenset({"approaches", "interaction_over", "interacts"})
+    records: ClassVar[frozenset[str]] = frozenset(
+        {"approaches", "asks", "delivered", "interaction_over", "interacts"}
+    )
     listens: ClassVar[frozenset[str]] = frozenset({"user_seen"})
 
     users: tuple[str, ...] = ()
@@ -44,10 +49,14 @@ class Opportunistic(Behavior):
     def start(self, actor: Actor) -> None:
         """Check that it has a camera."""
         check_has_camera(actor, "opportunistic")
+        self.request: Request | None = None
         self.last_opportunity: dict[str, datetime] = {}  # by person
 
     def decide(self, now: Situation) -> Plan | None:
         """Approach somebody in view, or leave the decision to later behaviors."""
+        if (accepted := self._accepted(now)) is not None:
+            plan = now.plan().stay(accepted.interaction.takes).note("delivered", accepted.text)
+            return plan.note("interaction_over", accepted.interaction.to)
         for name, (x, y) in sorted(now.in_view.items()):
             if not self._is_opportunity(name, now):
                 continue
@@ -67,5 +76,15 @@ class Opportunistic(Behavior):
         plan = now.plan().note("approaches", name)
         approach(now, plan, x, y, self.distance)
         plan.face(*now.home.plan.lattice.point_at((x, y)))
-        plan.note("interacts", name).stay(self.interaction)
-        return plan.note("interaction_over", name)
+        plan.note("interacts", name)
+        ready = [] if now.requests is None else now.requests.ready(now.time, (name,))
+        self.request = ready[0] if ready else None
+        if self.request is not None:
+            plan.note("asks", self.request.text).interrupt_on("accepted")
+        return plan.stay(self.interaction).note("interaction_over", name)
+
+    def _accepted(self, now: Situation) -> Request | None:
+        """Return the request that the person it is with has just accepted."""
+        request, self.request = self.request, None
+        texts = [event.user for event in now.events if event.event == "accepted"]
+        return request if request is not None and request.text in texts else None

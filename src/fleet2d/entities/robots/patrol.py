@@ -63,7 +63,7 @@ class Patrol(Behavior):
             stops = now.random("order").shuffled(stops)
         plan, has_stop = now.plan(), False
         for stop in stops:
-            if now.home.may_block_routes and not plan.reaches(*stop):
+            if now.actor.may_block_routes and not plan.reaches(*stop):
                 continue  # in a later round its door may be open, or its costs lower
             plan.go_to_point(*stop)
             if self.look_around:

@@ -77,7 +77,7 @@ class Retrace(Behavior):
         """Drive the whole path."""
         plan = now.plan().note("retraces", f"{len(self.points)} points")
         for x, y in self.points:
-            if not now.home.may_block_routes or plan.reaches(x, y):
+            if not now.actor.may_block_routes or plan.reaches(x, y):
                 plan.go_to_point(x, y)
         return plan.note("retraced")
 

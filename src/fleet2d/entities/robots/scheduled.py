@@ -71,7 +71,7 @@ class Scheduled(Behavior):
         self.last_decision = now.time
         self.pending = [v for v in self.pending + fresh if now.time - v[0] <= self.late]
         for due, number in self.pending:
-            if not now.home.may_block_routes or now.plan().reaches(*self.stops[number]):
+            if not now.actor.may_block_routes or now.plan().reaches(*self.stops[number]):
                 self.pending.remove((due, number))
                 return self._visit(now, number)
         blocked = [number for due, number in self.pending if (due, number) in fresh]

@@ -1,0 +1,324 @@
+"""Conversations: what robots want of people comes up, people are addressed, and they answer.
+
+All of it follows from the poses and plans alone, step by step, so it doesn't depend on spans. A
+span ends when a request comes up and with each question and answer; the robot decides after it.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+
+from fleet2d.configuration.units import micros
+from fleet2d.engine.bodies import Basis, Bodies, PoseBlock, Watcher
+from fleet2d.entities.behavior import SightEvent
+from fleet2d.entities.decisions import DecidingActor, StandStill
+from fleet2d.floorplan.placed_objects import POSTURES
+from fleet2d.interactions.answers import Answers, Circumstances, Reply
+from fleet2d.interactions.attitude import AttitudeState
+from fleet2d.interactions.interaction import Interaction, Outcome, RequestQueue
+from fleet2d.kernels.numbers import TURN, heading_of
+from fleet2d.kernels.sight import line_of_sight
+from fleet2d.kernels.space import locate
+from fleet2d.runtime.events import Event, EventKind
+
+LYING = POSTURES.index("lie")
+# Nobody is taken for the person addressed, and nobody notices, from farther away [m].
+EARSHOT_M = 8.0
+# Half of the field in which a person sees a robot: 100° [1/4096 turn].
+FRONT = TURN * 100 // 360
+
+
+class Question(NamedTuple):
+    """A robot addresses a person: at the end of a step."""
+
+    step: int
+    robot: int
+    text: str
+
+
+class PendingReply(NamedTuple):
+    """An answer that is given at the end of a step."""
+
+    step: int
+    robot: int
+    text: str
+    reply: Reply
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What happened when a robot addressed a person: truth, for metrics.
+
+    Attributes:
+        step: The step of the question.
+        robot: The robot.
+        person: The person who was addressed, who may be another than was meant; empty: nobody.
+        text: The interaction and the person meant.
+        activity: What the person did.
+        woke: Whether it woke the person.
+        willingness: Probability that the person was available.
+        outcome: The answer; empty if the robot wasn't noticed.
+        state: Novelty, burden, annoyance and trust after it.
+    """
+
+    step: int
+    robot: str
+    person: str
+    text: str
+    activity: str
+    woke: bool
+    willingness: float
+    outcome: str
+    state: tuple[float, float, float, float]
+
+
+@dataclass
+class Conversations(Watcher):
+    """All questions and answers of a run; it does nothing without interactions.
+
+    Attributes:
+        actors: All bodies: users, then robots.
+        users: Number of users.
+        queues: What each robot wants, by its row.
+        answers: How each user answers, by row.
+        attitudes: The attitude of each user to each robot: truth, by their rows.
+        log: What happened, for metrics.
+    """
+
+    actors: Sequence[DecidingActor]
+    users: int
+    queues: dict[int, RequestQueue] = field(default_factory=dict)
+    answers: dict[int, Answers] = field(default_factory=dict)
+    attitudes: dict[tuple[int, int], AttitudeState] = field(default_factory=dict)
+    log: list[Answer] = field(default_factory=list)
+    next_step: int = 0
+
+    def __post_init__(self) -> None:
+        self._activity: dict[int, str] = {}  # of each user before the present plan
+        self._questions: list[Question] = []  # at the ends of plans that were replaced
+        self._replies: list[PendingReply] = []
+        self._last: list[tuple[int, SightEvent]] = []
+
+    @classmethod
+    def of(cls, basis: Basis) -> "Conversations":
+        """Return those of a scenario, and give each robot its queue."""
+        users, clock = basis.bodies.users, basis.clock
+        conversations = cls(basis.actors, users)
+        rows = {actor.name: row for row, actor in enumerate(basis.actors)}
+        wanted: dict[int, dict[str, Interaction]] = {}
+        for name, interaction in basis.scenario.interactions.items():
+            by = interaction.by or next(iter(basis.scenario.robots))
+            wanted.setdefault(rows[by], {})[name] = interaction
+        for row, interactions in wanted.items():
+            queue = RequestQueue(interactions, clock.start)
+            conversations.queues[row] = basis.actors[row].requests = queue
+            for user in range(users):
+                entity = basis.scenario.users[basis.actors[user].name]
+                answers = conversations.answers.setdefault(user, entity.answers or Answers())
+                conversations.attitudes[user, row] = answers.months.begin(clock.start)
+        return conversations
+
+    @property
+    def waits(self) -> bool:
+        """Whether any robot wants something of people."""
+        return bool(self.queues)
+
+    def before_plan(self, row: int, actor: DecidingActor, step: int) -> None:
+        """Record what a plan that is replaced at a step has done until then."""
+        if not self.queues:
+            return
+        if row < self.users:
+            self._activity[row] = self._activity_at(row, step)
+        elif row in self.queues:
+            self._questions += [q for q in _questions(row, actor) if q.step == step]
+
+    def limit(self, bodies: Bodies, end: int) -> int:
+        """Return the step after the first question, answer or request that comes up."""
+        first = self.next_step
+        for row, queue in self.queues.items():
+            questions = [*self._questions, *_questions(row, self.actors[row])]
+            steps = [q.step for q in questions if q.step >= first]
+            steps += [reply.step for reply in self._replies if reply.step >= first]
+            change = queue.next_change()
+            if change is not None:
+                clock = self.actors[row].clock
+                steps.append(max(clock.step_at_or_after(clock.elapsed(change)), first))
+            end = min([end, *(step + 1 for step in steps)])
+        return end
+
+    def take(self, bodies: Bodies, end: int) -> Sequence[Event]:
+        """Take in the steps up to `end` - 1; only in the last of them can anything happen."""
+        first, self.next_step = self.next_step, end
+        self._last = []
+        if not self.queues or end == first:
+            return ()
+        events: list[Event] = []
+        step, block = end - 1, None
+        for row, queue in self.queues.items():
+            robot = self.actors[row]
+            events += [
+                Event(at, robot.name, EventKind.OPPORTUNITY, text)
+                for at, text in queue.opportunities
+            ]
+            queue.opportunities.clear()
+            for change in queue.advance(robot.clock.time(step)):
+                events.append(Event(step, robot.name, change.event, change.request.text))
+                self._tell(row, change.event, change.request.text)
+            asked = [q for q in _questions(row, robot) if q.step == step]
+            asked += [q for q in self._questions if q.step == step and q.robot == row]
+            for question in dict.fromkeys(asked):
+                block = block or bodies.block(step, end + 1)
+                self._ask(question, block)
+        self._questions = []
+        for pending in [reply for reply in self._replies if reply.step <= step]:
+            self._replies.remove(pending)
+            events += self._give(pending, step, bodies)
+        return events
+
+    def interruptions(self, events: Sequence[Event]) -> Iterable[tuple[int, SightEvent]]:
+        """Yield the robots whose plans wait for what was said, or for a request that came up."""
+        for row, event in self._last:
+            if event.event in self.actors[row].plan.interrupts:
+                yield row, event
+
+    def _tell(self, row: int, event: str, text: str) -> None:
+        actor = self.actors[row]
+        x, y = actor.home.plan.lattice.xy_of(actor.state.x, actor.state.y)
+        self._last.append((row, SightEvent(event, text, x, y)))
+
+    def _ask(self, question: Question, block: PoseBlock) -> None:
+        """Let the person who is addressed notice the robot, and draw the answer."""
+        name, _, meant = question.text.rpartition(" ")
+        interaction = self.queues[question.robot].interactions.get(name)
+        user = self._addressed(question.robot, meant, block)
+        clock = self.actors[question.robot].clock
+        if interaction is None or user is None:
+            self._note(question, "", "", None, None)
+            return
+        person, state = self.actors[user], self.attitudes[user, question.robot]
+        answers = self.answers[user]
+        now = self._circumstances(user, question, name, interaction, block)
+        answers.months.pass_time(state, now.time)
+        reply = answers.reply(now, state, person.seed, person.path, question.step)
+        if reply is not None and person.name != meant:
+            reply = reply._replace(outcome=Outcome.MISTAKEN)
+        if reply is not None:
+            answers.months.addressed(state, name, reply.outcome, reply.willingness)
+            waits = max(1, micros(reply.delay) // clock.step_us)
+            step = question.step + waits
+            self._replies.append(PendingReply(step, question.robot, question.text, reply))
+        self._note(question, person.name, now.activity, reply, state)
+
+    def _note(
+        self,
+        question: Question,
+        person: str,
+        activity: str,
+        reply: Reply | None,
+        state: AttitudeState | None,
+    ) -> None:
+        numbers = (0.0, 0.0, 0.0, 0.0)
+        if state is not None:
+            numbers = (state.novelty, state.burden, state.annoyance, state.trust)
+        self.log.append(
+            Answer(
+                question.step,
+                self.actors[question.robot].name,
+                person,
+                question.text,
+                activity,
+                reply is not None and reply.woke,
+                0.0 if reply is None else reply.willingness,
+                "" if reply is None else str(reply.outcome),
+                numbers,
+            )
+        )
+
+    def _addressed(self, row: int, meant: str, block: PoseBlock) -> int | None:
+        """Return the user nearest to a robot, or the one meant at equal distance; None: nobody."""
+        x, y = block.x[:, 0], block.y[:, 0]
+        away2 = (x[: self.users] - x[row]) ** 2 + (y[: self.users] - y[row]) ** 2
+        reach = round(EARSHOT_M * self.actors[row].home.plan.lattice.units_per_m)
+        near = [u for u in range(self.users) if not block.away[u, 0] and away2[u] <= reach**2]
+        key = lambda u: (int(away2[u]), self.actors[u].name != meant)  # noqa: E731
+        return min(near, key=key, default=None)
+
+    def _circumstances(
+        self, user: int, question: Question, name: str, interaction: Interaction, block: PoseBlock
+    ) -> Circumstances:
+        person, row = self.actors[user], question.robot
+        home, lattice = person.home, person.home.plan.lattice
+        x, y = int(block.x[user, 0]), int(block.y[user, 0])
+        robot_x, robot_y = int(block.x[row, 0]), int(block.y[row, 0])
+        gap = np.array([robot_x - x, robot_y - y], np.int64)
+        off = (heading_of(robot_x - x, robot_y - y) - int(block.heading[user, 0])) % TURN
+        rooms = [self._room(u, block) for u in range(self.users)]
+        others = sum(u != user and r is not None and r == rooms[user] for u, r in enumerate(rooms))
+        room = rooms[user]
+        return Circumstances(
+            time=person.clock.time(question.step),
+            name=name,
+            interaction=interaction,
+            activity=self._activity_at(user, question.step),
+            room="" if room is None else home.rooms[room].type,
+            company=others,
+            is_moving=bool((block.x[user, 1], block.y[user, 1]) != (x, y)),
+            is_lying=bool(block.posture[user, 0] == LYING),
+            distance=float(np.sqrt(np.float64((gap * gap).sum()))) / lattice.units_per_m,
+            in_sight=bool(
+                line_of_sight(home.walls, x, y, locate(home.walls, x, y), robot_x, robot_y)
+            ),
+            from_behind=min(off, TURN - off) > FRONT,
+        )
+
+    def _room(self, row: int, block: PoseBlock) -> int | None:
+        """Return the index of the room that a body is in at the begin of a block."""
+        if block.away[row, 0]:
+            return None
+        plan = self.actors[row].home.plan
+        room = plan.room_at(*plan.lattice.xy_of(int(block.x[row, 0]), int(block.y[row, 0])))
+        return None if room is None else room.index
+
+    def _activity_at(self, row: int, step: int) -> str:
+        """Return what a user does at a step of the present plan; empty if that is unknown."""
+        actor, time_us = self.actors[row], step * self.actors[row].clock.step_us
+        return next(
+            (
+                note.detail
+                for note in reversed(actor.plan.notes)
+                if note.event == EventKind.ACTIVITY and note.time_us <= time_us
+            ),
+            self._activity.get(row, ""),
+        )
+
+    def _give(self, pending: PendingReply, step: int, bodies: Bodies) -> list[Event]:
+        """Give an answer: tell the robot, and let it be banned or switched off."""
+        row, text, reply = pending.robot, pending.text, pending.reply
+        robot, queue, detail = self.actors[row], self.queues[row], text
+        time = robot.clock.time(step)
+        request = queue.find(text)
+        if request is not None:
+            queue.settle(request, reply.outcome, time, time + reply.later)
+        if reply.outcome == Outcome.BANNED:
+            block = bodies.block(step, step + 1)
+            room = self._room(row, block)
+            if room is not None:
+                queue.banned |= {room}
+                detail = f"{text} {robot.home.rooms[room].name}"
+        if reply.outcome == Outcome.SWITCHED_OFF:
+            user = next(a for a in self.actors if a.name == text.rpartition(" ")[2])
+            off_for = self.answers[user.row].off_for
+            robot.follow_order(StandStill(off_for), step + 1)
+        self._tell(row, str(reply.outcome), text)
+        return [Event(step, robot.name, str(reply.outcome), detail)]
+
+
+def _questions(row: int, robot: DecidingActor) -> list[Question]:
+    """Return the questions of a robot's plan."""
+    return [
+        Question(robot.clock.step_at_or_after(note.time_us), row, note.detail)
+        for note in robot.plan.notes
+        if note.event == EventKind.ASKS
+    ]

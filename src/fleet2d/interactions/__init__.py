@@ -1,0 +1,1 @@
+"""Interactions: what robots want of people, how people answer, and how months change that."""

@@ -1,0 +1,460 @@
+"""How people answer a robot: stages, each a logit of named parts.
+
+A person *notices* the robot, is *available*, and *accepts*; each is a draw with the probability
+logistic(sum of parts), addressed by person, interaction and step. After Choi et al. (2019), Cha et
+al. (2020) and the structure of Oralytics' simulation environment; docs/interactions.md has the
+source and the range of each number.
+"""
+
+from collections.abc import Mapping
+from datetime import datetime, timedelta
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple
+
+from pydantic import BeforeValidator, Field, model_validator
+
+from fleet2d.configuration.components import Component, OneOf, register
+from fleet2d.configuration.units import Duration, Length, PositiveDuration, Share
+from fleet2d.interactions.attitude import Attitude, AttitudeState
+from fleet2d.interactions.interaction import Interaction, Outcome
+from fleet2d.runtime.determinism import Draws, logistic, stream_key
+
+Stage = Literal["notice", "available", "accept"]
+
+ASLEEP = frozenset({"sleep", "nap"})
+PRIVATE_ROOMS = frozenset({"bedroom", "bathroom", "guest_room", "child_room", "toilet"})
+
+
+class Circumstances(NamedTuple):
+    """The truth at the moment at which a robot addresses a person.
+
+    Attributes:
+        time: The local time.
+        name: The interaction's name in the scenario.
+        interaction: The interaction.
+        activity: What the person does; empty if unknown.
+        room: Type of the room that the person is in; empty outside of rooms.
+        company: Number of other people in that room.
+        is_moving: Whether the person is going somewhere.
+        is_lying: Whether the person lies.
+        distance: Distance of the robot [m].
+        in_sight: Whether no wall is between them.
+        from_behind: Whether the robot is outside of the front 200° of the person.
+    """
+
+    time: datetime
+    name: str
+    interaction: Interaction
+    activity: str
+    room: str
+    company: int
+    is_moving: bool
+    is_lying: bool
+    distance: float
+    in_sight: bool
+    from_behind: bool
+
+
+class AnswerPart(Component):
+    """Base of the parts of a person's answers: each adds to the logit of one stage.
+
+    Example:
+        >>> class NeverOnMonday(AnswerPart):
+        ...     '''Refuses everything on Mondays.'''
+        ...     def logit(self, now, state):
+        ...         return -9.0 if now.time.weekday() == 0 else 0.0
+    """
+
+    kind: ClassVar[str] = "answer_part"
+    stage: ClassVar[Stage] = "accept"
+
+    def logit(self, now: Circumstances, state: AttitudeState) -> float:
+        """Return what it adds to the logit of its stage."""
+        raise NotImplementedError
+
+
+@register("answer_part", "notice")
+class NoticePart(AnswerPart):
+    """Whether the robot is heard or seen.
+
+    Attributes:
+        base: Logit for a person awake and near, in sight.
+        asleep: Added for a sleeper: noticing wakes.
+        out_of_sight: Added without line of sight.
+        reading: Added for what is only shown, to a person who looks elsewhere.
+        reach: Distance from which on it is harder [m].
+        per_metre: Added for each metre beyond it.
+    """
+
+    stage: ClassVar[Stage] = "notice"
+
+    base: float = 3.0
+    asleep: float = -4.0
+    out_of_sight: float = -2.0
+    reading: float = -4.0
+    reach: Length = 2.0
+    per_metre: float = -1.0
+
+    def logit(self, now: Circumstances, state: AttitudeState) -> float:
+        """Sum what makes it hard to notice."""
+        total = self.base + self.per_metre * max(0.0, now.distance - self.reach)
+        if now.activity in ASLEEP:
+            total += self.asleep
+        if not now.in_sight:
+            total += self.out_of_sight
+        if now.interaction.manner == "shown" and (now.from_behind or not now.in_sight):
+            total += self.reading
+        return total
+
+
+# How much an activity keeps a person from a robot; negative: not at all. Ours; see the docs.
+LOADS: Mapping[str, float] = {
+    "sleep": 9.0,
+    "nap": 6.0,
+    "shower": 4.0,
+    "phone_call": 3.0,
+    "phone": 2.0,
+    "toilet": 2.5,
+    "wash": 2.0,
+    "work_at_home": 1.5,
+    "study": 1.5,
+    "homework": 1.5,
+    "exercise": 1.5,
+    "party": 1.5,
+    "care": 1.2,
+    "cook": 1.0,
+    "paperwork": 1.0,
+    "computer": 0.8,
+    "dress": 0.8,
+    "talk": 0.8,
+    "dinner": 0.5,
+    "read": 0.5,
+    "games": 0.5,
+    "tv": 0.3,
+    "lunch": 0.2,
+    "rest": -0.3,
+    "snack": -0.4,
+    "breakfast": -0.5,
+}
+
+
+@register("answer_part", "activity")
+class ActivityPart(AnswerPart):
+    """The load of the activity: asleep never, on the phone hardly, at breakfast well.
+
+    Attributes:
+        base: Logit of a person without an activity.
+        loads: What each activity takes off; these come before the built-in ones.
+    """
+
+    stage: ClassVar[Stage] = "available"
+
+    base: float = 1.2
+    loads: dict[str, float] = Field(default={})
+
+    def logit(self, now: Circumstances, state: AttitudeState) -> float:
+        """Take off the load of the activity."""
+        return self.base - self.loads.get(now.activity, LOADS.get(now.activity, 0.0))
+
+
+@register("answer_part", "company")
+class CompanyPart(AnswerPart):
+    """Other people in the room.
+
+    Attributes:
+        each: Added for each of them, up to three.
+    """
+
+    stage: ClassVar[Stage] = "available"
+
+    each: float = -0.5
+
+    def logit(self, now: Circumstances, state: AttitudeState) -> float:
+        """Add the weight of the company."""
+        return self.each * min(now.company, 3)
+
+
+@register("answer_part", "movement")
+class MovementPart(AnswerPart):
+    """Whether the person is going somewhere.
+
+    Attributes:
+        going: Added if so.
+    """
+
+    stage: ClassVar[Stage] = "available"
+
+    going: float = -1.5
+
+    def logit(self, now: Circumstances, state: AttitudeState) -> float:
+        """Add the weight of going somewhere."""
+        return self.going if now.is_moving else 0.0
+
+
+# What a person makes of each kind, before anything else. Ours; see the docs.
+KIND_LOGITS: Mapping[str, float] = {
+    "remind": 0.6,
+    "offer": -0.4,
+    "ask": 0.4,
+    "greet": 0.8,
+    "deliver": 1.0,
+    "patrol_report": -0.6,
+}
+
+
+@register("answer_part", "importance")
+class ImportancePart(AnswerPart):
+    """Its kind, and its value to the person.
+
+    Attributes:
+        kinds: Logit of each kind; these come before the built-in ones.
+        worth: Added for a very high value; half of it at `half_worth`.
+        half_worth: The value at which half of `worth` is added.
+    """
+
+    kinds: dict[str, float] = Field(default={})
+    worth: float = 1.5
+    half_worth: float = Field(default=2.0, gt=0)
+
+    def logit(self, now: Circumstances, state: AttitudeState) -> float:
+        """Add kind and value."""
+        do, worth = now.interaction.do, now.interaction.worth
+        kind = self.kinds.get(do, KIND_LOGITS[do])
+        return kind + self.worth * worth / (worth + self.half_worth)
+
+
+@register("answer_part", "manner")
+class MannerPart(AnswerPart):
+    """How the robot comes: too near, from far away, from behind, in the way.
+
+    Attributes:
+        nearest: Distance below which it is too near [m].
+        farthest: Distance from which on it is too far [m].
+        off: Added if it is too near or too far.
+        behind: Added if it comes from behind.
+        in_the_way: Added if it stands within a metre of a person who is going somewhere.
+    """
+
+    nearest: Length = 0.45
+    farthest: Length = 2.5
+    off: float = -0.6
+    behind: float = -0.5
+    in_the_way: float = -0.8
+
+    def logit(self, now: Circumstances, state: AttitudeState) -> float:
+        """Add what is wrong with its manner."""
+        total = self.behind if now.from_behind else 0.0
+        if not self.nearest <= now.distance <= self.farthest:
+            total += self.off
+        if now.is_moving and now.distance < 1:
+            total += self.in_the_way
+        return total
+
+
+@register("answer_part", "recency")
+class RecencyPart(AnswerPart):
+    """The time since the robot addressed the person last.
+
+    Attributes:
+        at_once: Added right after it.
+        over: Time after which it no longer counts; it fades evenly.
+    """
+
+    at_once: float = -1.5
+    over: PositiveDuration = timedelta(hours=1)
+
+    def logit(self, now: Circumstances, state: AttitudeState) -> float:
+        """Add what is left of the last time."""
+        if state.last is None:
+            return 0.0
+        return self.at_once * max(0.0, 1 - (now.time - state.last) / self.over)
+
+
+@register("answer_part", "burden")
+class BurdenPart(AnswerPart):
+    """Too many prompts of late.
+
+    Attributes:
+        tolerance: Prompts a day that are no burden.
+        each: Added for each further prompt a day.
+    """
+
+    tolerance: float = Field(default=4.0, ge=0)
+    each: float = -0.35
+
+    def logit(self, now: Circumstances, state: AttitudeState) -> float:
+        """Add the burden beyond what is tolerated."""
+        return self.each * max(0.0, state.burden - self.tolerance)
+
+
+@register("answer_part", "attitude")
+class AttitudePart(AnswerPart):
+    """What months have made of the person: novelty, habit, trust and annoyance.
+
+    Attributes:
+        novelty: Added while the robot is new.
+        habit: Added if the interaction is expected at this time of day.
+        expected_within: How far from the usual time it is still expected.
+        trust: Added at full trust; as much is taken off without any.
+        annoyance: Added for each unit of annoyance.
+    """
+
+    novelty: float = 0.7
+    habit: float = 0.8
+    expected_within: Duration = timedelta(minutes=30)
+    trust: float = 0.8
+    annoyance: float = -0.4
+
+    def logit(self, now: Circumstances, state: AttitudeState) -> float:
+        """Add up the attitude."""
+        return (
+            self.novelty * state.novelty
+            + self.habit * state.expects(now.name, now.time, self.expected_within)
+            + self.trust * (2 * state.trust - 1)
+            + self.annoyance * state.annoyance
+        )
+
+
+class Reply(NamedTuple):
+    """How a person answers.
+
+    Attributes:
+        outcome: What the robot sees.
+        delay: Time from the question to the answer.
+        later: For DEFERRED: after which time the person wants to be asked again.
+        willingness: The probability that the person was available: truth.
+        woke: Whether it woke a sleeper: truth.
+    """
+
+    outcome: Outcome
+    delay: timedelta
+    later: timedelta = timedelta(0)
+    willingness: float = 0.0
+    woke: bool = False
+
+
+PARTS = (
+    "notice", "activity", "company", "movement", "importance", "manner", "recency", "burden",
+    "attitude",
+)  # fmt: skip
+"""The parts of a person's answers, which are types of `answer_part`, too."""
+
+
+@register("answers", "stages")
+class Answers(Component):
+    """How a person answers robots; each part may be replaced by a class of your own.
+
+    Attributes:
+        notice: Whether the robot is noticed.
+        activity: What the activity means for availability.
+        company: What other people in the room mean for it.
+        movement: What being on the way means for it.
+        importance: What the kind and the value of an interaction mean for accepting.
+        manner: What the way in which the robot comes means for it.
+        recency: What a recent interaction means for it.
+        burden: What many prompts mean for it.
+        attitude: What novelty, habit, trust and annoyance mean for it.
+        months: How the attitude changes.
+        defers: Probability that a person who isn't available asks for it later.
+        later: Least and greatest time after which it may come again.
+        answer_takes: Least and greatest time until the answer.
+        sends_away_at: Annoyance from which on the robot is sent away.
+        bans_at: Annoyance from which on it is banned from a bedroom or bathroom.
+        off_at: Annoyance from which on it is switched off.
+        off_for: For how long.
+    """
+
+    kind: ClassVar[str] = "answers"
+
+    notice: Annotated[AnswerPart, OneOf("answer_part")] = NoticePart()
+    activity: Annotated[AnswerPart, OneOf("answer_part")] = ActivityPart()
+    company: Annotated[AnswerPart, OneOf("answer_part")] = CompanyPart()
+    movement: Annotated[AnswerPart, OneOf("answer_part")] = MovementPart()
+    importance: Annotated[AnswerPart, OneOf("answer_part")] = ImportancePart()
+    manner: Annotated[AnswerPart, OneOf("answer_part")] = MannerPart()
+    recency: Annotated[AnswerPart, OneOf("answer_part")] = RecencyPart()
+    burden: Annotated[AnswerPart, OneOf("answer_part")] = BurdenPart()
+    attitude: Annotated[AnswerPart, OneOf("answer_part")] = AttitudePart()
+    months: Annotated[Attitude, OneOf("attitude")] = Attitude()
+    defers: Share = 0.3
+    later: tuple[Duration, Duration] = (timedelta(minutes=15), timedelta(hours=1))
+    answer_takes: tuple[Duration, Duration] = (timedelta(seconds=2), timedelta(seconds=8))
+    sends_away_at: float = 3.0
+    bans_at: float = 5.0
+    off_at: float = 8.0
+    off_for: PositiveDuration = timedelta(hours=24)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _types_by_name(cls, data: Any) -> Any:
+        """Let a part without a type be of the type of its name."""
+        if not isinstance(data, Mapping):
+            return data
+        types = {name: name for name in PARTS} | {"months": "fading"}
+        return {
+            name: {"type": types[name], **value}
+            if name in types and isinstance(value, Mapping)
+            else value
+            for name, value in data.items()
+        }
+
+    @property
+    def parts(self) -> list[AnswerPart]:
+        """All parts of the three stages."""
+        return [getattr(self, name) for name in PARTS]
+
+    def chance(self, stage: Stage, now: Circumstances, state: AttitudeState) -> float:
+        """Return the probability of a stage."""
+        total = 0.0
+        for part in self.parts:
+            if part.stage == stage:
+                total += part.logit(now, state)
+        return logistic(total)
+
+    def reply(
+        self, now: Circumstances, state: AttitudeState, seed: int, path: str, step: int
+    ) -> Reply | None:
+        """Draw the answer; None: the person doesn't notice the robot.
+
+        Args:
+            now: The circumstances.
+            state: The attitude of the person at that time.
+            seed: The seed of the run.
+            path: The person's path in the scenario.
+            step: The step.
+        """
+        draws = Draws(stream_key(seed, path, f"answer {now.name}"), step)
+        notices, available, accepts, defers, late, slow = (draws.uniform() for _ in range(6))
+        if notices >= self.chance("notice", now, state):
+            return None
+        willingness = self.chance("available", now, state)
+        delay = _between(self.answer_takes, slow)
+        woke = now.activity in ASLEEP
+        if available < willingness and accepts < self.chance("accept", now, state):
+            return Reply(Outcome.ACCEPTED, delay, willingness=willingness)
+        if state.annoyance >= self.off_at:
+            outcome = Outcome.SWITCHED_OFF
+        elif state.annoyance >= self.bans_at and now.room in PRIVATE_ROOMS:
+            outcome = Outcome.BANNED
+        elif state.annoyance >= self.sends_away_at:
+            outcome = Outcome.SENT_AWAY
+        elif available < willingness:
+            outcome = Outcome.DECLINED
+        else:
+            outcome = Outcome.DEFERRED if defers < self.defers and not woke else Outcome.IGNORED
+        later = _between(self.later, late)
+        return Reply(outcome, delay, later, willingness, woke)
+
+
+def _between(limits: tuple[timedelta, timedelta], share: float) -> timedelta:
+    """Return the duration at a share of the way between two, in whole seconds."""
+    low, high = limits
+    return timedelta(seconds=round((low + (high - low) * share).total_seconds()))
+
+
+def _with_type(value: Any) -> Any:
+    is_untyped = isinstance(value, Mapping) and "type" not in value
+    return {"type": "stages", **value} if is_untyped else value
+
+
+AnswersField = Annotated[Answers, OneOf("answers"), BeforeValidator(_with_type)]
+"""A field for how somebody answers; without a type: stages."""

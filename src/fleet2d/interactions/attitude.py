@@ -1,0 +1,136 @@
+"""Attitude: what months with a robot make of a person; truth, which only metrics read.
+
+Numbers for which no study is known are defaults of Fleet2D; docs/interactions.md has the sources
+and ranges of all of them.
+"""
+
+from dataclasses import dataclass, field
+from datetime import datetime, timedelta
+from typing import ClassVar
+
+from pydantic import Field
+
+from fleet2d.configuration.components import Component, register
+from fleet2d.configuration.units import PositiveDuration, Share
+from fleet2d.interactions.interaction import Outcome
+from fleet2d.runtime.clock import midnight_of
+from fleet2d.runtime.determinism import exp2
+
+DAY = timedelta(days=1)
+
+
+@dataclass
+class AttitudeState:
+    """A person's attitude to one robot.
+
+    Attributes:
+        time: The moment that it describes.
+        novelty: 1 at first, falling to 0.
+        burden: Prompts a day of late, an exponential mean.
+        annoyance: Accumulated by badly timed prompts, fading; 0: none.
+        trust: 0 to 1.
+        habits: How much each interaction is expected at a time of day, and when: strength from 0 to
+            1, and the time of day [s], by the interaction's name.
+        last: When the robot addressed the person last; None: never.
+    """
+
+    time: datetime
+    novelty: float = 1.0
+    burden: float = 0.0
+    annoyance: float = 0.0
+    trust: float = 0.5
+    habits: dict[str, tuple[float, float]] = field(default_factory=dict)
+    last: datetime | None = None
+
+    def expects(self, name: str, time: datetime, window: timedelta) -> float:
+        """Return how much an interaction is expected at a time, 0 to 1."""
+        strength, usual_s = self.habits.get(name, (0.0, 0.0))
+        off_s = abs((time - midnight_of(time)).total_seconds() - usual_s)
+        return strength if min(off_s, 86400 - off_s) <= window.total_seconds() else 0.0
+
+
+@register("attitude", "fading")
+class Attitude(Component):
+    """How a person's attitude to a robot changes: interest that fades, some patience.
+
+    Attributes:
+        novelty_lasts: Half-life of the novelty.
+        annoyance_lasts: Half-life of annoyance.
+        burden_over: Time over which prompts are averaged.
+        trust: Trust at first.
+        annoyed_by: What a prompt adds to annoyance at the worst moment; at a good one nothing.
+        gains: Part of the distance to full trust that an accepted interaction gains.
+        loses: Part of the trust that a mistake costs; a prompt for nothing costs a tenth of it.
+        habit_forms: Part of the distance to a full habit that an accepted interaction gains.
+    """
+
+    kind: ClassVar[str] = "attitude"
+
+    novelty_lasts: PositiveDuration = timedelta(days=14)
+    annoyance_lasts: PositiveDuration = timedelta(days=2)
+    burden_over: PositiveDuration = timedelta(days=7)
+    trust: Share = 0.5
+    annoyed_by: float = Field(default=0.4, ge=0, le=100)
+    gains: Share = 0.05
+    loses: Share = 0.3
+    habit_forms: Share = 0.15
+
+    def begin(self, start: datetime) -> AttitudeState:
+        """Return the attitude to a robot that has just come."""
+        return AttitudeState(start, trust=self.trust)
+
+    def pass_time(self, state: AttitudeState, time: datetime) -> None:
+        """Let novelty, annoyance and the memory of prompts fade until a time."""
+        passed = time - state.time
+        state.novelty *= exp2(-(passed / self.novelty_lasts))
+        state.annoyance *= exp2(-(passed / self.annoyance_lasts))
+        state.burden *= exp2(-(passed / self.burden_over) * 1.4426950408889634)
+        state.time = time
+
+    def addressed(
+        self, state: AttitudeState, name: str, outcome: Outcome, willingness: float
+    ) -> None:
+        """Learn from being addressed at the time of the state.
+
+        Args:
+            state: The attitude.
+            name: The interaction's name.
+            outcome: How the person answered.
+            willingness: Probability that the person was available, 0 at the worst moment.
+        """
+        state.last = state.time
+        state.burden += DAY / self.burden_over
+        if outcome == Outcome.MISTAKEN:
+            state.trust *= 1 - self.loses
+            state.annoyance += self.annoyed_by
+            return
+        state.annoyance += self.annoyed_by * (1 - willingness)
+        if outcome == Outcome.ACCEPTED:
+            state.trust += self.gains * (1 - state.trust)
+            strength, usual_s = state.habits.get(name, (0.0, 0.0))
+            time_s = (state.time - midnight_of(state.time)).total_seconds()
+            is_usual = state.expects(name, state.time, timedelta(hours=1)) > 0
+            usual_s = usual_s + 0.3 * (time_s - usual_s) if is_usual else time_s
+            strength = strength if is_usual else 0.0
+            state.habits[name] = (strength + self.habit_forms * (1 - strength), usual_s)
+        elif outcome in (Outcome.DECLINED, Outcome.SENT_AWAY):
+            state.trust *= 1 - self.loses / 10
+
+
+@register("attitude", "steady")
+class SteadyAttitude(Attitude):
+    """A person whose interest doesn't fade, and who is soon at peace: about a quarter of people."""
+
+    novelty_lasts: PositiveDuration = timedelta(days=36500)
+    annoyance_lasts: PositiveDuration = timedelta(days=1)
+    annoyed_by: float = Field(default=0.2, ge=0, le=100)
+
+
+@register("attitude", "leaving")
+class LeavingAttitude(Attitude):
+    """A person who soon loses interest and is easily annoyed: more than half of app users."""
+
+    novelty_lasts: PositiveDuration = timedelta(days=5)
+    annoyance_lasts: PositiveDuration = timedelta(days=5)
+    annoyed_by: float = Field(default=0.7, ge=0, le=100)
+    trust: Share = 0.35

@@ -1,0 +1,254 @@
+"""Interactions as data: what a robot wants of a person, when it is worth what, and its queue."""
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from datetime import datetime, timedelta
+from enum import StrEnum
+from typing import Annotated, Literal, NamedTuple, Self
+
+from pydantic import Field, model_validator
+
+from fleet2d.configuration.components import Settings
+from fleet2d.configuration.problems import problem
+from fleet2d.configuration.units import (
+    Days,
+    Duration,
+    Length,
+    PositiveDuration,
+    Share,
+    TimeOfDay,
+    weekdays_of,
+)
+from fleet2d.runtime.clock import midnight_of
+
+InteractionKind = Literal["remind", "offer", "ask", "greet", "deliver", "patrol_report"]
+
+DAY = timedelta(days=1)
+
+
+class Outcome(StrEnum):
+    """What can come of addressing a person: the events of the robot that sees it."""
+
+    ACCEPTED = "accepted"
+    DECLINED = "declined"
+    DEFERRED = "deferred"
+    IGNORED = "ignored"  # noticed, and not answered; a robot that isn't noticed sees the same
+    MISTAKEN = "mistaken"  # it addressed somebody else
+    SENT_AWAY = "sent_away"
+    BANNED = "banned"  # from the room that it is in
+    SWITCHED_OFF = "switched_off"
+
+
+REQUEST_EVENTS = frozenset({"due", "expired", *map(str, Outcome)})
+"""What a robot hears about its requests: they come up, expire, and people answer."""
+
+
+class Interaction(Settings):
+    """Something that a robot wants of a person, again and again.
+
+    A *request* comes up at each time of `at`, or every `every`, and is open for `within`. Its value
+    falls evenly from `worth` to `worth` · `falls_to` at the deadline.
+
+    Attributes:
+        do: Its kind.
+        to: The person.
+        by: The robot; left out: the first one.
+        about: What it is about, for reports; the person whom a question is about.
+        at: Times of day at which a request comes up.
+        on: The days on which it does.
+        every: Interval between two requests, from the start on, instead of `at`.
+        within: How long a request is open.
+        worth: Its value if it is carried out at once, in any unit.
+        falls_to: The part of the value that is left at the deadline.
+        takes: How long it takes once the person has accepted.
+        distance: How near the robot comes [m].
+        manner: Whether it speaks, or only shows a text, which has to be in sight.
+        tries: Number of times that the robot addresses the person, at most.
+        retry: Time before it tries again.
+        seek: Whether the behavior `interact` looks for the person; else it is an opportunity only.
+
+    Example:
+        >>> pill = Interaction(do="remind", to="ana", at=["08:00"], within="30 min", worth=4)
+        >>> pill.value_after(timedelta(minutes=10))
+        4.0
+        >>> song = Interaction(do="offer", to="ana", every="1 d", worth=4, falls_to=0.5)
+        >>> song.value_after(timedelta(minutes=15))
+        3.0
+    """
+
+    do: InteractionKind
+    to: str = Field(min_length=1)
+    by: str | None = None
+    about: str = ""
+    at: tuple[TimeOfDay, ...] = ()
+    on: Days | Annotated[tuple[Days, ...], Field(min_length=1)] = "daily"
+    every: PositiveDuration | None = None
+    within: PositiveDuration = timedelta(minutes=30)
+    worth: float = Field(default=1.0, ge=0, le=1e6)
+    falls_to: Share = 1.0
+    takes: Duration = timedelta(minutes=1)
+    distance: Length = Field(default=1.2, ge=0.3, le=10)
+    manner: Literal["spoken", "shown"] = "spoken"
+    tries: int = Field(default=3, ge=1, le=100)
+    retry: Duration = timedelta(minutes=10)
+    seek: bool = True
+
+    @model_validator(mode="after")
+    def _comes_up(self) -> Self:
+        if bool(self.at) == (self.every is not None):
+            raise problem("it comes up by 'at' (times of day) or 'every' (a duration): give one")
+        return self
+
+    def value_after(self, age: timedelta) -> float:
+        """Return its value when it is carried out some time after it came up; 0 if too late."""
+        if not timedelta(0) <= age <= self.within:
+            return 0.0
+        return self.worth * (1 - (1 - self.falls_to) * (age / self.within))
+
+    def times(self, start: datetime, after: datetime) -> Iterator[datetime]:
+        """Yield when requests come up from a moment on.
+
+        Args:
+            start: The start of the run.
+            after: The first moment that counts.
+        """
+        if self.every is not None:
+            passed = max(timedelta(0), after - start)
+            number = -(-passed // self.every)
+            while True:
+                yield start + number * self.every
+                number += 1
+        names = (self.on,) if isinstance(self.on, str) else self.on
+        days, midnight = weekdays_of(names), midnight_of(after)
+        while True:
+            if midnight.weekday() in days:
+                yield from (midnight + at for at in sorted(self.at) if midnight + at >= after)
+            midnight += DAY
+
+
+@dataclass
+class Request:
+    """One time that an interaction is wanted.
+
+    Attributes:
+        name: The interaction's name in the scenario.
+        interaction: The interaction.
+        since: When it came up.
+        not_before: When the robot may try (again).
+        tries: Number of times that the person was addressed.
+    """
+
+    name: str
+    interaction: Interaction
+    since: datetime
+    not_before: datetime
+    tries: int = 0
+
+    @property
+    def until(self) -> datetime:
+        """The deadline."""
+        return self.since + self.interaction.within
+
+    @property
+    def text(self) -> str:
+        """The interaction and the person, as events name them."""
+        return f"{self.name} {self.interaction.to}"
+
+    def value_at(self, time: datetime) -> float:
+        """Return its value if it is carried out at a time."""
+        return self.interaction.value_after(time - self.since)
+
+
+class RequestChange(NamedTuple):
+    """A request that came up, or whose deadline has passed."""
+
+    time: datetime
+    event: Literal["due", "expired"]
+    request: Request
+
+
+@dataclass
+class RequestQueue:
+    """What a robot wants of people at present, and what it has been told about itself.
+
+    Attributes:
+        interactions: Its interactions, by name.
+        start: The start of the run.
+        open: The open requests, in the order in which they came up.
+        banned: Indices of the rooms that it was told to keep out of.
+        opportunities: What it considered, for the events: step and text; taken from here once.
+    """
+
+    interactions: Mapping[str, Interaction]
+    start: datetime
+    open: list[Request] = field(default_factory=list)
+    banned: frozenset[int] = frozenset()
+    opportunities: list[tuple[int, str]] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self._next = {
+            name: next(each.times(self.start, self.start))
+            for name, each in self.interactions.items()
+        }
+
+    def next_change(self) -> datetime | None:
+        """Return when a request comes up next, or a deadline passes; None: never."""
+        times = [*self._next.values(), *(request.until for request in self.open)]
+        return min(times, default=None)
+
+    def advance(self, time: datetime) -> list[RequestChange]:
+        """Open what has come up by a time, drop what is too late; return what has changed."""
+        changes = [RequestChange(r.until, "expired", r) for r in self.open if r.until <= time]
+        self.open = [request for request in self.open if request.until > time]
+        for name, due in self._next.items():
+            each = self.interactions[name]
+            while due <= time:
+                request = Request(name, each, due, due)
+                changes.append(RequestChange(due, "due", request))
+                if request.until > time:
+                    self.open.append(request)
+                due = next(each.times(self.start, due + timedelta(microseconds=1)))
+            self._next[name] = due
+        self.open.sort(key=lambda request: (request.since, request.name))
+        return sorted(changes, key=lambda change: (change.time, change.request.name))
+
+    def find(self, text: str) -> Request | None:
+        """Return the first open request that events name by a text."""
+        return next((request for request in self.open if request.text == text), None)
+
+    def ready(self, time: datetime, people: Iterable[str] | None = None) -> list[Request]:
+        """Return the requests that may be tried now, the most valuable and urgent first.
+
+        Args:
+            time: The present time.
+            people: Only those to these people.
+        """
+        chosen = None if people is None else frozenset(people)
+        ready = [
+            request
+            for request in self.open
+            if request.not_before <= time and (chosen is None or request.interaction.to in chosen)
+        ]
+        return sorted(ready, key=lambda r: (-r.interaction.worth, r.until, r.name))
+
+    def next_ready(self, time: datetime) -> datetime | None:
+        """Return when a request that has to wait may be tried again; None: none has to."""
+        return min((r.not_before for r in self.open if r.not_before > time), default=None)
+
+    def settle(self, request: Request, outcome: Outcome, time: datetime, later: datetime) -> None:
+        """Note what came of addressing the person.
+
+        Args:
+            request: The request.
+            outcome: What the robot saw.
+            time: The present time.
+            later: When the person wants to be asked again, if it was deferred.
+        """
+        request.tries += 1
+        may_retry = outcome in (Outcome.DEFERRED, Outcome.IGNORED, Outcome.MISTAKEN)
+        if not may_retry or request.tries >= request.interaction.tries:
+            self.open = [each for each in self.open if each is not request]
+        elif outcome == Outcome.DEFERRED:
+            request.not_before = later
+        else:
+            request.not_before = time + request.interaction.retry

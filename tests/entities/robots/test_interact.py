@@ -1,0 +1,193 @@
+"""Interact: the robot serves its requests, and keeps to what people answer."""
+
+from collections.abc import Sequence
+from datetime import timedelta
+from typing import Any
+
+import numpy as np
+import pytest
+from tests.scenes import digests, scenario, table
+
+import fleet2d
+from fleet2d.errors import ScenarioError
+from fleet2d.interactions.answers import Answers, Circumstances, Reply
+from fleet2d.interactions.attitude import AttitudeState
+from fleet2d.interactions.interaction import Outcome
+
+PILL = {"do": "remind", "to": "ana", "at": ["07:10"], "within": "1 h", "worth": 4, "takes": "30 s"}
+
+
+class Scripted(Answers):
+    """Gives the same answers one after the other, 5 s after each question."""
+
+    outcomes: tuple[str, ...] = ("accepted",)
+    later: Any = (timedelta(minutes=12), timedelta(minutes=12))
+
+    def reply(
+        self, now: Circumstances, state: AttitudeState, seed: int, path: str, step: int
+    ) -> Reply | None:
+        self.__dict__.setdefault("number", 0)
+        self.__dict__["number"] += 1
+        outcome = self.outcomes[min(self.__dict__["number"], len(self.outcomes)) - 1]
+        if not outcome:
+            return None
+        return Reply(Outcome(outcome), timedelta(seconds=5), self.later[0], 0.5)
+
+
+def ana(place: Any = "kitchen", outcomes: Sequence[str] = ("accepted",)) -> dict[str, Any]:
+    """A person who stays at a place, and whose answers are known."""
+    item = {"at": "00:10", "place": place, "activity": "read"}
+    days = [{"on": "daily", "items": [item]}]
+    return {"type": "schedule", "days": days, "answers": Scripted(outcomes=outcomes)}
+
+
+def home(duration: str = "2 h", **changes: Any) -> dict[str, Any]:
+    return scenario(
+        duration,
+        **{
+            "users": {"ana": ana()},
+            "robots": {"astro": {"behaviors": [{"type": "interact"}, {"type": "patrol"}]}},
+            "interactions": {"pill": PILL},
+            "artifacts": {"trajectories": "1 s"},
+            **changes,
+        },
+    )
+
+
+def events_of(run: fleet2d.Run, *kinds: str) -> list[tuple[int, str]]:
+    rows = table(run, "events")
+    wanted = kinds or (
+        "due", "asks", *map(str, Outcome), "delivered", "withdraws", "expired",
+    )  # fmt: skip
+    return [
+        (int(step), str(event))
+        for step, event in zip(rows["step"], rows["event"], strict=True)
+        if event in wanted
+    ]
+
+
+def test_a_reminder_is_given_once_it_is_due() -> None:
+    run = fleet2d.run(home())
+    (due, _), (asks, _), (accepted, _), (delivered, _) = happened = events_of(run)
+
+    assert ["due", "asks", "accepted", "delivered"] == [event for _, event in happened]
+    assert 600 == due < asks
+    assert 5 == accepted - asks
+    assert 30 <= delivered - accepted <= 32
+
+
+@pytest.mark.parametrize("max_span", [1, 7])
+def test_spans_are_invisible(max_span: int) -> None:
+    content = home("30 min", users={"ana": ana(outcomes=("deferred", "accepted"))})
+    content["users"]["ana"]["answers"] = {"defers": 1}
+    other = {**content, "simulation": {**content["simulation"], "max_span": max_span}}
+    assert digests(fleet2d.run(content)) == digests(fleet2d.run(other))
+
+
+def test_a_deferred_reminder_comes_back_at_its_time() -> None:
+    run = fleet2d.run(home(users={"ana": ana(outcomes=("deferred", "accepted"))}))
+    happened = events_of(run, "asks", "deferred", "accepted")
+
+    assert ["asks", "deferred", "asks", "accepted"] == [event for _, event in happened]
+    deferred, again = happened[1][0], happened[2][0]
+    assert 12 * 60 <= again - deferred < 12 * 60 + 120
+
+
+def test_a_declined_reminder_is_dropped_and_the_robot_withdraws() -> None:
+    run = fleet2d.run(home(users={"ana": ana(outcomes=("declined",))}))
+
+    assert ["due", "asks", "declined", "withdraws"] == [event for _, event in events_of(run)]
+
+
+def test_who_gives_no_answer_is_not_asked_again_in_the_same_place() -> None:
+    """A sleeper is never asked in vain twice."""
+    run = fleet2d.run(home(users={"ana": ana("bedroom", ("",))}))
+
+    happened = [event for _, event in events_of(run)]
+    assert ["due", "asks", "withdraws", "expired"] == happened
+
+
+def test_who_has_moved_is_asked_again() -> None:
+    items = [
+        {"at": "00:10", "place": "bedroom", "activity": "sleep"},
+        {"at": "07:40", "place": "kitchen", "activity": "breakfast"},
+    ]
+    person = ana() | {"days": [{"on": "daily", "items": items}]}
+    person["answers"] = Scripted(outcomes=("", "accepted"))
+    run = fleet2d.run(home(users={"ana": person}))
+
+    happened = events_of(run, "asks", "accepted")
+    assert ["asks", "asks", "accepted"] == [event for _, event in happened]
+    assert happened[0][0] < 40 * 60 < happened[1][0]
+
+
+def test_a_banned_room_stays_empty() -> None:
+    users = {"ana": ana("bedroom", ("banned",))}
+    run = fleet2d.run(home("3 h", users=users))
+    (banned,) = events_of(run, "banned")
+    left = next(step for step, event in events_of(run, "withdraws") if step > banned[0]) + 120
+    rows = table(run, "trajectories")
+    is_robot = rows["entity"] == "astro"
+
+    before = set(rows["room"][is_robot & (rows["step"] <= banned[0])])
+    after = set(rows["room"][is_robot & (rows["step"] > left)])
+    assert any("bedroom" in str(room) for room in before)
+    assert len(after) > 1
+    assert not any("bedroom" in str(room) for room in after)
+
+
+def test_a_robot_that_is_switched_off_stands_still_until_it_is_on_again() -> None:
+    users = {"ana": ana(outcomes=("switched_off",))}
+    users["ana"]["answers"] = Scripted(outcomes=("switched_off",), off_for="30 min")
+    run = fleet2d.run(home("2 h", users=users))
+    ((off, _),) = events_of(run, "switched_off")
+    rows = table(run, "trajectories")
+    is_robot = rows["entity"] == "astro"
+
+    def moves(first: int, end: int) -> bool:
+        now = is_robot & (rows["step"] > first) & (rows["step"] < end)
+        return bool(np.ptp(rows["x"][now]) > 0.1 or np.ptp(rows["y"][now]) > 0.1)
+
+    assert not moves(off + 1, off + 1800)
+    assert moves(off + 1800, off + 3600)
+
+
+def test_an_opportunity_is_taken_when_the_person_comes_into_view() -> None:
+    behaviors = [{"type": "opportunistic"}, {"type": "patrol"}]
+    run = fleet2d.run(home(robots={"astro": {"behaviors": behaviors}}))
+
+    happened = [event for _, event in events_of(run)]
+    assert ["due", "asks", "accepted", "delivered"] == happened
+
+
+def test_who_is_addressed_in_place_of_another_has_less_trust_in_the_robot() -> None:
+    users = {
+        "ana": ana([4.5, 3.5]) | {"answers": {"notice": {"base": 9}}},
+        "ben": ana([1.0, 3.5]) | {"answers": {"notice": {"base": 9}}},
+    }
+    robots = {
+        "astro": {
+            "behaviors": [{"type": "interact"}, {"type": "patrol"}],
+            "perception": {"identity": {"mistaken": 1.0}},  # it takes each for the other
+        }
+    }
+    run = fleet2d.run(home(users=users, robots=robots))
+
+    assert "mistaken" in {event for _, event in events_of(run)}
+
+
+def test_a_run_that_is_branched_goes_on_the_same() -> None:
+    import copy
+
+    content = home("1 h", users={"ana": ana()})
+    content["users"]["ana"]["answers"] = {"activity": {"base": -1}}
+    whole = fleet2d.run(content)
+    half = fleet2d.Simulation(content)
+    half.run_until(timedelta(minutes=11))
+
+    assert whole.digest == copy.deepcopy(half).run().digest == half.run().digest
+
+
+def test_interact_without_requests_is_refused() -> None:
+    with pytest.raises(ScenarioError, match="write a section `interactions`"):
+        fleet2d.run(home(interactions={}))

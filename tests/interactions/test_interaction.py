@@ -1,0 +1,113 @@
+"""Interactions as data: when requests come up, what they are worth, and what becomes of them."""
+
+from datetime import datetime, timedelta
+from typing import Any
+
+import pytest
+from tests.scenes import scenario
+
+from fleet2d.errors import ScenarioError
+from fleet2d.interactions.interaction import Interaction, Outcome, RequestQueue
+from fleet2d.scenario.model import load_scenario
+
+MONDAY = datetime(2026, 1, 5)
+HOUR, MINUTE = timedelta(hours=1), timedelta(minutes=1)
+PILL: dict[str, Any] = {"do": "remind", "to": "ana", "at": ["20:00", "08:00"], "worth": 4}
+
+
+def queue(**changes: Any) -> RequestQueue:
+    return RequestQueue({"pill": Interaction(**(PILL | changes))}, MONDAY)
+
+
+def test_requests_come_up_at_their_times_and_expire() -> None:
+    requests = queue(on="weekdays")
+    changes = requests.advance(MONDAY + timedelta(days=6))
+
+    due = [change.time for change in changes if change.event == "due"]
+    expired = [change.time for change in changes if change.event == "expired"]
+    days = [MONDAY + timedelta(days=day) for day in range(5)]
+    assert [day + at * HOUR for day in days for at in (8, 20)] == due
+    assert [] == expired == requests.open  # they were late before anybody looked
+    assert MONDAY + timedelta(days=7, hours=8) == requests.next_change()
+
+
+def test_a_request_expires_at_its_deadline() -> None:
+    requests = queue()
+    assert ["due"] == [change.event for change in requests.advance(MONDAY + 8 * HOUR)]
+    assert [] == requests.advance(MONDAY + 8 * HOUR + 29 * MINUTE)
+    assert ["expired"] == [c.event for c in requests.advance(MONDAY + 8 * HOUR + 30 * MINUTE)]
+    assert [] == requests.open
+
+
+def test_requests_at_an_interval_count_from_the_start() -> None:
+    times = queue(at=[], every="90 min").interactions["pill"].times(MONDAY, MONDAY + 2 * HOUR)
+    assert MONDAY + 3 * HOUR == next(times)
+    assert MONDAY + 4.5 * HOUR == next(times)
+
+
+def test_value_falls_evenly_until_the_deadline() -> None:
+    song = Interaction(do="offer", to="ana", every="1 d", within="2 h", worth=10, falls_to=0.5)
+    values = [song.value_after(hours * HOUR) for hours in (0, 1, 2, 2.1, -1)]
+    assert [10.0, 7.5, 5.0, 0.0, 0.0] == values
+
+
+def test_the_most_valuable_request_comes_first() -> None:
+    hello = Interaction(do="greet", to="ben", every="1 d", worth=1)
+    news = Interaction(do="deliver", to="ana", every="1 d", worth=3)
+    requests = RequestQueue({"hello": hello, "news": news}, MONDAY)
+    requests.advance(MONDAY)
+
+    assert ["news ana", "hello ben"] == [request.text for request in requests.ready(MONDAY)]
+    assert ["hello ben"] == [request.text for request in requests.ready(MONDAY, ["ben"])]
+
+
+@pytest.mark.parametrize(
+    ("outcome", "tries", "ready_after"),
+    [
+        (Outcome.ACCEPTED, 3, None),
+        (Outcome.DECLINED, 3, None),
+        (Outcome.SENT_AWAY, 3, None),
+        (Outcome.BANNED, 3, None),
+        (Outcome.SWITCHED_OFF, 3, None),
+        (Outcome.DEFERRED, 3, 17 * MINUTE),
+        (Outcome.IGNORED, 3, 10 * MINUTE),
+        (Outcome.IGNORED, 1, None),
+    ],
+)
+def test_an_answer_settles_a_request(
+    outcome: Outcome, tries: int, ready_after: timedelta | None
+) -> None:
+    requests, now = queue(tries=tries), MONDAY + 8 * HOUR
+    requests.advance(now)
+    requests.settle(requests.open[0], outcome, now, now + 17 * MINUTE)
+
+    assert [] == requests.ready(now)
+    if ready_after is None:
+        assert [] == requests.open
+    else:
+        assert now + ready_after == requests.next_ready(now)
+        assert [] == requests.ready(now + ready_after - MINUTE)
+        assert ["pill ana"] == [each.text for each in requests.ready(now + ready_after)]
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"at": []}, "it comes up by 'at'"),
+        ({"every": "1 h"}, "it comes up by 'at'"),
+        ({"to": "anna"}, "there is no user 'anna': did you mean 'ana'?"),
+        ({"by": "astra"}, "there is no robot 'astra': did you mean 'astro'?"),
+        ({"do": "nag"}, "'remind', 'offer'"),
+        ({"on": "feast"}, "interactions.pill.on"),
+    ],
+)
+def test_wrong_interactions_are_refused(changes: dict[str, Any], message: str) -> None:
+    content = scenario(
+        users={"ana": {"type": "meander"}},
+        robots={"astro": {"type": "patrol"}},
+        interactions={"pill": PILL | changes},
+    )
+    with pytest.raises(ScenarioError) as caught:
+        load_scenario(content)
+    assert message in str(caught.value)
+    assert "interactions.pill" in str(caught.value)
