@@ -164,16 +164,16 @@ def hours(day: list[Episode]) -> list[tuple[str, float, float]]:
 
 
 def test_a_day_without_periods_stays_as_it_is() -> None:
-    assert DAY == with_absences(DAY, MIDNIGHT, [period("14:00", "15:00")], [])
+    assert DAY == with_absences(DAY, MIDNIGHT, [period("14:00", "15:00")], None)
 
 
 def test_a_period_within_an_activity_cuts_it_in_two() -> None:
-    times = hours(with_absences(DAY, MIDNIGHT, [period("09:00", "10:00")], []))
+    times = hours(with_absences(DAY, MIDNIGHT, [period("09:00", "10:00")], None))
     assert [("read", 7, 9), ("holiday", 9, 10), ("read", 10, 12), ("cook", 12, 13)] == times
 
 
 def test_a_period_over_several_swallows_what_it_covers() -> None:
-    times = hours(with_absences(DAY, MIDNIGHT, [period("11:00", "23:00")], []))
+    times = hours(with_absences(DAY, MIDNIGHT, [period("11:00", "23:00")], None))
     assert [("read", 7, 11), ("holiday", 11, 13)] == times
 
 

@@ -9,11 +9,23 @@ from pydantic import BeforeValidator, Field, model_validator
 
 from fleet2d.configuration.components import Settings
 from fleet2d.configuration.documents import read_document
-from fleet2d.configuration.problems import Location, did_you_mean, problem, problem_at, shown
-from fleet2d.configuration.units import OnDays, Share, folder_of
+from fleet2d.configuration.problems import (
+    Location,
+    did_you_mean,
+    problem,
+    problem_at,
+    shown,
+    suggest,
+)
+from fleet2d.configuration.units import OnDays, PositiveDuration, Share, folder_of
 from fleet2d.errors import ScenarioError
-from fleet2d.routines.activity import AnyDurationDistribution, SchemaForms, find_activity
-from fleet2d.routines.persona import AnyPersona, Dates, Timing
+from fleet2d.routines.activity import (
+    AnyDurationDistribution,
+    DurationDistribution,
+    SchemaForms,
+    find_activity,
+)
+from fleet2d.routines.persona import AnyPersona, Dates, Timing, YearEvent
 from fleet2d.routines.planner import (
     Episode,
 )
@@ -72,7 +84,10 @@ AnyPeriod = Annotated[Period, SchemaForms("pair")]
 
 
 def with_absences(
-    day: Sequence[Episode], midnight: datetime, away: Sequence[Period], visits: Sequence[Period]
+    day: Sequence[Episode],
+    midnight: datetime,
+    away: Sequence[Period],
+    visits: Sequence[Period] | None,
 ) -> list[Episode]:
     """Return a day with a person's absences from home in place of what is planned then.
 
@@ -80,11 +95,11 @@ def with_absences(
         day: The episodes of the day, without a gap.
         midnight: The midnight that begins the day's date.
         away: The periods in which the person is away.
-        visits: If any, the only periods in which the person is at home.
+        visits: The only periods in which the person is at home; None: it lives there.
     """
     begin, end = day[0].begin, day[-1].end
     absences = [period.seconds_since(midnight) for period in away]
-    if visits:
+    if visits is not None:
         stays = sorted(period.seconds_since(midnight) for period in visits)
         lasts, firsts = [begin, *(b for _, b in stays)], [*(a for a, _ in stays), end]
         absences += [(a, b) for a, b in zip(lasts, firsts, strict=True) if a < b]
@@ -137,6 +152,26 @@ class JointActivity(Timing):
         return self
 
 
+class RandomVisits(Timing):
+    """Visits by chance, at most one a day.
+
+    Attributes:
+        every: Mean time between two, at least a day.
+        takes: How long one takes.
+    """
+
+    every: PositiveDuration
+    takes: AnyDurationDistribution = DurationDistribution(mean=timedelta(hours=3))
+
+    @model_validator(mode="after")
+    def _has_a_time(self) -> Self:
+        if self.at is None and self.between is None:
+            raise problem("visits need 'at' or 'between'")
+        if self.every < timedelta(days=1):
+            raise problem_at(("every",), "visits come once a day at most: give 1 d or more")
+        return self
+
+
 class Household(Settings):
     """The members of a household, and their joint activities.
 
@@ -147,8 +182,10 @@ class Household(Settings):
         together: Their joint activities, by name.
         away: Periods in which nobody is at home.
         trips: Periods in which some members are away, by name.
-        visits: Members who are at home in these periods only, by name.
+        visits: Members who are at home in these periods only, or who come by chance, by name.
         welcome: Probability that members at leisure come to the door when one comes home.
+        year: What changes the days of all members in the course of a year, by name, as a vacation;
+            templates (`days`) are those of the members who have them.
     """
 
     name: str = Field(default="home", min_length=1)
@@ -157,8 +194,9 @@ class Household(Settings):
     together: dict[str, Annotated[JointActivity, SchemaForms("text")]] = Field(default_factory=dict)
     away: tuple[AnyPeriod, ...] = ()
     trips: dict[str, tuple[AnyPeriod, ...]] = Field(default_factory=dict)
-    visits: dict[str, tuple[AnyPeriod, ...]] = Field(default_factory=dict)
+    visits: dict[str, tuple[AnyPeriod, ...] | RandomVisits] = Field(default_factory=dict)
     welcome: Share = 0.0
+    year: dict[str, YearEvent] = Field(default_factory=dict)
 
     @model_validator(mode="after")
     def _names_members(self) -> Self:
@@ -171,6 +209,15 @@ class Household(Settings):
             if name not in self.members:
                 hint = did_you_mean(name, self.members)
                 raise problem_at(where, f"the household has no member {name!r}{hint}")
+        for name, event in self.year.items():
+            if event.becomes is not None:
+                raise problem_at(("year", name, "becomes"), "only a member becomes another persona")
+            if event.days and not any(event.days in p.plans for p in self.members.values()):
+                known = {day for persona in self.members.values() for day in persona.plans}
+                raise problem_at(
+                    ("year", name, "days"),
+                    f"no member has a template {event.days!r}{suggest(event.days, known)}",
+                )
         for name, joint in self.together.items():
             try:
                 find_activity(joint.activity or name, {})

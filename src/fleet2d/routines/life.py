@@ -9,7 +9,7 @@ from fleet2d.configuration.units import weekdays_of
 from fleet2d.kernels.motion import ANY_ROOM, NO_GAP_S, RoomUse
 from fleet2d.routines.activity import find_activity
 from fleet2d.routines.distributions import uniform
-from fleet2d.routines.household import Household, with_absences
+from fleet2d.routines.household import SECOND, Household, Period, RandomVisits, with_absences
 from fleet2d.routines.interruptions import interrupt
 from fleet2d.routines.persona import Persona, holds_on
 from fleet2d.routines.planner import (
@@ -30,6 +30,7 @@ from fleet2d.routines.planner import (
     with_jobs,
 )
 from fleet2d.routines.templates import starts
+from fleet2d.routines.year import Year
 from fleet2d.runtime.clock import DAY_S
 from fleet2d.runtime.determinism import Draws, stream_key
 
@@ -57,8 +58,18 @@ class Life:
         (['toilet', 'wash_hands', 'wash'], 'sleep')
     """
 
-    def __init__(self, persona: Persona, seed: int, path: str) -> None:
+    def __init__(self, persona: Persona, seed: int, path: str, shared: Year | None = None) -> None:
+        """Prepare to draw days.
+
+        Args:
+            persona: The persona.
+            seed: The seed of the run.
+            path: The path of the person, which names its random streams.
+            shared: The year of its household, which precedes its own.
+        """
         self.persona = persona
+        own = Year(persona.year, seed, path) if persona.year else None
+        self._years = [year for year in (own, shared) if year is not None]
         self._wake = stream_key(seed, path, "wake")
         self._day = stream_key(seed, path, "day")
         self._needs = stream_key(seed, path, "needs")
@@ -75,6 +86,8 @@ class Life:
             if len(self._templates) >= CACHED_DAYS:
                 del self._templates[next(iter(self._templates))]
             name = self.persona.day(date.fromordinal(ordinal))
+            for year in self._years:
+                name = year.template(self.persona, ordinal, name)
             self._templates[ordinal] = self.persona.plans[name]
         return self._templates[ordinal]
 
@@ -102,9 +115,13 @@ class Life:
     ) -> Sequence[Episode]:
         """Draw a day from a plan, which may differ from its template's, with interruptions."""
         day = self.draw_uninterrupted(ordinal, plan, private)
-        if not (self.persona.needs or self.persona.errands):
-            return day
-        return interrupt(self.persona.interruptions, Draws(self._needs, ordinal), day, private)
+        persona = self.persona
+        for year in self._years:
+            persona = year.persona(persona, ordinal)
+        if persona.needs or persona.errands:
+            day = interrupt(persona.interruptions, Draws(self._needs, ordinal), day, private)
+        away = [period for year in self._years for period in year.absences(ordinal)]
+        return with_absences(day, datetime.fromordinal(ordinal), away, None) if away else day
 
     def draw_uninterrupted(
         self, ordinal: int, plan: DayPlan, private: PrivateRooms | None = None
@@ -146,8 +163,9 @@ class Lives:
         self.household = household
         self._seed = seed
         self._path = f"household.{household.name}"
+        shared = Year(household.year, seed, self._path) if household.year else None
         self._lives = {
-            name: Life(persona, seed, f"{self._path}.{name}")
+            name: Life(persona, seed, f"{self._path}.{name}", shared)
             for name, persona in household.members.items()
         }
         self._rooms = {
@@ -202,14 +220,12 @@ class Lives:
         ]
 
     def _is_exclusive(self, name: str, episode: Episode) -> bool:
-        own = self.household.members[name].activities
-        return (
-            episode.activity in self._rooms[name] or find_activity(episode.activity, own).exclusive
-        )
+        activity = self.household.members[name].activity(episode.activity)
+        return episode.activity in self._rooms[name] or activity.exclusive
 
     def is_out(self, name: str, episode: Episode) -> bool:
         """Return whether a member is out of the home for an episode."""
-        return find_activity(episode.activity, self.household.members[name].activities).away
+        return self.household.members[name].activity(episode.activity).away
 
     def _draw(self, ordinal: int) -> Mapping[str, Sequence[Episode]]:
         """Draw the days of all members for a date."""
@@ -241,10 +257,24 @@ class Lives:
         """Return a member's day, away from home on trips and, for visitors, between visits."""
         household = self.household
         away = (*household.away, *household.trips.get(name, ()))
-        visits = household.visits.get(name, ())
-        if not away and not visits:
+        visits = self._visits(name, ordinal)
+        if not away and visits is None:
             return day
         return with_absences(day, datetime.fromordinal(ordinal), away, visits)
+
+    def _visits(self, name: str, ordinal: int) -> Sequence[Period] | None:
+        """Return the visits of a member on a day and those next to it; None: it lives here."""
+        visits = self.household.visits.get(name)
+        if not isinstance(visits, RandomVisits):
+            return visits or None
+        key, found = stream_key(self._seed, self._path, f"visits {name}"), []
+        begins, takes = starts(visits, 0), visits.takes.table()
+        for day in (ordinal - 1, ordinal, ordinal + 1):
+            draws = Draws(key, day)
+            if draws.below(visits.every // SECOND) < DAY_S:
+                begin = datetime.fromordinal(day) + begins.draw(draws) * SECOND
+                found.append(Period(begins=begin, ends=begin + takes.draw(draws) * SECOND))
+        return found
 
     def _with_welcomes(
         self, ordinal: int, days: Mapping[str, Sequence[Episode]]

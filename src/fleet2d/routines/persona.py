@@ -10,6 +10,7 @@ from pydantic import (
     BeforeValidator,
     Field,
     SerializerFunctionWrapHandler,
+    WithJsonSchema,
     WrapSerializer,
     model_validator,
 )
@@ -22,13 +23,14 @@ from fleet2d.configuration.units import (
     Duration,
     Length,
     OnDays,
+    PositiveDuration,
     Share,
     TimeOfDay,
     folder_of,
     format_time_of_day,
     weekdays_of,
 )
-from fleet2d.errors import ScenarioError
+from fleet2d.errors import ScenarioError, extra
 from fleet2d.routines.activity import (
     Activity,
     AnyDurationDistribution,
@@ -89,9 +91,26 @@ class Manners(Settings):
     stops: Share = 0.1
 
 
-BUNDLED = Path(__file__).parent / "personas"
+FOLDER = Path(__file__).parent
+BUNDLED = FOLDER / "personas"
 DAY = timedelta(days=1)
 Dates = tuple[date | tuple[date, date], ...]
+
+
+def _day_of_year(value: object) -> str:
+    try:
+        month, day = map(int, str(value).split("-"))
+        return f"{date(2000, month, day):%m-%d}"
+    except ValueError:
+        raise problem(f"expected a month and a day like 07-15, got {shown(value)}") from None
+
+
+DayOfYear = Annotated[
+    str,
+    BeforeValidator(_day_of_year),
+    WithJsonSchema({"type": "string", "description": "a month and a day", "examples": ["07-15"]}),
+]
+"""A day of each year, 'MM-DD'."""
 
 
 class Timing(Settings):
@@ -269,6 +288,62 @@ def holds_on(dates: Dates, day: date) -> bool:
     return any(first <= day <= last for first, last in spans)
 
 
+FIRST_YEAR, LAST_YEAR = 2000, 2050  # whose public holidays are looked up
+
+
+class YearEvent(Settings):
+    """Something that changes the days of a person in the course of a year.
+
+    When: one of `every`, `yearly`, `once`, `season` and `holidays`. What then: one of `days`,
+    `away` and `becomes`.
+
+    Attributes:
+        every: It comes by chance, with this mean time between its end and its next beginning.
+        yearly: It begins on a random day of this part of each year: ("07-10", "08-20").
+        once: It begins on this date, or on a random day of this range.
+        season: It is this part of each year: ("11-01", "02-28").
+        holidays: It is on the public holidays of a country or a part of it: "DE", "DE-BY".
+        dates: The dates of those holidays; looked up if left out.
+        lasts: How long it lasts, rounded to days, at least one; left out: for good (`once`).
+        days: The template of the days, of the persona or a bundled one: ill, bad_day, day_off.
+        away: Whether nobody is at home: from 10:00 on its first day to 18:00 on its last.
+        becomes: The persona whose days are lived from then on.
+    """
+
+    every: PositiveDuration | None = None
+    yearly: tuple[DayOfYear, DayOfYear] | None = None
+    once: date | tuple[date, date] | None = None
+    season: tuple[DayOfYear, DayOfYear] | None = None
+    holidays: str | None = None
+    dates: tuple[date, ...] = ()
+    lasts: AnyDurationDistribution | None = None
+    days: str | None = None
+    away: bool = False
+    becomes: "AnyPersona | None" = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _look_up_holidays(cls, data: Any) -> Any:
+        if not isinstance(data, Mapping) or not data.get("holidays") or data.get("dates"):
+            return data
+        return {**data, "dates": public_holidays(str(data["holidays"]))}
+
+    @model_validator(mode="after")
+    def _is_one_thing_at_one_time(self) -> Self:
+        times = ("every", "yearly", "once", "season", "holidays")
+        if sum(getattr(self, name) is not None for name in times) != 1:
+            raise problem(f"say when it is by exactly one of {', '.join(times)}")
+        if (self.days is not None) + self.away + (self.becomes is not None) != 1:
+            raise problem("say what it changes by exactly one of days, away and becomes")
+        if self.lasts is None and (self.every or self.yearly):
+            raise problem("say how long it lasts, like 'lasts: 5 d'")
+        if self.lasts is not None and (self.season or self.holidays):
+            raise problem("a season and a holiday have their own length: leave out 'lasts'")
+        if isinstance(self.once, tuple) and self.once[0] > self.once[1]:
+            raise problem_at(("once",), f"{self.once[0]} is after {self.once[1]}: swap them")
+        return self
+
+
 class Persona(Settings):
     """A person: walking speed, manners, activities, and the templates of the days.
 
@@ -281,6 +356,7 @@ class Persona(Settings):
         needs: Needs that interrupt a day, by name; left out: those of an adult; null: none.
         errands: Short tasks between activities, by name; left out: those of an adult; null: none.
         days: The kinds of days, by name.
+        year: What changes its days in the course of a year, by name; a later one precedes others.
     """
 
     about: str = ""
@@ -291,11 +367,13 @@ class Persona(Settings):
     needs: dict[str, AnyNeed] = Field(default_factory=lambda: dict(usual_needs()))
     errands: dict[str, AnyErrand] = Field(default_factory=lambda: dict(usual_errands()))
     days: dict[str, DayTemplate] = Field(min_length=1)
+    year: dict[str, YearEvent] = Field(default_factory=dict)
 
     @model_validator(mode="before")
     @classmethod
     def _drop_deleted(cls, data: Any) -> Any:
-        return _without_nulls(data, ("leisure", "days", "activities", "needs", "errands"))
+        keys = ("leisure", "days", "activities", "needs", "errands", "year")
+        return _without_nulls(data, keys)
 
     @model_validator(mode="after")
     def _is_complete(self) -> Self:
@@ -313,6 +391,7 @@ class Persona(Settings):
             self._check_activity(pastime, ("leisure", pastime))
         for key, name in named_activities(self.needs, self.errands):
             self._check_activity(name, key)
+        self._check_year()
         covered = {weekday for day in self.days.values() for weekday in day.weekdays}
         if missing := [WEEKDAYS[i] for i in range(7) if i not in covered]:
             raise problem_at(
@@ -321,10 +400,27 @@ class Persona(Settings):
         check(self)
         return self
 
+    def _check_year(self) -> None:
+        for name, event in self.year.items():
+            known = {**bundled_days(), **self.days}
+            if event.days is not None and event.days not in known:
+                raise problem_at(
+                    ("year", name, "days"),
+                    f"there is no template {event.days!r}{suggest(event.days, known)}",
+                )
+
     @cached_property
     def plans(self) -> dict[str, DayPlan]:
         """The plan of each template, for the planner, by the template's name."""
-        return day_plans(self)
+        templates = dict(self.days)
+        for event in self.year.values():
+            if event.days is not None and event.days not in templates:
+                templates[event.days] = bundled_days()[event.days]
+        plans = day_plans(self, templates)
+        for name, event in self.year.items():
+            if event.becomes is not None:
+                plans |= {f"{name}.{day}": plan for day, plan in event.becomes.plans.items()}
+        return plans
 
     @cached_property
     def interruptions(self) -> InterruptionRules:
@@ -343,7 +439,14 @@ class Persona(Settings):
 
     def activity(self, name: str) -> Activity:
         """Return an activity by name, its own first."""
-        return find_activity(name, self.activities)
+        return find_activity(name, self.known_activities)
+
+    @cached_property
+    def known_activities(self) -> dict[str, Activity]:
+        """Its own activities, and those of the personas that it becomes, by name."""
+        later = (event.becomes for event in self.year.values() if event.becomes is not None)
+        known = {name: a for persona in later for name, a in persona.known_activities.items()}
+        return {**known, **self.activities}
 
     @cached_property
     def used_activities(self) -> dict[str, Activity]:
@@ -352,6 +455,8 @@ class Persona(Settings):
         names |= {option.activity for plan in self.plans.values() for option in plan.pastimes}
         names |= {n for day in self.days.values() for r in day.recorded for n in r.activities}
         names |= activities_of(self.needs, self.errands)
+        for event in self.year.values():
+            names |= set() if event.becomes is None else set(event.becomes.used_activities)
         return {name: self.activity(name) for name in sorted(names | {REST, SLEEP})}
 
     def day(self, day: date) -> str:
@@ -361,6 +466,41 @@ class Persona(Settings):
             if holds_on(self.days[name].dates, day):
                 return name
         return next(n for n in reversed(names) if day.weekday() in self.days[n].weekdays)
+
+
+@cache
+def bundled_days() -> dict[str, DayTemplate]:
+    """Return the templates of days that every persona has for its year, by name.
+
+    >>> sorted(bundled_days())
+    ['bad_day', 'day_off', 'ill']
+    """
+    data = read_document(FOLDER / "days.yaml").data
+    return {name: DayTemplate.model_validate(fields) for name, fields in data.items()}
+
+
+def public_holidays(place: str) -> list[date]:
+    """Return the public holidays of a country ("DE") or a part of it ("DE-BY"), 2000 to 2050.
+
+    Source: the package `holidays`.
+
+    Raises:
+        PydanticCustomError: It knows no such place.
+        InputError: The package is not installed.
+    """
+    with extra("calendar", "public holidays need the package holidays"):
+        import holidays
+    country, _, part = place.partition("-")
+    try:
+        found = holidays.country_holidays(
+            country, part or None, years=range(FIRST_YEAR, LAST_YEAR + 1)
+        )
+    except NotImplementedError:
+        known = holidays.list_supported_countries()
+        names = known if country not in known else [f"{country}-{p}" for p in known[country]]
+        hint = suggest(place, names)
+        raise problem_at(("holidays",), f"no holidays are known of {place!r}{hint}") from None
+    return sorted(found)
 
 
 def _without_nulls(data: Any, keys: tuple[str, ...]) -> Any:
@@ -450,3 +590,6 @@ AnyPersona = Annotated[
     Persona, BeforeValidator(read_persona), WrapSerializer(_dump), SchemaForms("text", "extension")
 ]
 """A persona in a scenario: a bundled name, a file, or a mapping that may extend either."""
+
+YearEvent.model_rebuild()
+Persona.model_rebuild()

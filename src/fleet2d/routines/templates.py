@@ -1,6 +1,6 @@
 """Plans of the templates of a persona, in the form of the planner, and checks that they work."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -45,9 +45,9 @@ def span(time_s: int) -> str:
     return " ".join([f"{hours} h"] * (hours > 0) + [f"{minutes} min"] * (minutes > 0 or not hours))
 
 
-def day_plans(persona: "Persona") -> dict[str, DayPlan]:
-    """Return the plan of each template, by the template's name."""
-    return {name: _day_plan(persona, name, day) for name, day in persona.days.items()}
+def day_plans(persona: "Persona", days: "Mapping[str, DayTemplate]") -> dict[str, DayPlan]:
+    """Return the plans of some templates, by the template's name."""
+    return {name: _day_plan(persona, name, day) for name, day in days.items()}
 
 
 def _day_plan(persona: "Persona", name: str, day: "DayTemplate") -> DayPlan:
@@ -110,7 +110,8 @@ def _pastime(
         first, last = window(pastime.between, dawn)
     takes = persona.activity(activity).takes.table()
     if takes.shortest < 1 and takes.longest < 2:  # time would stand still
-        inside = ("leisure",) if persona.days[day].leisure is None else ("days", day, "leisure")
+        own = day in persona.days and persona.days[day].leisure is not None
+        inside = ("days", day, "leisure") if own else ("leisure",)
         raise problem_at((*inside, activity), f"{activity!r} may take 0 s: let it take a second")
     return PastimeOption(activity, max(1, round(pastime.weight * 1000)), takes, first, last)
 
@@ -161,7 +162,7 @@ def check(persona: "Persona") -> None:
         if plan.recorded is not None:  # recorded days are possible
             continue
         _check_appointments(name, plan)
-        next_wake = DAY_S + min(plans[n].wake.shortest for n in _days_after(persona, name))
+        next_wake = DAY_S + min(plans[n].wake.shortest for n in _plans_after(persona, name))
         if next_wake - plan.min_sleep < plan.sleep.shortest:
             raise problem_at(
                 ("days", name, "sleep"),
@@ -170,6 +171,22 @@ def check(persona: "Persona") -> None:
                 f" {clock(next_wake)}: that is too short a night",
             )
         _check_room(name, plan, next_wake)
+
+
+def _plans_after(persona: "Persona", name: str) -> set[str]:
+    """Return the plans of days that may follow one of them, the events of the year included."""
+    after = {event.days for event in persona.year.values() if event.days is not None}
+    own = set(persona.days) if name in after else set[str]()
+    for change, event in persona.year.items():
+        if event.becomes is not None:
+            plans = {f"{change}.{day}" for day in event.becomes.plans}
+            after |= plans
+            if name in plans:
+                own = set() if event.lasts is None else set(persona.days)
+                break
+    else:
+        own = own or _days_after(persona, name)
+    return after | own
 
 
 def _days_after(persona: "Persona", name: str) -> set[str]:

@@ -459,4 +459,5 @@ class Routine(ResidentBehavior):
     def _with_absences(self, day: Sequence[Episode], ordinal: int) -> Sequence[Episode]:
         if not self.away and not self.visits:
             return day
-        return with_absences(day, datetime.fromordinal(ordinal), self.away, self.visits)
+        visits = self.visits or None
+        return with_absences(day, datetime.fromordinal(ordinal), self.away, visits)
