@@ -194,12 +194,13 @@ def describe_components() -> list[ComponentDescription]:
     ]
 
 
-def _parts_of(cls: type[Settings]) -> list[type[Settings]]:
+def _parts_of(cls: type[Settings], above: tuple[type[Settings], ...] = ()) -> list[type[Settings]]:
     """Return the classes of settings nested in a class, outermost first, without components."""
     parts: list[type[Settings]] = []
     for field in cls.model_fields.values():
         for part in _settings_in(field.annotation):
-            parts += [part, *_parts_of(part)]
+            if part not in above:
+                parts += [part, *_parts_of(part, (*above, part))]
     return list(dict.fromkeys(parts))
 
 
@@ -211,6 +212,8 @@ def _settings_in(annotation: Any) -> list[type[Settings]]:
 
 def _describe(kind: str, name: str, cls: type[Settings]) -> ComponentDescription:
     schema = cls.model_json_schema(schema_generator=_SchemaGenerator)
+    if "$ref" in schema:  # it is nested in itself
+        schema = schema["$defs"][schema["$ref"].rpartition("/")[2]]
     properties, required = schema.get("properties", {}), schema.get("required", ())
     return ComponentDescription(
         kind,
