@@ -14,7 +14,7 @@ from pydantic import BeforeValidator
 
 from fleet2d.artifacts.manifest import FILE_NAME, Manifest, Status, TableRecord, table_record
 from fleet2d.artifacts.seal import TableDigest, make_seal, run_digest
-from fleet2d.artifacts.table import FLUSH_ROWS, Batch, Chunk, TableBuffer, TableSpec
+from fleet2d.artifacts.table import FLUSH_ROWS, Batch, Chunk, TableBuffer, TableSpec, rows_of
 from fleet2d.artifacts.unfinished import (
     LOCK_NAME,
     Commit,
@@ -160,6 +160,10 @@ class TableWriter:
     file: ParquetTable | None = None
     logged: int = 0
 
+    def __getstate__(self) -> dict[str, Any]:
+        """Leave out the functions that listen: they belong to the caller, not to the run."""
+        return {**self.__dict__, "row_listeners": []}
+
     def rehash(self) -> None:
         """Compute the digest again from the chunks in memory."""
         self.digest = TableDigest(self.buffer.spec)
@@ -202,6 +206,7 @@ class RunStore:
         directory: The run directory; None: the run is only in memory.
         root: Its absolute path, which stays right if the current directory changes.
         manifest: The content of `manifest.json`; the store sets status, tables and digest.
+        row_listeners: Functions that are called with each row, as a table and a mapping.
 
     Example:
         >>> from fleet2d.artifacts.table import Column
@@ -227,6 +232,7 @@ class RunStore:
         self.root = None if self.directory is None else self.directory.absolute()
         self._flush_rows = flush_rows
         self._tables: dict[str, TableWriter] = {}
+        self.row_listeners: list[Callable[[str, dict[str, Any]], None]] = []
         self._new_directories: list[Path] = []
         self._digests: dict[str, str] | None = None
         self._is_open = directory is None
@@ -379,7 +385,11 @@ class RunStore:
         if table not in self._tables:
             raise ArtifactError(f"there is no table {table!r}: add_table() it first")
         entry = self._tables[table]
-        self._fill(entry, entry.buffer.check(columns))
+        batch = entry.buffer.check(columns)
+        for listener in self.row_listeners:
+            for row in rows_of(entry.buffer.spec, columns, batch.rows):
+                listener(table, row)
+        self._fill(entry, batch)
 
     def _fill(self, entry: TableWriter, batch: Batch, *, log: bool = True) -> None:
         """Add rows to a buffer; without `log` they are not written to the journal."""

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 import re
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from datetime import datetime, timedelta
 from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
@@ -503,3 +505,35 @@ def categories(column: Any) -> tuple[I64, list[str]]:
     encoded = column.cast("string").combine_chunks().dictionary_encode()
     numbers = encoded.indices.fill_null(-1).to_numpy(zero_copy_only=False).astype(np.int64)
     return numbers, encoded.dictionary.to_pylist()
+
+
+_EPOCH = datetime(1970, 1, 1)
+
+
+def rows_of(spec: TableSpec, columns: Mapping[str, Any], count: int) -> Iterator[dict[str, Any]]:
+    """Yield rows for a table as mappings, with names and times in place of numbers, None for NaN.
+
+    Args:
+        spec: The table.
+        columns: One array per column, or a scalar for all rows, as `TableBuffer.check` takes them.
+        count: The number of rows.
+
+    Example:
+        >>> who = Column("who", "category", categories=("ana",))
+        >>> spec = TableSpec("seen", (Column("step", "step"), who))
+        >>> list(rows_of(spec, {"step": np.array([3, 4]), "who": np.array([0, -1])}, 2))
+        [{'step': 3, 'who': 'ana'}, {'step': 4, 'who': None}]
+    """
+    lists = []
+    for column in spec.columns:
+        array = np.asarray(columns[column.name])
+        values: list[Any] = array.tolist() if array.ndim else [array.item()] * count
+        if column.kind == "category" and array.dtype.kind in "iu":
+            values = [column.categories[v] if v >= 0 else None for v in values]
+        elif column.kind == "time" and array.dtype.kind in "iu":
+            values = [_EPOCH + timedelta(microseconds=v) for v in values]
+        elif array.dtype.kind == "f":
+            values = [None if math.isnan(v) else v for v in values]
+        lists.append(values)
+    for row in zip(*lists, strict=True):
+        yield dict(zip(spec.names, row, strict=True))

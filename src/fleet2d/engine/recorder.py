@@ -157,6 +157,7 @@ class Recorder:
     Attributes:
         activities: The activities of users so far.
         wall_s: Wall time of storing [s].
+        keeps_none: Whether rows are stored at once, for those who listen to them.
     """
 
     def __init__(self, basis: Basis, cameras: Sequence[Cameras], sensors: Sensors) -> None:
@@ -184,6 +185,7 @@ class Recorder:
         self._count = 0  # observations and readings
         self._most = max(MAX_ROWS, ROWS_PER_BODY * len(basis.actors))
         self.wall_s = 0.0
+        self.keeps_none = False
 
     def before_plan(self, row: int, step: int) -> None:
         """Collect the end of the plan that is replaced at `step`."""
@@ -226,7 +228,7 @@ class Recorder:
         self._readings += readings
         self._count += len(observations) + len(readings)
         count = self._count + self._samples.count + self._keys.count
-        if count + len(self._events) > self._most:
+        if count + len(self._events) > self._most or self.keeps_none:
             self.drain()
 
     def end(self, step: int, rows: int) -> None:

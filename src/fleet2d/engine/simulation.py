@@ -311,6 +311,30 @@ class Simulation(InterventionMethods):
         state.events.listeners.append(Listener(function, names))
         state.wait_for(state.requested)
 
+    def listen_rows(self, function: Callable[[str, Mapping[str, Any]], None]) -> None:
+        """Call a function with each row of a table as soon as it is known.
+
+        Events come to `listen`. From then on rows are stored after every span, which takes longer.
+
+        Args:
+            function: Called with the name of the table, and the row as a mapping of its columns.
+
+        Example:
+            >>> import fleet2d
+            >>> simulation = fleet2d.Simulation(None, "simulation.duration=2 h", seed=4)
+            >>> tables = []
+            >>> simulation.listen_rows(lambda table, row: tables.append(table))
+            >>> _ = simulation.run()
+            >>> tables.count("trajectories")
+            4
+        """
+        self._store.row_listeners.append(function)
+        self._state.recorder.keeps_none = True
+
+    def note(self, text: str) -> None:
+        """Add a line to the notes of the manifest."""
+        self._store.manifest.notes.append(text)
+
     def _event_kinds(self) -> frozenset[str]:
         """Return the kinds of events that may happen in this run."""
         behaviors = (b for actor in self._state.actors for b in actor.behaviors)

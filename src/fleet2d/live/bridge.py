@@ -1,0 +1,338 @@
+"""A run in real time, between other programs: what arrives is applied, what happens is passed on.
+
+What arrives becomes an intervention at the next step, so that the manifest repeats the run. What is
+late, lost, wrong or too much is counted and told, and never stops the run.
+"""
+
+import json
+import queue
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from datetime import datetime
+from functools import cached_property
+from typing import Any, Protocol
+
+from fleet2d.configuration.problems import suggest
+from fleet2d.engine.simulation import Simulation
+from fleet2d.errors import InputError
+from fleet2d.live.messages import (
+    DetectionsMessage,
+    GoalMessage,
+    LiveMessage,
+    PoseMessage,
+    ReadingMessage,
+    parse_message,
+)
+from fleet2d.runs.run import Run
+from fleet2d.runtime.events import Event
+
+# A body that gets poses stands when nothing arrived for so long [s].
+SILENCE_S = 5.0
+# A message that was sent longer ago is late, and left out [s].
+MAX_AGE_S = 2.0
+# More messages than this in a step are left out.
+MAX_PER_STEP = 1000
+# The number of texts of one kind that are told in full.
+MAX_TOLD = 20
+
+
+@dataclass(frozen=True)
+class Frame:
+    """What happened in a step.
+
+    Attributes:
+        step: The step.
+        time: Its local time.
+        bodies: x, y [m], heading [rad], room and away of each body after it, by name.
+        events: Its events, in order, readings of sensors among them.
+        rows: Its rows of other tables: pairs of the name of the table and the row.
+    """
+
+    step: int
+    time: datetime
+    bodies: Mapping[str, Mapping[str, Any]]
+    events: Sequence[Event]
+    rows: Sequence[tuple[str, Mapping[str, Any]]] = ()
+
+    @cached_property
+    def messages(self) -> list[dict[str, Any]]:
+        """The frame as JSON objects: one of poses, one for each event and row."""
+        stamp = {"step": self.step, "time": self.time.isoformat()}
+        return [
+            {"type": "poses", **stamp, "bodies": self.bodies},
+            *(
+                {
+                    "type": "event",
+                    "step": e.step,
+                    "entity": e.entity,
+                    "event": str(e.event),
+                    "detail": e.detail,
+                }
+                for e in self.events
+            ),
+            *({"type": "row", "table": table, "row": row} for table, row in self.rows),
+        ]
+
+    @cached_property
+    def texts(self) -> list[str]:
+        """The messages as JSON."""
+        return [json.dumps(message, default=str) for message in self.messages]
+
+
+Post = Callable[[str | bytes | Mapping[str, Any]], None]
+
+
+class Peer(Protocol):
+    """Another program, or a function: it may send messages to a run, and hear of it."""
+
+    def open(self, simulation: Simulation, post: Post) -> None:
+        """Connect, before the first step; `post` receives messages, from any thread."""
+
+    def send(self, frame: Frame) -> None:
+        """Pass on a step, without waiting."""
+
+    def tell(self, text: str) -> None:
+        """Pass on a note about what arrived."""
+
+    def close(self, run: Run) -> None:
+        """Disconnect, after the last step."""
+
+
+@dataclass
+class _Sender:
+    """What is known of the source of poses of a body."""
+
+    heard: float  # [s], of the clock of the machine
+    stands: bool = False
+
+
+@dataclass
+class Bridge:
+    """A simulation in real time, among other programs.
+
+    Attributes:
+        simulation: The simulation; it runs as fast as `speed` says, whatever its own speedup.
+        peers: The other programs.
+        speed: Times real time; 0: as fast as it can, for tests.
+        silence_s: A body that gets poses stands when none arrived for so long, which is told.
+        max_age_s: A message that was sent longer ago is left out.
+        max_per_step: More messages than this in a step are left out.
+        rows: Whether rows of tables are passed on, besides poses and events.
+        tell: Called with notes about what arrived.
+        counts: How many messages were received, applied, late, lost, wrong, replaced, too many.
+        lateness_s: How late each step began.
+
+    Example:
+        >>> from fleet2d.live import to_function
+        >>> simulation = Simulation(None, "simulation.duration=3 s", seed=4)
+        >>> steps = []
+        >>> run = Bridge(simulation, [to_function(lambda frame: steps.append(frame.step))], 0).run()
+        >>> steps
+        [0, 1, 2]
+    """
+
+    simulation: Simulation
+    peers: Sequence[Peer]
+    speed: float = 1.0
+    silence_s: float = SILENCE_S
+    max_age_s: float = MAX_AGE_S
+    max_per_step: int = MAX_PER_STEP
+    rows: bool = True
+    tell: Callable[[str], object] = str
+    counts: Counter[str] = field(default_factory=Counter)
+    lateness_s: list[float] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        """Begin with nothing heard."""
+        self._inbox: queue.SimpleQueue[tuple[float, int, Any]] = queue.SimpleQueue()
+        self._events: list[Event] = []
+        self._rows: list[tuple[str, Mapping[str, Any]]] = []
+        self._senders: dict[str, _Sender] = {}
+        self._numbers: dict[int, int] = {}
+        self._told: Counter[str] = Counter()
+
+    def run(self) -> Run:
+        """Simulate to the end, and return the run.
+
+        Raises:
+            KeyboardInterrupt: Ctrl-C; the run up to that step is stored.
+        """
+        simulation = self.simulation
+        simulation.listen(self._events.extend)
+        if self.rows:
+            simulation.listen_rows(self._hear)
+        for number, peer in enumerate(self.peers):
+            peer.open(simulation, self._post_of(number))
+        status = "complete"
+        try:
+            self._simulate()
+        except KeyboardInterrupt:
+            status = "interrupted"
+        finally:
+            for note in self.notes():
+                simulation.note(note)
+            run = simulation.finish("complete" if status == "complete" else "interrupted")
+            for peer in self.peers:
+                peer.close(run)
+        return run
+
+    def _hear(self, table: str, row: Mapping[str, Any]) -> None:
+        if table != "events":  # which are heard in order
+            self._rows.append((table, row))
+
+    def notes(self) -> list[str]:
+        """Return lines about what arrived."""
+        counts = self.counts
+        if not counts["received"]:
+            return []
+        words = [f"{counts[key]} {key}" for key in sorted(counts) if key != "received"]
+        return [f"live: {counts['received']} messages were received: {', '.join(words)}"]
+
+    def _post_of(self, number: int) -> Post:
+        return lambda content: self._inbox.put((time.monotonic(), number, content))
+
+    def _simulate(self) -> None:
+        simulation, step_s = self.simulation, self.simulation.clock.step_us / 1e6
+        began, first = time.monotonic(), simulation.step
+        while not simulation.done:
+            if self.speed:
+                due = began + (simulation.step - first) * step_s / self.speed
+                while (ahead := due - time.monotonic()) > 0:
+                    time.sleep(min(ahead, 0.1))
+                self.lateness_s.append(time.monotonic() - due)
+            self._apply(self._received())
+            self._stop_the_silent()
+            simulation.advance()
+            self._send()
+
+    # What arrives
+
+    def _received(self) -> list[LiveMessage]:
+        """Return the messages to apply at the present step."""
+        messages: list[LiveMessage] = []
+        latest: dict[tuple[str, str], int] = {}
+        for _ in range(self._inbox.qsize()):
+            arrived, sender, content = self._inbox.get()
+            self.counts["received"] += 1
+            if len(messages) >= self.max_per_step:
+                self._leave_out("too many", f"more than {self.max_per_step} messages in a step")
+                continue
+            try:
+                message = parse_message(content)
+            except InputError as error:
+                self._leave_out("wrong", str(error))
+                continue
+            if not self._is_timely(message, arrived, sender):
+                continue
+            if isinstance(message, PoseMessage | GoalMessage):
+                key = message.type, message.entity
+                if key in latest:  # only the last pose or goal of a body in a step counts
+                    messages[latest[key]] = message
+                    self.counts["replaced"] += 1
+                    continue
+                latest[key] = len(messages)
+            messages.append(message)
+        return messages
+
+    def _is_timely(self, message: LiveMessage, arrived: float, sender: int) -> bool:
+        """Return whether a message is neither late nor out of order, and count lost ones."""
+        if message.time is not None:
+            age = time.time() - message.time
+            if abs(age) > self.max_age_s:
+                self._leave_out("late", f"a message was sent {age:.1f} s ago by its clock")
+                return False
+        if message.number is not None:
+            expected = self._numbers.get(sender, -1) + 1
+            if message.number < expected:
+                self._leave_out("late", f"message {message.number} after {expected - 1}")
+                return False
+            if expected and message.number > expected:
+                lost = message.number - expected
+                self.counts["lost"] += lost
+                self._say("lost", f"{lost} messages before number {message.number} are lost")
+            self._numbers[sender] = message.number
+        return True
+
+    def _apply(self, messages: Sequence[LiveMessage]) -> None:
+        for message in messages:
+            try:
+                self._check(message)
+                for act in _acts_of(message):
+                    self.simulation.intervene(act)
+            except InputError as error:
+                self._leave_out("wrong", str(error))
+                continue
+            self.counts["applied"] += 1
+            if isinstance(message, PoseMessage):
+                sender = self._senders.setdefault(message.entity, _Sender(0.0))
+                if sender.stands:
+                    self._say("back", f"{message.entity}: poses arrive again")
+                self._senders[message.entity] = _Sender(time.monotonic())
+
+    def _check(self, message: LiveMessage) -> None:
+        """Refuse poses of bodies that decide themselves."""
+        if not isinstance(message, PoseMessage):
+            return
+        actors = self.simulation.actors
+        if message.entity not in actors:
+            raise InputError(
+                f"there is nobody named {message.entity!r}{suggest(message.entity, actors)}"
+            )
+        if all(behavior.type_name != "live" for behavior in actors[message.entity].behaviors):
+            raise InputError(
+                f"{message.entity} decides itself where it goes: only a body with the behavior live"
+                " gets poses"
+            )
+
+    def _stop_the_silent(self) -> None:
+        """Let bodies stand for which nothing has arrived for a while."""
+        now = time.monotonic()
+        for name, sender in self._senders.items():
+            if not sender.stands and now - sender.heard > self.silence_s:
+                sender.stands = True
+                self.counts["silences"] += 1
+                self._say("silent", f"{name}: no pose arrived for {self.silence_s:g} s: it stands")
+                self.simulation.intervene({"hold": name})
+
+    def _leave_out(self, why: str, text: str) -> None:
+        self.counts[why] += 1
+        self._say(why, f"{why}: {text}")
+
+    def _say(self, kind: str, text: str) -> None:
+        """Tell a note; of many of one kind, only the first."""
+        self._told[kind] += 1
+        if self._told[kind] > MAX_TOLD:
+            return
+        for tell in (self.tell, *(peer.tell for peer in self.peers)):
+            tell(text)
+
+    # What happens
+
+    def _send(self) -> None:
+        simulation = self.simulation
+        bodies = {n: s for n, s in simulation.state.items() if "heading" in s}
+        events, rows = self._events[:], self._rows[:]
+        self._events.clear()
+        self._rows.clear()
+        step = simulation.step - 1
+        frame = Frame(step, simulation.clock.time(step), bodies, events, rows)
+        for peer in self.peers:
+            peer.send(frame)
+
+
+def _acts_of(message: LiveMessage) -> Iterator[dict[str, Any]]:
+    """Yield the interventions of a message."""
+    if isinstance(message, PoseMessage):
+        heading = {} if message.heading_deg is None else {"heading_deg": message.heading_deg}
+        yield {"put": message.entity, "to": [message.x, message.y], **heading}
+    elif isinstance(message, GoalMessage):
+        to = message.to if isinstance(message.to, str) else list(message.to)
+        yield {"send": message.entity, "to": to}
+    elif isinstance(message, DetectionsMessage):
+        if message.detections:
+            detections = [d.model_dump() for d in message.detections]
+            yield {"perceive": message.entity, "detections": detections}
+    elif isinstance(message, ReadingMessage):
+        yield {"report": message.sensor, "says": "on" if message.on else "off"}

@@ -1,0 +1,79 @@
+"""Commands for other programs: live."""
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from fleet2d.errors import InputError
+from fleet2d.options import TrustFiles, TrustFolders, restrict_to, split
+
+
+def live(  # noqa: PLR0913 - options of the command line
+    arguments: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="[SCENARIO.yaml] [KEY.PATH=VALUE]...", help="A scenario and changes to it."
+        ),
+    ] = None,
+    peers: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--with",
+            metavar="URL",
+            help="Another program: ws://HOST:PORT and udp://HOST:PORT listen there,"
+            " rosbridge://HOST:PORT and mqtt://HOST:PORT/PREFIX connect. Several are possible.",
+        ),
+    ] = None,
+    speed: Annotated[float, typer.Option(min=0.0, help="Times real time; 0: unpaced.")] = 1.0,
+    silence: Annotated[
+        float, typer.Option(min=0.1, help="A body stands if nothing arrived for so long [s].")
+    ] = 5.0,
+    seed: Annotated[int | None, typer.Option(help="Seed of all random draws.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Directory to store the run in.")] = None,
+    schema: Annotated[
+        bool, typer.Option("--schema", help="Print the JSON Schema of messages, and end.")
+    ] = False,
+    trust: TrustFiles = None,
+    trust_dir: TrustFolders = None,
+) -> None:
+    """Run a scenario in real time among other programs, which may move its bodies."""
+    if schema:
+        from fleet2d.live.messages import message_schema
+
+        typer.echo(json.dumps(message_schema(), indent=2))
+        return
+    if not peers:
+        raise InputError(
+            "name at least one other program by --with, like --with ws://127.0.0.1:8765"
+        )
+    from fleet2d.engine.simulation import Simulation
+    from fleet2d.live.bridge import Bridge
+    from fleet2d.live.peers import open_peer
+
+    scenario, overrides = split(arguments)
+    changes = overrides if seed is None else [*overrides, f"simulation.seed={seed}"]
+    with restrict_to(trust, trust_dir):
+        opened = [open_peer(address) for address in peers]
+        simulation = Simulation(scenario, *changes, out=out)
+        for address, peer in zip(peers, opened, strict=True):
+            port = getattr(peer, "port", None)
+            typer.echo(
+                f"{address}: {'connected' if port is None else f'listens at {port}'}", err=True
+            )
+        bridge = Bridge(
+            simulation,
+            opened,
+            speed,
+            silence_s=silence,
+            tell=lambda text: typer.echo(text, err=True),
+        )
+        run = bridge.run()
+    for note in bridge.notes():
+        typer.echo(note, err=True)
+    typer.echo(
+        f"{run.status}, digest {(run.digest or '')[:8]}" + (f", stored in {out}" if out else "")
+    )
+    if run.status != "complete":
+        raise typer.Exit(130)

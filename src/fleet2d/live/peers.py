@@ -1,0 +1,254 @@
+"""Other programs of a live run: Python functions, UDP, WebSocket; and any by its address.
+
+A network peer is written `scheme://host:port`. The run waits for none of them: one that is slow
+loses messages, one that is gone is left out.
+"""
+
+import contextlib
+import json
+import queue
+import socket
+import threading
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any
+from urllib.parse import urlsplit
+
+from fleet2d.configuration.problems import did_you_mean
+from fleet2d.engine.simulation import Simulation
+from fleet2d.errors import InputError, extra
+from fleet2d.live.bridge import Frame, Peer, Post
+from fleet2d.live.messages import MAX_BYTES
+from fleet2d.runs.run import Run
+
+SCHEMES = ("udp", "ws", "rosbridge", "mqtt")
+# A client whose queue is longer is too slow, and is disconnected.
+MAX_QUEUE = 10_000
+VERSION = 1
+"""The version of the messages."""
+
+
+class FunctionPeer:
+    """A Python function that is called with each frame, or an iterator of messages."""
+
+    def __init__(
+        self,
+        function: Callable[[Frame], object] = id,
+        messages: Iterable[Mapping[str, Any]] = (),
+    ) -> None:
+        """Take a function, and messages that are read in a thread of their own."""
+        self._function, self._messages = function, messages
+
+    def open(self, simulation: Simulation, post: Post) -> None:
+        """Begin to read the messages."""
+
+        def read() -> None:
+            for message in self._messages:
+                post(message)
+
+        if self._messages != ():
+            threading.Thread(target=read, daemon=True).start()
+
+    def send(self, frame: Frame) -> None:
+        """Call the function."""
+        self._function(frame)
+
+    def tell(self, text: str) -> None:
+        """Do nothing: the bridge tells its caller."""
+
+    def close(self, run: Run) -> None:
+        """Do nothing: a thread ends with its iterator."""
+
+
+def to_function(function: Callable[[Frame], object]) -> FunctionPeer:
+    """Return a peer that calls a function with each frame, in the thread of the run."""
+    return FunctionPeer(function)
+
+
+def from_iterator(messages: Iterable[Mapping[str, Any]]) -> FunctionPeer:
+    """Return a peer that sends the messages of an iterator, which may wait between them."""
+    return FunctionPeer(messages=messages)
+
+
+def hello(simulation: Simulation) -> dict[str, Any]:
+    """Return the first message to a program: what the run is."""
+    scenario = simulation.scenario
+    return {
+        "type": "hello",
+        "version": VERSION,
+        "start": simulation.clock.start.isoformat(),
+        "step_s": simulation.clock.step_us / 1e6,
+        "users": list(scenario.users),
+        "robots": list(scenario.robots),
+        "objects": list(scenario.objects),
+        "rooms": [
+            {"name": room.name, "type": room.type, "x": room.anchor_xy[0], "y": room.anchor_xy[1]}
+            for room in simulation.home.rooms
+        ],
+    }
+
+
+class UdpPeer:
+    """Messages in datagrams, one JSON object each; it only receives."""
+
+    def __init__(self, host: str, port: int) -> None:
+        """Listen at an address; port 0 is a free one."""
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        try:
+            self._socket.bind((host, port))
+        except OSError as error:
+            self._socket.close()
+            raise InputError(f"udp://{host}:{port}: {error.strerror or error}") from error
+        self._socket.settimeout(0.2)
+        self._over = False
+
+    @property
+    def port(self) -> int:
+        """The port at which it listens."""
+        return int(self._socket.getsockname()[1])
+
+    def open(self, simulation: Simulation, post: Post) -> None:
+        """Begin to receive."""
+        threading.Thread(target=self._receive, args=(post,), daemon=True).start()
+
+    def _receive(self, post: Post) -> None:
+        while not self._over:
+            with contextlib.suppress(TimeoutError, OSError):
+                post(self._socket.recv(MAX_BYTES))
+
+    def send(self, frame: Frame) -> None:
+        """Do nothing: it only receives."""
+
+    def tell(self, text: str) -> None:
+        """Do nothing: it only receives."""
+
+    def close(self, run: Run) -> None:
+        """Stop listening."""
+        self._over = True
+        self._socket.close()
+
+
+class WebSocketPeer:
+    """A WebSocket server: clients get all that happens as JSON, and may send messages."""
+
+    def __init__(self, host: str, port: int) -> None:
+        """Serve at an address; port 0 is a free one.
+
+        Raises:
+            InputError: The address can't be used, or websockets isn't installed.
+        """
+        with extra("live", "ws:// needs websockets"):
+            from websockets.sync.server import serve
+
+        try:
+            self._server = serve(self._serve, host, port, max_size=MAX_BYTES)
+        except OSError as error:
+            raise InputError(f"ws://{host}:{port}: {error.strerror or error}") from error
+        self._clients: dict[Any, queue.Queue[str | None]] = {}
+        self._lock = threading.Lock()
+        self._hello = ""
+        self._post: Post
+
+    @property
+    def port(self) -> int:
+        """The port at which it serves."""
+        return int(self._server.socket.getsockname()[1])
+
+    def open(self, simulation: Simulation, post: Post) -> None:
+        """Begin to serve."""
+        self._hello, self._post = json.dumps(hello(simulation)), post
+        threading.Thread(target=self._server.serve_forever, daemon=True).start()
+
+    def _serve(self, connection: Any) -> None:
+        from websockets.exceptions import ConnectionClosed
+
+        texts: queue.Queue[str | None] = queue.Queue(MAX_QUEUE)
+        with contextlib.suppress(ConnectionClosed):
+            connection.send(self._hello)
+            with self._lock:
+                self._clients[connection] = texts
+            sender = threading.Thread(target=self._pass_on, args=(connection, texts), daemon=True)
+            sender.start()
+            for content in connection:
+                self._post(content)
+        self._forget(connection)
+
+    def _pass_on(self, connection: Any, texts: "queue.Queue[str | None]") -> None:
+        from websockets.exceptions import ConnectionClosed
+
+        with contextlib.suppress(ConnectionClosed):
+            while (text := texts.get()) is not None:
+                connection.send(text)
+            connection.close()
+
+    def _forget(self, connection: Any) -> None:
+        with self._lock:
+            texts = self._clients.pop(connection, None)
+        if texts is not None:
+            with contextlib.suppress(queue.Full):
+                texts.put_nowait(None)
+
+    def _put(self, texts: Iterable[str | None]) -> None:
+        with self._lock:
+            clients = list(self._clients.items())
+        for connection, waiting in clients:
+            try:
+                for text in texts:
+                    waiting.put_nowait(text)
+            except queue.Full:  # too slow: it is disconnected, and the run goes on
+                self._forget(connection)
+                threading.Thread(target=connection.close, daemon=True).start()
+
+    def send(self, frame: Frame) -> None:
+        """Pass a frame on to all clients."""
+        if self._clients:
+            self._put(frame.texts)
+
+    def tell(self, text: str) -> None:
+        """Pass a note on to all clients."""
+        self._put([json.dumps({"type": "note", "text": text})])
+
+    def close(self, run: Run) -> None:
+        """Tell the end to all clients, and disconnect them."""
+        end = {"type": "end", "status": run.status, "digest": run.digest}
+        self._put([json.dumps(end), None])
+        self._server.shutdown()
+
+
+def open_peer(address: str) -> Peer:
+    """Return a peer by its address.
+
+    Args:
+        address: `udp://HOST:PORT` and `ws://HOST:PORT` listen there; `rosbridge://HOST:PORT` and
+            `mqtt://HOST:PORT/PREFIX` connect to a rosbridge server and a broker.
+
+    Raises:
+        InputError: There is no such scheme, the address can't be used, or an extra isn't installed.
+
+    Example:
+        >>> open_peer("wss://localhost:1")
+        Traceback (most recent call last):
+        fleet2d.errors.InputError: 'wss://localhost:1' is no address of a peer: did you mean 'ws'? \
+Write udp://HOST:PORT, ws://HOST:PORT, rosbridge://HOST:PORT or mqtt://HOST:PORT/PREFIX
+    """
+    parts = urlsplit(address)
+    try:
+        host, port = parts.hostname or "127.0.0.1", parts.port
+    except ValueError:
+        host, port = "", None
+    if parts.scheme not in SCHEMES or not host:
+        hint = did_you_mean(parts.scheme, SCHEMES) or "."
+        raise InputError(
+            f"{address!r} is no address of a peer{hint} Write udp://HOST:PORT, ws://HOST:PORT,"
+            " rosbridge://HOST:PORT or mqtt://HOST:PORT/PREFIX"
+        )
+    if parts.scheme == "udp":
+        return UdpPeer(host, port or 0)
+    if parts.scheme == "ws":
+        return WebSocketPeer(host, port or 0)
+    if parts.scheme == "rosbridge":
+        from fleet2d.live.rosbridge import RosbridgePeer
+
+        return RosbridgePeer(host, port or 9090)
+    from fleet2d.live.mqtt import MqttPeer
+
+    return MqttPeer(host, port or 1883, parts.path.strip("/") or "fleet2d")

@@ -1,0 +1,201 @@
+"""rosbridge: standard ROS messages of a live run to a robot's or a laptop's ROS, and goals from it.
+
+Published: `/map`, `/tf`, and for each robot `/NAME/odom` and `/NAME/detections`, with the frames of
+`fleet2d export`. Subscribed, for each body: `/NAME/goal_pose` and `/NAME/pose`, both
+`geometry_msgs/PoseStamped` in the frame `map`.
+"""
+
+import math
+from datetime import UTC
+from typing import Any
+
+import numpy as np
+
+from fleet2d.engine.simulation import Simulation
+from fleet2d.errors import InputError, extra
+from fleet2d.live.bridge import Frame, Post
+from fleet2d.runs.run import Run
+
+WAIT_S = 5
+
+
+class RosbridgePeer:
+    """A rosbridge server, such as that of the ROS package `rosbridge_server`."""
+
+    def __init__(self, host: str, port: int) -> None:
+        """Connect to a server.
+
+        Raises:
+            InputError: There is no server at the address, or roslibpy isn't installed.
+        """
+        with extra("rosbridge", "rosbridge:// needs roslibpy"):
+            import roslibpy
+
+        self._library: Any = roslibpy
+        self._ros = roslibpy.Ros(host=host, port=port)
+        try:
+            self._ros.run(timeout=WAIT_S)
+        except Exception as error:
+            self._ros.close()
+            raise InputError(f"rosbridge://{host}:{port}: there is no server: {error}") from error
+        self._topics: dict[str, Any] = {}
+
+    def open(self, simulation: Simulation, post: Post) -> None:
+        """Advertise and subscribe."""
+        self._robots = list(simulation.scenario.robots)
+        self._start = simulation.clock.start.replace(tzinfo=UTC)
+        self._last: dict[str, tuple[float, float, float]] = {}
+        self._step_s = simulation.clock.step_us / 1e6
+        for robot in self._robots:
+            self._advertise(f"/{robot}/odom", "nav_msgs/Odometry")
+            self._advertise(f"/{robot}/detections", "vision_msgs/Detection3DArray")
+        self._advertise("/tf", "tf2_msgs/TFMessage")
+        self._advertise("/map", "nav_msgs/OccupancyGrid", latch=True)
+        self._topics["/map"].publish(self._map(simulation))
+        for name in simulation.actors:
+            self._subscribe(f"/{name}/goal_pose", name, "goal", post)
+            self._subscribe(f"/{name}/pose", name, "pose", post)
+
+    def _advertise(self, name: str, kind: str, *, latch: bool = False) -> None:
+        self._topics[name] = self._library.Topic(self._ros, name, kind, latch=latch)
+        self._topics[name].advertise()
+
+    def _subscribe(self, topic: str, name: str, kind: str, post: Post) -> None:
+        def receive(message: dict[str, Any]) -> None:
+            place = message["pose"]["position"]
+            turn = message["pose"]["orientation"]
+            z, w = float(turn.get("z", 0)), float(turn.get("w", 1))
+            x, y = float(place["x"]), float(place["y"])
+            if kind == "goal":
+                post({"type": "goal", "entity": name, "to": [x, y]})
+            else:
+                heading = math.degrees(2 * math.atan2(z, w))
+                post({"type": "pose", "entity": name, "x": x, "y": y, "heading_deg": heading})
+
+        self._topics[topic] = self._library.Topic(self._ros, topic, "geometry_msgs/PoseStamped")
+        self._topics[topic].subscribe(receive)
+
+    def _map(self, simulation: Simulation) -> dict[str, Any]:
+        plan = simulation.home.plan
+        x, y = plan.lattice.origin
+        return {
+            "header": self._header(0, "map"),
+            "info": {
+                "map_load_time": self._stamp(0),
+                "resolution": plan.lattice.cell,
+                "width": plan.lattice.columns,
+                "height": plan.lattice.rows,
+                "origin": _pose(x, y, 0.0),
+            },
+            "data": np.where(plan.free, 0, 100).ravel().tolist(),
+        }
+
+    def send(self, frame: Frame) -> None:
+        """Publish a frame."""
+        present = {name: body for name, body in frame.bodies.items() if not body["away"]}
+        transforms = []
+        for name, body in present.items():
+            x, y, heading = body["x"], body["y"], body["heading"]
+            pose = _pose(x, y, heading)
+            is_robot = name in self._robots
+            parent, child = (f"{name}/odom", f"{name}/base_link") if is_robot else ("map", name)
+            transforms.append(
+                {
+                    "header": self._header(frame.step, parent),
+                    "child_frame_id": child,
+                    "transform": {
+                        "translation": pose["position"],
+                        "rotation": pose["orientation"],
+                    },
+                }
+            )
+            if is_robot:
+                transforms.append(
+                    {
+                        "header": self._header(frame.step, "map"),
+                        "child_frame_id": parent,
+                        "transform": {
+                            "translation": {"x": 0.0, "y": 0.0, "z": 0.0},
+                            "rotation": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0},
+                        },
+                    }
+                )
+                self._topics[f"/{name}/odom"].publish(self._odometry(frame.step, name, body))
+        self._topics["/tf"].publish({"transforms": transforms})
+        for robot in self._robots:
+            seen = [r for t, r in frame.rows if t == "observations" and r["robot"] == robot]
+            if seen:
+                self._topics[f"/{robot}/detections"].publish(self._detections(frame.step, seen))
+
+    def _odometry(self, step: int, name: str, body: Any) -> dict[str, Any]:
+        x, y, heading = body["x"], body["y"], body["heading"]
+        before = self._last.get(name, (x, y, heading))
+        self._last[name] = x, y, heading
+        speed = math.hypot(x - before[0], y - before[1]) / self._step_s
+        turn = (heading - before[2] + math.pi) % (2 * math.pi) - math.pi
+        return {
+            "header": self._header(step, f"{name}/odom"),
+            "child_frame_id": f"{name}/base_link",
+            "pose": {"pose": _pose(x, y, heading), "covariance": [0.0] * 36},
+            "twist": {
+                "twist": {
+                    "linear": {"x": speed, "y": 0.0, "z": 0.0},
+                    "angular": {"x": 0.0, "y": 0.0, "z": turn / self._step_s},
+                },
+                "covariance": [0.0] * 36,
+            },
+        }
+
+    def _detections(self, step: int, rows: list[Any]) -> dict[str, Any]:
+        header = self._header(step, "map")
+        return {
+            "header": header,
+            "detections": [
+                {
+                    "header": header,
+                    "id": row["user"] or "unknown",
+                    "results": [
+                        {
+                            "hypothesis": {"class_id": row["user"] or "unknown", "score": 1.0},
+                            "pose": {
+                                "pose": _pose(row["x"], row["y"], 0.0),
+                                "covariance": [0.0] * 36,
+                            },
+                        }
+                    ],
+                    "bbox": {
+                        "center": _pose(row["x"], row["y"], 0.0),
+                        "size": {"x": 0.4, "y": 0.4, "z": 1.7},
+                    },
+                }
+                for row in rows
+            ],
+        }
+
+    def _stamp(self, step: int) -> dict[str, int]:
+        ns = int(self._start.timestamp()) * 10**9 + round(step * self._step_s * 1e9)
+        return {"sec": ns // 10**9, "nanosec": ns % 10**9}
+
+    def _header(self, step: int, frame: str) -> dict[str, Any]:
+        return {"stamp": self._stamp(step), "frame_id": frame}
+
+    def tell(self, text: str) -> None:
+        """Do nothing: there is no topic for notes."""
+
+    def close(self, run: Run) -> None:
+        """Disconnect."""
+        for topic in self._topics.values():
+            topic.unsubscribe() if topic.is_subscribed else topic.unadvertise()
+        self._ros.close()
+
+
+def _pose(x: float, y: float, heading: float) -> dict[str, Any]:
+    return {
+        "position": {"x": x, "y": y, "z": 0.0},
+        "orientation": {
+            "x": 0.0,
+            "y": 0.0,
+            "z": math.sin(heading / 2),
+            "w": math.cos(heading / 2),
+        },
+    }

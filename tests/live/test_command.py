@@ -1,0 +1,43 @@
+"""The command `fleet2d live`: addresses, schema, the stored run."""
+
+import json
+from pathlib import Path
+
+import pytest
+import typer
+from typer.testing import CliRunner
+
+import fleet2d
+from fleet2d.errors import InputError
+from fleet2d.live.command import live
+
+APP = typer.Typer()
+APP.command()(live)
+SCENARIO = "extends: bundled:base\nsimulation: {duration: 3 s}\nusers: {ana: {type: live}}\n"
+
+
+def test_a_run_among_datagrams_is_stored_and_reproduced(tmp_path: Path) -> None:
+    (tmp_path / "lab.yaml").write_text(SCENARIO)
+    arguments = [str(tmp_path / "lab.yaml"), "--with", "udp://127.0.0.1:0", "--speed", "0"]
+
+    result = CliRunner().invoke(APP, [*arguments, "--out", str(tmp_path / "run")])
+
+    assert result.exit_code == 0, result.output
+    assert "udp://127.0.0.1:0: listens at " in result.output
+    digest = fleet2d.open_run(tmp_path / "run").digest
+    assert f"complete, digest {str(digest)[:8]}, stored in " in result.output
+    assert fleet2d.reproduce(tmp_path / "run").digest == digest
+
+
+def test_the_schema_of_messages_is_printed() -> None:
+    schema = json.loads(CliRunner().invoke(APP, ["--schema"]).output)
+
+    assert schema["discriminator"]["propertyName"] == "type"
+    assert {"PoseMessage", "GoalMessage", "DetectionsMessage", "ReadingMessage"} <= schema[
+        "$defs"
+    ].keys()
+
+
+def test_a_program_has_to_be_named() -> None:
+    with pytest.raises(InputError, match="name at least one other program by --with"):
+        CliRunner().invoke(APP, [], catch_exceptions=False)

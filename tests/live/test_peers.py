@@ -1,0 +1,131 @@
+"""Peers over UDP and WebSocket, with real clients, and another process without Fleet2D."""
+
+import json
+import socket
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+from tests.live.scenes import LIVE, place
+
+import fleet2d
+from fleet2d.errors import InputError
+from fleet2d.live import Bridge, open_peer
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+
+
+def in_background(bridge: Bridge) -> tuple[threading.Thread, list[Any]]:
+    runs: list[Any] = []
+    thread = threading.Thread(target=lambda: runs.append(bridge.run()))
+    thread.start()
+    return thread, runs
+
+
+def test_datagrams_move_a_body() -> None:
+    peer: Any = open_peer("udp://127.0.0.1:0")
+    simulation = fleet2d.Simulation(LIVE)
+    thread, runs = in_background(Bridge(simulation, [peer], speed=30))
+    x, y = place()
+    sender = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    while thread.is_alive():
+        message = {"type": "pose", "entity": "ana", "x": x, "y": y}
+        sender.sendto(json.dumps(message).encode(), ("127.0.0.1", peer.port))
+        time.sleep(0.05)
+    sender.close()
+    thread.join()
+
+    assert runs[0].status == "complete"
+    assert simulation.state["ana"]["x"] == pytest.approx(x, abs=1e-3)
+
+
+@pytest.mark.parametrize("scheme", ["udp", "ws"])
+def test_an_address_in_use_is_refused(scheme: str) -> None:
+    if scheme == "ws":
+        pytest.importorskip("websockets", reason="the extra live is not installed")
+    kind = socket.SOCK_DGRAM if scheme == "udp" else socket.SOCK_STREAM
+    with socket.socket(socket.AF_INET, kind) as taken:
+        taken.bind(("127.0.0.1", 0))
+        if scheme == "ws":
+            taken.listen()
+        with pytest.raises(InputError, match=f"{scheme}://127.0.0.1:"):
+            open_peer(f"{scheme}://127.0.0.1:{taken.getsockname()[1]}")
+
+
+@pytest.mark.parametrize("address", ["tcp://localhost:1", "localhost:99", "ws://h:port", ""])
+def test_a_wrong_address_is_refused(address: str) -> None:
+    with pytest.raises(InputError, match="is no address of a peer"):
+        open_peer(address)
+
+
+def test_a_client_hears_all_and_sends_goals() -> None:
+    pytest.importorskip("websockets", reason="the extra live is not installed")
+    from websockets.sync.client import connect
+
+    peer: Any = open_peer("ws://127.0.0.1:0")
+    simulation = fleet2d.Simulation(LIVE)
+    bridge = Bridge(simulation, [peer], speed=30)
+    thread, runs = in_background(bridge)
+    heard: list[Any] = []
+    with connect(f"ws://127.0.0.1:{peer.port}") as client:
+        client.send(json.dumps({"type": "goal", "entity": "astro", "to": "kitchen_0"}))
+        client.send("?")
+        heard = [json.loads(text) for text in client]
+    thread.join()
+
+    hello, end = heard[0], heard[-1]
+    assert (hello["type"], hello["users"], hello["robots"]) == ("hello", ["ana"], ["astro"])
+    assert {"kitchen_0"} <= {room["name"] for room in hello["rooms"]}
+    assert end == {"type": "end", "status": "complete", "digest": runs[0].digest}
+    assert {"poses", "note"} <= {message["type"] for message in heard}
+    steps = [message["step"] for message in heard if message["type"] == "poses"]
+    assert steps == sorted(steps)
+    assert [act["do"] for act in runs[0].manifest["interventions"]] == ["send"]
+
+
+def test_a_client_that_leaves_does_not_stop_the_run() -> None:
+    pytest.importorskip("websockets", reason="the extra live is not installed")
+    from websockets.sync.client import connect
+
+    peer: Any = open_peer("ws://127.0.0.1:0")
+    thread, runs = in_background(Bridge(fleet2d.Simulation(LIVE), [peer], speed=30))
+    with connect(f"ws://127.0.0.1:{peer.port}") as client:
+        client.recv()
+        client.socket.shutdown(socket.SHUT_RDWR)
+    thread.join()
+
+    assert runs[0].status == "complete"
+
+
+def test_a_program_without_fleet2d_decides_where_the_robot_goes(tmp_path: Path) -> None:
+    pytest.importorskip("websockets", reason="the extra live is not installed")
+    content = LIVE | {
+        "users": {
+            "ana": {
+                "type": "schedule",
+                "days": [{"items": [{"at": "00:00", "place": "kitchen_0"}]}],
+            }
+        },
+        "robots": {"astro": {"behaviors": [{"type": "live"}]}},
+        "simulation": {"duration": "2 min", "seed": 4, "start": "2026-01-05T12:00"},
+    }
+    peer: Any = open_peer("ws://127.0.0.1:0")
+    simulation = fleet2d.Simulation(content)
+    thread, runs = in_background(Bridge(simulation, [peer], speed=40))
+    program = subprocess.run(
+        [sys.executable, "-I", str(EXAMPLES / "live/follow.py"), f"ws://127.0.0.1:{peer.port}"],
+        capture_output=True,
+        text=True,
+        timeout=30,
+        check=False,
+    )
+    thread.join()
+
+    assert program.returncode == 0, program.stderr
+    assert "astro goes to kitchen_0" in program.stdout
+    assert runs[0].status == "complete"
+    assert simulation.state["astro"]["room"] == simulation.state["ana"]["room"] == "kitchen_0"
