@@ -34,6 +34,8 @@ from fleet2d.runtime.determinism import Draws, stream_key
 
 BLOCK = 180  # length of a part of the day that has pastimes of its own [min]
 QUANTILES = 21  # maximum number of quantiles of a law of durations
+# Words of activities that are done standing, lying and sitting; the first that fit decide.
+STAND = ("cook", "prepar", "wash", "dish", "clean", "transition", "hygiene", "bathing")
 LIE, SIT = ("sleep", "nap", "bed", "wake_up"), ("eat", "tv", "work", "read", "relax", "computer",
     "breakfast", "lunch", "dinner", "snack", "music", "rest", "social", "toilet")  # fmt: skip
 # A task is done on at least this share of the days, at most once a day. The standard deviation of
@@ -298,10 +300,17 @@ class _Fitter:
         if place == AWAY:
             return {"away": True}
         rooms = dict.fromkeys([place, *USUAL_ROOMS.get(place, ()), "any"])
-        posture = "lie" if any(word in activity for word in LIE) else "stand"
-        if posture == "stand" and any(word in activity for word in SIT):
-            posture = "sit"
-        return {"rooms": list(rooms), "posture": posture}
+        return {"rooms": list(rooms), "posture": usual_posture(activity)}
+
+
+def usual_posture(activity: str) -> str:
+    """Return the posture of an activity, by the words in its name.
+
+    >>> [usual_posture(name) for name in ("cook_dinner", "eat_dinner", "bed_toilet_transition")]
+    ['stand', 'sit', 'stand']
+    """
+    words = {"stand": STAND, "lie": LIE, "sit": SIT}
+    return next((p for p, names in words.items() if any(n in activity for n in names)), "stand")
 
 
 def _recorded_day(day: LivedDay, names: Sequence[str]) -> RecordedDay:
