@@ -92,7 +92,7 @@ def refusal(read: Callable[..., object], path: Path, *arguments: Any) -> str:
 
 
 def test_every_format_of_documents_has_a_sample() -> None:
-    kinds = {k for k, source in components("floorplan").items() if getattr(source, "mark", None)}
+    kinds = {k for k, source in components("floorplan").items() if getattr(source, "marks", ())}
 
     assert set() == kinds - set(FORMATS), "give tests/floorplan/formats/test_NAME.py a SAMPLE"
 

@@ -158,11 +158,12 @@ def _types_by_suffix(path: Path) -> list[str]:
     kind = format_by_suffix(path)
     if kind is not None:
         return [kind]
-    return sorted([*_marks(), "ros"] if path.suffix.lower() in YAML else _marks())
+    kinds = {kind for kind, _ in _marks()}
+    return sorted(kinds | {"ros"} if path.suffix.lower() in YAML else kinds)
 
 
 def _unknown_format(path: Path) -> FloorPlanError:
-    marks = [f"{_as_json(*mark)} ({kind})" for kind, mark in sorted(_marks().items())]
+    marks = [f"{_as_json(*mark)} ({kind})" for kind, mark in sorted(_marks(), key=lambda m: m[0])]
     endings = [f", and doesn't end in {e} ({kind})" for e, kind in sorted(_suffixes().items())]
     return FloorPlanError(
         f"{path} is not a floor plan that Fleet2D can read: it has none of {', '.join(marks)}"
@@ -178,7 +179,7 @@ def _format_of(content: dict[str, Any]) -> str | None:
     """Return the `type` of the floor plan in a file, by the marks that formats declare."""
     if content.get("format") == FORMAT:  # the usual format, without importing the others
         return "native"
-    for kind, (key, value) in _marks().items():
+    for kind, (key, value) in _marks():
         if key in content and value in (None, content[key]):
             return kind
     return None
@@ -201,11 +202,10 @@ def _suffixes() -> dict[str, str]:
     return {suffix: kind for kind, src in sources for suffix in getattr(src, "suffixes", ())}
 
 
-def _marks() -> dict[str, tuple[str, str | None]]:
-    """Return the mark of each format that has one, by its `type`."""
+def _marks() -> list[tuple[str, tuple[str, str | None]]]:
+    """Return the marks of the formats that have some, each with their `type`."""
     sources = components("floorplan").items()
-    marks = {kind: getattr(source, "mark", None) for kind, source in sources}
-    return {kind: mark for kind, mark in marks.items() if mark is not None}
+    return [(kind, mark) for kind, source in sources for mark in getattr(source, "marks", ())]
 
 
 def _load_image(path: Path, resolution: float | None, cell: float | None) -> FloorPlan:

@@ -178,8 +178,9 @@ class FloorPlan:
             entrance: A place just inside the front door [m].
             doorways: Lines across passages [m]; one that stands in no passage is noted and left
                 out. None to search the walls for doorways.
-            regions_are: `exact`: the rooms themselves. `boxes`: rough boxes that label what walls
-                bound. `none`: there are none, and rooms are segmented from the walls alone.
+            regions_are: `exact`: the rooms themselves. `segments`: the same, with doorways where
+                they meet at a narrow place. `boxes`: rough boxes that label what walls bound.
+                `none`: there are none, and rooms are segmented from the walls alone.
             objects: Furniture and devices [m].
             no_go: Areas that robots keep out of [m].
             notes: Sentences on anomalies in the source.
@@ -212,7 +213,10 @@ class FloorPlan:
         room_of_cell.setflags(write=False)
         fitted = [(line, at) for line, at in zip(lines, segments, strict=True) if at is not None]
         if doorways is None and passages is not None:
-            fitted = select_doorways(lattice, polygons, room_of_cell, passages)
+            fitted, polygons = select_doorways(
+                lattice, polygons, room_of_cell, passages, regions_are
+            )
+            polygons = canonical_order(polygons)
         names = [room.name for room in rooms]
         plan = cls(
             name=name,

@@ -304,8 +304,8 @@ class FloorPlanSource(Component):
 
     kind: ClassVar[str] = "floorplan"
 
-    # The key, and the value unless that is None, by which the content of a file is recognized.
-    mark: ClassVar[tuple[str, str | None] | None] = None
+    # Keys, each with its value unless that is None; by one the content of a file is recognized.
+    marks: ClassVar[tuple[tuple[str, str | None], ...]] = ()
 
     # The endings, such as ".dxf", of the files that it reads, if they aren't JSON or YAML.
     suffixes: ClassVar[tuple[str, ...]] = ()

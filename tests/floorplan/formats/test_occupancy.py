@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 from shapely import Polygon
 
 from fleet2d.errors import FloorPlanError
-from fleet2d.floorplan.formats.occupancy import OccupancyMap, free_space
+from fleet2d.floorplan.formats.cleaning import OccupancyMap
+from fleet2d.floorplan.formats.occupancy import free_space
 
 KEEP = {"speck_area_m2": 0.0, "ray_width": 0.0}
 

@@ -15,7 +15,6 @@ from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.formats.native import native_document, read_native
 from fleet2d.floorplan.formats.valetudo import (
     Valetudo,
-    read_valetudo,
     read_valetudo_charger,
     read_valetudo_path,
     read_valetudo_paths,
@@ -91,6 +90,12 @@ def vacuum_map(*layers: dict[str, Any], **changes: Any) -> dict[str, Any]:
         "entities": [],
         **changes,
     }
+
+
+def read_valetudo(path: Path, cell: float | None = None, **settings: Any) -> FloorPlan:
+    """Read a map without cleaning, except where the settings ask for it."""
+    plain = {"bridge_pixels": 0, "scrap_area_m2": 0.0, "borders": "exact"}
+    return Valetudo.model_construct(path=path, cell=cell, **(plain | settings)).load()
 
 
 def write(folder: Path, content: object) -> Path:
@@ -555,7 +560,7 @@ def test_component_of_a_damaged_file_says_so_when_it_loads(tmp_path: Path) -> No
     ("changes", "message"),
     [
         ({"__class": "Map"}, "no Valetudo map"),
-        ({"metaData": {"version": 1}}, "version 1 of Valetudo's map format"),
+        ({"metaData": {"version": 3}}, "version 3 of Valetudo's map format"),
         ({"metaData": None}, "version null"),
         ({"pixelSize": None}, "pixelSize is null"),
         ({"pixelSize": 0}, "pixelSize is 0"),
@@ -629,3 +634,110 @@ def test_pixels_beyond_the_stated_size_are_noted(
 
 def test_map_without_a_stated_size_is_read(tmp_path: Path) -> None:
     assert () == home(tmp_path, KITCHEN, size=None).notes
+
+
+# --- Cleaning -----------------------------------------------------------------------------------
+
+# Two rooms of 2 m x 1.5 m with 1.5 m between them, and a scrap.
+LEFT = layer("segment", runs(0, 0, 40, 30), segmentId="1", name="Kitchen")
+RIGHT = layer("segment", runs(42, 0, 82, 30), segmentId="2", name="Office")
+SCRAP = layer("floor", runs(100, 0, 110, 10))
+
+
+def cleaned(folder: Path, *layers: dict[str, Any], **settings: Any) -> FloorPlan:
+    changes = {"entities": settings.pop("entities", [])}
+    source = Valetudo(path=write(folder, vacuum_map(*layers, **changes)), **settings)
+    return source.load()
+
+
+def wall_with_gap(low: int, high: int) -> dict[str, Any]:
+    """The wall between the rooms, without the pixels from row `low` to `high`."""
+    return layer("wall", [*runs(40, 0, 42, low), *runs(40, high, 42, 30)])
+
+
+def test_unknown_pixels_at_a_threshold_are_bridged(tmp_path: Path) -> None:
+    plan = cleaned(tmp_path, LEFT, RIGHT, wall_with_gap(10, 28))
+
+    assert 1 == len(plan.polygons)
+    assert ["kitchen", "office"] == [room.type for room in plan.rooms]
+    assert plan.area_m2 == pytest.approx((2 * 40 * 30 + 2 * 18) * PIXEL_AREA)
+    assert "gaps of at most 2 pixels between parts of the home are open: 1" in " ".join(plan.notes)
+    assert 2 == len(cleaned(tmp_path, LEFT, RIGHT, wall_with_gap(10, 28), bridge_pixels=0).polygons)
+
+
+def test_wall_between_rooms_stays_unless_the_vacuum_drove_through(tmp_path: Path) -> None:
+    wall = wall_with_gap(0, 0)
+    path = entity("path", 100, 75, 300, 75)
+
+    shut = cleaned(tmp_path, LEFT, RIGHT, wall)
+    driven = cleaned(tmp_path, LEFT, RIGHT, wall, entities=[path])
+
+    assert 2 == len(shut.polygons)
+    assert 1 == len(driven.polygons)
+
+
+def test_scraps_of_floor_are_no_rooms(tmp_path: Path) -> None:
+    plan = cleaned(tmp_path, LEFT, SCRAP)
+    beside = cleaned(tmp_path, LEFT, layer("floor", runs(40, 0, 50, 10)))
+    kept = cleaned(tmp_path, LEFT, SCRAP, scrap_area_m2=0)
+
+    assert ["Kitchen"] == [room.name for room in plan.rooms]
+    assert plan.area_m2 == pytest.approx(40 * 30 * PIXEL_AREA)
+    assert "scraps left out: 1 parts of the floor" in " ".join(plan.notes)
+    assert ["Kitchen"] == [room.name for room in beside.rooms]
+    assert beside.area_m2 == pytest.approx((40 * 30 + 100) * PIXEL_AREA)
+    assert ["Kitchen", "unknown_0"] == [room.name for room in kept.rooms]
+
+
+def test_segment_without_a_name_that_is_a_scrap_belongs_to_its_neighbor(tmp_path: Path) -> None:
+    tiny = layer("segment", runs(40, 0, 50, 10), segmentId="9")
+    named = layer("segment", runs(40, 0, 50, 10), segmentId="9", name="Pantry")
+
+    assert ["Kitchen"] == [room.name for room in cleaned(tmp_path, LEFT, tiny).rooms]
+    assert 2 == len(cleaned(tmp_path, LEFT, named).rooms)
+    assert 1 == len(cleaned(tmp_path, tiny).rooms)  # the only one
+
+
+def test_narrow_border_of_segments_is_a_doorway(tmp_path: Path) -> None:
+    rooms = [
+        layer("segment", runs(0, 0, 40, 60), segmentId="1", name="Kitchen"),
+        layer("segment", [*runs(40, 20, 90, 40)], segmentId="2", name="Hall"),
+        layer("segment", runs(90, 20, 120, 40), segmentId="3", name="Office"),
+    ]
+
+    plan = cleaned(tmp_path, *rooms)
+    plain = cleaned(tmp_path, *rooms, borders="exact")
+
+    assert {("Kitchen", "Hall"), ("Hall", "Office")} == {
+        tuple(plan.rooms[room].name for room in sorted(door.rooms)) for door in plan.doorways
+    }
+    assert all(door.width_m == pytest.approx(1.0) for door in plan.doorways)
+    assert len(plain.doorways) < 2
+    copy = tmp_path / "copy.json"
+    copy.write_text(json.dumps(native_document(plan)))
+    assert read_native(copy) == plan
+
+
+@pytest.mark.parametrize(
+    "name", ["S8_FW1286_with_obstacles", "converted_3790", "l10su_1121_carpet"]
+)
+def test_captured_map_is_one_home_with_doorways_between_its_rooms(
+    shared_data: Path, name: str
+) -> None:
+    path = shared_data / "captured" / "vacuum" / f"{name}.json"
+    if not path.exists():
+        pytest.skip(f"there is no {path}")
+
+    plan, before = Valetudo(path=path).load(), read_valetudo(path)
+
+    assert 1 == len(plan.polygons) < len(before.polygons)
+    assert len(plan.doorways) > len(before.doorways)
+    assert all(room.area_m2 >= 1 for room in plan.rooms)
+
+
+def test_format_version_1_is_read(tmp_path: Path) -> None:
+    pixels = [n for y in range(30) for x in range(40) for n in (x, y)]
+    segment = {"type": "segment", "metaData": {"segmentId": 1, "name": "Kitchen"}, "pixels": pixels}
+    old = vacuum_map(segment, metaData={"version": 1})
+
+    assert Valetudo(path=write(tmp_path, old)).load() == cleaned(tmp_path, LEFT)

@@ -12,12 +12,8 @@ from fleet2d.configuration.components import register
 from fleet2d.configuration.problems import suggest
 from fleet2d.configuration.units import InputFileOrFolder
 from fleet2d.errors import FloorPlanError
-from fleet2d.floorplan.formats.occupancy import (
-    OccupancyMap,
-    OccupancySource,
-    free_space,
-    refuse_object,
-)
+from fleet2d.floorplan.formats.cleaning import OccupancyMap
+from fleet2d.floorplan.formats.occupancy import OccupancySource
 from fleet2d.floorplan.lattice import MIN_CELL_M
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.kernels import I8
@@ -79,8 +75,8 @@ class BagMap(OccupancySource):
         turn = (round(math.cos(heading), 12), round(math.sin(heading), 12))
         free, occupied = grid.percent < FREE_BELOW, grid.percent > OCCUPIED_ABOVE
         raw = OccupancyMap(free & (grid.percent >= 0), occupied, grid.resolution, (x, y), turn)
-        home, notes = free_space(raw, speck_area_m2=self.speck_area_m2, ray_width=self.ray_width)
-        refuse_object(raw, home)
+        notes: list[str] = []
+        home = self.clean(raw, notes)
         rows, columns = grid.percent.shape
         notes.append(
             f"{grid.topic}: the last of {grid.maps} maps, {columns} × {rows} cells of"

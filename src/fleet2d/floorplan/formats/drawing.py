@@ -10,8 +10,9 @@ from pydantic import Field, TypeAdapter
 from fleet2d.configuration.components import register
 from fleet2d.configuration.units import InputPath, Length, PositiveLength, Share
 from fleet2d.errors import FloorPlanError
+from fleet2d.floorplan.formats.cleaning import OccupancyMap
 from fleet2d.floorplan.formats.files import in_file
-from fleet2d.floorplan.formats.occupancy import OBJECT_M2, OccupancyMap, PictureSource
+from fleet2d.floorplan.formats.occupancy import OBJECT_M2, PictureSource
 from fleet2d.floorplan.formats.raster import GreyPicture, read_grey
 from fleet2d.floorplan.lattice import MAX_CELL_M, MIN_CELL_M
 from fleet2d.floorplan.plan import FloorPlan
@@ -32,6 +33,8 @@ class Image(PictureSource):
         path: The picture, PNG or PGM.
         resolution: Side of a pixel, as a drawing has no scale.
         threshold: Share of white below which a pixel is wall.
+        bridge_pixels: Width of the widest gap between two parts of the home that opens; 0 opens
+            none, as furniture is drawn with thin lines, too.
         close_gaps: Width of the widest gap in outer walls that is closed, if the home would lose
             more than half of its floor through gaps; 0 closes none.
     """
@@ -39,6 +42,7 @@ class Image(PictureSource):
     path: InputPath
     resolution: PositiveLength = Field(le=MAX_CELL_M)
     threshold: Share = 0.5
+    bridge_pixels: int = Field(default=0, ge=0, le=10)
     close_gaps: Length = Field(default=1.2, ge=0, le=5)
 
     @classmethod

@@ -396,7 +396,7 @@ class GeoJson(FloorPlanSource):
         level: The floor, by id, name or ordinal; left out: the one of ordinal 0.
     """
 
-    mark: ClassVar = ("type", COLLECTION)
+    marks: ClassVar = (("type", COLLECTION),)
 
     path: InputPath
     units: Units = "auto"

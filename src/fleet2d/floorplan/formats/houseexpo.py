@@ -48,7 +48,7 @@ class HouseExpo(FloorPlanSource):
         path: The plan's JSON file.
     """
 
-    mark: ClassVar = ("verts", None)
+    marks: ClassVar = (("verts", None),)
 
     path: InputPath
 

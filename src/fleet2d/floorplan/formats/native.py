@@ -308,7 +308,7 @@ class Native(FloorPlanSource):
         path: The plan's JSON or YAML file.
     """
 
-    mark: ClassVar = ("format", FORMAT)
+    marks: ClassVar = (("format", FORMAT),)
 
     path: InputPath
 

@@ -1,7 +1,6 @@
 """The free space in maps and drawings of pixels: cleaned of noise, checked, traced."""
 
-import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Annotated, Literal
 
 import numpy as np
@@ -11,16 +10,19 @@ from shapely import Polygon
 
 from fleet2d.configuration.units import InputPath, Length
 from fleet2d.errors import FloorPlanError
+from fleet2d.floorplan.formats.cleaning import (
+    OccupancyMap,
+    bridge_gaps,
+    home_pixels,
+    note_left_out,
+    remove_specks,
+)
 from fleet2d.floorplan.formats.raster import GreyPicture
 from fleet2d.floorplan.lattice import MIN_CELL_M
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.source import PixelSource
-from fleet2d.kernels import F64, Bool
-from fleet2d.kernels.space import count_steps, label_parts, squared_distance, trace_rings
-
-# Tolerance of decimal lengths in pixels: 0.3 m are six pixels of 0.05 m, and not 5.999….
-TINY = 1e-9
-
+from fleet2d.kernels import Bool
+from fleet2d.kernels.space import trace_rings
 
 UnknownGrey = Literal["auto", "none"] | Annotated[int, Field(ge=0, le=255)]
 """The shade that stands for unknown, from 0 to 255; `auto` to find it, `none` for no such shade."""
@@ -43,13 +45,32 @@ class OccupancySource(PixelSource):
             of a chair or lettering, become free; 0 keeps all.
         ray_width: Free space narrower than this doesn't lead on: it cuts off rays through windows
             and gaps in walls; 0 keeps all that is connected.
+        bridge_pixels: Width of the widest gap between two parts of the home that opens, as at a
+            threshold or a shut door; 0 opens none.
         path: The file.
     """
 
     speck_area_m2: float = Field(default=0.02, ge=0)
     ray_width: Length = Field(default=0.3, ge=0)
+    bridge_pixels: int = Field(default=2, ge=0, le=10)
 
     path: InputPath
+
+    def clean(self, raw: OccupancyMap, notes: list[str]) -> Polygon:
+        """Return the home in an occupancy map [m], and add a note for each change.
+
+        Raises:
+            FloorPlanError: There is none, or what was found is the inside of an object.
+        """
+        free, changes = free_space(
+            raw,
+            speck_area_m2=self.speck_area_m2,
+            ray_width=self.ray_width,
+            bridge_pixels=self.bridge_pixels,
+        )
+        refuse_object(raw, free)
+        notes += changes
+        return free
 
     def build(self, free: Polygon, pixel: float, source: str, notes: list[str]) -> FloorPlan:
         """Return the floor plan of free space [m] whose rooms and doorways the walls determine."""
@@ -104,20 +125,18 @@ class PictureSource(OccupancySource):
                 return known
         return free
 
-    def home(self, raw: "OccupancyMap", picture: GreyPicture, notes: list[str]) -> Polygon:
+    def home(self, raw: OccupancyMap, picture: GreyPicture, notes: list[str]) -> Polygon:
         """Return the home in an occupancy map [m], and add a note for each change.
 
         Raises:
             FloorPlanError: There is none, or what was found is the ground around it or the inside
                 of an object.
         """
-        free, changes = free_space(raw, speck_area_m2=self.speck_area_m2, ray_width=self.ray_width)
+        free = self.clean(raw, notes)
         self._refuse_outside(raw, free, picture)
-        refuse_object(raw, free)
-        notes += changes
         return free
 
-    def _refuse_outside(self, raw: "OccupancyMap", free: Polygon, picture: GreyPicture) -> None:
+    def _refuse_outside(self, raw: OccupancyMap, free: Polygon, picture: GreyPicture) -> None:
         """Raise FloorPlanError if free space covers most of the edge of the picture."""
         rows, columns = raw.free.shape
         length = 2 * (rows + columns) * raw.pixel
@@ -133,7 +152,7 @@ class PictureSource(OccupancySource):
         )
 
 
-def refuse_object(raw: "OccupancyMap", free: Polygon) -> None:
+def refuse_object(raw: OccupancyMap, free: Polygon) -> None:
     """Raise FloorPlanError if a home is far smaller than what is drawn around it."""
     if free.area >= OBJECT_M2 or not raw.occupied.any():
         return
@@ -149,52 +168,17 @@ def refuse_object(raw: "OccupancyMap", free: Polygon) -> None:
         )
 
 
-@dataclass(frozen=True)
-class OccupancyMap:
-    """A robot's map of a floor in pixels; pixels in neither mask are unknown.
-
-    Attributes:
-        free: Pixels known to be free, bool (rows, columns), the first row at the bottom.
-        occupied: Pixels known to be occupied, of the same shape.
-        pixel: Side of a pixel [m].
-        origin: Where the lower left corner of the first pixel is (x, y) [m].
-        turn: Cosine and sine of the angle from the x axis to the rows, counter-clockwise.
-    """
-
-    free: Bool
-    occupied: Bool
-    pixel: float
-    origin: tuple[float, float] = (0.0, 0.0)
-    turn: tuple[float, float] = (1.0, 0.0)
-
-    def to_metres(self, xy: F64) -> F64:
-        """Return places (column, row) from the lower left corner in metres (…, 2)."""
-        cosine, sine = self.turn
-        x, y = xy[..., 0] * self.pixel, xy[..., 1] * self.pixel
-        turned = np.stack([x * cosine - y * sine, x * sine + y * cosine], axis=-1)
-        return turned + np.array(self.origin)
-
-    def crop(self) -> "OccupancyMap":
-        """Return the part around the free pixels, with a margin of one pixel if the map has it."""
-        rows, columns = (np.flatnonzero(self.free.any(axis=axis)) for axis in (1, 0))
-        low = (max(int(columns[0]) - 1, 0), max(int(rows[0]) - 1, 0))
-        window = (slice(low[1], int(rows[-1]) + 2), slice(low[0], int(columns[-1]) + 2))
-        x, y = self.to_metres(np.array(low, np.float64)).tolist()
-        # The kernels are compiled for this memory order.
-        free, occupied = (np.ascontiguousarray(m[window]) for m in (self.free, self.occupied))
-        return replace(self, free=free, occupied=occupied, origin=(x, y))
-
-
 def free_space(
-    raw: OccupancyMap, *, speck_area_m2: float, ray_width: float
+    raw: OccupancyMap, *, speck_area_m2: float, ray_width: float, bridge_pixels: int = 0
 ) -> tuple[Polygon, list[str]]:
     """Return the home in an occupancy map, without noise, specks and rays.
 
     1. A group of pixels that are not free, surrounded by free ones and smaller than
        `speck_area_m2`, becomes free.
-    2. Of the space that a disc of diameter `ray_width` reaches, the largest connected part is the
+    2. Gaps of at most `bridge_pixels` between large parts open; see `bridge_gaps`.
+    3. Of the space that a disc of diameter `ray_width` reaches, the largest connected part is the
        home.
-    3. Narrower space around it belongs to the home if all of it is within `ray_width` of the space
+    4. Narrower space around it belongs to the home if all of it is within `ray_width` of the space
        that the disc reaches; if it leads further, only the part within half of that.
 
     Everything else is wall. The diameter of the disc is an odd number of pixels, so that all sides
@@ -204,6 +188,7 @@ def free_space(
         raw: The map.
         speck_area_m2: Groups smaller than this are specks [m²]; 0 keeps all.
         ray_width: Diameter of the disc [m]; up to a pixel cuts nothing that is connected.
+        bridge_pixels: Largest width of a gap that opens [pixels]; 0 opens none.
 
     Returns:
         The free space [m], with all walls on sides of pixels, and a note for each change.
@@ -214,10 +199,13 @@ def free_space(
     if not raw.free.any():
         raise FloorPlanError("no pixel is free: check negate, free_thresh and occupied_thresh")
     raw = raw.crop()
-    specks, notes = _specks(raw, speck_area_m2)
-    free = raw.free | specks
-    home = _home(free, raw.pixel, ray_width)
-    notes += _left_out(raw, free, home, ray_width)
+    specks, notes = remove_specks(raw, speck_area_m2)
+    raw = replace(raw, free=raw.free | specks)
+    gaps, note = bridge_gaps(raw, bridge_pixels)
+    free = raw.free | gaps
+    notes += [note] * bool(note)
+    home = home_pixels(free, raw.pixel, ray_width)
+    notes += note_left_out(raw, free, home, ray_width)
     notes += _open_border(raw, home)
     return shapely.transform(outline(home), raw.to_metres), notes
 
@@ -240,66 +228,6 @@ def outline(free: Bool) -> Polygon:
     outer = np.asarray(shapely.is_ccw(rings))
     (shell,) = rings[outer]
     return Polygon(shell, rings[~outer].tolist())
-
-
-def _specks(raw: OccupancyMap, speck_area_m2: float) -> tuple[Bool, list[str]]:
-    """Return the pixels of small groups that are surrounded by free ones, and a note."""
-    # A margin around the map joins all groups that reach its edge.
-    part = label_parts(~np.pad(raw.free, 1), True)[1:-1, 1:-1]
-    sizes = np.bincount(part[~raw.free], minlength=1)
-    small = (sizes > 0) & (sizes * raw.pixel**2 < speck_area_m2 - TINY)
-    small[0] = False  # the part of the margin, which comes first
-    area = float(sizes[small].sum()) * raw.pixel**2
-    specks: Bool = ~raw.free & small[part]
-    if not small.any():
-        return specks, []
-    return specks, [
-        f"specks removed: {np.count_nonzero(small)} groups of pixels that are not free, each under"
-        f" {speck_area_m2:g} m2 and with free space all round, are free now ({area:.2f} m2 in all)"
-    ]
-
-
-def _home(free: Bool, pixel: float, ray_width: float) -> Bool:
-    """Return the pixels of the largest part that a disc reaches, and of what belongs to it."""
-    across = math.floor(ray_width / pixel + TINY)
-    reach = max((across + 1) // 2, 1)  # the disc covers what is nearer than this to its centre
-    core = squared_distance(np.pad(free, 1))[1:-1, 1:-1] >= reach**2
-    if not core.any():
-        raise FloorPlanError(
-            f"the free space is nowhere {ray_width:g} m wide: check the resolution, or set"
-            " floorplan.ray_width lower"
-        )
-    part = label_parts(core, False)
-    opened = squared_distance(part != np.argmax(np.bincount(part[core]))) < reach**2
-    steps = count_steps(opened, free)
-    narrow = steps > 0
-    part = label_parts(narrow, False)
-    depth = np.zeros(int(part.max()) + 2, np.int32)  # its last entry serves -1
-    np.maximum.at(depth, part[narrow], steps[narrow])
-    leads_on = depth > across
-    return (steps >= 0) & (~leads_on[part] | (steps < reach))
-
-
-def _left_out(raw: OccupancyMap, free: Bool, home: Bool, ray_width: float) -> list[str]:
-    """Return notes on free space outside the home: joined by narrow passages, or not at all."""
-    notes = []
-    joined = count_steps(home, free) >= 0
-    for mask, reason in (
-        (joined & ~home, f"only passages narrower than {ray_width:g} m join"),
-        (free & ~joined, "nothing joins"),
-    ):
-        if mask.any():
-            part = label_parts(mask, False)
-            sizes = np.bincount(part[mask])
-            largest = part == np.argmax(sizes)
-            middle = np.argwhere(largest)[:, ::-1].mean(axis=0) + 0.5
-            x, y = raw.to_metres(middle).tolist()
-            area, most = (float(n) * raw.pixel**2 for n in (sizes.sum(), sizes.max()))
-            notes.append(
-                f"left out: {area:.2f} m2 of free space, in pieces: {len(sizes)}, that {reason} to"
-                f" the rest; the largest, {most:.2f} m2, is round ({x:.2f}, {y:.2f}) m"
-            )
-    return notes
 
 
 def _open_border(raw: OccupancyMap, home: Bool) -> list[str]:

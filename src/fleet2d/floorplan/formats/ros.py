@@ -14,8 +14,9 @@ from shapely import Polygon
 from fleet2d.configuration.components import register
 from fleet2d.configuration.units import InputPath, Length
 from fleet2d.errors import FloorPlanError
+from fleet2d.floorplan.formats.cleaning import OccupancyMap
 from fleet2d.floorplan.formats.files import MAX_COORDINATE_M, in_file, read_yaml, shown_value
-from fleet2d.floorplan.formats.occupancy import OccupancyMap, PictureSource
+from fleet2d.floorplan.formats.occupancy import PictureSource
 from fleet2d.floorplan.formats.raster import GreyPicture, read_grey
 from fleet2d.floorplan.lattice import MAX_CELL_M, MIN_CELL_M
 from fleet2d.floorplan.plan import FloorPlan

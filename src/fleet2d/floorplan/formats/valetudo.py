@@ -1,4 +1,4 @@
-"""Maps of robot vacuums with Valetudo (JSON, format version 2).
+"""Maps of robot vacuums with Valetudo (JSON, format versions 1 and 2) or rand256's firmware.
 
 The file numbers pixels from the top and has lengths in centimetres. A place (x, y) [cm] of the file
 is (x / 100, -y / 100) [m] here, so that y points up and nothing is mirrored.
@@ -8,7 +8,8 @@ import math
 import unicodedata
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
@@ -22,6 +23,7 @@ from shapely.geometry.base import BaseGeometry
 from fleet2d.configuration.components import register
 from fleet2d.configuration.units import InputPath
 from fleet2d.errors import FloorPlanError
+from fleet2d.floorplan.formats.cleaning import OccupancyMap, bridge_gaps, drop_scraps
 from fleet2d.floorplan.formats.files import (
     MAX_COORDINATE_M,
     Listed,
@@ -31,22 +33,27 @@ from fleet2d.floorplan.formats.files import (
     validate,
 )
 from fleet2d.floorplan.formats.occupancy import outline
+from fleet2d.floorplan.formats.rand256 import (
+    MAP_CLASS,
+    MAX_PIXEL_NUMBER,
+    WRAPPERS,
+    as_valetudo,
+    raw_map,
+)
 from fleet2d.floorplan.mesh import repair
 from fleet2d.floorplan.placed_objects import PlacedObject, UsePlace, distinct_names
 from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
 from fleet2d.floorplan.rooms.room import UNKNOWN, usual_type
 from fleet2d.floorplan.source import PixelSource
 from fleet2d.kernels import F64, I64, Bool
-from fleet2d.kernels.space import label_parts, squared_distance
+from fleet2d.kernels.space import label_parts, spread_labels, squared_distance
 
-MAP_CLASS = "ValetudoMap"
-VERSION = 2
+VERSIONS = (1, 2)
 
 MAX_PIXELS = 2**22
 """A map of 2048 x 2048 pixels: 102 m a side at 5 cm."""
 
 MIN_PIXEL_CM, MAX_PIXEL_CM = 1, 100
-MAX_PIXEL_NUMBER = 2**20
 CM_PER_M = 100
 
 
@@ -116,14 +123,17 @@ class PixelBox:
 
 
 def check_map(content: dict[str, Any]) -> dict[str, Any]:
-    """Return the content, after checking that it is a map of the known version."""
+    """Return the content as a map of Valetudo, after checking its version."""
+    raw = raw_map(content)
+    if raw is not None:
+        return as_valetudo(raw)
     if content.get("__class") != MAP_CLASS:
         raise FloorPlanError(f'no Valetudo map: "__class" is not "{MAP_CLASS}"')
     version = _meta(content).get("version")
-    if version != VERSION:
+    if version not in VERSIONS:
         raise FloorPlanError(
             f"version {shown_value(version)} of Valetudo's map format is not known: this Fleet2D"
-            f" reads {VERSION}; save the map with a Valetudo that writes it"
+            f" reads {VERSIONS[0]} and {VERSIONS[1]}; save the map with a Valetudo that writes one"
         )
     return content
 
@@ -277,12 +287,21 @@ class Valetudo(PixelSource):
         path: The map's JSON file.
         no_go: Meaning of no-go areas and virtual walls: areas that robots keep out of
             (`keep_out`), walls (`wall`), or nothing (`ignore`).
+        bridge_pixels: Width of the widest gap between two parts of the home that opens, as at a
+            threshold or where the vacuum drove; 0 opens none.
+        scrap_area_m2: Floor smaller than this is no room: alone it is left out, beside a segment it
+            belongs to that; 0 keeps it.
+        borders: Doorways: also where segments meet at a narrow place (`segments`), or only between
+            walls (`exact`).
     """
 
-    mark: ClassVar = ("__class", MAP_CLASS)
+    marks: ClassVar = (("__class", MAP_CLASS), *((key, None) for key in WRAPPERS))
 
     path: InputPath
     no_go: NoGo = "keep_out"
+    bridge_pixels: int = Field(default=2, ge=0, le=10)
+    scrap_area_m2: float = Field(default=1.0, ge=0)
+    borders: Literal["segments", "exact"] = "segments"
 
     @classmethod
     def usual_cell(cls, settings: Mapping[str, Any]) -> float:
@@ -290,51 +309,55 @@ class Valetudo(PixelSource):
         return pixel_side(check_map(read_json(settings["path"])))
 
     def load(self) -> FloorPlan:
-        """Read the map."""
-        return read_valetudo(self.path, self.cell, no_go=self.no_go)
+        """Read the map.
 
+        Free space is the pixels of floors and segments without those of walls, gaps at thresholds
+        included and scraps left out. Every segment is a room under the name that it has in the
+        vacuum's app.
 
-def read_valetudo(path: Path, cell: float | None = None, *, no_go: NoGo = "keep_out") -> FloorPlan:
-    """Read the map of a robot vacuum.
+        Raises:
+            FloorPlanError: The file can't be read, isn't such a map, or has no floor.
+        """
+        content = read_json(self.path)
+        with in_file(self.path):
+            content = check_map(content)
+            pixel_m = pixel_side(content)
+            notes: list[str] = []
+            layers = read_layers(content, notes)
+            box = PixelBox.around(np.concatenate([layer.runs for layer in layers]))
+            note_size(content, box, notes)
+            free, wall = _free_pixels(layers, box, notes)
+            if free.any():
+                free = self._clean(content, free, wall, box, notes)
+            areas = _no_go_areas(content, free, box, self.no_go, notes)
+            if not free.any():
+                raise FloorPlanError("no floor is left: all of it is wall or in no-go areas")
+            _note_entities(content, notes)
+            regions = _regions(layers, free, box, (pixel_m, self.scrap_area_m2), notes)
+            return FloorPlan.build(
+                self.path.stem,
+                _in_metres(free, box, pixel_m),
+                regions,
+                pixel_m if self.cell is None else self.cell,
+                source=f"Valetudo map, {self.path.name}",
+                doorways=None,
+                regions_are=self.borders if regions else "none",
+                objects=_charger(content, free, box),
+                no_go=areas,
+                notes=notes,
+            )
 
-    Free space is the pixels of floors and segments without those of walls. Every segment is a room
-    under the name that it has in the vacuum's app.
-
-    Args:
-        path: The JSON file.
-        cell: Side of a grid cell [m]; None for the side of the map's pixels.
-        no_go: Meaning of no-go areas and virtual walls: `FloorPlan.no_go` (`keep_out`), walls
-            at the pixels that they touch (`wall`), or nothing (`ignore`).
-
-    Raises:
-        FloorPlanError: The file can't be read, isn't such a map, or has no floor.
-    """
-    content = read_json(path)
-    with in_file(path):
-        content = check_map(content)
+    def _clean(
+        self, content: dict[str, Any], free: Bool, wall: Bool, box: PixelBox, notes: list[str]
+    ) -> Bool:
+        """Return the free pixels with gaps open and without scraps."""
         pixel_m = pixel_side(content)
-        notes: list[str] = []
-        layers = read_layers(content, notes)
-        box = PixelBox.around(np.concatenate([layer.runs for layer in layers]))
-        note_size(content, box, notes)
-        free = _free_pixels(layers, box, notes)
-        areas = _no_go_areas(content, free, box, no_go, notes)
-        if not free.any():
-            raise FloorPlanError("no floor is left: all of it is wall or in no-go areas")
-        _note_entities(content, notes)
-        regions = _regions(layers, pixel_m, notes)
-        return FloorPlan.build(
-            path.stem,
-            _in_metres(free, box, pixel_m),
-            regions,
-            pixel_m if cell is None else cell,
-            source=f"Valetudo map, {path.name}",
-            doorways=None,
-            regions_are="exact" if regions else "none",
-            objects=_charger(content, free, box),
-            no_go=areas,
-            notes=notes,
-        )
+        raw = OccupancyMap(free, wall, pixel_m, (box.column * pixel_m, box.row * pixel_m))
+        gaps, gap_note = bridge_gaps(raw, self.bridge_pixels, _driven(content, box))
+        raw = replace(raw, free=free | gaps)
+        scraps, scrap_note = drop_scraps(raw, self.scrap_area_m2)
+        notes += [note for note in (gap_note, scrap_note) if note]
+        return raw.free & ~scraps
 
 
 def read_valetudo_paths(path: Path) -> list[F64]:
@@ -378,8 +401,8 @@ def read_valetudo_charger(path: Path) -> tuple[float, float] | None:
 # --- Free space and rooms ----------------------------------------------------------------------
 
 
-def _free_pixels(layers: list[PixelLayer], box: PixelBox, notes: list[str]) -> Bool:
-    """Return the pixels that are floor and not wall, bool (rows, columns)."""
+def _free_pixels(layers: list[PixelLayer], box: PixelBox, notes: list[str]) -> tuple[Bool, Bool]:
+    """Return the pixels that are floor and not wall, and those of walls, bool (rows, columns)."""
     segments_at = np.zeros((box.rows, box.columns), np.uint16)
     floor, wall = (np.zeros(segments_at.shape, np.bool_) for _ in range(2))
     for layer in layers:
@@ -397,7 +420,20 @@ def _free_pixels(layers: list[PixelLayer], box: PixelBox, notes: list[str]) -> B
     ):
         if both.any():
             notes.append(f"{np.count_nonzero(both)} pixels are {reason}")
-    return floor & ~wall
+    return floor & ~wall, wall
+
+
+def _driven(content: dict[str, Any], box: PixelBox) -> Bool:
+    """Return the pixels that the vacuum drove across, bool (rows, columns)."""
+    driven = np.zeros((box.rows, box.columns), np.bool_)
+    for entity, where in entities_of(content, "path"):
+        corners = read_points(entity, where) / pixel_side(content) - (box.column, box.row)
+        for (x0, y0), (x1, y1) in pairwise(corners.tolist()):
+            steps = int(2 * max(abs(x1 - x0), abs(y1 - y0))) + 2
+            rows, columns = np.linspace((y0, x0), (y1, x1), min(steps, MAX_PIXELS)).astype(int).T
+            inside = (rows >= 0) & (rows < box.rows) & (columns >= 0) & (columns < box.columns)
+            driven[rows[inside], columns[inside]] = True
+    return driven
 
 
 def _in_metres(mask: Bool, box: PixelBox, pixel_m: float) -> MultiPolygon:
@@ -422,17 +458,71 @@ def _in_metres(mask: Bool, box: PixelBox, pixel_m: float) -> MultiPolygon:
     return shapely.transform(MultiPolygon(polygons), lambda xy: xy * pixel_m)
 
 
-def _regions(layers: list[PixelLayer], pixel_m: float, notes: list[str]) -> list[LabelledRegion]:
-    """Return the segments in the file's order, each under a name of its own."""
-    regions: list[LabelledRegion] = []
+def _regions(
+    layers: list[PixelLayer],
+    free: Bool,
+    box: PixelBox,
+    limits: tuple[float, float],
+    notes: list[str],
+) -> list[LabelledRegion]:
+    """Return the segments in the file's order, each under a name of its own.
+
+    Floor without a segment that is no room belongs to the segment beside it. So does a segment
+    without a name that is no room.
+
+    Args:
+        layers: The layers of the map.
+        free: The floor, bool (rows, columns).
+        box: The window of these pixels.
+        limits: Side of a pixel [m], and the area from which on floor is a room [m²].
+        notes: Notes are added.
+    """
+    pixel_m, scrap_m2 = limits
     segments = [layer for layer in layers if layer.kind == "segment"]
+    if not segments:
+        return []
     names = distinct_names([segment.name for segment in segments], "segments", notes)
-    for layer, name in zip(segments, names, strict=True):
-        box = PixelBox.around(layer.runs)
-        shape = _in_metres(box.paint(layer.runs), box, pixel_m)
+    masks = []
+    for layer in segments:
+        window = PixelBox.around(layer.runs)
+        mask = np.zeros(free.shape, np.bool_)
+        mask[box.window(window)] = window.paint(layer.runs)
+        masks.append(mask)
+    labels = np.full(free.shape, -1, np.int32)
+    for index in sorted(range(len(masks)), key=lambda k: -np.count_nonzero(masks[k])):
+        labels[masks[index] & free] = index
+    sizes = np.bincount(labels[labels >= 0], minlength=len(segments)) * pixel_m**2
+    is_scrap = (sizes < scrap_m2) & [not segment.is_named for segment in segments]
+    if not is_scrap.all():
+        labels[np.append(is_scrap, False)[labels]] = -1
+    else:
+        is_scrap[:] = False
+    part = label_parts(free & (labels < 0), False)
+    areas = np.bincount(part[part >= 0], minlength=1) * pixel_m**2
+    small = (part >= 0) & np.append(areas < scrap_m2, False)[part]
+    spread = spread_labels(labels, small | (labels >= 0)) if (labels >= 0).any() else labels
+    added = np.where(small, spread, -1)
+    if (added >= 0).any():
+        area = np.count_nonzero(added >= 0) * pixel_m**2
+        notes.append(
+            f"floor of {area:.2f} m2 in pieces under {scrap_m2:g} m2 belongs to the segments beside"
+            " it; scrap_area_m2: 0 makes it rooms"
+        )
+    regions: list[LabelledRegion] = []
+    for index, (layer, name) in enumerate(zip(segments, names, strict=True)):
+        if is_scrap[index]:
+            continue
+        window = PixelBox.around(layer.runs)
+        shape: BaseGeometry = _in_metres(window.paint(layer.runs), window, pixel_m)
+        if (added == index).any():
+            shape = shapely.union(shape, _in_metres(added == index, box, pixel_m))
         kind = usual_type(layer.name) if layer.is_named else UNKNOWN
-        regions.append(LabelledRegion((layer.name,), shape, name, kind))
+        regions.append(LabelledRegion((layer.name,), MultiPolygon(_polygons(shape)), name, kind))
     return regions
+
+
+def _polygons(shape: BaseGeometry) -> list[Polygon]:
+    return [part for part in shapely.get_parts(shape).tolist() if part.geom_type == "Polygon"]
 
 
 # --- No-go areas and the charger ----------------------------------------------------------------
@@ -481,7 +571,7 @@ def _no_go_shape(corners: F64, kind: str) -> BaseGeometry:
 def _parts_in_metres(shape: BaseGeometry, pixel_m: float) -> list[Polygon]:
     # Rounded, so that the last bits of a machine's arithmetic don't matter.
     metres = shapely.transform(shape, lambda xy: np.round(xy * pixel_m, 6))
-    return [part for part in shapely.get_parts(metres).tolist() if part.geom_type == "Polygon"]
+    return _polygons(metres)
 
 
 def _remove_pixels(shape: BaseGeometry, free: Bool, box: PixelBox) -> None:

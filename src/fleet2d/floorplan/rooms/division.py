@@ -15,7 +15,13 @@ from shapely import Polygon
 
 from fleet2d.floorplan.lattice import Lattice
 from fleet2d.floorplan.mesh import Segment, build_mesh
-from fleet2d.floorplan.rooms.doorways import DoorLine, fit_lines, open_borders, rooms_beside
+from fleet2d.floorplan.rooms.doorways import (
+    DoorLine,
+    fit_lines,
+    narrow_borders,
+    open_borders,
+    rooms_beside,
+)
 from fleet2d.floorplan.rooms.room import (
     NO_ROOM,
     LabelledRegion,
@@ -29,6 +35,7 @@ from fleet2d.floorplan.rooms.room import (
 )
 from fleet2d.floorplan.rooms.segmentation import (
     MAX_DOOR_M,
+    MIN_DOOR_M,
     Chambers,
     cut_chambers,
     find_passages,
@@ -286,9 +293,10 @@ def _number_rests(labels: I32, inside: Bool, boxes: int, cell: float, next_room:
     return next_room
 
 
-RegionKind = Literal["exact", "boxes", "none"]
-"""The regions of a source are the rooms themselves (`exact`), boxes that label what walls bound
-(`boxes`), or absent, so that rooms are segmented from the walls (`none`)."""
+RegionKind = Literal["exact", "segments", "boxes", "none"]
+"""The regions of a source are the rooms themselves (`exact`), the same and doorways where they meet
+at a narrow place (`segments`), boxes that label what walls bound (`boxes`), or absent, so that
+rooms are segmented from the walls (`none`)."""
 
 ROOM = "room"
 HALLWAY = "hallway"
@@ -376,7 +384,7 @@ def divide(
     passages: Passages | None,
 ) -> tuple[I16, tuple[Room, ...], list[str]]:
     """Divide the free cells among rooms; see `assign_rooms`, `label_rooms`, `segment_rooms`."""
-    if kind == "exact" or passages is None:
+    if kind in ("exact", "segments") or passages is None:
         return assign_rooms(lattice, free, regions)
     chambers = cut_chambers(lattice, polygons, mesh, free, passages.segments)
     if not regions:
@@ -386,24 +394,38 @@ def divide(
 
 def select_doorways(
     lattice: Lattice,
-    polygons: Sequence[Polygon],
+    polygons: list[Polygon],
     room_of_cell: I16,
     passages: Passages,
-) -> list[tuple[DoorLine, Segment]]:
-    """Return the passages that are doorways: narrow, and between two different rooms."""
+    kind: RegionKind,
+) -> tuple[list[tuple[DoorLine, Segment]], list[Polygon]]:
+    """Return the passages that are doorways: narrow, and between two different rooms.
+
+    For rooms that are `segments`, so are narrow borders. The free space is returned, too, with
+    corners added on straight walls where these end.
+    """
     segments = []
     for segment, is_opening in zip(passages.segments, passages.is_opening, strict=True):
         left, right = rooms_beside(lattice, room_of_cell, segment)
         if not is_opening and left != right:
             segments.append(segment)
     lines = [_line(lattice, segment) for segment in segments]
+    if kind == "segments":
+        borders = narrow_borders(lattice, room_of_cell, segments, (MIN_DOOR_M, MAX_DOOR_M))
+        _, fitted, _ = fit_lines(lattice, polygons, [*lines, *borders])
+        segments += [
+            segment
+            for segment in fitted[len(lines) :]
+            if segment is not None and np.ptp(rooms_beside(lattice, room_of_cell, segment))
+        ]
+        lines = [_line(lattice, segment) for segment in segments]
     # A stored plan must be read back unchanged, so fitting a line once more may not move it.
-    _, refitted, _ = fit_lines(lattice, polygons, lines)
+    fitted_polygons, refitted, _ = fit_lines(lattice, polygons, lines)
     return [
         (line, segment)
         for line, segment, same in zip(lines, segments, refitted, strict=True)
         if segment == same
-    ]
+    ], fitted_polygons if kind == "segments" else list(polygons)
 
 
 def _line(lattice: Lattice, segment: Segment) -> DoorLine:

@@ -295,6 +295,44 @@ def open_borders(
     )
 
 
+def narrow_borders(
+    lattice: Lattice,
+    room_of_cell: I16,
+    passages: Sequence[Segment],
+    widths_m: tuple[float, float],
+) -> list[DoorLine]:
+    """Return lines along the borders of rooms without a wall that are as wide as a doorway.
+
+    Args:
+        lattice: Of the plan.
+        room_of_cell: Room index of each cell, -1 where not free.
+        passages: Doorways [lattice]; borders across them don't count.
+        widths_m: Least and largest width of a doorway [m].
+    """
+    places: dict[tuple[int, int], list[I64]] = {}
+    for axis in (0, 1):
+        cells, pairs = _border(room_of_cell, axis)
+        step = np.array([axis == 1, axis == 0], np.int64) * UNITS_PER_CELL
+        first = cells[:, ::-1] * UNITS_PER_CELL + _CENTRE
+        for place, pair in zip(first + step // 2, np.sort(pairs, axis=1).tolist(), strict=True):
+            places.setdefault((pair[0], pair[1]), []).append(place)
+    lines = []
+    for _, points in sorted(places.items(), key=lambda item: item[0]):
+        spots = shapely.points(np.array(points, np.float64))
+        reach = shapely.union_all(shapely.buffer(spots, UNITS_PER_CELL * 0.75))
+        for border in shapely.get_parts(reach).tolist():
+            ends = np.array(points, np.float64)[shapely.intersects(border, spots)]
+            away = ((ends[:, None] - ends) ** 2).sum(axis=2)
+            start, end = np.unravel_index(int(away.argmax()), away.shape)
+            line = LineString([ends[start], ends[end]])
+            width = (line.length + UNITS_PER_CELL) / lattice.units_per_m
+            crosses = any(line.distance(LineString(p)) < UNITS_PER_CELL for p in passages)
+            if widths_m[0] <= width <= widths_m[1] and not crosses and line.length > 0:
+                (x0, y0), (x1, y1) = lattice.to_metres(ends[[start, end]]).tolist()
+                lines.append(DoorLine((x0, y0), (x1, y1), leaf=False))
+    return lines
+
+
 def _border(rooms: I16, axis: int) -> tuple[I64, I64]:
     """Return the (row, column) of cells whose successor has another room, and both rooms."""
     before, after = (rooms[:-1], rooms[1:]) if axis == 0 else (rooms[:, :-1], rooms[:, 1:])

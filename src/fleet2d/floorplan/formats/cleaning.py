@@ -1,0 +1,232 @@
+"""Cleaning of maps that robots made: specks, rays, scraps, and gaps at thresholds.
+
+Each step has a setting that switches it off, and adds notes on what it changed.
+"""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fleet2d.errors import FloorPlanError
+from fleet2d.kernels import F64, I32, I64, Bool
+from fleet2d.kernels.space import count_steps, label_parts, squared_distance
+
+# Tolerance of decimal lengths in pixels: 0.3 m are six pixels of 0.05 m, and not 5.999….
+TINY = 1e-9
+# Widths of what is opened at a threshold or a shut door [m].
+DOOR_M = (0.4, 1.4)
+# A part of a map in which this can't stand is no part of a home: its area and width [m², m].
+SCRAP_M2, SCRAP_WIDTH_M = 1.0, 0.3
+
+
+@dataclass(frozen=True)
+class OccupancyMap:
+    """A robot's map of a floor in pixels; pixels in neither mask are unknown.
+
+    Attributes:
+        free: Pixels known to be free, bool (rows, columns), the first row at the bottom.
+        occupied: Pixels known to be occupied, of the same shape.
+        pixel: Side of a pixel [m].
+        origin: Where the lower left corner of the first pixel is (x, y) [m].
+        turn: Cosine and sine of the angle from the x axis to the rows, counter-clockwise.
+    """
+
+    free: Bool
+    occupied: Bool
+    pixel: float
+    origin: tuple[float, float] = (0.0, 0.0)
+    turn: tuple[float, float] = (1.0, 0.0)
+
+    def to_metres(self, xy: F64) -> F64:
+        """Return places (column, row) from the lower left corner in metres (…, 2)."""
+        cosine, sine = self.turn
+        x, y = xy[..., 0] * self.pixel, xy[..., 1] * self.pixel
+        turned = np.stack([x * cosine - y * sine, x * sine + y * cosine], axis=-1)
+        return turned + np.array(self.origin)
+
+    def crop(self) -> "OccupancyMap":
+        """Return the part around the free pixels, with a margin of one pixel if the map has it."""
+        rows, columns = (np.flatnonzero(self.free.any(axis=axis)) for axis in (1, 0))
+        low = (max(int(columns[0]) - 1, 0), max(int(rows[0]) - 1, 0))
+        window = (slice(low[1], int(rows[-1]) + 2), slice(low[0], int(columns[-1]) + 2))
+        x, y = self.to_metres(np.array(low, np.float64)).tolist()
+        # The kernels are compiled for this memory order.
+        free, occupied = (np.ascontiguousarray(m[window]) for m in (self.free, self.occupied))
+        return replace(self, free=free, occupied=occupied, origin=(x, y))
+
+
+def bridge_gaps(raw: OccupancyMap, widest: int, evidence: Bool | None = None) -> tuple[Bool, str]:
+    """Return the pixels of gaps between parts of the free space that belong together, and a note.
+
+    Two parts belong together if a strip of at most `widest` pixels lies between them that is as
+    long as a doorway, that nobody knows to be wall, or that a robot drove across. Of several
+    strips between two parts the first in this order is opened: driven across, unknown, shortest.
+
+    Args:
+        raw: The map.
+        widest: Largest width of a gap [pixels]; 0 opens none.
+        evidence: Pixels that a robot drove across, bool (rows, columns).
+
+    Returns:
+        The pixels to open, bool (rows, columns), and a note, empty without any.
+    """
+    opened = np.zeros(raw.free.shape, np.bool_)
+    part = label_parts(raw.free, False)
+    roomy = _roomy_parts(raw, part)
+    if widest == 0 or np.count_nonzero(roomy) < 2:
+        return opened, ""
+    gap = np.zeros(raw.free.shape, np.bool_)
+    first, second = (np.full(raw.free.shape, -1, np.int32) for _ in range(2))
+    for width in range(1, widest + 1):
+        for axis in (0, 1):
+            _mark_gaps(part, roomy, width, axis, gap, first, second)
+    strips = [(strip, False) for strip in _strips(gap & ~raw.occupied)]
+    strips += [(strip, True) for strip in _strips(gap & raw.occupied)]
+    candidates = []
+    for index, (strip, is_wall) in enumerate(strips):
+        length = float((np.ptp(strip, axis=0).max() + 1) * raw.pixel)
+        driven = evidence is not None and bool(evidence[tuple(strip.T)].any())
+        if driven or (length >= DOOR_M[0] and (not is_wall or length <= DOOR_M[1])):
+            candidates.append((not driven, is_wall, length, index))
+    places = []
+    owner = np.arange(len(roomy))
+    for *_, index in sorted(candidates):
+        pixels = tuple(strips[index][0].T)
+        pairs = np.unique(np.stack([first[pixels], second[pixels]], axis=1), axis=0)
+        joins = [(a, b) for a, b in pairs.tolist() if owner[a] != owner[b]]
+        for a, b in joins:
+            owner[owner == owner[b]] = owner[a]
+        if joins:
+            opened[pixels] = True
+            places.append(strips[index][0][:, ::-1].mean(axis=0) + 0.5)
+    if not places:
+        return opened, ""
+    x, y = raw.to_metres(places[0]).tolist()
+    return opened, (
+        f"gaps of at most {widest} pixels between parts of the home are open: {len(places)}, the"
+        f" first at ({x:.2f}, {y:.2f}) m; bridge_pixels: 0 leaves them shut"
+    )
+
+
+def _strips(gap: Bool) -> list[I64]:
+    """Return the (row, column) of the pixels of each connected strip, int64 (n, 2)."""
+    number = label_parts(gap, True)[gap]
+    order = np.argsort(number, kind="stable")
+    ends = np.cumsum(np.bincount(number[order]))[:-1]
+    return np.split(np.argwhere(gap)[order], ends) if len(number) else []
+
+
+def _roomy_parts(raw: OccupancyMap, part: I32) -> Bool:
+    """Return which parts of the free space a person can stand in, bool (parts,)."""
+    reach = max(SCRAP_WIDTH_M / 2 / raw.pixel, 1)
+    core = squared_distance(np.pad(raw.free, 1))[1:-1, 1:-1] >= reach**2
+    count = int(part.max(initial=-1)) + 1
+    sizes = np.bincount(part[part >= 0], minlength=count)
+    cores = np.bincount(part[core], minlength=count)
+    roomy: Bool = (sizes * raw.pixel**2 >= SCRAP_M2) & (cores > 0)
+    return roomy
+
+
+def _mark_gaps(
+    part: I32, roomy: Bool, width: int, axis: int, gap: Bool, first: I32, second: I32
+) -> None:
+    """Mark the pixels of gaps of a width along an axis, with the parts on their two sides."""
+    along = np.moveaxis(part, axis, 0)
+    before, after = along[: -width - 1], along[width + 1 :]
+    between = np.stack([along[k : k + len(before)] for k in range(1, width + 1)])
+    is_gap = (before >= 0) & (after >= 0) & (before != after) & (between < 0).all(axis=0)
+    is_gap &= roomy[before] & roomy[after]
+    low, high = np.minimum(before, after), np.maximum(before, after)
+    for k in range(1, width + 1):
+        for target, values in ((gap, is_gap), (first, low), (second, high)):
+            window = np.moveaxis(target, axis, 0)[k : k + len(before)]
+            window[is_gap] = values[is_gap]
+
+
+def drop_scraps(raw: OccupancyMap, scrap_area_m2: float) -> tuple[Bool, str]:
+    """Return the pixels of parts of the free space that are smaller than a room, and a note.
+
+    The largest part is none of them, and neither is a part that is as large as `scrap_area_m2`.
+
+    Args:
+        raw: The map.
+        scrap_area_m2: Area from which on a part belongs to the home [m²]; 0 drops none.
+    """
+    part = label_parts(raw.free, False)
+    sizes = np.bincount(part[raw.free], minlength=1)
+    small = sizes * raw.pixel**2 < scrap_area_m2 - TINY
+    small[np.argmax(sizes)] = False
+    if not small.any():
+        return np.zeros(raw.free.shape, np.bool_), ""
+    area = float(sizes[small].sum()) * raw.pixel**2
+    return raw.free & small[part], (
+        f"scraps left out: {np.count_nonzero(small)} parts of the floor, each under"
+        f" {scrap_area_m2:g} m2 and joined to nothing ({area:.2f} m2 in all); scrap_area_m2: 0"
+        " keeps them"
+    )
+
+
+def remove_specks(raw: OccupancyMap, speck_area_m2: float) -> tuple[Bool, list[str]]:
+    """Return the pixels of small groups that are surrounded by free ones, and a note.
+
+    Args:
+        raw: The map.
+        speck_area_m2: Groups smaller than this are specks [m²].
+    """
+    # A margin around the map joins all groups that reach its edge.
+    part = label_parts(~np.pad(raw.free, 1), True)[1:-1, 1:-1]
+    sizes = np.bincount(part[~raw.free], minlength=1)
+    small = (sizes > 0) & (sizes * raw.pixel**2 < speck_area_m2 - TINY)
+    small[0] = False  # the part of the margin, which comes first
+    area = float(sizes[small].sum()) * raw.pixel**2
+    specks: Bool = ~raw.free & small[part]
+    if not small.any():
+        return specks, []
+    return specks, [
+        f"specks removed: {np.count_nonzero(small)} groups of pixels that are not free, each under"
+        f" {speck_area_m2:g} m2 and with free space all round, are free now ({area:.2f} m2 in all)"
+    ]
+
+
+def home_pixels(free: Bool, pixel: float, ray_width: float) -> Bool:
+    """Return the pixels of the largest part that a disc reaches, and of what belongs to it."""
+    across = math.floor(ray_width / pixel + TINY)
+    reach = max((across + 1) // 2, 1)  # the disc covers what is nearer than this to its centre
+    core = squared_distance(np.pad(free, 1))[1:-1, 1:-1] >= reach**2
+    if not core.any():
+        raise FloorPlanError(
+            f"the free space is nowhere {ray_width:g} m wide: check the resolution, or set"
+            " floorplan.ray_width lower"
+        )
+    part = label_parts(core, False)
+    opened = squared_distance(part != np.argmax(np.bincount(part[core]))) < reach**2
+    steps = count_steps(opened, free)
+    narrow = steps > 0
+    part = label_parts(narrow, False)
+    depth = np.zeros(int(part.max()) + 2, np.int32)  # its last entry serves -1
+    np.maximum.at(depth, part[narrow], steps[narrow])
+    leads_on = depth > across
+    return (steps >= 0) & (~leads_on[part] | (steps < reach))
+
+
+def note_left_out(raw: OccupancyMap, free: Bool, home: Bool, ray_width: float) -> list[str]:
+    """Return notes on free space outside the home: joined by narrow passages, or not at all."""
+    notes = []
+    joined = count_steps(home, free) >= 0
+    for mask, reason in (
+        (joined & ~home, f"only passages narrower than {ray_width:g} m join"),
+        (free & ~joined, "nothing joins"),
+    ):
+        if mask.any():
+            part = label_parts(mask, False)
+            sizes = np.bincount(part[mask])
+            largest = part == np.argmax(sizes)
+            middle = np.argwhere(largest)[:, ::-1].mean(axis=0) + 0.5
+            x, y = raw.to_metres(middle).tolist()
+            area, most = (float(n) * raw.pixel**2 for n in (sizes.sum(), sizes.max()))
+            notes.append(
+                f"left out: {area:.2f} m2 of free space, in pieces: {len(sizes)}, that {reason} to"
+                f" the rest; the largest, {most:.2f} m2, is round ({x:.2f}, {y:.2f}) m"
+            )
+    return notes

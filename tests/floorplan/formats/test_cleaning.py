@@ -1,0 +1,70 @@
+"""Maps drawn as text: `.` free, `#` occupied, a blank unknown; a pixel is 0.1 m."""
+
+import numpy as np
+import pytest
+
+from fleet2d.floorplan.formats.cleaning import OccupancyMap, bridge_gaps, drop_scraps
+
+
+def two_rooms(gap: str, rows: slice = slice(0, 20), thickness: int = 1) -> OccupancyMap:
+    """Two rooms of 2 m x 1.5 m, with pixels between them of which some rows are `gap`."""
+    pixels = np.full((20, 30 + thickness), ".")
+    pixels[:, 15 : 15 + thickness] = "#"
+    pixels[rows, 15 : 15 + thickness] = gap
+    return OccupancyMap(pixels == ".", pixels == "#", 0.1)
+
+
+@pytest.mark.parametrize("thickness", [1, 2])
+def test_unknown_row_between_rooms_opens_and_wall_beside_it_stays(thickness: int) -> None:
+    raw = two_rooms(" ", slice(5, 18), thickness)
+
+    opened, note = bridge_gaps(raw, 2)
+
+    assert 13 * thickness == np.count_nonzero(opened)
+    assert not (opened & raw.occupied).any()
+    assert "are open: 1" in note
+
+
+def test_gap_wider_than_the_setting_stays() -> None:
+    opened, note = bridge_gaps(two_rooms(" ", thickness=3), 2)
+
+    assert not opened.any()
+    assert note == ""
+    assert not bridge_gaps(two_rooms(" "), 0)[0].any()
+
+
+def test_shut_door_opens_and_a_wall_along_the_whole_room_stays() -> None:
+    walls = np.full((20, 33), "#")
+    walls[:, :15] = walls[:, 18:] = "."
+    walls[5:14, 15] = walls[5:14, 17] = "."  # a door of 0.9 m in a wall of 0.3 m, one pixel thick
+    door = OccupancyMap(walls == ".", walls == "#", 0.1)
+
+    assert 9 == np.count_nonzero(bridge_gaps(door, 2)[0])
+    assert not bridge_gaps(two_rooms("#"), 2)[0].any()
+
+
+def test_wall_opens_where_a_robot_drove() -> None:
+    raw = two_rooms("#")
+    driven = np.zeros(raw.free.shape, np.bool_)
+    driven[10] = True
+
+    opened, _ = bridge_gaps(raw, 2, driven)
+
+    assert opened[10, 15]
+
+
+def test_part_too_small_to_stand_in_is_not_bridged() -> None:
+    raw = two_rooms(" ")
+    raw.free[:, 19:] = False  # 0.3 m x 2 m are left
+
+    assert not bridge_gaps(raw, 2)[0].any()
+
+
+def test_scraps_are_parts_below_the_area_but_never_the_largest() -> None:
+    raw = two_rooms("#")
+    raw.free[:, 22:] = False  # 1.2 m2 are left
+
+    assert not drop_scraps(raw, 1.0)[0].any()
+    assert 20 * 6 == np.count_nonzero(drop_scraps(raw, 1.3)[0])
+    assert 20 * 6 == np.count_nonzero(drop_scraps(raw, 100)[0])
+    assert not drop_scraps(raw, 0)[0].any()
