@@ -118,15 +118,15 @@ def test_entrance_holes_names_and_labels_come_back(tmp_path: Path) -> None:
         ({"roms": []}, "the plan has an unknown key 'roms': did you mean 'rooms'"),
         ({"name": 3}, "name is 3: a text is expected"),
         ({"free": {}}, "free is {}: a list is expected"),
+        ({"free": 3}, "free is 3: a list is expected"),
         ({"free": []}, "the outline of flat encloses no area"),
         ({"free": [{"outline": OUTLINE[:2]}]}, r"free\[0\]\.outline has 2 different points"),
         ({"free": [{"holes": []}]}, r"free\[0\] has no key 'outline'"),
-        ({"free": [OUTLINE]}, r"free\[0\] is not an object with the keys outline, holes"),
+        ({"free": [[3, 4]]}, r"free\[0\] has 1 different points"),
         (
             {"free": [{"outline": [[0, 0], [4, 4], [4, 0], [0, 4]]}]},
             r"free\[0\] is not a valid outline: self-intersection at \(2, 2\) m",
         ),
-        ({"free": [{"outline": OUTLINE}] * 2}, "free is not a valid outline"),
         ({"rooms": [{"type": "hall"}]}, r"rooms\[0\] needs either polygon .* or region"),
         ({"rooms": [{"polygon": OUTLINE}]}, r"rooms\[0\] has no key 'type'"),
         ({"rooms": [{"type": 3, "polygon": OUTLINE}]}, r"rooms\[0\]\.type is 3: a text"),
@@ -251,3 +251,51 @@ def test_load_floorplan_refuses_what_it_does_not_know(tmp_path: Path) -> None:
         load_floorplan("family-home")
     with pytest.raises(FloorPlanError, match="there is no file"):
         load_floorplan(tmp_path / "nowhere.json")
+
+
+# --- Written by hand ------------------------------------------------------------------------------
+
+
+def rectangle(x0: float, y0: float, x1: float, y1: float) -> list[list[float]]:
+    return [[x0, y0], [x1, y0], [x1, y1], [x0, y1]]
+
+
+KITCHEN, OFFICE, PASSAGE = rectangle(0, 0, 4, 3), rectangle(4.2, 0, 8, 3), rectangle(4, 1, 4.2, 1.9)
+
+
+def by_hand(folder: Path, free: Any, **keys: Any) -> FloorPlan:
+    document = {"format": "fleet2d-floorplan", "version": 1, "free": free, **keys}
+    return read_native(write(folder, document))
+
+
+def test_rectangles_for_rooms_and_doorways_are_one_free_space(tmp_path: Path) -> None:
+    rooms = [{"type": "kitchen", "polygon": KITCHEN}, {"type": "office", "polygon": OFFICE}]
+
+    plan = by_hand(tmp_path, [KITCHEN, OFFICE, PASSAGE], rooms=rooms)
+    overlapping = by_hand(tmp_path, [KITCHEN, OFFICE, rectangle(3.9, 1, 4.5, 1.9)], rooms=rooms)
+
+    assert 1 == len(plan.polygons)
+    assert 12 + 11.4 + 0.18 == pytest.approx(plan.area_m2)
+    assert ["kitchen_0", "office_0"] == [room.name for room in plan.rooms]
+    assert [(0, 1)] == [tuple(sorted(door.rooms)) for door in plan.doorways]
+    assert 0.9 == pytest.approx(plan.doorways[0].width_m)
+    assert plan == overlapping
+    assert () == plan.notes
+
+
+def test_free_space_may_be_one_outline_or_one_area(tmp_path: Path) -> None:
+    plan = by_hand(tmp_path, KITCHEN)
+
+    assert plan == by_hand(tmp_path, [KITCHEN]) == by_hand(tmp_path, [{"outline": KITCHEN}])
+    assert plan.area_m2 == pytest.approx(12)
+
+
+def test_door_in_no_wall_says_which_corner_may_be_missing(tmp_path: Path) -> None:
+    door = {"start": [4.1, 1], "end": [4.1, 1.9], "name": "office_door"}
+    open_door = {"start": [2, 1], "end": [2, 1.9]}
+
+    solid = by_hand(tmp_path, [KITCHEN, OFFICE], doorways=[door]).notes
+    loose = by_hand(tmp_path, [KITCHEN], doorways=[open_door]).notes
+
+    assert any("corners of the passage may be missing from (4.00, " in note for note in solid)
+    assert any("(2.00, 1.90) is 1.10 m from the wall from (4.00, 3.00)" in n for n in loose)

@@ -10,6 +10,7 @@ A plan that is written by `native_document` and read again at the same cell size
 `PlanFile` has all keys. The bundled homes are files in this format.
 """
 
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, Self
@@ -17,7 +18,6 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 import numpy as np
 import shapely
 from pydantic import (
-    AfterValidator,
     BeforeValidator,
     ConfigDict,
     Field,
@@ -48,9 +48,9 @@ from fleet2d.floorplan.formats.files import (
 )
 from fleet2d.floorplan.lattice import UNITS_PER_CELL
 from fleet2d.floorplan.placed_objects import Blocks, PlacedObject, Posture, UsePlace
-from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
+from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.rooms.doorways import DoorLine
-from fleet2d.floorplan.rooms.room import UNKNOWN, room_type
+from fleet2d.floorplan.rooms.room import MAX_GAP_M2, UNKNOWN, LabelledRegion, room_type
 from fleet2d.floorplan.source import FloorPlanSource
 from fleet2d.kernels import Bool
 
@@ -105,17 +105,25 @@ def _check_valid(shape: Polygon | MultiPolygon) -> None:
 
 
 def space_of(parts: list[AreaEntry]) -> Polygon | MultiPolygon:
-    """Return the union of parts [m]."""
-    return parts[0].polygon if len(parts) == 1 else MultiPolygon([part.polygon for part in parts])
+    """Return the union of parts [m], which may touch and overlap."""
+    if len(parts) == 1:
+        return parts[0].polygon
+    apart = MultiPolygon([part.polygon for part in parts])
+    if apart.is_valid:
+        return apart
+    united = shapely.union_all([part.polygon for part in parts])
+    assert isinstance(united, Polygon | MultiPolygon)
+    return united
 
 
-def _check_space(parts: list[AreaEntry]) -> list[AreaEntry]:
-    if len(parts) > 1:
-        _check_valid(space_of(parts))
-    return parts
+def _as_parts(value: object) -> object:
+    """Return the corners of one outline as a list of areas."""
+    is_ring = isinstance(value, list) and value and isinstance(value[0], list)
+    is_one = is_ring and all(isinstance(number, int | float) for number in value[0])
+    return [value] if is_one else value
 
 
-Space = Annotated[Listed[AreaEntry], AfterValidator(_check_space)]
+Space = Annotated[Listed[Area], BeforeValidator(_as_parts)]
 
 
 class RoomEntry(FileModel):
@@ -234,7 +242,8 @@ class PlanFile(FileModel):
 
     Attributes:
         name: Name of the plan; left out: of its file.
-        free: The parts of the free space between the walls.
+        free: The parts of the free space between the walls, such as a rectangle for each room and
+            each doorway; where they touch or overlap they are one.
         rooms: Its rooms; space of none is the room unknown_0.
         doorways: Passages between rooms; left out: the walls are searched.
         objects: Furniture and devices, which are separate from the walls.
@@ -350,10 +359,11 @@ def native_plan(content: dict[str, Any], path: Path, cell: float = 0.05) -> Floo
 
 def plan_of(file: PlanFile, path: Path, cell: float) -> FloorPlan:
     """Return the floor plan of a file."""
+    free, regions = space_of(file.free), [room.to_region() for room in file.rooms or ()]
     return FloorPlan.build(
         file.name or path.stem,
-        space_of(file.free),
-        [room.to_region() for room in file.rooms or ()],
+        free,
+        _with_passages(free, regions) if len(file.free) > 1 else regions,
         cell,
         source=f"Fleet2D floor plan, {path.name}",
         entrance=file.entrance,
@@ -362,6 +372,27 @@ def plan_of(file: PlanFile, path: Path, cell: float) -> FloorPlan:
         objects=[thing.to_object() for thing in file.objects],
         no_go=[area.polygon for area in file.no_go],
     )
+
+
+def _with_passages(
+    free: Polygon | MultiPolygon, regions: list[LabelledRegion]
+) -> list[LabelledRegion]:
+    """Return the rooms, each with those passages to others that no room covers.
+
+    A passage is free space that is smaller than a room and lies between two rooms; it belongs to
+    the first of these.
+    """
+    shapes = [region.shape for region in regions]
+    uncovered = shapely.get_parts(shapely.difference(free, shapely.union_all(shapes)))
+    grown = list(shapes)
+    for part in uncovered.tolist():
+        beside = [k for k, shape in enumerate(shapes) if part.distance(shape) == 0]
+        if len(beside) > 1 and 0 < part.area < MAX_GAP_M2:
+            grown[beside[0]] = shapely.union_all([grown[beside[0]], part])
+    return [
+        replace(region, shape=shape) if shape is not region.shape else region
+        for region, shape in zip(regions, grown, strict=True)
+    ]
 
 
 def native_document(plan: FloorPlan) -> dict[str, Any]:

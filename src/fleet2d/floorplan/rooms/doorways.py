@@ -103,12 +103,34 @@ def fit_lines(
             continue
         (x0, y0), (x1, y1) = line.start, line.end
         name = f" {line.name}" if line.name else ""
-        why = "ends at no wall" if fitted is None else "touches another one"
+        why, advice = "touches another one", ""
+        if fitted is None:
+            why, advice = "ends at no wall", _missing_corner(lattice, walls, ends)
         notes.append(
-            f"the doorway{name} from ({x0:.2f}, {y0:.2f}) to ({x1:.2f}, {y1:.2f}) m {why}: left out"
+            f"the doorway{name} from ({x0:.2f}, {y0:.2f}) to ({x1:.2f}, {y1:.2f}) m {why}: left"
+            f" out{advice}"
         )
         segments.append(None)
     return walls, segments, notes
+
+
+def _missing_corner(lattice: Lattice, walls: Sequence[Polygon], ends: F64) -> str:
+    """Return a hint at the wall in which a corner is likely missing, if a line ends at no wall."""
+    middle = shapely.Point(ends.mean(axis=0))
+    is_free = any(shapely.intersects(wall, middle) for wall in walls)
+    places = [shapely.Point(end) for end in ends] if is_free else [middle]
+    rings = [shapely.get_coordinates(ring) for wall in walls for ring in shapely.get_rings(wall)]
+    sides = np.concatenate([np.stack([ring[:-1], ring[1:]], axis=1) for ring in rings])
+    lines = np.asarray(shapely.linestrings(sides))
+    away = np.array([shapely.distance(lines, place) for place in places])
+    worst = int(np.argmax(away.min(axis=1)))
+    (ax, ay), (bx, by) = lattice.to_metres(sides[int(np.argmin(away[worst]))]).tolist()
+    wall = f"from ({ax:.2f}, {ay:.2f}) to ({bx:.2f}, {by:.2f}) m"
+    if not is_free:
+        return f"; no free space leads through it: corners of the passage may be missing {wall}"
+    metres = float(away[worst].min()) / lattice.units_per_m
+    x, y = lattice.to_metres(shapely.get_coordinates(places[worst])[0]).tolist()
+    return f"; ({x:.2f}, {y:.2f}) is {metres:.2f} m from the wall {wall}: a corner may be missing"
 
 
 def name_doorways(
