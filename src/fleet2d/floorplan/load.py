@@ -15,6 +15,7 @@ from fleet2d.configuration.problems import suggest
 from fleet2d.configuration.units import folder_of
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.formats.files import YAML, read_document, read_yaml
+from fleet2d.floorplan.formats.foreign import foreign_document
 from fleet2d.floorplan.formats.native import (
     FORMAT,
     bundled_names,
@@ -26,7 +27,7 @@ from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.source import FloorPlanSource
 
 DEFAULT_CELL_M = 0.05
-IMAGES = (".pgm", ".png")
+IMAGES = (".pgm", ".png", ".jpg", ".jpeg")
 JSON = (".json", ".geojson")
 SYNTHETIC = re.compile(r"synthetic:(0|[1-9][0-9]{0,17})", re.ASCII)
 
@@ -78,7 +79,7 @@ def _load_document(path: Path, cell: float | None) -> FloorPlan:
         content = read_document(path)
         kind = _format_of(content) or ("ros" if path.suffix.lower() in YAML else None)
     if kind is None:
-        raise _unknown_format(path)
+        raise _unknown_format(path, content)
     if kind == "native":
         return native_plan(content, path, DEFAULT_CELL_M if cell is None else cell)
     return _load_by(kind, path=path, cell=cell)
@@ -124,7 +125,7 @@ def format_of_file(path: Path) -> str:
     if kind is None and path.suffix.lower() in YAML and "image" in content:
         return "ros"
     if kind is None:
-        raise _unknown_format(path)
+        raise _unknown_format(path, content)
     return kind
 
 
@@ -162,7 +163,10 @@ def _types_by_suffix(path: Path) -> list[str]:
     return sorted(kinds | {"ros"} if path.suffix.lower() in YAML else kinds)
 
 
-def _unknown_format(path: Path) -> FloorPlanError:
+def _unknown_format(path: Path, content: dict[str, Any]) -> FloorPlanError:
+    said = foreign_document(content)
+    if said is not None:
+        return FloorPlanError(f"{path} {said}")
     marks = [f"{_as_json(*mark)} ({kind})" for kind, mark in sorted(_marks(), key=lambda m: m[0])]
     endings = [f", and doesn't end in {e} ({kind})" for e, kind in sorted(_suffixes().items())]
     return FloorPlanError(

@@ -128,6 +128,15 @@ def test_drawing_that_encloses_nothing_is_refused(tmp_path: Path, pixels: U8, me
     assert "flat.pgm" in str(caught.value)
 
 
+def test_jpeg_is_read_as_the_same_picture(tmp_path: Path) -> None:
+    images = pytest.importorskip("PIL.Image")
+    images.fromarray(HOME).save(tmp_path / "flat.jpg", quality=85)
+
+    plan = load_floorplan(tmp_path / "flat.jpg", resolution=0.05)
+
+    assert plan.area_m2 == pytest.approx(read(tmp_path).area_m2)
+
+
 def with_gap(width: int) -> U8:
     """Return the home with a gap in its outer wall [pixels]."""
     pixels = HOME.copy()

@@ -30,7 +30,7 @@ class Image(PictureSource):
     """A drawing: dark walls on light ground.
 
     Attributes:
-        path: The picture, PNG or PGM.
+        path: The picture, PNG, JPEG or PGM.
         resolution: Side of a pixel, as a drawing has no scale.
         threshold: Share of white below which a pixel is wall.
         bridge_pixels: Width of the widest gap between two parts of the home that opens; 0 opens

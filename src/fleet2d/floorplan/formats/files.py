@@ -66,6 +66,7 @@ def read_json(path: Path) -> dict[str, Any]:
     try:
         content = json.loads(text)
     except json.JSONDecodeError as error:
+        _refuse_foreign(path, text[:4096].encode())
         raise FloorPlanError(
             f"{path} is not JSON: {error.msg} in line {error.lineno}, column {error.colno}"
         ) from None
@@ -93,12 +94,15 @@ def read_yaml(path: Path) -> dict[str, Any]:
     try:
         content = parse(text)
     except (yaml.YAMLError, RecursionError) as error:
+        _refuse_foreign(path, text[:4096].encode())
         raise FloorPlanError(f"{path} is not YAML: {one_line(error, 200)}") from None
     except NodeError as error:
         line = error.node.start_mark.line + 1
         raise FloorPlanError(f"{path}, line {line}: {error}") from None
     except InputError as error:
         raise FloorPlanError(f"{path}: {error}") from None
+    if isinstance(content, str):
+        _refuse_foreign(path, text[:4096].encode())
     return _mapping(content, path, "a YAML mapping of keys and values")
 
 
@@ -106,15 +110,26 @@ def _read_text(path: Path, language: str) -> str:
     if path.is_dir():
         raise FloorPlanError(f"{path} is a folder: name the floor plan's {language} file in it")
     try:
-        return read_bytes(path, FILE_BYTES, FloorPlanError).decode("utf-8-sig")
+        content = read_bytes(path, FILE_BYTES, FloorPlanError)
+        return content.decode("utf-8-sig")
     except FileNotFoundError:
         raise FloorPlanError(f"there is no file {path}: check floorplan.path") from None
     except OSError as error:
         raise FloorPlanError(f"{path} can't be read: {error.strerror}") from None
     except UnicodeDecodeError:
+        _refuse_foreign(path, content[:65536])
         raise FloorPlanError(
             f"{path} is not a {language} text file: check floorplan.path"
         ) from None
+
+
+def _refuse_foreign(path: Path, content: bytes) -> None:
+    """Raise FloorPlanError if a file is one of another program, with what to convert it to."""
+    from fleet2d.floorplan.formats.foreign import foreign_file
+
+    said = foreign_file(content)
+    if said is not None:
+        raise FloorPlanError(f"{path} {said}") from None
 
 
 def _mapping(content: object, path: Path, expected: str) -> dict[str, Any]:

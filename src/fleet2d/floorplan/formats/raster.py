@@ -1,4 +1,4 @@
-"""Pictures of floors in shades of grey: PGM and PNG files."""
+"""Pictures of floors in shades of grey: PGM, PNG and JPEG files."""
 
 import io
 import re
@@ -15,12 +15,14 @@ from numpy.typing import NDArray
 
 from fleet2d.bounds import PICTURE_BYTES, PIXELS, read_bytes
 from fleet2d.errors import FloorPlanError
+from fleet2d.floorplan.formats.foreign import foreign_file
 from fleet2d.kernels import U8, Bool
 
 MAX_SIDE = 2**15
 """Pixels along a side of a picture: each step in cleaning it needs further rows round it."""
 
 _PNG = b"\x89PNG\r\n\x1a\n"
+_JPEG = b"\xff\xd8\xff"
 _CHANNELS = {2: 3, 4: 2, 6: 4}  # by colour type; 1 for the others
 # Three numbers, each after white space and comments; then one white space.
 _PGM_HEADER = re.compile(
@@ -60,11 +62,11 @@ class GreyPicture:
 
 
 def read_grey(path: Path) -> GreyPicture:
-    """Read a PGM (P2 or P5, 8 or 16 bits) or PNG file, by its content.
+    """Read a PGM (P2 or P5, 8 or 16 bits), PNG or JPEG file, by its content.
 
     Raises:
-        FloorPlanError: It can't be read, is damaged, too large or of another kind, or is a PNG and
-            Pillow is not installed.
+        FloorPlanError: It can't be read, is damaged, too large or of another kind, or is PNG or
+            JPEG and Pillow is not installed.
     """
     try:
         content = read_bytes(path, PICTURE_BYTES, FloorPlanError)
@@ -75,10 +77,15 @@ def read_grey(path: Path) -> GreyPicture:
             return _read_pgm(content)
         if content.startswith(_PNG):
             return _read_png(content)
+        if content.startswith(_JPEG):
+            return _read_by_pillow(content, "JPEG")
     except FloorPlanError as error:
         raise FloorPlanError(f"the image {path} {error}") from error
+    said = foreign_file(content[:65536])
+    if said is not None:
+        raise FloorPlanError(f"the image {path} {said}")
     raise FloorPlanError(
-        f"the image {path} is neither PGM (P2, P5) nor PNG: convert it to one of them"
+        f"the image {path} is neither PGM (P2, P5), PNG nor JPEG: convert it to one of them"
     )
 
 
@@ -157,28 +164,34 @@ def _check_size(columns: int, rows: int) -> None:
 
 
 def _read_png(content: bytes) -> GreyPicture:
+    if len(content) >= 24:  # else it is cut off, as Pillow says
+        _check_size(*(int.from_bytes(content[at : at + 4], "big") for at in (16, 20)))
+    return _read_by_pillow(content, "PNG")
+
+
+def _read_by_pillow(content: bytes, kind: str) -> GreyPicture:
+    """Read a PNG or JPEG picture, the mean of its colours."""
     try:
         from PIL import Image
     except ImportError:
         raise FloorPlanError(
-            'is PNG, which only Pillow can read: pip install "fleet2d[viz]", or convert the'
+            f'is {kind}, which only Pillow can read: pip install "fleet2d[viz]", or convert the'
             " image to PGM"
         ) from None
-    if len(content) >= 24:  # else it is cut off, as Pillow says
-        _check_size(*(int.from_bytes(content[at : at + 4], "big") for at in (16, 20)))
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # see _check_size
-            picture = Image.open(io.BytesIO(content), formats=["PNG"])
+            picture = Image.open(io.BytesIO(content), formats=[kind])
         _check_size(*picture.size)
-        _check_rows(content)
+        if kind == "PNG":
+            _check_rows(content)
         if picture.mode.startswith("I"):  # 16 bits, grey only
             return GreyPicture(np.asarray(picture).astype(np.uint16), 65535)
         channels = np.asarray(picture.convert("RGBA"))
     except Image.DecompressionBombError as error:
         raise FloorPlanError(f"is too large: {error}") from error
     except (OSError, SyntaxError, ValueError, zlib.error) as error:
-        raise FloorPlanError(f"is a damaged PNG: {error}") from error
+        raise FloorPlanError(f"is a damaged {kind}: {error}") from error
     # The mean of the colours, times three to keep it whole.
     shades = channels[..., :3].sum(axis=-1, dtype=np.uint16)
     clear = channels[..., 3] < 255
