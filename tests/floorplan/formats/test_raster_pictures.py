@@ -102,7 +102,8 @@ def test_pgm_of_another_size_than_its_header_is_refused(
         (b"P2\n2 1\n255\n1 -1", "the pixel '-1'"),
         (b"P5\n100000 100000\n255\n", "at most 16777216 are read"),
         (b"P6\n4 3\n255\n" + bytes(36), "neither PGM"),
-        (b"\xff\xd8\xff\xe0", "neither PGM"),
+        (b"\xff\xd8\xff\xe0", "is a damaged JPEG"),
+        (b"\xfa\xfb", "neither PGM"),
         (b"", "neither PGM"),
     ],
 )

@@ -106,21 +106,25 @@ def _check_valid(shape: Polygon | MultiPolygon) -> None:
 
 def space_of(parts: list[AreaEntry]) -> Polygon | MultiPolygon:
     """Return the union of parts [m], which may touch and overlap."""
-    if len(parts) == 1:
-        return parts[0].polygon
-    apart = MultiPolygon([part.polygon for part in parts])
-    if apart.is_valid:
-        return apart
+    if are_apart(parts):
+        shapes = [part.polygon for part in parts]
+        return shapes[0] if len(shapes) == 1 else MultiPolygon(shapes)
     united = shapely.union_all([part.polygon for part in parts])
     assert isinstance(united, Polygon | MultiPolygon)
     return united
 
 
+def are_apart(parts: list[AreaEntry]) -> bool:
+    """Return whether parts neither overlap nor share a side."""
+    return len(parts) == 1 or MultiPolygon([part.polygon for part in parts]).is_valid
+
+
 def _as_parts(value: object) -> object:
     """Return the corners of one outline as a list of areas."""
-    is_ring = isinstance(value, list) and value and isinstance(value[0], list)
-    is_one = is_ring and all(isinstance(number, int | float) for number in value[0])
-    return [value] if is_one else value
+    if isinstance(value, list) and value and isinstance(value[0], list):
+        first: list[object] = value[0]
+        return [value] if all(isinstance(number, int | float) for number in first) else value
+    return value
 
 
 Space = Annotated[Listed[Area], BeforeValidator(_as_parts)]
@@ -363,7 +367,7 @@ def plan_of(file: PlanFile, path: Path, cell: float) -> FloorPlan:
     return FloorPlan.build(
         file.name or path.stem,
         free,
-        _with_passages(free, regions) if len(file.free) > 1 else regions,
+        regions if are_apart(file.free) else _with_passages(free, regions),
         cell,
         source=f"Fleet2D floor plan, {path.name}",
         entrance=file.entrance,
@@ -384,7 +388,7 @@ def _with_passages(
     """
     shapes = [region.shape for region in regions]
     uncovered = shapely.get_parts(shapely.difference(free, shapely.union_all(shapes)))
-    grown = list(shapes)
+    grown: list[Any] = list(shapes)
     for part in uncovered.tolist():
         beside = [k for k, shape in enumerate(shapes) if part.distance(shape) == 0]
         if len(beside) > 1 and 0 < part.area < MAX_GAP_M2:
