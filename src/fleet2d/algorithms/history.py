@@ -10,6 +10,7 @@ from fleet2d.algorithms.log import BodyPoses
 from fleet2d.algorithms.log import Log as Log
 from fleet2d.algorithms.observations import Looks, Observations, Truth, frozen
 from fleet2d.errors import ComponentError
+from fleet2d.interactions.answers import AnswerRecord, Wanted
 from fleet2d.kernels import I32, I64, Bool
 from fleet2d.runtime.events import Event
 
@@ -108,6 +109,21 @@ class History:
         """
         self._check_metric("truth")
         return frozen(Truth.behind(self.observations))
+
+    @cached_property
+    def answers(self) -> list[AnswerRecord]:
+        """How people answered robots, and what it made of them; for metrics only.
+
+        Raises:
+            ComponentError: The component is an algorithm.
+        """
+        self._check_metric("answers")
+        return [record for record in self.log.answers if self.first <= record.step < self.end]
+
+    @cached_property
+    def wanted(self) -> list[Wanted]:
+        """What robots wanted of people."""
+        return [record for record in self.log.wanted if self.first <= record.step < self.end]
 
     @cached_property
     def looks(self) -> Looks:

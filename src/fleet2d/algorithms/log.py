@@ -20,6 +20,7 @@ from fleet2d.algorithms.observations import (
 from fleet2d.errors import ComponentError
 from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.plan import read_only
+from fleet2d.interactions.answers import AnswerRecord, Wanted
 from fleet2d.kernels import F64, I16, I64, Bool
 from fleet2d.kernels.motion import Poses, Window, count_together, rooms_at, sum_moves
 from fleet2d.kernels.numbers import in_radians
@@ -215,6 +216,8 @@ class Log:
         self.home, self.clock = home, clock
         self.index = {name: row for row, name in enumerate(names)}
         self.activities = activities
+        self.answers: Sequence[AnswerRecord] = ()  # how people answered: truth
+        self.wanted: Sequence[Wanted] = ()  # the requests that came up
         self._motions = motions
         self._observations = Blocks()  # (n, OBSERVATION), by step
         self._events: list[Event] = []

@@ -15,7 +15,7 @@ from fleet2d.engine.bodies import Basis, Bodies, PoseBlock, Watcher
 from fleet2d.entities.behavior import SightEvent
 from fleet2d.entities.decisions import DecidingActor, StandStill
 from fleet2d.floorplan.placed_objects import POSTURES
-from fleet2d.interactions.answers import Answers, Circumstances, Reply
+from fleet2d.interactions.answers import AnswerRecord, Answers, Circumstances, Reply, Wanted
 from fleet2d.interactions.attitude import AttitudeState
 from fleet2d.interactions.interaction import Interaction, Outcome, RequestQueue
 from fleet2d.kernels.numbers import TURN, heading_of
@@ -47,33 +47,6 @@ class PendingReply(NamedTuple):
     reply: Reply
 
 
-@dataclass(frozen=True)
-class Answer:
-    """What happened when a robot addressed a person: truth, for metrics.
-
-    Attributes:
-        step: The step of the question.
-        robot: The robot.
-        person: The person who was addressed, who may be another than was meant; empty: nobody.
-        text: The interaction and the person meant.
-        activity: What the person did.
-        woke: Whether it woke the person.
-        willingness: Probability that the person was available.
-        outcome: The answer; empty if the robot wasn't noticed.
-        state: Novelty, burden, annoyance and trust after it.
-    """
-
-    step: int
-    robot: str
-    person: str
-    text: str
-    activity: str
-    woke: bool
-    willingness: float
-    outcome: str
-    state: tuple[float, float, float, float]
-
-
 @dataclass
 class Conversations(Watcher):
     """All questions and answers of a run; it does nothing without interactions.
@@ -84,7 +57,8 @@ class Conversations(Watcher):
         queues: What each robot wants, by its row.
         answers: How each user answers, by row.
         attitudes: The attitude of each user to each robot: truth, by their rows.
-        log: What happened, for metrics.
+        log: How people answered: truth, for metrics.
+        wanted: The requests that came up, for metrics.
     """
 
     actors: Sequence[DecidingActor]
@@ -92,7 +66,8 @@ class Conversations(Watcher):
     queues: dict[int, RequestQueue] = field(default_factory=dict)
     answers: dict[int, Answers] = field(default_factory=dict)
     attitudes: dict[tuple[int, int], AttitudeState] = field(default_factory=dict)
-    log: list[Answer] = field(default_factory=list)
+    log: list[AnswerRecord] = field(default_factory=list)
+    wanted: list[Wanted] = field(default_factory=list)
     next_step: int = 0
 
     def __post_init__(self) -> None:
@@ -165,6 +140,9 @@ class Conversations(Watcher):
             queue.opportunities.clear()
             for change in queue.advance(robot.clock.time(step)):
                 events.append(Event(step, robot.name, change.event, change.request.text))
+                if change.event == "due":
+                    worth = change.request.interaction.worth
+                    self.wanted.append(Wanted(step, robot.name, change.request.text, worth))
                 self._tell(row, change.event, change.request.text)
             asked = [q for q in _questions(row, robot) if q.step == step]
             asked += [q for q in self._questions if q.step == step and q.robot == row]
@@ -219,20 +197,29 @@ class Conversations(Watcher):
         reply: Reply | None,
         state: AttitudeState | None,
     ) -> None:
-        numbers = (0.0, 0.0, 0.0, 0.0)
-        if state is not None:
-            numbers = (state.novelty, state.burden, state.annoyance, state.trust)
+        """Record how a person has answered, for metrics."""
+        state = state or AttitudeState(self.actors[0].clock.start, 0.0, trust=0.0)
+        robot, request = (
+            self.actors[question.robot],
+            self.queues[question.robot].find(question.text),
+        )
+        value = 0.0 if request is None else request.value_at(robot.clock.time(question.step))
         self.log.append(
-            Answer(
-                question.step,
-                self.actors[question.robot].name,
-                person,
-                question.text,
-                activity,
-                reply is not None and reply.woke,
-                0.0 if reply is None else reply.willingness,
-                "" if reply is None else str(reply.outcome),
-                numbers,
+            AnswerRecord(
+                step=question.step,
+                robot=robot.name,
+                text=question.text,
+                addressed=person,
+                activity=activity,
+                outcome="" if reply is None else str(reply.outcome),
+                delay_s=0.0 if reply is None else reply.delay.total_seconds(),
+                value=value,
+                woke=reply is not None and reply.woke,
+                willingness=0.0 if reply is None else reply.willingness,
+                novelty=state.novelty,
+                burden=state.burden,
+                annoyance=state.annoyance,
+                trust=state.trust,
             )
         )
 

@@ -60,10 +60,12 @@ def set_up(scenario: Scenario, clock: Clock, seed: int, store: RunStore) -> Stat
     for group in [*user_cameras, *cameras]:
         group.awaited = learners.awaited
     sensors.awaited = EventKind.SENSOR in learners.awaited
+    conversations = Conversations.of(basis)
     log = _log(basis, cameras, recorder) if learners.all else None
+    if log is not None:
+        log.answers, log.wanted = conversations.log, conversations.wanted
     clearance, blocking = Clearance(basis.users, basis.robots), BlockedWays(basis)
     encounters, interruptions = Encounters(basis.users, basis.robots), Interruptions(basis)
-    conversations = Conversations.of(basis)
     state = State(
         bodies=basis.bodies,
         actors=basis.actors,

@@ -332,6 +332,48 @@ class Reply(NamedTuple):
     woke: bool = False
 
 
+class Wanted(NamedTuple):
+    """A request that came up: when, whose, the interaction and the person, and its value then."""
+
+    step: int
+    robot: str
+    text: str
+    worth: float
+
+
+class AnswerRecord(NamedTuple):
+    """What happened when a robot addressed a person: truth, for metrics.
+
+    Attributes:
+        step: The step of the question.
+        robot: The robot.
+        text: The interaction and the person meant.
+        addressed: Who was addressed, maybe somebody else; empty: nobody was near.
+        activity: What that person did.
+        outcome: The answer; empty if the robot wasn't noticed.
+        delay_s: Time from the question to the answer [s].
+        value: Value of the request at the question; 0 if it was no longer open.
+        woke: Whether it woke the person.
+        willingness: Probability that the person was available.
+        novelty, burden, annoyance, trust: The person's attitude after it.
+    """
+
+    step: int
+    robot: str
+    text: str
+    addressed: str
+    activity: str
+    outcome: str
+    delay_s: float
+    value: float
+    woke: bool
+    willingness: float
+    novelty: float
+    burden: float
+    annoyance: float
+    trust: float
+
+
 PARTS = (
     "notice", "activity", "company", "movement", "importance", "manner", "recency", "burden",
     "attitude",

@@ -1,0 +1,80 @@
+"""What came of interactions: counts, value, interruptions and attitudes, from known answers."""
+
+from typing import Any
+
+import pytest
+from tests.entities.robots.test_interact import PILL, ana, home
+from tests.scenes import table
+
+import fleet2d
+
+METRICS = {"interactions": {"period": "1 h"}}
+
+
+def measured(**changes: Any) -> tuple[dict[str, Any], fleet2d.Run]:
+    run = fleet2d.run(home("2 h", metrics=METRICS, **changes))
+    return run.metrics["interactions"]["astro"]["ana"], run
+
+
+def test_what_is_accepted_counts_with_its_value_then() -> None:
+    pill = PILL | {"falls_to": 0.5}
+    numbers, run = measured(interactions={"pill": pill})
+
+    asked = int(table(run, "interactions")["asked_at"][0])
+    value = 4 * (1 - 0.5 * (asked - 600) / 3600)
+    assert (1, 1, 1.0, 1.0) == tuple(numbers[k] for k in ("wanted", "asked", "kept", "accepted"))
+    assert value == pytest.approx(numbers["value"])
+    assert 4 - value == pytest.approx(numbers["missed"])
+    assert 5.0 == numbers["wait_s"]
+
+
+def test_what_is_declined_is_answered_and_missed() -> None:
+    numbers, _ = measured(users={"ana": ana(outcomes=("declined",))})
+
+    assert {"answered": 1.0, "accepted": 0.0, "kept": 0.0, "value": 0.0, "missed": 4.0} == {
+        name: numbers[name] for name in ("answered", "accepted", "kept", "value", "missed")
+    }
+
+
+def test_who_is_not_reached_is_missed() -> None:
+    numbers, _ = measured(robots={"astro": {"behaviors": [{"type": "interact", "seek": False}]}})
+
+    assert (1, 0, 4.0) == (numbers["wanted"], numbers["asked"], numbers["missed"])
+
+
+def test_bad_times_count_by_activity_and_annoy() -> None:
+    person = ana(outcomes=("ignored",))
+    numbers, run = measured(users={"ana": person})
+    assert {} == numbers["interrupted"]  # at even odds of being available
+
+    days = [{"on": "daily", "items": [{"at": "07:02", "place": "kitchen", "activity": "read"}]}]
+    person = ana() | {"days": days, "answers": {"activity": {"base": -3}}}
+    numbers, run = measured(users={"ana": person})
+    rows = table(run, "interactions")
+    noticed = int((rows["outcome"] != "").sum())
+    assert {"read": noticed} == numbers["interrupted"]
+    assert numbers["annoyance"] > 0.2
+    assert rows["willingness"].max() < 0.1
+
+
+def test_waking_somebody_is_counted() -> None:
+    days = [{"on": "daily", "items": [{"at": "07:02", "place": "bedroom", "activity": "sleep"}]}]
+    person = ana() | {"days": days, "answers": {"notice": {"base": 20}}}
+    numbers, _ = measured(users={"ana": person})
+
+    assert 1 == numbers["woke"]
+    assert {"sleep": 1} == numbers["interrupted"]
+
+
+def test_algorithms_cannot_read_answers() -> None:
+    from fleet2d import Algorithm
+    from fleet2d.errors import ComponentError
+
+    class Curious(Algorithm):
+        """Reads the truth."""
+
+        def update(self, history: Any, state: Any) -> Any:
+            return {"n": len(history.answers)}
+
+    with pytest.raises(ComponentError, match="'answers' is ground truth"):
+        fleet2d.run(home("2 h", algorithms={"curious": Curious()}))
