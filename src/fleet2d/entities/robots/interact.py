@@ -52,8 +52,9 @@ class Interact(BeliefBehavior):
     person who gave no answer isn't addressed again in the same place: a sleeper isn't asked twice.
     Rooms that it was told to keep out of are no part of its ways any more.
 
-    With `timing` it asks an algorithm first: each time it sees a person of an open request, and
-    then every `look`, it addresses the person with the probability that the algorithm names.
+    With `timing` it asks an algorithm first: when a request comes up, when the person comes into
+    view, and at most every `look`, it serves it with the probability that the algorithm names for
+    the hour and the room of the person, seen or believed.
 
     Events, with the interaction and the person: `opportunity`, with that probability and what was
     drawn, `asks`, the answer, `delivered` and `withdraws`.
@@ -61,7 +62,7 @@ class Interact(BeliefBehavior):
     Attributes:
         user: Whose requests it serves, or anyone's.
         timing: The algorithm that knows when a person welcomes what; left out: at once.
-        look: Time between two draws while the person is in view.
+        look: Least time between two draws for a request.
         patience: How long it waits for an answer.
         again: Time after an answer other than yes before it addresses the same person again.
         seek: Whether it looks for people; else it serves only those who come into view.
@@ -75,7 +76,7 @@ class Interact(BeliefBehavior):
     serves_requests: ClassVar[bool] = True
 
     timing: str | None = None
-    look: PositiveDuration = timedelta(minutes=5)
+    look: PositiveDuration = timedelta(minutes=20)
     patience: PositiveDuration = timedelta(seconds=20)
     again: Duration = timedelta(minutes=10)
     seek: bool = True
@@ -135,8 +136,10 @@ class Interact(BeliefBehavior):
         ]
         for request in ready:
             place = now.in_view.get(request.interaction.to)
-            if place is not None and self._welcome(now, request, place):
-                return self._ask(now, request, place)
+            if place is not None and self._may_address(now, request, place):
+                is_meant = served is not None and served.request is request
+                if is_meant or self._is_good_time(now, request):
+                    return self._ask(now, request, place)
         return self._look_for_somebody(now, ready, served)
 
     def _look_for_somebody(
@@ -144,12 +147,15 @@ class Interact(BeliefBehavior):
     ) -> Plan | None:
         """Look for the person of a request; None: of none, or it has looked everywhere."""
         self.served = None
-        if not self.seek or self.timing is not None:
-            return None
         for request in ready:
-            if request.interaction.seek and self.not_found.get(request.text, now.time) <= now.time:
-                is_same = served is not None and served.request is request
-                looked = served.rooms if served is not None and is_same else frozenset()
+            if not (self.seek and request.interaction.seek):
+                continue
+            again_at = self.not_found.get(request.text, now.time)
+            if max(again_at, self.left_alone.get(request.interaction.to, now.time)) > now.time:
+                continue
+            is_same = served is not None and served.request is request
+            looked = served.rooms if served is not None and is_same else frozenset()
+            if is_same or self._is_good_time(now, request):
                 plan = self._seek(now, request, looked)
                 if plan is not None:
                     return plan
@@ -162,36 +168,44 @@ class Interact(BeliefBehavior):
         if queue.banned != now.actor.kept_out and (room is None or room.index not in queue.banned):
             now.actor.kept_out = queue.banned
 
-    def _welcome(self, now: Situation, request: Request, place: Point) -> bool:
-        """Return whether to address a person in view now."""
+    def _may_address(self, now: Situation, request: Request, place: Point) -> bool:
+        """Return whether a person in view may be addressed: one who was left alone for a while."""
         if self.left_alone.get(request.interaction.to, now.time) > now.time:
             return False
         quiet_at = self.unanswered.get(request.interaction.to)
-        if quiet_at is not None:
-            moved = (quiet_at[0] - place[0]) ** 2 + (quiet_at[1] - place[1]) ** 2
-            if moved < MOVED_M**2:
-                return False
-            del self.unanswered[request.interaction.to]
+        if quiet_at is not None and _squared(quiet_at, place) < MOVED_M**2:
+            return False
+        self.unanswered.pop(request.interaction.to, None)
+        return True
+
+    def _is_good_time(self, now: Situation, request: Request) -> bool:
+        """Draw whether to serve a request now, with the probability that `timing` names."""
         if self.timing is None:
             return True
         last = self.looked.get(request.text)
         if last is not None and now.time - last < self.look:
             return False
-        self.looked[request.text] = now.time
-        policy = now.outputs.get(self.timing)
-        age = (now.time - request.since) / request.interaction.within
-        if policy is None or age >= self.only_urgent_at:
-            chance = 1.0
-        else:
-            room = now.room
-            chance = policy.chance(
-                request.interaction.to, request.interaction.do, now.time, room and room.index
-            )
-        is_drawn = now.random(f"timing {request.text}").uniform() < chance
         assert now.requests is not None
+        self.looked[request.text] = now.time
+        chances, chance, to = now.outputs.get(self.timing), 1.0, request.interaction.to
+        age = (now.time - request.since) / request.interaction.within
+        if chances is not None and age < self.only_urgent_at:
+            chance = chances.chance(to, request.name, now.time, self._room_of(now, to))
+        is_drawn = now.random(f"timing {request.text}").uniform() < chance
         text = f"{request.text} {chance:.3f} {'asks' if is_drawn else 'waits'}"
         now.requests.opportunities.append((now.step, text))
         return is_drawn
+
+    def _room_of(self, now: Situation, person: str) -> int | None:
+        """Return the index of the room of a person in view, or the likeliest one."""
+        place = now.in_view.get(person)
+        if place is not None:
+            room = now.home.plan.room_at(*place)
+            return None if room is None else room.index
+        if self.source is None:
+            return None
+        joint = self.belief(now, person).joint.tolist()
+        return joint.index(max(joint))
 
     def _ask(self, now: Situation, request: Request, place: Point) -> Plan:
         """Approach a person in view, address the person, and wait for the answer."""

@@ -1,0 +1,1 @@
+"""Timing: when and where a person welcomes what, learned from answers alone."""

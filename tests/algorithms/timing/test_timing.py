@@ -1,0 +1,103 @@
+"""Timing: what is learned from answers, by each policy, and how the robot keeps to it."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from tests.entities.robots.test_interact import PILL, ana, events_of, home
+from tests.scenes import digests, table
+
+import fleet2d
+from fleet2d.algorithms.timing.fixed_times import FixedTimes
+from fleet2d.algorithms.timing.logistic import LogisticTiming
+from fleet2d.algorithms.timing.thompson import ThompsonTiming
+from fleet2d.algorithms.timing.timing import Asked, TimingPolicy
+
+ROOMS, KITCHEN, BEDROOM = 3, 0, 1
+
+
+def taught(policy: TimingPolicy, count: int = 30) -> TimingPolicy:
+    """Teach a policy that it is welcome in the kitchen at 8, and never at 14 in the bedroom."""
+    policy.start(ROOMS)
+    for _ in range(count):
+        policy.learn(Asked("ana", "tea", 8, KITCHEN, True))
+        policy.learn(Asked("ana", "tea", 14, BEDROOM, False))
+    return policy
+
+
+@pytest.mark.parametrize("policy", [LogisticTiming(), ThompsonTiming()])
+def test_a_learner_asks_when_it_is_welcome_and_not_when_it_is_not(policy: TimingPolicy) -> None:
+    chances = taught(policy).chances()
+
+    assert (24, ROOMS) == chances.shape
+    assert chances[8, KITCHEN] > 0.95
+    assert chances[14, BEDROOM] < 0.05
+    assert chances[9, KITCHEN] >= chances[14, KITCHEN]
+
+
+def test_a_greedy_learner_never_learns_of_an_unlucky_hour_again() -> None:
+    """The feedback loop: it asks only where a yes is likely, and so never sees a better answer."""
+    greedy, exploring = LogisticTiming(), LogisticTiming(explores=0.1)
+    for policy in (greedy, exploring):
+        policy.start(ROOMS)
+        for _ in range(3):
+            policy.learn(Asked("ana", "tea", 8, KITCHEN, False))
+
+    assert 0 == greedy.chances()[8, KITCHEN]
+    assert 0.1 == exploring.chances()[8, KITCHEN]
+
+
+def test_thompson_explores_less_the_more_it_knows() -> None:
+    few, many = (taught(ThompsonTiming(least=0.0), count).chances() for count in (1, 40))
+
+    assert 0.05 < few[14, BEDROOM] < 0.6
+    assert many[14, BEDROOM] < 0.01
+
+
+def test_fixed_times_learn_nothing() -> None:
+    policy = taught(FixedTimes(hours=(7, 8)))
+    expected = np.zeros((24, ROOMS))
+    expected[[7, 8]] = 1
+    assert np.array_equal(expected, policy.chances())
+
+
+def timed(policy: Any, duration: str = "3 h", **changes: Any) -> dict[str, Any]:
+    behaviors = [{"type": "interact", "timing": "when"}, {"type": "patrol"}]
+    return home(
+        duration,
+        robots={"astro": {"behaviors": behaviors}},
+        algorithms={"when": {"type": "timing", "policy": policy}},
+        interactions={"pill": PILL | {"at": [], "every": "1 h", "within": "1 h"}},
+        **changes,
+    )
+
+
+def test_answers_reach_the_learner_and_its_chances_reach_the_robot() -> None:
+    run = fleet2d.run(timed("thompson", users={"ana": ana(outcomes=("declined",))}))
+    rows = table(run, "when")
+    last = rows["step"] == rows["step"].max()
+    asked_in = {
+        (r, int(h))
+        for r, h, c in zip(
+            rows["room"][last], rows["hour"][last], rows["chance"][last], strict=True
+        )
+        if c < 0.45
+    }
+
+    assert any("kitchen" in str(room) for room, _ in asked_in)
+    assert {7, 8, 9} & {hour for _, hour in asked_in}
+    assert "opportunity" in {event for _, event in events_of(run, "opportunity")}
+
+
+def test_outside_of_the_fixed_times_nobody_is_asked() -> None:
+    run = fleet2d.run(timed({"type": "fixed_times", "hours": []}, "5 h"))
+    asks = [step for step, _ in events_of(run, "asks")]
+
+    assert len(asks) <= 1  # before the first answer there is no experience
+
+
+def test_spans_are_invisible_to_the_learner() -> None:
+    content = timed("thompson", "2 h")
+    content["users"]["ana"] = ana() | {"answers": {"defers": 0.5}}
+    other = {**content, "simulation": {**content["simulation"], "max_span": 7}}
+    assert digests(fleet2d.run(content)) == digests(fleet2d.run(other))

@@ -1,0 +1,118 @@
+"""Off-policy estimates cover the truth as often as they claim, whatever policy was logged."""
+
+from datetime import datetime, timedelta
+from typing import Any
+
+import numpy as np
+import pytest
+from tests.entities.robots.test_interact import PILL, ana, home
+from tests.thorough import THOROUGH
+
+import fleet2d
+from fleet2d.errors import InputError
+from fleet2d.interactions.answers import Answers, Circumstances
+from fleet2d.interactions.attitude import AttitudeState
+from fleet2d.interactions.interaction import Interaction, Outcome
+from fleet2d.interactions.off_policy import (
+    LoggedOpportunities,
+    doubly_robust,
+    inverse_propensity,
+    read_opportunities,
+)
+from fleet2d.kernels import F64
+
+SONG = Interaction(do="offer", to="ana", every=timedelta(hours=1), worth=2)
+ACTIVITIES = ("sleep", "breakfast", "work_at_home", "tv", "rest", "phone_call")
+DAY, COUNT = datetime(2026, 1, 5, 8), 150
+WORLDS = 1000 if THOROUGH else 150
+
+
+def circumstances(activity: str) -> Circumstances:
+    return Circumstances(
+        DAY, "song", SONG, activity, "living_room", 0, False, False, 1.0, True, False
+    )
+
+
+def true_rates() -> F64:
+    """The probability of a yes at each activity, by the model of answers itself."""
+    answers, state = Answers(), AttitudeState(DAY)
+    rates = []
+    for activity in ACTIVITIES:
+        now = circumstances(activity)
+        noticed, available = (
+            answers.chance("notice", now, state),
+            answers.chance("available", now, state),
+        )
+        rates.append(noticed * available * answers.chance("accept", now, state))
+    return np.array(rates)
+
+
+def world(number: int) -> tuple[LoggedOpportunities, np.ndarray[Any, Any]]:
+    """A log of random opportunities, answered by the model of answers; and their activities."""
+    rng = np.random.default_rng(number)
+    kinds = rng.integers(0, len(ACTIVITIES), COUNT)
+    chance = rng.uniform(0.2, 0.8, len(ACTIVITIES))[kinds]
+    asked = rng.uniform(size=COUNT) < chance
+    answers, state = Answers(), AttitudeState(DAY)
+    replies = [
+        answers.reply(circumstances(ACTIVITIES[kind]), state, number, "users.ana", step)
+        for step, kind in enumerate(kinds.tolist())
+    ]
+    said_yes = np.array([r is not None and r.outcome == Outcome.ACCEPTED for r in replies])
+    steps = np.arange(COUNT)
+    return LoggedOpportunities(["song ana"] * COUNT, steps, asked, chance, asked * said_yes), kinds
+
+
+@pytest.mark.parametrize("method", ["weights", "normalized", "robust", "robust with a wrong model"])
+def test_intervals_cover_the_truth_as_often_as_they_claim(method: str) -> None:
+    rates = true_rates()
+    target = np.array([0.05, 0.9, 0.2, 0.7, 0.8, 0.1])
+    hits, means = 0, []
+    for number in range(WORLDS):
+        log, kinds = world(number)
+        truth = float((target * rates).mean())
+        if method.startswith("robust"):
+            model = rates[kinds] if method == "robust" else np.full(COUNT, 0.9)
+            estimate = doubly_robust(log, target[kinds], model)
+        else:
+            estimate = inverse_propensity(log, target[kinds], normalized=method == "normalized")
+        hits += estimate.low <= truth <= estimate.high
+        means.append(estimate.mean)
+
+    assert truth == pytest.approx(np.mean(means), abs=0.012)
+    assert 0.95 == pytest.approx(hits / WORLDS, abs=0.015 if THOROUGH else 0.045)
+
+
+def test_a_good_model_narrows_the_interval() -> None:
+    log, kinds = world(1)
+    target = np.full(COUNT, 0.9)
+    weighted = inverse_propensity(log, target)
+    robust = doubly_robust(log, target, true_rates()[kinds])
+
+    assert robust.high - robust.low < 0.9 * (weighted.high - weighted.low)
+
+
+def test_a_log_without_chance_is_refused() -> None:
+    log = LoggedOpportunities(["a b"], np.zeros(1), np.array([True]), np.zeros(1), np.zeros(1))  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="let the policy that is logged explore"):
+        inverse_propensity(log, np.ones(1))
+
+
+def test_opportunities_of_a_run_are_read_with_what_came_of_them() -> None:
+    behaviors = [{"type": "interact", "timing": "when"}, {"type": "patrol"}]
+    run = fleet2d.run(
+        home(
+            "3 h",
+            users={"ana": ana(outcomes=("declined", "accepted"))},
+            robots={"astro": {"behaviors": behaviors}},
+            algorithms={"when": {"type": "timing", "policy": {"type": "thompson", "least": 0.5}}},
+            interactions={"pill": PILL | {"at": [], "every": "1 h"}},
+        )
+    )
+    log = read_opportunities(run)
+
+    assert {"pill ana"} == set(log.text)
+    assert (np.diff(log.step) >= 0).all()
+    assert ((log.chance >= 0.5) & (log.chance <= 1)).all()
+    assert (log.reward[~log.asked] == 0).all()
+    assert log.reward.sum() >= 1
