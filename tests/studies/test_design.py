@@ -1,6 +1,7 @@
 """Designs: which variants there are, what their scenarios are, and what errors name."""
 
 import pickle
+import time
 from pathlib import Path
 from typing import Any
 
@@ -8,7 +9,8 @@ import pytest
 from tests.studies.scenes import SPEED, base, small
 
 from fleet2d.errors import ScenarioError
-from fleet2d.studies.design import Design, build_design
+from fleet2d.studies.design import Design, build_design, content_hash, scenario_content
+from fleet2d.studies.plan import make_plan
 from fleet2d.studies.specification import read_specification
 
 RADIUS = "robots.astro.radius"
@@ -81,7 +83,7 @@ def test_a_design_without_variants_is_refused() -> None:
 
 def test_a_design_too_large_to_list_is_refused() -> None:
     many = {f"robots.astro.x{i}": list(range(60)) for i in range(5)}
-    with pytest.raises(ScenarioError, match="777,600,000 combinations"):
+    with pytest.raises(ScenarioError, match="= 2,332,800,000 variants"):
         design(axes=many)
 
 
@@ -115,3 +117,24 @@ def test_a_design_can_be_sent_to_another_process() -> None:
     study_design = design()
     again = pickle.loads(pickle.dumps(study_design))
     assert study_design.scenario(5).resolved() == again.scenario(5).resolved()
+
+
+def test_hashes_by_seed_are_those_of_whole_scenarios() -> None:
+    plan = make_plan(design(replicates=[0, 7, 2**62]))
+    for variant in plan.variants:
+        content = scenario_content(plan.design.scenario(variant.index))
+        assert content_hash(content) == variant.scenario
+
+
+def test_a_study_that_is_too_large_is_refused_at_once_with_its_size() -> None:
+    speeds = [round(0.1 + i / 10_000, 4) for i in range(2000)]
+    radii = [round(0.1 + i / 100_000, 5) for i in range(2000)]
+    start_s = time.process_time()
+    with pytest.raises(
+        ScenarioError, match=r"2,000 of .*speed × 2,000 of .*radius × 1,000 of seed = 4,000,000,000"
+    ):
+        design(axes={SPEED: speeds, RADIUS: radii}, replicates=1000)
+    assert time.process_time() - start_s < 5
+    # What applies nowhere, or is excluded, doesn't count.
+    narrow = {SPEED: speeds, "radius": {"key": RADIUS, "values": radii, "when": {SPEED: 0.1}}}
+    assert 1000 * (2000 + 1999) == len(design(axes=narrow, replicates=1000))

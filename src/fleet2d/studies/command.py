@@ -29,6 +29,7 @@ Workers = Annotated[
 ]
 Where = Annotated[str, typer.Argument(metavar="DIR", help="The folder or store of a study.")]
 MAX_LINES = 10  # of a list that is printed
+MANY_VARIANTS = 20_000
 IDENTITY_START = 6
 """The minimum number of characters of an identity that name a variant."""
 
@@ -70,7 +71,7 @@ def run(  # noqa: PLR0913 - options of the command line
     from fleet2d.studies.progress import observing
 
     with restrict_to(trust, trust_dir):
-        checked = check_study(source)
+        checked = check_study(source, _print_size)
         if dry_run:
             _print_plan(checked, workers)
             return
@@ -217,6 +218,12 @@ def _reference(study: "Study", metric: str, against: str | None) -> Mapping[str,
     return {axis: by_text[text]}
 
 
+def _print_size(count: int) -> None:
+    """Print the number of variants if it takes long to check them."""
+    if count >= MANY_VARIANTS:
+        _print(f"{count:,} variants: all are checked first, a million takes minutes", err=True)
+
+
 def _print_plan(checked: "CheckedStudy", workers: int | None) -> None:
     """Print the axes, the first variants, and the time that all will take."""
     from fleet2d.studies.executors import LocalExecutor, cores
@@ -235,7 +242,7 @@ def _print_plan(checked: "CheckedStudy", workers: int | None) -> None:
         _print(f"  {plan.design.describe(variant.index)}")
     if len(plan.variants) > MAX_LINES:
         _print(f"  … {len(plan.variants) - MAX_LINES} more")
-    expected = forecast(plan)
+    expected = forecast(plan, LocalExecutor(1))
     _print(
         f"\n{len(plan.variants)} variants, {len({v.home_key for v in plan.variants})} homes,"
         f" {in_words(expected.simulated)} of simulated time: about"

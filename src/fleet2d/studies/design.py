@@ -1,6 +1,7 @@
 """The design of a study: its variants, the scenario of each, and its identity."""
 
 import hashlib
+import itertools
 import json
 import math
 import platform
@@ -95,15 +96,31 @@ def input_hash(scenario: Scenario, files: FileHashes) -> str:
     return content_hash({str(path): files[path] for path in files_of(scenario)})
 
 
-def identity(content: Mapping[str, Any], inputs: str) -> tuple[str, str]:
-    """Return the identity of a variant, and the hash of its scenario alone.
+def scenario_hashes(content: dict[str, Any], seeds: Sequence[int]) -> Iterator[str]:
+    """Yield for each seed the `content_hash` of a scenario with that seed.
 
     Args:
-        content: Its `scenario_content`, with its seed.
+        content: Its `scenario_content`; the seed in it doesn't matter.
+        seeds: The seeds.
+    """
+    mark = "a seed stands here"
+    marked = {**content, "simulation": {**content["simulation"], SEED: mark}}
+    before, _, after = json.dumps(marked, separators=(",", ":")).partition(json.dumps(mark))
+    common, rest = hashlib.sha256(before.encode()), after.encode()
+    for seed in seeds:
+        digest = common.copy()
+        digest.update(str(seed).encode() + rest)
+        yield digest.hexdigest()[:DIGITS]
+
+
+def identity(scenario: str, inputs: str) -> str:
+    """Return the identity of a variant.
+
+    Args:
+        scenario: The hash of its scenario, with its seed.
         inputs: The `input_hash` of its scenario.
     """
-    scenario = content_hash(content)
-    return content_hash([code_version(), scenario, inputs]), scenario
+    return content_hash([code_version(), scenario, inputs])
 
 
 def home_key(content: Mapping[str, Any]) -> str:
@@ -185,6 +202,12 @@ class Design:
             for column in axis.columns
         }
         return {**labels, SEED: list(self.seeds)}
+
+    @property
+    def combination_labels(self) -> dict[str, list[Label]]:
+        """The label of each combination, by column of the axes."""
+        rows = [self._labels(combination) for combination in self.combinations]
+        return {column: [row[column] for row in rows] for column in self.columns[:-1]}
 
     def __len__(self) -> int:
         """Return the number of variants."""
@@ -290,19 +313,34 @@ def build_design(specification: Specification) -> Design:
         RulePlan(rule.when, _change(rule.set.items(), _place(specification, "rules", i)))
         for i, rule in enumerate(file.rules)
     )
-    count = math.prod(len(axis.choices) for axis in axes)
-    if count > MAX_VARIANTS:
-        raise ScenarioError(
-            f"{specification.name} would have {count:,} combinations: at most {MAX_VARIANTS:,}"
-            " can be run as one study; sample some of them by an axis of the kind `sample`"
-        )
     base = merge(specification.base, _artifacts(file.keep.tables))
     seeds = file.replicates or (_base_seed(specification.base),)
     design = Design(base, specification.folder, axes, rules, file.exclude, seeds)
+    _check_size(specification.name, design)
     _check_conditions(specification, design)
     if not design.combinations:
         raise ScenarioError(f"{specification.name} has no variants: all are excluded")
     return design
+
+
+def _check_size(name: str, design: Design) -> None:
+    """Refuse a design of too many variants, before they are listed.
+
+    Raises:
+        ScenarioError: There are too many.
+    """
+    sizes = {axis.name: len(axis.choices) for axis in design.axes} | {SEED: len(design.seeds)}
+    count = math.prod(sizes.values())
+    if design.exclude or any(axis.when for axis in design.axes):  # there may be fewer
+        combinations = itertools.islice(design._extend((), {}), MAX_VARIANTS // sizes[SEED] + 1)
+        count = min(count, sum(1 for _ in combinations) * sizes[SEED])
+    if count > MAX_VARIANTS:
+        product = " × ".join(f"{size:,} of {axis}" for axis, size in sizes.items() if size > 1)
+        raise ScenarioError(
+            f"{name} would have {product} = {math.prod(sizes.values()):,} variants: at most"
+            f" {MAX_VARIANTS:,} can be run as one study; sample some of them by an axis of the kind"
+            " `sample`"
+        )
 
 
 def _axis_plan(specification: Specification, name: str) -> AxisPlan:

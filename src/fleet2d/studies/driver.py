@@ -1,7 +1,7 @@
 """Running a study: missing variants are run, and each result is stored at once."""
 
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -19,6 +19,7 @@ from fleet2d.studies.design import (
     FileHashes,
     build_design,
     code_version,
+    content_hash,
     identity,
     input_hash,
     scenario_content,
@@ -87,8 +88,7 @@ class StudyJob:
             inputs = input_hash(scenario, self._files)
         except Fleet2DError as error:  # a file changed after the study was planned
             return VariantOutcome("failed", error=describe_error(error))
-        current, _ = identity(scenario_content(scenario), inputs)
-        if current != task.identity:
+        if identity(content_hash(scenario_content(scenario)), inputs) != task.identity:
             return VariantOutcome("failed", error=CHANGED_MESSAGE)
         return execute(scenario, self.metrics, self.tables)
 
@@ -136,8 +136,15 @@ class CheckedStudy:
         return StudyJob(self.plan.design, keep.metrics, keep.tables)
 
 
-def check_study(source: str | Path | Mapping[str, Any] | Specification) -> CheckedStudy:
+def check_study(
+    source: str | Path | Mapping[str, Any] | Specification,
+    on_size: Callable[[int], None] = lambda _: None,
+) -> CheckedStudy:
     """Read a study, and build and check the scenarios of all of its variants.
+
+    Args:
+        source: The study file, or the same as a mapping.
+        on_size: Receives the number of variants before they are built.
 
     Raises:
         InputError: The study is wrong; the message names file and line, or axis and value.
@@ -149,7 +156,9 @@ def check_study(source: str | Path | Mapping[str, Any] | Specification) -> Check
         scenarios.add(template, scenario)
         names.add(scenario)
 
-    plan = make_plan(build_design(specification), on_scenario)
+    design = build_design(specification)
+    on_size(len(design))
+    plan = make_plan(design, on_scenario)
     names.check(specification.file)
     return CheckedStudy(specification, plan, scenarios, names.facts)
 

@@ -30,7 +30,7 @@ MEMORY_SHARE = 0.8  # share of the machine's memory that all workers may use tog
 _numbers = itertools.count()
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class WorkerTask:
     """A variant to run.
 

@@ -7,7 +7,7 @@ commit record is written: the names of its files with their sizes and checksums.
 import hashlib
 import json
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 RECORDS, RESULTS, TABLES = "parts", "results", "tables"
 VARIANT = "variant"
 ROWS_PER_GROUP = 250_000
+ROWS_AT_A_TIME = 5_000  # of results, which take 3 kB each until they are in a table
 
 
 @dataclass(frozen=True)
@@ -158,11 +159,11 @@ def _write_files(scratch: Path, name: str, journal: "Journal") -> dict[str, Path
     numbers = sorted(journal.offsets)
     schemas = _table_schemas(journal.read(number) for number in numbers)
     results = scratch / f"{name}-results"
-    pq.write_table(
-        results_table(journal.read(number).header for number in numbers),
-        results,
-        compression="zstd",
-    )
+    metrics = list(dict.fromkeys(m for n in numbers for m in journal.read(n).header["metrics"]))
+    with pq.ParquetWriter(results, results_table((), metrics).schema, compression="zstd") as file:
+        for start in range(0, len(numbers), ROWS_AT_A_TIME):
+            batch = numbers[start : start + ROWS_AT_A_TIME]
+            file.write_table(results_table((journal.read(n).header for n in batch), metrics))
     files = {f"{RESULTS}/{name}.parquet": results}
     with ExitStack() as stack:
         writers: dict[str, _PartFileWriter] = {}
@@ -259,8 +260,15 @@ RESULT_COLUMNS = (
 """The columns of the results beside the metrics."""
 
 
-def results_table(headers: Iterable[Mapping[str, Any]]) -> "pa.Table":
-    """Return one row for each variant: status, times, memory, and a column for each metric."""
+def results_table(
+    headers: Iterable[Mapping[str, Any]], metrics: Sequence[str] | None = None
+) -> "pa.Table":
+    """Return one row for each variant: status, times, memory, and a column for each metric.
+
+    Args:
+        headers: The headers of their records.
+        metrics: The names of the metrics; None: all that a header has.
+    """
     import pyarrow as pa
 
     rows = list(headers)
@@ -272,7 +280,9 @@ def results_table(headers: Iterable[Mapping[str, Any]]) -> "pa.Table":
         seconds = [row.get("wall_s", {}).get(phase) for row in rows]
         columns["wall_s" if phase == "total" else f"{phase}_s"] = pa.array(seconds, pa.float64())
     columns["peak_rss_mb"] = pa.array([row.get("peak_rss_mb") for row in rows], pa.float64())
-    for name in dict.fromkeys(name for row in rows for name in row.get("metrics", ())):
+    if metrics is None:
+        metrics = list(dict.fromkeys(name for row in rows for name in row.get("metrics", ())))
+    for name in metrics:
         values = [row.get("metrics", {}).get(name) for row in rows]
         columns[name] = pa.array(values, pa.float64())
     return pa.table(columns)

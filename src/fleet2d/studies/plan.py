@@ -2,8 +2,9 @@
 
 import json
 import re
+import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import suppress
+from contextlib import closing
 from dataclasses import dataclass, field, replace
 from datetime import timedelta
 from typing import TYPE_CHECKING, Any, Literal
@@ -30,12 +31,20 @@ from fleet2d.studies.design import (
     identity,
     input_hash,
     scenario_content,
+    scenario_hashes,
 )
 from fleet2d.studies.directory import PLAN, SCENARIOS, MetricFacts, StudyDirectory
-from fleet2d.studies.executors import Executor, LostTask, SerialExecutor, TaskSchedule, WorkerTask
+from fleet2d.studies.executors import (
+    Executor,
+    FinishedTask,
+    LostTask,
+    SerialExecutor,
+    TaskSchedule,
+    WorkerTask,
+)
 from fleet2d.studies.parts import VARIANT
 from fleet2d.studies.simulator import check_setup, is_kept, measure
-from fleet2d.studies.specification import StudyFile
+from fleet2d.studies.specification import SEED, StudyFile
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -291,12 +300,10 @@ def _planned(
     home, simulation = home_key(content), content["simulation"]
     step, duration = parse_duration(simulation["step"]), parse_duration(simulation["duration"])
     template = content_hash({**content, "simulation": {**simulation, "seed": None}})
-    for i, seed in enumerate(design.seeds):
-        simulation["seed"] = seed
-        variant_identity, scenario = identity(content, inputs)
-        simulated_s = (duration // step * step).total_seconds()
+    simulated_s = (duration // step * step).total_seconds()
+    for i, scenario in enumerate(scenario_hashes(content, design.seeds), first):
         yield PlannedVariant(
-            first + i, first + i, variant_identity, scenario, template, home, simulated_s
+            i, i, identity(scenario, inputs), scenario, template, home, simulated_s
         )
 
 
@@ -449,9 +456,11 @@ def plan_table(plan: StudyPlan) -> "pa.Table":
     }
     for name in PLAN_COLUMNS[1:]:
         columns[name] = pa.array([getattr(v, name) for v in plan.variants])
-    labels = [plan.parameters(v) for v in plan.variants]
-    for column in plan.design.columns:
-        columns[column] = label_array([row[column] for row in labels])
+    seeds = len(plan.design.seeds)
+    places = pa.array([v.index // seeds for v in plan.variants], pa.int32())
+    for column, labels in plan.design.combination_labels.items():
+        columns[column] = label_array(labels).take(places)
+    columns[SEED] = pa.array([plan.design.seeds[v.index % seeds] for v in plan.variants])
     return pa.table(columns)
 
 
@@ -498,6 +507,7 @@ def stored_scenario(directory: StudyDirectory, number: int) -> dict[str, Any]:
 
 
 SAMPLES = 3
+BUILDS = 2  # of each home: to check the set-ups, and to run
 
 
 @dataclass(frozen=True)
@@ -506,35 +516,60 @@ class Forecast:
 
     Attributes:
         simulated: The simulated time of all variants.
-        wall: The wall time of all variants with one worker.
+        start: The wall time until workers are ready.
+        work: The wall time of all variants and homes with one worker.
     """
 
     simulated: timedelta
-    wall: timedelta
+    start: timedelta
+    work: timedelta
 
     def by(self, workers: int) -> timedelta:
         """Return the wall time with a number of workers."""
-        return self.wall / max(workers, 1)
+        return self.start + self.work / max(workers, 1)
 
 
-def forecast(plan: StudyPlan, samples: int = SAMPLES) -> Forecast:
-    """Measure the speed of some variants, after a warm-up that loads all code.
+@dataclass
+class SpeedJob(SetupJob):
+    """Measures the speed of variants, after a warm-up that loads all code."""
+
+    is_warm: bool = False
+
+    def __call__(self, task: WorkerTask) -> Any:
+        """Return the speed of a variant and the wall time of measuring it [s]; None if it fails."""
+        try:
+            with restrict(self.trust):
+                scenario = self.design.scenario(task.index)
+                if not self.is_warm:
+                    measure(scenario, max_s=0.0)
+                    self.is_warm = True
+                start_s = time.perf_counter()
+                return measure(scenario), time.perf_counter() - start_s
+        except Fleet2DError:  # a variant may fail without ending the study
+            return None
+
+
+def forecast(plan: StudyPlan, executor: Executor, samples: int = SAMPLES) -> Forecast:
+    """Measure the speed of some variants in a worker.
 
     Raises:
         ComponentError: All measured variants fail.
     """
     count = len(plan.variants)
-    numbers = sorted({round(i * (count - 1) / max(samples - 1, 1)) for i in range(samples)})
-    measure(plan.design.scenario(0), max_s=0.0)
-    speeds = []
-    for i in numbers:
-        with suppress(ComponentError):  # a variant may fail without ending the study
-            speeds.append(measure(plan.design.scenario(plan.variants[i].index)))
-    if not speeds:
+    numbers = {round(i * (count - 1) / max(samples - 1, 1)) for i in range(samples)}
+    tasks = [WorkerTask(i, plan.variants[i].index, "") for i in sorted(numbers)]
+    begin_s = time.perf_counter()
+    with closing(executor.run(SpeedJob(plan.design), TaskSchedule(tasks))) as events:
+        results = [event.payload for event in events if isinstance(event, FinishedTask)]
+    measured = [result for result in results if result is not None]
+    if not measured:
         raise ComponentError("all measured variants fail: run one of them with `fleet2d run`")
-    wall_s = sum_in_order(
-        sum_in_order(speed.seconds(variant.simulated_s) for speed in speeds) / len(speeds)
-        for variant in plan.variants
-    )
+    worker_s = time.perf_counter() - begin_s - sum_in_order(seconds for _, seconds in measured)
     simulated_s = sum(variant.simulated_s for variant in plan.variants)
-    return Forecast(timedelta(seconds=simulated_s), timedelta(seconds=wall_s))
+    homes = len({variant.home_key for variant in plan.variants})
+    start_s = worker_s * (1 + (len(setups_to_check(plan)) > FEW_SETUPS))
+    # The first variant finds its home built by the warm-up.
+    home_s = max(speed.home_s for speed, _ in measured)
+    runs_s = sum_in_order(speed.seconds(simulated_s / count) for speed, _ in measured)
+    work_s = BUILDS * homes * home_s + count * runs_s / len(measured)
+    return Forecast(*(timedelta(seconds=s) for s in (simulated_s, start_s, work_s)))

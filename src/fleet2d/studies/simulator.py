@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from fleet2d.engine.inputs import input_files
 from fleet2d.engine.simulation import Simulation
 from fleet2d.errors import ComponentError
-from fleet2d.runtime.clock import DAY_S
+from fleet2d.runtime.clock import HOUR_S
 from fleet2d.scenario.model import Scenario
 
 if TYPE_CHECKING:
@@ -190,37 +190,44 @@ class RunSpeed:
     """How fast a scenario runs on this machine.
 
     Attributes:
-        setup_s: Wall time of its set-up [s].
-        speedup: Simulated time over wall time after the set-up.
+        home_s: Wall time of building its home, which the variants of a home share [s].
+        setup_s: Wall time of setting it up in a home that is there, and of closing the run [s].
+        speedup: Simulated time over wall time between the two.
     """
 
+    home_s: float
     setup_s: float
     speedup: float
 
     def seconds(self, simulated_s: float) -> float:
-        """Return the wall time of a run [s]."""
+        """Return the wall time of a run in a home that is there [s]."""
         return self.setup_s + simulated_s / self.speedup
 
 
-def measure(scenario: Scenario, simulated_s: float = DAY_S, max_s: float = 2.0) -> RunSpeed:
-    """Run the beginning of a scenario to measure its speed.
+def measure(scenario: Scenario, max_s: float = 2.0) -> RunSpeed:
+    """Run a scenario for some time to measure its speed.
 
     Args:
         scenario: The scenario.
-        simulated_s: The simulated time to run, if the scenario lasts that long [s].
-        max_s: The longest wall time after the set-up [s].
+        max_s: The longest wall time between set-up and end [s].
 
     Raises:
         Fleet2DError: The scenario is wrong, or a component failed.
     """
     start_s = time.perf_counter()
+    Simulation(scenario)
+    built_s = time.perf_counter()
     simulation = Simulation(scenario)
     ready_s = time.perf_counter()
-    hour = max(1, int(3600e6 / simulation.clock.step_us))
+    hour = max(1, int(HOUR_S * 1e6 / simulation.clock.step_us))
     while not simulation.done and time.perf_counter() - ready_s < max_s:
-        simulation.advance(hour)
-        if simulation.step * simulation.clock.step_us / 1e6 >= simulated_s:
-            break
-    wall_s = max(time.perf_counter() - ready_s, 1e-6)
+        simulation.advance(min(hour, simulation.clock.steps - simulation.step))
+    end_s = time.perf_counter()
     done_s = simulation.step * simulation.clock.step_us / 1e6
-    return RunSpeed(ready_s - start_s, done_s / wall_s)
+    simulation.finish("interrupted")
+    setup_s = ready_s - built_s
+    return RunSpeed(
+        max(built_s - start_s - setup_s, 0.0),
+        setup_s + time.perf_counter() - end_s,
+        done_s / max(end_s - ready_s, 1e-6),
+    )
