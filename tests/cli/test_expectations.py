@@ -105,3 +105,44 @@ def test_run_says_what_held_and_what_was_violated(fleet2d: Cli) -> None:
     assert "still is violated" in out
     _, out, _ = fleet2d("run", path, "--out", "again", "--json")
     assert json.loads(out)["expectations"]["still"]["holds"] is False
+
+
+def test_one_file_runs_over_a_folder_of_homes(fleet2d: Cli) -> None:
+    path = written(apart=HOLDS, out="never(room(astro) == office)")
+    plans = Path("plans")
+    plans.mkdir()
+    flat = Path(scenario()["floorplan"]["path"])
+    for name in ("one", "other"):
+        (plans / f"{name}.json").write_text(flat.read_text())
+    code, out, _ = fleet2d("test", path, "--homes", "plans", "--seeds", "2", "--json")
+
+    cases = json.loads(out)
+    assert code == 0
+    assert [("one", 4), ("one", 5), ("other", 4), ("other", 5)] == [
+        (c["home"], c["seed"]) for c in cases
+    ]
+    assert cases[0]["expectations"]["out"]["notes"] == ['room("astro"): this home has no office']
+    code, out, _ = fleet2d("test", path, "simulation.duration=1 min", "--homes", "3")
+    assert "3 of 3" in out
+    assert 'note: room("astro"): this home has no office' in out
+
+
+def test_what_was_not_tested_is_shown_and_fails_unless_it_may(fleet2d: Cli) -> None:
+    waits = {"after": "events(called, astro)", "eventually": "moving(astro)", "within": "1 min"}
+    code, out, _ = fleet2d("test", written(waits=waits, apart=HOLDS), "--junit", "results.xml")
+
+    assert code == 1
+    assert "untested" in out.splitlines()[0]
+    assert "occasions" in out.splitlines()[0]
+    assert "waits is untested: its trigger never happened" in out
+    (suite,) = ET.parse("results.xml").getroot()
+    assert ("1", "0") == (suite.get("failures"), suite.get("skipped"))
+    code, out, _ = fleet2d("test", written(waits=waits, apart=HOLDS), "--json")
+    verdict = json.loads(out)[0]["expectations"]["waits"]
+    assert (None, 0) == (verdict["holds"], verdict["occasions"])
+    assert verdict["untested"] == "its trigger never happened"
+    path = written(waits=waits | {"may_be_untested": True}, apart=HOLDS)
+    code, out, _ = fleet2d("test", path, "--junit", "results.xml")
+    assert code == 0
+    (suite,) = ET.parse("results.xml").getroot()
+    assert ("0", "1") == (suite.get("failures"), suite.get("skipped"))

@@ -1,6 +1,10 @@
-"""The product tests of the examples: each holds, and fails where the robot is made worse for it."""
+"""The product tests of the examples: each holds, and fails where the robot is made worse for it.
+
+The mutants are behaviors with a seeded bug, see `mutants`.
+"""
 
 import importlib.util
+import json
 import sys
 import tomllib
 from dataclasses import replace
@@ -8,7 +12,11 @@ from pathlib import Path
 from types import ModuleType
 
 import pytest
+from tests.thorough import THOROUGH
 
+import fleet2d
+from fleet2d.configuration.documents import read_document
+from fleet2d.expectations import Verdict
 from fleet2d.testing.claim import ATTRIBUTE
 from fleet2d.testing.trials import run_claim
 
@@ -44,3 +52,56 @@ def test_tests_pass_for_the_product_and_fail_for_a_worse_robot(week: ModuleType,
     worse = replace(claim, overrides=(*claim.overrides, *WORSE[name]))
     bad = run_claim(worse, function)
     assert not bad.holds
+
+
+SCENARIOS = sorted(set(FOLDER.glob("*.yaml")) - {FOLDER / "home.yaml"})
+HOMES = range(10)
+MUTANTS = {
+    "call": ["ComeLate", "ComeToNextRoom", "ComeAndGo"],
+    "find": ["FindOther", "FindLate", "FindTooNear", "FindFromAfar"],
+    "follow": ["FollowOther", "FollowTooNear", "FollowShortly"],
+    "night_patrol": ["PatrolLate", "PatrolWithoutFirst", "PatrolAnytime"],
+    "keep_out": ["PatrolNextRooms", "PatrolEverywhere"],
+    "low_battery": ["DockLate", "DockShortly"],
+    "guest": ["GreetAnybody", "GreetTooNear", "GreetAgain"],
+    "fall_alarm": ["FindOther", "FindRarely"],
+    "medicine": ["VisitLate", "VisitNextRoom", "VisitDaily"],
+    "sleeping_baby": ["PatrolAnytime", "PatrolEverywhere"],
+}
+
+
+def verdicts(scenario: str, home: int, *changes: str) -> dict[str, Verdict]:
+    floorplan = f"floorplan={{type: synthetic, seed: {home}, furnish: true}}"
+    quiet = ["artifacts.trajectories=off", "artifacts.checkpoint=off"]
+    simulation = fleet2d.Simulation(FOLDER / f"{scenario}.yaml", floorplan, *quiet, *changes)
+    simulation.run()
+    return simulation.verdicts()
+
+
+def test_there_are_ten_scenarios_of_at_most_twenty_lines_and_twenty_mutants() -> None:
+    assert sorted(MUTANTS) == [path.stem for path in SCENARIOS]
+    assert max(len(path.read_text().splitlines()) for path in SCENARIOS) <= 20
+    assert len({name for names in MUTANTS.values() for name in names}) >= 20
+
+
+@pytest.mark.parametrize("home", HOMES if THOROUGH else [0, 4])
+@pytest.mark.parametrize("scenario", MUTANTS)
+def test_each_scenario_holds_in_ten_homes(scenario: str, home: int) -> None:
+    assert [] == [
+        str(verdict) for verdict in verdicts(scenario, home).values() if not verdict.holds
+    ]
+
+
+@pytest.mark.parametrize(
+    ("scenario", "mutant"),
+    [(name, mutant) for name, mutants in MUTANTS.items() for mutant in mutants],
+)
+def test_each_mutant_is_caught_in_one_of_the_homes(scenario: str, mutant: str) -> None:
+    content = read_document(FOLDER / f"{scenario}.yaml").data
+    behavior = content["robots"]["astro"]["behaviors"][0]
+    behavior["type"] = f"{Path(__file__).parent.as_posix()}/mutants:{mutant}"
+    change = f"robots.astro.behaviors.0={json.dumps(behavior)}"
+
+    assert any(
+        verdict.fails for home in HOMES for verdict in verdicts(scenario, home, change).values()
+    )

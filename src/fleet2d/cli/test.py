@@ -31,6 +31,7 @@ class ScenarioCase:
         source: The file of the scenario, as on the command line.
         scenario: The scenario, with the seed.
         overrides: Changes of the scenario, as on the command line.
+        home: The name of the home, of several; empty for the scenario's own.
         verdicts: The verdicts on expectations, by name.
         error: The error that ended the run; empty if there is none.
         wall_s: The wall time of the run [s].
@@ -40,6 +41,7 @@ class ScenarioCase:
     source: str
     scenario: "Scenario"
     overrides: Sequence[str]
+    home: str = ""
     verdicts: "Mapping[str, Verdict]" = field(default_factory=dict)
     error: str = ""
     wall_s: float = 0.0
@@ -57,9 +59,15 @@ class ScenarioCase:
         return bool(self.error) or any(v.fails for v in self.verdicts.values())
 
     @property
+    def label(self) -> str:
+        """The home, of several, and the seed."""
+        return f"home {self.home}, seed {self.seed}" if self.home else f"seed {self.seed}"
+
+    @property
     def name(self) -> str:
         """The name of its run directory and pictures."""
-        return f"{file_name(Path(self.source).stem) or 'run'}-seed-{self.seed}"
+        home = f"-{file_name(self.home)}" if self.home else ""
+        return f"{file_name(Path(self.source).stem) or 'run'}{home}-seed-{self.seed}"
 
     def commands(self, verdict: "Verdict") -> str:
         """Return the commands that run it and show the worst moment of a verdict."""
@@ -110,7 +118,7 @@ def _add_case(suite: ET.Element, case: "ScenarioCase") -> None:
             suite,
             "testcase",
             classname=_xml_text(Path(case.source).stem),
-            name=f"{_xml_text(name)}[seed {case.seed}]",
+            name=f"{_xml_text(name)}[{_xml_text(case.label)}]",
             time=f"{case.wall_s / len(names):.3f}",
         )
         if case.error:
@@ -165,7 +173,7 @@ def print_cases(cases: "Sequence[ScenarioCase]") -> None:
 
 
 def _print_failure(console: "Console", case: "ScenarioCase") -> None:
-    prefix = f"{case.source}, seed {case.seed}: "
+    prefix = f"{case.source}, {case.label}: "
     lines = [f"{prefix}{case.error}"] if case.error else []
     for verdict in case.verdicts.values():
         if verdict.fails:
@@ -206,6 +214,13 @@ def test(
     seed: Annotated[
         int | None, typer.Option(min=0, help="The first seed; left out: the scenario's own, or 1.")
     ] = None,
+    homes: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NUMBER|PATH",
+            help="Run each in so many synthetic homes, or in the floor plans of a folder.",
+        ),
+    ] = None,
     junit: Annotated[Path | None, typer.Option(help="JUnit XML to write.")] = None,
     pictures: Annotated[
         Path | None, typer.Option(help="Folder for a picture of the worst moment of each failure.")
@@ -222,7 +237,12 @@ def test(
         raise InputError("name the scenarios to test: fleet2d test SCENARIO.yaml…")
     if pictures is not None:
         _check_pictures()
-    cases = [case for file in files for case in _cases(file, overrides, seeds, seed)]
+    cases = [
+        case
+        for file in files
+        for home, change in _homes(homes, file, overrides)
+        for case in _cases(file, [*overrides, *change], seeds, seed, home)
+    ]
     failures: Counter[str] = Counter()
     for case in cases:
         _run(case)
@@ -240,8 +260,33 @@ def test(
         raise typer.Exit(1)
 
 
+def _homes(
+    homes: str | None, source: str, overrides: Sequence[str]
+) -> Iterator[tuple[str, list[str]]]:
+    """Yield the homes to run a scenario in: a name, and the change of the scenario.
+
+    Raises:
+        InputError: There are no such floor plans.
+    """
+    from fleet2d.scenario.model import load_scenario
+    from fleet2d.studies.axes import FloorplansAxis, SyntheticAxis
+
+    if homes is None:
+        yield "", []
+        return
+    furnish = load_scenario(source, *overrides).resolved()["floorplan"].get("furnish")
+    settings = {"furnish": furnish} if furnish else {}
+    if homes.isdigit():
+        axis = SyntheticAxis(synthetic=int(homes), settings=settings)
+    else:
+        axis = FloorplansAxis(floorplans=(homes,), settings=settings)  # type: ignore[assignment]
+    for choice in axis.choices("home"):
+        (_, section) = choice.changes[0]
+        yield str(choice.labels["home"]), [f"floorplan={json.dumps(section)}"]
+
+
 def _cases(
-    source: str, overrides: Sequence[str], seeds: int, seed: int | None
+    source: str, overrides: Sequence[str], seeds: int, seed: int | None, home: str = ""
 ) -> Iterator[ScenarioCase]:
     """Yield a scenario with each of its seeds, after a check of its set-up.
 
@@ -260,11 +305,12 @@ def _cases(
     if seed is None:
         seed = scenario.simulation.seed
     first_seed = FIRST_SEED if seed is None else seed
-    Simulation(scenario)
+    if not home:  # of several homes, some may lack what it needs
+        Simulation(scenario)
     for number in range(first_seed, first_seed + seeds):
         simulation = scenario.simulation.model_copy(update={"seed": number})
         yield ScenarioCase(
-            source, scenario.model_copy(update={"simulation": simulation}), overrides
+            source, scenario.model_copy(update={"simulation": simulation}), overrides, home
         )
 
 
@@ -323,6 +369,7 @@ def _content(case: ScenarioCase) -> dict[str, Any]:
     return {
         "scenario": case.source,
         "seed": case.seed,
+        **({"home": case.home} if case.home else {}),
         "holds": not case.fails,
         "error": case.error or None,
         "wall_s": case.wall_s,
