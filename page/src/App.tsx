@@ -14,6 +14,7 @@ import { Now } from "./panels/Now";
 import { slowMoment } from "./panels/slow";
 import { Plan } from "./plan/Plan";
 import * as state from "./state";
+import { Ask } from "./timeline/Ask";
 import { Timeline } from "./timeline/Timeline";
 
 const PANELS: Record<state.Panel, [string, ComponentType]> = {
@@ -136,15 +137,16 @@ function Controls() {
       )}
       {!state.live.value && <SpeedChoice />}
       <GoTo />
+      <Ask />
       <output class="clock" aria-label="Shown moment">
         day {run.clock.day(slowMoment.value)} · {run.clock.text(slowMoment.value)}
       </output>
       <span class="group">
-        <button type="button" aria-label="Previous event" onClick={() => state.jump(false)}>
+        <button type="button" aria-label={state.answer.value ? "Previous answer" : "Previous event"} onClick={() => state.jump(false)}>
           ‹
         </button>
         <KindChoice />
-        <button type="button" aria-label="Next event" onClick={() => state.jump(true)}>
+        <button type="button" aria-label={state.answer.value ? "Next answer" : "Next event"} onClick={() => state.jump(true)}>
           ›
         </button>
       </span>
@@ -213,7 +215,7 @@ function GoTo() {
       <input
         id="goto"
         ref={input}
-        aria-label="Go to a time, such as day 3 18:30"
+        aria-label="Go to a time, such as day 3 18:30, 7 Jan 18:30, 2 d 14 h"
         placeholder="day 3 18:30"
         aria-invalid={isWrong.value}
         size={12}

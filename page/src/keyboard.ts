@@ -9,13 +9,14 @@ export const KEYS: [string, string][] = [
   [", .", "a step back, forward"],
   ["← →", "a hundredth of the view back, forward; with Shift a tenth"],
   ["[ ]", "a day back, forward"],
-  ["p n", "previous, next event of the chosen kind"],
+  ["p n", "previous, next answer, or event of the chosen kind"],
   ["+ −", "zoom in, out"],
   ["0", "the whole run"],
   ["< >", "slower, faster"],
   ["Home End", "begin, end"],
   ["1 … 6", "panels"],
   ["g", "go to a time"],
+  ["a", "ask the timeline"],
   ["f", "search events"],
   ["t", "light, dark"],
 ];
@@ -46,6 +47,7 @@ const ACTIONS: Record<string, (event: KeyboardEvent) => void> = {
   t: () => {
     state.theme.value = document.documentElement.dataset.theme === "dark" ? "light" : "dark";
   },
+  a: () => document.getElementById("ask")?.focus(),
   g: () => document.getElementById("goto")?.focus(),
   f: () => {
     state.panel.value = "events";

@@ -1,7 +1,10 @@
 /** The state of the page: signals that all parts read, and the few functions that change them. */
 
 import { batch, computed, signal } from "@preact/signals";
+import { type Answer, eventText, hasWords } from "./data/ask";
+import type { EventRow } from "./data/events";
 import type { Run } from "./data/run";
+import { firstAtLeast, lastAtMost } from "./data/search";
 
 export const SPEEDS = [1, 10, 60, 600, 3600, 14_400, 86_400];
 export const SWITCHES = ["names", "furniture", "ways", "sight", "observations", "beliefs"] as const;
@@ -20,6 +23,8 @@ export const speed = signal(60);
 export const selected = signal("");
 export const eventKind = signal("");
 export const search = signal("");
+/** What was asked of the timeline, and what answers it. */
+export const answer = signal<Answer | null>(null);
 export const shown = signal<ReadonlySet<Switch>>(new Set(["names", "furniture", "ways", "sight", "observations"]));
 export const layer = signal("");
 export const panel = signal<Panel>("now");
@@ -32,6 +37,16 @@ export const run = computed<Run | null>(() => runs.value[0] ?? null);
 /** The part of the runs that can be shown [us]. */
 export const beginUs = computed(() => Math.min(...runs.value.map((entry) => entry.beginUs)));
 export const endUs = computed(() => Math.max(1, ...runs.value.map((entry) => (entry.version.value, entry.endUs))));
+
+/** The events of the chosen kind that have the words that are searched for. */
+export const foundEvents = computed<readonly EventRow[]>(() => {
+  const entry = run.value;
+  if (!entry) return [];
+  void entry.version.value;
+  const [kind, words] = [eventKind.value, search.value.trim()];
+  const rows = kind ? entry.events.ofKind(kind) : entry.events.rows;
+  return words ? rows.filter((row) => hasWords(eventText(row), words)) : rows;
+});
 
 const SHORTEST_US = 10e6;
 
@@ -77,9 +92,12 @@ export function faster(by: 1 | -1): void {
   speed.value = next ?? speed.value;
 }
 
+/** Go to the next answer, or without a question to the next event; or to the one before. */
 export function jump(forward: boolean): void {
-  const event = run.value?.events.next(eventKind.value, moment.value, forward);
-  if (event) goTo(event.us);
+  const moments = (answer.value?.spans ?? foundEvents.value.map((row) => ({ from: row.us }))).map((span) => span.from);
+  const at = forward ? lastAtMost(moments, moment.value) + 1 : firstAtLeast(moments, moment.value) - 1;
+  const us = moments[at];
+  if (us !== undefined) goTo(us);
 }
 
 export function select(name: string): void {

@@ -20,6 +20,11 @@ describe("a clock", () => {
     ["2026-01-05T07:00:01", 3601e6],
     ["step 12", 12e6],
     ["day 2", 18 * 3600e6],
+    ["Tue 6 Jan 07:00:30", (25 * 3600 + 30) * 1e6],
+    ["6 january, 07:00", 25 * 3600e6],
+    ["6 Jan 2026 7:00", 25 * 3600e6],
+    ["2 d 14 h", (2 * 24 + 14) * 3600e6],
+    ["90 min", 90 * 60e6],
   ])("reads %s", (text, us) => {
     expect(clock.parse(text)).toBe(us);
   });
@@ -28,7 +33,7 @@ describe("a clock", () => {
     expect(clock.parse("08:15", 20 * 3600e6)).toBe((18 + 8.25) * 3600e6);
   });
 
-  it.each(["", "noon", "day 99", "25:00", "2027-01-01"])("reads no moment from '%s'", (text) => {
+  it.each(["", "noon", "day 99", "25:00", "2027-01-01", "6 Foo 07:00", "31 Feb 07:00", "11 d"])("reads no moment from '%s'", (text) => {
     expect(clock.parse(text)).toBeNull();
   });
 

@@ -35,13 +35,6 @@ describe("events", () => {
   const events = new Events();
   [10, 20, 30].forEach((us, i) => events.add(us, us, "ana", i === 1 ? "left_home" : "activity", "", `${i}`));
 
-  it("jumps to the next and the previous of a kind, and stops at the ends", () => {
-    expect(events.next("left_home", 0, true)?.us).toBe(20);
-    expect(events.next("activity", 30, false)?.us).toBe(10);
-    expect(events.next("left_home", 20, true)).toBeNull();
-    expect(events.next("", 10, true)?.us).toBe(20);
-  });
-
   it("knows the last of an entity", () => {
     expect(events.last("ana", "activity", 25)?.detail).toBe("0");
     expect(events.last("ben", "", 25)).toBeNull();

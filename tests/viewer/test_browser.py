@@ -159,6 +159,18 @@ def test_events_are_filtered_searched_and_jumped_to(page: Any, run_dir: Path) ->
     assert activities[0]["step"] == moment(page)
 
 
+def test_last_sighting_before_a_time_is_one_question(page: Any, run_dir: Path) -> None:
+    stored = fleet2d.open_run(run_dir).tables["observations"].to_pylist()
+    before = 8 * 3600
+    seen = [row["step"] for row in stored if row["user"] == "ana" and row["step"] < before]
+    first = max(step for step in seen if step - 1 not in seen)  # of the last stretch
+    page.keyboard.press("a")
+    page.keyboard.type("last seen ana before 8 h")
+    page.keyboard.press("Enter")
+    page.wait_for_selector("#ask-answer[data-count='1']")
+    assert moment(page) == first
+
+
 def test_address_holds_the_moment_and_the_view(browser: Any, page: Any) -> None:
     page.fill("#goto", "day 1 05:00")
     page.press("#goto", "Enter")

@@ -65,8 +65,8 @@ export class Clock {
   }
 
   /**
-   * The moment that a text names: "2026-01-07T18:30", "day 3 18:30", "18:30" on the day of
-   * `nearUs`, or "step 5000". Null where it names none.
+   * The moment that a text names: "2026-01-07T18:30", "Wed 7 Jan 18:30", "day 3 18:30", "18:30" on the
+   * day of `nearUs`, "2 d 14 h" since the start, or "step 5000". Null where it names none.
    */
   parse(text: string, nearUs = 0): number | null {
     const words = text.trim().toLowerCase();
@@ -77,6 +77,13 @@ export class Clock {
       const ms = Date.parse(`${iso[1]}T${(iso[2] ?? "00:00").padStart(5, "0")}Z`);
       return Number.isNaN(ms) ? null : this.inside((ms - this.startMs) * 1000);
     }
+    const since = /^(?:(\d+) ?d)? ?(?:(\d+) ?h)? ?(?:(\d+) ?min)? ?(?:(\d+) ?s)?$/.exec(words);
+    if (since && words) {
+      const [days, hours, minutes, seconds] = since.slice(1).map((part) => Number(part ?? 0));
+      return this.inside((((days! * 24 + hours!) * 60 + minutes!) * 60 + seconds!) * 1e6);
+    }
+    const date = /^(?:[a-z]{3},? )?(\d{1,2})\.? ([a-z]{3})[a-z]*(?: (\d{4}))?(?:,? (\d{1,2}:\d{2}(?::\d{2})?))?$/.exec(words);
+    if (date) return this.ofDate(Number(date[1]), date[2]!, date[3], date[4] ?? "00:00");
     const day = /^(?:day (\d+))?\s*(?:(\d{1,2}):(\d{2})(?::(\d{2}))?)?$/.exec(words);
     if (!day || !words) return null;
     const number = day[1] ? Number(day[1]) : this.day(nearUs);
@@ -84,6 +91,17 @@ export class Clock {
     if (hours! > 23 || minutes! > 59 || seconds! > 59) return null;
     const us = ((hours! * 60 + minutes!) * 60 + seconds!) * 1e6;
     return this.inside(this.dayStart(number) + us);
+  }
+
+  /** The moment of a day and month: in a year, or in the first year in which the run has it. */
+  private ofDate(day: number, name: string, year: string | undefined, time: string): number | null {
+    const month = MONTHS.findIndex((each) => each.toLowerCase() === name) + 1;
+    const years = year ? [Number(year)] : [this.date(0).getUTCFullYear(), this.date(this.endUs).getUTCFullYear()];
+    for (const each of month ? years : []) {
+      const found = this.parse(`${each}-${two(month)}-${two(day)}T${time}`);
+      if (found !== null) return found;
+    }
+    return null;
   }
 
   private inside(us: number): number | null {

@@ -2,7 +2,7 @@
 
 import type { Clock } from "./clock";
 import type { Table } from "./parquet";
-import { firstAtLeast, lastAtMost } from "./search";
+import { lastAtMost } from "./search";
 
 export interface EventRow {
   index: number;
@@ -34,15 +34,6 @@ export class Events {
 
   ofKind(kind: string): EventRow[] {
     return (this.byKind.get(kind) ?? []).map((index) => this.rows[index]!);
-  }
-
-  /** The next event of a kind after a moment, or the one before; any kind where it is empty. */
-  next(kind: string, us: number, forward: boolean): EventRow | null {
-    const indices = kind ? (this.byKind.get(kind) ?? []) : null;
-    const moments = indices ? indices.map((index) => this.us[index]!) : this.us;
-    const at = forward ? lastAtMost(moments, us) + 1 : firstAtLeast(moments, us) - 1;
-    if (at < 0 || at >= moments.length) return null;
-    return this.rows[indices ? indices[at]! : at]!;
   }
 
   /** Index of the first event after a moment. */

@@ -1,6 +1,5 @@
 /** Events around the moment: filtered by kind, searched by word. */
 
-import { useComputed } from "@preact/signals";
 import { lastAtMost } from "../data/search";
 import * as state from "../state";
 import { slowMoment } from "./slow";
@@ -10,16 +9,7 @@ const AFTER = 60;
 
 export function EventsPanel() {
   const run = state.run.value!;
-  const rows = useComputed(() => {
-    void run.version.value;
-    const words = state.search.value.trim().toLowerCase();
-    const kind = state.eventKind.value;
-    return run.events.rows.filter(
-      (row) =>
-        (!kind || row.event === kind) &&
-        (!words || `${row.entity} ${row.event} ${row.user} ${row.detail}`.toLowerCase().includes(words)),
-    );
-  }).value;
+  const rows = state.foundEvents.value;
   const us = slowMoment.value;
   const at = lastAtMost(rows.map((row) => row.us), us) + 1;
   const visibleRows = rows.slice(Math.max(0, at - BEFORE), at + AFTER);

@@ -7,7 +7,7 @@ import { fitted, oncePerFrame } from "../plan/canvas";
 import * as state from "../state";
 import { colors } from "../theme";
 import { AXIS_HEIGHT, drawCursor, drawLanes, GAP, heightOf, laneAt, type Scale, usOf, xOf } from "./draw";
-import { type Lane, lanesOf, tableLanes } from "./lanes";
+import { answerLane, type Lane, lanesOf, tableLanes } from "./lanes";
 
 /** Lanes of all runs; those of tables are read once. */
 function useLanes(): { value: Lane[] } {
@@ -25,13 +25,15 @@ function useLanes(): { value: Lane[] } {
       effect(() => {
         void colors.value;
         const runs = state.runs.value;
-        lanes.value = runs.flatMap((run, i) => {
+        const answer = state.answer.value;
+        const own = runs.flatMap((run, i) => {
           void run.version.value;
           const other = runs.length === 2 ? runs[1 - i]! : null;
           if (other) void other.version.value;
           const title = runs.length > 1 ? run.facts.title : "";
           return [...lanesOf(run, `${i}:`, i === 0 ? other : null, title), ...(extra.value.get(run) ?? [])];
         });
+        lanes.value = answer && answer.spans.length > 0 ? [answerLane(answer), ...own] : own;
       }),
     [],
   );

@@ -1,5 +1,6 @@
 /** The lanes of a timeline: what each shows, in which colours. */
 
+import type { Answer } from "../data/ask";
 import type { Run } from "../data/run";
 import { lastAtMost } from "../data/search";
 import { differences, type Stretches } from "../data/stretches";
@@ -43,6 +44,19 @@ export function lanesOf(run: Run, prefix: string, other: Run | null, title = "")
   const lanes = ownLanes(run, prefix, other);
   if (title) lanes.forEach((lane) => (lane.label = `${title}: ${lane.label}`));
   return lanes;
+}
+
+/** What answers the question that was asked; its words are those of each mark. */
+export function answerLane(answer: Answer): Lane {
+  const { spans } = answer;
+  const stretches: Stretches = {
+    from: spans.map((span) => span.from),
+    // A moment is as wide as a pixel; it is drawn as if it lasted a microsecond.
+    to: spans.map((span) => Math.max(span.to, span.from + 1)),
+    value: spans.map((_, i) => i),
+  };
+  const words = (value: number): string => spans[value]?.words ?? "";
+  return stretchLane("answer", answer.question, "", stretches, () => colors.value.cursor, words, 16);
 }
 
 function ownLanes(run: Run, prefix: string, other: Run | null): Lane[] {

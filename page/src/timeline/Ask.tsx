@@ -1,0 +1,47 @@
+/** A question about the run: its answers are marks on a lane, which ‹ and › step through. */
+
+import { useSignal } from "@preact/signals";
+import { ask, completions, EXAMPLES } from "../data/ask";
+import * as state from "../state";
+
+export function Ask() {
+  const text = useSignal("");
+  const run = state.run.value!;
+  void run.version.value;
+  const answer = state.answer.value;
+  const put = (question: string): void => {
+    const found = question.trim() ? ask(run, question, state.moment.value) : null;
+    state.answer.value = found;
+    const first = found?.spans[0];
+    if (first) state.goTo(first.from);
+  };
+  return (
+    <div class="ask">
+      <input
+        id="ask"
+        type="search"
+        list="ask-words"
+        aria-label="Ask the timeline"
+        aria-describedby="ask-answer"
+        placeholder={`Ask: ${EXAMPLES[0]}`}
+        size={28}
+        value={text.value}
+        onInput={(event) => {
+          text.value = event.currentTarget.value;
+          if (!text.value) put("");
+        }}
+        onKeyDown={(event) => {
+          if (event.key === "Enter") put(text.value);
+        }}
+      />
+      <datalist id="ask-words">
+        {completions(run, text.value).map((words) => (
+          <option key={words} value={words} />
+        ))}
+      </datalist>
+      <output id="ask-answer" data-count={answer?.spans.length ?? 0}>
+        {answer?.words ?? ""}
+      </output>
+    </div>
+  );
+}

@@ -1,0 +1,113 @@
+import { beforeAll, describe, expect, it } from "vitest";
+import { ask, completions } from "../src/data/ask";
+import { AWAY } from "../src/data/rooms";
+import type { Run } from "../src/data/run";
+import { timeByValue, valueAt } from "../src/data/stretches";
+import * as state from "../src/state";
+import { held, wholeRun } from "./fixture";
+
+let run: Run;
+const SECOND = 1e6;
+const HOUR = 3600 * SECOND;
+
+beforeAll(async () => {
+  run = await wholeRun();
+  state.runs.value = [run];
+});
+
+const total = (question: string): number => ask(run, question, 0).spans.reduce((sum, span) => sum + span.to - span.from, 0);
+const froms = (question: string): number[] => ask(run, question, 0).spans.map((span) => span.from / SECOND);
+
+describe("a question", () => {
+  it("finds the last sighting before a time in one answer", () => {
+    const { first } = held.sightings[0]!;
+    const before = first.filter((step) => step < 6 * 3600);
+    expect(froms("last seen ana before 06:00")).toEqual(before.slice(-1));
+    expect(froms("first seen ana after day 1 06:00")).toEqual(first.filter((step) => step >= 6 * 3600).slice(0, 1));
+    expect(froms("Seen ana by astro")).toEqual(first);
+  });
+
+  it("finds when somebody was in a kind of room, as the lane says", () => {
+    const bedrooms = run.facts.home.rooms.flatMap((room, i) => (room.type === "bedroom" ? [i] : []));
+    const rooms = run.roomsOf("ana");
+    const time = timeByValue(rooms, run.facts.home.rooms.length, run.endUs);
+    expect(total("ana in bedroom")).toBe(bedrooms.reduce((sum, room) => sum + time[room]!, 0));
+    expect(total("ana in bedroom") + total("ana not in bedroom")).toBe(run.endUs);
+    for (const span of ask(run, "ana not in bedroom", 0).spans) expect(bedrooms).not.toContain(valueAt(rooms, span.from));
+    expect(total("ana away")).toBe(time[time.length - 1]);
+    expect(ask(run, "ana away", 0).spans.every((span) => valueAt(rooms, span.from) === AWAY)).toBe(true);
+  });
+
+  it("keeps what is longer or shorter than a time", () => {
+    const all = ask(run, "ana in bathroom", 0).spans;
+    const long = ask(run, "ana in bathroom > 5 min", 0).spans;
+    const short = ask(run, "ana in bathroom < 5 min", 0).spans;
+    expect(long.length).toBeGreaterThan(0);
+    expect(long.length + short.length).toBe(all.length);
+    expect(long.every((span) => span.to - span.from > 300 * SECOND)).toBe(true);
+  });
+
+  it("counts a night if it is so for more than half of it", () => {
+    expect(ask(run, "nights ana in bedroom", 0).words).toBe("2 nights"); // the run begins and ends in one
+    expect(ask(run, "nights ana not in bedroom", 0).words).toBe("never");
+    expect(ask(run, "mornings ana not in bedroom", 0).words).toBe("1 morning");
+    expect(ask(run, "nights astro away", 0).words).toBe("never");
+  });
+
+  it("tells who was where at a moment", () => {
+    const us = 3 * HOUR;
+    const room = run.facts.home.rooms[valueAt(run.roomsOf("ana"), us)!]!;
+    expect(ask(run, "ana at 03:00", 0).words).toContain(`ana is in ${room.name}`);
+    expect(ask(run, `${room.name} at 5 Jan 03:00`, 0).words).toContain("ana");
+    expect(ask(run, `${room.type} at 3 h`, 0).spans[0]!.from).toBe(us);
+  });
+
+  it("finds every event by the words that are shown of it, in any order", () => {
+    for (const row of run.events.rows) {
+      const shown = `${row.event.replaceAll("_", " ")} ${row.entity}`;
+      expect(froms(shown)).toContain(row.us / SECOND);
+    }
+    const asleep = run.events.rows.filter((row) => row.entity === "ana" && row.detail === "sleep");
+    expect(froms("ana sleep")).toEqual(asleep.map((row) => row.us / SECOND));
+  });
+
+  it.each([
+    ["ana in cellar", "nothing is called 'cellar'"],
+    ["kitchen at noonish", "'noonish' is no time of this run"],
+    ["seen ana before never", "'never' is no time of this run"],
+    ["last", "ask for something like"],
+  ])("says why '%s' has no answer", (question, reason) => {
+    expect(ask(run, question, 0)).toMatchObject({ spans: [] });
+    expect(ask(run, question, 0).words).toContain(reason);
+  });
+
+  it("is completed by names, rooms and events", () => {
+    expect(completions(run, "last seen a")).toContain("last seen ana");
+    expect(completions(run, "ana in bath")).toContain("ana in bathroom");
+    expect(completions(run, "")).toContain("nights");
+  });
+
+});
+
+describe("‹ and ›", () => {
+  it("step through the answers", () => {
+    state.answer.value = ask(run, "ana in bathroom", 0);
+    state.goTo(0);
+    state.jump(true);
+    expect(state.moment.value).toBe(state.answer.value.spans[0]!.from);
+    state.jump(true);
+    expect(state.moment.value).toBe(state.answer.value.spans[1]!.from);
+    state.jump(false);
+    expect(state.moment.value).toBe(state.answer.value.spans[0]!.from);
+    state.answer.value = null;
+  });
+
+  it("step through the events that were searched for", () => {
+    state.search.value = "ana sleep";
+    state.goTo(0);
+    state.jump(true);
+    expect(state.foundEvents.value.map((row) => row.us)).toContain(state.moment.value);
+    expect(state.foundEvents.value.every((row) => row.entity === "ana")).toBe(true);
+    state.search.value = "";
+  });
+});
