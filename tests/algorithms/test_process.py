@@ -1,0 +1,200 @@
+"""Algorithms and behaviors in other processes: same results, checkpoints, and what goes wrong."""
+
+import copy
+import pickle
+import shutil
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import fleet2d
+from fleet2d import Algorithm, RoomDistribution
+from fleet2d.configuration.trust import Trust, restrict
+from fleet2d.errors import ComponentError, InputError
+
+PROGRAMS = Path(__file__).parents[2] / "examples" / "programs"
+
+
+class SightingsOfRooms(Algorithm):
+    """The same as the program, within Fleet2D."""
+
+    def start(self, home: Any) -> None:
+        self.counts = [0] * len(home.rooms)
+
+    def update(self, history: Any, state: Any) -> Any:
+        for room in history.observations.room.tolist():
+            self.counts[room] += room >= 0
+        return RoomDistribution(self.counts)
+
+
+def scenario(command: Path, **settings: Any) -> dict[str, Any]:
+    return {
+        "extends": "bundled:base",
+        "simulation": {"duration": "12 h", "seed": 4},
+        "algorithms": {
+            "share": {"type": "process", "command": str(command), "period": "1 h"} | settings
+        },
+    }
+
+
+@pytest.fixture(scope="module")
+def compiled(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    compiler = shutil.which("g++")
+    if compiler is None:
+        pytest.skip("there is no g++")
+    program = tmp_path_factory.mktemp("programs") / "share"
+    subprocess.run(
+        [compiler, "-std=c++20", "-O1", "-o", program, PROGRAMS / "share.cpp"], check=True
+    )
+    return program
+
+
+def expected() -> Any:
+    content = scenario(PROGRAMS)
+    content["algorithms"]["share"] = {"type": f"{__file__}:SightingsOfRooms", "period": "1 h"}
+    return fleet2d.run(content).tables["share"].to_pylist()
+
+
+def test_a_python_program_learns_what_an_algorithm_does() -> None:
+    run = fleet2d.run(scenario(PROGRAMS / "share.py"))
+
+    assert run.tables["share"].to_pylist() == expected()
+    assert run.manifest["inputs"][0]["path"].endswith("share.py")
+
+
+def test_a_program_in_another_language_learns_the_same(compiled: Path) -> None:
+    assert fleet2d.run(scenario(compiled)).tables["share"].to_pylist() == expected()
+
+
+def test_copies_and_checkpoints_continue_from_its_state(compiled: Path) -> None:
+    for command in (PROGRAMS / "share.py", compiled):
+        simulation = fleet2d.Simulation(scenario(command))
+        simulation.advance(9 * 3600)
+        twins = [copy.deepcopy(simulation), pickle.loads(pickle.dumps(simulation))]
+
+        digests = {twin.run().digest for twin in (simulation, *twins)}
+
+        assert digests == {fleet2d.run(scenario(command)).digest}
+
+
+def test_every_span_length_gives_the_same_run() -> None:
+    content = scenario(PROGRAMS / "share.py", sends=["observations", "evidence", "poses"])
+    content["simulation"]["duration"] = "2 h"
+
+    assert len({fleet2d.run(content, max_span=span).digest for span in (600, None)}) == 1
+
+
+def program(folder: Path, answers: str) -> Path:
+    """Write a program that answers all but the first message by Python code."""
+    path = folder / "alg.py"
+    path.write_text(
+        "import json, sys, time\n"
+        "def say(content): print(json.dumps(content), flush=True)\n"
+        "for number, line in enumerate(sys.stdin.buffer):\n"
+        "    message = json.loads(line)\n"
+        "    [sys.stdin.buffer.read(size) for _, size in message.get('blocks', [])]\n"
+        "    if number == 0: say({'type': 'ready'}); continue\n"
+        f"    {answers}\n"
+    )
+    return path
+
+
+@pytest.mark.parametrize(
+    ("answers", "message"),
+    [
+        (
+            "sys.exit('no more memory')",
+            "ended with code 1 instead of answering 'update'; on stderr it wrote: no more memory",
+        ),
+        ("time.sleep(60)", "didn't answer 'update' within 0.3 s and was ended"),
+        ("print('hello', flush=True)", "which is no line of JSON with a type"),
+        ("say({'type': 'error', 'text': 'no rooms'})", "reports: no rooms"),
+        ("say({'type': 'output'})", "expected 'share' (one for each room)"),
+        ("say({'type': 'output', 'share': ['x']})", "answered wrong values"),
+        (
+            "say({'type': 'output', 'share': [1, 2]})",
+            "returned 2 shares, but the home has 14 rooms",
+        ),
+        ("say({'type': 'output', 'blocks': [['x', 10**12]]})", "a block is too large"),
+    ],
+)
+def test_a_program_that_fails_is_blamed(tmp_path: Path, answers: str, message: str) -> None:
+    content = scenario(program(tmp_path, answers), timeout="0.3 s")
+
+    with pytest.raises(ComponentError) as caught:
+        fleet2d.run(content)
+
+    assert "algorithms.share" in str(caught.value)
+    assert message in str(caught.value)
+
+
+def test_a_program_that_cannot_be_started_is_blamed(tmp_path: Path) -> None:
+    path = tmp_path / "alg"
+    path.write_text("not a program")
+
+    with pytest.raises(ComponentError, match="alg can't be started: Permission denied"):
+        fleet2d.run(scenario(path))
+
+
+def test_a_program_ends_with_its_simulation(tmp_path: Path) -> None:
+    simulation = fleet2d.Simulation(scenario(PROGRAMS / "share.py"))
+    simulation.advance(2 * 3600)
+    process = simulation.algorithms["share"].program._process
+    assert process.poll() is None
+
+    simulation._state.learners.all.clear()
+    del simulation
+
+    assert process.wait(5) == 0
+
+
+def test_a_program_that_is_not_trusted_does_not_run() -> None:
+    with (
+        restrict(Trust()),
+        pytest.raises(InputError, match=r"would run .*share\.py: name it by --trust"),
+    ):
+        fleet2d.Simulation(scenario(PROGRAMS / "share.py"))
+
+
+# Behaviors
+
+
+def robots(command: Path) -> dict[str, Any]:
+    return {
+        "extends": "bundled:base",
+        "simulation": {"duration": "2 h", "seed": 4},
+        "robots": {"astro": {"behaviors": [{"type": "process", "command": str(command)}]}},
+    }
+
+
+def test_a_program_decides_where_the_robot_goes() -> None:
+    run = fleet2d.run(robots(PROGRAMS / "rounds.py"))
+
+    path = run.path("astro")
+    rooms = [run.plan.rooms[r].name for r in dict.fromkeys(path.room.tolist()) if r >= 0]
+    assert len(rooms) > 4
+
+
+def test_a_copied_program_decides_as_the_first_one_would() -> None:
+    simulation = fleet2d.Simulation(robots(PROGRAMS / "rounds.py"))
+    simulation.advance(3600)
+
+    assert copy.deepcopy(simulation).run().digest == simulation.run().digest
+
+
+@pytest.mark.parametrize(
+    ("answers", "message"),
+    [
+        ("say({'type': 'plan', 'plan': []})", "expected 'plan', a list of 1 to 1000 items"),
+        ("say({'type': 'plan', 'plan': [{'fly_to': 'moon'}]})", "there is no 'fly_to'"),
+        ("say({'type': 'plan', 'plan': [{'go_to': 'moon'}]})", "moon"),
+        ("say({'type': 'plan', 'plan': [{'stay_s': 'x'}]})", "answered the item {'stay_s': 'x'}"),
+    ],
+)
+def test_a_wrong_plan_is_blamed(tmp_path: Path, answers: str, message: str) -> None:
+    with pytest.raises((ComponentError, InputError)) as caught:
+        fleet2d.run(robots(program(tmp_path, answers)))
+
+    assert message in str(caught.value)
