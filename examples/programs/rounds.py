@@ -1,4 +1,3 @@
-#!/usr/bin/env python3
 """A behavior in a process of its own, without Fleet2D: from room to room, ten minutes in each.
 
 robots: {astro: {behaviors: [{type: process, command: rounds.py}]}}

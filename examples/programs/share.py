@@ -1,4 +1,3 @@
-#!/usr/bin/env python3
 """An algorithm in a process of its own, without Fleet2D: the share of sightings of each room.
 
 algorithms: {share: {type: process, command: share.py, sends: [observations], period: 1 h}}

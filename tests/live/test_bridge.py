@@ -9,14 +9,19 @@ import pytest
 from tests.live.scenes import LIVE, place
 
 import fleet2d
-from fleet2d.live import Bridge, Frame, from_iterator, to_function
+from fleet2d.live import Bridge, LiveStep, from_iterator, to_function
 
 
 class Now:
     """A peer that sends messages before the steps for which it has some."""
 
     def __init__(self, messages: dict[int, list[Any]]) -> None:
-        self.messages, self.frames, self.told, self.ended = messages, list[Frame](), list[str](), ""
+        self.messages, self.frames, self.told, self.ended = (
+            messages,
+            list[LiveStep](),
+            list[str](),
+            "",
+        )
 
     def open(self, simulation: Any, post: Any) -> None:
         self.post = post
@@ -26,7 +31,7 @@ class Now:
         for message in self.messages.get(step, ()):
             self.post(message)
 
-    def send(self, frame: Frame) -> None:
+    def send(self, frame: LiveStep) -> None:
         self.frames.append(frame)
         self._give(frame.step + 1)
 
@@ -195,7 +200,7 @@ def test_steps_begin_in_time() -> None:
 def test_a_function_may_intervene() -> None:
     simulation = fleet2d.Simulation(LIVE)
 
-    def send(frame: Frame) -> None:
+    def send(frame: LiveStep) -> None:
         if frame.step == 3:
             simulation.intervene({"send": "astro", "to": "kitchen_0"})
 

@@ -39,7 +39,7 @@ MAX_TOLD = 20
 
 
 @dataclass(frozen=True)
-class Frame:
+class LiveStep:
     """What happened in a step.
 
     Attributes:
@@ -90,7 +90,7 @@ class Peer(Protocol):
     def open(self, simulation: Simulation, post: Post) -> None:
         """Connect, before the first step; `post` receives messages, from any thread."""
 
-    def send(self, frame: Frame) -> None:
+    def send(self, frame: LiveStep) -> None:
         """Pass on a step, without waiting."""
 
     def tell(self, text: str) -> None:
@@ -317,7 +317,7 @@ class Bridge:
         self._events.clear()
         self._rows.clear()
         step = simulation.step - 1
-        frame = Frame(step, simulation.clock.time(step), bodies, events, rows)
+        frame = LiveStep(step, simulation.clock.time(step), bodies, events, rows)
         for peer in self.peers:
             peer.send(frame)
 

@@ -13,7 +13,7 @@ from typing import Any
 from fleet2d.engine.simulation import Simulation
 from fleet2d.entities.objects.home_object import Sensor
 from fleet2d.errors import InputError, extra
-from fleet2d.live.bridge import Frame, Post
+from fleet2d.live.bridge import LiveStep, Post
 from fleet2d.runs.run import Run
 from fleet2d.runtime.events import EventKind
 
@@ -99,7 +99,7 @@ class MqttPeer:
     def _publish(self, topic: str, text: str, *, retain: bool = False) -> None:
         self._client.publish(f"{self.prefix}/{topic}", text, qos=1 if retain else 0, retain=retain)
 
-    def send(self, frame: Frame) -> None:
+    def send(self, frame: LiveStep) -> None:
         """Publish a frame."""
         for name, body in frame.bodies.items():
             self._publish(f"pose/{name}", json.dumps({**body, "step": frame.step}))

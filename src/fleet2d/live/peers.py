@@ -16,7 +16,7 @@ from urllib.parse import urlsplit
 from fleet2d.configuration.problems import did_you_mean
 from fleet2d.engine.simulation import Simulation
 from fleet2d.errors import InputError, extra
-from fleet2d.live.bridge import Frame, Peer, Post
+from fleet2d.live.bridge import LiveStep, Peer, Post
 from fleet2d.live.messages import MAX_BYTES
 from fleet2d.runs.run import Run
 
@@ -32,7 +32,7 @@ class FunctionPeer:
 
     def __init__(
         self,
-        function: Callable[[Frame], object] = id,
+        function: Callable[[LiveStep], object] = id,
         messages: Iterable[Mapping[str, Any]] = (),
     ) -> None:
         """Take a function, and messages that are read in a thread of their own."""
@@ -48,7 +48,7 @@ class FunctionPeer:
         if self._messages != ():
             threading.Thread(target=read, daemon=True).start()
 
-    def send(self, frame: Frame) -> None:
+    def send(self, frame: LiveStep) -> None:
         """Call the function."""
         self._function(frame)
 
@@ -59,7 +59,7 @@ class FunctionPeer:
         """Do nothing: a thread ends with its iterator."""
 
 
-def to_function(function: Callable[[Frame], object]) -> FunctionPeer:
+def to_function(function: Callable[[LiveStep], object]) -> FunctionPeer:
     """Return a peer that calls a function with each frame, in the thread of the run."""
     return FunctionPeer(function)
 
@@ -115,7 +115,7 @@ class UdpPeer:
             with contextlib.suppress(TimeoutError, OSError):
                 post(self._socket.recv(MAX_BYTES))
 
-    def send(self, frame: Frame) -> None:
+    def send(self, frame: LiveStep) -> None:
         """Do nothing: it only receives."""
 
     def tell(self, text: str) -> None:
@@ -198,7 +198,7 @@ class WebSocketPeer:
                 self._forget(connection)
                 threading.Thread(target=connection.close, daemon=True).start()
 
-    def send(self, frame: Frame) -> None:
+    def send(self, frame: LiveStep) -> None:
         """Pass a frame on to all clients."""
         if self._clients:
             self._put(frame.texts)

@@ -13,7 +13,7 @@ import numpy as np
 
 from fleet2d.engine.simulation import Simulation
 from fleet2d.errors import InputError, extra
-from fleet2d.live.bridge import Frame, Post
+from fleet2d.live.bridge import LiveStep, Post
 from fleet2d.runs.run import Run
 
 WAIT_S = 5
@@ -90,7 +90,7 @@ class RosbridgePeer:
             "data": np.where(plan.free, 0, 100).ravel().tolist(),
         }
 
-    def send(self, frame: Frame) -> None:
+    def send(self, frame: LiveStep) -> None:
         """Publish a frame."""
         present = {name: body for name, body in frame.bodies.items() if not body["away"]}
         transforms = []
