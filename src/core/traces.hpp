@@ -13,7 +13,7 @@
 
 namespace fleet2d {
 
-inline constexpr i64 TRACE_FEATURES = 30;
+inline constexpr i64 TRACE_FEATURES = 25;
 inline constexpr i64 DAY_HOURS = 24;
 inline constexpr f64 LONG_AGO = -1e9;         // [min]
 inline constexpr f64 LONGEST_GAP = 2 * 1440;  // [min]
@@ -156,23 +156,17 @@ inline void trace_bin(Traces& traces, const TracedRooms& home, const TracedEvide
     f64 gone = 0, bins = 0;
     for (i64 h = 0; h < DAY_HOURS; ++h) gone += traces.gone[h], bins += traces.bins[h];
     row(rooms, 16) = (traces.gone[hour] + 1) / (traces.bins[hour] + 4), row(rooms, 17) = (gone + 1) / (bins + 4);
-    // Triangular waves of one day and of half a day, in two phases each.
-    const f64 phase = static_cast<f64>(minute) / 1440;
-    const auto wave = [](f64 turns) { return std::abs(4 * (turns - std::floor(turns)) - 2) - 1; };
-    const std::array<f64, 11> shared{log_gap,
-                                     cover,
-                                     wave(phase),
-                                     wave(phase + 0.25),
-                                     wave(2 * phase),
-                                     wave(2 * phase + 0.25),
-                                     (evidence.day[bin] + 6) % 7 >= 5 ? 1.0 : 0.0,
-                                     ln(1 + (time - *traces.first_time) / 1440),
-                                     is_seen ? 1.0 : 0.0,
-                                     most_empty,
-                                     ln(1 + empty_floor)};
+    // No time of day: hours mean something by what was seen at them. People of the training sleep at night, others
+    // don't.
+    const std::array<f64, 6> shared{log_gap,
+                                    cover,
+                                    ln(1 + (time - *traces.first_time) / 1440),
+                                    is_seen ? 1.0 : 0.0,
+                                    most_empty,
+                                    ln(1 + empty_floor)};
     for (i64 place = 0; place <= rooms; ++place) {
         for (std::size_t k = 0; k < shared.size(); ++k) row(place, 18 + static_cast<i64>(k)) = shared[k];
-        row(place, 29) = ln(std::max(evidence.belief(bin, place), 1e-6));
+        row(place, 24) = ln(std::max(evidence.belief(bin, place), 1e-6));
     }
 }
 

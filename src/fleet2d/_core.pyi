@@ -1244,7 +1244,7 @@ def smooth_people(model: tuple[Any, ...], day: tuple[Any, ...], longest: int, pr
         ValueError: Arrays aren't of the same people, rooms and patches, or hold numbers of patches or bins that aren't.
     """
 
-TRACE_FEATURES: int = 30
+TRACE_FEATURES: int = 25
 
 def trace_size(home: tuple[Any, ...]) -> int:
     """Return the size of the memory of `trace_evidence`."""

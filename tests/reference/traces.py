@@ -49,11 +49,11 @@ class Traces:
         gap = min(time - self.last_time, CAP)
         self.gone[hour] += cover > 0.6 and gap > 5
         self.bins[hour] += 1
-        return self._rows(home, day, minute, time, gap, cover, watched, seen, unknown, belief)
+        return self._rows(home, hour, time, gap, cover, watched, seen, unknown, belief)
 
-    def _rows(self, home: Any, day: int, minute: int, time: float, *rest: Any) -> list[list[float]]:
+    def _rows(self, home: Any, hour: int, time: float, *rest: Any) -> list[list[float]]:
         gap, cover, watched, seen, unknown, belief = rest
-        rooms, hour = range(self.rooms), minute // 60
+        rooms = range(self.rooms)
         total = [sum(self.seen[h][r] for h in range(24)) for r in rooms]
         rate = [(total[r] + 1) / (sum(self.watched[h][r] for h in range(24)) + 10) for r in rooms]
         hours = [hour, (hour - 1) % 24, (hour + 1) % 24]
@@ -63,13 +63,9 @@ class Traces:
             for r in rooms
         ]
         moves = [self.moves[self.last][r] + 0.5 for r in rooms] if self.last >= 0 else []
-        phase = minute / 1440
-        waves = [phase, phase + 0.25, 2 * phase, 2 * phase + 0.25]
         shared = [
             math.log1p(gap),
             cover,
-            *(abs(4 * (turns % 1) - 2) - 1 for turns in waves),
-            float((day - 1) % 7 >= 5),
             math.log1p((time - self.first) / 1440),
             float(any(share > 0 for share in seen)),
             max(self.most),

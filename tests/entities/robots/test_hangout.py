@@ -104,6 +104,18 @@ def test_it_moves_rarely() -> None:
     assert min((b - a for a, b in pairwise(moves)), default=600) >= 600
 
 
+def test_a_place_that_is_better_for_a_moment_only_moves_nobody() -> None:
+    moody = {"algorithms": SHARE}
+    eager = {"source": "share", "hysteresis": 0, "moving": 0, "explore": 0, "period": "10 min"}
+    counts = [
+        names(
+            run(home_with([hangout(**eager, **more)], "12 h", {"type": "meander"}, **moody))
+        ).count("relocates")
+        for more in ({}, {"confirm": "0 s"}, {"confirm": "2 h"})
+    ]
+    assert counts[0] == counts[1] > counts[2] >= 1
+
+
 def test_it_stands_still_in_quiet_hours() -> None:
     content = home_with([hangout(explore=1, quiet="07:30-08:30")], "2 h", **belief(bathroom_0=1))
     stored = assert_same_for_every_max_span(content, 61)

@@ -24,7 +24,7 @@ INPUTS = ("features", "places")
 class OnnxModel(CorrectedRoutine):
     """The belief of `routine`, corrected by a network of your own in an ONNX file.
 
-    Inputs are `features`, float32 (bins, places, 30), and `places`, float32 (places, 12), as
+    Inputs are `features`, float32 (bins, places, 25), and `places`, float32 (places, 12), as
     `fleet2d.datasets.windows` has them; the output is float32 (bins, places), probabilities or
     scores of which the softmax is taken, away last. Homes differ in the number of places. It needs
     the package onnxruntime (`pip install "fleet2d[onnx]"`), whose results may differ in the last

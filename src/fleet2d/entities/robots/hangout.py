@@ -1,6 +1,6 @@
 """Hangout: stand near people without blocking their way, and move rarely."""
 
-from datetime import timedelta
+from datetime import datetime, timedelta
 from itertools import combinations
 from typing import ClassVar, Literal
 
@@ -9,7 +9,7 @@ import shapely
 from pydantic import Field
 
 from fleet2d.configuration.components import register
-from fleet2d.configuration.units import Length, PositiveDuration, Share
+from fleet2d.configuration.units import Duration, Length, PositiveDuration, Share
 from fleet2d.entities.behavior import Actor, Hours, Situation, holds
 from fleet2d.entities.place import available_rooms
 from fleet2d.entities.plan import Plan
@@ -217,7 +217,8 @@ class Hangout(BeliefBehavior):
     the share of the shortest ways between two rooms that lead through the robot's body there, for a
     person of radius 0.2 m; s falls from 1 on the place where furniture is used to 0 at 1.2 m from
     it; and m = t / (t + tau), with t the travel time from where it is [s]. It moves only to a place
-    that beats the present one by `hysteresis`, and never in quiet hours. With probability
+    that beats the present one by `hysteresis`, has been better than it for `confirm` (so that a
+    belief that flickers moves nobody), and never in quiet hours. With probability
     `explore` it goes to a room drawn with equal chances instead, looks round in it, and comes back,
     so that its observations don't depend only on its own beliefs.
 
@@ -233,6 +234,7 @@ class Hangout(BeliefBehavior):
         personal_space: Weight of being near a seat.
         moving: Weight of the travel time to a place.
         hysteresis: By how much another place must be better for it to move.
+        confirm: For how long some place must have been better by that before it moves.
         explore: Share of decisions in which it explores any room instead.
         avoid: Rooms, or kinds of rooms if the home has them, that it stays out of.
         quiet: Hours in which it doesn't move.
@@ -248,6 +250,7 @@ class Hangout(BeliefBehavior):
     personal_space: float = Field(default=0.5, ge=0)
     moving: float = Field(default=0.05, ge=0)
     hysteresis: float = Field(default=0.1, ge=0)
+    confirm: Duration = timedelta(0)
     explore: Share = 0.1
     avoid: tuple[str, ...] = ()
     quiet: Hours = ()
@@ -270,6 +273,7 @@ class Hangout(BeliefBehavior):
         self.rated_by: F64 | None = None  # the probabilities behind `worth`
         self.worth = -self.penalty
         self.place: int | None = None
+        self.better_since: datetime | None = None  # some place beats the present one since then
         self.decides_at = actor.clock.start
         self.is_blocked = False  # a person is on its place, or in front of it
 
@@ -307,8 +311,12 @@ class Hangout(BeliefBehavior):
         belief = self.belief(now, self.user)
         scores = self._scores(now, belief.joint)
         best = int(np.argmax(scores))
-        if self.place is None or scores[best] > scores[self.place] + self.hysteresis:
-            self.place = best
+        if self.place is not None and scores[best] <= scores[self.place] + self.hysteresis:
+            self.better_since = None
+            return
+        self.better_since = self.better_since or now.time
+        if self.place is None or now.time - self.better_since >= self.confirm:
+            self.place, self.better_since = best, None
             plan.note("relocates", now.home.plan.rooms[int(self.places.room[best])].name)
 
     def _explore(self, now: Situation, plan: Plan, room: int) -> None:
