@@ -1,4 +1,4 @@
-"""Commands for other programs: live."""
+"""Commands for other programs: live, mcp."""
 
 import json
 from pathlib import Path
@@ -77,3 +77,14 @@ def live(  # noqa: PLR0913 - options of the command line
     )
     if run.status != "complete":
         raise typer.Exit(130)
+
+
+def mcp(
+    folder: Annotated[
+        Path, typer.Argument(metavar="FOLDER", help="The only folder that is read and written.")
+    ],
+) -> None:
+    """Serve assistants by the Model Context Protocol, on stdin and stdout, within one folder."""
+    from fleet2d.live.assistant import serve
+
+    serve(folder)

@@ -1,0 +1,121 @@
+"""Assistants: tools within one folder, over the official SDK."""
+
+import asyncio
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from fleet2d.errors import Fleet2DError, InputError
+from fleet2d.live.assistant import Workspace, server
+
+HOME = "extends: bundled:base\nsimulation: {duration: 3 h, start: 2026-01-05T07:00}\n"
+
+
+@pytest.fixture
+def place(tmp_path: Path) -> Workspace:
+    folder = tmp_path / "homes"
+    folder.mkdir()
+    (tmp_path / "secret.yaml").write_text("name: secret\n")
+    workspace = Workspace(folder)
+    workspace.write("home.yaml", HOME)
+    return workspace
+
+
+def test_a_scenario_is_written_checked_run_and_asked(place: Workspace) -> None:
+    assert place.check("home.yaml")["users"] == ["ana"]
+
+    result = place.run("home.yaml", "first", ["simulation.seed=7"])
+
+    assert result["steps"] == 10800
+    assert place.files() == ["first/", "home.yaml"]
+    rows = place.ask("first", "observations", ["step", "user", "room"], "user == ana", 3)
+    assert rows["rows"] == result["tables"]["observations"]
+    assert len(rows["shown"]) == 3
+    assert place.ask("first", "observations", where="step >= 10000000")["rows"] == 0
+    assert place.picture("first").startswith(b"\x89PNG")
+
+
+def test_a_simulation_waits_for_interventions(place: Workspace) -> None:
+    name = place.begin("home.yaml")
+    place.advance(name, "10 min")
+
+    place.intervene(name, {"put": "ana", "to": "kitchen"})
+    state = place.advance(name, "1 s")
+
+    assert state["state"]["ana"]["room"] == "kitchen_0"
+    assert place.advance(name, "08:00")["time"] == "2026-01-05T08:00:00"
+    assert place.finish(name)["status"] == "interrupted"
+    with pytest.raises(InputError, match="there is no simulation 'simulation_1'; waiting: none"):
+        place.finish(name)
+
+
+@pytest.mark.parametrize("name", ["../secret.yaml", "/etc/passwd", "", ".", "a/../../secret.yaml"])
+def test_paths_out_of_the_folder_are_refused(place: Workspace, name: str) -> None:
+    for use in (place.read, lambda n: place.write(n, "x"), place.check, place.picture):
+        with pytest.raises(InputError, match="leads out of the folder"):
+            use(name)
+    with pytest.raises(InputError, match="leads out of the folder"):
+        place.run("home.yaml", name)
+
+
+def test_links_out_of_the_folder_are_refused(place: Workspace, tmp_path: Path) -> None:
+    (place.folder / "link.yaml").symlink_to(tmp_path / "secret.yaml")
+
+    with pytest.raises(InputError, match="leads out of the folder"):
+        place.read("link.yaml")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "extends: ../secret.yaml\n",
+        HOME + "floorplan: {type: native, path: ../secret.yaml}\n",
+        HOME + "algorithms: {x: {type: 'os:system'}}\n",
+        HOME + "algorithms: {x: {type: process, command: ../secret.yaml}}\n",
+        HOME + "algorithms: {x: {type: process, command: home.yaml}}\n",
+        HOME + "users: {ana: {type: replay, path: ../secret.yaml}}\n",
+    ],
+)
+def test_files_outside_and_code_are_refused(place: Workspace, text: str) -> None:
+    place.write("bad.yaml", text)
+
+    with pytest.raises(Fleet2DError):
+        place.check("bad.yaml")
+
+
+@pytest.mark.parametrize(
+    ("question", "message"),
+    [
+        ({"table": "rooms"}, "there is no table 'rooms'"),
+        ({"table": "events", "columns": ["who"]}, "there is no column 'who'"),
+        ({"table": "events", "where": "who == ana"}, "expected 'COLUMN OP VALUE'"),
+        ({"table": "events", "where": "step > soon"}, "step > soon"),
+    ],
+)
+def test_a_wrong_question_is_answered_with_what_there_is(
+    place: Workspace, question: dict[str, Any], message: str
+) -> None:
+    place.run("home.yaml", "first", ["simulation.duration=1 min"])
+
+    with pytest.raises(InputError, match=message):
+        place.ask("first", **question)
+
+
+def test_a_client_uses_the_tools(place: Workspace) -> None:
+    mcp = pytest.importorskip("mcp", reason="the extra mcp is not installed")
+
+    async def use() -> tuple[set[str], Any, Any]:
+        async with mcp.Client(server(place.folder)) as client:
+            tools = {tool.name for tool in (await client.list_tools()).tools}
+            done = await client.call_tool("run", {"scenario": "home.yaml", "out": "first"})
+            wrong = await client.call_tool("read", {"name": "../secret.yaml"})
+            return tools, done, wrong
+
+    tools, done, wrong = asyncio.run(use())
+
+    assert {"components", "write", "check", "run", "ask", "picture", "intervene"} <= tools
+    assert json.loads(done.content[0].text)["steps"] == 10800
+    assert wrong.is_error
+    assert "leads out of the folder" in wrong.content[0].text
