@@ -27,7 +27,7 @@ from fleet2d.studies.simulator import describe_error, run_scenario
 from fleet2d.studies.specification import read_specification
 
 Result = TypeVar("Result")
-ExecutorName = Literal["local", "ray", "serial"]
+ExecutorName = Literal["local", "ray", "slurm", "serial"]
 
 
 def study(
@@ -45,8 +45,8 @@ def study(
         source: A study file, or the same as a mapping.
         out: A folder, or a location like s3://bucket/study; None: studies/NAME.
         workers: The number of worker processes; None: one per core.
-        executor: Where they run: `local`, `ray`, `serial` (in this process), or an executor of your
-            own.
+        executor: Where they run: `local`, `ray`, `slurm`, `serial` (in this process), or an
+            executor of your own.
         fail_fast: End with the first variant that fails.
         changed: What to do with results of other code or scenarios: `redo` or `keep`; None: refuse
             to continue.
@@ -119,8 +119,17 @@ def map_runs(
     return [results[i] for i in range(len(resolved))]
 
 
-def make_executor(executor: ExecutorName | Executor, workers: int | None = None) -> Executor:
+def make_executor(
+    executor: ExecutorName | Executor,
+    workers: int | None = None,
+    slurm: Mapping[str, Any] | None = None,
+) -> Executor:
     """Return an executor by its name.
+
+    Args:
+        executor: Its name; an executor is returned as it is.
+        workers: The number of workers; None: one per core, or 16 jobs of Slurm.
+        slurm: submitit's parameters of jobs of Slurm.
 
     Raises:
         InputError: There is no executor of that name, or its package is missing.
@@ -135,7 +144,11 @@ def make_executor(executor: ExecutorName | Executor, workers: int | None = None)
         from fleet2d.studies.ray_executor import RayExecutor
 
         return RayExecutor(workers)
-    raise InputError(f"there is no executor {executor!r}: give local, ray or serial")
+    if executor == "slurm":
+        from fleet2d.studies.slurm_executor import SlurmExecutor
+
+        return SlurmExecutor(workers, slurm)
+    raise InputError(f"there is no executor {executor!r}: give local, ray, slurm or serial")
 
 
 def default_location(name: str) -> str:

@@ -27,6 +27,12 @@ studying = typer.Typer(
 Workers = Annotated[
     int | None, typer.Option(min=1, help="Processes at a time; left out: one per core.")
 ]
+SlurmParameters = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--slurm", metavar="KEY=VALUE", help="A parameter of jobs of Slurm, as submitit names it."
+    ),
+]
 Where = Annotated[str, typer.Argument(metavar="DIR", help="The folder or store of a study.")]
 MAX_LINES = 10  # of a list that is printed
 MANY_VARIANTS = 20_000
@@ -47,9 +53,10 @@ def run(  # noqa: PLR0913 - options of the command line
     ] = None,
     workers: Workers = None,
     executor: Annotated[
-        Literal["local", "ray", "serial"],
+        Literal["local", "ray", "slurm", "serial"],
         typer.Option(help="Where the workers are; serial: in this process, for a debugger."),
     ] = "local",
+    slurm: SlurmParameters = None,
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Check all, and print the variants and their time.")
     ] = False,
@@ -80,7 +87,9 @@ def run(  # noqa: PLR0913 - options of the command line
     show = sys.stderr.isatty() and not quiet
     with _interruptible(location), restrict_to(trust, trust_dir), observing(show=show) as observer:
         options = RunOptions(fail_fast, changed, observer)
-        counts = run_study(checked, location, make_executor(executor, workers), options)
+        counts = run_study(
+            checked, location, make_executor(executor, workers, slurm_parameters(slurm)), options
+        )
     if as_json:
         _print(json.dumps({"study": location, **vars(counts), "missing": counts.missing}))
     elif not quiet:
@@ -89,6 +98,25 @@ def run(  # noqa: PLR0913 - options of the command line
         _print_failures(location)
     if counts.failed or counts.missing:
         raise typer.Exit(1)
+
+
+def slurm_parameters(texts: list[str] | None) -> dict[str, Any]:
+    """Return parameters of jobs from texts like `slurm_partition=long`.
+
+    Raises:
+        InputError: A text has no name or no value.
+
+    Example:
+        >>> slurm_parameters(["slurm_partition=long", "timeout_min=240"])
+        {'slurm_partition': 'long', 'timeout_min': 240}
+    """
+    parameters: dict[str, Any] = {}
+    for text in texts or ():
+        name, _, value = text.partition("=")
+        if not name or not value:
+            raise InputError(f"--slurm {text}: write KEY=VALUE, as in timeout_min=240")
+        parameters[name] = int(value) if value.isdigit() else value
+    return parameters
 
 
 @studying.command()
@@ -300,8 +328,9 @@ def tune(  # noqa: PLR0913 - options of the command line
     out: Annotated[Path | None, typer.Option(help="A folder; left out: studies/NAME-tune.")] = None,
     workers: Workers = None,
     executor: Annotated[
-        Literal["local", "ray", "serial"], typer.Option(help="Where the workers are.")
+        Literal["local", "ray", "slurm", "serial"], typer.Option(help="Where the workers are.")
     ] = "local",
+    slurm: SlurmParameters = None,
     changed: Annotated[
         Literal["redo"] | None,
         typer.Option(help="redo: start over if the folder holds another search."),
@@ -323,7 +352,7 @@ def tune(  # noqa: PLR0913 - options of the command line
         specification = read_specification(source)
     folder = out or Path(default_location(f"{specification.name}-tune"))
     show = sys.stderr.isatty() and not quiet
-    runner = make_executor(executor, workers)
+    runner = make_executor(executor, workers, slurm_parameters(slurm))
     with _interruptible(folder), restrict_to(trust, trust_dir), observing_trials(show=show) as bar:
         result = search(specification, folder, runner, bar, changed=changed, storage=storage)
     if quiet:

@@ -1,0 +1,98 @@
+"""Array jobs, run by submitit in processes of this machine: results, failures, and who is cancelled."""
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+from tests.studies.scenes import digests, optional, run, small
+
+from fleet2d.errors import InputError
+from fleet2d.studies import slurm_executor
+from fleet2d.studies.command import slurm_parameters
+from fleet2d.studies.executors import FinishedTask, LostTask, TaskSchedule, WorkerTask
+from fleet2d.studies.slurm_executor import SlurmExecutor
+
+optional("submitit")
+pytestmark = [
+    pytest.mark.skipif(
+        os.environ.get("FLEET2D_REQUIRE_CLUSTER") != "1",
+        reason="every job starts a process: see .ci/cluster",
+    ),
+    pytest.mark.filterwarnings("ignore"),  # submitit's own
+]
+
+
+@pytest.fixture
+def executor(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> SlurmExecutor:
+    monkeypatch.setattr(slurm_executor, "LOOK_EVERY_S", 0.05)
+    return SlurmExecutor(2, folder=tmp_path / "jobs", cluster="local")
+
+
+def tasks(count: int) -> TaskSchedule:
+    return TaskSchedule(WorkerTask(i, i, "") for i in range(count))
+
+
+@dataclass
+class Square:
+    """Squares the number of a task; ends the process at some, the first time or always."""
+
+    folder: Path
+    dies_once: int = -1
+    dies_always: int = -1
+
+    def __call__(self, task: WorkerTask) -> int:
+        mark = self.folder / "died"
+        if task.number == self.dies_always or (task.number == self.dies_once and not mark.exists()):
+            mark.touch()
+            os._exit(1)
+        return task.number**2
+
+
+def test_a_study_of_array_jobs_has_the_results_of_one_here(
+    executor: SlurmExecutor, tmp_path: Path
+) -> None:
+    counts, study = run(small(replicates=1), tmp_path / "jobs_study", executor)
+    _, here = run(small(replicates=1), tmp_path / "here")
+    assert 2 == counts.complete
+    assert digests(here) == digests(study)
+
+
+def test_tasks_of_a_job_that_dies_are_run_again(executor: SlurmExecutor, tmp_path: Path) -> None:
+    executor.workers = 1
+    events = list(executor.run(Square(tmp_path, dies_once=2), tasks(8)))
+    assert all(isinstance(event, FinishedTask) for event in events)
+    payloads: dict[int, Any] = {e.task.number: getattr(e, "payload", None) for e in events}
+    assert {i: i**2 for i in range(8)} == payloads
+
+
+def test_a_task_whose_job_always_dies_is_lost_and_the_others_are_not(
+    executor: SlurmExecutor, tmp_path: Path
+) -> None:
+    events = list(executor.run(Square(tmp_path, dies_always=1), tasks(3)))
+    (lost,) = (event for event in events if isinstance(event, LostTask))
+    assert (1, 3) == (lost.task.number, lost.attempts)
+    assert "in each of 3 attempts" in lost.reason
+    assert {0, 2} == {event.task.number for event in events if isinstance(event, FinishedTask)}
+
+
+def test_closing_cancels_what_runs(executor: SlurmExecutor, tmp_path: Path) -> None:
+    events = executor.run(Square(tmp_path), tasks(3))
+    next(events)
+    events.close()
+
+
+def test_parameters_are_read_and_wrong_ones_refused(tmp_path: Path) -> None:
+    assert {"timeout_min": 5, "slurm_partition": "x"} == slurm_parameters(
+        ["timeout_min=5", "slurm_partition=x"]
+    )
+    with pytest.raises(InputError, match="KEY=VALUE"):
+        slurm_parameters(["timeout_min"])
+    with pytest.raises(InputError, match="can't be submitted"):
+        SlurmExecutor(1, {"timeuot": 5}, tmp_path, "local")
+
+
+def test_without_slurm_there_is_one_line(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="can't be submitted"):
+        SlurmExecutor(1, folder=tmp_path, cluster="slurm")
