@@ -4,7 +4,9 @@ import type { Run } from "../src/data/run";
 import { Walls } from "../src/data/sight";
 import { differences, timeByValue, valueAt } from "../src/data/stretches";
 import { TURN } from "../src/data/tracks";
-import { comparisonAt } from "../src/plan/beliefs";
+import { Beliefs } from "../src/data/beliefs";
+import { chosenBelief, comparisonAt, errorsOf } from "../src/plan/beliefs";
+import { beliefLanes } from "../src/timeline/lanes";
 import { expected, held, wholeRun } from "./fixture";
 
 let run: Run;
@@ -71,6 +73,40 @@ describe("a stored run", () => {
     const sum = (values: Float64Array): number => values.slice(0, -1).reduce((total, part) => total + part, 0);
     expect(sum(comparison.believed)).toBeCloseTo(1, 6);
     expect(sum(comparison.truth)).toBeCloseTo(1, 6);
+  });
+
+  it("knows how wrong each output of shares was: the total variation to the shares until then", () => {
+    const chosen = chosenBelief(run)!;
+    const error = errorsOf(run, chosen);
+    expect(error.us.length).toBeGreaterThan(2);
+    error.us.forEach((us, i) => {
+      const { believed, truth } = comparisonAt(run, us)!;
+      const apart = believed.slice(0, -1).reduce((sum, share, room) => sum + Math.abs(share - truth[room]!), 0) / 2;
+      expect(error.values[i]).toBeCloseTo(apart, 9);
+    });
+  });
+
+  it("judges beliefs of the present by the present room", () => {
+    const { name } = chosenBelief(run)!.beliefs;
+    const rooms = run.facts.home.rooms.length;
+    const shares = new Float64Array(rooms + 1).fill(1 / (rooms + 1));
+    const moments = [0, 3600e6, 7200e6];
+    const series = new Map([["ana", { us: moments, shares: moments.map(() => shares) }]]);
+    run.beliefs.unshift(new Beliefs("now", series, true));
+    const comparison = comparisonAt(run, 7200e6)!;
+    const room = valueAt(run.roomsOf("ana"), 7200e6)!;
+    expect([comparison.algorithm, comparison.truth[room], comparison.now]).toEqual(["now", 1, room]);
+    for (const value of errorsOf(run, chosenBelief(run)!).values) expect(value).toBeCloseTo(rooms / (rooms + 1), 9);
+    run.beliefs.shift();
+    expect(chosenBelief(run)!.beliefs.name).toBe(name);
+  });
+
+  it("shows beliefs as a lane with the rooms that were believed or true, and the truth in words", () => {
+    const [heat, error] = beliefLanes(run);
+    const room = run.facts.home.rooms[valueAt(run.roomsOf("ana"), 20 * 3600e6)!]!.name;
+    expect(heat!.words(20 * 3600e6)).toContain(`true: ${room}`);
+    expect(heat!.paint.kind).toBe("heat");
+    expect(error!.label).toContain("error");
   });
 
   it("reads its layers", async () => {

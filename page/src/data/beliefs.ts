@@ -13,11 +13,23 @@ export interface Belief {
   shares: Float64Array;
 }
 
+/** The outputs about one user: their moments, and shares by room, the last is away. */
+export interface BeliefSeries {
+  us: number[];
+  shares: Float64Array[];
+}
+
 export class Beliefs {
   constructor(
     readonly name: string,
-    private readonly series: Map<string, { us: number[]; shares: Float64Array[] }>,
+    private readonly series: Map<string, BeliefSeries>,
+    /** Whether they are of where a user is now, and not of shares of time. */
+    readonly isOfNow = false,
   ) {}
+
+  of(user: string): BeliefSeries | null {
+    return this.series.get(user) ?? null;
+  }
 
   get users(): string[] {
     return [...this.series.keys()];
@@ -43,6 +55,7 @@ export async function readBeliefs(
   table: Table,
   home: Home,
   stepUs: number,
+  isOfNow: boolean,
 ): Promise<Beliefs | null> {
   const column = SHARE_COLUMNS.find((name) => table.has(name));
   if (!column || !table.has("room")) return null;
@@ -54,7 +67,7 @@ export async function readBeliefs(
     const room = home.roomIndex(word);
     return room >= 0 ? room : home.facts.rooms.length;
   });
-  const series = new Map<string, { us: number[]; shares: Float64Array[] }>();
+  const series = new Map<string, BeliefSeries>();
   for (let i = 0; i < steps.length; i++) {
     const key = user ? (user.words[user.codes[i]!] ?? "") : "";
     let ofUser = series.get(key);
@@ -70,5 +83,5 @@ export async function readBeliefs(
     const place = room.codes[i]! >= 0 ? index[room.codes[i]!]! : home.facts.rooms.length;
     ofUser.shares[ofUser.shares.length - 1]![place]! += shares[i]!;
   }
-  return new Beliefs(name, series);
+  return new Beliefs(name, series, isOfNow);
 }

@@ -59,6 +59,12 @@ export class Run {
     return Math.min(this.facts.end_step, this.clock.steps) * this.clock.stepUs;
   }
 
+  /** Whether an algorithm says where users are now, and not for which shares of their time. */
+  isOfNow(algorithm: string): boolean {
+    const algorithms = this.facts.scenario.algorithms as Record<string, { type?: string } | undefined> | undefined;
+    return algorithms?.[algorithm]?.type === "real_time_presence";
+  }
+
   get bodies(): readonly BodyFacts[] {
     return this.facts.bodies;
   }
@@ -114,7 +120,7 @@ export class Run {
     for (const facts of this.facts.tables.filter((entry) => entry.role === "algorithm")) {
       await this.attempt(async () => {
         const table = await this.open(facts.name);
-        const beliefs = table && (await readBeliefs(facts.name, table, this.home, this.clock.stepUs));
+        const beliefs = table && (await readBeliefs(facts.name, table, this.home, this.clock.stepUs, this.isOfNow(facts.name)));
         if (beliefs) this.beliefs.push(beliefs);
       });
     }

@@ -146,7 +146,7 @@ export class Feed {
       series = { us: [], shares: [] };
       this.shares.set(name, series);
       const user = this.run.bodies.find((body) => !body.robot)?.name ?? "";
-      this.run.beliefs.push(new Beliefs(name, new Map([[user, series]])));
+      this.run.beliefs.push(new Beliefs(name, new Map([[user, series]]), this.run.isOfNow(name)));
     }
     const last = series.shares[series.shares.length - 1];
     if (last && shares.every((share, i) => share === last[i])) return;

@@ -46,7 +46,9 @@ function BeliefsOf({ run, title }: { run: Run; title: string }) {
       <p class="hint">
         {comparison.sinceUs < 0
           ? "No output yet."
-          : `Bars: believed since ${run.clock.text(comparison.sinceUs)}. Lines: share of the time until now, of rooms at home. ● is there now.`}
+          : `Bars: believed since ${run.clock.text(comparison.sinceUs)}. ${
+              comparison.isOfNow ? "Line and ●: the room now." : "Lines: share of the time until now, of rooms at home. ● is there now."
+            }`}
       </p>
       <table class="bars">
         <tbody>

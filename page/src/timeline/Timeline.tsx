@@ -7,7 +7,7 @@ import { fitted, oncePerFrame } from "../plan/canvas";
 import * as state from "../state";
 import { colors } from "../theme";
 import { AXIS_HEIGHT, drawCursor, drawLanes, GAP, heightOf, laneAt, type Scale, usOf, xOf } from "./draw";
-import { answerLane, type Lane, lanesOf, tableLanes } from "./lanes";
+import { answerLane, beliefLanes, type Lane, lanesOf, tableLanes } from "./lanes";
 
 /** Lanes of all runs; those of tables are read once. */
 function useLanes(): { value: Lane[] } {
@@ -33,7 +33,9 @@ function useLanes(): { value: Lane[] } {
           const title = runs.length > 1 ? run.facts.title : "";
           return [...lanesOf(run, `${i}:`, i === 0 ? other : null, title), ...(extra.value.get(run) ?? [])];
         });
-        lanes.value = answer && answer.spans.length > 0 ? [answerLane(answer), ...own] : own;
+        const asked = answer && answer.spans.length > 0 ? [answerLane(answer)] : [];
+        const showsBeliefs = state.panel.value === "beliefs" || state.shown.value.has("beliefs");
+        lanes.value = [...asked, ...(showsBeliefs && runs[0] ? beliefLanes(runs[0]) : []), ...own];
       }),
     [],
   );

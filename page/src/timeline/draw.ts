@@ -1,7 +1,7 @@
 /** Draw lanes, the axis of dates and times, and the cursor of a timeline. */
 
 import type { Clock } from "../data/clock";
-import { firstAtLeast } from "../data/search";
+import { firstAtLeast, lastAtMost } from "../data/search";
 import { type Colors } from "../theme";
 import type { Lane, LanePaint } from "./lanes";
 
@@ -52,7 +52,41 @@ export function drawLanes(context: Context, lanes: readonly Lane[], scale: Scale
 function paintLane(context: Context, paint: LanePaint, scale: Scale, top: number, height: number, colors: Colors): void {
   if (paint.kind === "stretches") paintStretches(context, paint, scale, top, height, colors);
   else if (paint.kind === "ticks") paintTicks(context, paint.us, paint.color, scale, top, height);
+  else if (paint.kind === "heat") paintHeat(context, paint, scale, top, height, colors);
   else paintLine(context, paint, scale, top, height);
+}
+
+/** A row a room, the darker the more is believed of it; where the user really is as a line. */
+function paintHeat(
+  context: Context,
+  { beliefs, rows, truth, color, endUs }: Extract<LanePaint, { kind: "heat" }>,
+  scale: Scale,
+  top: number,
+  height: number,
+  colors: Colors,
+): void {
+  const tall = height / rows.length;
+  context.fillStyle = color;
+  let i = Math.max(0, lastAtMost(beliefs.us, scale.from));
+  while (i < beliefs.us.length && beliefs.us[i]! <= scale.to) {
+    const left = Math.max(0, xOf(scale, beliefs.us[i]!));
+    let next = i + 1; // of the outputs within a pixel the first is shown
+    while (next < beliefs.us.length && xOf(scale, beliefs.us[next]!) < left + 1) next++;
+    const right = Math.min(scale.width, xOf(scale, beliefs.us[next] ?? endUs));
+    rows.forEach((room, row) => {
+      context.globalAlpha = Math.min(1, beliefs.shares[i]![room]!);
+      context.fillRect(left, top + row * tall, right - left, tall - 1);
+    });
+    i = next;
+  }
+  context.globalAlpha = 1;
+  context.fillStyle = colors.text;
+  for (let k = Math.max(0, firstAtLeast(truth.to, scale.from)); k < truth.from.length && truth.from[k]! <= scale.to; k++) {
+    const row = rows.indexOf(truth.value[k]!);
+    if (row < 0) continue;
+    const [left, right] = [Math.max(0, xOf(scale, truth.from[k]!)), Math.min(scale.width, xOf(scale, truth.to[k]!))];
+    context.fillRect(left, top + (row + 0.5) * tall - 1.5, Math.max(1, right - left), 2);
+  }
 }
 
 function paintStretches(

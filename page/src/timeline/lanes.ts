@@ -1,9 +1,11 @@
 /** The lanes of a timeline: what each shows, in which colours. */
 
 import type { Answer } from "../data/ask";
+import type { BeliefSeries } from "../data/beliefs";
 import type { Run } from "../data/run";
 import { lastAtMost } from "../data/search";
-import { differences, type Stretches } from "../data/stretches";
+import { differences, type Stretches, valueAt } from "../data/stretches";
+import { chosenBelief, errorsOf } from "../plan/beliefs";
 import { bodyColor, colors, dark, mix } from "../theme";
 import { type Series, readSeries } from "../data/metrics";
 
@@ -21,7 +23,8 @@ export interface Lane {
 export type LanePaint =
   | { kind: "stretches"; stretches: Stretches; color: (value: number) => string | null; label: (value: number) => string }
   | { kind: "ticks"; us: readonly number[]; color: string }
-  | { kind: "line"; series: Series; color: string };
+  | { kind: "line"; series: Series; color: string }
+  | { kind: "heat"; beliefs: BeliefSeries; rows: readonly number[]; truth: Stretches; color: string; endUs: number };
 
 /** Distinct colours with any kind of colour blindness (Paul Tol's muted scheme). */
 const WORD_COLORS = ["#88ccee", "#ddcc77", "#cc6677", "#44aa99", "#aa4499", "#999933", "#332288", "#117733", "#882255"];
@@ -44,6 +47,39 @@ export function lanesOf(run: Run, prefix: string, other: Run | null, title = "")
   const lanes = ownLanes(run, prefix, other);
   if (title) lanes.forEach((lane) => (lane.label = `${title}: ${lane.label}`));
   return lanes;
+}
+
+const HEAT_ROW_HEIGHT = 9;
+const MIN_HEAT = 0.02;
+
+/** What is believed of each room over time, the true room drawn over it, and the error below. */
+export function beliefLanes(run: Run): Lane[] {
+  const chosen = chosenBelief(run);
+  const beliefs = chosen?.beliefs.of(chosen.user);
+  if (!chosen || !beliefs) return [];
+  const { rooms } = run.facts.home;
+  const place = (value: number): number => (value < 0 ? rooms.length : value);
+  const lane = run.roomsOf(chosen.user);
+  const truth: Stretches = { ...lane, value: [...lane.value].map(place) };
+  const been = new Set(truth.value);
+  const rows = [...rooms.keys(), rooms.length].filter(
+    (room) => been.has(room) || beliefs.shares.some((shares) => shares[room]! > MIN_HEAT),
+  );
+  const name = (room: number): string => rooms[room]?.name ?? "away";
+  const label = `${chosen.beliefs.name} of ${chosen.user}`;
+  const color = bodyColor(run.body(chosen.user)?.color ?? "#0077bb");
+  const words = (us: number): string => {
+    const at = lastAtMost(beliefs.us, us);
+    if (at < 0) return "";
+    const shares = rows.map((room) => [room, beliefs.shares[at]![room]!] as const).sort((one, other) => other[1] - one[1]);
+    const believed = shares.slice(0, 3).map(([room, share]) => `${name(room)} ${(100 * share).toFixed(0)} %`);
+    const room = valueAt(truth, us);
+    return `${believed.join(", ")}${room === null ? "" : `; true: ${name(room)}`}`;
+  };
+  const paint: LanePaint = { kind: "heat", beliefs, rows, truth, color, endUs: run.endUs };
+  const heat = { id: "belief", label, height: rows.length * HEAT_ROW_HEIGHT, words, paint, subject: chosen.user };
+  const error = errorsOf(run, chosen);
+  return [heat, { ...lineLane("", label, error), label: `${label}: error` }];
 }
 
 /** What answers the question that was asked; its words are those of each mark. */
@@ -225,20 +261,19 @@ export async function tableLanes(run: Run, prefix: string): Promise<Lane[]> {
       else {
         const series = await readSeries(facts, table, run.clock.stepUs);
         const first = series[0];
-        if (first && first.us.length > 1) lanes.push(lineLane(run, prefix, facts.name, first));
+        if (first && first.us.length > 1) lanes.push(lineLane(prefix, facts.name, first));
       }
     });
   }
   return lanes;
 }
 
-function lineLane(run: Run, prefix: string, name: string, series: Series): Lane {
+function lineLane(prefix: string, name: string, series: Series): Lane {
   const words = (us: number): string => {
     const i = series.us.findIndex((at) => at >= us);
     const value = series.values[i < 0 ? series.values.length - 1 : i];
     return value === undefined || Number.isNaN(value) ? "" : `${series.name}: ${value.toPrecision(3)}`;
   };
-  void run;
   const paint: LanePaint = { kind: "line", series, color: colors.value.text };
   return { id: `${prefix}${name}/metric`, label: `${name} ${series.name}`, subject: "", height: 24, words, paint };
 }
