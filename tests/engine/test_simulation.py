@@ -41,7 +41,8 @@ def test_advancing_beyond_the_end_stops_at_the_end() -> None:
     simulation.advance(1000)
     assert (60, True) == (simulation.step, simulation.done)
     simulation.advance()
-    simulation.run_until(datetime(2030, 1, 1))
+    with pytest.raises(InputError, match="is after the run"):
+        simulation.run_until(datetime(2030, 1, 1))
     assert 60 == simulation.step
     assert "complete" == simulation.finish().status
 
@@ -50,7 +51,7 @@ def test_time_only_goes_forward() -> None:
     simulation = fleet2d.Simulation(small())
     simulation.advance(100)
     for when in (50, timedelta(seconds=3), datetime(2026, 1, 5, 6)):
-        with pytest.raises(InputError, match="it is step 100 already"):
+        with pytest.raises(InputError, match="now it is step 100, 2026-01-05 07:01:40"):
             simulation.run_until(when)
     with pytest.raises(InputError, match="must be 0 or more"):
         simulation.advance(-3)

@@ -15,6 +15,8 @@ from datetime import datetime, timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO, Self
 
+from pydantic_core import PydanticCustomError
+
 from fleet2d.algorithms.algorithm import Algorithm
 from fleet2d.artifacts.manifest import FLOORPLAN_NAME, LEARNED_NAME, SLOW, RunEnd, RunStart, Status
 from fleet2d.artifacts.store import RunStore, cannot_write
@@ -41,12 +43,12 @@ from fleet2d.errors import ArtifactError, InputError, ScenarioError
 from fleet2d.floorplan.checkup import errors_in
 from fleet2d.floorplan.formats.native import native_document
 from fleet2d.floorplan.home import Home
-from fleet2d.interventions.intervention import Intervention
+from fleet2d.interventions.intervention import ClockTime, Intervention, parse_when
 from fleet2d.interventions.methods import InterventionMethods
 from fleet2d.kernels.numbers import in_radians
 from fleet2d.memory import free_bodies, rare_collections
 from fleet2d.runs.run import Run, open_store
-from fleet2d.runtime.clock import Clock, next_time
+from fleet2d.runtime.clock import Clock, midnight_of
 from fleet2d.runtime.events import Event, EventKind, Listener
 from fleet2d.scenario.model import Scenario, load_scenario
 
@@ -412,26 +414,31 @@ class Simulation(InterventionMethods):
 
     def run_until(
         self,
-        when: int | str | datetime | timedelta | None = None,
+        when: "int | str | datetime | timedelta | Callable[[Self], bool] | Expectation" = "",
         *,
         event: str | None = None,
         entity: str | None = None,
         timeout: str | timedelta | None = None,
-    ) -> Event | None:
-        """Simulate up to a step, a local time or an event.
+    ) -> "Event | Verdict | bool | None":
+        """Simulate up to a step, a time, an event, or until something holds.
 
         Args:
-            when: A step, a local time, a time since the start, or the next time of day ("19:00").
+            when: A step, or a time as in a script: the next time of day ("19:00", "monday 07:30"),
+                a local time, or a time since the start ("2 h"). Or a function of the simulation,
+                called before each step, until it returns True. Or a condition, also as text: until
+                it holds; or another expectation: until it is decided.
             event: A kind of event instead, as in the table of events; the next step is the one
                 after it.
             entity: The body or object that it has to happen to; None: any.
-            timeout: The longest time to wait for the event; None: up to the end of the run.
+            timeout: The longest time to wait, except for a time; None: up to the end of the run.
 
         Returns:
-            The event; None if it didn't happen, or `when` is given.
+            The event, None if it didn't happen; None for a time; for a function, whether it
+            returned True; for an expectation the verdict, not `decided` if there was no time.
 
         Raises:
-            InputError: The time is past, the run is finished, or there is no such event or body.
+            InputError: The time is past or after the run, the run is finished, or there is no such
+                event or body.
             KeyboardInterrupt: Ctrl-C, after the present span; the simulation can be continued.
 
         Example:
@@ -442,39 +449,94 @@ class Simulation(InterventionMethods):
             19
             >>> simulation.run_until(event="user_seen", entity="astro", timeout="12 h").detail
             'ana'
+            >>> simulation.run_until("distance(astro, ana) > 2 m").holds
+            True
         """
-        if event is None:
+        if event is not None:
+            return self._run_until_event(event, entity, timeout)
+        if isinstance(when, str) and "(" in when:
+            when = _parsed(when)
+        if isinstance(when, int | str | datetime | timedelta):
             step = self._step_of(when)
-            if step < self.step:
+            if not self.step <= step <= self.clock.steps:
                 raise InputError(
-                    f"run_until(step {step}): it is step {self.step} already, {self.time}; branch a"
-                    " copy before that"
+                    f"run_until({when!r}) is {self._describe(step)}; now it is step {self.step},"
+                    f" {self.time}, and the run ends at {self.clock.time(self.clock.steps)}"
                 )
-            self._run_to(min(self.clock.steps, step))
+            self._run_to(step)
             return None
-        return self._run_until_event(event, entity, timeout)
+        end = self._end_of_wait(timeout)
+        if not callable(when):
+            return self._run_until_expectation(when, end)
+        while not (holds := when(self)) and self.step < end:
+            self._run_to(self.step + 1)
+        return holds
 
-    def _step_of(self, when: int | str | datetime | timedelta | None) -> int:
-        if when is None:
-            raise InputError("run_until(): give a time, or event=…")
+    def _describe(self, step: int) -> str:
+        is_past = step < self.step
+        return "past: keep a copy of an earlier step to go back" if is_past else "after the run"
+
+    def _end_of_wait(self, timeout: str | timedelta | None) -> int:
+        if timeout is None:
+            return self.clock.steps
+        wait = parse_duration(timeout) if isinstance(timeout, str) else timeout
+        return min(self.clock.steps, self.step + self.clock.step_at_or_after(micros(wait)))
+
+    def _run_until_expectation(self, expectation: "Expectation", end: int) -> "Verdict":
+        """Simulate until a condition holds, or an expectation is decided.
+
+        A copy goes ahead, so that the run itself stops at that step and knows nothing of it.
+        """
+        from fleet2d.expectations.temporal import eventually
+
+        after, steps = copy.deepcopy(self), 60
+        name = after.expect(expectation if expectation.is_judged else eventually(expectation))
+        before = after
+        while after.step < end and (before is after or not after.verdicts()[name].decided):
+            before = copy.deepcopy(after)
+            after._run_to(min(end, after.step + steps))
+            steps *= 2
+        while after.step - before.step > 1 and after.verdicts()[name].decided:
+            middle = copy.deepcopy(before)
+            middle._run_to((before.step + after.step) // 2)
+            if middle.verdicts()[name].decided:
+                after = middle
+            else:
+                before = middle
+        self._run_to(after.step)
+        return after.verdicts()[name]
+
+    def _step_of(self, when: int | str | datetime | timedelta) -> int:
+        if when == "":
+            raise InputError("run_until(): give a time, a condition, or event=…")
         if isinstance(when, str):
-            when = next_time(when, self.time)
+            when = self._moment(when)
         if isinstance(when, datetime):
             when = when - self.clock.start
         if isinstance(when, timedelta):
             return self.clock.step_at_or_after(micros(when))
         return operator.index(when)
 
+    def _moment(self, text: str) -> datetime | timedelta:
+        """Return a time as scripts write it; a time of day is the next one."""
+        try:
+            when = parse_when(text)
+        except PydanticCustomError as error:
+            raise InputError(f"run_until({text!r}): {error}") from None
+        if not isinstance(when, ClockTime):
+            return when
+        day = midnight_of(self.time)
+        while day.weekday() not in when.days or day + when.time < self.time:
+            day += timedelta(days=1)
+        return day + when.time
+
     def _run_until_event(
         self, event: str, entity: str | None, timeout: str | timedelta | None
     ) -> Event | None:
-        state, end = self._state, self.clock.steps
+        state, end = self._state, self._end_of_wait(timeout)
         _check_name("event", event, self._event_kinds())
         if entity is not None:
             _check_name("entity", entity, [*self.actors, *self.scenario.objects])
-        if timeout is not None:
-            wait = parse_duration(timeout) if isinstance(timeout, str) else timeout
-            end = min(end, self.step + self.clock.step_at_or_after(micros(wait)))
         state.wait_for(frozenset({event}))
         try:
             while self.step < end:
