@@ -12,8 +12,9 @@ import pytest
 from starlette.testclient import TestClient
 
 import fleet2d
+from fleet2d.errors import InputError
 from fleet2d.viewer.page_data import PageData
-from fleet2d.viewer.page_server import PageServer, ServedRuns, new_token, page_app
+from fleet2d.viewer.page_server import PageServer, ServedRuns, kept_token, new_token, page_app
 
 TOKEN = "0123456789abcdefghijABCDEFGHIJ01"
 PORT = 8765
@@ -272,3 +273,51 @@ def test_tables_of_a_run_that_was_cut_off_are_served_from_its_journal(tmp_path: 
         steps = pq.read_table(io.BytesIO(answer.content))["step"].to_pylist()
         assert 0 < len(steps) <= len(complete)
         assert complete[: len(steps)] == steps or "key_frames" == name
+
+
+@pytest.fixture
+def state(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The state folder of a user."""
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    return tmp_path / "state" / "fleet2d" / "view-token"
+
+
+def test_a_link_stays_valid_as_the_token_is_kept_where_only_the_user_reads_it(state: Path) -> None:
+    """A link to a moment was dead as soon as `fleet2d view` was started again."""
+    assert kept_token() == kept_token() == state.read_text()
+    assert state.stat().st_mode & 0o777 == 0o600
+
+
+@pytest.mark.parametrize("damage", ["others read it", "short", "link", "folder is a file"])
+def test_a_kept_token_that_cannot_be_trusted_is_not_used(state: Path, damage: str) -> None:
+    if damage == "folder is a file":
+        state.parent.parent.write_text("")
+    else:
+        kept = kept_token()
+        if damage == "others read it":
+            state.chmod(0o644)
+        elif damage == "short":
+            state.write_text("short")
+        else:
+            other = state.with_name("other")
+            state.rename(other)
+            state.symlink_to(other)
+        assert kept_token() != kept
+    assert kept_token() != kept_token()
+    assert len(kept_token()) >= 32
+
+
+def test_a_page_behind_a_tunnel_or_proxy_answers_under_the_stated_address_only(
+    run_dir: Path,
+) -> None:
+    app = page_app(ServedRuns([run_dir]), "token", PORT, seen_at="https://robots.example/fleet2d")
+    at = {url: TestClient(app, base_url=url) for url in ("https://robots.example", "http://evil")}
+    assert at["https://robots.example"].get("/token/session.json").status_code == 200
+    refused = at["http://evil"].get("/token/session.json")
+    assert refused.status_code == 403
+    assert "--seen-at" in refused.json()["message"]
+
+
+def test_what_is_no_address_of_a_proxy_is_refused(run_dir: Path) -> None:
+    with pytest.raises(InputError, match="http://localhost:9000"):
+        PageServer([run_dir], seen_at="localhost:9000")

@@ -22,6 +22,10 @@ def view(
         ),
     ] = None,
     port: Annotated[int, typer.Option(min=0, max=65535, help="Port; 0: a free one.")] = 0,
+    seen_at: Annotated[
+        str | None,
+        typer.Option(metavar="URL", help="Address in the browser, of a tunnel or proxy."),
+    ] = None,
     browser: Annotated[bool, typer.Option(help="Whether to open the browser.")] = True,
     seed: Annotated[int | None, typer.Option(help="Of a scenario: its seed.")] = None,
     out: Annotated[Path | None, typer.Option(help="Of a scenario: directory of the run.")] = None,
@@ -37,7 +41,7 @@ def view(
         with restrict_to(trust, trust_dir):
             if trust or trust_dir:
                 _import_code(directories)
-            _view_runs(directories, port, browser=browser)
+            _view_runs(directories, port, seen_at or "", browser=browser)
         return
     scenario, overrides = split(names)
     if scenario is not None and scenario.endswith("/"):
@@ -51,6 +55,7 @@ def view(
             seed=seed,
             out=out,
             port=port,
+            seen_at=seen_at or "",
             open_browser=browser,
             announce=_announce,
         )
@@ -73,7 +78,7 @@ def _where(run: "Run") -> str:
     )
 
 
-def _view_runs(directories: list[Path], port: int, *, browser: bool) -> None:
+def _view_runs(directories: list[Path], port: int, seen_at: str, *, browser: bool) -> None:
     from fleet2d.artifacts.manifest import FILE_NAME
     from fleet2d.viewer.page_server import MAX_RUNS, PageServer
 
@@ -82,7 +87,8 @@ def _view_runs(directories: list[Path], port: int, *, browser: bool) -> None:
     for path in directories:
         if not (path / FILE_NAME).exists():
             raise RunDirectoryError(f"{path} holds no run: give what `fleet2d run --out` wrote")
-    PageServer(directories, port=port).show(open_browser=browser, announce=_announce)
+    server = PageServer(directories, port=port, seen_at=seen_at)
+    server.show(open_browser=browser, announce=_announce)
     raise typer.Exit(130)
 
 

@@ -476,6 +476,7 @@ def watch_scenario(
     seed: int | None = None,
     out: Path | None = None,
     port: int = 0,
+    seen_at: str = "",
     open_browser: bool = True,
     announce: Callable[[str], None] = print,
 ) -> Run:
@@ -487,6 +488,7 @@ def watch_scenario(
         seed: Its seed.
         out: The directory of the run; None: the run stays in memory.
         port: The port of the page; 0: a free one.
+        seen_at: Another address under which browsers reach it.
         open_browser: Whether to open the page.
         announce: Called with the address of the page.
 
@@ -495,7 +497,7 @@ def watch_scenario(
     """
     settings: dict[str, Any] = {} if seed is None else {"seed": seed}
     live = LiveRun(Simulation(scenario, *overrides, out=out, **settings), paused=True)
-    server = PageServer([], port=port, live=live)
+    server = PageServer([], port=port, live=live, seen_at=seen_at)
     live.start()
     try:
         server.show(open_browser=open_browser, announce=announce)

@@ -1,6 +1,8 @@
 """The server of the page: it serves the page and some runs on this machine, and nothing else."""
 
 import asyncio
+import os
+import re
 import secrets
 import signal
 import socket
@@ -12,6 +14,7 @@ from http import HTTPStatus
 from pathlib import Path
 from types import FrameType
 from typing import Protocol
+from urllib.parse import urlsplit
 
 from starlette.applications import Starlette
 from starlette.concurrency import run_in_threadpool
@@ -22,6 +25,7 @@ from starlette.routing import Route
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from fleet2d import __version__
+from fleet2d.bounds import one_line
 from fleet2d.errors import ArtifactError, Fleet2DError, InputError, end_by_signal, extra
 from fleet2d.runs.run import open_run
 from fleet2d.viewer.contract import Problem, SessionFacts
@@ -38,6 +42,7 @@ def problem(message: str, status: int = 422) -> Response:
     return json_answer(compact_json(Problem(message=message)), status)
 
 
+TOKEN = re.compile(r"[\w-]{32,64}", re.ASCII)
 HOSTS = ("127.0.0.1", "localhost", "[::1]")
 POLICY = "; ".join(
     (
@@ -67,6 +72,26 @@ def new_token() -> str:
     return secrets.token_urlsafe(24)
 
 
+def kept_token() -> str:
+    """Return the token of this user, so that links stay valid; a new one where none can be kept.
+
+    It is in `fleet2d/view-token` of the user's state folder, which nobody else may read.
+    """
+    default = Path("~/.local/state")
+    folder = Path(os.environ.get("XDG_STATE_HOME") or os.environ.get("LOCALAPPDATA") or default)
+    path = folder.expanduser() / "fleet2d" / "view-token"
+    with suppress(OSError, RuntimeError, ValueError):
+        path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
+        with suppress(FileExistsError):
+            path.touch(0o600, exist_ok=False)
+            path.write_text(new_token())
+        kept, mode = path.read_text(), path.stat().st_mode
+        is_private = os.name == "nt" or not mode & 0o077
+        if is_private and not path.is_symlink() and TOKEN.fullmatch(kept):
+            return kept
+    return new_token()
+
+
 class Guard:
     """Refuses requests of other web pages, for other host names, and without the token.
 
@@ -75,17 +100,22 @@ class Guard:
     at this machine is visible in `Host`.
     """
 
-    def __init__(self, app: ASGIApp, token: str, port: int) -> None:
+    def __init__(self, app: ASGIApp, token: str, port: int, seen_at: str = "") -> None:
         """Guard an application.
 
         Args:
             app: The application that serves allowed requests.
             token: The first part of every allowed path.
             port: The port of the server.
+            seen_at: Another address under which browsers reach it, such as that of a proxy.
         """
         self._app, self._token = app, token
         self._hosts = {f"{host}:{port}" for host in HOSTS}
         self._origins = {f"http://{host}" for host in self._hosts}
+        if seen_at:
+            scheme, host = urlsplit(seen_at)[:2]
+            self._hosts.add(host)
+            self._origins.add(f"{scheme}://{host}")
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve a request, or refuse it."""
@@ -105,7 +135,10 @@ class Guard:
         """Return why a request is refused; empty if it is allowed."""
         headers = Headers(scope=scope)
         if headers.get("host", "") not in self._hosts:
-            return "this server answers under 127.0.0.1 and localhost only"
+            return (
+                "this server answers under 127.0.0.1 and localhost and its own port only; start it"
+                " with --seen-at and the address of your tunnel or proxy"
+            )
         origin = headers.get("origin")
         if origin is not None and origin not in self._origins:
             return "this request comes from another web page"
@@ -195,7 +228,12 @@ class ServedRuns:
 
 
 def page_app(
-    runs: ServedRuns, token: str, port: int, live: LiveRoutes | None = None, page: Path = PAGE
+    runs: ServedRuns,
+    token: str,
+    port: int,
+    live: LiveRoutes | None = None,
+    page: Path = PAGE,
+    seen_at: str = "",
 ) -> ASGIApp:
     """Return the application that serves the page and some runs.
 
@@ -205,6 +243,7 @@ def page_app(
         port: The port of the server.
         live: A running simulation, beside or instead of runs.
         page: The folder of the page's bundle.
+        seen_at: Another address under which browsers reach it.
     """
 
     async def session(_: Request) -> Response:
@@ -228,7 +267,7 @@ def page_app(
         *(live.routes() if live else ()),
         Route("/{name}", file),
     ]
-    return Guard(_strip_token(token, Starlette(routes=routes)), token, port)
+    return Guard(_strip_token(token, Starlette(routes=routes)), token, port, seen_at)
 
 
 def _strip_token(token: str, app: ASGIApp) -> ASGIApp:
@@ -310,7 +349,12 @@ class PageServer:
     """
 
     def __init__(
-        self, sources: Sequence[Path | PageData], *, port: int = 0, live: LiveRoutes | None = None
+        self,
+        sources: Sequence[Path | PageData],
+        *,
+        port: int = 0,
+        live: LiveRoutes | None = None,
+        seen_at: str = "",
     ) -> None:
         """Bind a port of this machine.
 
@@ -318,10 +362,17 @@ class PageServer:
             sources: Run directories, or data of runs.
             port: The port; 0: a free one.
             live: A running simulation.
+            seen_at: The address under which browsers reach it, if not by this port: of a tunnel
+                (`ssh -L`) or a proxy.
 
         Raises:
-            InputError: The port is in use.
+            InputError: The port is in use, or `seen_at` is no address.
         """
+        if seen_at and not re.fullmatch(r"https?://[\w.:\[\]-]+(/[\w./~-]*)?", seen_at):
+            raise InputError(
+                f"--seen-at {one_line(seen_at, 80)!r} is no address of a page: give one like"
+                " http://localhost:9000 or https://robots.example/fleet2d"
+            )
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
@@ -331,10 +382,11 @@ class PageServer:
             raise InputError(f"port {port} can't be used: {error}; choose another --port") from None
         host, self._port = self._socket.getsockname()[:2]
         self.listens_at: tuple[str, int] = (str(host), int(self._port))
-        token = new_token()
-        self.address = f"http://{HOST}:{self._port}/{token}/"
+        token = kept_token()
+        base = seen_at.rstrip("/") or f"http://{HOST}:{self._port}"
+        self.address = f"{base}/{token}/"
         self._runs = ServedRuns(sources)
-        app = page_app(self._runs, token, self._port, live)
+        app = page_app(self._runs, token, self._port, live, seen_at=seen_at)
         # Quiet: a page that is open when the server ends is no error.
         config = uvicorn.Config(
             app, log_level="critical", lifespan="off", ws="none", timeout_graceful_shutdown=1
