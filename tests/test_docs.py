@@ -99,6 +99,9 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def test_python_of_a_page_runs_in_an_empty_folder(
     page: Path, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    if page.stem == "gym":
+        pytest.importorskip("gymnasium", reason="needs the extra gym")
+        pytest.importorskip("pettingzoo", reason="needs the extra gym")
     write_titled_blocks(page, folder)
     monkeypatch.syspath_prepend(folder)  # as Python's prompt has its folder
     run_python_blocks(page)

@@ -22,6 +22,7 @@ TABLES = [
     *(("behaviors", name, name) for name in ("schedule", "meander", "patrol")),
     *(("people", name, name) for name in ("routine", "population", "room_sampling", "pet")),
     *(("robots", name, name) for name in ("hangout", "find")),
+    ("gym", "Tasks of your own", "policy"),
     ("robots", "Several behaviors", Behavior),
     ("perception", "Cameras", Camera),
     ("perception", "Errors of localization", Localization),

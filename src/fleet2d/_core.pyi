@@ -1416,6 +1416,9 @@ class Timelines:
     def forget(self, before: int) -> None:
         """Drop what is only needed for steps earlier than `before`."""
 
+    def __copy__(self) -> Timelines:
+        """Return an independent copy."""
+
     def __getstate__(self) -> tuple[Any, ...]: ...
 
     def __setstate__(self, state: tuple[Any, ...]) -> None: ...

@@ -114,6 +114,18 @@ public:
         std::erase_if(meshes_, [this](const nb::object& mesh) { return !is_walked(nb::cast<Mesh>(mesh)); });
     }
 
+    // A copy that shares tracks, which never change, and has its own random walks, which are drawn on.
+    OwnedTimelines copy() const {
+        OwnedTimelines twin(timelines_.bodies(), timelines_.step_us());
+        for (i64 body = 0; body < timelines_.bodies(); ++body) {
+            for (const auto& [first, track, walk] : timelines_.pieces(body)) {
+                twin.timelines_.put(body, {first, track, walk ? std::make_shared<WalkPiece>(*walk) : nullptr});
+            }
+        }
+        twin.meshes_ = meshes_;
+        return twin;
+    }
+
     nb::tuple state() const {
         nb::list bodies;
         for (i64 body = 0; body < timelines_.bodies(); ++body) {
@@ -402,6 +414,7 @@ Args:
         .def("runs", &OwnedTimelines::runs, "body"_a, "first"_a, "end"_a,
              "Return the runs of equal pose of one body in the steps from `first` to `end` - 1.")
         .def("forget", &OwnedTimelines::forget, "before"_a, "Drop what is only needed for steps earlier than `before`.")
+        .def("__copy__", &OwnedTimelines::copy, "Return an independent copy.")
         .def("__getstate__", &OwnedTimelines::state, nb::sig("def __getstate__(self) -> tuple[typing.Any, ...]"))
         .def(
             "__setstate__",

@@ -7,7 +7,7 @@ that are written in Python.
 import math
 from collections.abc import Iterator, Sequence, Set
 from fractions import Fraction
-from typing import ClassVar, NamedTuple
+from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -59,6 +59,9 @@ from fleet2d.sight.fov import FieldOfView
 from fleet2d.sight.line_of_sight import LineOfSight
 from fleet2d.sight.perception import Perception
 
+if TYPE_CHECKING:
+    from fleet2d.entities.robots.policy import SightingMemory
+
 # Squared distance beyond which a dark camera sees nobody.
 NO_RANGE = -1
 # Methods may round points to cells, so points this far outside the field of view are checked, too.
@@ -104,6 +107,7 @@ class Cameras(Watcher):
         perceived: The last perceived place of each identity, (identities, 2); the last row is for
             somebody unknown.
         awaited: Events that algorithms wait for: they end a span, too.
+        remembered: What its owner remembers of its sightings; None: nothing.
         next_step: The first step at which it has not looked.
         knows_truth: Whether the truth behind its sightings is known.
         notes: What is to be said about its source.
@@ -146,6 +150,7 @@ class Cameras(Watcher):
         self.memory = self._set_up()
         self.perceived = np.zeros((len(self.others) + 1, 2), np.int64)
         self.awaited: Set[str] = frozenset()
+        self.remembered: SightingMemory | None = None
         self._sightings: list[I64] = []  # not collected yet
         self._ahead: Look | None = None
 
@@ -303,6 +308,8 @@ class Cameras(Watcher):
         self.next_step = end
         if len(rows):
             self._sightings.append(rows)
+            if self.remembered is not None:
+                self.remembered.take(rows)
         identity = rows[:, SightingColumn.IDENTITY]  # -1, somebody unknown, is the last row
         self.perceived[identity, 0] = rows[:, SightingColumn.X]
         self.perceived[identity, 1] = rows[:, SightingColumn.Y]

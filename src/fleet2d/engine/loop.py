@@ -291,6 +291,38 @@ class Loop:
             self._is_stopping = False
             raise KeyboardInterrupt
 
+    def run_until_asked(self, state: State, end: int, asks: Callable[[State, int], bool]) -> bool:
+        """Simulate up to a step, or until a condition holds when bodies are about to decide.
+
+        Args:
+            state: The run.
+            end: The step.
+            asks: Called with the state and the step, before each decision.
+
+        Returns:
+            Whether the condition holds. The present step has begun then: its interventions and
+            changes of the home are made, and the next call continues with its decisions.
+        """
+        began, stored_s = perf_counter(), state.recorder.wall_s
+        try:
+            with restrict(self._trust):
+                while state.bodies.step < end:
+                    span = Span(state.bodies.step, end)
+                    intervene(state, span)
+                    change_home(state, span)
+                    if asks(state, span.first):
+                        return True
+                    for phase in PHASES[PHASES.index(decide) :]:
+                        phase(state, span)
+            return False
+        except BaseException:
+            self.has_failed = True
+            raise
+        finally:
+            stored_s = state.recorder.wall_s - stored_s
+            self.simulate_s += perf_counter() - began - stored_s
+            self.save_s += stored_s
+
     def _simulate(
         self, state: State, end: int, on_progress: Callable[[], None] | None, spans: int | None
     ) -> None:

@@ -20,7 +20,7 @@ from fleet2d.engine.layers import LayerBook, add_layers
 from fleet2d.engine.learners import Learners
 from fleet2d.engine.recorder import Recorder, activities_of, table_specs
 from fleet2d.engine.sensors import Sensors
-from fleet2d.engine.state import InView, State
+from fleet2d.engine.state import InView, Recall, State
 from fleet2d.engine.world import schedule_script
 from fleet2d.entities.decisions import DecidingActor
 from fleet2d.entities.objects.door import Door
@@ -104,6 +104,7 @@ def set_up(scenario: Scenario, clock: Clock, seed: int, store: RunStore) -> Stat
     )
     for group in [*user_cameras, *cameras]:
         group.owner.in_view = InView(state, group)
+    _remember(state, basis)
     # What waits for an event comes last: the event may be one that another entry causes.
     for index, entry in sorted(enumerate(scenario.script), key=lambda i: i[1].on is not None):
         path = f"script.{index}"
@@ -229,6 +230,20 @@ def _check_reads(scenario: Scenario, actors: list[DecidingActor]) -> None:
                     f"{actor.path} reads {name!r}, which is not an algorithm of the scenario"
                     f"{suggest(name, scenario.algorithms)}"
                 )
+
+
+def _remember(state: State, basis: Basis) -> None:
+    """Let robots remember their sightings, if a behavior of theirs needs it."""
+    for actor in basis.robots:
+        if not any(behavior.remembers for behavior in actor.behaviors):
+            continue
+        from fleet2d.entities.robots.policy import SightingMemory  # few robots need it
+
+        cameras = next((group for group in state.cameras if group.owner is actor), None)
+        memory = SightingMemory(basis.home.plan, len(basis.users), basis.clock)
+        actor.recall = Recall(state, cameras, memory)
+        if cameras is not None:
+            cameras.remembered = memory
 
 
 def _log(basis: Basis, cameras: list[Cameras], recorder: Recorder) -> Log:

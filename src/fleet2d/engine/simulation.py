@@ -37,6 +37,7 @@ from fleet2d.engine.snapshot import (
 )
 from fleet2d.engine.state import State
 from fleet2d.engine.world import repeat, request
+from fleet2d.entities.behavior import Situation
 from fleet2d.entities.decisions import DecidingActor
 from fleet2d.entities.plan import Plan, data_of
 from fleet2d.errors import ArtifactError, InputError, ScenarioError
@@ -549,6 +550,42 @@ class Simulation(InterventionMethods):
             state.wait_for(frozenset())
         return None
 
+    def run_until_asked(self, *names: str) -> list[str]:
+        """Simulate until the first behavior of one of some robots has to choose; see `Policy`.
+
+        The robots' first behaviors are policies without file. To continue, set `given` of each that
+        is returned.
+
+        Returns:
+            The names of the robots that have to choose at the present step; none at the end.
+        """
+        rows = {name: self._body(name).row for name in names}
+        asked: list[str] = []
+
+        def asks(state: State, step: int) -> bool:
+            asked[:] = [name for name, row in rows.items() if has_to_choose(state, row, step)]
+            return bool(asked)
+
+        self._check_not_over()
+        self._loop.run_until_asked(self._state, self.clock.steps, asks)
+        return asked
+
+    def situation(self, name: str) -> Situation:
+        """Return what the behaviors of a body know when they are asked at the present step.
+
+        Raises:
+            ScenarioError: There is no such body.
+        """
+        return _situation(self._state, self._body(name).row, self.step)
+
+    def perceived_s(self, robot: str) -> float:
+        """Return for how long a robot has perceived people so far, summed over people [s]."""
+        cameras = [c for c in self._state.cameras if c.owner.name == robot]
+        for group in cameras:
+            self._state.take(group, self.step)
+        looks = [c.counts[..., 1].max(axis=0).sum() * int(c.lenses.period[0]) for c in cameras]
+        return float(sum(looks)) * self.clock.step_us / 1e6
+
     def _run_to(
         self, end: int, on_progress: Callable[[Self], None] | None = None, spans: int | None = None
     ) -> None:
@@ -958,6 +995,23 @@ def run(
     finished = simulation.run()
     free_bodies(simulation._state.actors)
     return finished
+
+
+def has_to_choose(state: State, row: int, step: int) -> bool:
+    """Return whether a robot's policy, its first behavior, has to choose at a step."""
+    actor = state.actors[row]
+    if state.bodies.ask_at[row] > step and not state.clearance.looks(row, step):
+        return False
+    policy: Any = actor.behaviors[0]
+    if policy.given is not None:
+        return False
+    now = _situation(state, row, step)
+    return actor.asks_first(now) and policy.asks(now)
+
+
+def _situation(state: State, row: int, step: int) -> Situation:
+    events = tuple(state.pending.get(row, ()))
+    return Situation(state.actors[row], step, events, state.learners.readable_outputs)
 
 
 def _check_name(noun: str, name: str, known: Iterable[str]) -> None:

@@ -8,25 +8,29 @@ Arrays are stored in files as a plain type and the bytes: NumPy's own pickle for
 and flags in a file, so that a wrong file can crash the process or worse.
 """
 
+import copy
 import copyreg
 import hashlib
 import io
 import json
 import pickle
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
+from datetime import datetime, timedelta
+from functools import cache
 from pathlib import Path
 from types import BuiltinFunctionType, FunctionType
 from typing import Any, BinaryIO, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
+from shapely import Polygon
 
 from fleet2d import __version__
 from fleet2d.artifacts.manifest import plain
-from fleet2d.artifacts.table import ColumnChunk
+from fleet2d.artifacts.table import Column, ColumnChunk, TableSpec
 from fleet2d.configuration.trust import (
     current_trust,
     is_listed,
@@ -36,12 +40,16 @@ from fleet2d.configuration.trust import (
 from fleet2d.engine.inputs import components_of
 from fleet2d.engine.state import State
 from fleet2d.entities.body import RandomWalk, Track
+from fleet2d.entities.plan import Note
 from fleet2d.errors import ArtifactError
 from fleet2d.floorplan.costmap import CostedSpace
-from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.floorplan.placed_objects import PlacedObject, UsePlace
+from fleet2d.floorplan.plan import FloorPlan, Room
 from fleet2d.floorplan.space import Space
+from fleet2d.kernels.motion import Timelines
 from fleet2d.kernels.space import Mesh
 from fleet2d.routines.persona import Persona
+from fleet2d.runtime.events import Event
 from fleet2d.scenario.model import Scenario
 
 # Booleans, numbers, times and text of a fixed length.
@@ -117,14 +125,17 @@ def _reduce_type(kind: np.dtype[Any]) -> tuple[Any, ...]:
     return plain_type, (plain_type(kind.str).str,)
 
 
+_HASH = type(hashlib.sha256())
+_DTYPES = {type(np.dtype(scalar)) for scalar in set(np.sctypeDict.values()) - {np.void, np.object_}}
+
+
 def _reducers() -> dict[type, Any]:
     scalars = set(np.sctypeDict.values())
-    types = {type(np.dtype(scalar)) for scalar in scalars - {np.void, np.object_}}
     return {
         **copyreg.dispatch_table,
         np.ndarray: _reduce_array,
         **dict.fromkeys(scalars - {np.void, np.object_}, _reduce_scalar),
-        **dict.fromkeys(types, _reduce_type),
+        **dict.fromkeys(_DTYPES, _reduce_type),
     }
 
 
@@ -132,11 +143,23 @@ REDUCERS = _reducers()
 """The `dispatch_table` of a pickler for arrays, their values and their types."""
 
 
-_HASH = type(hashlib.sha256())
-
-# Types of objects that never change: copies in one process share them.
+# Types of objects that never change: copies in one process share them. Some by name, as few runs
+# need their modules.
 _SHARED = frozenset(
-    {CostedSpace, FloorPlan, FunctionType, Mesh, Persona, Space, Track, RandomWalk, ColumnChunk}
+    {
+        *(Column, ColumnChunk, CostedSpace, Event, FloorPlan, FunctionType, Mesh, Note, Persona),
+        *(PlacedObject, Polygon, RandomWalk, Room, Space, TableSpec, Track, UsePlace),
+        *(datetime, timedelta, *_DTYPES),
+    }
+)
+_SHARED_NAMES = frozenset(
+    {
+        "fleet2d.entities.users.resident.Seat",
+        "fleet2d.entities.users.resident.Venue",
+        "fleet2d.routines.activity.Activity",
+        "fleet2d.routines.activity.DurationDistribution",
+        "fleet2d.routines.distributions.Distribution",
+    }
 )
 
 # Names that a file may refer to besides classes of Fleet2D and of the scenario's own modules.
@@ -215,11 +238,11 @@ class UnstorableStateError(ArtifactError):
 
 def copy_state(state: State, constants: Constants) -> State:
     """Return an independent copy of a state, which shares only objects that never change."""
-    shared: list[object] = []
-    buffer = io.BytesIO()
-    _StateWriter(buffer, constants, shared).dump(state)
-    buffer.seek(0)
-    return _StateReader(buffer, constants, shared).state()
+    buffer, arrays = io.BytesIO(), list[pickle.PickleBuffer]()
+    copier = _StateCopier(buffer, constants, arrays)
+    copier.dump(state)
+    content = (a if (raw := a.raw()).readonly else bytearray(raw) for a in arrays)
+    return _CopyReader(io.BytesIO(buffer.getbuffer()), copier.shared, content).load()
 
 
 def read_state(file: BinaryIO, constants: Constants) -> State:
@@ -229,7 +252,7 @@ def read_state(file: BinaryIO, constants: Constants) -> State:
         ArtifactError: The file contains something else, or is damaged.
     """
     try:
-        return _StateReader(file, constants, None).state()
+        return _StateReader(file, constants).state()
     except ArtifactError:
         raise
     except Exception as error:  # a damaged pickle may raise anything
@@ -256,7 +279,7 @@ def write_snapshot(
     parts.write(MAGIC + b"\n")
     parts.write(json.dumps({"fleet2d": __version__, **plain(header)}).encode() + b"\n")
     try:
-        _StateWriter(parts, constants, None).dump(state)
+        _StateWriter(parts, constants).dump(state)
     except ArtifactError as error:
         raise UnstorableStateError(str(error)) from error
     except Exception as error:  # a component's own pickling may raise anything
@@ -351,18 +374,64 @@ def open_snapshot(path: str | Path | BinaryIO) -> tuple[dict[str, Any], BinaryIO
     return header, io.BytesIO(memoryview(body)[:-_DIGEST_BYTES])
 
 
-class _StateWriter(pickle.Pickler):
-    """Replaces constants by their names, and collects shared objects."""
+@cache
+def _is_shared(kind: Any) -> bool:
+    name = f"{kind.__module__}.{kind.__qualname__}"
+    return kind in _SHARED or issubclass(kind, type) or name in _SHARED_NAMES
+
+
+def shared_object(number: int) -> object:
+    """Stand for a shared object in a copy, whose reader replaces this function by its own."""
+    raise NotImplementedError
+
+
+class _StateCopier(pickle.Pickler):
+    """Leaves out what a copy shares, and the content of arrays.
+
+    Attributes:
+        shared: The shared objects; in the copy each is a call of `shared_object`.
+    """
 
     def __init__(
-        self, file: "BinaryIO | _SnapshotParts", constants: Constants, shared: list[object] | None
+        self, file: BinaryIO, constants: Constants, arrays: list[pickle.PickleBuffer]
     ) -> None:
+        super().__init__(file, pickle.HIGHEST_PROTOCOL, buffer_callback=arrays.append)
+        self._constants = {id(value) for value in constants.values()}
+        self.shared: list[object] = []
+
+    def reducer_override(self, obj: Any) -> Any:
+        """Share an object; not called for plain values, lists and mappings."""
+        kind: Any = type(obj)
+        if obj is shared_object:
+            return NotImplemented
+        if kind is _HASH or kind is Timelines:
+            obj = obj.copy() if kind is _HASH else copy.copy(obj)
+        elif not (_is_shared(kind) or id(obj) in self._constants):
+            return NotImplemented
+        self.shared.append(obj)
+        return shared_object, (len(self.shared) - 1,)
+
+
+class _CopyReader(pickle.Unpickler):
+    """Reads what a `_StateCopier` wrote."""
+
+    def __init__(self, file: BinaryIO, shared: list[object], arrays: Iterable[Any]) -> None:
+        super().__init__(file, buffers=arrays)
+        self._shared = shared
+
+    def find_class(self, module: str, name: str) -> Any:
+        is_shared = name == shared_object.__name__ and module == __name__
+        return self._shared.__getitem__ if is_shared else super().find_class(module, name)
+
+
+class _StateWriter(pickle.Pickler):
+    """Replaces constants by their names."""
+
+    def __init__(self, file: "BinaryIO | _SnapshotParts", constants: Constants) -> None:
         super().__init__(file, pickle.HIGHEST_PROTOCOL)
         self._names = {id(value): name for name, value in constants.items()}
-        self._shared = shared
-        if shared is None:
-            self.dispatch_table = REDUCERS
-        self._code = _OwnCode() if shared is not None else _OwnCode.of(constants)
+        self.dispatch_table = REDUCERS
+        self._code = _OwnCode.of(constants)
         self._checked: set[int] = set()  # references to classes that are allowed, by id
 
     def persistent_id(self, obj: Any) -> object:
@@ -371,18 +440,11 @@ class _StateWriter(pickle.Pickler):
             return name
         kind = type(obj)
         if kind is _HASH:  # of a table: when a file is read it is computed again from the rows
-            if self._shared is None:
-                return ("sha256",)
-            obj = obj.copy()
-        elif self._shared is None:
-            if isinstance(obj, _REFERENCES) and id(obj) not in self._checked:
-                self._check_reference(obj)
-                self._checked.add(id(obj))
-            return ("space", obj.key) if kind is Space else None
-        elif kind not in _SHARED and not isinstance(obj, type):
-            return None
-        self._shared.append(obj)
-        return len(self._shared) - 1
+            return ("sha256",)
+        if isinstance(obj, _REFERENCES) and id(obj) not in self._checked:
+            self._check_reference(obj)
+            self._checked.add(id(obj))
+        return ("space", obj.key) if kind is Space else None
 
     def _check_reference(self, obj: Any) -> None:
         """Refuse a name that the reader would refuse."""
@@ -396,10 +458,9 @@ class _StateWriter(pickle.Pickler):
 class _StateReader(pickle.Unpickler):
     """Looks constants up by name; creates only plain values, and objects of allowed classes."""
 
-    def __init__(self, file: BinaryIO, constants: Constants, shared: list[object] | None) -> None:
+    def __init__(self, file: BinaryIO, constants: Constants) -> None:
         super().__init__(file)
-        self._constants, self._shared = constants, shared
-        self._code = _OwnCode() if shared is not None else _OwnCode.of(constants)
+        self._constants, self._code = constants, _OwnCode.of(constants)
 
     def state(self) -> State:
         """Return the state."""
@@ -409,8 +470,6 @@ class _StateReader(pickle.Unpickler):
         return state
 
     def persistent_load(self, pid: Any) -> object:
-        if self._shared is not None and isinstance(pid, int):
-            return self._shared[pid]
         if isinstance(pid, tuple) and pid[0] == "sha256":
             return hashlib.sha256()
         if isinstance(pid, tuple) and pid[0] == "space":
@@ -418,8 +477,6 @@ class _StateReader(pickle.Unpickler):
         return self._constants[pid]
 
     def find_class(self, module: str, name: str) -> Any:
-        if self._shared is not None:
-            return super().find_class(module, name)
         if not is_scenario_module(module):  # it may be one under another name in this process
             top, dot, rest = public_name(module).partition(".")
             module = self._code.packages.get(top, top) + dot + rest

@@ -32,6 +32,7 @@ from fleet2d.scenario.model import Scenario
 
 if TYPE_CHECKING:
     from fleet2d.engine.expectations import RunExpectations
+    from fleet2d.entities.robots.policy import SightingMemory
     from fleet2d.expectations.expectation import Expectation
 
 # The maximum number of steps that watchers process together: fewer if there are many bodies.
@@ -278,3 +279,18 @@ class InView:
         """Return the last perceived place of each [m], by name; "" for somebody unknown."""
         self.state.take(self.cameras, self.state.bodies.step)
         return self.cameras.in_view
+
+
+@dataclass(frozen=True)
+class Recall:
+    """What a robot remembers of its sightings up to the present step, for its behaviors."""
+
+    state: State
+    cameras: Cameras | None
+    memory: "SightingMemory"
+
+    def __call__(self) -> "SightingMemory":
+        """Return the memory."""
+        if self.cameras is not None:
+            self.state.take(self.cameras, self.state.bodies.step)
+        return self.memory

@@ -294,6 +294,8 @@ class Behavior(Component):
     listens: ClassVar[frozenset[str]] = frozenset()
     # Whether it does nothing in a scenario in which its robot wants nothing of people.
     serves_requests: ClassVar[bool] = False
+    # Whether it reads what its robot remembers of its sightings, by `actor.recall`.
+    remembers: ClassVar[bool] = False
     # Kinds of commands that it carries out: find, come, dock, or a name of its own.
     answers: ClassVar[frozenset[str]] = frozenset()
 
@@ -366,6 +368,7 @@ class Actor(Body):
         requests: What it wants of people; None without interactions.
         command: What it was called to do, until a behavior takes it up.
         in_view: Returns the people that its cameras have in view, and the last place of each [m].
+        recall: Returns the robot's `SightingMemory`, if a behavior of it `remembers`.
         plan: The plan that it follows.
         motion: The motion of that plan.
         planned_at: The step at which it began the plan.
@@ -376,6 +379,7 @@ class Actor(Body):
     def __post_init__(self) -> None:
         super().__post_init__()
         self.in_view: Callable[[], Mapping[str, Point]] = dict  # set if it has cameras
+        self.recall: Callable[[], Any] = dict  # set if it remembers
         behaviors = getattr(self.entity, "behaviors", ())
         self.requests: RequestQueue | None = None  # set if the scenario has interactions
         self.behaviors = [behavior.model_copy(deep=True) for behavior in behaviors]

@@ -92,6 +92,11 @@ class Arbiter:
                     return other
         return True
 
+    def asks_first(self, now: Situation, plan: Plan) -> bool:
+        """Return whether the first behavior would be asked, as `keeps_plan` and `choose` do it."""
+        goes_on = self.active == 0 and not plan.is_over(now.step) and not now.events
+        return self._may_decide(0, now) and not (goes_on and self.wake_step == now.step)
+
     def choose(self, now: Situation, plan: Plan, ask: Ask) -> Plan | None:
         """Ask all behaviors in turn; return the first plan, or None if none returns one."""
         if self.active is not None and plan.is_over(now.step):
@@ -401,6 +406,22 @@ class DecidingActor(Actor):
                 return True
         self._chosen = answer if isinstance(answer, Plan) else None
         return False
+
+    def asks_first(self, now: Situation) -> bool:
+        """Return whether a decision at this step, which is due, asks its first behavior for a plan.
+
+        Nothing changes by the question.
+        """
+        if self.is_stuck or self._chosen is not None or self.order is not None:
+            return False
+        if self.charge is not None:
+            self.charge.follow(self.motion, now.step * self.clock.step_us)
+            if self.charge.is_empty:
+                return False
+        waits = self._waiting is not None and not now.events
+        if waits and self._waiting.continued(now) is not None:  # type: ignore[union-attr]
+            return False
+        return self.arbiter.asks_first(now, self.plan)
 
     def decide(self, now: Situation) -> None:
         """Ask the behaviors, in order, for a plan that begins now."""

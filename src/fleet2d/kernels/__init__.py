@@ -10,9 +10,10 @@ of int64 of any shape, `F64` one of float64, `Bool` one of booleans.
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["F64", "I8", "I16", "I32", "I64", "U8", "U64", "Bool"]
+__all__ = ["F32", "F64", "I8", "I16", "I32", "I64", "U8", "U64", "Bool"]
 
 Bool = NDArray[np.bool_]
+F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 I8 = NDArray[np.int8]
 I16 = NDArray[np.int16]

@@ -1,0 +1,494 @@
+"""Policy: a robot whose next room is chosen by a learned policy, from what the robot knows.
+
+An observation is a table with a row for each room, padded to a fixed number of rooms; the last
+columns are the same in all rows. So a policy that scores rows applies to any home, and one network
+serves homes with different numbers of rooms. Nothing in it is the truth: it is computed from the
+robot's own pose, clock and battery, the plan of the home, the beliefs of an algorithm, and the
+robot's sightings (`SightingMemory`).
+"""
+
+from collections.abc import Callable
+from datetime import datetime, timedelta
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, ClassVar, Literal, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from fleet2d.configuration.components import register
+from fleet2d.configuration.problems import problem
+from fleet2d.configuration.units import InputPath, PositiveDuration
+from fleet2d.entities.behavior import Actor, Situation
+from fleet2d.entities.plan import Plan
+from fleet2d.entities.robots.approach import (
+    ANYONE,
+    MAX_TARGET_CELLS,
+    MAX_VIEWPOINT_CELLS,
+    BeliefBehavior,
+    centres,
+    check_has_camera,
+    room_belief,
+    spread,
+    visible_from,
+)
+from fleet2d.entities.robots.find import Sites
+from fleet2d.errors import ComponentError, InputError, PlacementError, extra
+from fleet2d.floorplan.plan import FloorPlan, Room, read_only
+from fleet2d.kernels import F32, F64, I64, Bool
+from fleet2d.kernels.numbers import TURN, UNIT, cosine, sine
+from fleet2d.kernels.sight import SightingColumn as Column
+from fleet2d.kernels.space import SUB
+from fleet2d.runtime.clock import (
+    DAY_MINUTES,
+    HOUR_S,
+    HOUR_US,
+    MICROSECOND,
+    Clock,
+    midnight_of,
+)
+
+# How many people have columns of their own, in the order of the scenario.
+PEOPLE = 4
+HOURS = 24
+NEVER = -1
+
+KINDS: dict[str, tuple[str, ...]] = {
+    "living": ("living_room",),
+    "dining": ("dining_room",),
+    "kitchen": ("kitchen",),
+    "bedroom": ("bedroom", "child_room", "guest_room"),
+    "bathroom": ("bathroom", "toilet"),
+    "office": ("office",),
+    "hallway": ("hallway", "hall", "lobby", "entryway"),
+    "other": (),
+}
+"""Kinds of rooms in observations, and the types of rooms of each."""
+
+COLUMNS = (
+    # Of the home
+    *("room", "reachable", "area"),
+    *(f"is_{kind}" for kind in KINDS),
+    # Of the robot
+    *("here", "way", "visited_20min", "visited_6h"),
+    # Of the person, or of anyone
+    *("belief", "in_view", "seen_30min", "seen_6h", "habit", "habit_now"),
+    # Of each of the first people
+    *(f"{name}_{n}" for n in range(PEOPLE) for name in ("belief", "seen_30min", "habit_now")),
+    # The same in all rooms
+    *("hour_sin", "hour_cos", "weekend", "away", "charge", "last_seen", "elapsed"),
+)
+"""The columns of an observation, in their order: see docs/gym.md."""
+_AT = {name: number for number, name in enumerate(COLUMNS)}
+
+TALLIED = ("relocations", "found", "gave_up", "searching_min", "overdue_h")
+"""What a policy counts for rewards: see `fleet2d.gym.task.REWARDS`."""
+MAX_OVERDUE_H = 24.0
+MINUTE = timedelta(minutes=1)
+SATURDAY = 5
+
+# Unit vectors of the headings in which a robot may wait, (n, 2).
+DIRECTIONS = np.array([(cosine(h), sine(h)) for h in range(0, TURN, TURN // 16)]) / UNIT
+
+# A time t ago counts 1 / (1 + t / scale) [s].
+SHORT_S, SEEN_S, LONG_S = 20 * 60, 30 * 60, 6 * HOUR_S
+# A way that takes this long, or longer, counts 1 [s].
+LONGEST_WAY_S = 60.0
+
+
+class SightingMemory:
+    """When and where a robot perceived people: all that it remembers of its sightings.
+
+    Attributes:
+        last: The last step at which it perceived each person in each room, int64 (people + 1,
+            rooms), NEVER for never; the last row is of people whom it didn't recognize.
+        looks: The number of such looks in each hour of the day, int64 (people + 1, rooms, 24).
+        total: The number of such looks, int64 (people + 1, rooms).
+    """
+
+    def __init__(self, plan: FloorPlan, people: int, clock: Clock) -> None:
+        shape = people + 1, len(plan.rooms)
+        self.last = np.full(shape, NEVER, np.int64)
+        self.looks = np.zeros((*shape, HOURS), np.int64)
+        self.total = np.zeros(shape, np.int64)
+        self._room_of_place = plan.room_of_place
+        self._step_us = clock.step_us
+        self._start_us = (clock.start - midnight_of(clock.start)) // MICROSECOND
+
+    def take(self, rows: I64) -> None:
+        """Add sightings, rows of `SightingColumn`."""
+        if not len(rows):
+            return
+        room = self._room_of_place[rows[:, Column.Y] // SUB, rows[:, Column.X] // SUB]
+        inside = room >= 0
+        person = rows[:, Column.IDENTITY][inside] % len(self.last)  # -1 is the last row
+        step, room = rows[:, Column.STEP][inside], room[inside].astype(np.int64)
+        at = person * self.last.shape[1] + room
+        np.maximum.at(self.last.reshape(-1), at, step)
+        hour = (self._start_us + step * self._step_us) // HOUR_US % HOURS
+        counts = np.bincount(at * HOURS + hour, minlength=self.looks.size)
+        self.looks += counts.reshape(self.looks.shape)
+        self.total += np.bincount(at, minlength=self.total.size).reshape(self.total.shape)
+
+
+class Poses:
+    """Where a robot stands in each room to see as much of it as possible, and how far apart.
+
+    Attributes:
+        points: Lattice points (rooms, 2), of the rooms that it can enter.
+        headings: The heading there, int64 (rooms,) [1/4096 turn].
+        index: The index of each of these rooms, int64 (rooms,).
+    """
+
+    def __init__(self, actor: Actor) -> None:
+        home, self._actor = actor.home, actor
+        angles = [camera.angle_deg for camera in actor.entity.eyes.values()]
+        self._half_angle = round(max(angles) / 720 * TURN)
+        key = (home.walls, actor.space, actor.part, actor.entity.radius, repr(actor.entity.eyes))
+        self.index, self.points, self.headings = home.cached(("standing", *key), self._choose)
+        self._key = key
+        self._ways: tuple[object, F64] = None, np.zeros(0)  # from a position
+
+    def _choose(self) -> tuple[I64, I64, I64]:
+        rooms = self._actor.reachable_rooms()
+        poses = np.array([self._best(room) for room in rooms], np.int64).reshape(-1, 3)
+        index = np.array([room.index for room in rooms], np.int64)
+        points, headings = np.ascontiguousarray(poses[:, :2]), poses[:, 2].copy()
+        return read_only(index), read_only(points), read_only(headings)
+
+    def _best(self, room: Room) -> tuple[int, int, int]:
+        """Return the place (x, y) and the heading at which most of a room is in view."""
+        actor, plan = self._actor, self._actor.home.plan
+        stands = centres(spread(actor.space.cells(room.index, actor.part), MAX_VIEWPOINT_CELLS))
+        goals = centres(spread(np.argwhere(plan.room_of_cell == room.index), MAX_TARGET_CELLS))
+        limit, best, most = cosine(self._half_angle) / UNIT, (*actor.middle(room), 0), 0
+        for place in stands:
+            gaps = (goals[visible_from(actor, place, goals)] - place).astype(np.float64)
+            lengths = np.sqrt((gaps * gaps).sum(axis=1)) * limit
+            ahead = gaps[:, 0] * DIRECTIONS[:, :1] + gaps[:, 1] * DIRECTIONS[:, 1:]
+            shown = (ahead >= lengths).sum(axis=1)
+            facing = int(np.argmax(shown))
+            if shown[facing] > most:
+                most = int(shown[facing])
+                best = int(place[0]), int(place[1]), facing * TURN // len(DIRECTIONS)
+        return best
+
+    def seconds(self) -> F64:
+        """Return the time of the way from where the robot is to each place [s], inf for none."""
+        actor = self._actor
+        at = actor.state.x, actor.state.y
+        here = at, actor.home.version, actor.space
+        if self._ways[0] != here:
+            key = ("standing ways", *self._key, actor.home.version, actor.speed, at)
+            self._ways = (
+                here,
+                actor.home.cached(
+                    key, lambda: read_only(actor.seconds(actor.space.distances(at, self.points)))
+                ),
+            )
+        return self._ways[1]
+
+
+@register("behavior", "policy")
+class Policy(BeliefBehavior):
+    """Let a learned policy choose the next room: to wait in, to look for a person in, or to visit.
+
+    The policy is a file of ONNX with the inputs `observation`, float32 (1, rooms, columns), and
+    optionally `action_mask`, bool (1, rooms + 1), whose first output has a score for each of the
+    rooms + 1 actions; or a class of yours, derived from this one, that overrides `act`. Action r is
+    to go to room r; the last action is to rest: at the charger, if the robot has one, until it is
+    charged, else where it is. The columns are those of `COLUMNS`.
+
+    Events: `relocates` (hangout) and `visits` (patrol) with the room, and those of the behavior
+    `find`.
+
+    Attributes:
+        task: To wait where people are in view (hangout); to look for a person (find); or to visit
+            rooms (patrol).
+        file: The policy, an ONNX file; left out: a class of yours, or an environment, decides.
+        rooms: Number of rooms in an observation; a home may have fewer.
+        period: How long it waits in a room (hangout), or when it rests.
+        dwell: How long it stays in a visited room (patrol).
+        every: Interval between the beginnings of two searches (find), from the start on.
+        deadline: Duration of a search after which it gives up (find).
+    """
+
+    records: ClassVar[frozenset[str]] = frozenset(
+        {"docks", "find_begins", "found", "gave_up", "relocates", "visits"}
+    )
+
+    remembers: ClassVar[bool] = True
+
+    task: Literal["hangout", "find", "patrol"] = "hangout"
+    file: InputPath | None = None
+    rooms: int = Field(default=16, ge=1, le=256)
+    period: PositiveDuration = timedelta(minutes=30)
+    dwell: PositiveDuration = timedelta(minutes=5)
+    every: PositiveDuration = timedelta(hours=2)
+    deadline: PositiveDuration = timedelta(minutes=10)
+
+    @model_validator(mode="after")
+    def _can_be_read(self) -> Self:
+        if self.file is not None and self.file.suffix != ".onnx":
+            raise problem(f"expected a file with the suffix .onnx, got {self.file.name}")
+        return self
+
+    def start(self, actor: Actor) -> None:
+        """Choose where it stands in each room.
+
+        Raises:
+            ScenarioError: The robot has no camera.
+            PlacementError: The home has more rooms than an observation.
+        """
+        check_has_camera(actor, "policy")
+        count = len(actor.home.rooms)
+        if count > self.rooms:
+            raise PlacementError(
+                f"{actor.path}: the home has {count} rooms, and observations have {self.rooms}:"
+                f" set rooms: {count}, or more, here and when you train the policy"
+            )
+        self.poses = Poses(actor)
+        self.sites = Sites(actor, 2) if self.task != "hangout" else None
+        self.names = list(actor.people)
+        self.visited = np.full(count, NEVER, np.int64)
+        self.since: datetime | None = None  # when the present search began
+        self.due = actor.clock.start
+        self.given: int | None = None  # the next action, if an environment decides
+        # From the beginning of the run, of rewards.
+        self._tally = dict.fromkeys(TALLIED, 0.0)
+        self._fixed = self._describe_home(actor)
+
+    # What it knows
+
+    def observe(self, now: Situation) -> F32:
+        """Return the observation, float32 (rooms, columns): see docs/gym.md."""
+        table, count = (
+            self._fixed.copy(),
+            len(now.home.rooms),
+        )  # by columns: it is turned at the end
+        part, memory, step_s = table[:, :count], now.actor.recall(), now.actor.clock.step_us / 1e6
+        row = None if self.user == ANYONE else self.names.index(self.user)
+        room, time = now.room, now.time
+        if room is not None:
+            part[_AT["here"], room.index] = 1
+        part[_AT["way"], self.poses.index] = self._seconds(now) / LONGEST_WAY_S
+        age_s = (now.step - self.visited) * step_s
+        part[_AT["visited_20min"]] = _fresh(age_s, self.visited, SHORT_S)
+        part[_AT["visited_6h"]] = _fresh(age_s, self.visited, LONG_S)
+        recent = _fresh((now.step - memory.last) * step_s, memory.last, SEEN_S)
+        present = memory.looks[:, :, time.hour]
+        last = memory.last.max(axis=0) if row is None else memory.last[row]
+        part[_AT["seen_30min"]] = recent.max(axis=0) if row is None else recent[row]
+        part[_AT["seen_6h"]] = _fresh((now.step - last) * step_s, last, LONG_S)
+        part[_AT["habit"]] = _shares(memory.total.sum(axis=0) if row is None else memory.total[row])
+        part[_AT["habit_now"]] = _shares(present.sum(axis=0) if row is None else present[row])
+        for name, xy in now.in_view.items():
+            seen = now.home.plan.room_at(*xy) if self.user in (ANYONE, name) else None
+            if seen is not None:
+                part[_AT["in_view"], seen.index] = 1
+        belief = room_belief(now, self.source, self.user)
+        part[_AT["belief"]] = belief.joint
+        for number, name in enumerate(self.names[:PEOPLE]):
+            begin = _AT[f"belief_{number}"]
+            if self.source is not None:
+                part[begin] = room_belief(now, self.source, name).joint
+            part[begin + 1] = recent[number]
+            part[begin + 2] = _shares(present[number])
+        newest, minute = int(last.max()), (time.hour * 60 + time.minute) * TURN // DAY_MINUTES
+        charge, since = now.actor.charge, self.since
+        table[_AT["hour_sin"] :].T[:] = (
+            sine(minute) / UNIT,
+            cosine(minute) / UNIT,
+            time.weekday() >= SATURDAY,
+            belief.away,
+            1.0 if charge is None else charge.level,
+            0.0 if newest < 0 else SEEN_S / (SEEN_S + (now.step - newest) * step_s),
+            0.0 if since is None else min((time - since) / self.deadline, 1.0),
+        )
+        return np.ascontiguousarray(table.T)
+
+    def _seconds(self, now: Situation) -> F64:
+        """Return the time of the way to each place [s], at most LONGEST_WAY_S."""
+        return np.minimum(self.poses.seconds(), LONGEST_WAY_S)
+
+    def mask(self, now: Situation) -> Bool:
+        """Return which actions are possible, bool (rooms + 1,): rooms with a way, and to rest."""
+        allowed = np.zeros(self.rooms + 1, np.bool_)
+        allowed[self.poses.index] = np.isfinite(self.poses.seconds())
+        allowed[-1] = True
+        return allowed
+
+    def _describe_home(self, actor: Actor) -> F32:
+        """Return what never changes in observations, by columns: float32 (columns, rooms)."""
+        table = np.zeros((len(COLUMNS), self.rooms), np.float32)
+        cells = sum(room.cells for room in actor.home.rooms)
+        types = {kind: name for name, kinds in KINDS.items() for kind in kinds}
+        for room in actor.home.rooms:
+            row = table[:, room.index]
+            row[_AT["room"]], row[_AT["area"]] = 1, room.cells / cells
+            row[_AT[f"is_{types.get(room.type, 'other')}"]] = 1
+        table[_AT["reachable"], self.poses.index] = 1
+        return table
+
+    def tally(self, now: Situation) -> dict[str, float]:
+        """Return the counts since the beginning of the run, by name: see `TALLIED`."""
+        searching = 0.0 if self.since is None else (now.time - self.since) / MINUTE
+        return {**self._tally, "searching_min": self._tally["searching_min"] + searching}
+
+    # What it does
+
+    def asks(self, now: Situation) -> bool:
+        """Return whether its decision at a step depends on the policy."""
+        return self.task != "find" or self._phase(now) == "asks"
+
+    def _phase(self, now: Situation) -> Literal["idle", "asks", "found", "gave_up"]:
+        """Return what becomes of its search at a step."""
+        if self.since is None and now.time < self.due:
+            return "idle"
+        in_view = now.in_view
+        if self.user in in_view or (self.user == ANYONE and in_view):
+            return "found"
+        if self.since is not None and now.time >= self.since + self.deadline:
+            return "gave_up"
+        return "asks"
+
+    def decide(self, now: Situation) -> Plan | None:
+        """Carry out the action that the policy chooses."""
+        plan = now.plan()
+        if self.task == "find":
+            phase = self._phase(now)
+            if phase == "idle":
+                return plan.stay(until=self.due)
+            if self.since is None:
+                self.since = now.time
+                plan.note("find_begins", self.user)
+            if phase != "asks":
+                self._tally["searching_min"] += (now.time - self.since) / MINUTE
+                self._tally[phase] += 1
+                self.since = None
+                while self.due <= now.time:
+                    self.due += self.every
+                return plan.note(phase, self.user).stay(until=self.due)
+        action = self._action(now)
+        if action == self.rooms:
+            return self._rest(now, plan)
+        return self._go(now, plan, action)
+
+    def act(self, observation: F32, mask: Bool) -> int:
+        """Return the action for an observation; override it for a policy of your own.
+
+        Args:
+            observation: float32 (rooms, columns), see `COLUMNS`.
+            mask: bool (rooms + 1,), the possible actions.
+
+        Raises:
+            ComponentError: There is no policy.
+        """
+        if self.file is None:
+            raise ComponentError(
+                "the policy has no file: give one, as file: hangout.onnx, derive a class from"
+                " Policy that overrides act, or use fleet2d.gym"
+            )
+        scores = _model(str(self.file), self.file.stat().st_mtime_ns)(observation, mask)
+        if scores.shape != mask.shape:
+            raise ComponentError(
+                f"{self.file.name} returned scores of the shape {scores.shape}, expected"
+                f" {mask.shape}: train it with rooms={self.rooms}"
+            )
+        return int(np.argmax(np.where(mask, scores, -np.inf)))
+
+    def _action(self, now: Situation) -> int:
+        mask, action = self.mask(now), self.given
+        if action is None:
+            action = self.act(self.observe(now), mask)
+        self.given = None
+        self.check(now, action, mask)
+        return int(action)
+
+    def check(self, now: Situation, action: object, mask: Bool | None = None) -> None:
+        """Refuse an impossible action.
+
+        Raises:
+            InputError: It is out of range, or masked; the message says why.
+        """
+        mask = self.mask(now) if mask is None else mask
+        if not (isinstance(action, int | np.integer) and 0 <= action <= self.rooms):
+            raise InputError(
+                f"the policy chose {action!r}: actions are whole numbers from 0 to {self.rooms}"
+            )
+        if not mask[action]:
+            rooms = now.home.rooms
+            reason = "can't be reached" if action < len(rooms) else "doesn't exist"
+            raise InputError(f"the policy chose room {action}, which {reason}")
+
+    def _rest(self, now: Situation, plan: Plan) -> Plan:
+        """Charge, if it has a battery; else stay where it is."""
+        charge = now.actor.charge
+        if charge is None or not plan.reaches(*charge.charger):
+            return self._wait(plan, timedelta(minutes=1) if self.task == "find" else self.period)
+        if (plan.x, plan.y) != charge.charger:
+            plan.go_to_point(*charge.charger).note("docks", charge.percent)
+        charging = timedelta(microseconds=charge.time_to_charge(1.0))
+        return self._wait(plan, max(charging, timedelta(minutes=1)))
+
+    def _go(self, now: Situation, plan: Plan, room: int) -> Plan:
+        """Go to a room, and wait or look round there."""
+        name, number = now.home.rooms[room].name, int(np.flatnonzero(self.poses.index == room)[0])
+        begun, step_s = max(self.visited[room], 0), now.actor.clock.step_us / 1e6
+        overdue_h = min((now.step - begun) * step_s / HOUR_S, MAX_OVERDUE_H)
+        self.visited[room] = now.step
+        if self.sites is not None and self.task == "find":
+            self.sites.look_round(plan, number)
+            self._tally["relocations"] += 1
+            return plan.interrupt_on("user_seen")
+        x, y = self.poses.points[number].tolist()
+        if (plan.x, plan.y) != (x, y):
+            self._tally["relocations"] += 1
+            plan.note("relocates" if self.task == "hangout" else "visits", name).go_to_point(x, y)
+            plan.turn_to(int(self.poses.headings[number]))
+        if self.task == "hangout":
+            return plan.stay(self.period)
+        self._tally["overdue_h"] += overdue_h
+        return plan.turn_by(1.0).stay(self.dwell)
+
+    def _wait(self, plan: Plan, duration: timedelta) -> Plan:
+        plan.stay(duration)
+        return plan.interrupt_on("user_seen") if self.task == "find" else plan
+
+
+def _fresh(age_s: Any, last: I64, scale_s: float) -> F64:
+    """Return 1 for something that happened just now, less for older ones, and 0 for never."""
+    fresh: F64 = (last >= 0) * (scale_s / (scale_s + age_s))
+    return fresh
+
+
+def _shares(counts: I64) -> F64:
+    """Return the share of each of some counts in their sum; zeros if all are zero."""
+    return counts / max(int(counts.sum()), 1)
+
+
+@lru_cache(maxsize=8)
+def _model(path: str, _: int) -> Callable[[F32, Bool], F32]:
+    """Return a function that scores all actions by an ONNX file."""
+    with extra("onnx", "a policy from a file needs onnxruntime"):
+        import onnxruntime as ort
+    options = ort.SessionOptions()
+    options.intra_op_num_threads = options.inter_op_num_threads = 1
+    try:
+        session = ort.InferenceSession(
+            Path(path).read_bytes(), options, providers=["CPUExecutionProvider"]
+        )
+    except Exception as error:
+        raise ComponentError(f"{path} can't be read as an ONNX file: {error}") from error
+    names = [item.name for item in session.get_inputs()]
+
+    def scores(observation: F32, mask: Bool) -> Any:
+        values = {"observation": observation[None], "action_mask": mask[None]}
+        unknown = [name for name in names if name not in values]
+        if unknown:
+            raise ComponentError(
+                f"{path} has the input {unknown[0]!r}; a policy has 'observation' and 'action_mask'"
+            )
+        return session.run(None, {name: values[name] for name in names})[0][0]
+
+    return scores

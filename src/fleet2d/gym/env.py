@@ -1,0 +1,261 @@
+"""One robot's life as an environment of Gymnasium."""
+
+import copy
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, Literal, Self
+
+import gymnasium
+import numpy as np
+
+from fleet2d.engine.simulation import Simulation
+from fleet2d.entities.behavior import Situation
+from fleet2d.entities.decisions import DecidingActor
+from fleet2d.entities.robots.policy import COLUMNS, Policy
+from fleet2d.errors import InputError
+from fleet2d.gym.task import Split, Task, Variant, Variants, load_task
+from fleet2d.kernels import F32, Bool
+from fleet2d.runs.run import Run
+
+Reward = Mapping[str, float] | Callable[["RobotEnv"], float] | None
+
+
+class Life:
+    """A run in which policies of robots wait for their actions.
+
+    Attributes:
+        simulation: The run.
+        robots: The names of the robots.
+        due: Those that have to choose now.
+    """
+
+    def __init__(self, simulation: Simulation, robots: tuple[str, ...]) -> None:
+        self.simulation, self.robots = simulation, robots
+        self.due = simulation.run_until_asked(*robots)
+
+    def actor(self, robot: str) -> DecidingActor:
+        """Return a robot."""
+        return self.simulation.actors[robot]
+
+    def policy(self, robot: str) -> Policy:
+        """Return the policy of a robot."""
+        policy = self.actor(robot).behaviors[0]
+        assert isinstance(policy, Policy)
+        return policy
+
+    def act(self, actions: Mapping[str, int]) -> None:
+        """Let robots that have to choose act, up to the next step at which one has to choose.
+
+        Raises:
+            InputError: An action is masked or out of range; nothing has changed then.
+        """
+        for robot in self.due:
+            self.policy(robot).check(self.now(robot), actions[robot])
+        for robot in self.due:
+            self.policy(robot).given = int(actions[robot])
+        self.due = self.simulation.run_until_asked(*self.robots)
+
+    def now(self, robot: str) -> Situation:
+        """Return what a robot knows of the present step."""
+        return self.simulation.situation(robot)
+
+    def is_empty(self, robot: str) -> bool:
+        """Whether the battery of a robot is empty, so that it never decides again."""
+        charge = self.actor(robot).charge
+        return charge is not None and charge.is_empty
+
+    def terms(self, robot: str) -> dict[str, float]:
+        """Return the terms of the reward, from the beginning of the life to the present step."""
+        now = self.now(robot)
+        return {
+            **self.policy(robot).tally(now),
+            "in_view_min": self.simulation.perceived_s(robot) / 60,
+        }
+
+    def copy(self) -> "Life":
+        """Return an independent copy."""
+        life = Life.__new__(Life)
+        life.simulation, life.robots = copy.deepcopy(self.simulation), self.robots
+        life.due = list(self.due)
+        return life
+
+
+class RobotEnv(gymnasium.Env[F32, np.int64]):  # type: ignore[misc]
+    """The decisions of one robot, each lasting until the next: a semi-Markov process.
+
+    An observation is a table float32 (rooms, columns), with the columns `COLUMNS` of
+    `fleet2d.entities.robots.policy`; action r is to go to room r, the last one to rest. `info` has
+    the `action_mask`, the length of the interval since the last decision, `elapsed_s`, and the
+    local `time`. A life is truncated at the end of its scenario, and terminated when the robot's
+    battery is empty.
+
+    Args:
+        task: hangout, find, patrol, a file of a task or a scenario, or a `Task`.
+        overrides: Changes of the scenario, such as "simulation.duration=3 d".
+        robot: The robot; left out: the only one with a policy.
+        reward: Weights of terms in place of the task's, or a function that is called with the
+            environment after each step.
+        split: Which values of what varies are drawn.
+        masked: What an impossible action is: an error, or as to rest.
+        truth: Put the truth, where everybody is, into `info`.
+
+    Example:
+        >>> env = RobotEnv("hangout", "simulation.duration=1 d")
+        >>> observation, info = env.reset(seed=1)
+        >>> observation.shape, int(info["action_mask"].sum()) > 1
+        ((16, 40), True)
+        >>> action = np.flatnonzero(info["action_mask"])[0]
+        >>> _, reward, terminated, truncated, info = env.step(action)
+        >>> info["elapsed_s"] > 60, terminated
+        (True, False)
+    """
+
+    metadata = {"render_modes": ["rgb_array"]}  # noqa: RUF012 - as Gymnasium declares it
+
+    def __init__(
+        self,
+        task: str | Path | Mapping[str, Any] | Task = "hangout",
+        *overrides: str,
+        robot: str | None = None,
+        reward: Reward = None,
+        split: Split = "train",
+        masked: Literal["error", "rest"] = "error",
+        truth: bool = False,
+        render_mode: str | None = None,
+    ) -> None:
+        if split not in ("train", "test") or masked not in ("error", "rest"):
+            raise InputError("split is 'train' or 'test', and masked is 'error' or 'rest'")
+        self.variants = Variants(load_task(task), overrides)
+        self.reward: Any = dict(self.variants.task.reward) if reward is None else reward
+        if not callable(self.reward):
+            Task(reward=self.reward)  # refuses unknown terms
+        self.split, self.masked, self.truth, self.render_mode = split, masked, truth, render_mode
+        variant = self._first_variant()
+        self.robot = robot or variant.robots[0]
+        self.robots: tuple[str, ...] = (self.robot,)  # those that have to choose in its lives
+        if self.robot not in variant.robots or (robot is None and len(variant.robots) > 1):
+            raise InputError(
+                f"name the robot that learns by robot=…: one of {', '.join(variant.robots)}"
+            )
+        policy = variant.scenario.robots[self.robot].behaviors[0]
+        assert isinstance(policy, Policy)
+        shape = policy.rooms, len(COLUMNS)
+        self.observation_space = gymnasium.spaces.Box(-1.0, 1.0, shape, np.float32)
+        self.action_space = gymnasium.spaces.Discrete(policy.rooms + 1)
+        self.life: Life | None = None
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[F32, dict[str, Any]]:
+        """Begin a new life.
+
+        Args:
+            seed: Seed of all that is drawn from now on.
+            options: `values`: values of what varies, by key; `seed`: the seed of the life.
+
+        Raises:
+            InputError: The scenario with these values is wrong.
+        """
+        super().reset(seed=seed)
+        options = options or {}
+        values = self.variants.task.draw(self.np_random, self.split) | options.get("values", {})
+        drawn = int(self.np_random.integers(2**53))
+        variant = self.variants.load(values)
+        simulation = variant.scenario.simulation
+        settings = simulation.model_copy(update={"seed": options.get("seed", drawn)})
+        scenario = variant.scenario.model_copy(update={"simulation": settings})
+        self.join(Life(Simulation(scenario), self.robots))
+        return self.observe(0)
+
+    def join(self, life: Life) -> None:
+        """Go on in a life, which other robots may share."""
+        self.life, self._step = life, life.simulation.step
+        self._terms = life.terms(self.robot)
+
+    def step(self, action: Any) -> tuple[F32, float, bool, bool, dict[str, Any]]:
+        """Let the robot act until it has to choose again.
+
+        Raises:
+            InputError: The action is masked or out of range, or the life is over; nothing has
+                changed then.
+        """
+        life = self.present
+        if not life.due:
+            raise InputError("the life is over: call reset()")
+        life.act({self.robot: self.allowed(action)})
+        step, clock = life.simulation.step, life.simulation.clock
+        elapsed_s = (step - self._step) * clock.step_us / 1e6
+        self._step = step
+        reward = self.collect()
+        observation, info = self.observe(elapsed_s)
+        is_empty = life.is_empty(self.robot)
+        return observation, reward, is_empty, not life.due and not is_empty, info
+
+    def allowed(self, action: Any) -> int:
+        """Return an action, or that to rest in place of one that is masked, if so configured."""
+        rest = int(self.action_space.n) - 1
+        if self.masked == "rest" and 0 <= action <= rest and not self.action_masks()[action]:
+            return rest
+        return int(action)
+
+    def collect(self) -> float:
+        """Return the reward since it was collected last."""
+        if callable(self.reward):
+            return float(self.reward(self))
+        before, self._terms = self._terms, self.present.terms(self.robot)
+        return sum(w * (self._terms[name] - before[name]) for name, w in self.reward.items())
+
+    def _first_variant(self) -> Variant:
+        return self.variants.load(self.variants.task.draw(np.random.default_rng(0), self.split))
+
+    @classmethod
+    def robots_of(cls, task: Any, *overrides: str) -> tuple[str, ...]:
+        """Return the robots with policies in the scenarios of a task."""
+        variants = Variants(load_task(task), overrides)
+        return variants.load(variants.task.draw(np.random.default_rng(0), "train")).robots
+
+    def branch(self) -> Self:
+        """Return an independent copy of the environment and its life, for a search over futures."""
+        twin = copy.copy(self)
+        twin.life = self.present.copy()
+        twin._np_random = copy.deepcopy(self._np_random)
+        return twin
+
+    def run(self) -> Run:
+        """End the life here, and return it as a run: its tables, metrics and pictures."""
+        return self.present.simulation.finish()
+
+    def action_masks(self) -> Bool:
+        """Return which actions are possible, bool (rooms + 1,), as MaskablePPO asks for it."""
+        life = self.present
+        return life.policy(self.robot).mask(life.now(self.robot))
+
+    def render(self) -> Any:
+        """Return a picture of the present moment, uint8 (height, width, 3)."""
+        from fleet2d.gym.pictures import life_figure, pixels_of
+
+        return pixels_of(life_figure(self))
+
+    @property
+    def present(self) -> Life:
+        """The present life.
+
+        Raises:
+            InputError: There is none yet.
+        """
+        if self.life is None:
+            raise InputError("there is no life yet: call reset()")
+        return self.life
+
+    def observe(self, elapsed_s: float) -> tuple[F32, dict[str, Any]]:
+        """Return the observation and the information of the present step."""
+        life = self.present
+        now, policy = life.now(self.robot), life.policy(self.robot)
+        info: dict[str, Any] = {
+            "elapsed_s": float(elapsed_s),
+            "action_mask": policy.mask(now),
+            "time": now.time.isoformat(),
+        }
+        if self.truth:
+            info["truth"] = life.simulation.state
+        return policy.observe(now), info

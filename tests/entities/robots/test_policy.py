@@ -1,0 +1,238 @@
+"""Policies: what they observe, which actions they have, and what a robot does then."""
+
+from datetime import datetime
+from typing import Any
+
+import numpy as np
+import pytest
+from tests.entities.robots.robots import OUT, assert_same_for_every_max_span, home_with, names
+from tests.scenes import run
+
+import fleet2d
+from fleet2d import Simulation
+from fleet2d.entities.robots.policy import COLUMNS, NEVER, Policy, SightingMemory
+from fleet2d.errors import ComponentError, InputError, PlacementError, ScenarioError
+from fleet2d.kernels import F32, Bool
+from fleet2d.kernels.sight import SightingColumn
+from fleet2d.kernels.space import SUB
+from fleet2d.runtime.clock import Clock
+
+AT = {name: number for number, name in enumerate(COLUMNS)}
+CLASS = "tests.entities.robots.test_policy:Farthest"
+
+
+class Farthest(Policy):
+    """Go where it takes longest to go, unless somebody was seen lately."""
+
+    def act(self, observation: F32, mask: Bool) -> int:
+        seen = observation[:, AT["seen_30min"]]
+        scores = np.append(observation[:, AT["way"]] + 2 * seen, -1.0)
+        return int(np.argmax(np.where(mask, scores, -np.inf)))
+
+
+class Fixed(Policy):
+    """Choose one action again and again."""
+
+    action: int = 0
+
+    def act(self, observation: F32, mask: Bool) -> int:
+        return self.action
+
+
+def policy(task: str = "hangout", **fields: Any) -> dict[str, Any]:
+    return {"type": CLASS, "task": task, "period": "10 min", **fields}
+
+
+def fixed(action: int, **fields: Any) -> dict[str, Any]:
+    return {
+        "type": f"{CLASS.partition(':')[0]}:Fixed",
+        "action": action,
+        "period": "10 min",
+        **fields,
+    }
+
+
+def lives(content: dict[str, Any], choose: Any) -> tuple[Simulation, list[F32]]:
+    """Let a function of the simulation choose all actions; return the observations, too."""
+    simulation, observations = Simulation(content), []
+    while simulation.run_until_asked("astro"):
+        behavior: Any = simulation.actors["astro"].behaviors[0]
+        now = simulation.situation("astro")
+        observations.append(behavior.observe(now))
+        behavior.given = choose(behavior, observations[-1], behavior.mask(now))
+    return simulation, observations
+
+
+@pytest.mark.parametrize("task", ["hangout", "find", "patrol"])
+def test_a_run_with_a_policy_is_the_same_for_every_max_span(task: str) -> None:
+    stored = assert_same_for_every_max_span(home_with([policy(task, every="20 min")], "90 min"))
+
+    assert {"hangout": "relocates", "find": "find_begins", "patrol": "visits"}[task] in names(
+        stored
+    )
+
+
+@pytest.mark.parametrize("task", ["hangout", "find", "patrol"])
+def test_actions_from_outside_repeat_the_run_of_the_policy(task: str) -> None:
+    content = home_with([policy(task, every="20 min")], "90 min")
+    simulation, _ = lives(content, lambda behavior, table, mask: behavior.act(table, mask))
+
+    assert run(content).digest == simulation.finish().digest
+
+
+def test_what_was_never_perceived_is_not_in_observations() -> None:
+    """Two lives that differ only in where somebody is whom the robot never sees."""
+    blind = {"camera": {"range": [0.2, 0.21], "angle_deg": 1}}
+    places = ([7.0, 6.0], "bedroom")
+    people = [
+        {"type": "schedule", "days": [{"items": [{"at": "00:00", "place": place}]}]}
+        for place in places
+    ]
+    ways = [
+        lives(home_with([policy()], "3 h", ana, astro=blind), lambda *_: 2)[1] for ana in people
+    ]
+
+    assert len(ways[0]) > 10
+    assert np.array_equal(*map(np.stack, ways))
+
+
+def test_what_was_perceived_is_in_observations() -> None:
+    bathroom = "bathroom_0"
+    simulation = Simulation(home_with([policy()], "2 h"))
+    room = simulation.home.plan.room(bathroom).index
+    tables = lives(home_with([policy()], "2 h"), lambda *_: room)[1]
+
+    assert 0 == tables[0][:, AT["seen_30min"]].max()
+    assert 1 == tables[2][room, AT["in_view"]]
+    assert tables[2][room, AT["seen_30min_0"]] > 0.99
+    assert 1 == tables[2][room, AT["habit_now"]] == tables[2][room, AT["habit"]]
+    assert 1 == tables[2][room, AT["here"]] == tables[2][:, AT["here"]].sum()
+
+
+def test_observation_describes_the_home_and_pads_it() -> None:
+    table = lives(home_with([policy(rooms=9)], "30 min"), lambda *_: 0)[1][0]
+    home = Simulation(home_with([policy()])).home
+
+    assert (9, len(COLUMNS)) == table.shape
+    assert np.float32 == table.dtype
+    assert [1] * 6 + [0] * 3 == table[:, AT["room"]].tolist()
+    assert 0 == np.abs(table[6:, : AT["hour_sin"]]).sum()
+    assert {"storage_0"} == {
+        room.name for room in home.rooms if not table[room.index, AT["reachable"]]
+    }
+    assert 1 == table[home.plan.room("kitchen_0").index, AT["is_kitchen"]]
+    assert pytest.approx(1) == table[:, AT["area"]].sum()
+    assert np.abs(table).max() <= 1
+
+
+def test_rooms_without_a_way_are_masked_and_rest_is_always_possible() -> None:
+    masks = []
+    lives(home_with([policy()], "30 min"), lambda _, __, mask: masks.append(mask) or 16)
+    storage = Simulation(home_with([policy()])).home.plan.room("storage_0").index
+
+    expected = [n < 6 and n != storage for n in range(16)]
+    assert [*expected, True] == masks[0].tolist()
+
+
+@pytest.mark.parametrize(
+    ("action", "reason"),
+    [(4, "can't be reached"), (7, "doesn't exist"), (17, "from 0 to 16"), (-1, "from 0 to 16")],
+)
+def test_impossible_action_is_an_error_with_the_reason(action: int, reason: str) -> None:
+    home = Simulation(home_with([policy()])).home
+    action = home.plan.room("storage_0").index if action == 4 else action
+    with pytest.raises(ComponentError, match=f"robots.astro failed at step 0.*{reason}"):
+        run(home_with([fixed(action)]))
+
+    simulation = Simulation(home_with([policy()]))
+    simulation.run_until_asked("astro")
+    behavior: Any = simulation.actors["astro"].behaviors[0]
+    with pytest.raises(InputError, match=reason):
+        behavior.check(simulation.situation("astro"), action)
+
+
+def test_policy_without_a_file_says_what_to_give() -> None:
+    with pytest.raises(ComponentError, match=r"file: hangout\.onnx"):
+        run(home_with([{"type": "policy"}]))
+
+
+def test_file_of_another_kind_is_refused(tmp_path: Any) -> None:
+    path = tmp_path / "net.pt"
+    path.touch()
+    with pytest.raises(ScenarioError, match=r"suffix \.onnx, got net\.pt"):
+        Simulation(home_with([{"type": "policy", "file": str(path)}]))
+
+
+def test_home_with_more_rooms_than_observations_is_refused() -> None:
+    with pytest.raises(PlacementError, match=r"6 rooms.*set rooms: 6"):
+        Simulation(home_with([policy(rooms=4)]))
+
+
+def test_robot_without_camera_is_refused() -> None:
+    with pytest.raises(ScenarioError, match="has no camera"):
+        Simulation(home_with([policy()], astro={"camera": None}))
+
+
+def test_search_ends_when_the_person_is_found_or_the_deadline_is_over() -> None:
+    found = run(home_with([policy("find", every="20 min")], "30 min"))
+    lost = run(home_with([policy("find", every="20 min", deadline="3 min")], "30 min", ana=OUT))
+
+    assert ["find_begins", "found"] * 2 == names(found)
+    assert ["find_begins", "gave_up"] * 2 == names(lost)
+
+
+def test_terms_of_rewards_count_searches_to_their_ends() -> None:
+    content = home_with([policy("find", every="20 min", deadline="3 min")], "30 min", ana=OUT)
+    simulation, _ = lives(content, lambda behavior, table, mask: behavior.act(table, mask))
+    behavior: Any = simulation.actors["astro"].behaviors[0]
+    tally = behavior.tally(simulation.situation("astro"))
+
+    assert (0, 2) == (tally["found"], tally["gave_up"])
+    assert 6 <= tally["searching_min"] < 8
+
+
+def test_perceived_time_is_that_of_the_sightings() -> None:
+    content = home_with([policy()], "2 h")
+    simulation, _ = lives(content, lambda behavior, table, mask: behavior.act(table, mask))
+    perceived_s = simulation.perceived_s("astro")
+    stored = simulation.finish()
+
+    assert stored.tables["observations"].num_rows == perceived_s > 0
+
+
+def test_empty_battery_ends_all_decisions_and_rest_charges() -> None:
+    battery = {"driving": "10 min", "standing": "1 h", "charging": "30 min", "charger": "kitchen"}
+    content = home_with([policy("patrol", dwell="1 s")], "4 h", astro={"battery": battery})
+    away, _ = lives(content, lambda b, table, mask: b.act(table, mask))
+    home, tables = lives(content, lambda *_: 16)
+    charges = [float(table[0, AT["charge"]]) for table in tables]
+
+    assert away.actors["astro"].charge.is_empty  # type: ignore[union-attr]
+    assert not home.actors["astro"].charge.is_empty  # type: ignore[union-attr]
+    assert min(charges) > 0.9
+
+
+def test_order_is_carried_out_without_asking_the_policy() -> None:
+    simulation = Simulation(home_with([policy()], "1 h"))
+    simulation.send("astro", to="bedroom", duration="30 min")
+
+    assert ["astro"] == simulation.run_until_asked("astro")
+    assert simulation.step >= 1800
+
+
+def test_memory_counts_looks_by_room_hour_and_person() -> None:
+    plan = fleet2d.load_floorplan("family_home")
+    memory = SightingMemory(plan, 2, Clock(datetime(2026, 1, 5, 7, 59), 1_000_000, 3600))
+    row, column = np.argwhere(plan.room_of_cell >= 0)[0]
+    room = int(plan.room_of_cell[row, column])
+    rows = np.zeros((4, len(SightingColumn)), np.int64)
+    rows[:, SightingColumn.STEP] = 10, 20, 70, 30
+    rows[:, SightingColumn.IDENTITY] = 0, 0, 0, -1
+    rows[:, SightingColumn.X], rows[:, SightingColumn.Y] = column * SUB, row * SUB
+    memory.take(rows)
+    memory.take(rows[:0])
+
+    assert [70, NEVER, 30] == memory.last[:, room].tolist()
+    assert [2, 1] == memory.looks[0, room, 7:9].tolist()
+    assert 1 == memory.looks[2, room, 7]
+    assert [3, 0, 1] == memory.total[:, room].tolist()

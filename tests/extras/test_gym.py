@@ -1,0 +1,351 @@
+"""Environments: the checkers of three libraries, the odd cases, many lives, branches, pickles."""
+
+import copy
+import pickle
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+
+gymnasium = pytest.importorskip("gymnasium", reason="needs the extra gym")
+pytest.importorskip("pettingzoo", reason="needs the extra gym")
+
+from tests.entities.robots.robots import OUT, home_with  # noqa: E402
+
+import fleet2d  # noqa: E402
+from fleet2d.errors import InputError  # noqa: E402
+from fleet2d.gym import DiscountByTime, Lives, RobotEnv, RobotsEnv, load_task  # noqa: E402
+
+SHORT = "simulation.duration=1 d"
+TASKS = ["hangout", "find", "patrol"]
+
+
+def policy(task: str = "hangout", **fields: Any) -> dict[str, Any]:
+    return {"type": "policy", "task": task, "period": "10 min", **fields}
+
+
+def flat(task: str = "hangout", duration: str = "4 h", **sections: Any) -> dict[str, Any]:
+    return home_with([policy(task, rooms=7, every="1 h")], duration, **sections)
+
+
+def play(env: Any, seed: int | None = None, steps: int = 10**6) -> Iterator[tuple[Any, ...]]:
+    """Let a policy that is drawn at random act; yield what `step` returns."""
+    observation, info = env.reset(seed=seed)
+    random = np.random.default_rng(0)
+    for _ in range(steps):
+        action = random.choice(np.flatnonzero(info["action_mask"]))
+        observation, reward, terminated, truncated, info = env.step(action)
+        yield observation, reward, terminated, truncated, info
+        if terminated or truncated:
+            return
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_gymnasium_has_no_complaint(task: str) -> None:
+    from gymnasium.utils.env_checker import check_env
+
+    env = RobotEnv(task, SHORT, masked="rest")
+    env.spec = gymnasium.spec(f"fleet2d/{task.title()}-v1")
+    check_env(env, skip_render_check=True)
+
+
+@pytest.mark.filterwarnings("ignore:Your observation")  # a table, for which it has no network
+def test_stable_baselines_has_no_complaint() -> None:
+    checker = pytest.importorskip("stable_baselines3.common.env_checker", reason="not installed")
+
+    checker.check_env(RobotEnv("hangout", SHORT, masked="rest"), skip_render_check=True)
+
+
+def test_pettingzoo_has_no_complaint() -> None:
+    from pettingzoo.test import parallel_api_test
+
+    robots = {
+        name: {"start": [1.0 + n, 3.0], "behaviors": [policy(rooms=7)]}
+        for n, name in enumerate(("astro", "rosie"))
+    }
+    content = flat()
+    content["robots"] = robots
+    parallel_api_test(RobotsEnv({"scenario": content}, masked="rest"), num_cycles=60)
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_environments_are_made_by_name(task: str) -> None:
+    env = gymnasium.make(f"fleet2d/{task.title()}-v1")
+
+    many = gymnasium.make_vec(
+        f"fleet2d/{task.title()}-v1", 3, vectorization_mode="vector_entry_point"
+    )
+
+    assert (16, 40) == env.observation_space.shape
+    assert 17 == env.action_space.n
+    assert (3, 16, 40) == many.observation_space.shape
+
+
+def test_environment_of_a_scenario_file(tmp_path: Any) -> None:
+    import yaml
+
+    path = tmp_path / "home.yaml"
+    path.write_text(yaml.safe_dump(flat()))
+    env = RobotEnv(path, robot="astro", reward={"relocations": -1.0})
+
+    assert {0.0, -1.0} == {reward for _, reward, *_ in play(env)}
+
+
+def test_life_is_truncated_at_its_end_and_intervals_add_up() -> None:
+    steps = list(play(RobotEnv(flat()), seed=1))
+
+    assert [False] * len(steps) == [terminated for _, _, terminated, *_ in steps]
+    assert [False] * (len(steps) - 1) + [True] == [truncated for *_, truncated, _ in steps]
+    assert 4 * 3600 == sum(info["elapsed_s"] for *_, info in steps)
+
+
+def test_rewards_add_up_to_the_terms_of_the_whole_run() -> None:
+    env = RobotEnv({"scenario": flat(), "reward": {"in_view_min": 1.0, "relocations": -0.5}})
+    total = sum(reward for _, reward, *_ in play(env, seed=1))
+    stored = env.run()
+    events = stored.arrow("events").to_pylist()
+
+    moves = sum(row["event"] == "relocates" for row in events)
+    assert pytest.approx(stored.tables["observations"].num_rows / 60 - 0.5 * moves) == total
+
+
+def test_reward_may_be_a_function() -> None:
+    env = RobotEnv(flat(), reward=lambda env: env.present.simulation.step)
+
+    assert all(reward == info["elapsed_s"] for _, reward, *_, info in play(env, 1, steps=1))
+
+
+def test_unknown_term_of_a_reward_is_an_error_with_the_nearest_name() -> None:
+    with pytest.raises(Exception, match="relocations"):
+        RobotEnv(flat(), reward={"relocation": 1.0})
+
+
+@pytest.mark.parametrize("action", [4, 6, 8, -1])
+def test_impossible_action_is_an_error_and_changes_nothing(action: int) -> None:
+    env = RobotEnv(flat())
+    _, info = env.reset(seed=1)
+    storage = env.present.simulation.home.plan.room("storage_0").index
+    action = storage if action == 4 else action
+    with pytest.raises(InputError, match="the policy chose"):
+        env.step(action)
+
+    assert info["action_mask"].tolist() == env.action_masks().tolist()
+    assert env.step(7)[4]["elapsed_s"] == 600
+
+
+def test_masked_action_may_mean_to_rest() -> None:
+    env = RobotEnv(flat(), masked="rest")
+    env.reset(seed=1)
+    storage = env.present.simulation.home.plan.room("storage_0").index
+
+    assert 600 == env.step(storage)[4]["elapsed_s"]
+
+
+def test_step_without_a_life_and_after_its_end_is_an_error() -> None:
+    env = RobotEnv(flat(duration="30 min"))
+    with pytest.raises(InputError, match="call reset"):
+        env.step(0)
+    list(play(env))
+    with pytest.raises(InputError, match="call reset"):
+        env.step(7)
+
+
+def test_empty_battery_terminates_the_life() -> None:
+    battery = {"driving": "10 min", "standing": "1 h", "charging": "30 min", "charger": "kitchen"}
+    *_, (_, _, terminated, truncated, info) = play(RobotEnv(flat(astro={"battery": battery})), 1)
+
+    assert (terminated, truncated) == (True, False)
+    assert info["elapsed_s"] > 0
+
+
+def test_nobody_at_home_is_never_found() -> None:
+    env = RobotEnv({"scenario": flat("find", ana=OUT), "reward": {"found": 1.0, "gave_up": -1.0}})
+
+    assert {0.0, -1.0} == {reward for _, reward, *_ in play(env)}
+
+
+def test_truth_is_told_only_if_asked_for() -> None:
+    assert "truth" not in RobotEnv(flat()).reset()[1]
+    assert {"ana", "astro"} == set(RobotEnv(flat(), truth=True).reset()[1]["truth"])
+
+
+def test_same_seed_is_the_same_episode_in_any_number_of_environments() -> None:
+    settings: dict[str, Any] = {"task": load_task("hangout"), "masked": "rest"}
+    few, many = Lives(2, SHORT, **settings), Lives(3, SHORT, **settings)
+    first, second = few.reset(seed=5)[0], many.reset(seed=5)[0]
+    for step in range(60):
+        assert np.array_equal(first, second[:2])
+        actions = np.array([step % 7, step % 5, step % 3])
+        first, *rewards = few.step(actions[:2])
+        second, *other = many.step(actions)
+        assert np.array_equal(rewards[0], other[0][:2])
+
+
+def test_lives_are_those_of_single_environments() -> None:
+    lives, env = Lives(2, task=flat(), masked="rest"), RobotEnv(flat(), masked="rest")
+    observations, info = lives.reset(seed=3)
+    single, own = env.reset(seed=4)
+
+    for _ in range(30):
+        assert np.array_equal(observations[1], single)
+        assert np.array_equal(info["action_mask"][1], own["action_mask"])
+        observations, rewards, terminated, truncated, info = lives.step(np.array([0, 1]))
+        if truncated[1]:
+            break
+        single, reward, _, _, own = env.step(1)
+        assert reward == rewards[1]
+    observations, rewards, terminated, truncated, info = lives.step(np.array([0, 1]))
+    assert [0, 0] == info["elapsed_s"].tolist() == rewards.tolist()  # new lives
+    assert not (terminated | truncated).any()
+
+
+def test_pickled_environment_goes_on_as_the_original() -> None:
+    env = RobotEnv(flat())
+    list(play(env, seed=1, steps=5))
+    twin = pickle.loads(pickle.dumps(env))
+    one, other = env.step(1), twin.step(1)
+
+    assert np.array_equal(one[0], other[0])
+    assert one[1:4] == other[1:4]
+    assert np.array_equal(env.reset()[0], twin.reset()[0])
+
+
+def test_branch_goes_its_own_way_and_leaves_the_original_as_it_was() -> None:
+    env = RobotEnv(flat())
+    list(play(env, seed=1, steps=5))
+    twin, other = env.branch(), env.branch()
+    for _ in range(5):
+        twin.step(2)
+    before = [env.step(1) for _ in range(3)]
+    after = [other.step(1) for _ in range(3)]
+
+    assert twin.present.simulation.step > env.present.simulation.step
+    assert all(
+        np.array_equal(a[0], b[0]) and a[1] == b[1] for a, b in zip(before, after, strict=True)
+    )
+
+
+def test_reset_in_the_middle_begins_anew_and_nothing_grows() -> None:
+    import gc
+
+    env = RobotEnv(flat(duration="30 min"))
+    first = env.reset(seed=7)[0]
+    counts = []
+    for _ in range(3):
+        for _ in range(40):
+            env.reset()
+            env.step(7)
+        gc.collect()
+        counts.append(len(gc.get_objects()))
+
+    assert np.array_equal(first, env.reset(seed=7)[0])
+    assert counts[2] - counts[1] < 200
+
+
+def test_run_of_a_life_is_stored_as_any_other() -> None:
+    env = RobotEnv(flat())
+    list(play(env, seed=1))
+
+    assert "complete" == env.run().status
+    assert {"trajectories", "events", "observations"} <= set(env.run().tables)
+
+
+def test_policies_from_files_repeat_the_episode(tmp_path: Any) -> None:
+    path = tmp_path / "policy.onnx"
+    path.write_bytes(scores_of_rooms("visited_20min", "visited_6h"))
+    content = flat(duration="8 h")
+    content["robots"]["astro"]["behaviors"] = [policy(rooms=7, file=str(path))]
+    stored = fleet2d.run(content)
+    env = RobotEnv(flat(duration="8 h"))
+    observation, info = env.reset(seed=1, options={"seed": 4})
+    model: Any = copy.copy(env.present.policy("astro"))
+    object.__setattr__(model, "file", path)
+    truncated = False
+    while not truncated:
+        observation, _, _, truncated, info = env.step(model.act(observation, info["action_mask"]))
+
+    assert stored.digest == env.run().digest
+    assert stored.tables["events"].num_rows > 5
+
+
+def scores_of_rooms(*names: str) -> bytes:
+    """An ONNX file that prefers rooms where some columns are low, and to rest least."""
+    pytest.importorskip("onnx", reason="needs onnx")
+    pytest.importorskip("onnxruntime", reason="needs the extra onnx")
+    from onnx import TensorProto, helper, numpy_helper
+
+    from fleet2d.entities.robots.policy import COLUMNS
+
+    weights = -np.isin(COLUMNS, names).astype(np.float32)[:, None]
+    rest = np.full((1, 1), -9, np.float32)
+    graph = helper.make_graph(
+        [
+            helper.make_node("MatMul", ["observation", "weights"], ["column"]),
+            helper.make_node("Squeeze", ["column", "axis"], ["rooms"]),
+            helper.make_node("Concat", ["rooms", "rest"], ["scores"], axis=1),
+        ],
+        "policy",
+        [helper.make_tensor_value_info("observation", TensorProto.FLOAT, [1, 7, len(COLUMNS)])],
+        [helper.make_tensor_value_info("scores", TensorProto.FLOAT, [1, 8])],
+        [
+            numpy_helper.from_array(weights, "weights"),
+            numpy_helper.from_array(rest, "rest"),
+            numpy_helper.from_array(np.array([2]), "axis"),
+        ],
+    )
+    model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 13)], ir_version=8)
+    return bytes(model.SerializeToString())
+
+
+def test_broken_policy_file_is_named(tmp_path: Any) -> None:
+    pytest.importorskip("onnxruntime", reason="needs the extra onnx")
+    path = tmp_path / "policy.onnx"
+    path.write_bytes(b"no network")
+    content = flat()
+    content["robots"]["astro"]["behaviors"] = [policy(rooms=7, file=str(path))]
+    with pytest.raises(fleet2d.ComponentError, match=r"policy\.onnx can't be read as an ONNX file"):
+        fleet2d.run(content)
+
+
+def test_discount_is_by_time() -> None:
+    env = DiscountByTime(RobotEnv(flat(), reward={"in_view_min": 1.0}), half_life="20 min")
+    plain = RobotEnv(flat(), reward={"in_view_min": 1.0})
+    env.reset(seed=1)
+    plain.reset(seed=1)
+    for number in range(6):
+        reward, info = env.step(7)[1], env.step
+        assert pytest.approx(plain.step(7)[1] * 2 ** -(number / 2)) == reward
+    assert callable(info)
+
+
+def test_task_draws_homes_apart_for_training_and_testing() -> None:
+    task, random = load_task("hangout"), np.random.default_rng(0)
+    train = {task.draw(random, "train")["floorplan.seed"] for _ in range(50)}
+    test = {task.draw(random, "test")["floorplan.seed"] for _ in range(50)}
+
+    assert not train & test
+    assert max(train) < 1000 <= min(test)
+
+
+def test_task_without_a_policy_says_what_to_give() -> None:
+    with pytest.raises(InputError, match="first behavior is a policy"):
+        RobotEnv({"scenario": "bundled:base"})
+
+
+def test_unknown_task_has_the_nearest_name() -> None:
+    with pytest.raises(InputError, match="hangout"):
+        RobotEnv("hangot")
+
+
+def test_picture_of_a_life_shows_the_scores() -> None:
+    pytest.importorskip("matplotlib")
+    from fleet2d.gym.pictures import life_figure
+
+    env = RobotEnv(flat(), render_mode="rgb_array")
+    env.reset(seed=1)
+    pixels = env.render()
+    texts = [text.get_text() for text in life_figure(env, np.arange(8.0)).axes[0].texts]
+
+    assert (np.uint8, 3) == (pixels.dtype, pixels.shape[2])
+    assert any(text.startswith("kitchen_0\n") for text in texts)
