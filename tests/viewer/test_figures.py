@@ -3,11 +3,11 @@
 from pathlib import Path
 
 import pytest
-from tests.scenes import Cli
+from tests.scenes import Cli, scenario
 
 import fleet2d
 from fleet2d.errors import InputError
-from fleet2d.viewer.figures import draw_moment, draw_stretch
+from fleet2d.viewer.figures import draw_failure, draw_moment, draw_stretch
 from fleet2d.viewer.film import write_film
 from fleet2d.viewer.report import write_report
 from fleet2d.viewer.stage import Stage
@@ -130,3 +130,35 @@ def test_show_refuses_what_is_no_picture(
     code, _, err = fleet2d("show", run_dir, *words)
     assert 2 == code
     assert message in err
+
+
+def test_the_picture_of_a_failure_says_what_failed_and_marks_it(tmp_path: Path) -> None:
+    content = scenario(
+        "5 min",
+        users={"ana": {"type": "meander"}},
+        robots={"astro": {"type": "patrol", "dwell": "10 s"}},
+        expect={
+            "off": "never(distance(astro, ana) < 3 m and room(astro) in [kitchen, living_room])"
+        },
+    )
+    simulation = fleet2d.Simulation(content)
+    run = simulation.run()
+    verdict = simulation.verdicts()["off"]
+    evidence = simulation.evidence("off")
+    assert verdict.worst is not None
+    draw_failure(run, verdict.worst.worst, tmp_path / "whole.svg", str(verdict), evidence)
+    draw_failure(run, verdict.worst.worst, tmp_path / "plain.svg", str(verdict), None)
+    whole, plain = ((tmp_path / f"{name}.svg").read_text() for name in ("whole", "plain"))
+
+    assert {"kitchen", "living_room"} == evidence.places - {"ana"}
+    assert (("astro", "ana"),) == evidence.distances
+    distance, room = evidence.signals
+    assert ('distance("astro", "ana")', "m", 3.0) == (distance.text, distance.unit, distance.limit)
+    assert set(room.trace.value.tolist()) <= {0.0, 1.0}
+    gap = distance.trace.at(verdict.worst.worst)
+    assert f"{gap:.2f} m" in whole
+    for text in ("off is violated", f"step {verdict.worst.worst}"):
+        assert text in whole
+        assert text in plain
+    assert "seconds from the failure" in whole
+    assert "seconds from the failure" not in plain

@@ -337,19 +337,21 @@ def _simulation(case: ScenarioCase, out: Path | None = None) -> "Simulation":
 def _store(case: ScenarioCase, pictures: Path | None, out: Path | None) -> None:
     """Run a failed case again, to store it and to draw the worst moments."""
     directory = None if out is None else out / case.name
-    run = _simulation(case, directory).run()
+    simulation = _simulation(case, directory)
+    run = simulation.run()
     if directory is not None:
         case.files.append(directory)
     if pictures is None:
         return
-    from fleet2d.viewer.figures import draw_moment
+    from fleet2d.viewer.figures import draw_failure
 
     pictures.mkdir(parents=True, exist_ok=True)
     for verdict in case.verdicts.values():
         worst = verdict.worst
         if worst is not None:
             path = pictures / f"{case.name}-{file_name(verdict.name)}.png"
-            draw_moment(run, worst.worst, path)
+            evidence = simulation.evidence(verdict.name)
+            draw_failure(run, worst.worst, path, str(verdict), evidence)
             case.files.append(path)
 
 

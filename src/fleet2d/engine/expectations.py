@@ -23,7 +23,13 @@ from fleet2d.entities.decisions import DecidingActor
 from fleet2d.errors import InputError
 from fleet2d.expectations.expectation import Expectation, RunSignals
 from fleet2d.expectations.signals import Gauge, MeasuredRun, Scene, SignalBlock
-from fleet2d.expectations.verdict import Verdict, check_judged, verdict_of
+from fleet2d.expectations.verdict import (
+    Evidence,
+    Verdict,
+    check_judged,
+    evidence_of,
+    verdict_of,
+)
 from fleet2d.kernels import I64
 from fleet2d.kernels.sight import SightMemory
 from fleet2d.metrics.metric import Metric
@@ -200,9 +206,18 @@ class RunExpectations:
             if self.first > entry.since
         }
 
+    def evidence(self, name: str) -> Evidence:
+        """Return what an expectation is about, with its signals so far."""
+        entry = self.entries[name]
+        return evidence_of(entry.expectation, self._signals(entry, ended=True))
+
     def _verdict(self, name: str, entry: ActiveExpectation, ended: bool) -> Verdict:
+        verdict = verdict_of(name, entry.expectation, self._signals(entry, ended), entry.text)
+        return replace(verdict, notes=entry.notes)
+
+    def _signals(self, entry: ActiveExpectation, ended: bool) -> RunSignals:
         gauges = {str(s): self._gauges[str(s)] for s in entry.expectation.measures()}
-        signals = RunSignals(
+        return RunSignals(
             {key: gauge.trace() for key, gauge in gauges.items()},
             {key: gauge.words for key, gauge in gauges.items()},
             entry.since,
@@ -210,8 +225,6 @@ class RunExpectations:
             ended,
             self.clock,
         )
-        verdict = verdict_of(name, entry.expectation, signals, entry.text)
-        return replace(verdict, notes=entry.notes)
 
     def finish(self, results: Mapping[str, Any], store: RunStore, *, ended: bool) -> dict[str, Any]:
         """Store the table of violations; return the content of all verdicts for the manifest.

@@ -55,7 +55,7 @@ from fleet2d.scenario.model import Scenario, load_scenario
 
 if TYPE_CHECKING:
     from fleet2d.expectations.expectation import Expectation
-    from fleet2d.expectations.verdict import Verdict
+    from fleet2d.expectations.verdict import Evidence, Verdict
 
 
 class Simulation(InterventionMethods):
@@ -733,6 +733,11 @@ class Simulation(InterventionMethods):
         if self._run is None:
             self._state.settle(self.step)
         return self._state.expectations.verdicts(ended=self.done)
+
+    def evidence(self, name: str) -> "Evidence":
+        """Return the signals of an expectation so far, and what it is about, for pictures."""
+        assert self._state.expectations is not None
+        return self._state.expectations.evidence(name)
 
     def judge(self, expectation: "Expectation | str", name: str = "") -> "Verdict":
         """Return the verdict on an expectation from the step on at which it was first requested.

@@ -1,14 +1,15 @@
 """Verdicts: whether an expectation holds, by how much, and when it was violated."""
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 from fleet2d.configuration.units import format_duration
 from fleet2d.errors import InputError
 from fleet2d.expectations.expectation import And, Expectation, Not, Or, RunSignals, number_text
-from fleet2d.expectations.signals import SignalComparison
+from fleet2d.expectations.signals import ANY_KIND, Signal, SignalComparison, WordComparison
 from fleet2d.expectations.temporal import (
     Temporal,
     Total,
@@ -17,7 +18,8 @@ from fleet2d.expectations.temporal import (
     at_end,
     may_be_untested,
 )
-from fleet2d.expectations.traces import TINY
+from fleet2d.expectations.traces import TINY, Trace
+from fleet2d.expectations.vocabulary import distance, during
 from fleet2d.runtime.clock import DAY_S, HOUR_S, Clock
 
 
@@ -137,6 +139,65 @@ class Verdict:
             **({"untested": self.untested} if self.holds is None else {}),
             **({"notes": list(self.notes)} if self.notes else {}),
         }
+
+
+class SignalCourse(NamedTuple):
+    """A signal of an expectation over the run, and its bound.
+
+    Attributes:
+        text: The signal, or a condition that is 1 while it holds.
+        unit: Its unit; empty for plain numbers and conditions.
+        trace: Its values.
+        limit: What it is compared with; None for a condition, or if that is a signal, too.
+    """
+
+    text: str
+    unit: str
+    trace: Trace
+    limit: float | None
+
+
+class Evidence(NamedTuple):
+    """What an expectation is about, for pictures.
+
+    Attributes:
+        signals: Its signals.
+        places: The names and kinds of rooms that it names, among other names.
+        distances: The pairs of bodies, or of a body and a place, whose distance it measures.
+    """
+
+    signals: tuple[SignalCourse, ...]
+    places: frozenset[str]
+    distances: tuple[tuple[str, str | tuple[float, float]], ...]
+
+
+def evidence_of(expectation: Expectation, run: RunSignals) -> Evidence:
+    """Return what an expectation is about, with the signals of a run."""
+    courses: dict[str, SignalCourse] = {}
+    places: set[str] = set()
+    for atom in _atoms(expectation):
+        if isinstance(atom, SignalComparison):
+            limit = atom.limit if isinstance(atom.limit, float) else None
+            signals = [s for s in (atom.signal, atom.limit) if isinstance(s, Signal)]
+            courses |= {str(s): SignalCourse(str(s), s.unit, s.trace(run), limit) for s in signals}
+        else:
+            holds = atom.robustness(run, False).map(lambda value: (value > 0).astype(float))
+            courses[str(atom)] = SignalCourse(str(atom), "", holds, None)
+        if isinstance(atom, WordComparison):
+            places |= {word.removeprefix(ANY_KIND) for word in atom.words}
+    distances = [m for m in expectation.measures() if isinstance(m, distance)]
+    pairs = [(m.body, m.other) for m in distances if isinstance(m.other, str | tuple)]
+    places |= {other for _, other in pairs if isinstance(other, str)}
+    return Evidence(tuple(courses.values()), frozenset(places), tuple(dict.fromkeys(pairs)))
+
+
+def _atoms(expectation: Expectation) -> Iterator[Expectation]:
+    """Yield the conditions that an expectation is made of."""
+    parts = [part for part in expectation.parts() if isinstance(part, Expectation)]
+    for part in parts:
+        yield from _atoms(part)
+    if not parts and not isinstance(expectation, during):
+        yield expectation
 
 
 class Judged(Protocol):

@@ -6,7 +6,6 @@ from datetime import datetime, time, timedelta
 import numpy as np
 from numpy.typing import NDArray
 
-from fleet2d.errors import InputError
 from fleet2d.kernels import I64
 
 MICROSECOND = timedelta(microseconds=1)
@@ -62,21 +61,3 @@ class Clock:
 def midnight_of(moment: datetime) -> datetime:
     """Return the midnight that begins the day of a moment."""
     return datetime.combine(moment.date(), time())
-
-
-def next_time(text: str, now: datetime) -> datetime:
-    """Return the next moment at a time of day, which may be the present one.
-
-    Raises:
-        InputError: It is not a time of day.
-
-    Example:
-        >>> next_time("19:00", datetime(2026, 1, 5, 20)).isoformat()
-        '2026-01-06T19:00:00'
-    """
-    try:
-        at = time.fromisoformat(text)
-    except ValueError:
-        raise InputError(f"expected a time of day like 19:00, got {text!r}") from None
-    moment = datetime.combine(now.date(), at)
-    return moment if moment >= now else moment + timedelta(days=1)

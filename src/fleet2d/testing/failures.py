@@ -352,11 +352,13 @@ def _store(
     yield f"  run: {out}"
     try:
         from fleet2d.runs.run import open_run
-        from fleet2d.viewer.figures import draw_moment
+        from fleet2d.viewer.figures import draw_failure
 
         picture = out.with_suffix(".png")
         run = open_run(out)
-        draw_moment(run, min(step, run.manifest["steps"] - 1), picture)
+        evidence = None if failure is None else failure.evidence
+        text = failure.text.splitlines()[0] if failure is not None else ""
+        draw_failure(run, min(step, run.manifest["steps"] - 1), picture, text, evidence)
         yield f"  picture: {picture}"
     except Fleet2DError as error:  # such as that matplotlib is not installed
         yield f"  no picture: {error}"

@@ -15,7 +15,7 @@ from fleet2d.engine.simulation import Simulation
 from fleet2d.errors import InputError
 from fleet2d.expectations.expectation import Expectation, Term
 from fleet2d.expectations.temporal import after, at_end, eventually, until
-from fleet2d.expectations.verdict import Verdict
+from fleet2d.expectations.verdict import Evidence, Verdict
 from fleet2d.floorplan.home import keep_homes
 from fleet2d.floorplan.source import keep_plans
 from fleet2d.interventions.bodies import Decide, TakeControl
@@ -93,7 +93,10 @@ class Trial(Simulation):
             self.finish()  # some metrics are known at the end only
         entries = self._state.expectations.entries if self._state.expectations else {}
         return tuple(
-            result_of(verdict, entries[name].expectation)
+            replace(
+                result_of(verdict, entries[name].expectation),
+                evidence=self.evidence(name) if verdict.fails else None,
+            )
             for name, verdict in self.verdicts().items()
         )
 
@@ -123,6 +126,7 @@ class ExpectationResult:
         kind: What kind of violation it is: `MISSED` or `MISSED_BY_THE_END` if something didn't come
             about, its line for an `assert`, else empty.
         names: What it is about: names of bodies, rooms, doors and the like.
+        evidence: Its signals, if it failed, for a picture.
     """
 
     name: str
@@ -133,6 +137,7 @@ class ExpectationResult:
     untested: bool = False
     kind: str = ""
     names: frozenset[str] = frozenset()
+    evidence: Evidence | None = None
 
 
 def result_of(verdict: Verdict, expectation: Expectation) -> ExpectationResult:

@@ -1,5 +1,6 @@
 """Pictures of a run: a moment, a stretch, heat maps, a strip of time."""
 
+import textwrap
 from datetime import timedelta
 from pathlib import Path
 from typing import Literal
@@ -12,6 +13,7 @@ from matplotlib.colors import PowerNorm
 from matplotlib.figure import Figure
 
 from fleet2d.errors import InputError
+from fleet2d.expectations.verdict import Evidence, SignalCourse
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.kernels import F64
 from fleet2d.palette import TEXT_COLOR
@@ -39,6 +41,12 @@ BLUR_M = 0.15
 SAMPLES = 40_000
 HEIGHT_IN = 7.0
 
+# Pictures of failures: signals drawn, their height, and that of the text; seconds shown around.
+MAX_COURSES = 4
+COURSE_IN, HEAD_IN = 1.05, 0.75
+COURSE_S = 180
+MARK_RGB = (0.84, 0.15, 0.16)
+
 
 def draw_moment(run: Run, step: int, path: Path) -> None:
     """Draw a moment: positions, what is in view and noticed, and the paths of the last minute.
@@ -56,6 +64,87 @@ def draw_moment(run: Run, step: int, path: Path) -> None:
     with drawing_style():
         figure = moment_figure(run, step)
         save_figure(figure, path)
+
+
+def draw_failure(run: Run, step: int, path: Path, text: str, evidence: Evidence | None) -> None:
+    """Draw the moment at which an expectation failed, with what it is about.
+
+    Its rooms and distances are marked, and its signals drawn over the minutes around the moment,
+    each with its bound.
+
+    Args:
+        run: The run.
+        step: The step at which it failed.
+        path: The file: .png, .svg or .pdf. An existing file is replaced.
+        text: What failed, and when.
+        evidence: The signals of the expectation; None: only the moment is drawn.
+
+    Raises:
+        InputError: The run has no such step, or the file can't be written.
+        ArtifactError: The run stored no key frames or no floor plan.
+    """
+    check_picture(path)
+    courses = evidence.signals[:MAX_COURSES] if evidence is not None else ()
+    with drawing_style():
+        width, height = figure_size(run.plan)
+        lower = COURSE_IN * len(courses) + 0.35
+        figure = Figure(figsize=(width, height + lower + HEAD_IN), dpi=DPI, facecolor="white")
+        FigureCanvasAgg(figure)
+        whole = figure.get_figheight()
+        axes = figure.add_axes((0.0, lower / whole, 1.0, height / whole))
+        stage = Stage(run, max(0, step - _minute(run)), step + 1, axes)
+        stage.show(step)
+        if evidence is not None:
+            _mark(run.plan, stage, evidence, axes)
+        moment = f"{clock_of(run).time(step):%a %d %b %H:%M:%S}, step {step}"
+        lines = textwrap.wrap(text, round(width * 14))[:3]
+        figure.text(0.02, 1 - 0.08 / whole, "\n".join([moment, *lines]), va="top", fontsize=8)
+        for number, course in enumerate(courses):
+            bottom = (lower - COURSE_IN * (number + 1)) / whole
+            below = figure.add_axes((0.09, bottom, 0.88, (COURSE_IN - 0.3) / whole))
+            _draw_course(run, course, step, below)
+            if number == len(courses) - 1:
+                below.set_xlabel("seconds from the failure", fontsize=6, labelpad=1)
+        save_figure(figure, path)
+
+
+def _mark(plan: FloorPlan, stage: Stage, evidence: Evidence, axes: Axes) -> None:
+    """Mark the rooms of an expectation, and its distances between bodies."""
+    rooms = [r.index for r in plan.rooms if evidence.places & {r.name, r.type}]
+    left, bottom = plan.lattice.origin
+    mask = np.isin(plan.room_of_place, rooms)
+    image = np.zeros((*mask.shape, 4))
+    image[mask] = (*MARK_RGB, 0.22)
+    rows, columns = mask.shape
+    extent = (left, left + columns * plan.lattice.cell, bottom, bottom + rows * plan.lattice.cell)
+    axes.imshow(image, extent=extent, origin="lower", zorder=2.2)
+    poses = {b.facts["name"]: (b.path.x[-1], b.path.y[-1]) for b in stage.bodies}
+    for body, other in evidence.distances:
+        here, there = poses.get(body), other if isinstance(other, tuple) else poses.get(other)
+        if here is not None and there is not None:
+            (x0, y0), (x1, y1) = here, there
+            axes.plot([x0, x1], [y0, y1], ls="--", lw=1.2, color=MARK_RGB, zorder=5)
+            label = f"{np.hypot(x1 - x0, y1 - y0):.2f} m"
+            middle = ((x0 + x1) / 2, (y0 + y1) / 2)
+            box = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1}
+            axes.annotate(label, middle, color=MARK_RGB, fontsize=8, zorder=6, bbox=box)
+
+
+def _draw_course(run: Run, course: SignalCourse, step: int, axes: Axes) -> None:
+    """Draw a signal over the minutes around a step, in seconds from it, with its bound."""
+    seconds = int(run.manifest["step_us"]) / 1e6
+    reach = round(COURSE_S / seconds)
+    first, end = max(course.trace.first, step - reach), min(course.trace.end, step + reach)
+    part = course.trace.since(first).until(end)
+    at = (np.append(part.start, part.end) - step) * seconds
+    value = np.where(np.isfinite(part.value), part.value, np.nan)
+    axes.stairs(value, at, color=TEXT_COLOR, lw=1.2, baseline=None)
+    if course.limit is not None:
+        axes.axhline(course.limit, color=MARK_RGB, ls="--", lw=1)
+    axes.axvline(0, color=MARK_RGB, lw=1)
+    unit = f" [{course.unit}]" if course.unit else ""
+    axes.set_title(f"{course.text}{unit}", fontsize=7, loc="left", pad=2)
+    axes.tick_params(labelsize=6)
 
 
 def moment_figure(run: Run, step: int) -> Figure:
