@@ -1,6 +1,7 @@
 """Array jobs, run by submitit in processes of this machine: results, failures, and who is cancelled."""
 
 import os
+import shutil
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -93,6 +94,18 @@ def test_parameters_are_read_and_wrong_ones_refused(tmp_path: Path) -> None:
         SlurmExecutor(1, {"timeuot": 5}, tmp_path, "local")
 
 
+@pytest.mark.skipif(shutil.which("srun") is not None, reason="there is Slurm")
 def test_without_slurm_there_is_one_line(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="can't be submitted"):
         SlurmExecutor(1, folder=tmp_path, cluster="slurm")
+
+
+def test_a_job_that_left_the_queue_without_results_is_lost(
+    executor: SlurmExecutor, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Without accounting, submitit would wait for it for ever."""
+    monkeypatch.setattr(slurm_executor, "_queued_jobs", lambda cluster: set[str]())
+    monkeypatch.setattr(slurm_executor, "GRACE_S", 0.0)
+    (event,) = executor.run(Square(tmp_path), tasks(1))
+    assert isinstance(event, LostTask)
+    assert "left the queue without results" in event.reason

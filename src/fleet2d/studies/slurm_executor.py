@@ -1,5 +1,7 @@
 """Workers on a Slurm cluster: array jobs, submitted by submitit."""
 
+import logging
+import subprocess
 import time
 from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass
@@ -22,6 +24,7 @@ WORKERS = 16
 CHUNKS_PER_WORKER = 4  # so that all end at about the same time
 MAX_CHUNK = 100  # tasks of a job, whose results arrive together
 LOOK_EVERY_S = 2.0
+GRACE_S = 30.0  # until a job that has left the queue counts as lost: its files may arrive late
 
 
 @dataclass
@@ -65,7 +68,10 @@ class SlurmExecutor:
         """
         with extra("slurm", "this needs submitit"):
             import submitit
+        logging.getLogger("submitit").setLevel(logging.ERROR)  # it warns at each look otherwise
         self.workers = workers or WORKERS
+        self._cluster = cluster
+        self._missing: dict[str, float] = {}
         try:
             self._executor = submitit.AutoExecutor(folder=str(folder), cluster=cluster)
             self._executor.update_parameters(
@@ -85,9 +91,11 @@ class SlurmExecutor:
                     jobs = self._executor.map_array(ChunkJob(job), chunks)
                     running |= zip(jobs, chunks, strict=True)
                     retries = []
-                for ended in [each for each in running if each.done()]:
+                for ended in self._ended(running):
                     chunk = running.pop(ended)
                     try:
+                        if ended.job_id in self._missing:
+                            raise RuntimeError("it has left the queue without results")
                         payloads = ended.result()
                     except Exception as error:  # noqa: BLE001 - a job may fail in any way
                         yield from self._lost(chunk, error, attempts, retries)
@@ -100,6 +108,20 @@ class SlurmExecutor:
         finally:
             for each in running:
                 each.cancel()
+
+    def _ended(self, running: Mapping[Any, Any]) -> list[Any]:
+        """Return the jobs that have ended, with results or without."""
+        ended = [job for job in running if job.done()]
+        # submitit learns of failures by accounting, which not every cluster has.
+        if ended or (queued := _queued_jobs(self._cluster)) is None:
+            return ended
+        now_s = time.monotonic()
+        for job in running:
+            if job.job_id in queued or job.paths.result_pickle.exists():
+                self._missing.pop(job.job_id, None)
+            elif now_s - self._missing.setdefault(job.job_id, now_s) > GRACE_S:
+                ended.append(job)
+        return ended
 
     def _chunks(self, tasks: TaskSchedule, running: int) -> list[list[WorkerTask]]:
         """Take all tasks that are there, in chunks, unless enough jobs wait already."""
@@ -130,3 +152,12 @@ class SlurmExecutor:
                 yield LostTask(task, text, MAX_ATTEMPTS)
             else:
                 retries.append([task])
+
+
+def _queued_jobs(cluster: str) -> set[str] | None:
+    """Return the numbers of jobs that wait or run; None if unknown."""
+    if cluster != "slurm":
+        return None
+    command = ("squeue", "--me", "--noheader", "--array", "--format=%F_%K")
+    done = subprocess.run(command, capture_output=True, text=True, check=False)  # noqa: S603
+    return None if done.returncode else set(done.stdout.split())
