@@ -1,7 +1,8 @@
 """The sensors of a run: their readings, and the activities at that time."""
 
 from bisect import bisect_right
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from copy import copy
 from operator import itemgetter
 from typing import Protocol, runtime_checkable
@@ -20,6 +21,8 @@ from fleet2d.entities.objects.home_object import (
     in_order,
 )
 from fleet2d.errors import ScenarioError, blame
+from fleet2d.logs.log import LogError
+from fleet2d.runtime.clock import Clock
 from fleet2d.runtime.events import Event, EventKind
 
 
@@ -31,6 +34,14 @@ class OfDoor(Protocol):
 
     def watch(self, door: int) -> None:
         """Set the door."""
+
+
+@runtime_checkable
+class FromLog(Protocol):
+    """A sensor whose readings are in a file, which `read` reads before the run."""
+
+    def read(self, clock: Clock) -> None:
+        """Read the file."""
 
 
 class Sensors(Watcher):
@@ -56,6 +67,9 @@ class Sensors(Watcher):
         for name, item in basis.scenario.objects.items():
             if isinstance(item, Sensor):
                 sensor = item.model_copy(deep=True)
+                if isinstance(sensor, FromLog):
+                    with _in_object(name):
+                        sensor.read(basis.clock)
                 if isinstance(sensor, OfDoor):
                     sensor.watch(_door(name, sensor.of, doors))
                 sensor.start(home, step_us)
@@ -162,6 +176,15 @@ class Sensors(Watcher):
         activities_of_user = list(self._activities.values())[user]
         index = bisect_right(activities_of_user, step, key=itemgetter(0))
         return activities_of_user[index - 1][1] if index else ""
+
+
+@contextmanager
+def _in_object(name: str) -> Iterator[None]:
+    """Say in errors about a log which object reads it."""
+    try:
+        yield
+    except LogError as error:
+        raise LogError(f"objects.{name}: {error}") from None
 
 
 def _door(name: str, door: str, doors: Sequence[str]) -> int:

@@ -278,11 +278,12 @@ def columns_of(
     overrides: Mapping[str, str],
     path: Path,
     usual: Mapping[str, Sequence[str]] = NAMES,
+    needed: Sequence[str] = ("time", "x", "y"),
 ) -> dict[str, str]:
     """Return the name of the column of each quantity: as the user says, else one of the usual.
 
     Raises:
-        LogError: A quantity is unknown, or has no column; time, x and y are needed.
+        LogError: A quantity is unknown, or one that is needed has no column.
     """
     named = dict(overrides)
     for quantity, name in named.items():
@@ -295,7 +296,7 @@ def columns_of(
         column = next((lower[name] for name in names if name in lower), None)
         if quantity not in named and column is not None:
             named[quantity] = column
-        if quantity not in named and quantity in ("time", "x", "y"):
+        if quantity not in named and quantity in needed:
             raise LogError(
                 f"{path} has no column {quantity!r}; it has: {', '.join(table.column_names)}. Say"
                 f" which it is by columns: {{{quantity}: …}}"

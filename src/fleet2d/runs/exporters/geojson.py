@@ -38,26 +38,65 @@ def export(run: Run, path: Path, part: Selection) -> str:
     with new_file(path) as file:
         head = json.dumps(home)[:-1] + ', "features": [\n'
         file.write((head + ",\n".join(json.dumps(feature) for feature in features)).encode())
-        for chunk in Records(run, part).chunks(tables=tables):
-            ways = (way for name, path in chunk.poses.items() for way in _ways(name, path))
-            events = (_event(row, chunk.poses) for rows in chunk.rows.values() for row in rows)
-            for feature in (*ways, *events):
-                file.write(f",\n{json.dumps(feature)}".encode())
-                count += 1
+        for feature in _features(Records(run, part), tables):
+            file.write(f",\n{json.dumps(feature)}".encode())
+            count += 1
         file.write(b"\n]}\n")
     return f"{count:,} features in {path}"
 
 
-def _ways(name: str, way: Trajectory) -> Iterator[dict[str, Any]]:
-    """Yield the movements of a body, each from its last rest to its next."""
-    xy = np.stack([way.x, way.y], axis=-1)
-    moves = np.any(xy[1:] != xy[:-1], axis=1) & ~way.away[1:] & ~way.away[:-1]
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], moves, [0]])))
-    times = np.datetime_as_string(way.time, unit="s")
-    for begin, end in zip(edges[::2], edges[1::2], strict=True):
-        line = {"type": "LineString", "coordinates": xy[begin : end + 1].round(4).tolist()}
-        moments = {"from": str(times[begin]), "to": str(times[end])}
-        yield _feature(line, kind="way", entity=name, **moments)
+def _features(records: Records, tables: list[str]) -> Iterator[dict[str, Any]]:
+    """Yield all ways and events."""
+    ways: dict[str, _Ways] = {}
+    for chunk in records.chunks(tables=tables):
+        for name, path in chunk.poses.items():
+            yield from ways.setdefault(name, _Ways(name)).take(path)
+        yield from (_event(row, chunk.poses) for rows in chunk.rows.values() for row in rows)
+    for body in ways.values():
+        yield from body.finish()
+
+
+class _Ways:
+    """The movements of a body, each from its last rest to its next, also from chunk to chunk."""
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+        self._line: list[list[float]] = []  # of a movement that isn't over
+        self._from = self._to = ""
+        self._last: tuple[Any, Any, Any] | None = None  # the last pose: place, whether away, time
+
+    def take(self, path: Trajectory) -> Iterator[dict[str, Any]]:
+        """Yield the movements that are over in the next poses."""
+        xy, away = np.stack([path.x, path.y], axis=-1), path.away
+        times = np.datetime_as_string(path.time, unit="s")
+        if not len(xy):
+            return
+        if self._last is not None:
+            place, was_away, time = self._last
+            xy = np.concatenate([place[np.newaxis], xy])
+            away, times = np.append(was_away, away), np.append(time, times)
+        self._last = xy[-1], away[-1], times[-1]
+        moves = np.any(xy[1:] != xy[:-1], axis=1) & ~away[1:] & ~away[:-1]
+        edges = np.flatnonzero(np.diff(np.concatenate([[0], moves, [0]])))
+        if self._line and not (len(moves) and moves[0]):
+            yield from self.finish()
+        for begin, end in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+            line = xy[begin : end + 1].round(4).tolist()
+            if self._line:  # which goes on
+                self._line += line[1:]
+            else:
+                self._line, self._from = line, str(times[begin])
+            self._to = str(times[end])
+            if end < len(moves):
+                yield from self.finish()
+
+    def finish(self) -> Iterator[dict[str, Any]]:
+        """Yield the movement that isn't over, as it is cut here."""
+        if self._line:
+            line = {"type": "LineString", "coordinates": self._line}
+            moments = {"from": self._from, "to": self._to}
+            yield _feature(line, kind="way", entity=self._name, **moments)
+            self._line = []
 
 
 def _event(row: dict[str, Any], poses: dict[str, Trajectory]) -> dict[str, Any]:

@@ -1,0 +1,80 @@
+"""Beliefs of a real algorithm, replayed from a table: newest shares, rooms, people, errors."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import fleet2d
+from fleet2d.errors import InputError
+
+
+def scenario(path: Path, **settings: Any) -> dict[str, Any]:
+    return {
+        "extends": "bundled:base",
+        "simulation": {"duration": "4 h", "seed": 4},
+        "algorithms": {
+            "ltp": {"type": "replay", "path": str(path), "period": "1 h"} | settings,
+        },
+    }
+
+
+def write(folder: Path, text: str) -> Path:
+    path = folder / "belief.csv"
+    path.write_text(text)
+    return path
+
+
+ROWS = """time,user,room,share
+2026-01-05 01:30:00,ana,kitchen_0,0.75
+2026-01-05 01:30:00,ana,living_room_0,0.25
+2026-01-05 03:00:00,ana,kitchen_0,0.1
+2026-01-05 03:00:00,ana,living_room_0,0.9
+2026-01-05 03:00:00,ben,kitchen_0,1
+"""
+
+
+def shares(run: Any, room: str) -> list[float]:
+    return [r["share"] for r in run.tables["ltp"].to_pylist() if r["room"] == room]
+
+
+def test_the_newest_shares_are_put_out(tmp_path: Path) -> None:
+    run = fleet2d.run(scenario(write(tmp_path, ROWS), user="ana"))
+
+    assert shares(run, "kitchen_0") == [0.75, 0.1, 0.1] or shares(run, "kitchen_0") == [
+        0.75,
+        0.75,
+        0.1,
+    ]
+    assert run.manifest["inputs"][0]["path"].endswith("belief.csv")
+
+
+def test_what_a_run_stored_is_put_out_again(tmp_path: Path) -> None:
+    content = {"extends": "bundled:base", "simulation": {"duration": "4 h", "seed": 4}}
+    content["algorithms"] = {"ltp": {"type": "ltp", "period": "1 h"}}
+    first = fleet2d.run(content, out=tmp_path / "first")
+
+    again = fleet2d.run(scenario(tmp_path / "first" / "ltp.parquet", user="ana"))
+
+    stored = [
+        r for r in first.tables["ltp"].to_pylist() if r["user"] == "ana" and r["room"] != "away"
+    ]
+    last = [r["share"] for r in stored][-14:]
+    last = [share / sum(last) for share in last]
+    assert [r["share"] for r in again.tables["ltp"].to_pylist()][-14:] == pytest.approx(last)
+
+
+@pytest.mark.parametrize(
+    ("text", "settings", "message"),
+    [
+        (ROWS, {}, "has several: select one by 'user': ana, ben"),
+        (ROWS, {"user": "anna"}, "has nobody named 'anna'"),
+        ("time,room,share\n0,attic,1\n", {}, "there is no room 'attic'"),
+        ("time,room\n0,kitchen_0\n", {}, "has no column 'share'"),
+    ],
+)
+def test_a_table_of_another_home_is_refused(
+    tmp_path: Path, text: str, settings: dict[str, Any], message: str
+) -> None:
+    with pytest.raises(InputError, match=message):
+        fleet2d.Simulation(scenario(write(tmp_path, text), **settings))

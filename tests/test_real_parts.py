@@ -1,0 +1,80 @@
+"""The table of parts that are simulated, from a log, or live: every cell runs, alone and together."""
+
+import itertools
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from tests import thorough
+
+import fleet2d
+
+PAGE = (Path(__file__).parent.parent / "docs" / "real-parts.md").read_text(encoding="utf-8")
+ROWS = [
+    [re.findall(r"`([a-z][^`]*=[^`]*)`", cell) for cell in line.split(" | ")[1:]]
+    for line in PAGE.splitlines()
+    if line.startswith("| ") and "=" in line
+]
+COLUMNS = ("simulated", "log", "live")
+CELLS = [
+    pytest.param(cell[0], id=f"{cell[0].partition('=')[0]}-{COLUMNS[number]}")
+    for row in ROWS
+    for number, cell in enumerate(row)
+    if cell
+]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """Return a folder with the files of the page, and the logs that its commands write."""
+    pytest.importorskip("rosbags", reason="the extra ros is not installed")
+    pytest.importorskip("foxglove", reason="the extra ros is not installed")
+    folder = tmp_path_factory.mktemp("parts")
+    for name, text in re.findall(r"```\w+ title=(\S+)\n(.*?)```", PAGE, re.DOTALL):
+        (folder / name).write_text(text, encoding="utf-8")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        sensor = ROWS[4][0][0]
+        run = fleet2d.run("parts.yaml", "algorithms.ltp.period=30 min", sensor, out="first")
+        fleet2d.export(run, Path("drive.mcap"))
+        fleet2d.export(run, Path("poses.csv"))
+        yield folder
+
+
+def test_the_table_has_all_parts_in_all_columns() -> None:
+    assert len(ROWS) == 6
+    assert [sum(bool(cell) for cell in row) for row in ROWS] == [2, 3, 3, 3, 3, 3]
+
+
+@pytest.mark.parametrize("cell", CELLS)
+def test_a_cell_runs(folder: Path, cell: str) -> None:
+    run = fleet2d.run("parts.yaml", cell)
+
+    assert run.status == "complete"
+    assert run.tables["trajectories"].num_rows
+
+
+def test_what_was_replayed_is_as_it_was(folder: Path) -> None:
+    logged = [row[1][0] for row in ROWS[1:]]
+    first = fleet2d.open_run("first")
+
+    run = fleet2d.run("parts.yaml", *logged)
+
+    old, new = first.path("astro"), run.path("astro")
+    assert abs(old.x - new.x).max() < 0.1
+    assert abs(old.y - new.y).max() < 0.1
+    steps = first.tables["observations"]["step"].to_pylist()
+    assert run.tables["observations"]["step"].to_pylist() == steps
+    assert run.tables["observations"]["user"].to_pylist() == ["ana"] * len(steps)
+    states = ("step", "state")
+    assert run.tables["sensors"].select(states) == first.tables["sensors"].select(states) or (
+        run.tables["sensors"].num_rows == first.tables["sensors"].num_rows
+    )
+
+
+def test_parts_are_combined(folder: Path) -> None:
+    choices = [[cell[0] for cell in row if cell] for row in ROWS[1:]]
+    combinations = list(itertools.product(*choices))
+    for cells in combinations if thorough.THOROUGH else combinations[:: len(combinations) // 4]:
+        assert fleet2d.run("parts.yaml", *cells).status == "complete"
