@@ -14,7 +14,7 @@ from fleet2d.runtime.determinism import logistic
 
 @register("timing_policy", "thompson")
 class ThompsonTiming(TimingPolicy):
-    """Ask with the probability that a yes is likelier than `ask_at`, given the answers so far.
+    """Ask with the probability that a yes is likelier than usual, given the answers so far.
 
     A contextual bandit with probability matching (Thompson 1933): where little is known, that
     probability is near a half, so that it explores; it stops where the answers are clear. The
@@ -22,23 +22,27 @@ class ThompsonTiming(TimingPolicy):
     by a logistic one; each answer counts in neighboring hours, and in other rooms, by a part.
 
     Attributes:
-        ask_at: Least probability of a yes that is worth asking.
+        ask_at: Least probability of a yes that is worth asking; null: the share of yeses so far, so
+            that it asks at the better times of the day.
         least: Least probability of asking anywhere: off-policy estimates need one above 0.
         prior: Number of imagined answers, at even odds.
     """
 
-    ask_at: Share = 0.5
+    ask_at: Share | None = 0.5
     least: Share = 0.02
     prior: float = Field(default=2.0, gt=0)
 
     def start(self, rooms: int) -> None:
         """Begin with imagined answers only."""
         super().start(rooms)
+        self.answers = [0.6 * self.prior, self.prior]  # yeses, and all
         self.yes = np.full((HOURS, rooms), self.prior * 0.6)
         self.no = np.full((HOURS, rooms), self.prior * 0.4)
 
     def learn(self, asked: Asked) -> None:
         """Count an answer, and less of it near by."""
+        self.answers[0] += asked.was_accepted
+        self.answers[1] += 1
         counts = self.yes if asked.was_accepted else self.no
         for hour, near in ((-2, 0.25), (-1, 0.5), (0, 1.0), (1, 0.5), (2, 0.25)):
             row = counts[(asked.hour + hour) % HOURS]
@@ -48,12 +52,13 @@ class ThompsonTiming(TimingPolicy):
 
     def chances(self) -> F64:
         """Return the probability that the rate of yes is above `ask_at`."""
+        ask_at = self.answers[0] / self.answers[1] if self.ask_at is None else self.ask_at
         chances = np.empty((HOURS, self.rooms))
         for hour in range(HOURS):
             for room in range(self.rooms):
                 yes, no = float(self.yes[hour, room]), float(self.no[hour, room])
                 total = yes + no
                 spread = math.sqrt(yes * no / (total * total * (total + 1)))
-                above = logistic(1.7 * (yes / total - self.ask_at) / spread)
+                above = logistic(1.7 * (yes / total - ask_at) / spread)
                 chances[hour, room] = max(self.least, min(above, 1.0))
         return chances

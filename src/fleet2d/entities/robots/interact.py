@@ -8,6 +8,7 @@ from pydantic import Field
 from fleet2d.configuration.components import register
 from fleet2d.configuration.units import Duration, PositiveDuration, Share
 from fleet2d.entities.behavior import Actor, Situation
+from fleet2d.entities.giving_way import resumed
 from fleet2d.entities.place import Point
 from fleet2d.entities.plan import Plan
 from fleet2d.entities.robots.approach import (
@@ -18,11 +19,14 @@ from fleet2d.entities.robots.approach import (
 )
 from fleet2d.errors import NoWayError
 from fleet2d.interactions.interaction import Outcome, Request
+from fleet2d.runtime.determinism import sum_in_order
 
 Step = Literal["seek", "ask", "carry_out", "withdraw"]
 ANSWERS = frozenset(str(outcome) for outcome in Outcome)
 # A person who gave no answer isn't asked again before having moved this far [m].
 MOVED_M = 1.0
+# It looks into the likeliest rooms, until they have this part of the probability.
+ENOUGH = 0.9
 
 
 class ServedRequest(NamedTuple):
@@ -32,29 +36,29 @@ class ServedRequest(NamedTuple):
         request: The request.
         step: What its last plan was for.
         place: Where the person was perceived when addressed [m].
-        rooms: Indices of the rooms that it has looked into.
     """
 
     request: Request
     step: Step
     place: Point | None = None
-    rooms: frozenset[int] = frozenset()
 
 
 @register("behavior", "interact")
 class Interact(BeliefBehavior):
     """Serve the requests of `interactions:`: approach, address, wait for the answer, carry out.
 
-    It looks for the person of the most valuable request in the rooms where `source` believes the
-    person to be, likeliest first. A person in view is approached and addressed; the robot waits for
-    `patience`. What is accepted is carried out; after any other answer the robot withdraws a few
-    steps, and comes back at the time that the person named, or after `retry` of the interaction. A
-    person who gave no answer isn't addressed again in the same place: a sleeper isn't asked twice.
-    Rooms that it was told to keep out of are no part of its ways any more.
+    It looks once for the person of the most valuable request, in the rooms where `source` believes
+    the person to be, likeliest first, up to nine tenths of the probability. A person in view is
+    approached and addressed; the robot waits for `patience`. What is accepted is carried out; after
+    any other answer the robot withdraws from the room, and comes back at the time that the person
+    named, or after `retry` of the interaction. A person who gave no answer isn't addressed again in
+    the same place: a sleeper isn't asked twice. Rooms that it was told to keep out of are no part
+    of its ways any more.
 
     With `timing` it asks an algorithm first: when a request comes up, when the person comes into
     view, and at most every `look`, it serves it with the probability that the algorithm names for
-    the hour and the room of the person, seen or believed.
+    the hour and the room of the person, seen or believed. A request that was put off is taken up
+    only at moments that are better than those before.
 
     Events, with the interaction and the person: `opportunity`, with that probability and what was
     drawn, `asks`, the answer, `delivered` and `withdraws`.
@@ -93,6 +97,7 @@ class Interact(BeliefBehavior):
         self.plan: Plan | None = None  # the last one that addresses somebody
         self.looked: dict[str, datetime] = {}  # when each request was considered last
         self.unanswered: dict[str, Point] = {}  # where a person gave no answer
+        self.best_so_far: dict[str, tuple[datetime, float]] = {}  # best chance of each request
         self.left_alone: dict[str, datetime] = {}  # until when each person isn't addressed
         self.not_found: dict[str, datetime] = {}  # when it may look for a person again
 
@@ -145,20 +150,16 @@ class Interact(BeliefBehavior):
     def _look_for_somebody(
         self, now: Situation, ready: list[Request], served: ServedRequest | None
     ) -> Plan | None:
-        """Look for the person of a request; None: of none, or it has looked everywhere."""
+        """Look for the person of a request; None: of none, or it has looked for all."""
         self.served = None
+        if served is not None and (plan := self._look_on(now, served)) is not None:
+            return plan
         for request in ready:
-            if not (self.seek and request.interaction.seek):
-                continue
             again_at = self.not_found.get(request.text, now.time)
             if max(again_at, self.left_alone.get(request.interaction.to, now.time)) > now.time:
                 continue
-            is_same = served is not None and served.request is request
-            looked = served.rooms if served is not None and is_same else frozenset()
-            if is_same or self._is_good_time(now, request):
-                plan = self._seek(now, request, looked)
-                if plan is not None:
-                    return plan
+            if self.seek and request.interaction.seek and self._is_good_time(now, request):
+                return self._seek(now, request)
         return None
 
     def _keep_out(self, now: Situation) -> None:
@@ -191,7 +192,13 @@ class Interact(BeliefBehavior):
         age = (now.time - request.since) / request.interaction.within
         if chances is not None and age < self.only_urgent_at:
             chance = chances.chance(to, request.name, now.time, self._room_of(now, to))
+        since, best = self.best_so_far.get(request.text, (request.since, 0.0))
+        best = best if since == request.since else 0.0
+        # It is asked at the first moment whose chance exceeds a threshold drawn for the request.
+        chance = max(0.0, (chance - best) / (1 - best))
         is_drawn = now.random(f"timing {request.text}").uniform() < chance
+        best = 0.0 if is_drawn else best + chance * (1 - best)
+        self.best_so_far[request.text] = request.since, best
         text = f"{request.text} {chance:.3f} {'asks' if is_drawn else 'waits'}"
         now.requests.opportunities.append((now.step, text))
         return is_drawn
@@ -255,18 +262,31 @@ class Interact(BeliefBehavior):
                 plan.stay(timedelta(seconds=10))
         return plan.stay(timedelta(seconds=1))
 
-    def _seek(self, now: Situation, request: Request, looked: frozenset[int]) -> Plan | None:
-        """Look into the likeliest room that it hasn't looked into; None: it has seen them all."""
-        belief = self.belief(now, request.interaction.to).joint
-        rooms = [room for room in now.actor.reachable_rooms() if room.index not in looked]
-        if not rooms:
-            self.served = None
-            self.not_found[request.text] = now.time + request.interaction.retry
+    def _seek(self, now: Situation, request: Request) -> Plan:
+        """Look into the likeliest rooms, on one round; the person may come into view on the way."""
+        joint = self.belief(now, request.interaction.to).joint
+        rooms = now.actor.reachable_rooms()
+        rooms.sort(key=lambda room: (-float(joint[room.index]), room.index))
+        total = sum_in_order(float(joint[room.index]) for room in rooms)
+        self.served, self.plan = ServedRequest(request, "seek"), now.plan()
+        looked = 0.0
+        for room in rooms:
+            if looked > ENOUGH * total:
+                break
+            looked += float(joint[room.index])
+            self.plan.go_to_point(*now.actor.middle(room)).turn_by(1)
+        return self.plan.interrupt_on("user_seen")
+
+    def _look_on(self, now: Situation, served: ServedRequest) -> Plan | None:
+        """Go on with a round that somebody has interrupted; None: it is over, without a find."""
+        last = now.actor.plan
+        if last.root is not self.plan:
             return None
-        room = max(rooms, key=lambda room: (float(belief[room.index]), -room.index))
-        self.served = ServedRequest(request, "seek", rooms=looked | {room.index})
-        plan = now.plan()
-        plan.go_to_point(*now.actor.middle(room)).turn_by(1)
+        plan = None if last.is_over(now.step) else resumed(now.actor, now.plan(), last, now.step)
+        if plan is None:
+            self.not_found[served.request.text] = served.request.until
+            return None
+        self.served = served
         return plan.interrupt_on("user_seen")
 
 
