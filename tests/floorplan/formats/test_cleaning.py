@@ -43,6 +43,17 @@ def test_shut_door_opens_and_a_wall_along_the_whole_room_stays() -> None:
     assert not bridge_gaps(two_rooms("#"), 2)[0].any()
 
 
+def test_shut_door_that_is_thinner_than_its_wall_opens() -> None:
+    pixels = np.full((30, 32), ".")
+    pixels[:, 15:17] = "#"
+    pixels[5:14, 15] = "."  # a door of 0.9 m, one pixel thick, in a wall of two
+    raw = OccupancyMap(pixels == ".", pixels == "#", 0.1)
+
+    opened, _ = bridge_gaps(raw, 2)
+
+    assert np.array_equal(np.argwhere(opened), [[row, 16] for row in range(5, 14)])
+
+
 def test_wall_opens_where_a_robot_drove() -> None:
     raw = two_rooms("#")
     driven = np.zeros(raw.free.shape, np.bool_)

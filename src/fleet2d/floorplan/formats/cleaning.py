@@ -7,6 +7,7 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fleet2d.errors import FloorPlanError
 from fleet2d.kernels import F64, I32, I64, Bool
@@ -16,6 +17,7 @@ from fleet2d.kernels.space import count_steps, label_parts, squared_distance
 TINY = 1e-9
 # Widths of what is opened at a threshold or a shut door [m].
 DOOR_M = (0.4, 1.4)
+USUAL_DOOR_M = 0.8
 # A part of a map in which this can't stand is no part of a home: its area and width [m², m].
 SCRAP_M2, SCRAP_WIDTH_M = 1.0, 0.3
 
@@ -61,7 +63,8 @@ def bridge_gaps(raw: OccupancyMap, widest: int, evidence: Bool | None = None) ->
 
     Two parts belong together if a strip of at most `widest` pixels lies between them that is as
     long as a doorway, that nobody knows to be wall, or that a robot drove across. Of several
-    strips between two parts the first in this order is opened: driven across, unknown, shortest.
+    strips between two parts the first in this order is opened: driven across, unknown, thinnest,
+    as long as a door.
 
     Args:
         raw: The map.
@@ -76,30 +79,23 @@ def bridge_gaps(raw: OccupancyMap, widest: int, evidence: Bool | None = None) ->
     roomy = _roomy_parts(raw, part)
     if widest == 0 or np.count_nonzero(roomy) < 2:
         return opened, ""
-    gap = np.zeros(raw.free.shape, np.bool_)
+    gap = np.zeros(raw.free.shape, np.int8)  # its width where it is one
     first, second = (np.full(raw.free.shape, -1, np.int32) for _ in range(2))
     for width in range(1, widest + 1):
         for axis in (0, 1):
             _mark_gaps(part, roomy, width, axis, gap, first, second)
-    strips = [(strip, False) for strip in _strips(gap & ~raw.occupied)]
-    strips += [(strip, True) for strip in _strips(gap & raw.occupied)]
-    candidates = []
-    for index, (strip, is_wall) in enumerate(strips):
-        length = float((np.ptp(strip, axis=0).max() + 1) * raw.pixel)
-        driven = evidence is not None and bool(evidence[tuple(strip.T)].any())
-        if driven or (length >= DOOR_M[0] and (not is_wall or length <= DOOR_M[1])):
-            candidates.append((not driven, is_wall, length, index))
+    strips = _candidates(raw, gap, evidence)
     places = []
     owner = np.arange(len(roomy))
-    for *_, index in sorted(candidates):
-        pixels = tuple(strips[index][0].T)
+    for strip in strips:
+        pixels = tuple(strip.T)
         pairs = np.unique(np.stack([first[pixels], second[pixels]], axis=1), axis=0)
         joins = [(a, b) for a, b in pairs.tolist() if owner[a] != owner[b]]
         for a, b in joins:
             owner[owner == owner[b]] = owner[a]
         if joins:
             opened[pixels] = True
-            places.append(strips[index][0][:, ::-1].mean(axis=0) + 0.5)
+            places.append(strip[:, ::-1].mean(axis=0) + 0.5)
     if not places:
         return opened, ""
     x, y = raw.to_metres(places[0]).tolist()
@@ -107,6 +103,20 @@ def bridge_gaps(raw: OccupancyMap, widest: int, evidence: Bool | None = None) ->
         f"gaps of at most {widest} pixels between parts of the home are open: {len(places)}, the"
         f" first at ({x:.2f}, {y:.2f}) m; bridge_pixels: 0 leaves them shut"
     )
+
+
+def _candidates(raw: OccupancyMap, gap: NDArray[np.int8], evidence: Bool | None) -> list[I64]:
+    """Return the pixels of each strip that may open, the likeliest first, int64 (n, 2)."""
+    strips = [(strip, 0) for strip in _strips((gap > 0) & ~raw.occupied)]
+    for width in range(1, int(gap.max()) + 1):  # a shut door is thinner than the wall that it is in
+        strips += [(strip, width) for strip in _strips((gap == width) & raw.occupied)]
+    candidates = []
+    for index, (strip, wall) in enumerate(strips):
+        length = float((np.ptp(strip, axis=0).max() + 1) * raw.pixel)
+        driven = evidence is not None and bool(evidence[tuple(strip.T)].any())
+        if driven or (length >= DOOR_M[0] and (wall == 0 or length <= DOOR_M[1])):
+            candidates.append((not driven, wall, abs(length - USUAL_DOOR_M), index))
+    return [strips[index][0] for *_, index in sorted(candidates)]
 
 
 def _strips(gap: Bool) -> list[I64]:
@@ -129,7 +139,13 @@ def _roomy_parts(raw: OccupancyMap, part: I32) -> Bool:
 
 
 def _mark_gaps(
-    part: I32, roomy: Bool, width: int, axis: int, gap: Bool, first: I32, second: I32
+    part: I32,
+    roomy: Bool,
+    width: int,
+    axis: int,
+    gap: NDArray[np.int8],
+    first: I32,
+    second: I32,
 ) -> None:
     """Mark the pixels of gaps of a width along an axis, with the parts on their two sides."""
     along = np.moveaxis(part, axis, 0)
@@ -139,9 +155,11 @@ def _mark_gaps(
     is_gap &= roomy[before] & roomy[after]
     low, high = np.minimum(before, after), np.maximum(before, after)
     for k in range(1, width + 1):
-        for target, values in ((gap, is_gap), (first, low), (second, high)):
-            window = np.moveaxis(target, axis, 0)[k : k + len(before)]
-            window[is_gap] = values[is_gap]
+        window = (slice(k, k + len(before)),)
+        new = is_gap & (np.moveaxis(gap, axis, 0)[window] == 0)
+        np.moveaxis(gap, axis, 0)[window][new] = width
+        np.moveaxis(first, axis, 0)[window][new] = low[new]
+        np.moveaxis(second, axis, 0)[window][new] = high[new]
 
 
 def drop_scraps(raw: OccupancyMap, scrap_area_m2: float) -> tuple[Bool, str]:
