@@ -6,15 +6,15 @@ Two dialects are read, also mixed: our own, which names the kind of a feature by
 
 import math
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any, ClassVar, Literal
 
 import numpy as np
 import shapely
 import shapely.geometry
-from pydantic import Field, TypeAdapter
-from shapely import LineString, MultiPolygon, Point, Polygon
+from pydantic import Field
+from shapely import LineString, MultiPolygon, Point
 from shapely.geometry import mapping
 from shapely.geometry.base import BaseGeometry
 
@@ -23,35 +23,30 @@ from fleet2d.configuration.components import register
 from fleet2d.configuration.problems import suggest
 from fleet2d.configuration.units import InputPath, Length
 from fleet2d.errors import FloorPlanError
+from fleet2d.floorplan.formats.features import (
+    GEOMETRIES,
+    SURFACES,
+    Draft,
+    Feature,
+    Move,
+)
 from fleet2d.floorplan.formats.files import (
     MAX_COORDINATE_M,
     clean_coordinate,
     in_file,
     read_json,
     shown_value,
-    validate,
 )
-from fleet2d.floorplan.formats.native import ObjectUse, cell_polygons, object_document
+from fleet2d.floorplan.formats.native import cell_polygons, object_document
 from fleet2d.floorplan.mesh import repair
-from fleet2d.floorplan.placed_objects import PlacedObject, distinct_names
-from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
-from fleet2d.floorplan.rooms.doorways import (
-    TOUCH_M,
-    DoorLine,
-    Passage,
-    door_axes,
-    find_passage,
-    shared_borders,
-)
-from fleet2d.floorplan.rooms.room import PRIORITY, UNKNOWN, room_type, usual_type
+from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.floorplan.rooms.room import room_type
 from fleet2d.floorplan.source import FloorPlanSource
 from fleet2d.kernels import F64
-from fleet2d.runtime.determinism import sum_in_order
 
 COLLECTION = "FeatureCollection"
 
 Units = Literal["auto", "m", "degrees"]
-Move = Callable[[F64], F64]
 
 # WGS 84: half the larger axis [m], and the square of the eccentricity.
 SEMI_MAJOR_M, ECCENTRICITY_2 = 6378137.0, 0.00669437999014
@@ -60,54 +55,11 @@ SMALLEST_M, LARGEST_DEGREES = 0.5, 0.05
 # The largest coordinate that is read; UTM's northings reach ten million.
 FARTHEST = 1e8
 
-_SURFACES, _LINES = ("Polygon", "MultiPolygon"), ("LineString", "MultiLineString")
 _DEPTHS = {"Point": 0, "LineString": 1, "MultiLineString": 2, "Polygon": 2, "MultiPolygon": 3}
-GEOMETRIES = {
-    "room": _SURFACES,
-    "free": _SURFACES,
-    "no_go": _SURFACES,
-    "object": (*_SURFACES, "Point"),
-    "door": (*_LINES, *_SURFACES),
-    "opening": (*_LINES, *_SURFACES),
-    "wall": (*_LINES, *_SURFACES),
-    "entrance": ("Point", "LineString"),
-}
-"""The types of geometry that each kind of feature may have."""
-
 _IMDF_KINDS = {"unit": "room", "opening": "opening", "fixture": "object", "kiosk": "object"}
 _IMDF_SOLID = ("brick", "column", "concrete", "drywall", "glass", "structure", "wall")
 _IMDF_NO_FLOOR = ("opentobelow", "road", "vegetation")
 _KIND_WORDS = {"furniture": "object", "no_go_area": "no_go"} | {kind: kind for kind in GEOMETRIES}
-
-
-@dataclass(frozen=True)
-class Feature:
-    """A feature of the file.
-
-    Attributes:
-        kind: One of `GEOMETRIES`.
-        where: Its place in the file, for messages.
-        shape: Its geometry; in the units of the file until `in_metres`.
-        properties: Its properties in the file.
-        level: The floor that it is on, or None.
-    """
-
-    kind: str
-    where: str
-    shape: BaseGeometry
-    properties: dict[str, Any]
-    level: str | None = None
-
-    def text(self, *keys: str) -> str | None:
-        """Return the first property with text, on one line; in English if possible."""
-        for key in keys:
-            value = self.properties.get(key)
-            if isinstance(value, dict):  # in IMDF by language
-                texts = [v for v in (value.get("en"), *value.values()) if isinstance(v, str)]
-                value = texts[0] if texts else None
-            if isinstance(value, str) and value.strip():
-                return " ".join(value.split())
-        return None
 
 
 def read_features(content: dict[str, Any], level: str | None, notes: list[str]) -> list[Feature]:
@@ -206,7 +158,7 @@ def _kind(item: dict[str, Any], properties: dict[str, Any], where: str) -> tuple
             return _KIND_WORDS[room_type(text)], text
     geometry = item.get("geometry")
     form = geometry.get("type") if isinstance(geometry, dict) else None
-    return ("room", "room") if form in _SURFACES else (None, f"{form or 'feature'} without a kind")
+    return ("room", "room") if form in SURFACES else (None, f"{form or 'feature'} without a kind")
 
 
 def _has_leaf(door: object) -> bool:
@@ -297,10 +249,10 @@ def _shape(geometry: object, kind: str, where: str, notes: list[str]) -> BaseGeo
         known = ", ".join(GEOMETRIES[kind])
         raise FloorPlanError(f"{where} of a {kind} is {shown_value(form)}: {known} is expected")
     where = f"{where}.coordinates"
-    least = 3 if form in _SURFACES else 2
+    least = 3 if form in SURFACES else 2
     coordinates = _coordinates(geometry.get("coordinates"), _DEPTHS[form], least, where)
     shape: BaseGeometry = shapely.geometry.shape({"type": form, "coordinates": coordinates})
-    if shape.is_valid or form not in _SURFACES:
+    if shape.is_valid or form not in SURFACES:
         return shape
     at = shapely.is_valid_reason(shape).rpartition("[")[2].rstrip("]").replace(" ", ", ")
     notes.append(f"{where} touches or crosses itself at ({at}): everything inside it is used")
@@ -360,31 +312,6 @@ def _shift(bounds: F64, notes: list[str]) -> Move:
     return lambda xy: np.round(xy - corner, 6)
 
 
-# Distance of the entrance from a door that leads outside, and how far an entrance may be moved.
-INSIDE_M, ENTRANCE_REACH_M = 0.3, 1.0
-# Side of an object that is drawn as a point.
-POINT_OBJECT_M = 0.1
-
-_USES = ("category", "type", "usage", "use", "room", "room_type", "function")
-# IMDF's categories of units that have another name in the vocabulary.
-_IMDF_TYPES = {
-    "restroom": "toilet",
-    "shower": "bathroom",
-    "lounge": "living_room",
-    "privatelounge": "living_room",
-    "walkway": "hallway",
-    "fitnessroom": "gym",
-    "foodservice": "dining_room",
-    "parking": "garage",
-    "elevator": "passenger_elevator",
-    "unspecified": UNKNOWN,
-    "nonpublic": UNKNOWN,
-}
-
-
-_OBJECT_USE = TypeAdapter(ObjectUse)
-
-
 @register("floorplan", "geojson")
 class GeoJson(FloorPlanSource):
     """A vector plan in GeoJSON: our own dialect, or IMDF.
@@ -419,225 +346,11 @@ class GeoJson(FloorPlanSource):
             raw = read_features(content, self.level, notes)
             features, move = in_metres(raw, content, self.units, notes)
             name = content.get("name")
-            return _Draft(features, move, self.wall_m, notes).plan(
+            return Draft(features, move, self.wall_m, notes).plan(
                 name if isinstance(name, str) and name else self.path.stem,
                 self.cell,
-                self.path.name,
+                f"GeoJSON, {self.path.name}",
             )
-
-
-@dataclass
-class _DrawnDoor:
-    """A doorway of the file, and its passage through the wall."""
-
-    feature: Feature
-    passage: Passage
-
-    @property
-    def line(self) -> DoorLine:
-        name = self.feature.text("name")
-        return DoorLine(*self.passage.line, name, self.feature.kind == "door")
-
-
-class _Draft:
-    """Converts features to the arguments of `FloorPlan.build`; all in metres."""
-
-    def __init__(
-        self, features: Sequence[Feature], move: Move, wall_m: float, notes: list[str]
-    ) -> None:
-        self.features = features
-        self.move = move
-        self.notes = notes
-        self.rooms = [_areas([room]) for room in self._of("room")]
-        self.free = self._free(wall_m)
-        self.doors: list[_DrawnDoor] = []
-        self.ways_out: list[Passage] = []
-        self._cut_doors()
-
-    def plan(self, name: str, cell: float, file: str) -> FloorPlan:
-        """Build the plan."""
-        return FloorPlan.build(
-            name,
-            self.free,
-            self._regions(cell),
-            cell,
-            source=f"GeoJSON, {file}",
-            entrance=self._entrance(),
-            doorways=[door.line for door in self.doors] if self._of("door", "opening") else None,
-            regions_are="exact" if self.rooms else "none",
-            objects=self._objects(),
-            no_go=[part for area in self._of("no_go") for part in _parts(area.shape)],
-            notes=self.notes,
-        )
-
-    def _of(self, *kinds: str) -> list[Feature]:
-        return [feature for feature in self.features if feature.kind in kinds]
-
-    # --- Free space ----------------------------------------------------------------------------
-
-    def _free(self, wall_m: float) -> MultiPolygon:
-        """Return the free space between the walls, before doors open these."""
-        open_space, walls = _areas(self._of("free")), self._walls(wall_m)
-        if open_space.is_empty and not self.rooms:
-            raise FloorPlanError(
-                "it has no room and no free space: no feature of kind room or free"
-            )
-        free = self._room_space(walls, wall_m) if open_space.is_empty else open_space
-        free = _multi(free.difference(walls))
-        if free.is_empty:
-            raise FloorPlanError("no free space is left: all of it is wall")
-        return free
-
-    def _walls(self, wall_m: float) -> BaseGeometry:
-        """Return the walls that the file draws."""
-        shapes = [wall.shape for wall in self._of("wall")]
-        lines = [shape for shape in shapes if not shape.geom_type.endswith("Polygon")]
-        if lines and wall_m == 0:
-            self.notes.append(f"walls drawn as lines: {len(lines)}, ignored as wall_m is 0")
-        solid = [shape for shape in shapes if shape.geom_type.endswith("Polygon")]
-        return shapely.union_all([*solid, _thick(lines, wall_m)])
-
-    def _room_space(self, walls: BaseGeometry, wall_m: float) -> MultiPolygon:
-        """Return the rooms, with walls where they touch unless the file draws these."""
-        free, borders = _areas(self._of("room")), shared_borders(self.rooms)
-        length = sum_in_order(line.length for line in borders)
-        near = walls.buffer(TOUCH_M + wall_m / 2, join_style="mitre")
-        drawn = sum_in_order(float(line.intersection(near).length) for line in borders)
-        if borders and wall_m > 0 and drawn < length / 2:
-            self.notes.append(
-                f"rooms touch along {length:.1f} m: there are walls of {wall_m:g} m but for doors"
-            )
-            return _multi(free.difference(_thick(borders, wall_m)))
-        # A gap within the precision of drawings is no wall.
-        joints = [line.buffer(TOUCH_M, cap_style="flat") for line in borders]
-        return _multi(shapely.union_all([free, *joints]))
-
-    def _cut_doors(self) -> None:
-        """Open the walls where doors are; a door that leads outside stays shut."""
-        cuts: list[Polygon] = []
-        for feature in self._of("door", "opening"):
-            for axes in door_axes(feature.shape):
-                passages = [find_passage(self.free, start, end) for start, end in axes]
-                through = next((p for p in passages if p and p.through), None)
-                out = next((p for p in passages if p), None)
-                name = feature.text("name") or feature.where
-                if through:
-                    self.doors.append(_DrawnDoor(feature, through))
-                    cuts += [through.opening] if through.halves else []
-                elif out:
-                    self.ways_out.append(out)
-                    self.notes.append(f"the {feature.kind} {name} leads outside: it stays shut")
-                else:
-                    self.notes.append(f"the {feature.kind} {name} is in no room's wall: ignored")
-        self.free = _multi(shapely.union_all([self.free, *cuts]))
-
-    # --- Rooms and objects ---------------------------------------------------------------------
-
-    def _regions(self, cell: float) -> list[LabelledRegion]:
-        """Return the rooms, each with its half of the passages through its walls."""
-        halves: list[list[Polygon]] = [[] for _ in self.rooms]
-        for door in self.doors if self.rooms else ():
-            for half in door.passage.halves:
-                away = shapely.distance(self.rooms, half).tolist()
-                overlap = shapely.area(shapely.intersection(self.rooms, half)).tolist()
-                if max(overlap) < half.area / 2:
-                    halves[away.index(min(away))].append(half)
-        own_names = [room.text("name") for room in self._of("room")]
-        names = distinct_names(own_names, "rooms", self.notes)
-        regions = []
-        for feature, area, half_parts, name in zip(
-            self._of("room"), self.rooms, halves, names, strict=True
-        ):
-            # Slightly grown: walls move to the lattice, and every cell at them needs a room.
-            shape = shapely.union_all([area, *half_parts]).buffer(cell / 16, join_style="mitre")
-            labels, kind = _use_of(feature)
-            own_labels = feature.properties.get("labels")
-            if isinstance(own_labels, list) and all(isinstance(x, str) for x in own_labels):
-                labels = tuple(own_labels)
-            regions.append(LabelledRegion(labels, _multi(shape), name, kind))
-        return regions
-
-    def _entrance(self) -> tuple[float, float] | None:
-        """Return the place just inside the front door, if the file has one."""
-        shapes = [feature.shape for feature in self._of("entrance")]
-        if shapes:
-            if len(shapes) > 1:
-                self.notes.append(f"it has {len(shapes)} entrances: the first is used")
-            at = shapes[0].centroid
-        elif len(self.ways_out) == 1:
-            at = shapely.Point(self.ways_out[0].inside(INSIDE_M))
-        else:
-            return None
-        roomy = self.free.buffer(-INSIDE_M / 3, join_style="mitre")
-        if not roomy.contains(at) and not roomy.is_empty:
-            near = shapely.get_point(shapely.shortest_line(roomy, at), 0)
-            if near.distance(at) <= ENTRANCE_REACH_M:
-                at = near
-        return round(float(at.x), 6), round(float(at.y), 6)
-
-    def _objects(self) -> list[PlacedObject]:
-        return [
-            thing for feature in self._of("object") for thing in _to_objects(feature, self.move)
-        ]
-
-
-def _use_of(room: Feature) -> tuple[tuple[str, ...], str]:
-    """Return a room's labels and type: by its use in the file, else by its name."""
-    use, name = room.text(*_USES) or UNKNOWN, room.text("name")
-    kind = _IMDF_TYPES.get(use.partition(".")[0], usual_type(use))
-    if kind in ("room", UNKNOWN) and name is not None and usual_type(name) in PRIORITY:
-        return (name,), usual_type(name)
-    return () if kind == UNKNOWN else (use,), kind
-
-
-def _to_plan(move: Move, x: float, y: float) -> tuple[float, float]:
-    """Return a place of the file in the frame of the plan [m]."""
-    plan_x, plan_y = move(np.array([[x, y]]))[0].tolist()
-    return plan_x, plan_y
-
-
-def _to_objects(feature: Feature, move: Move) -> Iterable[PlacedObject]:
-    shape = feature.shape
-    if isinstance(shape, Point):
-        half = POINT_OBJECT_M / 2
-        shape = shapely.box(shape.x - half, shape.y - half, shape.x + half, shape.y + half)
-    kind = feature.text("type", "category", "object") or "object"
-    properties = {key: feature.properties.get(key) for key in ObjectUse.model_fields}
-    present = {key: value for key, value in properties.items() if value is not None}
-    use_of = validate(_OBJECT_USE, present, f"{feature.where}.properties")
-    uses = []
-    for use in use_of.use_places():
-        x, y = _to_plan(move, use.x, use.y)
-        approach = None if use.approach is None else _to_plan(move, *use.approach)
-        uses.append(replace(use, x=x, y=y, approach=approach))
-    name, parts = feature.text("name") or "", _parts(shape)
-    for number, part in enumerate(parts):
-        yield PlacedObject(
-            f"{name} {number + 1}" if name and len(parts) > 1 else name,
-            room_type(kind),
-            part,
-            use_of.blocks,
-            () if number else tuple(uses),
-            use_of.heading,
-        )
-
-
-def _thick(lines: Iterable[BaseGeometry], wall_m: float) -> BaseGeometry:
-    """Return walls along lines; square at the ends, so that corners are filled."""
-    shapes = [line.buffer(wall_m / 2, cap_style="square", join_style="mitre") for line in lines]
-    return shapely.union_all(shapes)
-
-
-def _areas(features: Iterable[Feature]) -> MultiPolygon:
-    return _multi(shapely.union_all([feature.shape for feature in features]))
-
-
-def _multi(shape: BaseGeometry) -> MultiPolygon:
-    return MultiPolygon(_parts(shape))
-
-
-def _parts(shape: BaseGeometry) -> list[Polygon]:
-    return [part for part in shapely.get_parts(shape).tolist() if part.geom_type == "Polygon"]
 
 
 # --- Writing ---------------------------------------------------------------------------------

@@ -1,0 +1,337 @@
+"""Plans of features: rooms, walls, doors and furniture as shapes, however a file draws them."""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import shapely
+import shapely.geometry
+from pydantic import TypeAdapter
+from shapely import MultiPolygon, Point, Polygon
+from shapely.geometry.base import BaseGeometry
+
+from fleet2d.errors import FloorPlanError
+from fleet2d.floorplan.formats.files import (
+    validate,
+)
+from fleet2d.floorplan.formats.native import ObjectUse
+from fleet2d.floorplan.placed_objects import PlacedObject, distinct_names
+from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
+from fleet2d.floorplan.rooms.doorways import (
+    TOUCH_M,
+    DoorLine,
+    Passage,
+    door_axes,
+    find_passage,
+    shared_borders,
+)
+from fleet2d.floorplan.rooms.room import PRIORITY, UNKNOWN, room_type, usual_type
+from fleet2d.kernels import F64
+from fleet2d.runtime.determinism import sum_in_order
+
+SURFACES, LINES = ("Polygon", "MultiPolygon"), ("LineString", "MultiLineString")
+GEOMETRIES = {
+    "room": SURFACES,
+    "free": SURFACES,
+    "no_go": SURFACES,
+    "object": (*SURFACES, "Point"),
+    "door": (*LINES, *SURFACES),
+    "opening": (*LINES, *SURFACES),
+    "wall": (*LINES, *SURFACES),
+    "entrance": ("Point", "LineString"),
+}
+"""The types of geometry that each kind of feature may have."""
+
+Move = Callable[[F64], F64]
+
+
+# Distance of the entrance from a door that leads outside, and how far an entrance may be moved.
+INSIDE_M, ENTRANCE_REACH_M = 0.3, 1.0
+# Widths of gaps in walls that are closed in turn to find what they enclose [m], and the share of
+# the largest space that it must keep.
+GAPS_M, KEPT_SHARE = (0.0, 0.05, 0.2, 0.5, 1.0), 0.7
+# Side of an object that is drawn as a point.
+POINT_OBJECT_M = 0.1
+
+_USES = ("category", "type", "usage", "use", "room", "room_type", "function")
+# IMDF's categories of units that have another name in the vocabulary.
+_IMDF_TYPES = {
+    "restroom": "toilet",
+    "shower": "bathroom",
+    "lounge": "living_room",
+    "privatelounge": "living_room",
+    "walkway": "hallway",
+    "fitnessroom": "gym",
+    "foodservice": "dining_room",
+    "parking": "garage",
+    "elevator": "passenger_elevator",
+    "unspecified": UNKNOWN,
+    "nonpublic": UNKNOWN,
+}
+
+
+_OBJECT_USE = TypeAdapter(ObjectUse)
+
+
+@dataclass(frozen=True)
+class Feature:
+    """A feature of the file.
+
+    Attributes:
+        kind: One of `GEOMETRIES`.
+        where: Its place in the file, for messages.
+        shape: Its geometry; in the units of the file until `in_metres`.
+        properties: Its properties in the file.
+        level: The floor that it is on, or None.
+    """
+
+    kind: str
+    where: str
+    shape: BaseGeometry
+    properties: dict[str, Any]
+    level: str | None = None
+
+    def text(self, *keys: str) -> str | None:
+        """Return the first property with text, on one line; in English if possible."""
+        for key in keys:
+            value = self.properties.get(key)
+            if isinstance(value, dict):  # in IMDF by language
+                texts = [v for v in (value.get("en"), *value.values()) if isinstance(v, str)]
+                value = texts[0] if texts else None
+            if isinstance(value, str) and value.strip():
+                return " ".join(value.split())
+        return None
+
+
+@dataclass
+class _DrawnDoor:
+    """A doorway of the file, and its passage through the wall."""
+
+    feature: Feature
+    passage: Passage
+
+    @property
+    def line(self) -> DoorLine:
+        name = self.feature.text("name")
+        return DoorLine(*self.passage.line, name, self.feature.kind == "door")
+
+
+class Draft:
+    """Converts features to the arguments of `FloorPlan.build`; all in metres."""
+
+    def __init__(
+        self, features: Sequence[Feature], move: Move, wall_m: float, notes: list[str]
+    ) -> None:
+        self.features = features
+        self.move = move
+        self.notes = notes
+        self.rooms = [_areas([room]) for room in self._of("room")]
+        self.free = self._free(wall_m)
+        self.doors: list[_DrawnDoor] = []
+        self.ways_out: list[Passage] = []
+        self._cut_doors()
+
+    def plan(self, name: str, cell: float, source: str) -> FloorPlan:
+        """Build the plan."""
+        return FloorPlan.build(
+            name,
+            self.free,
+            self._regions(cell),
+            cell,
+            source=source,
+            entrance=self._entrance(),
+            doorways=[door.line for door in self.doors] if self._of("door", "opening") else None,
+            regions_are="exact" if self.rooms else "none",
+            objects=self._objects(),
+            no_go=[part for area in self._of("no_go") for part in _parts(area.shape)],
+            notes=self.notes,
+        )
+
+    def _of(self, *kinds: str) -> list[Feature]:
+        return [feature for feature in self.features if feature.kind in kinds]
+
+    # --- Free space ----------------------------------------------------------------------------
+
+    def _free(self, wall_m: float) -> MultiPolygon:
+        """Return the free space between the walls, before doors open these."""
+        open_space, walls = _areas(self._of("free")), self._walls(wall_m)
+        if open_space.is_empty and not self.rooms and not walls.is_empty:
+            open_space = self._enclosed(walls)
+        if open_space.is_empty and not self.rooms:
+            raise FloorPlanError(
+                "it has no room and no free space: no feature of kind room or free, and no walls"
+                " that enclose space"
+            )
+        free = self._room_space(walls, wall_m) if open_space.is_empty else open_space
+        free = _multi(free.difference(walls))
+        if free.is_empty:
+            raise FloorPlanError("no free space is left: all of it is wall")
+        return free
+
+    def _enclosed(self, walls: BaseGeometry) -> MultiPolygon:
+        """Return the space that walls enclose, with gaps closed as far as they lose most of it."""
+        doors = [door.shape.buffer(GAPS_M[1]) for door in self._of("door", "opening")]
+        outlines = []
+        for gap in GAPS_M:
+            solid = shapely.union_all([walls, *doors]).buffer(gap / 2, join_style="mitre")
+            shells = [Polygon(part.exterior) for part in _parts(solid) if part.interiors]
+            whole = shapely.union_all(shells).buffer(-gap / 2, join_style="mitre")
+            inside = sum_in_order(Polygon(hole).area for p in _parts(solid) for hole in p.interiors)
+            outlines.append((inside, whole, gap))
+        most = max(inside for inside, *_ in outlines)
+        whole, gap = next((w, g) for inside, w, g in outlines if inside >= KEPT_SHARE * most)
+        if gap > 0 and most > 0:
+            self.notes.append(f"gaps in the walls are closed up to {gap:g} m to find the inside")
+        return _multi(whole)
+
+    def _walls(self, wall_m: float) -> BaseGeometry:
+        """Return the walls that the file draws."""
+        shapes = [wall.shape for wall in self._of("wall")]
+        lines = [shape for shape in shapes if not shape.geom_type.endswith("Polygon")]
+        if lines and wall_m == 0:
+            self.notes.append(f"walls drawn as lines: {len(lines)}, ignored as wall_m is 0")
+        solid = [shape for shape in shapes if shape.geom_type.endswith("Polygon")]
+        return shapely.union_all([*solid, _thick(lines, wall_m)])
+
+    def _room_space(self, walls: BaseGeometry, wall_m: float) -> MultiPolygon:
+        """Return the rooms, with walls where they touch unless the file draws these."""
+        free, borders = _areas(self._of("room")), shared_borders(self.rooms)
+        length = sum_in_order(line.length for line in borders)
+        near = walls.buffer(TOUCH_M + wall_m / 2, join_style="mitre")
+        drawn = sum_in_order(float(line.intersection(near).length) for line in borders)
+        if borders and wall_m > 0 and drawn < length / 2:
+            self.notes.append(
+                f"rooms touch along {length:.1f} m: there are walls of {wall_m:g} m but for doors"
+            )
+            return _multi(free.difference(_thick(borders, wall_m)))
+        # A gap within the precision of drawings is no wall.
+        joints = [line.buffer(TOUCH_M, cap_style="flat") for line in borders]
+        return _multi(shapely.union_all([free, *joints]))
+
+    def _cut_doors(self) -> None:
+        """Open the walls where doors are; a door that leads outside stays shut."""
+        cuts: list[Polygon] = []
+        for feature in self._of("door", "opening"):
+            for axes in door_axes(feature.shape):
+                passages = [find_passage(self.free, start, end) for start, end in axes]
+                through = next((p for p in passages if p and p.through), None)
+                out = next((p for p in passages if p), None)
+                name = feature.text("name") or feature.where
+                if through:
+                    self.doors.append(_DrawnDoor(feature, through))
+                    cuts += [through.opening] if through.halves else []
+                elif out:
+                    self.ways_out.append(out)
+                    self.notes.append(f"the {feature.kind} {name} leads outside: it stays shut")
+                else:
+                    self.notes.append(f"the {feature.kind} {name} is in no room's wall: ignored")
+        self.free = _multi(shapely.union_all([self.free, *cuts]))
+
+    # --- Rooms and objects ---------------------------------------------------------------------
+
+    def _regions(self, cell: float) -> list[LabelledRegion]:
+        """Return the rooms, each with its half of the passages through its walls."""
+        halves: list[list[Polygon]] = [[] for _ in self.rooms]
+        for door in self.doors if self.rooms else ():
+            for half in door.passage.halves:
+                away = shapely.distance(self.rooms, half).tolist()
+                overlap = shapely.area(shapely.intersection(self.rooms, half)).tolist()
+                if max(overlap) < half.area / 2:
+                    halves[away.index(min(away))].append(half)
+        own_names = [room.text("name") for room in self._of("room")]
+        names = distinct_names(own_names, "rooms", self.notes)
+        regions = []
+        for feature, area, half_parts, name in zip(
+            self._of("room"), self.rooms, halves, names, strict=True
+        ):
+            # Slightly grown: walls move to the lattice, and every cell at them needs a room.
+            shape = shapely.union_all([area, *half_parts]).buffer(cell / 16, join_style="mitre")
+            labels, kind = _use_of(feature)
+            own_labels = feature.properties.get("labels")
+            if isinstance(own_labels, list) and all(isinstance(x, str) for x in own_labels):
+                labels = tuple(own_labels)
+            regions.append(LabelledRegion(labels, _multi(shape), name, kind))
+        return regions
+
+    def _entrance(self) -> tuple[float, float] | None:
+        """Return the place just inside the front door, if the file has one."""
+        shapes = [feature.shape for feature in self._of("entrance")]
+        if shapes:
+            if len(shapes) > 1:
+                self.notes.append(f"it has {len(shapes)} entrances: the first is used")
+            at = shapes[0].centroid
+        elif len(self.ways_out) == 1:
+            at = shapely.Point(self.ways_out[0].inside(INSIDE_M))
+        else:
+            return None
+        roomy = self.free.buffer(-INSIDE_M / 3, join_style="mitre")
+        if not roomy.contains(at) and not roomy.is_empty:
+            near = shapely.get_point(shapely.shortest_line(roomy, at), 0)
+            if near.distance(at) <= ENTRANCE_REACH_M:
+                at = near
+        return round(float(at.x), 6), round(float(at.y), 6)
+
+    def _objects(self) -> list[PlacedObject]:
+        return [
+            thing for feature in self._of("object") for thing in _to_objects(feature, self.move)
+        ]
+
+
+def _use_of(room: Feature) -> tuple[tuple[str, ...], str]:
+    """Return a room's labels and type: by its use in the file, else by its name."""
+    use, name = room.text(*_USES) or UNKNOWN, room.text("name")
+    kind = _IMDF_TYPES.get(use.partition(".")[0], usual_type(use))
+    if kind in ("room", UNKNOWN) and name is not None and usual_type(name) in PRIORITY:
+        return (name,), usual_type(name)
+    return () if kind == UNKNOWN else (use,), kind
+
+
+def _to_plan(move: Move, x: float, y: float) -> tuple[float, float]:
+    """Return a place of the file in the frame of the plan [m]."""
+    plan_x, plan_y = move(np.array([[x, y]]))[0].tolist()
+    return plan_x, plan_y
+
+
+def _to_objects(feature: Feature, move: Move) -> Iterable[PlacedObject]:
+    shape = feature.shape
+    if isinstance(shape, Point):
+        half = POINT_OBJECT_M / 2
+        shape = shapely.box(shape.x - half, shape.y - half, shape.x + half, shape.y + half)
+    kind = feature.text("type", "category", "object") or "object"
+    properties = {key: feature.properties.get(key) for key in ObjectUse.model_fields}
+    present = {key: value for key, value in properties.items() if value is not None}
+    use_of = validate(_OBJECT_USE, present, f"{feature.where}.properties")
+    uses = []
+    for use in use_of.use_places():
+        x, y = _to_plan(move, use.x, use.y)
+        approach = None if use.approach is None else _to_plan(move, *use.approach)
+        uses.append(replace(use, x=x, y=y, approach=approach))
+    name, parts = feature.text("name") or "", _parts(shape)
+    for number, part in enumerate(parts):
+        yield PlacedObject(
+            f"{name} {number + 1}" if name and len(parts) > 1 else name,
+            room_type(kind),
+            part,
+            use_of.blocks,
+            () if number else tuple(uses),
+            use_of.heading,
+        )
+
+
+def _thick(lines: Iterable[BaseGeometry], wall_m: float) -> BaseGeometry:
+    """Return walls along lines; square at the ends, so that corners are filled."""
+    shapes = [line.buffer(wall_m / 2, cap_style="square", join_style="mitre") for line in lines]
+    return shapely.union_all(shapes)
+
+
+def _areas(features: Iterable[Feature]) -> MultiPolygon:
+    return _multi(shapely.union_all([feature.shape for feature in features]))
+
+
+def _multi(shape: BaseGeometry) -> MultiPolygon:
+    return MultiPolygon(_parts(shape))
+
+
+def _parts(shape: BaseGeometry) -> list[Polygon]:
+    return [part for part in shapely.get_parts(shape).tolist() if part.geom_type == "Polygon"]
