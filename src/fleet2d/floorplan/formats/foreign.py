@@ -48,7 +48,7 @@ _BEGINNINGS: tuple[tuple[bytes, str, str], ...] = (
 # What a text begins with, after white space and an XML declaration; a regular expression.
 _TEXTS = (
     (r"<svg|<!DOCTYPE svg", "an SVG drawing", "name it with the ending .svg"),
-    (r"<home\b", "a home of Sweet Home 3D (Home.xml)", "name it with the ending .xml"),
+    (r"<home\b", "a home of Sweet Home 3D", "give it the ending .xml"),
     (r"<kml", "KML", _MAP),
     (r"<osm", "OpenStreetMap data", _MAP),
     (r"<(\w+:)?(CityModel|FeatureCollection)", "GML", _MAP),

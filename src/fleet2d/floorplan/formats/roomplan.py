@@ -1,0 +1,144 @@
+"""Room scans of Apple's RoomPlan, as its JSON has them: walls, doors, openings and furniture."""
+
+from pathlib import Path
+from typing import Annotated, Any, ClassVar
+
+import numpy as np
+import shapely
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, TypeAdapter
+from shapely import LineString, Polygon
+
+from fleet2d.configuration.components import register
+from fleet2d.configuration.units import InputPath, Length
+from fleet2d.floorplan.formats.features import Draft, Feature
+from fleet2d.floorplan.formats.files import Listed, in_file, read_json, validate
+from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.floorplan.source import FloorPlanSource
+from fleet2d.kernels import F64
+
+# Names of furniture in the catalogue that RoomPlan has under others.
+FURNITURE = {
+    "refrigerator": "fridge",
+    "television": "tv",
+    "washerdryer": "washing_machine",
+    "storage": "shelf",
+    "oven": "stove",
+    "dishwasher": "kitchen_counter",
+}
+# Axes of a scan are rounded to this [m], and turned so that its longest wall is along x.
+ROUNDED_M = 0.001
+
+Extent = Annotated[list[float], Field(min_length=3, max_length=3)]
+Matrix = Annotated[list[float], Field(min_length=16, max_length=16)]
+
+
+def _name_of(category: object) -> object:
+    """Return the name of a category, which is written as `{"sofa": {}}`."""
+    return next(iter(category), "object") if isinstance(category, dict) else category
+
+
+class _Surface(BaseModel):
+    """A wall, door, opening, window or piece of furniture.
+
+    Attributes:
+        dimensions: Its width, height and depth [m].
+        transform: Its place, a matrix of 4 x 4 by columns; y points up.
+        category: What it is.
+    """
+
+    model_config = ConfigDict(defer_build=True)
+
+    dimensions: Extent
+    transform: Matrix
+    category: Annotated[str, BeforeValidator(_name_of)] = "object"
+
+    @property
+    def line(self) -> F64:
+        """Its two ends on the floor (x, y), float64 (2, 2) [m]; seen from above."""
+        matrix = np.array(self.transform).reshape(4, 4)
+        along, at = matrix[0, [0, 2]] * self.dimensions[0] / 2, matrix[3, [0, 2]]
+        return np.stack([at - along, at + along]) * (1, -1)
+
+    @property
+    def box(self) -> F64:
+        """The corners of what it covers of the floor, float64 (4, 2) [m]."""
+        matrix = np.array(self.transform).reshape(4, 4)
+        along, across = (matrix[k, [0, 2]] * self.dimensions[k] / 2 for k in (0, 2))
+        at = matrix[3, [0, 2]]
+        corners = [at - along - across, at + along - across, at + along + across]
+        return np.stack([*corners, at - along + across]) * (1, -1)
+
+
+class _Scan(BaseModel):
+    model_config = ConfigDict(defer_build=True)
+
+    walls: Listed[_Surface]
+    doors: Listed[_Surface] = []
+    openings: Listed[_Surface] = []
+    objects: Listed[_Surface] = []
+
+
+_SCAN = TypeAdapter(_Scan)
+
+
+@register("floorplan", "roomplan")
+class RoomPlan(FloorPlanSource):
+    """A scan by Apple's RoomPlan, exported as JSON.
+
+    Attributes:
+        path: The scan's JSON file.
+        wall_m: Thickness of walls, which a scan sees from one side.
+    """
+
+    marks: ClassVar = (("walls", None),)
+
+    path: InputPath
+    wall_m: Length = Field(default=0.1, ge=0.01, le=1)
+
+    def load(self) -> FloorPlan:
+        """Read the scan; its longest wall is turned along x.
+
+        Raises:
+            FloorPlanError: The file can't be read, isn't such a scan, or its walls enclose nothing.
+        """
+        return read_roomplan(read_json(self.path), self.path, self.cell, self.wall_m)
+
+
+def read_roomplan(content: dict[str, Any], path: Path, cell: float, wall_m: float) -> FloorPlan:
+    """Return the floor plan of a scan's content.
+
+    Raises:
+        FloorPlanError: It isn't such a scan, or its walls enclose nothing.
+    """
+    with in_file(path):
+        scan = validate(_SCAN, content)
+        lines = [wall.line for wall in scan.walls]
+        spans = [line[1] - line[0] for line in lines] or [np.array([1.0, 0.0])]
+        longest = max(spans, key=lambda span: float(span @ span))
+        x, y = longest / max(float(np.sqrt(longest @ longest)), 1e-9)
+        turn = np.array([[x, -y], [y, x]])
+
+        def place(points: F64) -> F64:
+            return np.round(points @ turn / ROUNDED_M) * ROUNDED_M
+
+        features = [
+            Feature("wall", f"walls[{k}]", LineString(place(line)), {})
+            for k, line in enumerate(lines)
+        ]
+        for kind, surfaces in (("door", scan.doors), ("opening", scan.openings)):
+            features += [
+                Feature(kind, f"{kind}s[{k}]", LineString(place(surface.line)), {})
+                for k, surface in enumerate(surfaces)
+            ]
+        features += [
+            Feature("object", f"objects[{k}]", Polygon(place(thing.box)), _furniture(thing))
+            for k, thing in enumerate(scan.objects)
+        ]
+        sound = [f for f in features if f.kind != "object" or shapely.is_valid(f.shape)]
+        draft = Draft(sound, lambda xy: xy, wall_m, [])
+        return draft.plan(path.stem, cell, f"RoomPlan scan, {path.name}")
+
+
+def _furniture(thing: _Surface) -> dict[str, Any]:
+    kind = thing.category.lower()
+    return {"type": FURNITURE.get(kind, kind)}

@@ -1,0 +1,174 @@
+"""Homes of Sweet Home 3D, as the Home.xml in their file has them."""
+
+import math
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Any, ClassVar
+from xml.etree import ElementTree as ET
+
+import numpy as np
+from shapely import LineString, Polygon, affinity
+
+from fleet2d.bounds import FILE_BYTES, read_bytes
+from fleet2d.configuration.components import register
+from fleet2d.configuration.units import InputPath
+from fleet2d.errors import FloorPlanError
+from fleet2d.floorplan.formats.features import Draft, Feature
+from fleet2d.floorplan.formats.files import MAX_COORDINATE_M, in_file
+from fleet2d.floorplan.furniture import FURNITURE
+from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.floorplan.rooms.room import room_type
+from fleet2d.floorplan.source import FloorPlanSource
+
+CM_PER_M = 100
+# What begins higher above the floor is a window or hangs on a wall [cm].
+RAISED_CM = 20
+# Words in names and catalogues of furniture, and the type in Fleet2D's catalogue.
+FURNITURE_WORDS = {
+    "refrigerator": "fridge",
+    "cooker": "stove",
+    "oven": "stove",
+    "television": "tv",
+    "washbasin": "washbasin",
+    "bath": "bathtub",
+    "couch": "sofa",
+    "closet": "wardrobe",
+    "bookcase": "bookshelf",
+    "bedsidetable": "nightstand",
+}
+MIN_SIDE_CM = 1.0
+
+
+@register("floorplan", "sweethome")
+class SweetHome(FloorPlanSource):
+    """A home of Sweet Home 3D: the Home.xml that is in its .sh3d file, a ZIP file.
+
+    Attributes:
+        path: The Home.xml file.
+        level: The floor, by name or id; left out: the lowest that is not below the ground.
+    """
+
+    suffixes: ClassVar[tuple[str, ...]] = (".xml",)
+
+    path: InputPath
+    level: str | None = None
+
+    def load(self) -> FloorPlan:
+        """Read the home.
+
+        Free space is the rooms without the walls or, without rooms, what the walls enclose. Doors
+        lead through walls; windows don't.
+
+        Raises:
+            FloorPlanError: The file can't be read, isn't such a home, or has no free space.
+        """
+        root = _parse(self.path)
+        with in_file(self.path):
+            if root.tag != "home":
+                raise FloorPlanError(f"no home of Sweet Home 3D: it begins with <{root.tag}>")
+            notes: list[str] = []
+            level = _level(root, self.level, notes)
+            here = [e for e in root.iter() if level is None or e.get("level") in (None, level)]
+            features = [feature for element in here for feature in _features(element)]
+            return Draft(features, lambda xy: xy, 0.1, notes).plan(
+                root.get("name") or self.path.stem, self.cell, f"Sweet Home 3D, {self.path.name}"
+            )
+
+
+def _parse(path: Path) -> ET.Element:
+    """Return the root of an XML file without entities of its own, which could fill the memory."""
+    try:
+        content = read_bytes(path, FILE_BYTES, FloorPlanError)
+    except OSError as error:
+        raise FloorPlanError(f"{path} can't be read: {error.strerror}") from None
+    if b"<!ENTITY" in content or b"<!DOCTYPE" in content:
+        raise FloorPlanError(f"{path} declares entities, which no home of Sweet Home 3D does")
+    try:
+        return ET.fromstring(content)  # noqa: S314 - it declares no entities
+    except (ET.ParseError, ValueError, LookupError) as error:
+        raise FloorPlanError(f"{path} is not XML: {error}") from None
+
+
+def _level(root: ET.Element, level: str | None, notes: list[str]) -> str | None:
+    """Return the id of the floor to read, or None if there is only one."""
+    levels = root.findall("level")
+    names = {str(e.get("id")): e.get("name") or str(e.get("id")) for e in levels}
+    if level is not None:
+        matches = [key for key, name in names.items() if level in (key, name)]
+        if not matches:
+            known = ", ".join(names.values()) or "none"
+            raise FloorPlanError(f"there is no level {level!r}; its levels are: {known}")
+        return matches[0]
+    if len(levels) < 2:
+        return None
+    ranked = sorted(levels, key=lambda e: (_number(e, "elevation") < 0, _number(e, "elevation")))
+    chosen = str(ranked[0].get("id"))
+    others = ", ".join(name for key, name in names.items() if key != chosen)
+    notes.append(f"of its levels, {names[chosen]} is used, not {others}")
+    return chosen
+
+
+def _number(element: ET.Element, key: str, default: float = 0.0) -> float:
+    """Return an attribute as a number [cm or rad]."""
+    text = element.get(key)
+    try:
+        value = default if text is None else float(text)
+    except ValueError:
+        value = math.nan
+    if not abs(value) <= MAX_COORDINATE_M * CM_PER_M:
+        raise FloorPlanError(f"<{element.tag}> has {key}={text!r}: a number is expected")
+    return value
+
+
+def _features(element: ET.Element) -> Iterator[Feature]:
+    """Yield what an element draws: a room, a wall, a door or a piece of furniture [m]."""
+    name = element.get("name")
+    where = f"<{element.tag}{f' {name}' if name else ''}>"
+    properties: dict[str, Any] = {"name": name} if name else {}
+    if element.tag == "room":
+        corners = _metres((_number(p, "x"), _number(p, "y")) for p in element.iter("point"))
+        if len(corners) > 2 and Polygon(corners).is_valid:
+            yield Feature("room", where, Polygon(corners), properties)
+    elif element.tag == "wall":
+        ends = _metres(
+            (_number(element, f"x{end}"), _number(element, f"y{end}")) for end in ("Start", "End")
+        )
+        thickness = max(_number(element, "thickness", 10.0), MIN_SIDE_CM) / CM_PER_M
+        if ends[0] != ends[1]:
+            wall = LineString(ends).buffer(thickness / 2, cap_style="square")
+            yield Feature("wall", where, wall, properties)
+    elif element.tag == "doorOrWindow":
+        if _number(element, "elevation") < RAISED_CM:
+            yield Feature("door", where, _box(element), {})
+    elif element.tag == "pieceOfFurniture" and _number(element, "elevation") < RAISED_CM:
+        kind = _furniture_type(f"{element.get('catalogId', '')} {name or ''}")
+        yield Feature("object", where, _box(element), {"type": kind})
+
+
+def _box(element: ET.Element) -> Polygon:
+    """Return the box that a door or a piece of furniture covers [m]."""
+    width, depth = (
+        max(_number(element, key), MIN_SIDE_CM) / CM_PER_M for key in ("width", "depth")
+    )
+    box = Polygon([(-width, -depth), (width, -depth), (width, depth), (-width, depth)])
+    turned = affinity.rotate(
+        affinity.scale(box, 0.5, 0.5), -_number(element, "angle"), (0, 0), True
+    )
+    (x, y) = _metres([(_number(element, "x"), _number(element, "y"))])[0]
+    moved = affinity.translate(turned, x, y)
+    return Polygon(np.round(np.asarray(moved.exterior.coords), 4))
+
+
+def _metres(points: Iterable[tuple[float, float]]) -> list[tuple[float, float]]:
+    """Return places of the file, in centimetres with y downwards, in metres with y upwards."""
+    return [(round(x / CM_PER_M, 4), round(-y / CM_PER_M, 4)) for x, y in points]
+
+
+def _furniture_type(words: str) -> str:
+    """Return the type in the catalogue that a name means, else the name as a type."""
+    kind = room_type(words.rpartition("#")[2])
+    flat = kind.replace("_", "")
+    for word, known in (*FURNITURE_WORDS.items(), *((name, name) for name in FURNITURE)):
+        if word.replace("_", "") in flat:
+            return known
+    return kind

@@ -1,0 +1,83 @@
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from fleet2d.errors import FloorPlanError
+from fleet2d.floorplan.load import load_floorplan
+
+
+def surface(x: float, z: float, width: float, angle_deg: float = 0, **keys: Any) -> dict[str, Any]:
+    """A surface of RoomPlan: its middle (x, z), its width, and its turn about the upward axis."""
+    c, s = math.cos(math.radians(angle_deg)), math.sin(math.radians(angle_deg))
+    depth = keys.pop("depth", 0.0)
+    return {
+        "dimensions": [width, 2.5, depth],
+        "transform": [c, 0, -s, 0, 0, 1, 0, 0, s, 0, c, 0, x, 1.25, z, 1],
+        **keys,
+    }
+
+
+def scan(turn_deg: float = 0.0) -> dict[str, Any]:
+    """A flat of 8 m x 4 m with a wall across its middle, a door in it, and a sofa."""
+
+    def at(x: float, z: float, width: float, angle: float = 0, **keys: Any) -> dict[str, Any]:
+        c, s = math.cos(math.radians(turn_deg)), math.sin(math.radians(turn_deg))
+        return surface(c * x + s * z, -s * x + c * z, width, angle + turn_deg, **keys)
+
+    return {
+        "version": 2,
+        "walls": [at(4, 0, 8), at(4, 4, 8), at(0, 2, 4, 90), at(8, 2, 4, 90), at(4, 2, 4, 90)],
+        "doors": [at(4, 1, 0.9, 90, category={"door": {"isOpen": True}})],
+        "windows": [at(0, 2, 1, 90)],
+        "objects": [at(6, 3, 2.0, depth=0.9, category={"sofa": {}})],
+    }
+
+
+SAMPLE: tuple[str, dict[str, Any]] = ("scan.json", scan())
+
+
+def write(folder: Path, content: object) -> Path:
+    path = folder / "scan.json"
+    path.write_text(json.dumps(content))
+    return path
+
+
+@pytest.mark.parametrize("turn_deg", [0, 33])
+def test_scan_becomes_a_home_with_its_longest_wall_along_x(tmp_path: Path, turn_deg: float) -> None:
+    plan = load_floorplan(write(tmp_path, scan(turn_deg)))
+
+    assert plan.area_m2 == pytest.approx(2 * 3.9 * 3.9 + 0.1 * 0.9, abs=0.15)
+    assert 2 == len(plan.rooms)
+    assert [(0, 1)] == [tuple(sorted(door.rooms)) for door in plan.doorways]
+    assert 0.9 == pytest.approx(plan.doorways[0].width_m, abs=0.01)
+    x0, y0, x1, y1 = plan.bounds
+    assert (7.9, 3.9) == pytest.approx((x1 - x0, y1 - y0), abs=0.02)
+
+
+def test_furniture_has_the_names_of_the_catalogue_and_its_place(tmp_path: Path) -> None:
+    content = scan()
+    content["objects"].append(surface(1, 3.5, 0.7, depth=0.7, category="refrigerator"))
+
+    plan = load_floorplan(write(tmp_path, content))
+
+    assert ["sofa", "fridge"] == [thing.type for thing in plan.objects]
+    assert (5.0, -3.45, 7.0, -2.55) == pytest.approx(plan.objects[0].footprint.bounds)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"walls": 3}, "walls is 3"),
+        ({"walls": []}, "no free space"),
+        ({"walls": [{"dimensions": [1, 2]}]}, "walls[0]"),
+        ({"walls": [surface(0, 0, 4)]}, "no free space"),
+    ],
+)
+def test_damaged_scan_is_refused(tmp_path: Path, change: dict[str, Any], message: str) -> None:
+    with pytest.raises(FloorPlanError) as caught:
+        load_floorplan(write(tmp_path, {**scan(), **change}))
+
+    assert message in str(caught.value)
