@@ -32,6 +32,7 @@ def scan(turn_deg: float = 0.0) -> dict[str, Any]:
         "walls": [at(4, 0, 8), at(4, 4, 8), at(0, 2, 4, 90), at(8, 2, 4, 90), at(4, 2, 4, 90)],
         "doors": [at(4, 1, 0.9, 90, category={"door": {"isOpen": True}})],
         "windows": [at(0, 2, 1, 90)],
+        "openings": [],
         "objects": [at(6, 3, 2.0, depth=0.9, category={"sofa": {}})],
     }
 

@@ -1,7 +1,9 @@
 """Chambers that are too small to be rooms are joined to others."""
 
 import numpy as np
+import shapely
 
+from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.rooms.segmentation import Chambers, Link, segment_rooms
 
 CELL = 0.1
@@ -19,22 +21,35 @@ def areas(rooms: np.ndarray) -> list[float]:
 
 
 def test_rooms_are_numbered_by_decreasing_size_and_walls_have_none() -> None:
-    rooms = segment_rooms(chambers(2.0, 9.0, links=(Link(0, (0, 1)),)), [False], CELL)
+    rooms = segment_rooms(chambers(2.0, 9.0, links=(Link(0, (0, 1)),)), [False], [0.9], CELL)
     assert [9.0, 2.0] == areas(rooms)
     assert -1 == rooms[0, -1]
 
 
 def test_alcove_behind_an_opening_is_joined_but_a_small_room_behind_a_doorway_is_not() -> None:
     both = chambers(9.0, 3.0, links=(Link(0, (0, 1)),))
-    assert [12.0] == areas(segment_rooms(both, [True], CELL))
-    assert [9.0, 3.0] == areas(segment_rooms(both, [False], CELL))
+    assert [12.0] == areas(segment_rooms(both, [True], [0.9], CELL))
+    assert [9.0, 3.0] == areas(segment_rooms(both, [False], [0.9], CELL))
 
 
 def test_what_is_too_small_for_a_toilet_goes_across_an_opening_rather_than_a_doorway() -> None:
     links = (Link(0, (0, 1)), Link(1, (1, 2)))
-    rooms = segment_rooms(chambers(9.0, 1.0, 6.0, links=links), [False, True], CELL)
+    rooms = segment_rooms(chambers(9.0, 1.0, 6.0, links=links), [False, True], [0.9, 0.9], CELL)
     assert [9.0, 7.0] == areas(rooms)
 
 
 def test_chamber_without_a_link_stays_a_room_however_small() -> None:
-    assert [9.0, 0.5] == areas(segment_rooms(chambers(9.0, 0.5, links=()), [], CELL))
+    assert [9.0, 0.5] == areas(segment_rooms(chambers(9.0, 0.5, links=()), [], [], CELL))
+
+
+def test_corridor_past_a_column_is_one_room_and_a_hall_beyond_it_another() -> None:
+    corridor = shapely.box(0, 0, 12, 2.2).difference(shapely.box(6, 0, 6.4, 0.3))
+    hall = shapely.union_all(
+        [shapely.box(0, 0, 5, 5), shapely.box(5, 1, 5.2, 3.2), shapely.box(5.2, 0, 10, 5)]
+    )
+
+    past_a_column = FloorPlan.build("corridor", corridor, doorways=None, regions_are="none")
+    two_halls = FloorPlan.build("halls", hall, doorways=None, regions_are="none")
+
+    assert 1 == len(past_a_column.rooms)
+    assert 2 == len(two_halls.rooms)

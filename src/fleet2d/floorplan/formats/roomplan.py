@@ -90,7 +90,7 @@ class RoomPlan(FloorPlanSource):
         wall_m: Thickness of walls, which a scan sees from one side.
     """
 
-    marks: ClassVar = (("walls", None),)
+    marks: ClassVar = (("openings", None),)
 
     path: InputPath
     wall_m: Length = Field(default=0.1, ge=0.01, le=1)

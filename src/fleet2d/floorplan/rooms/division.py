@@ -5,6 +5,7 @@ a box is matched to the chamber that it outlines, and doesn't reach into others.
 one chamber, as in an open plan, divide it.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal
@@ -388,7 +389,9 @@ def divide(
         return assign_rooms(lattice, free, regions)
     chambers = cut_chambers(lattice, polygons, mesh, free, passages.segments)
     if not regions:
-        return number_rooms(lattice, segment_rooms(chambers, passages.is_opening, lattice.cell))
+        widths = [math.dist(*segment) / lattice.units_per_m for segment in passages.segments]
+        rooms = segment_rooms(chambers, passages.is_opening, widths, lattice.cell)
+        return number_rooms(lattice, rooms)
     return label_rooms(lattice, free, regions, chambers, passages)
 
 

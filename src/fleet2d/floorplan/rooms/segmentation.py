@@ -9,6 +9,7 @@ one of the four methods that Bormann, Jordan, Li, Hampp and Hägele compare in "
 Survey, Implementation, and Analysis" (ICRA 2016).
 """
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -23,10 +24,12 @@ from fleet2d.kernels import F64, I32, I64, Bool
 from fleet2d.kernels.space import (
     WALL,
     Mesh,
+    label_frames,
     label_triangles,
     pairs_in_sight,
     rasterize_cells,
     spread_labels,
+    squared_distance,
 )
 
 Corners = NDArray[np.intp]
@@ -436,35 +439,56 @@ MIN_OPEN_ROOM_M2 = 4.0
 """Least area of a room behind an opening; a smaller space is an alcove."""
 
 
-def segment_rooms(chambers: Chambers, is_opening: Sequence[bool], cell: float) -> I64:
+WIDE_SHARE = 1.1
+"""An opening that is wider than this share of the narrower space beside it separates no rooms: what
+is behind it is the same corridor or hall, past a column, a niche or a cupboard."""
+
+
+def segment_rooms(
+    chambers: Chambers, is_opening: Sequence[bool], widths_m: Sequence[float], cell: float
+) -> I64:
     """Join chambers into rooms.
 
     Args:
         chambers: The free space, cut at doorways and openings.
         is_opening: Whether each line at which the chambers were cut is an opening, not a doorway.
+        widths_m: The length of each such line [m].
         cell: Side of a cell [m].
 
     Returns:
         The room of each cell, by decreasing size; -1 where not free. int64 (rows, columns).
     """
     sizes = np.bincount(chambers.of_cell[chambers.of_cell >= 0], minlength=chambers.count)
-    areas = sizes * cell**2
+    areas, across = sizes * cell**2, _clear_widths(chambers, cell)
     owner = np.arange(chambers.count)
     while True:
-        candidates = [
-            (areas[owner[one]], not is_opening[link.line], link.line, owner[one], owner[other])
-            for link in chambers.links
-            for one, other in (link.chambers, link.chambers[::-1])
-            if owner[one] != owner[other]
-            and areas[owner[one]] < (MIN_OPEN_ROOM_M2 if is_opening[link.line] else MIN_ROOM_M2)
-        ]
+        candidates = []
+        for link in chambers.links:
+            one, other = (int(owner[chamber]) for chamber in link.chambers)
+            opening = is_opening[link.line]
+            is_wide = widths_m[link.line] > WIDE_SHARE * min(across[one], across[other])
+            least = MIN_OPEN_ROOM_M2 if opening else MIN_ROOM_M2
+            for room, into in ((one, other), (other, one)):
+                if room != into and (areas[room] < least or (opening and is_wide)):
+                    candidates.append((areas[room], not opening, link.line, room, into))
         if not candidates:
             break
         # The smallest goes first, across an opening rather than a doorway.
         *_, smallest, into = min(candidates)
         areas[into] += areas[smallest]
+        across[into] = max(across[into], across[smallest])
         owner[owner == smallest] = into
     roots = sorted(set(owner.tolist()), key=lambda root: (-areas[root], root))
     number = np.full(chambers.count + 1, -1, np.int64)  # its last entry serves -1
     number[:-1] = [roots.index(root) for root in owner.tolist()]
     return number[chambers.of_cell]
+
+
+def _clear_widths(chambers: Chambers, cell: float) -> F64:
+    """Return the diameter of the largest disc in each chamber, float64 (chambers,) [m]."""
+    widths = np.zeros(chambers.count)
+    for chamber, frame in enumerate(label_frames(chambers.of_cell, chambers.count).tolist()):
+        row, column, end_row, end_column = frame
+        inside = chambers.of_cell[row:end_row, column:end_column] == chamber
+        widths[chamber] = 2 * cell * math.sqrt(int(squared_distance(np.pad(inside, 1)).max()))
+    return widths
