@@ -19,44 +19,44 @@ WRAPPERS = ("rand256", "rand25")
 PixelNumber = Annotated[int, Field(strict=True, ge=0, le=MAX_PIXEL_NUMBER)]
 
 
-class _Part(BaseModel):
+class _RawModel(BaseModel):
     model_config = ConfigDict(defer_build=True)
 
 
-class _Position(_Part):
+class _RawPosition(_RawModel):
     top: int = Field(ge=-MAX_PIXEL_NUMBER, le=MAX_PIXEL_NUMBER)
     left: int = Field(ge=-MAX_PIXEL_NUMBER, le=MAX_PIXEL_NUMBER)
 
 
-class _Dimensions(_Part):
+class _RawDimensions(_RawModel):
     width: int = Field(ge=1, le=MAX_PIXEL_NUMBER)
 
 
-class _Pixels(_Part):
+class _RawPixels(_RawModel):
     floor: Listed[PixelNumber] = []
     walls: Listed[PixelNumber] = []
 
 
-class _Image(_Part):
-    position: _Position
-    dimensions: _Dimensions
-    pixels: _Pixels
+class _RawImage(_RawModel):
+    position: _RawPosition
+    dimensions: _RawDimensions
+    pixels: _RawPixels
     segments: dict[str, Any] = {}
 
 
-class _Path(_Part):
+class _RawPath(_RawModel):
     points: Listed[Point] = []
 
 
-class _Map(_Part):
-    image: _Image
-    path: _Path = _Path.model_construct(points=[])
+class _RawMap(_RawModel):
+    image: _RawImage
+    path: _RawPath = _RawPath.model_construct(points=[])
     charger: Point | None = None
     forbidden_zones: Listed[Listed[float]] = []
     virtual_walls: Listed[Listed[float]] = []
 
 
-_MAP, _SEGMENT = TypeAdapter(_Map), TypeAdapter(Listed[PixelNumber])
+_MAP, _SEGMENT = TypeAdapter(_RawMap), TypeAdapter(Listed[PixelNumber])
 
 
 def raw_map(content: dict[str, Any]) -> dict[str, Any] | None:
@@ -114,7 +114,7 @@ def _from_top(xy: F64) -> F64:
     return np.abs(xy / MM_PER_CM - (0, SIDE_CM))
 
 
-def _absolute(numbers: list[int], image: _Image) -> list[int]:
+def _absolute(numbers: list[int], image: _RawImage) -> list[int]:
     """Return pixels that are numbered by rows of the image as x, y, x, y, … of the whole map."""
     row, column = np.divmod(np.array(numbers, np.int64), image.dimensions.width)
     xy: I64 = np.stack([column + image.position.left, row + image.position.top], axis=1)
