@@ -78,3 +78,38 @@ def test_parts_are_combined(folder: Path) -> None:
     combinations = list(itertools.product(*choices))
     for cells in combinations if thorough.THOROUGH else combinations[:: len(combinations) // 4]:
         assert fleet2d.run("parts.yaml", *cells).status == "complete"
+
+
+def test_a_learner_is_as_good_on_a_real_log_as_the_page_says(
+    shared_data: Path, tmp_path: Path
+) -> None:
+    """One learner, a real log and its twin: both are runs of one scenario, shown on one page."""
+    from starlette.testclient import TestClient
+
+    from fleet2d.fit.command import fit_routine
+    from fleet2d.viewer.page_server import ServedRuns, new_token, page_app
+
+    log = shared_data / "activity" / "uci_adl_a"
+    content = {
+        "extends": "bundled:base",
+        "simulation": {"start": "2011-11-28", "duration": {"days": 13}},
+    }
+    persona, errors = tmp_path / "persona.yaml", {}
+    fit_routine(log, persona)
+    users = {
+        "real": {"type": "replay", "path": str(log), "day": "date"},
+        "twin": {"type": "routine", "persona": str(persona)},
+    }
+
+    for name, ana in users.items():
+        run = fleet2d.run(content | {"users": {"ana": ana}}, out=tmp_path / name)
+        errors[name] = run.metrics["ltp_error"]["ana"]["tv"]
+
+    said = re.search(r"of ([\d.]+) from the truth on the real log, and of ([\d.]+) on", PAGE)
+    assert said is not None
+    assert [round(errors[name], 3) for name in users] == [float(text) for text in said.groups()]
+    token = new_token()
+    app = page_app(ServedRuns([tmp_path / name for name in users]), token, 8765)
+    with TestClient(app, base_url="http://127.0.0.1:8765") as client:
+        session = client.get(f"/{token}/session.json").json()
+    assert session["runs"] == ["real", "twin"]
