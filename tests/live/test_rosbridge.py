@@ -70,7 +70,7 @@ def test_a_robot_program_hears_standard_messages_and_sends_goals() -> None:
     result = json.loads(done.stdout.splitlines()[-1])
 
     x, y = result["place"]
-    assert result["topics"] == ["/astro/detections", "/astro/odom", "/map", "/tf"]
+    assert result["topics"] == ["/astro/detections", "/astro/odom", "/astro/scan", "/map", "/tf"]
     assert result["subscribed"] == [
         f"/{name}/{kind}" for name in ("ana", "astro") for kind in ("goal_pose", "pose")
     ]
@@ -102,3 +102,26 @@ def test_no_server_is_told() -> None:
     )
 
     assert done.stdout.startswith("rosbridge://127.0.0.1:9: there is no server: ")
+
+
+def test_a_scan_measures_the_walls_around() -> None:
+    import numpy as np
+    import shapely
+    from tests.live.scenes import place
+
+    import fleet2d
+    from fleet2d.live.rosbridge import BEAMS, scan_of
+
+    plan = fleet2d.load_floorplan()
+    x, y = plan.lattice.point_at(place())
+    for heading in (0.0, 1.0, -2.5):
+        ranges = scan_of(plan.mesh, x, y, heading) / plan.lattice.units_per_m
+
+        x_m, y_m = plan.lattice.xy_of(x, y)
+        walls = plan.free_space.boundary
+        for beam in range(0, BEAMS, 7):
+            angle = heading - np.pi + 2 * np.pi / BEAMS * beam
+            far = (x_m + 50 * np.cos(angle), y_m + 50 * np.sin(angle))
+            line = shapely.LineString([(x_m, y_m), far])
+            expected = shapely.Point(x_m, y_m).distance(line.intersection(walls))
+            assert ranges[beam] == pytest.approx(expected, abs=0.02)

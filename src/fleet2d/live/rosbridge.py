@@ -1,7 +1,7 @@
 """rosbridge: standard ROS messages of a live run to a robot's or a laptop's ROS, and goals from it.
 
-Published: `/map`, `/tf`, and for each robot `/NAME/odom` and `/NAME/detections`, with the frames of
-`fleet2d export`. Subscribed, for each body: `/NAME/goal_pose` and `/NAME/pose`, both
+Published: `/map`, `/tf`, and for each robot `/NAME/odom`, `/NAME/scan` and `/NAME/detections`, with
+the frames of `fleet2d export`. Subscribed, for each body: `/NAME/goal_pose` and `/NAME/pose`, both
 `geometry_msgs/PoseStamped` in the frame `map`.
 """
 
@@ -13,10 +13,16 @@ import numpy as np
 
 from fleet2d.engine.simulation import Simulation
 from fleet2d.errors import InputError, extra
+from fleet2d.kernels import F64
+from fleet2d.kernels.sight import region_outline, visible_region
+from fleet2d.kernels.space import Mesh
 from fleet2d.live.bridge import LiveStep, Post
 from fleet2d.runs.run import Run
 
 WAIT_S = 5
+BEAMS = 360
+"""Number of beams of a laser scan, over a whole turn."""
+SCAN_RANGE_M = 12.0
 
 
 class RosbridgePeer:
@@ -46,8 +52,10 @@ class RosbridgePeer:
         self._start = simulation.clock.start.replace(tzinfo=UTC)
         self._last: dict[str, tuple[float, float, float]] = {}
         self._step_s = simulation.clock.step_us / 1e6
+        self._simulation = simulation
         for robot in self._robots:
             self._advertise(f"/{robot}/odom", "nav_msgs/Odometry")
+            self._advertise(f"/{robot}/scan", "sensor_msgs/LaserScan")
             self._advertise(f"/{robot}/detections", "vision_msgs/Detection3DArray")
         self._advertise("/tf", "tf2_msgs/TFMessage")
         self._advertise("/map", "nav_msgs/OccupancyGrid", latch=True)
@@ -121,6 +129,7 @@ class RosbridgePeer:
                     }
                 )
                 self._topics[f"/{name}/odom"].publish(self._odometry(frame.step, name, body))
+                self._topics[f"/{name}/scan"].publish(self._scan(frame.step, name, body))
         self._topics["/tf"].publish({"transforms": transforms})
         for robot in self._robots:
             seen = [r for t, r in frame.rows if t == "observations" and r["robot"] == robot]
@@ -144,6 +153,23 @@ class RosbridgePeer:
                 },
                 "covariance": [0.0] * 36,
             },
+        }
+
+    def _scan(self, step: int, name: str, body: Any) -> dict[str, Any]:
+        home = self._simulation.home
+        x, y = home.plan.lattice.point_at((body["x"], body["y"]))
+        ranges = scan_of(home.walls, x, y, body["heading"]) / home.plan.lattice.units_per_m
+        return {
+            "header": self._header(step, f"{name}/base_link"),
+            "angle_min": -math.pi,
+            "angle_max": math.pi - 2 * math.pi / BEAMS,
+            "angle_increment": 2 * math.pi / BEAMS,
+            "time_increment": 0.0,
+            "scan_time": self._step_s,
+            "range_min": 0.0,
+            "range_max": SCAN_RANGE_M,
+            "ranges": [r if r <= SCAN_RANGE_M else None for r in ranges.round(4).tolist()],
+            "intensities": [],
         }
 
     def _detections(self, step: int, rows: list[Any]) -> dict[str, Any]:
@@ -187,6 +213,36 @@ class RosbridgePeer:
         for topic in self._topics.values():
             topic.unsubscribe() if topic.is_subscribed else topic.unadvertise()
         self._ros.close()
+
+
+def scan_of(walls: Mesh, x: int, y: int, heading: float) -> F64:
+    """Return how far a laser scanner sees to the next wall, float64 (BEAMS,) [lattice units].
+
+    Beams begin behind and turn counter-clockwise. Furniture and people are lower than the laser.
+
+    Args:
+        walls: The free space between walls and shut doors.
+        x: Its place [lattice units].
+        y: Its place [lattice units].
+        heading: Its heading [rad].
+    """
+    pieces = visible_region(walls, x, y)
+    if not len(pieces[0]):
+        return np.zeros(BEAMS)
+    ends = region_outline(walls, x, y, *pieces)[0].reshape(-1, 2, 2) - np.array([x, y])
+    right, left = ends[:, 0], ends[:, 1]
+    angles = heading - math.pi + 2 * math.pi / BEAMS * np.arange(BEAMS)
+    turn = 2 * math.pi
+    begins = np.arctan2(right[:, 1], right[:, 0]) % turn
+    order = np.argsort(begins, kind="stable")
+    piece = order[np.searchsorted(begins[order], angles % turn, side="right") - 1]
+    direction = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    wall = (left - right)[piece]
+    across = direction[:, 0] * wall[:, 1] - direction[:, 1] * wall[:, 0]
+    start = right[piece]
+    along = start[:, 0] * wall[:, 1] - start[:, 1] * wall[:, 0]
+    distance: F64 = np.abs(along / np.where(across == 0, np.inf, across))
+    return distance
 
 
 def _pose(x: float, y: float, heading: float) -> dict[str, Any]:
