@@ -353,6 +353,9 @@ class Behavior(Component):
         """Return whether it is in the middle of something that hours and cooldown don't end."""
         return False
 
+    def dismiss(self) -> None:
+        """Drop what it is in the middle of, as the robot was sent away; by default nothing."""
+
     def decide(self, now: Situation) -> Plan | None:
         """Return the plan from now on; None leaves the decision to the next behavior."""
         raise NotImplementedError

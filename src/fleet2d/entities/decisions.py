@@ -37,6 +37,7 @@ from fleet2d.entities.giving_way import (
 from fleet2d.entities.place import Point, RoomChoice
 from fleet2d.entities.plan import Plan
 from fleet2d.errors import ComponentError, NoWayError, PlacementError, blame
+from fleet2d.floorplan.placed_objects import Posture
 
 Ask = Callable[[Behavior, Situation], Plan | None]
 
@@ -218,15 +219,19 @@ class StandStill:
 
     Args:
         duration: For how long; None: for good.
+        posture: Its posture; None: as before.
     """
 
-    def __init__(self, duration: timedelta | None = None) -> None:
+    def __init__(self, duration: timedelta | None = None, posture: Posture | None = None) -> None:
         self._lasts_us = None if duration is None else micros(duration)
         self._until_us: int | None = None
+        self._posture = posture
 
     def decide(self, now: Situation) -> Plan | None:
         """Stay for the rest of the time."""
         plan = now.plan()
+        if self._posture is not None:
+            plan.take(self._posture)
         if self._lasts_us is None:
             return plan.stay()
         if self._until_us is None:
@@ -381,6 +386,13 @@ class DecidingActor(Actor):
         if now:
             self.decide_again(step)
         return now
+
+    def dismiss(self, step: int) -> None:
+        """Forget what it was called to do, and replan."""
+        self.command = None
+        for behavior in self.behaviors:
+            behavior.dismiss()
+        self.decide_again(step)
 
     def reacts_to(self, event: SightEvent, step: int) -> bool:
         """Return whether it reacts to an action of a robot."""

@@ -79,7 +79,10 @@ class Charge:
     Attributes:
         level: Charge at the last decision, 0 to 1.
         charger: Where the charger is [lattice].
+        is_broken: Whether the charger doesn't charge.
     """
+
+    is_broken = False
 
     def __init__(self, battery: Battery, body: Body) -> None:
         self.level = battery.charge
@@ -103,6 +106,11 @@ class Charge:
         """Set the charge at a moment, up to which a motion was followed."""
         self.follow(motion, now_us)
         self.level = level
+
+    def set_broken(self, is_broken: bool, motion: Motion, now_us: int) -> None:
+        """Let the charger fail, or work again, at a moment up to which a motion was followed."""
+        self.follow(motion, now_us)
+        self.is_broken = is_broken
 
     def follow(self, motion: Motion, until_us: int) -> None:
         """Update the charge: a motion was followed from the last decision to a moment."""
@@ -150,6 +158,7 @@ class Charge:
         same = (np.diff(x) == 0) & (np.diff(y) == 0)
         still = np.append(same & (np.diff(track.heading) == 0), True)
         docked = np.append(same, True) & (x == self.charger[0]) & (y == self.charger[1])
+        docked &= not self.is_broken
         rate = np.where(docked, self._gain, np.where(still, standing, driving))
         first = max(0, int(np.searchsorted(time, since_us, side="right")) - 1)
         begins = np.maximum(time[first:], since_us)

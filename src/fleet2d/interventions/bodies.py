@@ -15,6 +15,7 @@ from fleet2d.entities.place import Place, Point, RoomChoice, furniture_of, is_po
 from fleet2d.entities.plan import check_data, plan_of
 from fleet2d.entities.users.guest import Guest
 from fleet2d.errors import PlacementError, ScenarioError
+from fleet2d.floorplan.placed_objects import Posture
 from fleet2d.interventions.intervention import Intervention, World, body, user
 from fleet2d.kernels.numbers import TURN
 
@@ -104,17 +105,26 @@ class Send(BodyIntervention):
 
 @register("intervention", "hold")
 class HoldStill(BodyIntervention):
-    """Let a body stand still where it is, until it is released.
+    """Let a body stay still where it is, until it is released.
 
     Attributes:
-        duration: How long it stands still; left out: until it is released.
+        duration: How long it stays still; left out: until it is released.
+        posture: How a person is there, such as lie after a fall; left out: as before.
     """
 
     duration: PositiveDuration | None = None
+    posture: Posture | None = None
+
+    def check(self, world: World) -> None:
+        """Refuse an unknown body, and a robot that sits or lies."""
+        body(world, self.entity)
+        if self.posture is not None:
+            user(world, self.entity)
 
     def begin(self, world: World) -> None:
         """Give the order."""
-        body(world, self.entity).follow_order(StandStill(self.duration), world.step)
+        order = StandStill(self.duration, self.posture)
+        body(world, self.entity).follow_order(order, world.step)
 
 
 @register("intervention", "release")

@@ -11,6 +11,7 @@ from fleet2d.configuration.components import lookup
 from fleet2d.configuration.problems import refusal
 from fleet2d.entities.objects.home_object import SensorFault
 from fleet2d.floorplan.home_change import HomeChange
+from fleet2d.floorplan.placed_objects import Posture
 from fleet2d.interventions.intervention import Intervention
 
 Time = str | timedelta
@@ -86,13 +87,20 @@ class InterventionMethods(ABC):
         """
         self._do("send", entity=name, to=to, heading_deg=heading_deg, duration=duration)
 
-    def hold(self, name: str, *, duration: Time | None = None) -> None:
-        """Let a body stand still where it is, for a duration or until it is released.
+    def hold(
+        self, name: str, *, duration: Time | None = None, posture: Posture | None = None
+    ) -> None:
+        """Let a body stay still where it is, for a duration or until it is released.
+
+        Args:
+            name: The person or robot.
+            duration: For how long; None: until released.
+            posture: How a person is there, such as "lie" after a fall; None: as before.
 
         Raises:
             ScenarioError: There is no such person or robot.
         """
-        self._do("hold", entity=name, duration=duration)
+        self._do("hold", entity=name, duration=duration, posture=posture)
 
     def release(self, name: str) -> None:
         """Return a body to the control of its own behaviors.
@@ -183,6 +191,23 @@ class InterventionMethods(ABC):
         """
         self._do("call", entity=name, to=to, find=find, dock=dock, command=command)
 
+    def dismiss(self, name: str) -> None:
+        """Send a robot away: it drops what it was called to do, whom it follows, and its search.
+
+        Raises:
+            ScenarioError: There is no such robot.
+        """
+        self._do("dismiss", entity=name)
+
+    def kidnap(self, name: str, to: Any, *, duration: Time | None = "1 min") -> None:
+        """Carry a robot elsewhere without its knowledge: it stands there, lost, for a duration.
+
+        Raises:
+            ScenarioError: There is no such robot.
+            PlacementError: There is no such place, or its body doesn't fit there.
+        """
+        self._do("kidnap", entity=name, to=to, duration=duration)
+
     def battery(self, name: str, charge: float | str) -> None:
         """Set the charge of a robot's battery: 0.2, or "20 %".
 
@@ -228,6 +253,8 @@ class InterventionMethods(ABC):
         name: str,
         *,
         wheels: bool = False,
+        lost: bool = False,
+        charger: bool = False,
         dark: bool | str = False,
         detection: float | str = 1.0,
         errs: Any = None,
@@ -238,6 +265,8 @@ class InterventionMethods(ABC):
         Args:
             name: The robot.
             wheels: Whether its wheels are stuck.
+            lost: Whether its localization is lost, so that it stands still.
+            charger: Whether its charger is broken.
             dark: Whether its cameras see nothing, or the name of the one that doesn't.
             detection: Factor of the probability that a user in view is noticed.
             errs: The errors of its cameras instead, like `perception` of a robot in a scenario.
@@ -246,8 +275,9 @@ class InterventionMethods(ABC):
         Raises:
             ScenarioError: There is no such robot or camera, or nothing fails.
         """
-        fields = {"wheels": wheels, "dark": dark, "detection": detection, "errs": errs}
-        self._do("fault", entity=name, duration=duration, **fields)
+        body = {"wheels": wheels, "lost": lost, "charger": charger}
+        sight = {"dark": dark, "detection": detection, "errs": errs}
+        self._do("fault", entity=name, duration=duration, **body, **sight)
 
     def restore(self, name: str) -> None:
         """End all that lasts on a robot, a sensor or an algorithm: faults, switches and the like.

@@ -1,16 +1,17 @@
 """Interventions on robots: calls, batteries, faults, and what they perceive."""
 
-from typing import Self
+from datetime import timedelta
+from typing import ClassVar, Self
 
 from pydantic import Field, model_validator
 
 from fleet2d.configuration.components import Settings, register
 from fleet2d.configuration.problems import problem, suggest
-from fleet2d.configuration.units import AngleDeg, Share
+from fleet2d.configuration.units import AngleDeg, PositiveDuration, Share
 from fleet2d.entities.behavior import Actor, Command
 from fleet2d.entities.place import Place
 from fleet2d.errors import PlacementError, ScenarioError
-from fleet2d.interventions.bodies import check_reach, heading_of
+from fleet2d.interventions.bodies import Put, check_reach, heading_of
 from fleet2d.interventions.intervention import Intervention, Lasting, World, body, robot, user
 from fleet2d.runtime.events import EventKind
 from fleet2d.sight.camera import Disturbance, FalseSighting
@@ -89,6 +90,15 @@ class Call(RobotIntervention):
         command = self.order
         world.emit(self.entity, EventKind.CALLED, command.text)
         robot(world, self.entity).receive(command, world.step)
+
+
+@register("intervention", "dismiss")
+class Dismiss(RobotIntervention):
+    """Send a robot away: it drops what it was called to do, whom it follows, and its search."""
+
+    def begin(self, world: World) -> None:
+        """Make it replan without that."""
+        robot(world, self.entity).dismiss(world.step)
 
 
 @register("intervention", "battery")
@@ -206,12 +216,15 @@ class SwitchOn(Switch):
 class Fault(Lasting):
     """Let a part of a robot fail for a while: stuck wheels, or a camera that sees less.
 
-    With stuck wheels the robot can neither drive nor turn, and its behaviors don't decide. A dark
-    camera sees nothing; with `detection` and `errs` it perceives with errors.
+    With stuck wheels the robot can neither drive nor turn, and its behaviors don't decide. A robot
+    that is lost doesn't know where it is, and stands still until it does. A broken charger doesn't
+    charge. A dark camera sees nothing; with `detection` and `errs` it perceives with errors.
 
     Attributes:
         entity: The robot.
         wheels: Whether its wheels are stuck.
+        lost: Whether its localization is lost.
+        charger: Whether its charger is broken.
         dark: A camera that is dark, by name where it has several; true: all.
         detection: Factor of the probability that a user in view is noticed.
         errs: The errors of its cameras instead of the usual ones.
@@ -219,15 +232,25 @@ class Fault(Lasting):
 
     entity: str
     wheels: bool = False
+    lost: bool = False
+    charger: bool = False
     dark: bool | str = False
     detection: Share = 1.0
     errs: Perception | None = None
 
     @model_validator(mode="after")
     def _has_effect(self) -> Self:
-        if not (self.wheels or self.dark or self.detection < 1 or self.errs):
-            raise problem("nothing fails: give 'wheels', 'dark', 'detection' or 'errs'")
+        body_fails = self.immobilizes or self.charger
+        if not (body_fails or self.dark or self.detection < 1 or self.errs):
+            raise problem(
+                "nothing fails: give 'wheels', 'lost', 'charger', 'dark', 'detection' or 'errs'"
+            )
         return self
+
+    @property
+    def immobilizes(self) -> bool:
+        """Whether the robot can't drive."""
+        return self.wheels or self.lost
 
     @property
     def disturbance(self) -> Disturbance | None:
@@ -245,17 +268,22 @@ class Fault(Lasting):
             check_camera(actor, self.dark or True)
         if self.errs is not None:
             check_truth(world, self.entity)
+        if self.charger and actor.charge is None:
+            raise ScenarioError(f"{self.entity} has no battery: add `battery` to the robot")
 
     def begin(self, world: World) -> None:
         """Let it fail."""
         if self.disturbance is not None:
             disturb(world, self.entity)
-        if self.wheels:
+        if self.immobilizes:
+            immobilize(world, self.entity)
+        if self.charger:
             actor = robot(world, self.entity)
-            actor.is_stuck = any(
-                isinstance(act, Fault) and act.wheels and act.entity == self.entity
-                for act in world.lasting
-            )
+            assert actor.charge is not None
+            acts = (act for act in world.lasting if isinstance(act, Fault))
+            is_broken = any(act.charger and act.entity == self.entity for act in acts)
+            now_us = world.step * world.clock.step_us
+            actor.charge.set_broken(is_broken, actor.motion, now_us)
             actor.decide_again(world.step)
 
     def end(self, world: World) -> None:
@@ -312,6 +340,53 @@ class Perceive(RobotIntervention):
                 for d in self.detections
             ],
         )
+
+
+def immobilize(world: World, name: str) -> None:
+    """Let a robot stand still while an active intervention keeps it from driving."""
+    actor = robot(world, name)
+    actor.is_stuck = any(
+        getattr(act, "immobilizes", False) and getattr(act, "entity", None) == name
+        for act in world.lasting
+    )
+    actor.decide_again(world.step)
+
+
+@register("intervention", "kidnap")
+class Kidnap(Lasting):
+    """Carry a robot elsewhere without its knowledge: it is lost there, until it knows its place.
+
+    Meanwhile it stands still, and its behaviors don't decide. `put` moves it with its knowledge.
+
+    Attributes:
+        entity: The robot.
+        to: The place: a room, furniture, or a point.
+        duration: How long it takes until it knows where it is; left out: until it is restored.
+    """
+
+    entity: str
+    to: Place
+    duration: PositiveDuration | None = timedelta(minutes=1)
+
+    immobilizes: ClassVar[bool] = True
+
+    def check(self, world: World) -> None:
+        """Refuse an unknown robot, and a place where it doesn't fit."""
+        robot(world, self.entity)
+        self._put.check(world)
+
+    def begin(self, world: World) -> None:
+        """Put it there, lost."""
+        self._put.begin(world)
+        immobilize(world, self.entity)
+
+    def end(self, world: World) -> None:
+        """Let it know where it is."""
+        immobilize(world, self.entity)
+
+    @property
+    def _put(self) -> Put:
+        return Put(entity=self.entity, to=self.to)
 
 
 def camera_name(camera: bool | str | None) -> str | None:

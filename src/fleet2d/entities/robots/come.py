@@ -36,6 +36,10 @@ class Come(Behavior):
         """Return whether it is on its way."""
         return self.command is not None
 
+    def dismiss(self) -> None:
+        """Stay away from where it was called to."""
+        self.command = None
+
     def decide(self, now: Situation) -> Plan | None:
         """Go where it is called to, if it is."""
         command = now.take_command("come")

@@ -232,6 +232,10 @@ class Find(BeliefBehavior):
             blocked = search.blocked | {search.goal}
             self.search = search._replace(blocked=blocked, route=search.route[1:], goal=None)
 
+    def dismiss(self) -> None:
+        """End the search."""
+        self.search = None
+
     def decide(self, now: Situation) -> Plan | None:
         """Begin a search that is due, continue one, or leave the robot to other behaviors."""
         plan = now.plan()

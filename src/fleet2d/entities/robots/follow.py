@@ -60,6 +60,10 @@ class Follow(Behavior):
         """Return whether it follows or looks for a person."""
         return self.person is not None
 
+    def dismiss(self) -> None:
+        """Let the person go; it follows again when somebody comes into view."""
+        self.person, self.is_searching = None, False
+
     def decide(self, now: Situation) -> Plan | None:
         """Follow the person, look where the person was lost, or leave it to later behaviors."""
         in_view = now.in_view

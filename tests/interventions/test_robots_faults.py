@@ -1,0 +1,143 @@
+"""Faults of robots and falls of people: what is lost, broken, carried off, dismissed, or lies."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from tests.scenes import AGENDA, scenario, table
+
+import fleet2d
+from fleet2d.errors import ScenarioError
+
+BATTERY = {"driving": "1 h", "standing": "2 h", "charging": "1 h", "charger": [0.5, 6.5]}
+
+
+def home(*script: dict[str, Any], behaviors: Any = None, **robot: Any) -> fleet2d.Simulation:
+    robot = {"camera": {"range": [0.3, 5], "angle_deg": 200}, "battery": BATTERY, **robot}
+    robot["behaviors"] = behaviors or [{"type": "patrol", "dwell": "10 s"}]
+    content = scenario(
+        "30 min",
+        users={"ana": {"type": "schedule", "days": AGENDA, "rest": "living_room"}},
+        robots={"astro": robot},
+        artifacts={"trajectories": "every step"},
+        script=list(script),
+    )
+    return fleet2d.Simulation(content)
+
+
+def poses(run: fleet2d.Run, name: str = "astro") -> Any:
+    rows = table(run, "trajectories", entity=name)
+    return np.stack([rows["x"], rows["y"]], axis=1)
+
+
+@pytest.mark.parametrize(
+    "act",
+    [
+        {"kidnap": "astro", "to": "bathroom", "duration": "2 min"},
+        {"fault": "astro", "lost": True, "duration": "2 min"},
+    ],
+)
+def test_a_robot_that_does_not_know_its_place_stands_until_it_does(act: dict[str, Any]) -> None:
+    run = home({"at": "07:05", **act}).run()
+    xy = poses(run)
+    moves = np.hypot(*np.diff(xy, axis=0).T) > 0
+
+    assert not moves[301:419].any(), "it stands for two minutes"
+    assert moves[420:480].any(), "and goes on"
+    assert moves[240:299].any()
+    jump = float(np.hypot(*(xy[301] - xy[299])))
+    assert (jump > 1) == ("kidnap" in act)
+    if "kidnap" in act:
+        rooms = table(run, "trajectories", entity="astro")["room"].astype(str)
+        assert "bathroom_0" == rooms[301]
+
+
+def test_a_broken_charger_does_not_charge_until_it_is_repaired() -> None:
+    behaviors = [{"type": "dock", "threshold": "60 %", "until": "90 %"}, {"type": "patrol"}]
+    battery = {**BATTERY, "charge": 0.55}
+    whole = home(behaviors=behaviors, battery=battery)
+    broken = home(
+        {"at": "07:03", "fault": "astro", "charger": True, "duration": "10 min"},
+        behaviors=behaviors,
+        battery=battery,
+    )
+    for simulation in (whole, broken):
+        simulation.expect("always(battery(astro) > 55 %, within=8..12 min)", "charges")
+        simulation.expect("eventually(battery(astro) > 60 %)", "at last")
+        simulation.run()
+
+    assert whole.verdicts()["charges"].holds
+    assert not broken.verdicts()["charges"].holds
+    assert broken.verdicts()["at last"].holds
+
+
+@pytest.mark.parametrize("behavior", ["find", "follow", "come"])
+def test_a_robot_that_is_dismissed_drops_what_it_was_called_to_do(behavior: str) -> None:
+    first = {"type": behavior} | ({"user": "ana"} if behavior != "come" else {"stay": "20 min"})
+    calls = {"find": {"find": "ana"}, "come": {"to": "kitchen"}}
+    script = [{"at": "07:05", "put": "ana", "to": "storage"}] if behavior == "find" else []
+    if behavior in calls:
+        script.append({"at": "07:06", "call": "astro", **calls[behavior]})
+    script.append({"at": "07:06:20", "dismiss": "astro"})
+    simulation = home(
+        *script, behaviors=[first, {"type": "patrol", "rooms": ["bedroom"], "dwell": "1 h"}]
+    )
+    simulation.run_until("07:06:19")
+    was_busy = simulation.actors["astro"].behaviors[0].busy() or behavior == "come"
+    simulation.run_until("07:06:21")
+
+    if behavior != "follow":
+        assert was_busy
+    assert not simulation.actors["astro"].behaviors[0].busy()
+    simulation.run_until("07:12")
+    assert simulation.state["astro"]["room"] == "bedroom_0" or behavior == "follow"
+
+
+def test_a_person_who_lies_down_is_lying() -> None:
+    perception = {"detection": {"posture": {"lie": 0}}}
+    fall = [{"at": "07:06", "put": "ana", "to": [1.0, 3.0]}, {"at": "07:06", "hold": "ana"}]
+    lies = [fall[0], {**fall[1], "posture": "lie"}]
+    near = {"at": "07:07", "put": "astro", "to": [2.0, 3.5]}
+    seen = []
+    for script in (fall, lies):
+        simulation = home(
+            *script,
+            near,
+            behaviors=[{"type": "patrol", "waypoints": [[2.0, 3.5]], "dwell": "1 min"}],
+            perception=perception,
+        )
+        run = simulation.run()
+        rows = table(run, "observations", robot="astro", user="ana")
+        seen.append(int((rows["step"] > 480).sum()))
+
+    assert seen[0] > 0, "who stands is seen"
+    assert 0 == seen[1], "a detector that is blind to who lies doesn't see her"
+
+
+def test_what_cannot_fail_or_lie_is_refused() -> None:
+    with pytest.raises(ScenarioError, match="there is no user 'astro'"):
+        home({"at": "07:05", "hold": "astro", "posture": "lie"})
+    with pytest.raises(ScenarioError, match="has no battery"):
+        home({"at": "07:05", "fault": "astro", "charger": True}, battery=None)
+    with pytest.raises(ScenarioError, match="did you mean 'astro'"):
+        home({"at": "07:05", "kidnap": "astr", "to": "kitchen"})
+
+
+def test_methods_do_the_same_as_entries_of_a_script() -> None:
+    acts = [
+        {"kidnap": "astro", "to": "bathroom", "duration": "2 min"},
+        {"hold": "ana", "posture": "lie", "duration": "1 min"},
+        {"fault": "astro", "charger": True, "duration": "5 min"},
+        {"dismiss": "astro"},
+    ]
+    scripted = home(*({"at": "07:05", **act} for act in acts)).run()
+    simulation = home()
+    simulation.run_until("07:05")
+    simulation.kidnap("astro", "bathroom", duration="2 min")
+    simulation.hold("ana", posture="lie", duration="1 min")
+    simulation.fault("astro", charger=True, duration="5 min")
+    simulation.dismiss("astro")
+    by_hand = simulation.run()
+
+    for name in ("trajectories", "observations", "events"):
+        assert scripted.manifest["tables"][name] == by_hand.manifest["tables"][name]
