@@ -224,6 +224,25 @@ def power(
         _print(str(table).replace("null", "–"))
 
 
+@studying.command()
+def track(
+    location: Where,
+    to: Annotated[Literal["mlflow", "wandb"], typer.Option(help="The tracker.")],
+    project: Annotated[
+        str, typer.Option(help="The experiment of MLflow, or the project of Weights & Biases.")
+    ] = "fleet2d",
+    uri: Annotated[
+        str | None, typer.Option(help="MLflow's store; left out: as MLFLOW_TRACKING_URI says.")
+    ] = None,
+) -> None:
+    """Store parameters, metrics and report of a study in MLflow or Weights & Biases."""
+    from fleet2d.studies.reader import open_study
+    from fleet2d.studies.trackers import track as store
+
+    count = store(open_study(location), to, project, uri)
+    _print(f"{count} variants stored in {project}")
+
+
 def _reference(study: "Study", metric: str, against: str | None) -> Mapping[str, Any]:
     """Return the axis and the reference value of a comparison.
 
