@@ -24,8 +24,8 @@ from fleet2d.errors import InputError
 from fleet2d.expectations.expectation import Expectation, RunSignals
 from fleet2d.expectations.signals import Gauge, MeasuredRun, Scene, SignalBlock
 from fleet2d.expectations.verdict import (
-    Evidence,
     Verdict,
+    VerdictEvidence,
     check_judged,
     evidence_of,
     verdict_of,
@@ -206,7 +206,7 @@ class RunExpectations:
             if self.first > entry.since
         }
 
-    def evidence(self, name: str) -> Evidence:
+    def evidence(self, name: str) -> VerdictEvidence:
         """Return what an expectation is about, with its signals so far."""
         entry = self.entries[name]
         return evidence_of(entry.expectation, self._signals(entry, ended=True))

@@ -55,7 +55,7 @@ from fleet2d.scenario.model import Scenario, load_scenario
 
 if TYPE_CHECKING:
     from fleet2d.expectations.expectation import Expectation
-    from fleet2d.expectations.verdict import Evidence, Verdict
+    from fleet2d.expectations.verdict import Verdict, VerdictEvidence
 
 
 class Simulation(InterventionMethods):
@@ -734,7 +734,7 @@ class Simulation(InterventionMethods):
             self._state.settle(self.step)
         return self._state.expectations.verdicts(ended=self.done)
 
-    def evidence(self, name: str) -> "Evidence":
+    def evidence(self, name: str) -> "VerdictEvidence":
         """Return the signals of an expectation so far, and what it is about, for pictures."""
         assert self._state.expectations is not None
         return self._state.expectations.evidence(name)

@@ -157,7 +157,7 @@ class SignalCourse(NamedTuple):
     limit: float | None
 
 
-class Evidence(NamedTuple):
+class VerdictEvidence(NamedTuple):
     """What an expectation is about, for pictures.
 
     Attributes:
@@ -171,7 +171,7 @@ class Evidence(NamedTuple):
     distances: tuple[tuple[str, str | tuple[float, float]], ...]
 
 
-def evidence_of(expectation: Expectation, run: RunSignals) -> Evidence:
+def evidence_of(expectation: Expectation, run: RunSignals) -> VerdictEvidence:
     """Return what an expectation is about, with the signals of a run."""
     courses: dict[str, SignalCourse] = {}
     places: set[str] = set()
@@ -188,7 +188,7 @@ def evidence_of(expectation: Expectation, run: RunSignals) -> Evidence:
     distances = [m for m in expectation.measures() if isinstance(m, distance)]
     pairs = [(m.body, m.other) for m in distances if isinstance(m.other, str | tuple)]
     places |= {other for _, other in pairs if isinstance(other, str)}
-    return Evidence(tuple(courses.values()), frozenset(places), tuple(dict.fromkeys(pairs)))
+    return VerdictEvidence(tuple(courses.values()), frozenset(places), tuple(dict.fromkeys(pairs)))
 
 
 def _atoms(expectation: Expectation) -> Iterator[Expectation]:

@@ -15,7 +15,7 @@ from fleet2d.engine.simulation import Simulation
 from fleet2d.errors import InputError
 from fleet2d.expectations.expectation import Expectation, Term
 from fleet2d.expectations.temporal import after, at_end, eventually, until
-from fleet2d.expectations.verdict import Evidence, Verdict
+from fleet2d.expectations.verdict import Verdict, VerdictEvidence
 from fleet2d.floorplan.home import keep_homes
 from fleet2d.floorplan.source import keep_plans
 from fleet2d.interventions.bodies import Decide, TakeControl
@@ -137,7 +137,7 @@ class ExpectationResult:
     untested: bool = False
     kind: str = ""
     names: frozenset[str] = frozenset()
-    evidence: Evidence | None = None
+    evidence: VerdictEvidence | None = None
 
 
 def result_of(verdict: Verdict, expectation: Expectation) -> ExpectationResult:

@@ -13,7 +13,7 @@ from matplotlib.colors import PowerNorm
 from matplotlib.figure import Figure
 
 from fleet2d.errors import InputError
-from fleet2d.expectations.verdict import Evidence, SignalCourse
+from fleet2d.expectations.verdict import SignalCourse, VerdictEvidence
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.kernels import F64
 from fleet2d.palette import TEXT_COLOR
@@ -66,7 +66,9 @@ def draw_moment(run: Run, step: int, path: Path) -> None:
         save_figure(figure, path)
 
 
-def draw_failure(run: Run, step: int, path: Path, text: str, evidence: Evidence | None) -> None:
+def draw_failure(
+    run: Run, step: int, path: Path, text: str, evidence: VerdictEvidence | None
+) -> None:
     """Draw the moment at which an expectation failed, with what it is about.
 
     Its rooms and distances are marked, and its signals drawn over the minutes around the moment,
@@ -108,7 +110,7 @@ def draw_failure(run: Run, step: int, path: Path, text: str, evidence: Evidence 
         save_figure(figure, path)
 
 
-def _mark(plan: FloorPlan, stage: Stage, evidence: Evidence, axes: Axes) -> None:
+def _mark(plan: FloorPlan, stage: Stage, evidence: VerdictEvidence, axes: Axes) -> None:
     """Mark the rooms of an expectation, and its distances between bodies."""
     rooms = [r.index for r in plan.rooms if evidence.places & {r.name, r.type}]
     left, bottom = plan.lattice.origin
