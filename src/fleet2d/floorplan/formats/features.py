@@ -157,7 +157,8 @@ class Draft:
         """Return the free space between the walls, before doors open these."""
         open_space, walls = _areas(self._of("free")), self._walls(wall_m)
         if open_space.is_empty and not self.rooms and not walls.is_empty:
-            open_space = self._enclosed(walls)
+            doors = [door.shape for door in self._of("door", "opening")]
+            open_space = enclosed_space(walls, doors, self.notes)
         if open_space.is_empty and not self.rooms:
             raise FloorPlanError(
                 "it has no room and no free space: no feature of kind room or free, and no walls"
@@ -168,22 +169,6 @@ class Draft:
         if free.is_empty:
             raise FloorPlanError("no free space is left: all of it is wall")
         return free
-
-    def _enclosed(self, walls: BaseGeometry) -> MultiPolygon:
-        """Return the space that walls enclose, with gaps closed as far as they lose most of it."""
-        doors = [door.shape.buffer(GAPS_M[1]) for door in self._of("door", "opening")]
-        outlines = []
-        for gap in GAPS_M:
-            solid = shapely.union_all([walls, *doors]).buffer(gap / 2, join_style="mitre")
-            shells = [Polygon(part.exterior) for part in _parts(solid) if part.interiors]
-            whole = shapely.union_all(shells).buffer(-gap / 2, join_style="mitre")
-            inside = sum_in_order(Polygon(hole).area for p in _parts(solid) for hole in p.interiors)
-            outlines.append((inside, whole, gap))
-        most = max(inside for inside, *_ in outlines)
-        whole, gap = next((w, g) for inside, w, g in outlines if inside >= KEPT_SHARE * most)
-        if gap > 0 and most > 0:
-            self.notes.append(f"gaps in the walls are closed up to {gap:g} m to find the inside")
-        return _multi(whole)
 
     def _walls(self, wall_m: float) -> BaseGeometry:
         """Return the walls that the file draws."""
@@ -335,3 +320,28 @@ def _multi(shape: BaseGeometry) -> MultiPolygon:
 
 def _parts(shape: BaseGeometry) -> list[Polygon]:
     return [part for part in shapely.get_parts(shape).tolist() if part.geom_type == "Polygon"]
+
+
+def enclosed_space(
+    walls: BaseGeometry, doors: Iterable[BaseGeometry], notes: list[str]
+) -> MultiPolygon:
+    """Return the space within walls and doors, with gaps closed that would lose most of it.
+
+    Args:
+        walls: The walls [m]; what they cover isn't left out.
+        doors: Doors, at which walls may have gaps [m].
+        notes: A note is added if gaps are closed.
+    """
+    shut = [walls, *(door.buffer(GAPS_M[1]) for door in doors)]
+    outlines = []
+    for gap in GAPS_M:
+        solid = _parts(shapely.union_all(shut).buffer(gap / 2, join_style="mitre"))
+        shells = [Polygon(part.exterior) for part in solid if part.interiors]
+        whole = shapely.union_all(shells).buffer(-gap / 2, join_style="mitre")
+        inside = sum_in_order(Polygon(hole).area for part in solid for hole in part.interiors)
+        outlines.append((inside, whole, gap))
+    most = max(inside for inside, *_ in outlines)
+    whole, gap = next((w, g) for inside, w, g in outlines if inside >= KEPT_SHARE * most)
+    if gap > 0 and most > 0:
+        notes.append(f"gaps in the walls are closed up to {gap:g} m to find the inside")
+    return _multi(whole)

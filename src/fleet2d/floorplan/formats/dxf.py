@@ -1,0 +1,162 @@
+"""Drawings of CAD programs as DXF: their walls as lines, on layers."""
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+import shapely
+from pydantic import Field
+from shapely import LineString, MultiPolygon
+from shapely.geometry.base import BaseGeometry
+
+from fleet2d.bounds import CORNERS, FILE_BYTES
+from fleet2d.configuration.components import register
+from fleet2d.configuration.units import InputPath
+from fleet2d.errors import FloorPlanError, extra
+from fleet2d.floorplan.formats.features import Draft, Feature, enclosed_space
+from fleet2d.floorplan.formats.files import in_file
+from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.floorplan.source import FloorPlanSource
+from fleet2d.kernels import F64
+
+# Metres to a unit, by the header variable $INSUNITS, and what is tried if it says nothing.
+UNITS_M = {1: 0.0254, 2: 0.3048, 4: 0.001, 5: 0.01, 6: 1.0}
+TRIED_M = (1.0, 0.001, 0.01, 0.0254, 0.3048)
+# Length of a home's longer side [m].
+SIDE_M = (4.0, 80.0)
+# Words in the names of layers, in several languages.
+WALLS = re.compile("wall|wand|mauer|mur|pared|paret|muur", re.IGNORECASE)
+WINDOWS = re.compile("window|fenster|fen[eê]tre|ventana|finestra|raam|glas", re.IGNORECASE)
+OTHERS = re.compile(
+    "dim|text|hatch|furn|m[öo]bel|mobil|door|t[üu]e?r|porte|puerta|axis|grid|defpoints|anno|title",
+    re.IGNORECASE,
+)
+DRAWN = ("LINE", "LWPOLYLINE", "POLYLINE")
+# Width of a line, and of the narrowest space: what is narrower is the inside of a wall that is
+# drawn by its two sides [m].
+LINE_M, NARROW_M = 0.02, 0.5
+MIN_PART_M2 = 1.0
+
+
+@register("floorplan", "dxf")
+class Dxf(FloorPlanSource):
+    """A drawing in DXF; needs the extra `cad`.
+
+    Attributes:
+        path: The DXF file.
+        scale: Metres to a unit of the drawing; left out: as the file says, or by its extent.
+        walls: Layers with walls, by name, `*` for any text; left out: those named like walls and
+            windows, or all lines if there are none.
+    """
+
+    suffixes: ClassVar[tuple[str, ...]] = (".dxf",)
+
+    path: InputPath
+    scale: float | None = Field(default=None, gt=0)
+    walls: str | None = None
+
+    def load(self) -> FloorPlan:
+        """Read the drawing.
+
+        Lines on the layers of walls bound the home, and the space between the two lines of a wall
+        is wall. Gaps in the outer walls are closed. Rooms are found from the walls.
+
+        Raises:
+            FloorPlanError: The file can't be read, or its lines enclose no home.
+            InputError: ezdxf is not installed.
+        """
+        drawing = _read(self.path)
+        with in_file(self.path):
+            notes: list[str] = []
+            lines = list(_lines(drawing, self._layers(drawing, notes)))
+            CORNERS.check(sum(map(len, lines)), "it", FloorPlanError)
+            if not lines:
+                raise FloorPlanError(
+                    "it has no lines of walls: name their layers by floorplan.walls"
+                )
+            bounds = np.concatenate(lines)
+            low, high = bounds.min(axis=0), bounds.max(axis=0)
+            scale = self.scale or _scale(int(drawing.units), float((high - low).max()), notes)
+            metres = [LineString(np.round((line - low) * scale, 4)) for line in lines]
+            free = _inside(metres, notes)
+            draft = Draft([Feature("free", "walls", free, {})], lambda xy: xy, 0.0, notes)
+            return draft.plan(self.path.stem, self.cell, f"DXF, {self.path.name}")
+
+    def _layers(self, drawing: Any, notes: list[str]) -> set[str]:
+        """Return the names of the layers with walls."""
+        names = {str(entity.dxf.layer) for entity in drawing.modelspace()}
+        if self.walls is not None:
+            pattern = re.compile(re.escape(self.walls).replace(r"\*", ".*"), re.IGNORECASE)
+            chosen = {name for name in names if pattern.fullmatch(name)}
+            if not chosen:
+                known = ", ".join(sorted(names)[:20])
+                raise FloorPlanError(f"no layer is named {self.walls!r}; its layers are: {known}")
+            return chosen
+        walls = {name for name in names if WALLS.search(name)}
+        if not walls:
+            walls = {name for name in names if not OTHERS.search(name)}
+        walls |= {name for name in names if WINDOWS.search(name)}
+        notes.append(
+            f"walls are on the layers {', '.join(sorted(walls)[:20])}; walls: names others"
+        )
+        return walls
+
+
+def _read(path: Path) -> Any:
+    """Return the document of a DXF file."""
+    with extra("cad", "reading DXF needs ezdxf"):
+        import ezdxf
+    try:
+        FILE_BYTES.check(path.stat().st_size, path, FloorPlanError)
+        return ezdxf.readfile(path)  # type: ignore[attr-defined,unused-ignore]
+    except FloorPlanError:
+        raise
+    except OSError as error:
+        raise FloorPlanError(f"{path} can't be read: {error.strerror or error}") from None
+    except (ezdxf.DXFError, ValueError, LookupError, AttributeError, TypeError) as error:
+        raise FloorPlanError(f"{path} is damaged, or not DXF: {error}") from None
+
+
+def _lines(drawing: Any, layers: set[str]) -> Iterator[F64]:
+    """Yield the corners of each line on some layers, float64 (n, 2), in units of the drawing."""
+    from ezdxf.path import make_path
+
+    for entity in drawing.modelspace():
+        parts = [entity]
+        if entity.dxftype() == "INSERT":
+            parts = list(entity.virtual_entities())
+        for part in parts:
+            on_layer = {str(part.dxf.layer), str(entity.dxf.layer)} & layers
+            if on_layer and part.dxftype() in DRAWN:
+                points = [(p.x, p.y) for p in make_path(part).flattening(distance=0.01)]
+                corners = np.array(points, np.float64).reshape(-1, 2)
+                if len(corners) > 1 and np.isfinite(corners).all():
+                    yield corners
+
+
+def _scale(units: int, extent: float, notes: list[str]) -> float:
+    """Return the metres to a unit: as the file says, else by the extent of the drawing."""
+    for scale in (UNITS_M.get(units, 0.0), *TRIED_M):
+        if SIDE_M[0] <= extent * scale <= SIDE_M[1]:
+            if scale != UNITS_M.get(units):
+                notes.append(f"a unit is taken for {scale:g} m, by the extent; scale: sets another")
+            return scale
+    raise FloorPlanError(
+        f"its walls extend over {extent:.4g} units, which is no home in metres, centimetres,"
+        " millimetres, inches or feet: set floorplan.scale to the metres to a unit"
+    )
+
+
+def _inside(lines: list[LineString], notes: list[str]) -> MultiPolygon:
+    """Return the space that lines enclose [m], without the inside of walls."""
+    walls: BaseGeometry = shapely.union_all(lines).buffer(LINE_M / 2, join_style="mitre")
+    space = enclosed_space(walls, [], notes).difference(walls)
+    half = NARROW_M / 2
+    roomy = space.buffer(-half, join_style="mitre").buffer(half, join_style="mitre")
+    parts = shapely.get_parts(roomy.intersection(space)).tolist()
+    kept = [p for p in parts if p.geom_type == "Polygon" and p.area >= MIN_PART_M2]
+    if not kept:
+        raise FloorPlanError("its lines enclose no space that a person fits into")
+    return MultiPolygon(kept)

@@ -1,0 +1,65 @@
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from fleet2d.errors import FloorPlanError
+from fleet2d.floorplan.formats.dxf import Dxf
+from fleet2d.floorplan.load import load_floorplan
+
+ezdxf = pytest.importorskip("ezdxf")
+
+# Walls of 0.2 m drawn by their two sides: 8 m x 4 m outside, a wall across, a door, a front door.
+OUTSIDE = [(0, 0), (8, 0), (8, 4), (0, 4)]
+LEFT = [(4.0, 1.5), (4.0, 0.2), (0.2, 0.2), (0.2, 3.8), (4.0, 3.8), (4.0, 2.4)]
+RIGHT = [(4.2, 2.4), (4.2, 3.8), (7.8, 3.8), (7.8, 0.2), (4.2, 0.2), (4.2, 1.5)]
+JAMBS = [[(4.0, 1.5), (4.2, 1.5)], [(4.0, 2.4), (4.2, 2.4)]]
+
+
+def write(folder: Path, unit_m: float = 1.0, units: int = 6, layer: str = "A-WALL") -> Path:
+    drawing: Any = ezdxf.new(units=units)
+    space = drawing.modelspace()
+
+    def line(points: Any, on: str, close: bool = False) -> None:
+        scaled = [(x / unit_m, y / unit_m) for x, y in points]
+        space.add_lwpolyline(scaled, close=close, dxfattribs={"layer": on})
+
+    line(OUTSIDE, layer, close=True)
+    for points in (LEFT, RIGHT, *JAMBS):
+        line(points, layer)
+    line([(1, 1), (3, 1), (3, 2), (1, 2)], "FURNITURE", close=True)
+    path = folder / "plan.dxf"
+    drawing.saveas(path)
+    return path
+
+
+@pytest.mark.parametrize(("unit_m", "units"), [(1.0, 6), (0.001, 4), (0.001, 0), (0.01, 5)])
+def test_walls_of_two_lines_bound_two_rooms(tmp_path: Path, unit_m: float, units: int) -> None:
+    plan = load_floorplan(write(tmp_path, unit_m, units))
+
+    assert plan.area_m2 == pytest.approx(3.8 * 3.6 + 3.6 * 3.6 + 0.2 * 0.9, abs=0.4)
+    assert 2 == len(plan.rooms)
+    assert [(0, 1)] == [tuple(sorted(door.rooms)) for door in plan.doorways]
+
+
+def test_layers_and_scale_can_be_named(tmp_path: Path) -> None:
+    path = write(tmp_path, layer="0-MAIN")
+
+    named = Dxf(path=path, walls="0-*").load()
+
+    assert 2 == len(named.rooms)
+    assert Dxf(path=path, walls="0-*", scale=2.0).load().area_m2 > 3.5 * named.area_m2
+    with pytest.raises(FloorPlanError, match="its layers are: 0-MAIN, FURNITURE"):
+        Dxf(path=path, walls="WALLS").load()
+
+
+def test_damaged_and_empty_drawings_are_refused(tmp_path: Path) -> None:
+    (tmp_path / "text.dxf").write_text("hello")
+    ezdxf.new().saveas(tmp_path / "empty.dxf")
+
+    with pytest.raises(FloorPlanError, match="is not a DXF file"):
+        load_floorplan(tmp_path / "text.dxf")
+    with pytest.raises(FloorPlanError, match="no lines of walls"):
+        load_floorplan(tmp_path / "empty.dxf")
+    with pytest.raises(FloorPlanError, match="can't be read"):
+        load_floorplan(tmp_path / "none.dxf")
