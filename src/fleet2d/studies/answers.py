@@ -143,7 +143,7 @@ def power_table(
             if effect is not None:
                 rows.append({**label, first: spread.needed(effect, first, power, **sizes)})
                 continue
-            for count in SIZES:
+            for count in SIZES[SIZES.index(FEW_UNITS) :]:
                 detectable = spread.detectable({**sizes, first: count}, power)
                 rows.append({**label, first: count, "detectable": detectable})
     if not rows:

@@ -36,6 +36,7 @@ SlurmParameters = Annotated[
 Where = Annotated[str, typer.Argument(metavar="DIR", help="The folder or store of a study.")]
 MAX_LINES = 10  # of a list that is printed
 MANY_VARIANTS = 20_000
+PIVOTED = 4  # columns of a table of two kinds of units, such as homes and seeds
 IDENTITY_START = 6
 """The minimum number of characters of an identity that name a variant."""
 
@@ -217,9 +218,15 @@ def power(
     aim = "the smallest difference that shows" if effect is None else f"to detect {effect:g}"
     name = f"{metric} [{unit}]" if unit else metric
     _print(f"{name}: {aim}, with a power of {100 * share:g} %; – is never")
+    table = table.with_columns(pl.col(table.columns[0]).cast(pl.String))
+    table = table.with_columns(pl.col(pl.Float64).round_sig_figs(3))
+    if effect is None and len(table.columns) == PIVOTED:  # a column for each number of seeds
+        axis, seed, home, detectable = table.columns
+        table = table.pivot(seed, index=[axis, home], values=detectable)
+        table = table.rename({n: f"{n} of {seed}" for n in table.columns[2:]})
     with pl.Config(
         tbl_hide_dataframe_shape=True, tbl_hide_column_data_types=True, tbl_rows=-1, tbl_cols=-1,
-        tbl_formatting="NOTHING", float_precision=4,
+        tbl_formatting="NOTHING", tbl_width_chars=200,
     ):  # fmt: skip
         _print(str(table).replace("null", "–"))
 
