@@ -60,7 +60,7 @@ def rtp(
         typer.Option("--from", help="Weights to go on from: a file, or `learned`, the shipped."),
     ] = None,
     hidden: Annotated[int, typer.Option(min=1, max=256, help="Width of the layers.")] = 32,
-    epochs: Annotated[int, typer.Option(min=1, help="How often each window is used.")] = 20,
+    epochs: Annotated[int, typer.Option(min=1, help="How often each window is used.")] = 10,
     seed: Annotated[int, typer.Option(min=0, help="Of the first weights.")] = 0,
 ) -> None:
     """Train the network of `model: learned`, or fit one to the days of a run."""
@@ -111,14 +111,30 @@ def leaderboard(
     weights: Annotated[
         list[Path] | None, typer.Option(help="A file of weights to score, too, for rtp.")
     ] = None,
+    picture: Annotated[
+        Path | None,
+        typer.Option(
+            help="Draw how reliable the first network is, or the shipped one; scores nothing."
+        ),
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
     """Score the baselines of each task on a data set, and networks of your own."""
     from fleet2d.algorithms.presence.learned import Weights
     from fleet2d.datasets.reader import open_dataset
+    from fleet2d.datasets.tasks import forecasts
     from fleet2d.datasets.tasks import leaderboard as score
 
     models = {path.stem: Weights.read(path) for path in weights or []}
+    if picture is not None:
+        from fleet2d.pictures.charts import draw_forecasts
+
+        made, name = forecasts(open_dataset(directory), split, models), [*models, "learned"][0]
+        if made is None:
+            raise InputError(f"{directory} has no windows in {split!r}: nothing to draw")
+        draw_forecasts(name, made.beliefs[name], made.truth, picture)
+        typer.echo(f"{picture}: how reliable {name} is")
+        return
     entries = score(open_dataset(directory), task or (), split, models)
     if as_json:
         rows: list[dict[str, Any]] = [

@@ -106,9 +106,29 @@ def rtp_scores(belief: F64, truth: I64, gap: F64) -> dict[str, float]:
     return scores
 
 
-def _score_rtp(data: Dataset, split: str, models: Mapping[str, Weights]) -> list[Entry]:
+class Forecasts(NamedTuple):
+    """Beliefs of models in the windows of a split.
+
+    Attributes:
+        beliefs: By model, float64 (n, places); homes with fewer places have zeros.
+        truth: int64 (n,), the place where the person was.
+        gap: float64 (n,), minutes since the newest sighting.
+    """
+
+    beliefs: Mapping[str, F64]
+    truth: I64
+    gap: F64
+
+
+def forecasts(
+    data: Dataset, split: str, models: Mapping[str, Weights] | None = None
+) -> Forecasts | None:
+    """Return the stored beliefs of a split, those of `learned`, and of further networks.
+
+    None if the split has no windows.
+    """
     parts = list(windows(data, split))
-    networks = {"learned": shipped_weights(), **models}
+    networks = {"learned": shipped_weights(), **(models or {})}
     beliefs: dict[str, list[F64]] = {}
     for part in parts:
         for name, belief in part.beliefs.items():
@@ -116,13 +136,22 @@ def _score_rtp(data: Dataset, split: str, models: Mapping[str, Weights]) -> list
         for name, weights in networks.items():
             beliefs.setdefault(name, []).append(predict(weights, part))
     if not parts:
-        return []
+        return None
     width = max(belief.shape[1] for own in beliefs.values() for belief in own)
-    truth = np.concatenate([part.truth for part in parts])
-    gap = np.concatenate([part.gap for part in parts])
+    return Forecasts(
+        {name: _padded(own, width) for name, own in beliefs.items()},
+        np.concatenate([part.truth for part in parts]),
+        np.concatenate([part.gap for part in parts]),
+    )
+
+
+def _score_rtp(data: Dataset, split: str, models: Mapping[str, Weights]) -> list[Entry]:
+    made = forecasts(data, split, models)
+    if made is None:
+        return []
     return [
-        Entry("rtp", name, rtp_scores(_padded(own, width), truth, gap), len(truth))
-        for name, own in beliefs.items()
+        Entry("rtp", name, rtp_scores(belief, made.truth, made.gap), len(made.truth))
+        for name, belief in made.beliefs.items()
     ]
 
 

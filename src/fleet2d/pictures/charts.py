@@ -200,8 +200,22 @@ def draw_reliability(run: Run, algorithm: str, path: Path) -> None:
         ArtifactError: The run has no output of the algorithm, or no key frames.
         InputError: The file name has another suffix, or the file can't be written.
     """
+    draw_forecasts(algorithm, *forecasts_of(run, algorithm), path)
+
+
+def draw_forecasts(name: str, belief: F64, truth: I64, path: Path) -> None:
+    """Draw the reliability diagram of forecasts, as `draw_reliability`.
+
+    Args:
+        name: What forecast them.
+        belief: float64 (n, places), the probability of each place.
+        truth: int64 (n,), the true place.
+        path: The file.
+
+    Raises:
+        InputError: The file name has another suffix, or the file can't be written.
+    """
     check_picture(path)
-    belief, truth = forecasts_of(run, algorithm)
     places = np.arange(belief.shape[1])
     highest, is_right = belief.max(axis=1), top_k(belief, truth, 1)
     is_true = (truth[:, None] == places).astype(np.float64)
@@ -220,7 +234,7 @@ def draw_reliability(run: Run, algorithm: str, path: Path) -> None:
         curve.set(
             ylabel="observed frequency", xlim=(-0.02, 1.02), ylim=(-0.02, 1.02), aspect="equal"
         )
-        curve.set_title(f"{algorithm}: {len(truth):,} forecasts", fontsize=11, loc="left")
+        curve.set_title(f"{name}: {len(truth):,} forecasts", fontsize=11, loc="left")
         curve.legend(loc="upper left", frameon=False)
         for forecasts, color in ((highest, LIKELIEST_COLOR), (belief.ravel(), EVERY_COLOR)):
             weights = np.full(len(forecasts), 1 / len(forecasts))
