@@ -253,7 +253,7 @@ class RobotEnv(gymnasium.Env[F32, np.int64]):  # type: ignore[misc]
         now, policy = life.now(self.robot), life.policy(self.robot)
         info: dict[str, Any] = {
             "elapsed_s": float(elapsed_s),
-            "action_mask": policy.mask(now),
+            "action_mask": policy.mask(now).copy(),
             "time": now.time.isoformat(),
         }
         if self.truth:

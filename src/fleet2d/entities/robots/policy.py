@@ -257,6 +257,7 @@ class Policy(BeliefBehavior):
         # From the beginning of the run, of rewards.
         self._tally = dict.fromkeys(TALLIED, 0.0)
         self._fixed = self._describe_home(actor)
+        self._mask: tuple[object, Bool] = None, np.zeros(0, np.bool_)  # and what it follows from
 
     # What it knows
 
@@ -313,10 +314,13 @@ class Policy(BeliefBehavior):
 
     def mask(self, now: Situation) -> Bool:
         """Return which actions are possible, bool (rooms + 1,): rooms with a way, and to rest."""
-        allowed = np.zeros(self.rooms + 1, np.bool_)
-        allowed[self.poses.index] = np.isfinite(self.poses.seconds())
-        allowed[-1] = True
-        return allowed
+        seconds = self.poses.seconds()
+        if self._mask[0] is not seconds:  # as long as the robot stays, it is the same array
+            allowed = np.zeros(self.rooms + 1, np.bool_)
+            allowed[self.poses.index] = np.isfinite(seconds)
+            allowed[-1] = True
+            self._mask = seconds, read_only(allowed)
+        return self._mask[1]
 
     def _describe_home(self, actor: Actor) -> F32:
         """Return what never changes in observations, by columns: float32 (columns, rooms)."""
