@@ -47,13 +47,13 @@ class ServedRequest(NamedTuple):
 class Interact(BeliefBehavior):
     """Serve the requests of `interactions:`: approach, address, wait for the answer, carry out.
 
-    It looks once for the person of the most valuable request, in the rooms where `source` believes
-    the person to be, likeliest first, up to nine tenths of the probability. A person in view is
-    approached and addressed; the robot waits for `patience`. What is accepted is carried out; after
-    any other answer the robot withdraws from the room, and comes back at the time that the person
-    named, or after `retry` of the interaction. A person who gave no answer isn't addressed again in
-    the same place: a sleeper isn't asked twice. Rooms that it was told to keep out of are no part
-    of its ways any more.
+    It looks for the person of the most valuable request, at most four times, in the rooms where
+    `source` believes the person to be, likeliest first, up to nine tenths of the probability. A
+    person in view is approached and addressed; the robot waits for `patience`. What is accepted is
+    carried out; after any other answer the robot withdraws from the room, and comes back at the
+    time that the person named, or after `retry` of the interaction. A person who gave no answer
+    isn't addressed again in the same place: a sleeper isn't asked twice. Rooms that it was told to
+    keep out of are no part of its ways any more.
 
     With `timing` it asks an algorithm first: when a request comes up, when the person comes into
     view, and at most every `look`, it serves it with the probability that the algorithm names for
@@ -284,7 +284,10 @@ class Interact(BeliefBehavior):
             return None
         plan = None if last.is_over(now.step) else resumed(now.actor, now.plan(), last, now.step)
         if plan is None:
-            self.not_found[served.request.text] = served.request.until
+            within = served.request.interaction.within
+            self.not_found[served.request.text] = now.time + max(
+                served.request.interaction.retry, within / 4
+            )
             return None
         self.served = served
         return plan.interrupt_on("user_seen")
