@@ -175,6 +175,12 @@ class PatrolEverywhere(OtherSettings, Patrol):
     settings: ClassVar = {"rooms": "all"}
 
 
+class PatrolWithoutAvoiding(OtherSettings, Patrol):
+    """Ignores `avoid`."""
+
+    settings: ClassVar = {"avoid": []}
+
+
 class DockLate(OtherSettings, Dock):
     """Waits until it is nearly empty."""
 

@@ -61,7 +61,7 @@ MUTANTS = {
     "find": ["FindOther", "FindLate", "FindTooNear", "FindFromAfar"],
     "follow": ["FollowOther", "FollowTooNear", "FollowShortly"],
     "night_patrol": ["PatrolLate", "PatrolWithoutFirst", "PatrolAnytime"],
-    "keep_out": ["PatrolNextRooms", "PatrolEverywhere"],
+    "keep_out": ["PatrolNextRooms", "PatrolWithoutAvoiding"],
     "low_battery": ["DockLate", "DockShortly"],
     "guest": ["GreetAnybody", "GreetTooNear", "GreetAgain"],
     "fall_alarm": ["FindOther", "FindRarely"],

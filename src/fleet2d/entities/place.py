@@ -298,6 +298,20 @@ def available_rooms(
     return list(dict.fromkeys(room for place in places for room in body.rooms(place)))
 
 
+def avoided_rooms(body: "Body", key: str, names: tuple[str, ...]) -> frozenset[int]:
+    """Return the indices of the rooms, or kinds of rooms, that a behavior stays out of.
+
+    Args:
+        body: The robot.
+        key: The key of the scenario, for notes about kinds of rooms that the home lacks.
+        names: The rooms and kinds of rooms.
+
+    Raises:
+        PlacementError: There is no such room.
+    """
+    return frozenset(room.index for room in available_rooms(body, key, names, needed=False))
+
+
 def is_kind(body: "Body", place: RoomChoice | Point) -> bool:
     """Whether a place gives a type ('bathroom'), not a particular room or object ('bathroom_0')."""
     if is_point(place):

@@ -262,6 +262,12 @@ def approach(now: Situation, plan: Plan, x: float, y: float, distance: float) ->
     return plan
 
 
+def is_in_rooms(now: Situation, x: float, y: float, rooms: frozenset[int]) -> bool:
+    """Return whether a point [m] is in one of some rooms."""
+    room = now.home.plan.room_at(x, y) if rooms else None
+    return room is not None and room.index in rooms
+
+
 def check_has_camera(actor: Actor, behavior: str) -> None:
     """Refuse a behavior that needs a camera, for a body without one.
 

@@ -18,12 +18,14 @@ from fleet2d.configuration.units import (
 )
 from fleet2d.entities.behavior import DOOR_WAIT, Actor, Command, Situation
 from fleet2d.entities.giving_way import resumed
+from fleet2d.entities.place import avoided_rooms
 from fleet2d.entities.plan import Plan
 from fleet2d.entities.robots.approach import (
     ANYONE,
     BeliefBehavior,
     approach,
     check_has_camera,
+    is_in_rooms,
     spot_back,
     viewpoints_of,
     way_seconds,
@@ -50,14 +52,15 @@ class Sites:
         share: The part of each room that its viewpoints show, float64 (n,).
     """
 
-    def __init__(self, actor: Actor, views: int) -> None:
+    def __init__(self, actor: Actor, views: int, avoided: frozenset[int] = frozenset()) -> None:
         """Choose the viewpoints, by walls and furniture as they are at present.
 
         Args:
             actor: The robot.
             views: The maximum number of viewpoints in a room.
+            avoided: Indices of the rooms that it doesn't enter.
         """
-        rooms = actor.reachable_rooms()
+        rooms = [room for room in actor.reachable_rooms() if room.index not in avoided]
         viewpoints = [viewpoints_of(actor, room, SHARE_TO_SHOW, views) for room in rooms]
         self.rooms = np.array([room.index for room in rooms], np.int64)
         self.share = np.array([of_room.share for of_room in viewpoints], np.float64)
@@ -171,6 +174,7 @@ class Find(BeliefBehavior):
         views: The maximum number of places in a room from which it looks around.
         distance: How far it stays from the person it found [m].
         stay: How long it stays with the person it found.
+        avoid: Rooms, or kinds of rooms if the home has them, that it looks into from outside only.
     """
 
     records: ClassVar[frozenset[str]] = frozenset(
@@ -190,6 +194,7 @@ class Find(BeliefBehavior):
     views: int = Field(default=2, ge=1, le=8)
     distance: Length = Field(default=1.5, ge=0.3, le=10)
     stay: Duration = timedelta(minutes=1)
+    avoid: tuple[str, ...] = ()
 
     @model_validator(mode="after")
     def _begins(self) -> Self:
@@ -204,7 +209,8 @@ class Find(BeliefBehavior):
     def start(self, actor: Actor) -> None:
         """Choose the viewpoints of each room."""
         check_has_camera(actor, "find")
-        self.sites = Sites(actor, self.views)
+        self.avoided = avoided_rooms(actor, "find.avoid", self.avoid)
+        self.sites = Sites(actor, self.views, self.avoided)
         if self.policy == "exact" and len(self.sites) > MAX_EXACT_SITES:
             raise PlacementError(
                 f"{actor.path}: the exact policy works for up to {MAX_EXACT_SITES} rooms, and"
@@ -292,7 +298,10 @@ class Find(BeliefBehavior):
         """End the search: approach the person, at (x, y) [m], and stay."""
         assert self.search is not None
         user, self.search = self.search.user, None
-        approach(now, plan.note("found", user), x, y, self.distance)
+        plan.note("found", user)
+        if is_in_rooms(now, x, y, self.avoided):
+            return plan.face(*now.home.plan.lattice.point_at((x, y))).stay(self.stay)
+        approach(now, plan, x, y, self.distance)
         back = spot_back(now, x, y, self.distance)
         if (plan.x, plan.y) == (now.actor.state.x, now.actor.state.y) != back:
             plan.go_to_point(*back)

@@ -8,8 +8,13 @@ from pydantic import Field
 from fleet2d.configuration.components import register
 from fleet2d.configuration.units import Duration, Length, PositiveDuration
 from fleet2d.entities.behavior import Actor, Behavior, Situation
+from fleet2d.entities.place import avoided_rooms
 from fleet2d.entities.plan import Plan
-from fleet2d.entities.robots.approach import approach, check_has_camera
+from fleet2d.entities.robots.approach import (
+    approach,
+    check_has_camera,
+    is_in_rooms,
+)
 
 # Distance from where a person was lost at which it looks for the person [m].
 SEARCH_DISTANCE_M = 0.3
@@ -33,6 +38,7 @@ class Follow(Behavior):
         distance: How far behind it stays [m].
         update: How often it looks where the person is.
         longest: For how long it follows at most; 0: without end.
+        avoid: Rooms, or kinds of rooms if the home has them, into which it follows nobody.
     """
 
     records: ClassVar[frozenset[str]] = frozenset({"follows", "lost"})
@@ -42,6 +48,7 @@ class Follow(Behavior):
     distance: Length = Field(default=1.5, ge=0.3, le=10)
     update: PositiveDuration = timedelta(seconds=2)
     longest: Duration = timedelta(0)
+    avoid: tuple[str, ...] = ()
 
     def about(self) -> tuple[str, ...]:
         """Return the user that it follows, if it is one by name."""
@@ -50,6 +57,7 @@ class Follow(Behavior):
     def start(self, actor: Actor) -> None:
         """Check that it has a camera."""
         check_has_camera(actor, "follow")
+        self.avoided = avoided_rooms(actor, "follow.avoid", self.avoid)
         self.person: str | None = None  # the one that it follows now
         self.last = (0.0, 0.0)  # where the person was perceived last [m]
         self.pause = self.update
@@ -83,7 +91,8 @@ class Follow(Behavior):
             return None
         self.is_searching = True
         plan = now.plan().note("lost", self.person).interrupt_on("user_seen")
-        approach(now, plan, *self.last, SEARCH_DISTANCE_M)
+        if not is_in_rooms(now, *self.last, self.avoided):
+            approach(now, plan, *self.last, SEARCH_DISTANCE_M)
         return plan.turn_by(1.0)
 
     def _person_in_view(self, now: Situation) -> str | None:
@@ -99,7 +108,8 @@ class Follow(Behavior):
         longest = max(MAX_INTERVAL, self.update)
         self.pause = min(2 * self.pause, longest) if is_resting else self.update
         self.last = x, y
-        approach(now, plan, x, y, self.distance)
+        if not is_in_rooms(now, x, y, self.avoided):
+            approach(now, plan, x, y, self.distance)
         plan.face(*now.home.plan.lattice.point_at((x, y)))
         until = now.time + self.pause
         if self.longest:

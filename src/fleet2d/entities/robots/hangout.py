@@ -11,7 +11,7 @@ from pydantic import Field
 from fleet2d.configuration.components import register
 from fleet2d.configuration.units import Duration, Length, PositiveDuration, Share
 from fleet2d.entities.behavior import Actor, Hours, Situation, holds
-from fleet2d.entities.place import available_rooms
+from fleet2d.entities.place import avoided_rooms
 from fleet2d.entities.plan import Plan
 from fleet2d.entities.robots.approach import (
     BeliefBehavior,
@@ -258,8 +258,7 @@ class Hangout(BeliefBehavior):
 
     def start(self, actor: Actor) -> None:
         """Lay out the places, and rate them by what doesn't depend on where people are."""
-        avoided = available_rooms(actor, "hangout.avoid", self.avoid, needed=False)
-        self.avoided = frozenset(room.index for room in avoided)
+        self.avoided = avoided_rooms(actor, "hangout.avoid", self.avoid)
         self.places = HangoutPlaces(actor, self.avoided, self.off_doors)
         if not len(self.places.points):
             raise PlacementError(

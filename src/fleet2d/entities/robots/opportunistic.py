@@ -8,8 +8,13 @@ from pydantic import Field
 from fleet2d.configuration.components import register
 from fleet2d.configuration.units import Duration, Length, Share
 from fleet2d.entities.behavior import Actor, Behavior, Situation
+from fleet2d.entities.place import avoided_rooms
 from fleet2d.entities.plan import Plan
-from fleet2d.entities.robots.approach import approach, check_has_camera
+from fleet2d.entities.robots.approach import (
+    approach,
+    check_has_camera,
+    is_in_rooms,
+)
 from fleet2d.interactions.interaction import Request
 
 
@@ -29,6 +34,7 @@ class Opportunistic(Behavior):
         interaction: How long it interacts.
         chance: Probability that it takes an opportunity.
         again: Minimum time between two approaches to the same person.
+        avoid: Rooms, or kinds of rooms if the home has them, in which it leaves people alone.
     """
 
     records: ClassVar[frozenset[str]] = frozenset(
@@ -41,6 +47,7 @@ class Opportunistic(Behavior):
     interaction: Duration = timedelta(minutes=1)
     chance: Share = 1.0
     again: Duration = timedelta(minutes=15)
+    avoid: tuple[str, ...] = ()
 
     def about(self) -> tuple[str, ...]:
         """Return the users that it approaches, if only some."""
@@ -49,6 +56,7 @@ class Opportunistic(Behavior):
     def start(self, actor: Actor) -> None:
         """Check that it has a camera."""
         check_has_camera(actor, "opportunistic")
+        self.avoided = avoided_rooms(actor, "opportunistic.avoid", self.avoid)
         self.request: Request | None = None
         self.last_opportunity: dict[str, datetime] = {}  # by person
 
@@ -58,7 +66,7 @@ class Opportunistic(Behavior):
             plan = now.plan().stay(accepted.interaction.takes).note("delivered", accepted.text)
             return plan.note("interaction_over", accepted.interaction.to)
         for name, (x, y) in sorted(now.in_view.items()):
-            if not self._is_opportunity(name, now):
+            if not self._is_opportunity(name, now) or is_in_rooms(now, x, y, self.avoided):
                 continue
             self.last_opportunity[name] = now.time
             if now.random(f"chance {name}").uniform() < self.chance:

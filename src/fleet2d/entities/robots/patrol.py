@@ -9,7 +9,7 @@ from fleet2d.configuration.components import register
 from fleet2d.configuration.problems import problem
 from fleet2d.configuration.units import Duration
 from fleet2d.entities.behavior import Actor, Behavior, Situation
-from fleet2d.entities.place import Place, Point, available_places, stops_at
+from fleet2d.entities.place import Place, Point, available_places, avoided_rooms, stops_at
 from fleet2d.entities.plan import Plan
 
 
@@ -26,6 +26,7 @@ class Patrol(Behavior):
         dwell: How long it stays at each stop.
         order: Stops in the order given, or reshuffled for each round.
         look_around: Turn once on the spot on arriving at a stop.
+        avoid: Rooms, or kinds of rooms if the home has them, without stops.
     """
 
     resumes: ClassVar[bool] = True
@@ -35,6 +36,7 @@ class Patrol(Behavior):
     dwell: Duration = timedelta(minutes=5)
     order: Literal["fixed", "random"] = "fixed"
     look_around: bool = True
+    avoid: tuple[str, ...] = ()
 
     @model_validator(mode="after")
     def _goes_somewhere(self) -> Self:
@@ -47,14 +49,17 @@ class Patrol(Behavior):
     def start(self, actor: Actor) -> None:
         """Find the stops."""
         if self.waypoints:
-            self.stops = [actor.point(point) for point in self.waypoints]
-            return
-        if self.rooms == "all":
+            stops = [actor.point(point) for point in self.waypoints]
+        elif self.rooms == "all":
             stops = [actor.middle(room) for room in actor.reachable_rooms()]
         else:
             places = available_places(actor, "patrol.rooms", self.rooms)
             stops = [stop for place in places for stop in stops_at(actor, place)]
-        self.stops = list(dict.fromkeys(stops))
+        if self.avoid:
+            avoided, plan = avoided_rooms(actor, "patrol.avoid", self.avoid), actor.home.plan
+            at = {stop: plan.room_at(*plan.lattice.to_metres(stop).tolist()) for stop in stops}
+            stops = [s for s in stops if (room := at[s]) is None or room.index not in avoided]
+        self.stops = stops if self.waypoints else list(dict.fromkeys(stops))
 
     def decide(self, now: Situation) -> Plan:
         """Plan one round."""
