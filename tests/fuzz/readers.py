@@ -26,6 +26,7 @@ from fleet2d.artifacts.seal import verify_run
 from fleet2d.configuration.trust import Trust, restrict
 from fleet2d.fit.perception import read_detections
 from fleet2d.floorplan.load import load_floorplan
+from fleet2d.live.messages import parse_message
 from fleet2d.logs.layouts import read_log
 from fleet2d.routines.persona import BUNDLED as PERSONAS
 from fleet2d.scenario.model import load_scenario
@@ -276,6 +277,33 @@ DETECTIONS = "distance,detected,bearing_deg,identity,true_identity\n" + "".join(
 )
 
 
+FACES = "time,label,x,y,heading\n" + "".join(
+    f"2020-03-02 00:{minute:02}:00,{'ana' if minute % 3 else 'person'},{16 + minute / 10},7.7,1\n"
+    for minute in range(12)
+)
+FACES_AS_LINES = "".join(
+    json.dumps({"time": float(second), "user": "ana", "x": 16.5, "y": 7.7}) + "\n"
+    for second in range(12)
+)
+MESSAGE = {
+    "type": "detections", "entity": "astro", "number": 3,
+    "detections": [{"user": "ana", "x": 16.5, "y": 7.7, "heading_deg": 90}],
+}  # fmt: skip
+
+
+def _perceive(path: Path) -> None:
+    """Read what a real robot perceived, and let one perceive it."""
+    source = {"type": "replay", "path": str(path), "time_zone": "UTC", "sort": True}
+    robot = {"perceives": source, "behaviors": [{"type": "patrol"}]}
+    home = scenario("1 h", users={"ana": {"type": "unknown"}}, robots={"astro": robot})
+    fleet2d.run({**home, "simulation": {**home["simulation"], "start": "2020-03-02"}})
+
+
+def _post(path: Path) -> None:
+    """Read a message to a live run."""
+    parse_message(path.read_bytes())
+
+
 def _words(text: str) -> Callable[[], st.SearchStrategy[bytes]]:
     """Changes to the cells of a table as to the words of a log."""
     spaced = text.replace(",", " , ")
@@ -336,6 +364,9 @@ READERS = {
             _replay, cost=2,
         ),
         Reader("detections", "seen.csv", _words(DETECTIONS), read_detections),
+        Reader("faces", "faces.csv", _words(FACES), _perceive, cost=2),
+        Reader("faces as lines", "faces.jsonl", lambda: lines(FACES_AS_LINES), _perceive, cost=2),
+        Reader("message", "message.json", lambda: _json(MESSAGE), _post),
         Reader("manifest", "manifest.json", lambda: _json(_manifest()), _read_run, _run_beside, 3),
         Reader(
             "table", "key_frames.parquet",
