@@ -96,7 +96,7 @@ def seed_of(run: Run) -> int:
 
 
 def test_an_unknown_executor_is_refused() -> None:
-    with pytest.raises(InputError, match="give local, ray or serial"):
+    with pytest.raises(InputError, match="give local, ray, slurm or serial"):
         make_executor("cloud")  # type: ignore[arg-type]
 
 
