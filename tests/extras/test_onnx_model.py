@@ -8,7 +8,7 @@ import pytest
 
 import fleet2d
 from fleet2d.algorithms.presence.learned import shipped_weights
-from fleet2d.errors import Fleet2DError, InputError
+from fleet2d.errors import Fleet2DError
 
 onnx = pytest.importorskip("onnx", reason="onnx isn't installed")
 pytest.importorskip("onnxruntime", reason="onnxruntime isn't installed")
@@ -85,12 +85,12 @@ def test_the_shipped_network_as_onnx_has_the_same_beliefs(tmp_path: Path) -> Non
 def test_other_files_and_other_inputs_are_refused(tmp_path: Path) -> None:
     foreign = tmp_path / "foreign.onnx"
     foreign.write_bytes(b"no model")
-    with pytest.raises(InputError, match="is no ONNX model"):
+    with pytest.raises(Fleet2DError, match="is no ONNX model"):
         beliefs({"type": "onnx", "file": str(foreign)})
     other = tmp_path / "other.onnx"
     node = onnx.helper.make_node("Relu", ["other"], ["output"])
     other.write_bytes(graph_of([node], {}, ("other",)))
-    with pytest.raises(InputError, match="has the inputs other, expected features"):
+    with pytest.raises(Fleet2DError, match="has the inputs other, expected features"):
         beliefs({"type": "onnx", "file": str(other)})
 
 

@@ -12,7 +12,7 @@ from tests.algorithms.presence.worlds import MONDAY, any_evidence, evidence_of, 
 import fleet2d
 from fleet2d.algorithms.presence.belief import BeliefSeries
 from fleet2d.algorithms.presence.learned import WEIGHTS, LearnedModel, Weights
-from fleet2d.errors import InputError
+from fleet2d.errors import Fleet2DError, InputError
 
 LEARNED = {"rtp": {"type": "rtp", "model": "learned"}}
 
@@ -114,6 +114,15 @@ def test_files_that_are_damaged_or_foreign_are_refused(
 
     with pytest.raises(InputError, match=words):
         Weights.read(tmp_path / "own.npz")
+
+
+def test_a_damaged_file_is_refused_before_the_run(tmp_path: Path) -> None:
+    (tmp_path / "own.npz").write_bytes(b"not a model")
+    model = {"type": "learned", "weights": str(tmp_path / "own.npz")}
+    with pytest.raises(Fleet2DError, match="can't be read as weights"):
+        fleet2d.Simulation(
+            "simulation.duration=1 h", seed=1, algorithms={"rtp": {"type": "rtp", "model": model}}
+        )
 
 
 def test_weights_are_read_as_they_were_saved(tmp_path: Path) -> None:

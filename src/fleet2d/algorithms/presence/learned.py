@@ -240,10 +240,17 @@ class LearnedModel(CorrectedRoutine):
 
     weights: InputPath | None = None
 
+    def check(self) -> None:
+        """Refuse a file of weights that is damaged, foreign, or of another version."""
+        self._read()
+
+    def _read(self) -> Weights:
+        return shipped_weights() if self.weights is None else Weights.read(self.weights)
+
     def begin(self, home: Home, users: Sequence[str], start: datetime) -> None:
         """Prepare for a run."""
         super().begin(home, users, start)
-        read = shipped_weights() if self.weights is None else Weights.read(self.weights)
+        read = self._read()
         self.network, self.places = read.network, read.of_places(self.facts.features)
 
     def correct(self, features: F64) -> F64:

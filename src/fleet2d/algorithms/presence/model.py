@@ -25,6 +25,13 @@ class Model(Component):
 
     kind: ClassVar[str] = "presence_model"
 
+    def check(self) -> None:
+        """Refuse files that it can't use; called when a run is set up.
+
+        Raises:
+            InputError: A file is damaged, or of something else.
+        """
+
     def begin(self, home: Home, users: Sequence[str], start: datetime) -> None:
         """Prepare for a run.
 

@@ -1,7 +1,5 @@
 """Models of real-time presence in ONNX files, made by any library."""
 
-from collections.abc import Sequence
-from datetime import datetime
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -13,7 +11,6 @@ from fleet2d.bounds import one_line
 from fleet2d.configuration.components import register
 from fleet2d.configuration.units import InputPath
 from fleet2d.errors import ComponentError, InputError
-from fleet2d.floorplan.home import Home
 from fleet2d.kernels import F64
 from fleet2d.kernels.presence import TRACE_FEATURES
 
@@ -38,13 +35,12 @@ class OnnxModel(CorrectedRoutine):
     file: InputPath
     scores: bool = True
 
-    def begin(self, home: Home, users: Sequence[str], start: datetime) -> None:
-        """Prepare for a run.
+    def check(self) -> None:
+        """Refuse a file that is no ONNX model with these inputs.
 
         Raises:
-            InputError: The file is no ONNX model with these inputs, or onnxruntime is missing.
+            InputError: It isn't, or onnxruntime is missing.
         """
-        super().begin(home, users, start)
         _session(Path(self.file))
 
     def correct(self, features: F64) -> F64:

@@ -14,6 +14,7 @@ from fleet2d.algorithms.presence.model import Model
 from fleet2d.configuration.components import OneOf, register
 from fleet2d.configuration.units import PositiveDuration
 from fleet2d.errors import ComponentError
+from fleet2d.floorplan.home import Home
 
 
 @register("algorithm", "real_time_presence", aliases=("rtp",))
@@ -30,6 +31,11 @@ class RealTimePresence(PresenceAlgorithm):
 
     period: PositiveDuration = timedelta(minutes=5)
     model: Annotated[Model, OneOf("presence_model")] = cast("Any", "hmm")
+
+    def start(self, home: Home) -> None:
+        """Begin without evidence, with a model whose files can be used."""
+        super().start(home)
+        self.model.check()
 
     def update(self, history: History, state: Present) -> Presence | None:
         """Process the evidence of the period; return the present belief."""
