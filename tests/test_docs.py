@@ -58,7 +58,8 @@ def scenarios() -> list[object]:
 def commands() -> list[object]:
     found = []
     for block in (block for page in PAGES for block in blocks(page, "sh")):
-        lines = (words for line in block.text.splitlines() for words in split_commands(line))
+        text = block.text.replace("\\\n", " ")  # a command may go on in the next line
+        lines = (words for line in text.splitlines() for words in split_commands(line))
         ours = [words[1:] for words in lines if Path(words[0]).name == "fleet2d"]
         found += [pytest.param(words, id=f"{block.where} {' '.join(words)}") for words in ours]
     return found
