@@ -20,8 +20,7 @@ from fleet2d.entities.objects.home_object import (
     SensorView,
     in_order,
 )
-from fleet2d.errors import ScenarioError, blame
-from fleet2d.logs.log import LogError
+from fleet2d.errors import InputError, ScenarioError, blame
 from fleet2d.runtime.clock import Clock
 from fleet2d.runtime.events import Event, EventKind
 
@@ -183,8 +182,8 @@ def _in_object(name: str) -> Iterator[None]:
     """Say in errors about a log which object reads it."""
     try:
         yield
-    except LogError as error:
-        raise LogError(f"objects.{name}: {error}") from None
+    except InputError as error:
+        raise type(error)(f"objects.{name}: {error}") from None
 
 
 def _door(name: str, door: str, doors: Sequence[str]) -> int:
