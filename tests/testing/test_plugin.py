@@ -132,7 +132,11 @@ def test_ana_stays(trial):
     assert (5, 1) == (smaller.manifest["steps"], len(smaller.manifest["interventions"]))
     assert [] == smaller.manifest["entities"]["robots"]
     assert ["ana"] == smaller.manifest["entities"]["users"]
-    assert "see it: fleet2d view" in (folder / "failure.txt").read_text()
+    report = (folder / "failure.txt").read_text()
+    assert "see it: fleet2d view" in report
+    place = folder.relative_to(tmp_path)
+    assert f"film it: fleet2d film {place / 'run'} --from 'step 94' --to 'step 154'" in report
+    assert f"film it: fleet2d film {place / 'smaller'} --from 'step 0' --to 'step 4'" in report
 
 
 def test_fixtures_parameters_and_choices_of_tests_work(suite: Suite) -> None:

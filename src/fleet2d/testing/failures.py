@@ -28,6 +28,7 @@ from fleet2d.testing.trials import (
 LEAD_TIMES = tuple(timedelta(minutes=minutes) for minutes in (0, 1, 5, 15, 60, 240, 1440, 10_080))
 """Times from the start of a shorter run to the failure, tried in this order."""
 MAX_SEEDS_SHOWN = 8
+FILM_STEPS = 30  # before and after a failure
 
 
 @dataclass(frozen=True)
@@ -364,3 +365,6 @@ def _store(
         yield f"  no picture: {error}"
     path = shlex.quote(str(out))
     yield f"  see it: fleet2d view {path}, or fleet2d show {path} --at 'step {step}'"
+    first = max(0, step - FILM_STEPS)
+    last = min(step + FILM_STEPS, variant.scenario.simulation.steps - 1)
+    yield f"  film it: fleet2d film {path} --from 'step {first}' --to 'step {last}' --speed 4"
