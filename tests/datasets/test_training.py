@@ -34,7 +34,7 @@ def loss(weights: Weights, windows: Windows) -> float:
 def test_gradients_equal_differences() -> None:
     random = np.random.default_rng(1)
     [batch] = training._batches([random_windows(1, count=7)], 7)
-    batch = training._Batch(*(np.asarray(part, float) for part in batch[:2]), batch.truth)
+    batch = training.WindowBatch(*(np.asarray(part, float) for part in batch[:2]), batch.truth)
     values = {k: random.normal(size=v.shape) for k, v in training._initial(random, 3).items()}
     _, gradient = training._gradient(values, batch)
 

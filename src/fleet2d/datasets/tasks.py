@@ -32,7 +32,7 @@ Cases = list[tuple[tuple[str, ...], str]]
 SMOOTHING = 1.0  # added to each count of a baseline
 
 
-class Entry(NamedTuple):
+class LeaderboardEntry(NamedTuple):
     """A row of the leaderboard.
 
     Attributes:
@@ -58,7 +58,7 @@ def leaderboard(
     tasks: Sequence[str] = (),
     split: str = "test",
     models: Mapping[str, Weights] | None = None,
-) -> list[Entry]:
+) -> list[LeaderboardEntry]:
     """Score the baselines of tasks on a split.
 
     Args:
@@ -106,7 +106,7 @@ def rtp_scores(belief: F64, truth: I64, gap: F64) -> dict[str, float]:
     return scores
 
 
-class Forecasts(NamedTuple):
+class SplitForecasts(NamedTuple):
     """Beliefs of models in the windows of a split.
 
     Attributes:
@@ -122,7 +122,7 @@ class Forecasts(NamedTuple):
 
 def forecasts(
     data: Dataset, split: str, models: Mapping[str, Weights] | None = None
-) -> Forecasts | None:
+) -> SplitForecasts | None:
     """Return the stored beliefs of a split, those of `learned`, and of further networks.
 
     None if the split has no windows.
@@ -138,19 +138,19 @@ def forecasts(
     if not parts:
         return None
     width = max(belief.shape[1] for own in beliefs.values() for belief in own)
-    return Forecasts(
+    return SplitForecasts(
         {name: _padded(own, width) for name, own in beliefs.items()},
         np.concatenate([part.truth for part in parts]),
         np.concatenate([part.gap for part in parts]),
     )
 
 
-def _score_rtp(data: Dataset, split: str, models: Mapping[str, Weights]) -> list[Entry]:
+def _score_rtp(data: Dataset, split: str, models: Mapping[str, Weights]) -> list[LeaderboardEntry]:
     made = forecasts(data, split, models)
     if made is None:
         return []
     return [
-        Entry("rtp", name, rtp_scores(belief, made.truth, made.gap), len(made.truth))
+        LeaderboardEntry("rtp", name, rtp_scores(belief, made.truth, made.gap), len(made.truth))
         for name, belief in made.beliefs.items()
     ]
 
@@ -160,7 +160,7 @@ def _padded(beliefs: Sequence[F64], width: int) -> F64:
     return np.concatenate([np.pad(b, ((0, 0), (0, width - b.shape[1]))) for b in beliefs])
 
 
-def _score_ltp(data: Dataset, split: str) -> list[Entry]:
+def _score_ltp(data: Dataset, split: str) -> list[LeaderboardEntry]:
     """Score shares of rooms from all evidence of a run, against the true ones."""
     errors: dict[str, list[float]] = {"uniform": [], "sighting_share": [], "exposure_ratio": []}
     rooms, evidence = _groups(data, "rooms", split), _groups(data, "evidence", split)
@@ -185,10 +185,14 @@ def _score_ltp(data: Dataset, split: str) -> list[Entry]:
         for name, guess in guesses.items():
             share = guess / guess.sum() if guess.any() else np.full(len(names), 1 / len(names))
             errors[name].append(float(np.abs(share - truth).sum() / 2))
-    return [Entry("ltp", n, {"tv": float(np.mean(e))}, len(e)) for n, e in errors.items() if e]
+    return [
+        LeaderboardEntry("ltp", n, {"tv": float(np.mean(e))}, len(e))
+        for n, e in errors.items()
+        if e
+    ]
 
 
-def _score_next_room(data: Dataset, split: str) -> list[Entry]:
+def _score_next_room(data: Dataset, split: str) -> list[LeaderboardEntry]:
     def cases(part: str) -> Cases:
         found: Cases = []
         for labels in _with_kinds(data, part):
@@ -201,7 +205,7 @@ def _score_next_room(data: Dataset, split: str) -> list[Entry]:
     return _score_tables("next_room", cases(TRAIN), cases(split), "kind of room")
 
 
-def _score_activity(data: Dataset, split: str) -> list[Entry]:
+def _score_activity(data: Dataset, split: str) -> list[LeaderboardEntry]:
     def cases(part: str) -> Cases:
         found: Cases = []
         for labels in _with_kinds(data, part):
@@ -213,7 +217,7 @@ def _score_activity(data: Dataset, split: str) -> list[Entry]:
     return _score_tables("activity", cases(TRAIN), cases(split), "kind of room and hour")
 
 
-def _score_time_to_return(data: Dataset, split: str) -> list[Entry]:
+def _score_time_to_return(data: Dataset, split: str) -> list[LeaderboardEntry]:
     def cases(part: str) -> tuple[I64, F64]:
         hours, minutes = [], []
         for labels in _with_kinds(data, part):
@@ -234,7 +238,9 @@ def _score_time_to_return(data: Dataset, split: str) -> list[Entry]:
     ]
     guesses = {"median": np.full(len(truth), overall), "median by hour": np.take(by_hour, asked)}
     return [
-        Entry("time_to_return", name, {"mae_min": float(np.abs(g - truth).mean())}, len(truth))
+        LeaderboardEntry(
+            "time_to_return", name, {"mae_min": float(np.abs(g - truth).mean())}, len(truth)
+        )
         for name, g in guesses.items()
     ]
 
@@ -244,7 +250,7 @@ def _score_tables(
     known: Cases,
     asked: Cases,
     given: str,
-) -> list[Entry]:
+) -> list[LeaderboardEntry]:
     """Score the shares of each outcome in the training: overall, and given what is known."""
     outcomes = sorted({what for _, what in [*known, *asked]})
     if not known or not asked:
@@ -266,7 +272,7 @@ def _score_tables(
         f"by {given}": np.array([tables.get(condition, base) for condition, _ in asked]),
     }
     return [
-        Entry(
+        LeaderboardEntry(
             task,
             name,
             {
@@ -306,11 +312,11 @@ def _groups(data: Dataset, table: str, split: str, *also: str) -> dict[Any, dict
     }
 
 
-def _rtp(data: Dataset, split: str) -> list[Entry]:
+def _rtp(data: Dataset, split: str) -> list[LeaderboardEntry]:
     return _score_rtp(data, split, {})
 
 
-TASKS: Mapping[str, Callable[[Dataset, str], list[Entry]]] = {
+TASKS: Mapping[str, Callable[[Dataset, str], list[LeaderboardEntry]]] = {
     "rtp": _rtp,
     "ltp": _score_ltp,
     "next_room": _score_next_room,

@@ -41,7 +41,7 @@ class TrainingSettings:
     trust: float = 0.7
 
 
-class _Batch(NamedTuple):
+class WindowBatch(NamedTuple):
     """Windows with the same number of places: features, (n, places, features), and the truth."""
 
     inputs: Any
@@ -130,7 +130,7 @@ def predict(weights: Weights, windows: Windows) -> Any:
     return place_probabilities(weights.network, places, windows.features.astype(np.float64))
 
 
-def _batches(parts: Iterable[Windows], size: int) -> list[_Batch]:
+def _batches(parts: Iterable[Windows], size: int) -> list[WindowBatch]:
     """Return batches of windows of homes with as many places, in a fixed random order."""
     batches = []
     for places, group in sorted(joined(parts).items()):
@@ -151,20 +151,20 @@ def _batches(parts: Iterable[Windows], size: int) -> list[_Batch]:
         truth = np.concatenate([w.truth for w in group])
         order = np.random.default_rng(places).permutation(len(truth))
         batches += [
-            _Batch(inputs[rows], inputs[rows, :, -1], truth[rows])
+            WindowBatch(inputs[rows], inputs[rows, :, -1], truth[rows])
             for rows in np.array_split(order, -(-len(order) // size))
         ]
     return batches
 
 
-def _scales(batches: list[_Batch]) -> tuple[Any, Any]:
+def _scales(batches: list[WindowBatch]) -> tuple[Any, Any]:
     """Return the mean and the standard deviation of each feature."""
     rows = np.concatenate([b.inputs.reshape(-1, b.inputs.shape[2]) for b in batches[::4]])
     scale = rows.std(axis=0, dtype=np.float64).astype(np.float32)
     return rows.mean(axis=0, dtype=np.float64).astype(np.float32), np.maximum(scale, 1e-2)
 
 
-def _scaled(batch: _Batch, mean: Any, scale: Any) -> _Batch:
+def _scaled(batch: WindowBatch, mean: Any, scale: Any) -> WindowBatch:
     return batch._replace(inputs=(batch.inputs - mean) / scale)
 
 
@@ -184,7 +184,7 @@ def _initial(random: np.random.Generator, hidden: int) -> Parameters:
     }
 
 
-def _forward(values: Parameters, batch: _Batch) -> tuple[Any, Any, Any, Any]:
+def _forward(values: Parameters, batch: WindowBatch) -> tuple[Any, Any, Any, Any]:
     inner = np.maximum(batch.inputs @ values["first"] + values["start"], 0)
     mean = inner.mean(axis=1)
     outer = inner @ values["second"] + (mean @ values["context"] + values["bias"])[:, None]
@@ -194,7 +194,7 @@ def _forward(values: Parameters, batch: _Batch) -> tuple[Any, Any, Any, Any]:
     return inner, mean, outer, score / score.sum(axis=1, keepdims=True)
 
 
-def _gradient(values: Parameters, batch: _Batch) -> tuple[float, Parameters]:
+def _gradient(values: Parameters, batch: WindowBatch) -> tuple[float, Parameters]:
     inner, mean, outer, belief = _forward(values, batch)
     count, places, hidden = inner.shape
     rows = np.arange(count)
@@ -237,7 +237,7 @@ def _adam(
     return made
 
 
-def _loss(values: Parameters, batches: list[_Batch]) -> float:
+def _loss(values: Parameters, batches: list[WindowBatch]) -> float:
     total = count = 0.0
     for batch in batches:
         belief = _forward(values, batch)[3][np.arange(len(batch.truth)), batch.truth]
