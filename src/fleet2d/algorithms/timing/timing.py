@@ -96,7 +96,7 @@ class TimingChances:
 
 
 @register("algorithm", "timing")
-class Timing(Algorithm):
+class TimingAlgorithm(Algorithm):
     """Learn from answers when and where a person welcomes an interaction.
 
     The behavior `interact` with `timing: NAME` addresses people with the probabilities of its
