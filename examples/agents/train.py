@@ -17,7 +17,7 @@ import torch
 from torch import Tensor, nn
 from torch.distributions import Categorical
 
-from fleet2d.gym import Lives
+from fleet2d.gym import VectorRobotEnv
 
 LIVES, HORIZON, EPOCHS, BATCHES, WIDTH = 16, 128, 4, 4, 64
 HALF_LIFE_S = {"hangout": 4 * 3600.0, "find": 600.0, "patrol": 3600.0}
@@ -64,10 +64,10 @@ class Batch(NamedTuple):
 
 
 class Experience:
-    """Lives that go on while the network learns from them."""
+    """VectorRobotEnv that go on while the network learns from them."""
 
     def __init__(self, task: str, seed: int) -> None:
-        self.lives, self.half_life_s = Lives(LIVES, task=task), HALF_LIFE_S[task]
+        self.lives, self.half_life_s = VectorRobotEnv(LIVES, task=task), HALF_LIFE_S[task]
         self.observation, info = self.lives.reset(seed=seed)
         self.mask, self.over = info["action_mask"], np.zeros(LIVES, np.bool_)
         self.returns: list[float] = []  # of lives that are over

@@ -15,7 +15,7 @@ from tests.entities.robots.robots import OUT, home_with  # noqa: E402
 
 import fleet2d  # noqa: E402
 from fleet2d.errors import InputError  # noqa: E402
-from fleet2d.gym import DiscountByTime, Lives, RobotEnv, RobotsEnv, load_task  # noqa: E402
+from fleet2d.gym import DiscountByTime, RobotEnv, RobotsEnv, VectorRobotEnv, load_task  # noqa: E402
 
 SHORT = "simulation.duration=1 d"
 TASKS = ["hangout", "find", "patrol"]
@@ -172,7 +172,7 @@ def test_truth_is_told_only_if_asked_for() -> None:
 
 def test_same_seed_is_the_same_episode_in_any_number_of_environments() -> None:
     settings: dict[str, Any] = {"task": load_task("hangout"), "masked": "rest"}
-    few, many = Lives(2, SHORT, **settings), Lives(3, SHORT, **settings)
+    few, many = VectorRobotEnv(2, SHORT, **settings), VectorRobotEnv(3, SHORT, **settings)
     first, second = few.reset(seed=5)[0], many.reset(seed=5)[0]
     for step in range(60):
         assert np.array_equal(first, second[:2])
@@ -183,7 +183,7 @@ def test_same_seed_is_the_same_episode_in_any_number_of_environments() -> None:
 
 
 def test_lives_are_those_of_single_environments() -> None:
-    lives, env = Lives(2, task=flat(), masked="rest"), RobotEnv(flat(), masked="rest")
+    lives, env = VectorRobotEnv(2, task=flat(), masked="rest"), RobotEnv(flat(), masked="rest")
     observations, info = lives.reset(seed=3)
     single, own = env.reset(seed=4)
 

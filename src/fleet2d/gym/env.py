@@ -13,14 +13,14 @@ from fleet2d.entities.behavior import Situation
 from fleet2d.entities.decisions import DecidingActor
 from fleet2d.entities.robots.policy import COLUMNS, Policy
 from fleet2d.errors import InputError
-from fleet2d.gym.task import Split, Task, Variant, Variants, load_task
+from fleet2d.gym.task import LearningTask, LifeScenario, Split, Variants, load_task
 from fleet2d.kernels import F32, Bool
 from fleet2d.runs.run import Run
 
 Reward = Mapping[str, float] | Callable[["RobotEnv"], float] | None
 
 
-class Life:
+class RobotLife:
     """A run in which policies of robots wait for their actions.
 
     Attributes:
@@ -72,9 +72,9 @@ class Life:
             "in_view_min": self.simulation.perceived_s(robot) / 60,
         }
 
-    def copy(self) -> "Life":
+    def copy(self) -> "RobotLife":
         """Return an independent copy."""
-        life = Life.__new__(Life)
+        life = RobotLife.__new__(RobotLife)
         life.simulation, life.robots = copy.deepcopy(self.simulation), self.robots
         life.due = list(self.due)
         return life
@@ -90,7 +90,7 @@ class RobotEnv(gymnasium.Env[F32, np.int64]):  # type: ignore[misc]
     battery is empty.
 
     Args:
-        task: hangout, find, patrol, a file of a task or a scenario, or a `Task`.
+        task: hangout, find, patrol, a file of a task or a scenario, or a `LearningTask`.
         overrides: Changes of the scenario, such as "simulation.duration=3 d".
         robot: The robot; left out: the only one with a policy.
         reward: Weights of terms in place of the task's, or a function that is called with the
@@ -114,7 +114,7 @@ class RobotEnv(gymnasium.Env[F32, np.int64]):  # type: ignore[misc]
 
     def __init__(
         self,
-        task: str | Path | Mapping[str, Any] | Task = "hangout",
+        task: str | Path | Mapping[str, Any] | LearningTask = "hangout",
         *overrides: str,
         robot: str | None = None,
         reward: Reward = None,
@@ -128,7 +128,7 @@ class RobotEnv(gymnasium.Env[F32, np.int64]):  # type: ignore[misc]
         self.variants = Variants(load_task(task), overrides)
         self.reward: Any = dict(self.variants.task.reward) if reward is None else reward
         if not callable(self.reward):
-            Task(reward=self.reward)  # refuses unknown terms
+            LearningTask(reward=self.reward)  # refuses unknown terms
         self.split, self.masked, self.truth, self.render_mode = split, masked, truth, render_mode
         variant = self._first_variant()
         self.robot = robot or variant.robots[0]
@@ -142,7 +142,7 @@ class RobotEnv(gymnasium.Env[F32, np.int64]):  # type: ignore[misc]
         shape = policy.rooms, len(COLUMNS)
         self.observation_space = gymnasium.spaces.Box(-1.0, 1.0, shape, np.float32)
         self.action_space = gymnasium.spaces.Discrete(policy.rooms + 1)
-        self.life: Life | None = None
+        self.life: RobotLife | None = None
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -164,10 +164,10 @@ class RobotEnv(gymnasium.Env[F32, np.int64]):  # type: ignore[misc]
         simulation = variant.scenario.simulation
         settings = simulation.model_copy(update={"seed": options.get("seed", drawn)})
         scenario = variant.scenario.model_copy(update={"simulation": settings})
-        self.join(Life(Simulation(scenario), self.robots))
+        self.join(RobotLife(Simulation(scenario), self.robots))
         return self.observe(0)
 
-    def join(self, life: Life) -> None:
+    def join(self, life: RobotLife) -> None:
         """Go on in a life, which other robots may share."""
         self.life, self._step = life, life.simulation.step
         self._terms = life.terms(self.robot)
@@ -205,7 +205,7 @@ class RobotEnv(gymnasium.Env[F32, np.int64]):  # type: ignore[misc]
         before, self._terms = self._terms, self.present.terms(self.robot)
         return sum(w * (self._terms[name] - before[name]) for name, w in self.reward.items())
 
-    def _first_variant(self) -> Variant:
+    def _first_variant(self) -> LifeScenario:
         return self.variants.load(self.variants.task.draw(np.random.default_rng(0), self.split))
 
     @classmethod
@@ -237,7 +237,7 @@ class RobotEnv(gymnasium.Env[F32, np.int64]):  # type: ignore[misc]
         return pixels_of(life_figure(self))
 
     @property
-    def present(self) -> Life:
+    def present(self) -> RobotLife:
         """The present life.
 
         Raises:

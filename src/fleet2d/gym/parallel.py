@@ -7,12 +7,12 @@ import numpy as np
 from gymnasium.spaces import Box, Discrete
 from pettingzoo import ParallelEnv
 
-from fleet2d.gym.env import Life, RobotEnv
-from fleet2d.gym.task import Task
+from fleet2d.gym.env import RobotEnv, RobotLife
+from fleet2d.gym.task import LearningTask
 from fleet2d.kernels import F32
 
 Agents = dict[str, Any]
-Source = str | Path | Task
+Source = str | Path | LearningTask
 
 
 class RobotsEnv(ParallelEnv):  # type: ignore[misc]
@@ -25,7 +25,7 @@ class RobotsEnv(ParallelEnv):  # type: ignore[misc]
     metadata = {"name": "fleet2d", "render_modes": ["rgb_array"]}  # noqa: RUF012
 
     def __init__(
-        self, task: str | Path | Task = "hangout", *overrides: str, **settings: Any
+        self, task: str | Path | LearningTask = "hangout", *overrides: str, **settings: Any
     ) -> None:
         robots = RobotEnv.robots_of(task, *overrides)
         self._envs = {
@@ -61,7 +61,7 @@ class RobotsEnv(ParallelEnv):  # type: ignore[misc]
         return self._observe(0.0)
 
     @property
-    def life(self) -> Life:
+    def life(self) -> RobotLife:
         """The life that all robots share."""
         return self._first.present
 

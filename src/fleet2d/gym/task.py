@@ -23,6 +23,7 @@ FOLDER = Path(__file__).with_name("tasks")
 Split = Literal["train", "test"]
 # Scenarios of one task that are kept, with their homes.
 KEPT = 512
+Items = tuple[tuple[str, Any], ...]
 
 REWARDS = {
     "in_view_min": "minutes for which a person is perceived, summed over the people",
@@ -56,7 +57,7 @@ class Values(Settings):
         return value
 
 
-class Task(Settings):
+class LearningTask(Settings):
     """What an agent learns.
 
     Attributes:
@@ -85,7 +86,7 @@ class Task(Settings):
         return {key: items[int(random.integers(len(items)))] for key, items in values.items()}
 
 
-class Variant(NamedTuple):
+class LifeScenario(NamedTuple):
     """A scenario of a task.
 
     Attributes:
@@ -100,15 +101,17 @@ class Variant(NamedTuple):
 class Variants:
     """The scenarios of a task, with the newest ones kept."""
 
-    def __init__(self, task: Task, overrides: tuple[str, ...] = ()) -> None:
+    def __init__(self, task: LearningTask, overrides: tuple[str, ...] = ()) -> None:
         self.task, self.overrides = task, overrides
-        self._load: Callable[[tuple[tuple[str, Any], ...]], Variant] = lru_cache(KEPT)(self._read)
+        self._load: Callable[[tuple[tuple[str, Any], ...]], LifeScenario] = lru_cache(KEPT)(
+            self._read
+        )
 
     def __reduce__(self) -> Any:
         """Keep no scenario in a pickled copy."""
         return Variants, (self.task, self.overrides)
 
-    def load(self, values: Mapping[str, Any]) -> Variant:
+    def load(self, values: Mapping[str, Any]) -> LifeScenario:
         """Return the scenario with some values of its keys.
 
         Raises:
@@ -116,7 +119,7 @@ class Variants:
         """
         return self._load(tuple(values.items()))
 
-    def _read(self, values: tuple[tuple[str, Any], ...]) -> Variant:
+    def _read(self, values: tuple[tuple[str, Any], ...]) -> LifeScenario:
         texts = [f"{key}={value}" for key, value in values]
         scenario = load_scenario(self.task.scenario, *self.overrides, *texts)
         robots = tuple(
@@ -129,10 +132,10 @@ class Variants:
                 "no robot's first behavior is a policy: give one, as in robots: {astro: {behaviors:"
                 " [{type: policy, task: hangout}]}}"
             )
-        return Variant(scenario, robots)
+        return LifeScenario(scenario, robots)
 
 
-def load_task(source: str | Path | Mapping[str, Any] | Task) -> Task:
+def load_task(source: str | Path | Mapping[str, Any] | LearningTask) -> LearningTask:
     """Return a task: hangout, find, patrol, a file of a task or a scenario, or its content.
 
     Raises:
@@ -142,7 +145,7 @@ def load_task(source: str | Path | Mapping[str, Any] | Task) -> Task:
         >>> load_task("hangout").reward["in_view_min"]
         1.0
     """
-    if isinstance(source, Task):
+    if isinstance(source, LearningTask):
         return source
     names = [path.stem for path in sorted(FOLDER.glob("*.yaml"))]
     if isinstance(source, str) and source in names:
@@ -155,8 +158,10 @@ def load_task(source: str | Path | Mapping[str, Any] | Task) -> Task:
             raise InputError(f"there is no task {str(source)!r}{suggest(str(source), names)}")
         document = read_document(path)
     if "scenario" not in document.data:
-        return Task(scenario=str(source) if not isinstance(source, Mapping) else dict(source))
+        return LearningTask(
+            scenario=str(source) if not isinstance(source, Mapping) else dict(source)
+        )
     try:
-        return Task.model_validate(document.data)
+        return LearningTask.model_validate(document.data)
     except ValidationError as error:
         raise explain(error, document) from None

@@ -11,7 +11,7 @@ from fleet2d.gym.env import RobotEnv
 from fleet2d.kernels import F32, F64, I64, Bool
 
 
-class Lives(gymnasium.vector.VectorEnv[F32, I64, Any]):  # type: ignore[misc]
+class VectorRobotEnv(gymnasium.vector.VectorEnv[F32, I64, Any]):  # type: ignore[misc]
     """Some environments that are stepped together.
 
     Where a life is over, the next step begins a new one, and ignores the action. `info` has the

@@ -131,7 +131,7 @@ class SightingMemory:
         self.total += np.bincount(at, minlength=self.total.size).reshape(self.total.shape)
 
 
-class Poses:
+class WaitingPoses:
     """Where a robot stands in each room to see as much of it as possible, and how far apart.
 
     Attributes:
@@ -247,7 +247,7 @@ class Policy(BeliefBehavior):
                 f"{actor.path}: the home has {count} rooms, and observations have {self.rooms}:"
                 f" set rooms: {count}, or more, here and when you train the policy"
             )
-        self.poses = Poses(actor)
+        self.poses = WaitingPoses(actor)
         self.sites = Sites(actor, 2) if self.task != "hangout" else None
         self.names = list(actor.people)
         self.visited = np.full(count, NEVER, np.int64)
