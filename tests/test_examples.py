@@ -15,14 +15,15 @@ from fleet2d.studies.driver import check_study
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 SCRIPTS = sorted(EXAMPLES.rglob("*.py"))
-RUNNABLE = [  # those in agents/ need torch: tests/extras/test_agents.py
+RUNNABLE = [  # those in agents/ need torch: tests/extras; those in live/ a run: tests/live
     path
     for path in SCRIPTS
-    if '__name__ == "__main__"' in path.read_text() and path.parent.name != "agents"
+    if '__name__ == "__main__"' in path.read_text() and path.parent.name not in ("agents", "live")
 ]
 STUDIES = sorted((EXAMPLES / "studies").glob("*.yaml"))
+DATA_SETS = sorted((EXAMPLES / "datasets").glob("*.yaml"))
 MAY_BE_EMPTY = {"observations", "violations"}
-SCENARIOS = sorted(set(EXAMPLES.rglob("*.yaml")) - set(STUDIES))
+SCENARIOS = sorted(set(EXAMPLES.rglob("*.yaml")) - {*STUDIES, *DATA_SETS})
 
 
 @pytest.fixture

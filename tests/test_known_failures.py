@@ -301,7 +301,7 @@ CHANGES: dict[tuple[type, str], dict[str, Any]] = {
     },
     (Patrol, PATROL): {
         "rooms": ["kitchen"], "waypoints": [[1, 3], [7, 1]], "dwell": "25 s", "order": "random",
-        "look_around": False, "when": "23:00-23:30", "cooldown": "2 min",
+        "look_around": False, "when": "23:00-23:30", "cooldown": "2 min", "avoid": ["kitchen"],
     },
     (Meander, "users.ben.behaviors.0"): {
         "turn_std_deg": 25, "at_walls": "stay", "when": "23:00-23:30",
@@ -322,8 +322,10 @@ CHANGES: dict[tuple[type, str], dict[str, Any]] = {
 # What is not told by tables, and which test sees it.
 ELSEWHERE = {
     (User, "color"): "tests/pictures: pictures",
+    (User, "answers"): "tests/interactions: no robot wants anything here",
     (Robot, "localization"): "tests/entities/test_localization",
     (Robot, "color"): "tests/pictures: pictures",
+    (Robot, "perceives"): "tests/entities/evidence/test_replay: it needs a table",
     (User, "opens_doors"): "tests/engine/test_change_queue: there is no door in this home",
     (Robot, "gives_way"): "tests/engine/test_collisions_clearance: it meets nobody on its way here",
     (Robot, "opens_doors"): "tests/engine/test_change_queue: there is no door in this home",

@@ -145,7 +145,7 @@ def test_keywords_are_simulation_settings_and_sections(home: Path) -> None:
         (["floorplan=null"], "floorplan: missing, and has no default"),
         (["floorplan.path=gone.json"], "floorplan.path: no such file"),
         (["users.ana.sped=1"], "users.ana.sped: unknown key 'sped': did you mean 'speed'? Allowed "
-         "here: camera, color, "),
+         "here: answers, camera, color, "),
         (["users.ana.stops=hall"], "users.ana.stops: expected a list, got 'hall'"),
         (["users.ana.speed=fast"], "users.ana.speed: expected a speed, got 'fast': write a number in"),
         (["users.ana.type=wander"], "users.ana.type: there is no behavior 'wander'"),
