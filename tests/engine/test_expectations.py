@@ -339,7 +339,7 @@ WRONG = {
     "always(distance(ana, kitchn) > 1)": "did you mean 'kitchen'",
     "never(room(ana) == bathrom)": "did you mean 'bathroom'",
     "never(events(dock))": "did you mean 'docks'",
-    "never(events(docks, astro))": "'docks' happens only to robots with the behavior dock (here: none)",
+    "never(events(docks, astro))": "'docks' happens only to robots with the behavior dock or policy (here: none)",
     "never(events(user_seen, ben))": "no such event is possible",
     "never(seen(astro, by=ben))": "no robot or user with a camera 'ben'",
     "never(door(bth))": "no door 'bth': did you mean 'bath'",

@@ -124,7 +124,7 @@ def test_names_that_do_not_exist_are_refused_with_the_nearest() -> None:
         run.run_until(event="user_sen")
     with pytest.raises(InputError, match="did you mean 'astro'"):
         run.run_until(event="user_seen", entity="asto")
-    with pytest.raises(InputError, match="expected a time of day"):
+    with pytest.raises(InputError, match="expected a time, got 'noon'"):
         run.run_until("noon")
 
 

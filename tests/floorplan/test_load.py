@@ -116,4 +116,4 @@ def test_format_is_recognized_by_the_ending_that_it_declares(
     assert is_floorplan(file)
     assert format_of_file(file) == "drawn"
     assert load_floorplan(file, 0.1).name == load_floorplan("synthetic:7", 0.1).name
-    assert not is_floorplan(tmp_path / "mine.dxf")
+    assert not is_floorplan(tmp_path / "mine.xyz")

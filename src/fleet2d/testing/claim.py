@@ -116,7 +116,7 @@ def seeds_for(holds: float, alternative: float, error: float = 0.05) -> int | No
 
     Example:
         >>> seeds_for(1.0, 0.9), seeds_for(0.9, 0.7)
-        (29, 50)
+        (29, 46)
     """
     if holds == 1:
         return math.ceil(math.log(error) / math.log(alternative))

@@ -28,8 +28,9 @@ FURNITURE = {
 # Axes of a scan are rounded to this [m], and turned so that its longest wall is along x.
 ROUNDED_M = 0.001
 
-Extent = Annotated[list[float], Field(min_length=3, max_length=3)]
-Matrix = Annotated[list[float], Field(min_length=16, max_length=16)]
+Number = Annotated[float, Field(ge=-1e4, le=1e4)]  # metres, none of them infinite or NaN
+Extent = Annotated[list[Number], Field(min_length=3, max_length=3)]
+Matrix = Annotated[list[Number], Field(min_length=16, max_length=16)]
 
 
 def _name_of(category: object) -> object:
