@@ -3,10 +3,10 @@
 import re
 from typing import Any
 
-_VECTOR = "export the floor as DXF or SVG, or draw its walls in a picture"
+_VECTOR = "export the floor as DXF, or draw its walls in a picture"
 _PICTURE = "save it as PNG"
 _POINTS = "cut a slice of points between 0.3 m and 1.8 m above the floor, and save it as a picture"
-_MESH = "save a section 1 m above the floor as DXF or SVG"
+_MESH = "save a section 1 m above the floor as DXF"
 _BAG = "give it the ending .bag, .mcap or .db3; {type: bag, path: …} reads its map"
 _MAP = "export one floor of it as GeoJSON"
 _UNPACK = "unpack it, and name the floor plan in it"
@@ -18,8 +18,8 @@ _BEGINNINGS: tuple[tuple[bytes, str, str], ...] = (
     (b"BM", "a BMP picture", _PICTURE),
     (b"II*\0", "a TIFF picture", _PICTURE),
     (b"MM\0*", "a TIFF picture", _PICTURE),
-    (b"%PDF", "a PDF", "save the page as PNG, and give its resolution, or as SVG"),
-    (b"%!PS", "PostScript", "save it as PNG or SVG"),
+    (b"%PDF", "a PDF", "save the page as PNG, and give its resolution"),
+    (b"%!PS", "PostScript", "save it as PNG"),
     (b"AC10", "a DWG drawing of AutoCAD", "save it as DXF"),
     (b"AutoCAD Binary DXF", "a binary DXF drawing", "save it as DXF in text"),
     (b"ISO-10303-21", "an IFC or STEP model", _VECTOR),
@@ -47,7 +47,7 @@ _BEGINNINGS: tuple[tuple[bytes, str, str], ...] = (
 )
 # What a text begins with, after white space and an XML declaration; a regular expression.
 _TEXTS = (
-    (r"<svg|<!DOCTYPE svg", "an SVG drawing", "name it with the ending .svg"),
+    (r"<svg|<!DOCTYPE svg", "an SVG drawing", "save it as DXF or PNG"),
     (r"<home\b", "a home of Sweet Home 3D", "give it the ending .xml"),
     (r"<kml", "KML", _MAP),
     (r"<osm", "OpenStreetMap data", _MAP),
