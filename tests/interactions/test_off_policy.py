@@ -105,7 +105,9 @@ def test_opportunities_of_a_run_are_read_with_what_came_of_them() -> None:
             "3 h",
             users={"ana": ana(outcomes=("declined", "accepted"))},
             robots={"astro": {"behaviors": behaviors}},
-            algorithms={"when": {"type": "timing", "policy": {"type": "thompson", "least": 0.5}}},
+            algorithms={
+                "when": {"type": "timing", "policy": {"type": "thompson", "min_chance": 0.5}}
+            },
             interactions={"pill": PILL | {"at": [], "every": "1 h"}},
         )
     )

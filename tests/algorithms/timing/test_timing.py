@@ -37,7 +37,7 @@ def test_a_learner_asks_when_it_is_welcome_and_not_when_it_is_not(policy: Timing
 
 def test_a_greedy_learner_never_learns_of_an_unlucky_hour_again() -> None:
     """The feedback loop: it asks only where a yes is likely, and so never sees a better answer."""
-    greedy, exploring = LogisticTiming(), LogisticTiming(explores=0.1)
+    greedy, exploring = LogisticTiming(), LogisticTiming(explore=0.1)
     for policy in (greedy, exploring):
         policy.start(ROOMS)
         for _ in range(3):
@@ -48,7 +48,7 @@ def test_a_greedy_learner_never_learns_of_an_unlucky_hour_again() -> None:
 
 
 def test_thompson_explores_less_the_more_it_knows() -> None:
-    few, many = (taught(ThompsonTiming(least=0.0), count).chances() for count in (1, 40))
+    few, many = (taught(ThompsonTiming(min_chance=0.0), count).chances() for count in (1, 40))
 
     assert 0.05 < few[14, BEDROOM] < 0.6
     assert many[14, BEDROOM] < 0.01

@@ -18,13 +18,13 @@ class LogisticTiming(TimingPolicy):
     that it never learns better.
 
     Attributes:
-        ask_at: Least probability of a yes at which it asks.
-        explores: Probability of asking nevertheless.
+        ask_at: Minimum probability of a yes at which it asks.
+        explore: Probability of asking nevertheless.
         rate: Learning rate of the gradient steps.
     """
 
     ask_at: Share = 0.5
-    explores: Share = 0.0
+    explore: Share = 0.0
     rate: float = Field(default=0.5, gt=0, le=10)
 
     def start(self, rooms: int) -> None:
@@ -51,4 +51,4 @@ class LogisticTiming(TimingPolicy):
             [logistic(self._logit(hour, room)) >= self.ask_at for room in range(self.rooms)]
             for hour in range(HOURS)
         ]
-        return np.where(likely, 1.0, self.explores)
+        return np.where(likely, 1.0, self.explore)

@@ -22,14 +22,14 @@ class ThompsonTiming(TimingPolicy):
     by a logistic one; each answer counts in neighboring hours, and in other rooms, by a part.
 
     Attributes:
-        ask_at: Least probability of a yes that is worth asking; null: the share of yeses so far, so
-            that it asks at the better times of the day.
-        least: Least probability of asking anywhere: off-policy estimates need one above 0.
+        ask_at: Minimum probability of a yes that is worth asking; null: the share of yeses so
+            far, so that it asks at the better times of the day.
+        min_chance: Minimum probability of asking anywhere: off-policy estimates need one above 0.
         prior: Number of imagined answers, at even odds.
     """
 
     ask_at: Share | None = 0.5
-    least: Share = 0.02
+    min_chance: Share = 0.02
     prior: float = Field(default=2.0, gt=0)
 
     def start(self, rooms: int) -> None:
@@ -60,5 +60,5 @@ class ThompsonTiming(TimingPolicy):
                 total = yes + no
                 spread = math.sqrt(yes * no / (total * total * (total + 1)))
                 above = logistic(1.7 * (yes / total - ask_at) / spread)
-                chances[hour, room] = max(self.least, min(above, 1.0))
+                chances[hour, room] = max(self.min_chance, min(above, 1.0))
         return chances
