@@ -121,6 +121,51 @@ def test_unknown_term_of_a_reward_is_an_error_with_the_nearest_name() -> None:
         RobotEnv(flat(), reward={"relocation": 1.0})
 
 
+@pytest.mark.parametrize(
+    ("vary", "message"),
+    [
+        ({"floorplan.seed": {"train": {"range": [0, 1.5]}}}, "whole numbers, first < end"),
+        ({"floorplan.seed": {"train": {"range": 5}}}, "expected a list of values, or {range"),
+        ({"floorplan.seed": {"train": {"range": [5, 5]}}}, "whole numbers, first < end"),
+        ({"floorplan.seed": {"train": []}}, "vary.floorplan.seed.train: expected a list of length"),
+        ({"floorplan.sed": {"train": [1]}}, "unknown key 'sed': did you mean 'seed'"),
+    ],
+)
+def test_wrong_values_of_what_varies_are_an_error_that_says_which(vary: Any, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        RobotEnv({"scenario": load_task("hangout").scenario, "vary": vary})
+
+
+def test_values_may_be_whole_sections_of_the_scenario() -> None:
+    users = [{"ana": {"type": "routine", "persona": name}} for name in ("student", "retired")]
+    env = RobotEnv({"scenario": flat(), "vary": {"users": {"train": users}}})
+
+    env.reset(seed=1)
+
+    assert list(env.present.simulation.scenario.users) == ["ana"]
+    assert env.present.simulation.scenario.users["ana"].persona
+
+
+def test_unknown_option_of_a_reset_is_an_error_and_keeps_the_life() -> None:
+    env = RobotEnv(flat())
+    env.reset(seed=1)
+    life = env.life
+
+    with pytest.raises(InputError, match="no option 'value': did you mean 'values'"):
+        env.reset(options={"value": {"floorplan.seed": 3}})
+
+    assert env.life is life
+
+
+@pytest.mark.parametrize("action", ["a", 1.5, float("nan"), np.array([0])])
+def test_action_that_is_no_whole_number_is_an_error(action: Any) -> None:
+    env = RobotEnv(flat())
+    env.reset(seed=1)
+
+    with pytest.raises(InputError, match="an action is a whole number"):
+        env.step(action)
+
+
 @pytest.mark.parametrize("action", [4, 6, 8, -1])
 def test_impossible_action_is_an_error_and_changes_nothing(action: int) -> None:
     env = RobotEnv(flat())

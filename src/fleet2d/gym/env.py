@@ -1,22 +1,27 @@
 """One robot's life as an environment of Gymnasium."""
 
 import copy
-from collections.abc import Callable, Mapping
+import operator
+from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
 from typing import Any, Literal, Self
 
 import gymnasium
 import numpy as np
 
+from fleet2d.configuration.documents import Document
+from fleet2d.configuration.problems import suggest
 from fleet2d.engine.simulation import Simulation
 from fleet2d.entities.behavior import Situation
 from fleet2d.entities.decisions import DecidingActor
 from fleet2d.entities.robots.policy import COLUMNS, Policy
 from fleet2d.errors import InputError
-from fleet2d.gym.task import LearningTask, LifeScenario, Split, Variants, load_task
+from fleet2d.gym.task import LearningTask, LifeScenario, Split, Variants, checked, load_task
 from fleet2d.kernels import F32, Bool
 from fleet2d.runs.run import Run
 
+OPTIONS = ("values", "seed")
+"""The options of `RobotEnv.reset`."""
 Reward = Mapping[str, float] | Callable[["RobotEnv"], float] | None
 
 
@@ -64,13 +69,12 @@ class RobotLife:
         charge = self.actor(robot).charge
         return charge is not None and charge.is_empty
 
-    def terms(self, robot: str) -> dict[str, float]:
-        """Return the terms of the reward, from the beginning of the life to the present step."""
-        now = self.now(robot)
-        return {
-            **self.policy(robot).tally(now),
-            "in_view_min": self.simulation.perceived_s(robot) / 60,
-        }
+    def terms(self, robot: str, names: Collection[str]) -> dict[str, float]:
+        """Return terms of the reward, from the beginning of the life to the present step."""
+        terms = self.policy(robot).tally(self.now(robot))
+        if "in_view_min" in names:
+            terms["in_view_min"] = self.simulation.perceived_s(robot) / 60
+        return {name: terms[name] for name in names}
 
     def copy(self) -> "RobotLife":
         """Return an independent copy."""
@@ -126,9 +130,9 @@ class RobotEnv(gymnasium.Env[F32, np.int64]):  # type: ignore[misc]
         if split not in ("train", "test") or masked not in ("error", "rest"):
             raise InputError("split is 'train' or 'test', and masked is 'error' or 'rest'")
         self.variants = Variants(load_task(task), overrides)
-        self.reward: Any = dict(self.variants.task.reward) if reward is None else reward
+        self.reward: Any = self.variants.task.reward if reward is None else reward
         if not callable(self.reward):
-            LearningTask(reward=self.reward)  # refuses unknown terms
+            self.reward = checked(Document({"reward": self.reward}, {})).reward
         self.split, self.masked, self.truth, self.render_mode = split, masked, truth, render_mode
         variant = self._first_variant()
         self.robot = robot or variant.robots[0]
@@ -156,11 +160,19 @@ class RobotEnv(gymnasium.Env[F32, np.int64]):  # type: ignore[misc]
         Raises:
             InputError: The scenario with these values is wrong.
         """
-        super().reset(seed=seed)
         options = options or {}
+        for name in options:
+            if name not in OPTIONS:
+                raise InputError(f"there is no option {name!r}{suggest(name, OPTIONS)}")
+        super().reset(seed=seed)
         values = self.variants.task.draw(self.np_random, self.split) | options.get("values", {})
         drawn = int(self.np_random.integers(2**53))
         variant = self.variants.load(values)
+        if not {*self.robots} <= {*variant.robots}:
+            raise InputError(
+                f"robots with policies are {', '.join(variant.robots)}, expected"
+                f" {', '.join(self.robots)}, in the scenario with {values}"
+            )
         simulation = variant.scenario.simulation
         settings = simulation.model_copy(update={"seed": options.get("seed", drawn)})
         scenario = variant.scenario.model_copy(update={"simulation": settings})
@@ -170,7 +182,7 @@ class RobotEnv(gymnasium.Env[F32, np.int64]):  # type: ignore[misc]
     def join(self, life: RobotLife) -> None:
         """Go on in a life, which other robots may share."""
         self.life, self._step = life, life.simulation.step
-        self._terms = life.terms(self.robot)
+        self._terms = {} if callable(self.reward) else life.terms(self.robot, self.reward)
 
     def step(self, action: Any) -> tuple[F32, float, bool, bool, dict[str, Any]]:
         """Let the robot act until it has to choose again.
@@ -192,17 +204,25 @@ class RobotEnv(gymnasium.Env[F32, np.int64]):  # type: ignore[misc]
         return observation, reward, is_empty, not life.due and not is_empty, info
 
     def allowed(self, action: Any) -> int:
-        """Return an action, or that to rest in place of one that is masked, if so configured."""
+        """Return an action, or that to rest in place of one that is masked, if so configured.
+
+        Raises:
+            InputError: The action is no whole number.
+        """
+        try:
+            action = operator.index(action)
+        except TypeError:
+            raise InputError(f"an action is a whole number, got {action!r}") from None
         rest = int(self.action_space.n) - 1
         if self.masked == "rest" and 0 <= action <= rest and not self.action_masks()[action]:
             return rest
-        return int(action)
+        return action
 
     def collect(self) -> float:
         """Return the reward since it was collected last."""
         if callable(self.reward):
             return float(self.reward(self))
-        before, self._terms = self._terms, self.present.terms(self.robot)
+        before, self._terms = self._terms, self.present.terms(self.robot, self.reward)
         return sum(w * (self._terms[name] - before[name]) for name, w in self.reward.items())
 
     def _first_variant(self) -> LifeScenario:

@@ -7,7 +7,8 @@ import numpy as np
 from gymnasium.spaces import Box, Discrete
 from pettingzoo import ParallelEnv
 
-from fleet2d.gym.env import RobotEnv, RobotLife
+from fleet2d.errors import InputError
+from fleet2d.gym.env import OPTIONS, RobotEnv, RobotLife
 from fleet2d.gym.task import LearningTask
 from fleet2d.kernels import F32
 
@@ -51,7 +52,8 @@ class RobotsEnv(ParallelEnv):  # type: ignore[misc]
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Agents, Agents]:
-        """Begin a new life of all robots."""
+        """Begin a new life of all robots; options without a meaning are ignored."""
+        options = {name: value for name, value in (options or {}).items() if name in OPTIONS}
         self._first.robots = tuple(self.possible_agents)
         self._first.reset(seed=seed, options=options)
         life = self.life
@@ -66,8 +68,16 @@ class RobotsEnv(ParallelEnv):  # type: ignore[misc]
         return self._first.present
 
     def step(self, actions: Agents) -> tuple[Agents, Agents, Agents, Agents, Agents]:
-        """Let the robots act that have to choose, until one has to choose again."""
+        """Let the robots act that have to choose, until one has to choose again.
+
+        Raises:
+            InputError: The action of a robot that has to choose is missing, masked or out of range;
+                nothing has changed then.
+        """
         life, before = self.life, self.life.simulation.step
+        for robot in life.due:
+            if robot not in actions:
+                raise InputError(f"{robot} has to choose: give its action")
         due = {robot: self._envs[robot].allowed(actions[robot]) for robot in life.due}
         life.act(due)
         rewards = {robot: self._envs[robot].collect() for robot in self.agents}

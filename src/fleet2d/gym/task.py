@@ -4,6 +4,7 @@ A task is one YAML file: a scenario with a robot whose first behavior is `policy
 it at each reset, apart for training and testing, and the weights of the reward.
 """
 
+import json
 from collections.abc import Callable, Mapping
 from functools import lru_cache
 from pathlib import Path
@@ -23,7 +24,6 @@ FOLDER = Path(__file__).with_name("tasks")
 Split = Literal["train", "test"]
 # Scenarios of one task that are kept, with their homes.
 KEPT = 512
-Items = tuple[tuple[str, Any], ...]
 
 REWARDS = {
     "in_view_min": "minutes for which a person is perceived, summed over the people",
@@ -44,16 +44,25 @@ class Values(Settings):
         test: Likewise for testing; left out: those for training.
     """
 
-    train: tuple[Any, ...]
+    train: tuple[Any, ...] = Field(min_length=1)
     test: tuple[Any, ...] = ()
 
     @field_validator("train", "test", mode="before")
     @classmethod
     def _spell_out(cls, value: Any) -> Any:
         if isinstance(value, Mapping):
-            if set(value) != {"range"} or len(value["range"]) != 2:
-                raise problem("expected a list of values, or {range: [first, end]}")
-            return tuple(range(*value["range"]))
+            ends = value.get("range")
+            if set(value) != {"range"} or not (
+                isinstance(ends, list | tuple)
+                and len(ends) == 2
+                and all(isinstance(end, int) for end in ends)
+                and ends[0] < ends[1]
+            ):
+                raise problem(
+                    "expected a list of values, or {range: [first, end]} with whole numbers, first"
+                    " < end"
+                )
+            return tuple(range(*ends))
         return value
 
 
@@ -103,9 +112,7 @@ class Variants:
 
     def __init__(self, task: LearningTask, overrides: tuple[str, ...] = ()) -> None:
         self.task, self.overrides = task, overrides
-        self._load: Callable[[tuple[tuple[str, Any], ...]], LifeScenario] = lru_cache(KEPT)(
-            self._read
-        )
+        self._load: Callable[[tuple[str, ...]], LifeScenario] = lru_cache(KEPT)(self._read)
 
     def __reduce__(self) -> Any:
         """Keep no scenario in a pickled copy."""
@@ -117,11 +124,10 @@ class Variants:
         Raises:
             InputError: The scenario is wrong, or no robot has a policy.
         """
-        return self._load(tuple(values.items()))
+        return self._load(tuple(f"{key}={json.dumps(value)}" for key, value in values.items()))
 
-    def _read(self, values: tuple[tuple[str, Any], ...]) -> LifeScenario:
-        texts = [f"{key}={value}" for key, value in values]
-        scenario = load_scenario(self.task.scenario, *self.overrides, *texts)
+    def _read(self, changes: tuple[str, ...]) -> LifeScenario:
+        scenario = load_scenario(self.task.scenario, *self.overrides, *changes)
         robots = tuple(
             name
             for name, robot in scenario.robots.items()
@@ -161,6 +167,15 @@ def load_task(source: str | Path | Mapping[str, Any] | LearningTask) -> Learning
         return LearningTask(
             scenario=str(source) if not isinstance(source, Mapping) else dict(source)
         )
+    return checked(document)
+
+
+def checked(document: Document) -> LearningTask:
+    """Return the task of a document.
+
+    Raises:
+        ScenarioError: It is wrong.
+    """
     try:
         return LearningTask.model_validate(document.data)
     except ValidationError as error:

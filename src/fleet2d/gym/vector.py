@@ -63,7 +63,7 @@ class VectorRobotEnv(gymnasium.vector.VectorEnv[F32, I64, Any]):  # type: ignore
                 self._keep(number, *env.reset())
                 continue
             observation, rewards[number], terminated[number], truncated[number], info = env.step(
-                int(actions[number])
+                actions[number]
             )
             self._keep(number, observation, info)
         self._over = terminated | truncated

@@ -7,11 +7,11 @@ robot's own pose, clock and battery, the plan of the home, the beliefs of an alg
 robot's sightings (`SightingMemory`).
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from datetime import datetime, timedelta
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, ClassVar, Literal, Self
+from typing import Any, ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -100,14 +100,14 @@ class SightingMemory:
     """When and where a robot perceived people: all that it remembers of its sightings.
 
     Attributes:
-        last: The last step at which it perceived each person in each room, int64 (people + 1,
-            rooms), NEVER for never; the last row is of people whom it didn't recognize.
-        looks: The number of such looks in each hour of the day, int64 (people + 1, rooms, 24).
-        total: The number of such looks, int64 (people + 1, rooms).
+        last: The last step at which it perceived each person in each room, int64 (people + 2,
+            rooms), NEVER for never; row -2 is of people whom it didn't recognize, row -1 of anyone.
+        looks: The number of such looks in each hour of the day, int64 (people + 2, rooms, 24).
+        total: The number of such looks, int64 (people + 2, rooms).
     """
 
     def __init__(self, plan: FloorPlan, people: int, clock: Clock) -> None:
-        shape = people + 1, len(plan.rooms)
+        shape = people + 2, len(plan.rooms)
         self.last = np.full(shape, NEVER, np.int64)
         self.looks = np.zeros((*shape, HOURS), np.int64)
         self.total = np.zeros(shape, np.int64)
@@ -121,14 +121,15 @@ class SightingMemory:
             return
         room = self._room_of_place[rows[:, Column.Y] // SUB, rows[:, Column.X] // SUB]
         inside = room >= 0
-        person = rows[:, Column.IDENTITY][inside] % len(self.last)  # -1 is the last row
+        person = rows[:, Column.IDENTITY][inside] % (len(self.last) - 1)  # -1 is row -2
         step, room = rows[:, Column.STEP][inside], room[inside].astype(np.int64)
-        at = person * self.last.shape[1] + room
-        np.maximum.at(self.last.reshape(-1), at, step)
+        rooms, anyone = self.last.shape[1], len(self.last) - 1
         hour = (self._start_us + step * self._step_us) // HOUR_US % HOURS
-        counts = np.bincount(at * HOURS + hour, minlength=self.looks.size)
-        self.looks += counts.reshape(self.looks.shape)
-        self.total += np.bincount(at, minlength=self.total.size).reshape(self.total.shape)
+        for row in (person, anyone):
+            at = row * rooms + room
+            np.maximum.at(self.last.reshape(-1), at, step)
+            np.add.at(self.looks.reshape(-1), at * HOURS + hour, 1)
+            np.add.at(self.total.reshape(-1), at, 1)
 
 
 class WaitingPoses:
@@ -187,6 +188,59 @@ class WaitingPoses:
                 ),
             )
         return self._ways[1]
+
+
+class Ways(NamedTuple):
+    """The ways from where a robot is.
+
+    Attributes:
+        seconds: How long each takes [s], float64 (places,); inf for none.
+        share: The same as a share of LONGEST_WAY_S, 1 at most.
+        mask: Which actions are possible, bool (rooms + 1,).
+    """
+
+    seconds: F64
+    share: F64
+    mask: Bool
+
+
+# The first rows of `Shown.fresh_rows`: the visits, and the sightings of the person.
+VISITED = (SHORT_S, LONG_S)
+PERSON = len(VISITED)
+
+
+class Shown(NamedTuple):
+    """Which rows of a `SightingMemory` are in which columns of an observation.
+
+    Attributes:
+        fresh_rows: Rows of times, int64 (n,); the first ones are replaced by the visits.
+        fresh_at: Their columns, int64 (n,).
+        scale_s: After which time each counts half [s], float64 (n, 1).
+        habit_rows: Rows of numbers of looks, int64 (n,): of the whole day, then of this hour.
+        habit_at: Their columns, int64 (n,).
+    """
+
+    fresh_rows: I64
+    fresh_at: I64
+    scale_s: F64
+    habit_rows: I64
+    habit_at: I64
+
+    @classmethod
+    def of(cls, names: Sequence[str], user: str) -> Self:
+        """Return the rows and columns for a person, or ANYONE, among some people."""
+        person = -1 if user == ANYONE else names.index(user)
+        people = range(min(len(names), PEOPLE))
+        fresh = ["visited_20min", "visited_6h", "seen_30min", "seen_6h"]
+        fresh += [f"seen_30min_{n}" for n in people]
+        habits = ["habit", "habit_now", *(f"habit_now_{n}" for n in people)]
+        return cls(
+            np.array([person] * 4 + [*people]),
+            np.array([_AT[name] for name in fresh]),
+            np.array([[*VISITED, SEEN_S, LONG_S, *(SEEN_S for _ in people)]], np.float64).T,
+            np.array([person] * 2 + [*people]),
+            np.array([_AT[name] for name in habits]),
+        )
 
 
 @register("behavior", "policy")
@@ -257,70 +311,66 @@ class Policy(BeliefBehavior):
         # From the beginning of the run, of rewards.
         self._tally = dict.fromkeys(TALLIED, 0.0)
         self._fixed = self._describe_home(actor)
-        self._mask: tuple[object, Bool] = None, np.zeros(0, np.bool_)  # and what it follows from
+        self._shown = Shown.of(self.names, self.user)
+        self._from_here = Ways(np.zeros(0), np.zeros(0), np.zeros(0, np.bool_))
 
     # What it knows
 
     def observe(self, now: Situation) -> F32:
         """Return the observation, float32 (rooms, columns): see docs/gym.md."""
-        table, count = (
-            self._fixed.copy(),
-            len(now.home.rooms),
-        )  # by columns: it is turned at the end
-        part, memory, step_s = table[:, :count], now.actor.recall(), now.actor.clock.step_us / 1e6
-        row = None if self.user == ANYONE else self.names.index(self.user)
-        room, time = now.room, now.time
+        table = self._fixed.copy()  # by columns: it is turned at the end
+        part, memory = table[:, : len(now.home.rooms)], now.actor.recall()
+        room, time, shown = now.room, now.time, self._shown
         if room is not None:
             part[_AT["here"], room.index] = 1
-        part[_AT["way"], self.poses.index] = self._seconds(now) / LONGEST_WAY_S
-        age_s = (now.step - self.visited) * step_s
-        part[_AT["visited_20min"]] = _fresh(age_s, self.visited, SHORT_S)
-        part[_AT["visited_6h"]] = _fresh(age_s, self.visited, LONG_S)
-        recent = _fresh((now.step - memory.last) * step_s, memory.last, SEEN_S)
-        present = memory.looks[:, :, time.hour]
-        last = memory.last.max(axis=0) if row is None else memory.last[row]
-        part[_AT["seen_30min"]] = recent.max(axis=0) if row is None else recent[row]
-        part[_AT["seen_6h"]] = _fresh((now.step - last) * step_s, last, LONG_S)
-        part[_AT["habit"]] = _shares(memory.total.sum(axis=0) if row is None else memory.total[row])
-        part[_AT["habit_now"]] = _shares(present.sum(axis=0) if row is None else present[row])
+        part[_AT["way"], self.poses.index] = self._ways(now).share
+        last = memory.last[shown.fresh_rows]
+        last[: len(VISITED)] = self.visited
+        age_s = (now.step - last) * (now.actor.clock.step_us / 1e6)
+        part[shown.fresh_at] = (last >= 0) * (shown.scale_s / (shown.scale_s + age_s))
+        looks = memory.looks[shown.habit_rows, :, time.hour]
+        looks[0] = memory.total[shown.habit_rows[0]]
+        part[shown.habit_at] = looks / np.maximum(looks.sum(axis=1, keepdims=True), 1)
         for name, xy in now.in_view.items():
             seen = now.home.plan.room_at(*xy) if self.user in (ANYONE, name) else None
             if seen is not None:
                 part[_AT["in_view"], seen.index] = 1
-        belief = room_belief(now, self.source, self.user)
-        part[_AT["belief"]] = belief.joint
-        for number, name in enumerate(self.names[:PEOPLE]):
-            begin = _AT[f"belief_{number}"]
-            if self.source is not None:
-                part[begin] = room_belief(now, self.source, name).joint
-            part[begin + 1] = recent[number]
-            part[begin + 2] = _shares(present[number])
-        newest, minute = int(last.max()), (time.hour * 60 + time.minute) * TURN // DAY_MINUTES
+        away = 0.0
+        if self.source is not None:
+            belief = room_belief(now, self.source, self.user)
+            part[_AT["belief"]], away = belief.joint, belief.away
+            for number, name in enumerate(self.names[:PEOPLE]):
+                part[_AT[f"belief_{number}"]] = room_belief(now, self.source, name).joint
+        newest, minute = (
+            int(last[PERSON].max()),
+            (time.hour * 60 + time.minute) * TURN // DAY_MINUTES,
+        )
         charge, since = now.actor.charge, self.since
         table[_AT["hour_sin"] :].T[:] = (
             sine(minute) / UNIT,
             cosine(minute) / UNIT,
             time.weekday() >= SATURDAY,
-            belief.away,
+            away,
             1.0 if charge is None else charge.level,
-            0.0 if newest < 0 else SEEN_S / (SEEN_S + (now.step - newest) * step_s),
+            0.0 if newest < 0 else SEEN_S / (SEEN_S + float(age_s[PERSON].min())),
             0.0 if since is None else min((time - since) / self.deadline, 1.0),
         )
         return np.ascontiguousarray(table.T)
 
-    def _seconds(self, now: Situation) -> F64:
-        """Return the time of the way to each place [s], at most LONGEST_WAY_S."""
-        return np.minimum(self.poses.seconds(), LONGEST_WAY_S)
-
     def mask(self, now: Situation) -> Bool:
         """Return which actions are possible, bool (rooms + 1,): rooms with a way, and to rest."""
+        return self._ways(now).mask
+
+    def _ways(self, now: Situation) -> "Ways":
+        """Return the ways from where the robot is."""
         seconds = self.poses.seconds()
-        if self._mask[0] is not seconds:  # as long as the robot stays, it is the same array
-            allowed = np.zeros(self.rooms + 1, np.bool_)
-            allowed[self.poses.index] = np.isfinite(seconds)
-            allowed[-1] = True
-            self._mask = seconds, read_only(allowed)
-        return self._mask[1]
+        if self._from_here.seconds is not seconds:  # as long as it stays, it is the same array
+            mask = np.zeros(self.rooms + 1, np.bool_)
+            mask[self.poses.index] = np.isfinite(seconds)
+            mask[-1] = True
+            share = np.minimum(seconds, LONGEST_WAY_S) / LONGEST_WAY_S
+            self._from_here = Ways(seconds, share, read_only(mask))
+        return self._from_here
 
     def _describe_home(self, actor: Actor) -> F32:
         """Return what never changes in observations, by columns: float32 (columns, rooms)."""
@@ -330,6 +380,8 @@ class Policy(BeliefBehavior):
         for room in actor.home.rooms:
             row = table[:, room.index]
             row[_AT["room"]], row[_AT["area"]] = 1, room.cells / cells
+            if self.source is None:
+                row[_AT["belief"]] = row[_AT["area"]]
             row[_AT[f"is_{types.get(room.type, 'other')}"]] = 1
         table[_AT["reachable"], self.poses.index] = 1
         return table
@@ -458,17 +510,6 @@ class Policy(BeliefBehavior):
     def _wait(self, plan: Plan, duration: timedelta) -> Plan:
         plan.stay(duration)
         return plan.interrupt_on("user_seen") if self.task == "find" else plan
-
-
-def _fresh(age_s: Any, last: I64, scale_s: float) -> F64:
-    """Return 1 for something that happened just now, less for older ones, and 0 for never."""
-    fresh: F64 = (last >= 0) * (scale_s / (scale_s + age_s))
-    return fresh
-
-
-def _shares(counts: I64) -> F64:
-    """Return the share of each of some counts in their sum; zeros if all are zero."""
-    return counts / max(int(counts.sum()), 1)
 
 
 @lru_cache(maxsize=8)
