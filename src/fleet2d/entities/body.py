@@ -261,9 +261,13 @@ class Body:
         return self.home.may_block_routes or bool(self.kept_out)
 
     def _present_space(self) -> Space:
+        return self.space_without(frozenset())
+
+    def space_without(self, rooms: frozenset[int]) -> Space:
+        """Return where its body can be at present outside of some rooms, by their indices."""
         entity = self.entity
         space = self.home.space(
-            entity.radius, opens_doors=entity.opens_doors, without=self.kept_out
+            entity.radius, opens_doors=entity.opens_doors, without=self.kept_out | rooms
         )
         return self.home.costed(space) if entity.minds_costs else space
 

@@ -312,6 +312,13 @@ def avoided_rooms(body: "Body", key: str, names: tuple[str, ...]) -> frozenset[i
     return frozenset(room.index for room in available_rooms(body, key, names, needed=False))
 
 
+def lies_in(body: "Body", point: tuple[int, int], rooms: frozenset[int]) -> bool:
+    """Return whether a lattice point lies in one of some rooms, by their indices."""
+    plan = body.home.plan
+    room = plan.room_at(*plan.lattice.to_metres(point).tolist()) if rooms else None
+    return room is not None and room.index in rooms
+
+
 def is_kind(body: "Body", place: RoomChoice | Point) -> bool:
     """Whether a place gives a type ('bathroom'), not a particular room or object ('bathroom_0')."""
     if is_point(place):

@@ -1,12 +1,14 @@
-"""Rooms that behaviors stay out of: `avoid` of patrol, find, follow and opportunistic."""
+"""Rooms that behaviors stay out of: `avoid` of all behaviors of robots but hangout."""
 
+from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.scenes import scenario, table
+from tests.scenes import DOORS, scenario, table, write_flat
 
 import fleet2d
-from fleet2d.errors import PlacementError
+from fleet2d.errors import PlacementError, ScenarioError
+from fleet2d.floorplan.load import load_floorplan
 
 CAMERA = {"range": [0.2, 6], "angle_deg": 340}
 BEHAVIORS: dict[str, dict[str, Any]] = {
@@ -14,7 +16,10 @@ BEHAVIORS: dict[str, dict[str, Any]] = {
     "find": {"type": "find", "user": "ana", "every": "3 min", "distance": 0.5},
     "follow": {"type": "follow", "user": "ana", "distance": 0.5},
     "opportunistic": {"type": "opportunistic", "again": "1 min", "distance": 0.5},
-}
+    "come": {"type": "come", "stay": "2 min"},
+    "explore": {"type": "explore"},
+    "scheduled": {"type": "scheduled", "visits": [{"at": "07:02", "place": "kitchen"}, {"at": "07:04", "place": "bedroom"}]},
+}  # fmt: skip
 
 
 def inside(behavior: str, avoid: list[str]) -> int:
@@ -24,6 +29,7 @@ def inside(behavior: str, avoid: list[str]) -> int:
         "12 min",
         users={"ana": {"type": "schedule", "rest": "kitchen", "days": [{"on": "daily", "items": [{"at": "00:00", "place": [6.5, 3.1], "activity": "read"}]}]}},
         robots={"astro": {"start": [1.0, 3.0], "camera": CAMERA, "behaviors": [{**BEHAVIORS[behavior], "avoid": avoid}, rest]}},
+        script=[{"at": "07:01", "call": "astro", "to": "kitchen"}] if behavior == "come" else [],
         artifacts={"trajectories": "every step"},
     )  # fmt: skip
     rows = table(fleet2d.run(content), "trajectories", entity="astro")
@@ -33,10 +39,81 @@ def inside(behavior: str, avoid: list[str]) -> int:
 @pytest.mark.parametrize("behavior", BEHAVIORS)
 def test_the_robot_stays_out_of_the_rooms_that_it_avoids(behavior: str) -> None:
     assert inside(behavior, []) > 0
-    assert 0 == inside(behavior, ["kitchen"])
+    assert 0 == inside(behavior, ["kitchen", "bathroom"])  # the way there leads through the kitchen
 
 
 def test_an_unknown_room_is_refused_and_a_kind_that_the_home_lacks_is_noted() -> None:
     with pytest.raises(PlacementError, match=r"patrol\.avoid: .*did you mean 'kitchen'"):
         inside("patrol", ["kitchn"])
     assert inside("patrol", ["office"]) > 0
+
+
+def test_a_robot_called_into_a_room_that_it_avoids_waits_near_the_door() -> None:
+    """The door from the living room to the kitchen is at x = 5 m, y = 2.6 to 3.6 m."""
+    simulation = fleet2d.Simulation(
+        scenario(robots={"astro": {"start": [1.0, 1.0], "behaviors": [{"type": "come", "avoid": ["kitchen"]}]}})
+    )  # fmt: skip
+    simulation.call("astro", to="kitchen")
+    simulation.run_until("07:01")
+    x, y = simulation.state["astro"]["x"], simulation.state["astro"]["y"]
+    assert simulation.state["astro"]["room"] == "living_room_0"
+    assert 0.8 < 5 - x + abs(y - 3.1) < 2
+
+
+CHARGER = {"driving": "2 h", "standing": "9 h", "charging": "3 h", "charger": [2.0, 3.5]}
+
+
+@pytest.fixture
+def loop(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
+    """The flat with one more door, from the bathroom to the bedroom: two ways lead to a charger."""
+    monkeypatch.setattr("tests.scenes.DOORS", [*DOORS, (4, 5, 4.1, 6)])
+    return write_flat(tmp_path)
+
+
+def docking(plan: Path, **dock: Any) -> set[str]:
+    """Return through which of two rooms a robot drives from the bathroom to its charger."""
+    robot = {
+        "start": [7.0, 6.0],
+        "battery": CHARGER,
+        "behaviors": [{"type": "dock", "rest": True, **dock}],
+    }
+    content = scenario("3 min", robots={"astro": robot}, artifacts={"trajectories": "every step"})
+    content["floorplan"]["path"] = str(plan)
+    rows = table(fleet2d.run(content), "trajectories", entity="astro")
+    assert abs(float(rows["x"][-1]) - 2.0) < 0.1, "it is at the charger"
+    return {"kitchen_0", "bedroom_0"} & set(rows["room"].astype(str))
+
+
+def test_the_way_to_the_charger_leads_round_rooms_to_avoid_if_there_is_another(loop: Path) -> None:
+    assert {"bedroom_0"} == docking(loop)
+    assert {"kitchen_0"} == docking(loop, avoid=["bedroom"])
+    assert {"bedroom_0"} == docking(loop, avoid=["kitchen", "bedroom"])
+
+
+def test_a_charger_in_a_room_to_avoid_is_refused(loop: Path) -> None:
+    with pytest.raises(ScenarioError, match=r"dock\.avoid has the room of the charger"):
+        docking(loop, avoid=["living_room"])
+
+
+def test_a_visit_in_a_room_to_avoid_is_left_out_with_a_note() -> None:
+    visits = [{"at": "07:01", "place": "kitchen"}, {"at": "07:02", "place": "bedroom"}]
+    robot = {"behaviors": [{"type": "scheduled", "visits": visits, "avoid": ["kitchen"]}]}
+    simulation = fleet2d.Simulation(scenario(robots={"astro": robot}))
+    note = "scheduled.visits: left out, because of `avoid`: those of kitchen_0"
+    assert [note] == simulation.actors["astro"].notes
+    assert ["bedroom_0"] == table(simulation.run(), "events", event="visits")["detail"].tolist()
+
+
+def test_a_path_is_retraced_but_for_its_part_in_rooms_to_avoid(shared_data: Path) -> None:
+    file = shared_data / "valetudo" / "dreame_z10_named_rooms_and_paths.json"
+
+    def points(avoid: list[str]) -> int:
+        robot = {
+            "behaviors": [{"type": "retrace", "path": str(file), "spacing": 1.0, "avoid": avoid}]
+        }
+        content = scenario(robots={"astro": robot})
+        content["floorplan"] = {"type": "valetudo", "path": str(file)}
+        return int(table(fleet2d.run(content), "events", event="retraces")["detail"][0].split()[0])
+
+    kinds = sorted({room.type for room in load_floorplan(file).rooms})
+    assert points([kinds[0]]) < points([])

@@ -9,6 +9,7 @@ from fleet2d.configuration.components import register
 from fleet2d.configuration.problems import problem
 from fleet2d.configuration.units import Share
 from fleet2d.entities.behavior import Actor, Behavior, Situation
+from fleet2d.entities.place import avoided_rooms, lies_in
 from fleet2d.entities.plan import Plan
 from fleet2d.errors import ScenarioError
 
@@ -29,6 +30,8 @@ class Dock(Behavior):
         threshold: Charge at which it goes to the charger.
         until: Charge with which it leaves the charger.
         rest: Wait at the charger when there is nothing else to do.
+        avoid: Rooms, or kinds of rooms if the home has them, that it goes round on its way, as long
+            as there is another way.
     """
 
     records: ClassVar[frozenset[str]] = frozenset({"charged", "docks"})
@@ -37,6 +40,7 @@ class Dock(Behavior):
     threshold: Share = 0.2
     until: Share = 1.0
     rest: bool = False
+    avoid: tuple[str, ...] = ()
 
     @model_validator(mode="after")
     def _charges(self) -> Self:
@@ -51,7 +55,7 @@ class Dock(Behavior):
         """Check that there is a battery.
 
         Raises:
-            ScenarioError: There is none.
+            ScenarioError: There is none, or the charger is in a room to avoid.
         """
         if actor.charge is None:
             raise ScenarioError(
@@ -59,6 +63,12 @@ class Dock(Behavior):
                 " 2 h, standing: 10 h, charging: 3 h, charger: hallway}"
             )
         self.charging = False
+        self.avoided = avoided_rooms(actor, "dock.avoid", self.avoid)
+        if lies_in(actor, actor.charge.charger, self.avoided):
+            raise ScenarioError(
+                f"{actor.path}: dock.avoid has the room of the charger: leave it out, or move the"
+                " charger by battery.charger"
+            )
 
     def busy(self) -> bool:
         """Return whether it is charging."""
@@ -80,7 +90,7 @@ class Dock(Behavior):
         is_low = charge.level <= self.threshold
         if has_command or is_low or (self.charging and charge.level < self.until):
             if not self.charging or (plan.x, plan.y) != charger:
-                plan.go_to_point(*charger).note("docks", charge.percent)
+                self._go(plan, now.actor, charger).note("docks", charge.percent)
             self.charging = True
             return plan.stay(timedelta(microseconds=charge.time_to_charge(self.until)))
         if self.charging:
@@ -91,6 +101,13 @@ class Dock(Behavior):
                 return plan.stay(timedelta(microseconds=1))
         if self.rest:
             if (plan.x, plan.y) != charger:
-                plan.go_to_point(*charger)
+                self._go(plan, now.actor, charger)
             return plan.stay(REST)
         return None
+
+    def _go(self, plan: Plan, actor: Actor, charger: tuple[int, int]) -> Plan:
+        """Add the way to the charger to a plan: round the rooms to avoid, else the shortest."""
+        route = None
+        if self.avoided:
+            route = actor.space_without(self.avoided).route((plan.x, plan.y), charger)
+        return plan.go_to_point(*charger, route=route)

@@ -9,6 +9,7 @@ from pydantic import Field
 from fleet2d.configuration.components import register
 from fleet2d.configuration.units import Length, Share
 from fleet2d.entities.behavior import Actor, Behavior, Situation
+from fleet2d.entities.place import avoided_rooms
 from fleet2d.entities.plan import Plan
 from fleet2d.entities.robots.approach import centres, check_has_camera, spread, visible_from
 from fleet2d.kernels import Bool
@@ -39,6 +40,8 @@ class Explore(Behavior):
     Attributes:
         enough: Share of the floor to be seen.
         reach: How near it goes to a frontier [m].
+        avoid: Rooms, or kinds of rooms if the home has them, that it doesn't explore: it looks
+            round in none of them, and their floor needn't be seen.
     """
 
     records: ClassVar[frozenset[str]] = frozenset({"explored", "explores"})
@@ -46,14 +49,19 @@ class Explore(Behavior):
 
     enough: Share = 0.98
     reach: Length = Field(default=1.0, ge=0.1, le=5)
+    avoid: tuple[str, ...] = ()
 
     def start(self, actor: Actor) -> None:
         """Determine the floor to be seen, and the places from which it may be seen."""
         check_has_camera(actor, "explore")
         plan = actor.home.plan
-        rooms = [room.index for room in actor.reachable_rooms()]
+        avoided = avoided_rooms(actor, "explore.avoid", self.avoid)
+        rooms = [r.index for r in actor.reachable_rooms() if r.index not in avoided]
         self.floor: Bool = np.isin(plan.room_of_cell, rooms) & plan.free
-        self.stands = spread(actor.space.cells(None, actor.part), MAX_VIEWPOINT_CELLS)
+        cells = actor.space.cells(None, actor.part)
+        if avoided:
+            cells = cells[self.floor[cells[:, 0], cells[:, 1]]]
+        self.stands = spread(cells, MAX_VIEWPOINT_CELLS)
         self.targets = spread(np.argwhere(self.floor), MAX_TARGET_CELLS)
         self.tried: Bool = np.zeros(len(self.targets), np.bool_)  # looked at, seen or not
         self.visible: tuple[int, dict[int, Bool]] = actor.home.version, {}  # targets, by stand

@@ -9,7 +9,7 @@ from fleet2d.configuration.components import register
 from fleet2d.configuration.problems import problem
 from fleet2d.configuration.units import Duration
 from fleet2d.entities.behavior import Actor, Behavior, Situation
-from fleet2d.entities.place import Place, Point, available_places, avoided_rooms, stops_at
+from fleet2d.entities.place import Place, Point, available_places, avoided_rooms, lies_in, stops_at
 from fleet2d.entities.plan import Plan
 
 
@@ -56,9 +56,8 @@ class Patrol(Behavior):
             places = available_places(actor, "patrol.rooms", self.rooms)
             stops = [stop for place in places for stop in stops_at(actor, place)]
         if self.avoid:
-            avoided, plan = avoided_rooms(actor, "patrol.avoid", self.avoid), actor.home.plan
-            at = {stop: plan.room_at(*plan.lattice.to_metres(stop).tolist()) for stop in stops}
-            stops = [s for s in stops if (room := at[s]) is None or room.index not in avoided]
+            avoided = avoided_rooms(actor, "patrol.avoid", self.avoid)
+            stops = [stop for stop in stops if not lies_in(actor, stop, avoided)]
         self.stops = stops if self.waypoints else list(dict.fromkeys(stops))
 
     def decide(self, now: Situation) -> Plan:

@@ -8,7 +8,7 @@ from pydantic import Field
 from fleet2d.configuration.components import register
 from fleet2d.configuration.units import InputPath, Length
 from fleet2d.entities.behavior import Behavior, Situation
-from fleet2d.entities.place import Nearest
+from fleet2d.entities.place import Nearest, avoided_rooms, lies_in
 from fleet2d.entities.plan import Plan
 from fleet2d.errors import FloorPlanError, PlacementError
 from fleet2d.floorplan.formats.valetudo import read_valetudo_paths
@@ -33,6 +33,7 @@ class Retrace(Behavior):
         path: The map's JSON file.
         spacing: Points of the path nearer than this are left out [m].
         reach: A point farther than this from free space is left out [m].
+        avoid: Rooms, or kinds of rooms if the home has them, whose part of the path is left out.
     """
 
     records: ClassVar[frozenset[str]] = frozenset({"retraced", "retraces"})
@@ -41,6 +42,7 @@ class Retrace(Behavior):
     path: InputPath
     spacing: Length = Field(default=0.1, ge=0)
     reach: Length = Field(default=1.0, ge=0)
+    avoid: tuple[str, ...] = ()
 
     def files(self) -> tuple["Path", ...]:
         """Return the files that it reads."""
@@ -66,11 +68,14 @@ class Retrace(Behavior):
         near: I64 = Nearest(actor).of(points)
         squared_moves = ((near - points) ** 2).sum(axis=1)
         reachable = near[squared_moves <= (self.reach * lattice.units_per_m) ** 2]
-        self.points = _thin_out(reachable, self.spacing * lattice.units_per_m)
+        avoided = avoided_rooms(actor, "retrace.avoid", self.avoid)
+        points_left = _thin_out(reachable, self.spacing * lattice.units_per_m)
+        self.points = [p for p in points_left if not lies_in(actor, p, avoided)]
         if len(self.points) < 2:
             raise PlacementError(
                 f"{actor.path}: of the path in {self.path}, {len(self.points)} points are within"
-                f" {self.reach:g} m of where the robot can be: is this the home of that map?"
+                f" {self.reach:g} m of where the robot can be and goes: is this the home of that"
+                " map?"
             )
 
     def decide(self, now: Situation) -> Plan:

@@ -9,7 +9,7 @@ from pydantic import Field
 from fleet2d.configuration.components import Settings, register
 from fleet2d.configuration.units import Days, Duration, TimeOfDay, weekdays_of
 from fleet2d.entities.behavior import DAY, DOOR_WAIT, Actor, Behavior, Situation
-from fleet2d.entities.place import Place, stop_at
+from fleet2d.entities.place import Place, avoided_rooms, lies_in, stop_at
 from fleet2d.entities.plan import Plan
 from fleet2d.runtime.clock import midnight_of
 
@@ -46,16 +46,24 @@ class Scheduled(Behavior):
     Attributes:
         visits: The visits.
         late: A visit that can't begin within this time is left out.
+        avoid: Rooms, or kinds of rooms if the home has them, that it doesn't visit: visits there
+            are left out, with a note.
     """
 
     records: ClassVar[frozenset[str]] = frozenset({"visits", "way_blocked"})
 
     visits: tuple[ScheduledVisit, ...] = Field(min_length=1)
     late: Duration = timedelta(minutes=30)
+    avoid: tuple[str, ...] = ()
 
     def start(self, actor: Actor) -> None:
         """Find the stops."""
         self.stops = [stop_at(actor, visit.place) for visit in self.visits]
+        avoided = avoided_rooms(actor, "scheduled.avoid", self.avoid)
+        self.left_out = {i for i, xy in enumerate(self.stops) if lies_in(actor, xy, avoided)}
+        if self.left_out:
+            rooms = ", ".join(sorted({self._room_name(actor, i) for i in self.left_out}))
+            actor.notes.append(f"scheduled.visits: left out, because of `avoid`: those of {rooms}")
         self.last_decision = actor.clock.start - timedelta(microseconds=1)
         self.pending: list[tuple[datetime, int]] = []  # due time and number of visits to make
 
@@ -76,21 +84,25 @@ class Scheduled(Behavior):
                 return self._visit(now, number)
         blocked = [number for due, number in self.pending if (due, number) in fresh]
         if blocked:
-            return now.plan().note("way_blocked", self._room_name(now, blocked[0])).stay(DOOR_WAIT)
+            return (
+                now.plan()
+                .note("way_blocked", self._room_name(now.actor, blocked[0]))
+                .stay(DOOR_WAIT)
+            )
         return None
 
     def _visit(self, now: Situation, number: int) -> Plan:
         visit, (x, y) = self.visits[number], self.stops[number]
-        name = visit.task or self._room_name(now, number)
+        name = visit.task or self._room_name(now.actor, number)
         plan = now.plan().go_to_point(x, y).note("visits", name)
         if visit.look_around:
             plan.turn_by(1.0)
         return plan.stay(visit.dwell)
 
-    def _room_name(self, now: Situation, number: int) -> str:
+    def _room_name(self, actor: Actor, number: int) -> str:
         """Return the name of the room of a visit; empty for a point between two rooms."""
-        xy = now.home.plan.lattice.to_metres(self.stops[number]).tolist()
-        room = now.home.plan.room_at(*xy)
+        plan = actor.home.plan
+        room = plan.room_at(*plan.lattice.to_metres(self.stops[number]).tolist())
         return room.name if room else ""
 
     def _due(self, since: datetime) -> Iterator[tuple[datetime, int]]:
@@ -101,6 +113,6 @@ class Scheduled(Behavior):
             today = [
                 (day + visit.at, number)
                 for number, visit in enumerate(self.visits)
-                if day.weekday() in weekdays_of(visit.on)
+                if number not in self.left_out and day.weekday() in weekdays_of(visit.on)
             ]
             yield from (entry for entry in sorted(today) if entry[0] > since)
