@@ -213,9 +213,10 @@ class Basis:
     def may_change(self) -> bool:
         """Whether the home may change during the run."""
         scenario = self.scenario
-        if not scenario.script:
-            return bool(scenario.objects or scenario.changes)
+        changes = bool(scenario.objects or scenario.changes)
+        changes |= any(user.lights for user in scenario.users.values())
+        if changes or not scenario.script:
+            return changes
         from fleet2d.interventions.home import HomeIntervention  # only scripts need it
 
-        moves = any(isinstance(entry.act, HomeIntervention) for entry in scenario.script)
-        return bool(scenario.objects or scenario.changes or moves)
+        return any(isinstance(entry.act, HomeIntervention) for entry in scenario.script)

@@ -190,6 +190,7 @@ class Cameras(Watcher):
             owner.path,
         )
         self.lenses = stack_lenses(lenses, has_errors, context)
+        self._perceptions = perceptions
         errors = [p if errs else None for p, errs in zip(perceptions, has_errors, strict=True)]
         self.errors = error_tables(lenses, errors, context)
         self._dark = dark_cameras(self.disturbances, self.names)
@@ -338,6 +339,10 @@ class Cameras(Watcher):
         return np.concatenate(blocks) if blocks else NOTHING
 
     def _look(self, bodies: Bodies, end: int, *, stop: bool = True) -> "Look":
+        if self.owner.home.unlit and self.sighting_errors is None and self._first == 0:
+            from fleet2d.engine.sighting_errors import SightingErrors  # few runs need them
+
+            self.sighting_errors = SightingErrors(self, self._perceptions)
         may_redo = stop or self.sighting_errors is not None
         old_memory = [array.copy() for array in self.memory] if may_redo else []
         stop_lost, stop_seen = self.ends if stop else (False, False)

@@ -17,12 +17,13 @@ from shapely import LineString
 from fleet2d.configuration.problems import suggest
 from fleet2d.configuration.units import micros
 from fleet2d.engine.bodies import Basis
+from fleet2d.engine.lights import PeopleSwitches, switch
 from fleet2d.entities.behavior import Actor
 from fleet2d.entities.body import Track
 from fleet2d.entities.objects.door import Door, door_hint
 from fleet2d.errors import ComponentError, PlacementError, ScenarioError
 from fleet2d.floorplan.home import lattice_footprint
-from fleet2d.floorplan.home_change import HomeChange
+from fleet2d.floorplan.home_change import ALL_ROOMS, HomeChange
 from fleet2d.floorplan.mesh import Segment
 from fleet2d.floorplan.placed_objects import move_object
 from fleet2d.floorplan.rooms.room import PRIORITY, usual_type
@@ -81,7 +82,8 @@ class DueChange(NamedTuple):
     Attributes:
         step: The step.
         number: The number of changes that were put into the queue before.
-        change: The change; None: the door opens for a body, or closes by itself.
+        change: The change; None: the door opens for a body, or closes by itself; or without a
+            door, the body may switch a light.
         by: The body or thing that causes it, for the table of events.
         door: Number of that door; else -1.
         opens_for: Row of the body that the door opens for, and the step of its decision: the
@@ -112,6 +114,7 @@ class ChangeQueue:
         self.doors = {name: item for name, item in objects.items() if isinstance(item, Door)}
         self.names = list(self.doors)
         self._used_us = [-1] * len(self.names)
+        self._switches = PeopleSwitches(basis)
         self._queue: list[DueChange] = []
         self._count = 0
         for number, door in enumerate(self.doors.values()):
@@ -164,7 +167,9 @@ class ChangeQueue:
             raise ComponentError(f"{by} requests an impossible change: {error}") from None
 
     def expect(self, row: int, actor: Actor) -> None:
-        """Schedule the opening of the doors on a body's way, after it has a new plan."""
+        """Schedule what a body does on its way to doors and lights, after it has a new plan."""
+        for step in self._switches.steps(row, actor):
+            self._put(step, None, actor.name, opens_for=(row, actor.planned_at))
         if not self.names or not actor.entity.opens_doors or not isinstance(actor.motion, Track):
             return
         for door in range(len(self.names)):
@@ -184,6 +189,9 @@ class ChangeQueue:
             due = heapq.heappop(self._queue)
             if due.change is not None:
                 events += self._make_change(due, due.change, step, actors)
+            elif due.door < 0 and due.opens_for is not None:
+                row = due.opens_for[0]
+                events += self._switches.see_to(row, actors[row], step)
             elif due.opens_for is not None:
                 events += self._open_for(due, step, actors)
             else:
@@ -202,6 +210,8 @@ class ChangeQueue:
             return [Event(step, HOME, EventKind.ROOM_CHANGED, f"{target}: {change.type}")]
         if verb == "move":
             return self._move(due, change, step, actors)
+        if verb == "lights":
+            return switch(self.home, self._lit_by(target), step, is_on=change.turn == "on")
         door = self.names.index(target)
         if verb in ("lock", "unlock"):
             self.home.set_lock(door, locked=verb == "lock")
@@ -211,6 +221,11 @@ class ChangeQueue:
         if is_open != (door in self.home.shut):
             return []
         return self._turn(door, is_open, due, step, actors)
+
+    def _lit_by(self, name: str) -> list[int]:
+        """Return the indices of the rooms that the name of lights stands for."""
+        rooms = self.home.rooms
+        return [room.index for room in rooms if name in (room.name, room.type, ALL_ROOMS)]
 
     def _open_for(self, due: DueChange, step: int, actors: Sequence[Actor]) -> list[Event]:
         row, planned_at = due.opens_for or (0, 0)
@@ -356,8 +371,12 @@ class ChangeQueue:
             ScenarioError: There is no such thing; the message lists all names.
         """
         noun, names = "door", self.names
+        rooms = self.home.rooms
         if change.verb == "room":
-            noun, names = "room", [room.name for room in self.home.rooms]
+            noun, names = "room", [room.name for room in rooms]
+        elif change.verb == "lights":
+            kinds = dict.fromkeys(room.type for room in rooms)
+            noun, names = "room", [*(room.name for room in rooms), *kinds, ALL_ROOMS]
         elif change.verb == "move":
             noun, names = "object in the floor plan", [item.name for item in self.home.objects]
         if change.target not in names:

@@ -13,7 +13,9 @@ PERSON_EVENTS = frozenset(
     {EventKind.ACTIVITY, EventKind.CAME_HOME, EventKind.LEFT_HOME, EventKind.USES}
 )
 DOOR_EVENTS = frozenset({EventKind.OPENED, EventKind.SHUT, EventKind.LOCKED, EventKind.UNLOCKED})
-HOME_EVENTS = frozenset({EventKind.MOVED, EventKind.ROOM_CHANGED})
+HOME_EVENTS = frozenset(
+    {EventKind.MOVED, EventKind.ROOM_CHANGED, EventKind.LIGHT_ON, EventKind.LIGHT_OFF}
+)
 SENSOR_EVENTS = frozenset({EventKind.SENSOR})
 # Events whose detail names a user, or a robot.
 ABOUT_USERS = (

@@ -138,6 +138,10 @@ USER_EVENTS = frozenset({EventKind.USER_LOST, EventKind.USER_SEEN})
 ACTIVITY = EventKind.ACTIVITY.value
 # Rows that are collected before they are stored: so many, or more with many bodies.
 MAX_ROWS = 1 << 15
+UNSTORED = (
+    "changes of the home are not in the table of events, as the scenario has none: announce them,"
+    " like changes: [{at: 0 s, lights: all, turn: on}]"
+)
 ROWS_PER_BODY = 128
 
 
@@ -176,6 +180,7 @@ class Recorder:
         self._users = {actor.name: row for row, actor in enumerate(basis.users)}
         entities = [*(actor.name for actor in basis.actors), *basis.scenario.objects]
         self._rows = {name: row for row, name in enumerate(entities)} | {HOME: -1}
+        self._stores_home = basis.may_change
         self._events: list[Event] = []
         self._observations: list[I64] = []
         self._sensors, self._readings = sensors, list[SensorRow]()
@@ -303,6 +308,10 @@ class Recorder:
         rows = np.array([self._rows[name] for name in entity], np.int32)
         ranks = np.array([RANKS.get(name, 0) for name in kind], np.int8)
         order = np.lexsort((ranks, rows, steps))
+        if not self._stores_home and rows.min() < 0:  # a change by hand, which nobody announced
+            order = order[rows[order] >= 0]
+            if UNSTORED not in self.store.manifest.notes:
+                self.store.manifest.notes.append(UNSTORED)
         kinds, details = ([column[i] for i in order.tolist()] for column in (kind, detail))
         of_users = [i for i, name in enumerate(kinds) if name in USER_EVENTS]
         columns: dict[str, Any] = self._times(steps[order])

@@ -12,9 +12,18 @@ from fleet2d.floorplan.lattice import Lattice
 from fleet2d.kernels import I64
 from fleet2d.kernels.motion import Window
 from fleet2d.kernels.numbers import TURN, in_radians
-from fleet2d.kernels.sight import NOBODY, USER_LOST, USER_SEEN, About, SightMemory, camera_poses
+from fleet2d.kernels.sight import (
+    NOBODY,
+    ONE,
+    USER_LOST,
+    USER_SEEN,
+    About,
+    SightMemory,
+    camera_poses,
+)
 from fleet2d.kernels.sight import SightingColumn as Column
-from fleet2d.sight.perception import Perception
+from fleet2d.sight.curve import Curve
+from fleet2d.sight.perception import Detection, Perception
 from fleet2d.sight.perception_error import CameraSightings, ErrorStream, PerceptionError
 
 if TYPE_CHECKING:
@@ -61,6 +70,24 @@ PoseColumns = tuple[I64, I64, I64]  # x, y [lattice units] and heading, one elem
 RETRACTED = -2
 
 
+class Darkness(PerceptionError):
+    """People who aren't noticed because the light of their room is off.
+
+    Attributes:
+        unlit: Share that are noticed nevertheless, by the time of day [hours].
+    """
+
+    unlit: Curve
+
+    def distort(self, sightings: CameraSightings) -> CameraSightings:
+        """Return the sightings without those that the darkness hides."""
+        is_dark = np.isin(sightings.true_room, sorted(sightings.home.unlit))
+        is_dark &= sightings.true_user != NOBODY
+        shares = self.unlit.around_the_clock().chances(sightings.hour.tolist()) / ONE
+        is_hidden = is_dark & (sightings.uniform("noticed") >= shares)
+        return sightings.replace(noticed=sightings.noticed & ~is_hidden)
+
+
 class CameraErrors(NamedTuple):
     """The errors of one camera.
 
@@ -68,11 +95,13 @@ class CameraErrors(NamedTuple):
         name: The name of the camera.
         path: Their path in the scenario, "robots.astro.perception.errors".
         errors: The errors by name, in the order in which they act, that of the names.
+        darkness: What it misses where lights are off; it acts before them.
     """
 
     name: str
     path: str
     errors: dict[str, PerceptionError]
+    darkness: Darkness
 
 
 class SightingErrors:
@@ -92,7 +121,9 @@ class SightingErrors:
             part = "" if perception is common else ".camera" if only else f".cameras.{name}"
             path = f"{owner.path}{part}.perception.errors"
             errors = dict(sorted(perception.errors.items())) if perception else {}
-            self._cameras.append(CameraErrors(name, path, errors))
+            detection = perception.detection if perception else Detection()
+            darkness = Darkness(unlit=detection.unlit)
+            self._cameras.append(CameraErrors(name, path, errors, darkness))
 
     def change(
         self, rows: I64, memory: SightMemory, before: SightMemory, window: Window, end: int
@@ -133,10 +164,13 @@ class SightingErrors:
     def _change(self, c: int, rows: I64, looks: I64, body: PoseColumns, memory: SightMemory) -> I64:
         """Return the sightings of some looks of a camera; the body is at a place in each."""
         camera = self._cameras[c]
-        if camera.errors:
+        errors = camera.errors
+        if self._owner.home.unlit:
+            errors = {"": camera.darkness} | errors  # no error of a scenario has an empty name
+        if errors:
             eye = camera_poses(self._lenses, c, body, looks * self._owner.clock.step_us)
             old = self._sightings(camera.name, rows, looks, eye)
-            new = self._with_errors(camera, old)
+            new = self._with_errors(camera, errors, old)
             _write(rows, old, new, self._owner.home.plan.lattice)
             missed = rows[~new.noticed & (rows[:, Column.USER] != NOBODY), Column.USER]
             np.subtract.at(memory.about, (c, missed, About.NOTICED.value), 1)
@@ -149,10 +183,12 @@ class SightingErrors:
             rows[:, Column.HEADING] = (rows[:, Column.HEADING] + self._drift.at(looks).turn) % TURN
         return rows
 
-    def _with_errors(self, camera: CameraErrors, sightings: CameraSightings) -> CameraSightings:
+    def _with_errors(
+        self, camera: CameraErrors, errors: dict[str, PerceptionError], sightings: CameraSightings
+    ) -> CameraSightings:
         """Return sightings with the errors of a camera, one after the other."""
         owner = self._owner
-        for name, error in camera.errors.items():
+        for name, error in errors.items():
             stream = ErrorStream(owner.seed, owner.path, f"{camera.name}: errors.{name}")
             with blame(f"{camera.path}.{name}", int(sightings.step[0])):
                 before = replace(sightings, _stream=stream)

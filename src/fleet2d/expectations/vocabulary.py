@@ -481,6 +481,26 @@ class door(Condition):
 
 
 @dataclass(frozen=True, eq=False)
+class light(Condition):
+    """Whether the light of a room is on; of a kind of rooms, whether any of them is."""
+
+    name: str
+
+    def check(self, scene: Scene) -> None:
+        """Refuse an unknown room."""
+        scene.check_room(self.name, self)
+
+    def start(self, run: MeasuredRun, gauge: Gauge) -> Any:
+        """Return the indices of the rooms."""
+        name = self.name.removeprefix(ANY_KIND)
+        return {room.index for room in run.home.rooms if name in (room.name, room.type)}
+
+    def measure(self, block: SignalBlock, gauge: Gauge) -> Trace:
+        """Return 1 while it is on."""
+        return constant(float(not gauge.memory <= block.home.unlit), block.first, block.end)
+
+
+@dataclass(frozen=True, eq=False)
 class sensor(Condition):
     """Whether a sensor is on; for the contact sensor of a door, whether the door is open."""
 

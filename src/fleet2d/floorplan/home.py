@@ -1,6 +1,6 @@
 """The home of a run: its floor plan, and what stands in it now."""
 
-from collections.abc import Callable, Collection, Hashable, Mapping, Sequence
+from collections.abc import Callable, Collection, Hashable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
 from typing import Any, Self, TypeVar
@@ -62,6 +62,7 @@ class Home:
         self.objects: tuple[PlacedObject, ...] = plan.objects
         self.shut: frozenset[int] = NO_DOORS
         self.locked: frozenset[int] = NO_DOORS
+        self.unlit: frozenset[int] = frozenset()
         self.version = 0
         self.layers = Layers(plan)
         self._shapes = _shapes_of(plan, doorway_segments(plan.lattice, self.doors))
@@ -157,6 +158,10 @@ class Home:
         """Lock or unlock a door."""
         self.locked = self.locked | {door} if locked else self.locked - {door}
         self.version += 1
+
+    def set_lights(self, rooms: Iterable[int], *, is_on: bool) -> None:
+        """Switch the lights of rooms on or off, by their indices."""
+        self.unlit = self.unlit.difference(rooms) if is_on else self.unlit.union(rooms)
 
     def put(self, thing: PlacedObject) -> None:
         """Replace the object of the same name."""

@@ -1,9 +1,9 @@
-"""Changes of a home during a run, as data: doors, furniture, and what rooms are used for."""
+"""Changes of a home during a run, as data: doors, furniture, lights, and the use of rooms."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
 from datetime import date, datetime, timedelta
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from pydantic import BeforeValidator, Field, PlainSerializer, WithJsonSchema, model_validator
@@ -13,7 +13,9 @@ from fleet2d.configuration.problems import problem
 from fleet2d.configuration.units import format_duration, parse_duration
 from fleet2d.floorplan.placed_objects import Point
 
-VERBS = ("open", "shut", "lock", "unlock", "move", "room")
+VERBS = ("open", "shut", "lock", "unlock", "move", "room", "lights")
+ALL_ROOMS = "all"
+"""What names the lights of all rooms."""
 
 
 def parse_moment(value: Any) -> datetime | timedelta:
@@ -59,7 +61,7 @@ Moment = Annotated[
 
 
 class HomeChange(Settings):
-    """One change of the home: exactly one of open, shut, lock, unlock, move and room.
+    """One change of the home: exactly one of open, shut, lock, unlock, move, room, lights.
 
     Attributes:
         at: Time of the change; left out by an algorithm or a script: now.
@@ -72,6 +74,8 @@ class HomeChange(Settings):
         turn_deg: Angle by which it is turned, counter-clockwise.
         room: The room whose use changes.
         type: The type of the room from then on.
+        lights: The room whose light is switched, a kind of rooms, or `all`.
+        turn: How it is switched: `on` or `off`.
 
     Example:
         >>> HomeChange(shut="bath_door").verb
@@ -90,6 +94,8 @@ class HomeChange(Settings):
     turn_deg: float = Field(default=0.0, ge=-3600, le=3600)
     room: str | None = None
     type: str | None = None
+    lights: str | None = None
+    turn: Literal["on", "off"] | None = None
 
     @model_validator(mode="after")
     def _is_one_change(self) -> Self:
@@ -97,7 +103,7 @@ class HomeChange(Settings):
         if len(verbs) != 1:
             listed = " and ".join(verbs) or "nothing"
             raise problem(f"give exactly one of {', '.join(VERBS)}, got {listed}")
-        for verb, further in (("move", "to"), ("room", "type")):
+        for verb, further in (("move", "to"), ("room", "type"), ("lights", "turn")):
             if (verbs[0] == verb) != (getattr(self, further) is not None):
                 raise problem(f"'{verb}' and '{further}' go together")
         return self

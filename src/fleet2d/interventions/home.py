@@ -123,6 +123,25 @@ class SetRoomType(HomeIntervention):
         return HomeChange(room=self.name, type=self.type)
 
 
+@register("intervention", "lights")
+class Lights(HomeIntervention):
+    """Switch the light of a room on or off.
+
+    Attributes:
+        room: The room, a kind of rooms, or `all`.
+        turn: How it is switched.
+    """
+
+    subject: ClassVar[str] = "room"
+    room: str
+    turn: Literal["on", "off"]
+
+    @property
+    def home_change(self) -> HomeChange:
+        """The change."""
+        return HomeChange(lights=self.room, turn=self.turn)
+
+
 @register("intervention", "report")
 class Report(Intervention):
     """Let a real sensor report its state: one of the type `live_sensor`.

@@ -3,7 +3,7 @@
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from datetime import timedelta
-from typing import Any, cast
+from typing import Any, Literal, cast
 
 from pydantic import ValidationError
 
@@ -438,6 +438,14 @@ class InterventionMethods(ABC):
             ScenarioError: There is no such room, or no such room type.
         """
         self._do("room", name=name, type=type)
+
+    def lights(self, room: str, turn: Literal["on", "off"]) -> None:
+        """Switch the light of a room, of all rooms of a kind, or of "all", on or off.
+
+        Raises:
+            ScenarioError: There is no such room.
+        """
+        self._do("lights", room=room, turn=turn)
 
     def change(self, change: HomeChange | None = None, /, **keys: Any) -> None:
         """Change the home at the present step: ``simulation.change(shut="bath_door")``.

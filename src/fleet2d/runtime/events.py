@@ -74,6 +74,8 @@ class EventKind(StrEnum):
     WAY_BLOCKED = "way_blocked"
     WITHDRAWS = "withdraws"
     # The home
+    LIGHT_OFF = "light_off"
+    LIGHT_ON = "light_on"
     LOCKED = "locked"
     MOVED = "moved"
     OPENED = "opened"
@@ -89,8 +91,8 @@ SIGHTS = frozenset(
 )
 CHANGES = frozenset(
     {
-        EventKind.LOCKED, EventKind.MOVED, EventKind.OPENED, EventKind.ROOM_CHANGED,
-        EventKind.SHUT, EventKind.UNLOCKED,
+        EventKind.LIGHT_OFF, EventKind.LIGHT_ON, EventKind.LOCKED, EventKind.MOVED,
+        EventKind.OPENED, EventKind.ROOM_CHANGED, EventKind.SHUT, EventKind.UNLOCKED,
     }
 )  # fmt: skip
 

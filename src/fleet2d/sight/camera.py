@@ -422,7 +422,10 @@ def _fill_false_positives(
 
 def is_perfect(perception: Perception | None) -> bool:
     """Return whether a look has no errors, so that it needs no tables; `errors` come after it."""
-    return perception is None or perception.model_copy(update={"errors": {}}) == Perception()
+    if perception is None:
+        return True
+    lit = perception.detection.model_copy(update={"unlit": Detection().unlit})
+    return perception.model_copy(update={"errors": {}, "detection": lit}) == Perception()
 
 
 class FalseSighting(NamedTuple):
