@@ -13,6 +13,7 @@ import numpy as np
 from fleet2d.configuration.units import micros
 from fleet2d.engine.bodies import Basis, Bodies, PoseBlock, Watcher
 from fleet2d.entities.behavior import SightEvent
+from fleet2d.entities.body import NEVER
 from fleet2d.entities.decisions import DecidingActor, StandStill
 from fleet2d.floorplan.placed_objects import POSTURES
 from fleet2d.interactions.answers import AnswerRecord, Answers, Circumstances, Reply, Wanted
@@ -75,6 +76,7 @@ class Conversations(Watcher):
         self._questions: list[Question] = []  # at the ends of plans that were replaced
         self._replies: list[PendingReply] = []
         self._last: list[tuple[int, SightEvent]] = []
+        self._next: int | None = None  # the next step with a question, answer or request
 
     @classmethod
     def of(cls, basis: Basis) -> "Conversations":
@@ -104,6 +106,7 @@ class Conversations(Watcher):
         """Record what a plan that is replaced at a step has done until then."""
         if not self.queues:
             return
+        self._next = None
         if row < self.users:
             self._activity[row] = self._activity_at(row, step)
         elif row in self.queues:
@@ -111,17 +114,22 @@ class Conversations(Watcher):
 
     def limit(self, bodies: Bodies, end: int) -> int:
         """Return the step after the first question, answer or request that comes up."""
+        if self._next is None:
+            self._next = self._next_step()
+        return min(end, self._next + 1)
+
+    def _next_step(self) -> int:
+        """Return the next step at which anything happens."""
         first = self.next_step
+        steps = [reply.step for reply in self._replies]
+        steps += [question.step for question in self._questions]
         for row, queue in self.queues.items():
-            questions = [*self._questions, *_questions(row, self.actors[row])]
-            steps = [q.step for q in questions if q.step >= first]
-            steps += [reply.step for reply in self._replies if reply.step >= first]
+            steps += [q.step for q in _questions(row, self.actors[row]) if q.step >= first]
             change = queue.next_change()
             if change is not None:
                 clock = self.actors[row].clock
                 steps.append(max(clock.step_at_or_after(clock.elapsed(change)), first))
-            end = min([end, *(step + 1 for step in steps)])
-        return end
+        return min((step for step in steps if step >= first), default=NEVER)
 
     def take(self, bodies: Bodies, end: int) -> Sequence[Event]:
         """Take in the steps up to `end` - 1; only in the last of them can anything happen."""
@@ -129,15 +137,16 @@ class Conversations(Watcher):
         self._last = []
         if not self.queues or end == first:
             return ()
-        events: list[Event] = []
-        step, block = end - 1, None
+        events = [
+            Event(at, self.actors[row].name, EventKind.OPPORTUNITY, text)
+            for row, queue in self.queues.items()
+            for at, text in queue.take_opportunities()
+        ]
+        if self._next is not None and end <= self._next:
+            return events
+        step, block, self._next = end - 1, None, None
         for row, queue in self.queues.items():
             robot = self.actors[row]
-            events += [
-                Event(at, robot.name, EventKind.OPPORTUNITY, text)
-                for at, text in queue.opportunities
-            ]
-            queue.opportunities.clear()
             for change in queue.advance(robot.clock.time(step)):
                 events.append(Event(step, robot.name, change.event, change.request.text))
                 if change.event == "due":

@@ -290,7 +290,7 @@ class Behavior(Component):
     # Kinds of events that its plans record: all of its own, and those of EventKind that a script
     # may wait for.
     records: ClassVar[frozenset[str]] = frozenset()
-    # Events of its cameras at which it may interrupt the behaviors after it.
+    # Events at which it may interrupt the behaviors after it: all that `awaits` can return.
     listens: ClassVar[frozenset[str]] = frozenset()
     # Whether it does nothing in a scenario in which its robot wants nothing of people.
     serves_requests: ClassVar[bool] = False
@@ -328,6 +328,10 @@ class Behavior(Component):
     def wakes_at(self, now: Situation, plan: Plan) -> datetime | None:
         """Return when it wants to be asked while the body follows a plan of a later behavior."""
         return None
+
+    def awaits(self, now: Situation) -> frozenset[str]:
+        """Return at which events it is asked while the body follows a plan of a later behavior."""
+        return self.listens
 
     def about(self) -> tuple[str, ...]:
         """Return the users that its fields name; a scenario that lacks one of them is refused."""

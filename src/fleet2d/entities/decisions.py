@@ -138,7 +138,7 @@ class Arbiter:
                 times.append(opens)
             else:
                 times.append(behavior.wakes_at(now, plan))
-                events |= behavior.listens
+                events |= behavior.awaits(now)
         self._preempting_events = events - self.own
         plan.interrupts = events
         clock = now.actor.clock

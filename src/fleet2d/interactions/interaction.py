@@ -176,7 +176,7 @@ class RequestQueue:
         start: The start of the run.
         open: The open requests, in the order in which they came up.
         banned: Indices of the rooms that it was told to keep out of.
-        opportunities: What it considered, for the events: step and text; taken from here once.
+        opportunities: What it considered, for the events: step and text.
     """
 
     interactions: Mapping[str, Interaction]
@@ -190,6 +190,11 @@ class RequestQueue:
             name: next(each.times(self.start, self.start))
             for name, each in self.interactions.items()
         }
+
+    def take_opportunities(self) -> list[tuple[int, str]]:
+        """Return and remove what was considered."""
+        taken, self.opportunities = self.opportunities, []
+        return taken
 
     def next_change(self) -> datetime | None:
         """Return when a request comes up next, or a deadline passes; None: never."""

@@ -9,6 +9,10 @@ import pytest
 from tests.scenes import digests, scenario, table
 
 import fleet2d
+from fleet2d import Algorithm, Plan, Situation
+from fleet2d.algorithms.algorithm import Present, RoomDistribution
+from fleet2d.algorithms.history import History
+from fleet2d.entities.robots.interact import Interact
 from fleet2d.errors import ScenarioError
 from fleet2d.interactions.answers import Answers, Circumstances, Reply
 from fleet2d.interactions.attitude import AttitudeState
@@ -186,6 +190,65 @@ def test_a_run_that_is_branched_goes_on_the_same() -> None:
     half.run_until(timedelta(minutes=11))
 
     assert whole.digest == copy.deepcopy(half).run().digest == half.run().digest
+
+
+class Believed(Algorithm):
+    """Believes the person to be out with a probability."""
+
+    out: float = 0.9
+
+    def update(self, history: History, state: Present) -> Any:
+        belief = RoomDistribution(np.ones(len(state.home.rooms)))
+        belief.away = self.out  # type: ignore[attr-defined]
+        return belief
+
+
+@pytest.mark.parametrize(("out", "moves"), [(0.9, False), (0.5, True)])
+def test_nobody_is_looked_for_who_is_likely_out(out: float, moves: bool) -> None:
+    content = home(
+        "40 min",
+        users={"ana": {"type": "schedule", "days": [{"items": [{"at": "00:10", "away": True}]}]}},
+        robots={"astro": {"behaviors": [{"type": "interact", "source": "belief"}]}},
+        algorithms={"belief": Believed(out=out, period=timedelta(minutes=1))},
+    )
+    rows = table(fleet2d.run(content), "trajectories")
+
+    assert moves == bool(np.ptp(rows["x"][rows["entity"] == "astro"]) > 1)
+
+
+def test_who_is_out_is_looked_for_less_and_less_often() -> None:
+    content = home(
+        "8 h",
+        users={"ana": {"type": "schedule", "days": [{"items": [{"at": "00:10", "away": True}]}]}},
+        robots={"astro": {"behaviors": [{"type": "interact"}]}},
+        interactions={"pill": {**PILL, "within": "7 h"}},
+    )
+    rows = table(fleet2d.run(content), "trajectories")
+    x = rows["x"][rows["entity"] == "astro"]
+    moves = np.flatnonzero(np.diff(x)) / 60
+    pauses = np.diff(moves)
+
+    assert [30, 60, 120, 120] == pytest.approx(pauses[pauses > 5].tolist(), abs=3)
+
+
+def test_sightings_wake_nobody_who_wants_nothing() -> None:
+    asked: list[int] = []
+
+    class Watched(Interact):
+        """Notes when it is asked."""
+
+        def decide(self, now: Situation) -> Plan | None:
+            asked.append(now.step)
+            return super().decide(now)
+
+    behaviors = [Watched(), {"type": "patrol", "dwell": "10 s"}]
+    run = fleet2d.run(home(robots={"astro": {"behaviors": behaviors}}))
+    (delivered,) = events_of(run, "delivered")
+    seen = [step for step, _ in events_of(run, "user_seen")]
+    ends = [step for step, _ in events_of(run, "visits")]
+
+    assert sum(step > delivered[0] for step in seen) > 10
+    assert not {step + 1 for step in seen if step > delivered[0] + 5} & set(asked) - set(ends)
 
 
 def test_interact_without_requests_is_refused() -> None:

@@ -94,10 +94,10 @@ class Interruptions(Watcher):
 
     def expect(self, row: int) -> None:
         """Wait for the interrupts that the present plan of a body names, and for no others."""
-        names = self._actors[row].plan.interrupts
+        names = self._actors[row].plan.interrupts - WATCHED_EVENTS
         if not names and not self._held:
             return
-        named = {(row, name) for name in names - WATCHED_EVENTS}
+        named = {(row, name) for name in names}
         others = {wait: held for wait, held in self._held.items() if wait[0] != row}
         new = {wait: self._held.get(wait) for wait in named}
         self._held = dict(sorted((others | new).items(), key=lambda item: item[0]))

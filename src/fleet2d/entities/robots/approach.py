@@ -223,11 +223,12 @@ def spot_near(now: Situation, x: float, y: float, distance: float) -> LatticePoi
         return position
     for start, end, length in zip(route[:-1], route[1:], _legs(route), strict=True):
         steps = max(1, int(length / (lattice.units_per_m / 20)))
-        for k in range(1, steps + 1):
-            point = start + (end - start) * k // steps
-            at = int(point[0]), int(point[1])
-            if _distance(person, at) <= reach and actor.space.part_at(*at) == actor.part:
-                return at
+        points = start + (end - start) * np.arange(1, steps + 1)[:, None] // steps
+        gaps = points - person
+        is_near = np.sqrt((gaps * gaps).sum(axis=1).astype(np.float64)) <= reach
+        for x_at, y_at in points[is_near].tolist():
+            if actor.space.part_at(x_at, y_at) == actor.part:
+                return x_at, y_at
     return int(goal[0]), int(goal[1])
 
 

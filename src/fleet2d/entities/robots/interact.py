@@ -1,5 +1,6 @@
 """Interact: look for the people of its requests, address them, wait for an answer, carry out."""
 
+from collections.abc import Mapping
 from datetime import datetime, timedelta
 from typing import ClassVar, Literal, NamedTuple
 
@@ -19,14 +20,21 @@ from fleet2d.entities.robots.approach import (
 )
 from fleet2d.errors import NoWayError
 from fleet2d.interactions.interaction import Outcome, Request
+from fleet2d.kernels import F64
 from fleet2d.runtime.determinism import sum_in_order
 
-Step = Literal["seek", "ask", "carry_out", "withdraw"]
+Step = Literal["seek", "ask", "carry_out"]
 ANSWERS = frozenset(str(outcome) for outcome in Outcome)
+LEAVES_AFTER = frozenset({Outcome.SENT_AWAY, Outcome.BANNED})
 # A person who gave no answer isn't asked again before having moved this far [m].
 MOVED_M = 1.0
 # It looks into the likeliest rooms, until they have this part of the probability.
 ENOUGH = 0.9
+# After a round without a find it looks for the person again after the shorter time, and after each
+# further one it waits twice as long, up to the longer time or as long as the request is open.
+SEARCH_PAUSES = timedelta(minutes=30), timedelta(hours=2)
+# It tries again after this time if somebody was in the way.
+DETOUR_PAUSE = timedelta(minutes=2)
 
 
 class ServedRequest(NamedTuple):
@@ -36,24 +44,28 @@ class ServedRequest(NamedTuple):
         request: The request.
         step: What its last plan was for.
         place: Where the person was perceived when addressed [m].
+        came_from: Where the robot was when it came to the person [lattice].
     """
 
     request: Request
     step: Step
     place: Point | None = None
+    came_from: tuple[int, int] | None = None
 
 
 @register("behavior", "interact")
 class Interact(BeliefBehavior):
     """Serve the requests of `interactions:`: approach, address, wait for the answer, carry out.
 
-    It looks for the person of the most valuable request, at most four times, in the rooms where
-    `source` believes the person to be, likeliest first, up to nine tenths of the probability. A
-    person in view is approached and addressed; the robot waits for `patience`. What is accepted is
-    carried out; after any other answer the robot withdraws from the room, and comes back at the
-    time that the person named, or after `retry` of the interaction. A person who gave no answer
-    isn't addressed again in the same place: a sleeper isn't asked twice. Rooms that it was told to
-    keep out of are no part of its ways any more.
+    It looks for the person of the most valuable request on a round through the rooms where `source`
+    believes the person to be, likeliest first, up to nine tenths of the probability; not while the
+    person is likely out of the home. After a round without a find it looks for that person again
+    after 30 min, then after 1 h and 2 h, or as long as the request is open. A person in view is
+    approached and addressed; the robot waits for `patience`. What is accepted is carried out.
+    Otherwise the robot goes back to where it came from, or leaves the room if it was sent away, and
+    comes back at the time that the person named, or after `retry` of the interaction. A person who
+    gave no answer isn't addressed again in the same place: a sleeper isn't asked twice. Rooms that
+    it was told to keep out of are no part of its ways any more.
 
     With `timing` it asks an algorithm first: when a request comes up, when the person comes into
     view, and at most every `look`, it serves it with the probability that the algorithm names for
@@ -70,6 +82,7 @@ class Interact(BeliefBehavior):
         patience: How long it waits for an answer.
         again: Time after an answer other than yes before it addresses the same person again.
         seek: Whether it looks for people; else it serves only those who come into view.
+        seek_at: Minimum probability, by `source`, that the person is at home for it to look.
         only_urgent_at: With `timing`: part of the time to the deadline after which it no longer
             waits for a better moment.
     """
@@ -84,6 +97,7 @@ class Interact(BeliefBehavior):
     patience: PositiveDuration = timedelta(seconds=20)
     again: Duration = timedelta(minutes=10)
     seek: bool = True
+    seek_at: Share = 0.25
     only_urgent_at: Share = Field(default=1.0)
 
     def reads(self) -> tuple[str, ...]:
@@ -99,18 +113,26 @@ class Interact(BeliefBehavior):
         self.unanswered: dict[str, Point] = {}  # where a person gave no answer
         self.best_so_far: dict[str, tuple[datetime, float]] = {}  # best chance of each request
         self.left_alone: dict[str, datetime] = {}  # until when each person isn't addressed
-        self.not_found: dict[str, datetime] = {}  # when it may look for a person again
+        # When the last round for each person was over, and for how long it looks for no other one.
+        self.not_found: dict[str, tuple[datetime, timedelta]] = {}
+
+    def awaits(self, now: Situation) -> frozenset[str]:
+        """Return `due`, and `user_seen` while it waits for somebody to come into view."""
+        waits = any(self._waits_for(now, request) for request in self._ready(now))
+        return self.listens if waits else frozenset({"due"})
 
     def wakes_at(self, now: Situation, plan: Plan) -> datetime | None:
         """Return when a request may be served that has to wait now."""
         queue = now.requests
-        if queue is None:
+        if queue is None or not queue.open:
             return None
-        times = [queue.next_change(), queue.next_ready(now.time)]
-        later = (*self.not_found.values(), *self.left_alone.values())
-        times += [time for time in later if time > now.time]
-        times += [seen + self.look for seen in self.looked.values() if seen + self.look > now.time]
-        return min((time for time in times if time is not None), default=None)
+        times = [queue.next_ready(now.time)]
+        for request in queue.open:
+            name, to = request.text, request.interaction.to
+            times += [self.left_alone.get(to), self._looks_again(now, request)]
+            if (last := self.looked.get(name)) is not None:
+                times.append(last + self.look)
+        return min((time for time in times if time is not None and time > now.time), default=None)
 
     def busy(self) -> bool:
         """Return whether it is with a person, which hours don't end."""
@@ -119,7 +141,7 @@ class Interact(BeliefBehavior):
     def give_up(self, now: Situation) -> None:
         """Drop the way to a person: somebody is in the way."""
         if self.served is not None:
-            self.not_found[self.served.request.text] = now.time + timedelta(minutes=2)
+            self.not_found[self.served.request.interaction.to] = now.time, DETOUR_PAUSE
         self.served = None
 
     def decide(self, now: Situation) -> Plan | None:
@@ -127,47 +149,77 @@ class Interact(BeliefBehavior):
         if now.requests is None:
             return None
         self._keep_out(now)
-        served = self.served
-        if served is not None and served.step in ("ask", "carry_out"):
-            if now.actor.plan.root is self.plan:
-                return self._go_on(now, served)
-            served = self.served = None  # another behavior has interrupted it
-        if served is not None and served.step == "withdraw":
-            served = self.served = None
-        ready = [
-            request
-            for request in now.requests.ready(now.time)
-            if self.user in (ANYONE, request.interaction.to)
-        ]
+        served, self.served = self.served, None
+        if served is not None and now.actor.plan.root is not self.plan:
+            served = None  # another behavior has interrupted it
+        if served is not None and served.step == "ask":
+            return self._react(now, served)
+        if not now.requests.open:
+            return None
+        ready = self._ready(now)
+        in_view = now.in_view if ready else {}
         for request in ready:
-            place = now.in_view.get(request.interaction.to)
+            place = in_view.get(request.interaction.to)
             if place is not None and self._may_address(now, request, place):
                 is_meant = served is not None and served.request is request
                 if is_meant or self._is_good_time(now, request):
                     return self._ask(now, request, place)
-        return self._look_for_somebody(now, ready, served)
+        if served is not None and served.step == "seek" and served.request in ready:
+            plan = self._look_on(now, served, in_view)
+            if plan is not None:
+                return plan
+        return self._look_for_somebody(now, [r for r in ready if r.interaction.to not in in_view])
 
-    def _look_for_somebody(
-        self, now: Situation, ready: list[Request], served: ServedRequest | None
-    ) -> Plan | None:
-        """Look for the person of a request; None: of none, or it has looked for all."""
-        self.served = None
-        if served is not None and (plan := self._look_on(now, served)) is not None:
-            return plan
+    def _ready(self, now: Situation) -> list[Request]:
+        """Return the open requests of its users that may be tried now, the most valuable first."""
+        if now.requests is None or not now.requests.open:
+            return []
+        ready = now.requests.ready(now.time)
+        return [each for each in ready if self.user in (ANYONE, each.interaction.to)]
+
+    def _waits_for(self, now: Situation, request: Request) -> bool:
+        """Return whether it would address the person of a request now, if in view."""
+        last = self.looked.get(request.text)
+        if last is not None and now.time - last < self.look:
+            return False
+        return self.left_alone.get(request.interaction.to, now.time) <= now.time
+
+    def _look_for_somebody(self, now: Situation, ready: list[Request]) -> Plan | None:
+        """Look for the person of one of some requests, if likely at home; None: of none."""
         for request in ready:
-            again_at = self.not_found.get(request.text, now.time)
-            if max(again_at, self.left_alone.get(request.interaction.to, now.time)) > now.time:
+            to = request.interaction.to
+            if not self.seek or not request.interaction.seek:
                 continue
-            if self.seek and request.interaction.seek and self._is_good_time(now, request):
-                return self._seek(now, request)
+            if max(self._looks_again(now, request), self.left_alone.get(to, now.time)) > now.time:
+                continue
+            joint = self.belief(now, to).joint
+            if sum_in_order(joint.tolist()) < self.seek_at:
+                self._pause_search(now, to)
+            elif self._is_good_time(now, request):
+                return self._seek(now, request, joint)
         return None
+
+    def _looks_again(self, now: Situation, request: Request) -> datetime:
+        """Return when it may look for the person of a request."""
+        if request.interaction.to not in self.not_found:
+            return now.time
+        since, pause = self.not_found[request.interaction.to]
+        return since + min(pause, request.interaction.within)
+
+    def _pause_search(self, now: Situation, person: str) -> None:
+        """Wait before it looks for a person again who wasn't found."""
+        first, longest = SEARCH_PAUSES
+        _, pause = self.not_found.get(person, (now.time, first / 2))
+        self.not_found[person] = now.time, min(2 * pause, longest)
 
     def _keep_out(self, now: Situation) -> None:
         """Keep out of the rooms that it was told to, from when it is outside on."""
-        queue, room = now.requests, now.room
+        queue = now.requests
         assert queue is not None
-        if queue.banned != now.actor.kept_out and (room is None or room.index not in queue.banned):
-            now.actor.kept_out = queue.banned
+        if queue.banned != now.actor.kept_out:
+            room = now.room
+            if room is None or room.index not in queue.banned:
+                now.actor.kept_out = queue.banned
 
     def _may_address(self, now: Situation, request: Request, place: Point) -> bool:
         """Return whether a person in view may be addressed: one who was left alone for a while."""
@@ -177,6 +229,7 @@ class Interact(BeliefBehavior):
         if quiet_at is not None and _squared(quiet_at, place) < MOVED_M**2:
             return False
         self.unanswered.pop(request.interaction.to, None)
+        self.not_found.pop(request.interaction.to, None)
         return True
 
     def _is_good_time(self, now: Situation, request: Request) -> bool:
@@ -216,35 +269,37 @@ class Interact(BeliefBehavior):
 
     def _ask(self, now: Situation, request: Request, place: Point) -> Plan:
         """Approach a person in view, address the person, and wait for the answer."""
-        self.served = ServedRequest(request, "ask", place)
-        self.plan = plan = now.plan()
+        x, y = now.home.plan.lattice.point_at(now.nearest_free(*now.xy))
+        self.served = ServedRequest(request, "ask", place, (x, y))
+        plan = now.plan()
         approach(now, plan, *place, request.interaction.distance)
         plan.face(*now.home.plan.lattice.point_at(place))
-        return plan.note("asks", request.text).stay(self.patience).interrupt_on(*ANSWERS)
+        plan.note("asks", request.text).stay(self.patience).interrupt_on(*ANSWERS)
+        self.plan = plan.root
+        return plan
 
-    def _go_on(self, now: Situation, served: ServedRequest) -> Plan:
-        """Carry out what was accepted, say that it is done, or withdraw after another answer."""
+    def _react(self, now: Situation, served: ServedRequest) -> Plan:
+        """Carry out what was accepted, or withdraw after another answer."""
         request, to = served.request, served.request.interaction.to
-        if served.step == "carry_out":
-            self.served = None
-            return now.plan().note("delivered", request.text).stay(timedelta(seconds=1))
         answers = [e.event for e in now.events if e.event in ANSWERS and e.user == request.text]
         if Outcome.ACCEPTED in answers:
             self.served = served._replace(step="carry_out")
-            self.plan = now.plan().stay(request.interaction.takes)
-            return self.plan
+            self.plan = now.plan().stay(request.interaction.takes).note("delivered", request.text)
+            return self.plan.stay(timedelta(seconds=1))
         if not answers:
             assert now.requests is not None
             now.requests.settle(request, Outcome.IGNORED, now.time, now.time)
         if served.place is not None and (not answers or Outcome.IGNORED in answers):
             self.unanswered[to] = served.place
-        self.served = served._replace(step="withdraw")
         self.left_alone[to] = now.time + self.again
-        return self._withdraw(now, request)
+        plan = now.plan().note("withdraws", request.text)
+        if LEAVES_AFTER.isdisjoint(answers) and served.came_from is not None:
+            return plan.go_to_point(*served.came_from).stay(timedelta(seconds=1))
+        return self._leave_room(now, plan)
 
-    def _withdraw(self, now: Situation, request: Request) -> Plan:
+    def _leave_room(self, now: Situation, plan: Plan) -> Plan:
         """Leave the room of the person for the nearest one in which it isn't shut in by bans."""
-        plan, room, queue = now.plan().note("withdraws", request.text), now.room, now.requests
+        room, queue = now.room, now.requests
         assert queue is not None
         entity, others = now.actor.entity, now.actor.reachable_rooms()
         if queue.banned:
@@ -262,9 +317,8 @@ class Interact(BeliefBehavior):
                 plan.stay(timedelta(seconds=10))
         return plan.stay(timedelta(seconds=1))
 
-    def _seek(self, now: Situation, request: Request) -> Plan:
+    def _seek(self, now: Situation, request: Request, joint: F64) -> Plan:
         """Look into the likeliest rooms, on one round; the person may come into view on the way."""
-        joint = self.belief(now, request.interaction.to).joint
         rooms = now.actor.reachable_rooms()
         rooms.sort(key=lambda room: (-float(joint[room.index]), room.index))
         total = sum_in_order(float(joint[room.index]) for room in rooms)
@@ -277,17 +331,15 @@ class Interact(BeliefBehavior):
             self.plan.go_to_point(*now.actor.middle(room)).turn_by(1)
         return self.plan.interrupt_on("user_seen")
 
-    def _look_on(self, now: Situation, served: ServedRequest) -> Plan | None:
+    def _look_on(
+        self, now: Situation, served: ServedRequest, in_view: Mapping[str, Point]
+    ) -> Plan | None:
         """Go on with a round that somebody has interrupted; None: it is over, without a find."""
-        last = now.actor.plan
-        if last.root is not self.plan:
-            return None
-        plan = None if last.is_over(now.step) else resumed(now.actor, now.plan(), last, now.step)
+        last, plan = now.actor.plan, None
+        if served.request.interaction.to not in in_view and not last.is_over(now.step):
+            plan = resumed(now.actor, now.plan(), last, now.step)
         if plan is None:
-            within = served.request.interaction.within
-            self.not_found[served.request.text] = now.time + max(
-                served.request.interaction.retry, within / 4
-            )
+            self._pause_search(now, served.request.interaction.to)
             return None
         self.served = served
         return plan.interrupt_on("user_seen")
