@@ -118,6 +118,10 @@ def program(folder: Path, answers: str) -> Path:
             "returned 2 shares, but the home has 14 rooms",
         ),
         ("say({'type': 'output', 'blocks': [['x', 10**12]]})", "a block is too large"),
+        (
+            "[say({'type': 'none'}) for _ in range(2)]; time.sleep(0.1)",
+            """wrote b'{"type": "none"}\\n' without being asked""",
+        ),
     ],
 )
 def test_a_program_that_fails_is_blamed(tmp_path: Path, answers: str, message: str) -> None:
@@ -128,6 +132,35 @@ def test_a_program_that_fails_is_blamed(tmp_path: Path, answers: str, message: s
 
     assert "algorithms.share" in str(caught.value)
     assert message in str(caught.value)
+
+
+def test_a_program_that_stops_reading_is_blamed(tmp_path: Path) -> None:
+    """More than a pipe holds was written to it without a limit of time."""
+    path = tmp_path / "alg.py"
+    path.write_text('import time\nprint(\'{"type": "ready"}\', flush=True)\ntime.sleep(60)\n')
+    content = scenario(path, timeout="0.3 s", period="6 h", sends=["poses"])
+
+    with pytest.raises(ComponentError, match="didn't answer 'update' within"):
+        fleet2d.run(content)
+
+
+def test_a_program_that_answers_while_it_is_told_is_heard(tmp_path: Path) -> None:
+    """Both sides write more than a pipe holds, before either reads."""
+    path = tmp_path / "alg.py"
+    path.write_text(
+        "import json, sys\n"
+        "for line in sys.stdin.buffer:\n"
+        "    message = json.loads(line)\n"
+        "    answer = {'type': 'ready'}\n"
+        "    if message['type'] == 'update':\n"
+        "        answer = {'type': 'none', 'remark': 'x' * 300_000}\n"
+        "    print(json.dumps(answer), flush=True)\n"
+        "    [sys.stdin.buffer.read(size) for _, size in message.get('blocks', [])]\n"
+    )
+
+    run = fleet2d.run(scenario(path, period="6 h", sends=["poses"]))
+
+    assert run.status == "complete"
 
 
 def test_a_program_that_cannot_be_started_is_blamed(tmp_path: Path) -> None:

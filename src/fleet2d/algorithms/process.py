@@ -15,7 +15,10 @@ from fleet2d.configuration.trust import check_trust
 from fleet2d.configuration.units import InputPath, PositiveDuration
 from fleet2d.errors import ComponentError
 from fleet2d.floorplan.home import Home
-from fleet2d.runtime.program import ExternalProgram, command_line
+from fleet2d.runtime.program import ExternalProgram
+
+# What ends an Arrow IPC stream: no further message.
+END_OF_STREAM = b"\xff\xff\xff\xff\0\0\0\0"
 
 
 @register("algorithm", "process")
@@ -64,8 +67,9 @@ class Process(Algorithm):
                 "robots": list(state.robots),
                 "settings": self.settings,
             }
-            command = command_line(self.command, self.arguments)
-            self.program = ExternalProgram(command, self.timeout.total_seconds(), about)
+            self.program = ExternalProgram(
+                self.command, self.arguments, self.timeout.total_seconds(), about
+            )
         blocks = {
             name: data
             for part in self.sends
@@ -104,13 +108,17 @@ def _ipc(columns: Mapping[str, Any]) -> bytes:
     """Return columns of numbers as an Arrow IPC stream of one batch."""
     import pyarrow as pa
 
-    batch = pa.record_batch(
-        [pa.array(np.ascontiguousarray(values)) for values in columns.values()], list(columns)
-    )
-    sink = pa.BufferOutputStream()
-    with pa.ipc.new_stream(sink, batch.schema) as writer:
-        writer.write_batch(batch)
-    return sink.getvalue().to_pybytes()
+    arrays = [  # not by `pa.array`, which imports pandas
+        pa.Array.from_buffers(
+            pa.from_numpy_dtype(values.dtype),
+            len(values),
+            [None, pa.py_buffer(np.ascontiguousarray(values))],
+        )
+        for values in columns.values()
+    ]
+    batch = pa.RecordBatch.from_arrays(arrays, list(columns))
+    schema: bytes = batch.schema.serialize().to_pybytes()
+    return schema + batch.serialize().to_pybytes() + END_OF_STREAM
 
 
 def _observations(history: History, _: Present) -> dict[str, bytes]:

@@ -7,7 +7,7 @@ that are written in Python.
 import math
 from collections.abc import Iterator, Sequence, Set
 from fractions import Fraction
-from typing import TYPE_CHECKING, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -113,7 +113,7 @@ class Cameras(Watcher):
         notes: What is to be said about its source.
     """
 
-    knows_truth: ClassVar[bool] = True
+    knows_truth = True
     notes: tuple[str, ...] = ()
 
     def __init__(
@@ -160,8 +160,10 @@ class Cameras(Watcher):
 
     def disturb(self, disturbances: Sequence[Disturbance]) -> None:
         """Set all disturbances, from the step on at which they look next."""
-        self.disturbances = list(disturbances)
-        memory, people = self._set_up(), [other.name for other in self.others]
+        old, self.disturbances = self.disturbances, list(disturbances)
+        injects = _without_injections(old) == _without_injections(self.disturbances)
+        memory = self._inject() if injects else self._set_up()
+        people = [other.name for other in self.others]
         forced = forced_of(self.disturbances, self.names, people)
         self.memory = carry_over(memory, self.memory, forced)
 
@@ -182,7 +184,7 @@ class Cameras(Watcher):
         ]
         has_errors = [not is_perfect(perception) for perception in perceptions]
         self.drift = _drift_of(owner)
-        context = TableContext(
+        self._context = context = TableContext(
             [other.name for other in self.others],
             [other.entity.radius * lattice.units_per_m for other in self.others],
             lattice,
@@ -191,13 +193,12 @@ class Cameras(Watcher):
         )
         self.lenses = stack_lenses(lenses, has_errors, context)
         self._perceptions = perceptions
+        self._patience = max(lens.patience for lens in lenses)
         errors = [p if errs else None for p, errs in zip(perceptions, has_errors, strict=True)]
         self.errors = error_tables(lenses, errors, context)
         self._dark = dark_cameras(self.disturbances, self.names)
         degrade(self.lenses, self.disturbances, self.names)
         self.errors.has_ghosts[self._dark] = 0
-        injected = injected_by(self.disturbances, self.names, context)
-        self.errors = self.errors._replace(injected=injected)
         self.sighting_errors = None
         if self.drift is not None or any(p and p.errors for p in perceptions):
             from fleet2d.engine.sighting_errors import SightingErrors  # few runs need them
@@ -207,10 +208,16 @@ class Cameras(Watcher):
         self._draw_streams()
         if not self.activity_senses:  # later ones would not fit the tables of the run
             self._sense_activities(perceptions)
-        count = len(self.others)
+        return self._inject()
+
+    def _inject(self) -> SightMemory:
+        """Set the false sightings of interventions; return an empty memory with room for them."""
+        injected = injected_by(self.disturbances, self.names, self._context)
+        self.errors = self.errors._replace(injected=injected)
+        clock, count = self.owner.clock, len(self.others)
         bursts = count + MAX_GHOSTS * self.errors.has_ghosts + len(self.errors.injected)
         self.rule = DetectionRule(
-            patience=max(lens.patience for lens in lenses),
+            patience=self._patience,
             step_us=clock.step_us,
             start_us=micros(clock.start - midnight_of(clock.start)),
             burst=int(bursts.sum()),
@@ -218,7 +225,7 @@ class Cameras(Watcher):
             stop_seen=False,
         )
         looks = self.lenses.latency // self.lenses.period + 2
-        return new_memory(len(lenses), count, int((looks * bursts).max()))
+        return new_memory(len(self.names), count, int((looks * bursts).max()))
 
     def _draw_streams(self) -> None:
         """Set the random stream of each draw, by names: another user doesn't change the others'."""
@@ -428,6 +435,10 @@ def dark_cameras(disturbances: Sequence[Disturbance], cameras: Sequence[str]) ->
         for c, camera in enumerate(cameras)
         if any(disturbance.dark for disturbance in of_camera(disturbances, camera))
     ]
+
+
+def _without_injections(disturbances: Sequence[Disturbance]) -> list[Disturbance]:
+    return [disturbance for disturbance in disturbances if disturbance.injected is None]
 
 
 def degrade(lenses: Lenses, disturbances: Sequence[Disturbance], cameras: Sequence[str]) -> None:

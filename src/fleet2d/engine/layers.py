@@ -103,6 +103,7 @@ class SeenArea(Watcher):
         self._bins = np.zeros((0, 2, len(patches.room)), np.int64)
         self._first_bin = 0
         self._cache = empty_pose_cache(SLOTS, len(patches.room))
+        self._is_dark = [False] * len(self._names)
         self._set_walls(robot.home.walls)
 
     def _set_walls(self, walls: Mesh) -> None:
@@ -120,8 +121,11 @@ class SeenArea(Watcher):
 
     def darken(self, cameras: Collection[str]) -> None:
         """Let these cameras see nothing from the present step on, and all others see normally."""
-        self._settle()
         is_dark = [name in cameras for name in self._names]
+        if is_dark == self._is_dark:
+            return
+        self._settle()
+        self._is_dark = is_dark
         near, far = self._open_lenses.near_squared, self._open_lenses.far_squared
         self._lenses = self._open_lenses._replace(near_squared=np.where(is_dark, far + 1, near))
         self._set_walls(self.robot.home.walls)

@@ -23,14 +23,13 @@ MAX_AHEAD = 1 << 12
 class RealSight(Cameras):
     """The cameras of a robot that perceives what a source of evidence has.
 
-    The cameras say what it watched; whom it perceived is the source's.
+    The cameras say what it watched; whom it perceived is the source's, or also the source's.
     """
-
-    knows_truth = False
 
     def prepare(self, source: EvidenceSource) -> None:
         """Set the source, a component of the scenario, and start it."""
         self.source = source.model_copy()
+        self.knows_truth = source.besides_cameras
         self.expect_disturbances()
         with blame(f"{self.owner.path}.perceives", None):
             self.source.start(self.owner, [other.name for other in self.others])
@@ -55,10 +54,19 @@ class RealSight(Cameras):
         first = self.next_step
         old_memory = [array.copy() for array in self.memory] if stop else []
         looked = min(end, first + MAX_AHEAD) if stop else end
+        if self.source.besides_cameras:
+            old_memory = [array.copy() for array in self.memory]
+            seen = super()._look(bodies, looked, stop=stop)
+            looked = seen.looked
+            self.memory.noticed[:], self.memory.seen[:] = old_memory[:2]
         with blame(f"{self.owner.path}.perceives", first):
             rows = self.source.sightings(first, looked)
         if self.source.relative and len(rows):
             rows = self._on_map(rows, bodies, first, looked)
+        if self.source.besides_cameras:
+            rows = np.concatenate([seen.sightings, rows])
+            rows[len(seen.sightings) :, Column.USER] = NOBODY  # of the simulated people
+            rows = rows[np.argsort(rows[:, Column.STEP], kind="stable")]
         patience = self.rule.patience
         events = sight_events(rows, SightMemory(*self.memory), patience, first, looked)
         ends = dict(zip((USER_LOST, USER_SEEN), self.ends, strict=True)) if stop else {}

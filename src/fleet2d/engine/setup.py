@@ -150,7 +150,7 @@ def _cameras_of(row: int, basis: Basis, method: FieldOfView, radii: I64 | None) 
         return Cameras(row, actors, users, method, radii)
     from fleet2d.engine.real_sight import RealSight  # few runs need it
 
-    sight = RealSight(row, actors, users)
+    sight = RealSight(row, actors, users, method, radii)
     sight.prepare(source)
     return sight
 

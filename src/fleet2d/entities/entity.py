@@ -76,8 +76,8 @@ class Robot(Entity):
         camera: Its only camera; null: it is blind, or has `cameras`.
         cameras: Several cameras, by name, in place of `camera`; their order doesn't matter.
         perception: How its cameras err, unless they say so themselves; null: they don't.
-        perceives: What it perceives in place of what its cameras would see, such as a real robot's
-            detections; null: what they see.
+        perceives: What it perceives in place of what its cameras would see, or besides it, such as
+            a real robot's detections; null: what they see.
         battery: Its battery, for the behavior dock; null: its charge never ends.
         gives_way: How it keeps clear of people; null: it drives on, and people go round it.
         localization: The error of its estimate of its own pose; null: there is none.
@@ -121,8 +121,12 @@ class Robot(Entity):
             raise problem_at(
                 ("perceives",), "it needs a camera, from whose view follows what it watched"
             )
-        if self.perception is not None or any(c.perception for c in self.eyes.values()):
-            raise problem_at(("perceives",), "give 'perceives' or 'perception', not both")
+        errs = self.perception is not None or any(c.perception for c in self.eyes.values())
+        if errs and not self.perceives.besides_cameras:
+            raise problem_at(
+                ("perceives",),
+                "give 'perceives' or 'perception', not both, or perceives.besides_cameras: true",
+            )
         return self
 
     @property

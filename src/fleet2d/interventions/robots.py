@@ -404,7 +404,8 @@ def check_camera(actor: Actor, camera: bool | str | None) -> None:
     eyes, name = actor.entity.eyes, camera_name(camera)
     if not eyes:
         raise ScenarioError(f"{actor.name} has no camera: give it one")
-    if getattr(actor.entity, "perceives", None) is not None:
+    source = getattr(actor.entity, "perceives", None)
+    if source is not None and not source.besides_cameras:
         raise ScenarioError(
             f"{actor.name} perceives what robots.{actor.name}.perceives has, so its cameras can't"
             " be changed: leave one of them out"

@@ -14,11 +14,10 @@ reads messages from its standard input and answers each by one on its standard o
 import contextlib
 import json
 import os
-import queue
+import select
 import subprocess
 import sys
 import tempfile
-import threading
 import time
 import weakref
 from collections.abc import Mapping, Sequence
@@ -31,6 +30,7 @@ VERSION = 1
 """The version of the messages."""
 MAX_BLOCK = 256 << 20
 MAX_LINE = 16 << 20
+READ_SIZE = 1 << 20
 # Time for a program to end by itself [s].
 END_S = 1.0
 # The end of what it wrote on stderr that an error quotes [characters].
@@ -44,12 +44,6 @@ class Answer(NamedTuple):
     blocks: dict[str, bytes]
 
 
-def command_line(program: Path, arguments: Sequence[str]) -> list[str]:
-    """Return how a program is run: a Python file by the interpreter of this process."""
-    python = [sys.executable] if program.suffix == ".py" else []
-    return [*python, str(program), *arguments]
-
-
 class ExternalProgram:
     """A program of a run, which is started when it is first asked.
 
@@ -60,15 +54,19 @@ class ExternalProgram:
         asked: How often it was asked.
     """
 
-    def __init__(self, command: Sequence[str], timeout_s: float, start: Mapping[str, Any]) -> None:
+    def __init__(
+        self, program: Path, arguments: Sequence[str], timeout_s: float, start: Mapping[str, Any]
+    ) -> None:
         """Note what to run.
 
         Args:
-            command: The program and its arguments.
+            program: The program, which runs in its folder; a file .py is run by this interpreter.
+            arguments: Its arguments.
             timeout_s: An answer that takes longer ends the run.
             start: The content of its first message.
         """
-        self._command, self._timeout_s, self._start = list(command), timeout_s, dict(start)
+        self._program, self._arguments = program.absolute(), list(arguments)
+        self._timeout_s, self._start = timeout_s, dict(start)
         self._state: bytes | None = None
         self._process: subprocess.Popen[bytes] | None = None
         self.wall_s, self.asked = 0.0, 0
@@ -81,7 +79,8 @@ class ExternalProgram:
             if state is None:
                 raise self._failure('answered "save" without a block named "state"')
         return {
-            "_command": self._command,
+            "_program": self._program,
+            "_arguments": self._arguments,
             "_timeout_s": self._timeout_s,
             "_start": self._start,
             "_state": state,
@@ -122,24 +121,27 @@ class ExternalProgram:
 
     def _begin(self) -> None:
         self._stderr = tempfile.TemporaryFile()  # noqa: SIM115 - open while the program runs
+        python = [sys.executable] if self._program.suffix == ".py" else []
         try:
             process = subprocess.Popen(  # noqa: S603 - which programs may run is checked by trust
-                self._command,
+                [*python, str(self._program), *self._arguments],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=self._stderr,
-                cwd=Path(self._command[0]).parent if os.sep in self._command[0] else None,
+                cwd=self._program.parent,
+                bufsize=0,
             )
         except OSError as error:
             self._stderr.close()
             raise ComponentError(
-                f"{self._command[0]} can't be started: {error.strerror or error}"
+                f"{self._program} can't be started: {error.strerror or error}"
             ) from error
-        self._process = process
-        answers: queue.SimpleQueue[Answer | str] = queue.SimpleQueue()
-        self._answers = answers
+        self._process, self._unread = process, bytearray()
+        assert process.stdin is not None
         assert process.stdout is not None
-        threading.Thread(target=_read, args=(process.stdout, answers), daemon=True).start()
+        self._ends = process.stdin.fileno(), process.stdout.fileno()
+        for end in self._ends:
+            os.set_blocking(end, False)
         self._finalizer = weakref.finalize(self, _end, process, self._stderr)
         self._exchange_checked({"type": "start", "version": VERSION, **self._start}, {})
         if self._state is not None:
@@ -152,29 +154,90 @@ class ExternalProgram:
             raise self._failure(f"answered {text} to {content['type']!r}, not 'ready'")
 
     def _exchange(self, content: Mapping[str, Any], blocks: Mapping[str, bytes]) -> Answer:
-        process = self._process
-        assert process is not None
-        assert process.stdin is not None
         if blocks:
             content = {**content, "blocks": [[name, len(data)] for name, data in blocks.items()]}
+        if self._unread:
+            raise self._failure(f"wrote {bytes(self._unread[:80])!r} without being asked")
+        message = json.dumps(content).encode() + b"\n" + b"".join(blocks.values())
         try:
-            process.stdin.write(json.dumps(content).encode() + b"\n" + b"".join(blocks.values()))
-            process.stdin.flush()
-            answer = self._answers.get(timeout=self._timeout_s)
-        except queue.Empty:
+            answer = self._transfer(memoryview(message))
+        except TimeoutError:
             raise self._failure(
                 f"didn't answer {content['type']!r} within {self._timeout_s:g} s and was ended"
             ) from None
-        except OSError:
-            answer = "ended"
-        if isinstance(answer, str):
+        except (ValueError, TypeError, AttributeError) as error:
+            line = bytes(self._unread[:80])
+            raise self._failure(
+                f"wrote {line!r}, which is no line of JSON with a type ({error})"
+            ) from None
+        if answer is None:
+            process = self._process
+            assert process is not None
             with contextlib.suppress(subprocess.TimeoutExpired):
                 process.wait(END_S)
-            code = process.poll()
-            if answer == "ended":
-                answer = f"ended with code {code} instead of answering {content['type']!r}"
-            raise self._failure(answer)
+            raise self._failure(
+                f"ended with code {process.poll()} instead of answering {content['type']!r}"
+            )
         return answer
+
+    def _transfer(self, message: memoryview) -> Answer | None:
+        """Write a message while reading the answer; return None if the program has ended.
+
+        Both at once, as neither side reads while it waits for the other one to take its bytes.
+
+        Raises:
+            TimeoutError: It doesn't answer in time.
+            ValueError: It answers with something else.
+        """
+        to_program, from_program = self._ends
+        poll = select.poll()
+        poll.register(from_program, select.POLLIN)
+        poll.register(to_program, select.POLLOUT)
+        deadline, needed = time.monotonic() + self._timeout_s, 0
+        answer: Answer | None = None
+        while True:
+            if message:
+                message = message[_write(to_program, message) :]
+                if not message:
+                    poll.unregister(to_program)
+            if answer is not None and not message:
+                return answer
+            ready = poll.poll(max(0.0, deadline - time.monotonic()) * 1000)
+            if not ready:
+                raise TimeoutError
+            if all(end != from_program for end, _ in ready):
+                continue
+            part = os.read(from_program, READ_SIZE)
+            if not part:
+                return None
+            self._unread += part
+            if answer is None and len(self._unread) >= needed:
+                answer, needed = self._parse()
+
+    def _parse(self) -> tuple[Answer | None, int]:
+        """Return an answer that has arrived as a whole; else None, and the size to wait for.
+
+        Raises:
+            ValueError: It isn't an answer.
+        """
+        end = self._unread.find(b"\n", 0, MAX_LINE) + 1
+        if not end:
+            if len(self._unread) >= MAX_LINE:
+                raise ValueError(f"more than {MAX_LINE} bytes without a newline")
+            return None, 0
+        content = json.loads(self._unread[:end])
+        sizes = [(str(name), int(size)) for name, size in content.get("blocks", ())]
+        if any(not 0 <= size <= MAX_BLOCK for _, size in sizes):
+            raise ValueError("a block is too large")
+        whole = end + sum(size for _, size in sizes)
+        if len(self._unread) < whole:
+            return None, whole
+        blocks = {}
+        for name, size in sizes:
+            blocks[name] = bytes(self._unread[end : end + size])
+            end += size
+        del self._unread[:whole]
+        return Answer(content, blocks), 0
 
     def _failure(self, text: str) -> ComponentError:
         """End the program, and return the error about it."""
@@ -183,26 +246,17 @@ class ExternalProgram:
         said = self._stderr.read().decode(errors="replace").strip()
         self._finalizer()
         quoted = f"; on stderr it wrote: {said}" if said else ""
-        return ComponentError(f"{' '.join(self._command)} {text}{quoted}")
+        return ComponentError(f"{self._program} {text}{quoted}")
 
 
-def _read(stream: IO[bytes], answers: "queue.SimpleQueue[Answer | str]") -> None:
-    """Read answers until the stream ends."""
-    while True:
-        line = stream.readline(MAX_LINE)
-        if not line:
-            answers.put("ended")
-            return
-        try:
-            content = json.loads(line)
-            sizes = [(str(name), int(size)) for name, size in content.get("blocks", ())]
-            if any(not 0 <= size <= MAX_BLOCK for _, size in sizes):
-                raise ValueError("a block is too large")
-            blocks = {name: stream.read(size) for name, size in sizes}
-        except (ValueError, TypeError, AttributeError) as error:
-            answers.put(f"wrote {line[:80]!r}, which is no line of JSON with a type ({error})")
-            return
-        answers.put(Answer(content, blocks))
+def _write(pipe: int, message: memoryview) -> int:
+    """Write as much of a message as a pipe takes; return the number of bytes that are done with."""
+    try:
+        return os.write(pipe, message)
+    except BlockingIOError:
+        return 0
+    except BrokenPipeError:  # the program has ended, maybe with an answer
+        return len(message)
 
 
 def _end(process: "subprocess.Popen[bytes]", stderr: IO[bytes]) -> None:

@@ -21,10 +21,16 @@ class EvidenceSource(Component):
     with UNKNOWN_TRUTH for the true user. What the robot watched still follows from its poses and
     cameras.
 
+    Attributes:
+        besides_cameras: Whether this comes in addition to what its cameras see, as false positives
+            that are known in advance do; else in place of it.
+
     After `start` it has `notes`, lines about its log: what was left out, and what doesn't fit.
     """
 
     kind: ClassVar[str] = "evidence_source"
+
+    besides_cameras: bool = False
 
     @property
     def relative(self) -> bool:

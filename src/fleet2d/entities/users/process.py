@@ -12,7 +12,7 @@ from fleet2d.configuration.units import InputPath, PositiveDuration
 from fleet2d.entities.behavior import Behavior, Situation
 from fleet2d.entities.plan import Plan
 from fleet2d.errors import ComponentError, Fleet2DError
-from fleet2d.runtime.program import ExternalProgram, command_line
+from fleet2d.runtime.program import ExternalProgram
 
 if TYPE_CHECKING:
     from fleet2d.entities.behavior import Actor
@@ -51,8 +51,9 @@ class ProcessBehavior(Behavior):
             "rooms": [{"name": room.name, "type": room.type} for room in actor.home.rooms],
             "settings": self.settings,
         }
-        command = command_line(self.command, self.arguments)
-        self.program = ExternalProgram(command, self.timeout.total_seconds(), about)
+        self.program = ExternalProgram(
+            self.command, self.arguments, self.timeout.total_seconds(), about
+        )
 
     def decide(self, now: Situation) -> Plan | None:
         """Ask the program."""
