@@ -163,6 +163,13 @@ def test_a_program_that_answers_while_it_is_told_is_heard(tmp_path: Path) -> Non
     assert run.status == "complete"
 
 
+def test_a_program_runs_in_its_own_folder(tmp_path: Path) -> None:
+    (tmp_path / "answer.json").write_text('{"type": "none"}')
+    run = fleet2d.run(scenario(program(tmp_path, "print(open('answer.json').read(), flush=True)")))
+
+    assert run.status == "complete"
+
+
 def test_a_program_that_cannot_be_started_is_blamed(tmp_path: Path) -> None:
     path = tmp_path / "alg"
     path.write_text("not a program")
