@@ -1,6 +1,7 @@
 """How true the people are: simulated time use beside the American Time Use Survey.
 
     python benchmarks/people.py compare [--people 1000] [--weeks 1] [--figure FILE] [--json FILE]
+    python benchmarks/people.py measures --data FOLDER [--days 28]   # days, as those of real people
     python benchmarks/people.py visits --data FOLDER [--days 28]   # moving about, as real people
     python benchmarks/people.py rooms [--figure FILE]      # room_sampling: shares over time
     python benchmarks/people.py speed [--users N]          # how long people take
@@ -8,7 +9,9 @@
 
 `compare` draws the days of that many people of each group of `population`, and prints how far the
 share of them that do each activity is from the survey's, by hour: the total variation distance, and
-the largest difference of each activity. `visits` prints how often each persona visits bathrooms,
+the largest difference of each activity. `measures` prints fourteen measures of the days of each
+persona, with and without the part short_stays, and of the logs; then how far the days of a persona
+fitted to each log are from days held back, beside copied days and a Markov chain. `visits` prints how often each persona visits bathrooms,
 goes somewhere for less than three minutes, and comes back, and how long it stays in which kind of
 room, and how its hours differ from the survey's, beside the real homes of CASAS and UCI ADL and the
 simulated one of HOMER+; it fails where a persona is outside the spread of the real ones. `rooms`
@@ -35,17 +38,27 @@ from typing import Any
 
 import numpy as np
 from visits import (
+    MEDIANS,
+    ActivityTrace,
+    Measures,
     RoomTrace,
     Visits,
     count_visits,
+    grouped_stays,
+    measure,
     spread,
     stays,
-    trace_of_log,
-    trace_of_persona,
+    traces_of_log,
+    traces_of_persona,
 )
 
 import fleet2d
 import fleet2d.routines.survey as survey
+from fleet2d.fit.command import table
+from fleet2d.fit.persona import validate
+from fleet2d.fit.timeline import ks_distance, read_timeline
+from fleet2d.logs.layouts import read_log
+from fleet2d.logs.log import ActivityLog
 from fleet2d.routines.interruptions import without_interruptions
 from fleet2d.routines.life import Life
 from fleet2d.routines.persona import bundled_names, bundled_persona
@@ -270,10 +283,50 @@ def rooms_over_time(days: int, seeds: int) -> list[tuple[int, float, float]]:
     ]
 
 
+def show_measures(data: Path, days: int, seed: int) -> None:
+    """Print the measures of the logs' days and of the personas', and those of fitted personas."""
+    print(f"personas: {days} days from Monday, 2026-01-05, seed {seed}, bundled home, furnished")
+    print("means per day or night; medians of bathroom min and stays min; stay KS from each log")
+    columns = [name.replace("_", " ") for name in Measures._fields]
+    columns += ["living min", "bath < 1 min", *(f"KS {name}" for name in REAL)]
+    print(f"{'':30}" + "".join(f"{column:>15}" for column in columns))
+    homes = {name: traces_of_log(data / path) for name, path in LOGS.items()}
+    real = {name: np.sort(measure(*homes[name]).stays_min) for name in REAL}
+    for name, traces in homes.items():
+        print_measures(name, traces, real)
+    for name in bundled_names():
+        print_measures(name, traces_of_persona(name, days, seed), real)
+        lively = traces_of_persona({"extends": [name, "short_stays"]}, days, seed)
+        print_measures(f"{name}, short_stays", lively, real)
+    for name, path in LOGS.items():
+        log = read_log(data / path)
+        assert isinstance(log, ActivityLog)
+        print(f"\n{name}: fitted")
+        print("\n".join(table(validate(read_timeline(log), seed=seed))))
+
+
+def print_measures(
+    name: str, traces: tuple[RoomTrace, ActivityTrace], real: dict[str, np.ndarray]
+) -> None:
+    """Print a row of the table of measures."""
+    found = measure(*traces)
+    cells = [
+        float((np.median if key in MEDIANS else np.mean)(values)) if values else math.nan
+        for key, values in found._asdict().items()
+    ]
+    living = [s.length / 60 for s in grouped_stays(traces[0]) if s.kind == "living_room"]
+    cells += [
+        float(np.median(living)) if living else math.nan,
+        sum(m < 1 for m in found.bathroom_min) / len(found.bathroom_min),
+        *(ks_distance(np.sort(found.stays_min), stays_min) for stays_min in real.values()),
+    ]
+    print(f"{name:30}" + "".join(f"{cell:>15.2f}" for cell in cells))
+
+
 def show_visits(data: Path, days: int, seed: int) -> bool:
     """Print the table of visits; return whether every persona is within the real homes' spread."""
-    homes = {name: trace_of_log(data / path) for name, path in LOGS.items()}
-    lives = {name: trace_of_persona(name, days, seed) for name in bundled_names()}
+    homes = {name: traces_of_log(data / path)[0] for name, path in LOGS.items()}
+    lives = {name: traces_of_persona(name, days, seed)[0] for name in bundled_names()}
     print(f"personas: {days} days from Monday, 2026-01-05, seed {seed}, bundled home, furnished")
     print("per day: mean [lowest to highest day]")
     print(f"{'':18}" + "".join(f"{name.replace('_', ' '):>20}" for name in Visits._fields))
@@ -418,10 +471,11 @@ def main() -> None:
     one.add_argument("--json", type=Path, help="write the rows to this file, too")
     two = commands.add_parser("derive")
     two.add_argument("folder", type=Path)
-    five = commands.add_parser("visits")
-    five.add_argument("--data", type=Path, required=True, help="the folder of the three logs")
-    five.add_argument("--days", type=int, default=28)
-    five.add_argument("--seed", type=int, default=4)
+    for name in ("visits", "measures"):
+        five = commands.add_parser(name)
+        five.add_argument("--data", type=Path, required=True, help="the folder of the three logs")
+        five.add_argument("--days", type=int, default=28)
+        five.add_argument("--seed", type=int, default=4)
     three = commands.add_parser("rooms")
     three.add_argument("--days", type=int, default=64)
     three.add_argument("--seeds", type=int, default=8)
@@ -433,6 +487,9 @@ def main() -> None:
     if arguments.command == "visits":
         if not show_visits(arguments.data, arguments.days, arguments.seed):
             raise SystemExit(1)
+        return
+    if arguments.command == "measures":
+        show_measures(arguments.data, arguments.days, arguments.seed)
         return
     if arguments.command == "rooms":
         rooms = rooms_over_time(arguments.days, arguments.seeds)

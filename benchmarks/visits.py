@@ -1,20 +1,24 @@
-"""Visits to kinds of rooms a day, short ones, and returns, of logs and of simulated personas.
+"""Visits to kinds of rooms, stays, outings, nights and meals, of logs and of simulated personas.
 
-They are counted in the kinds of rooms of each second, so that logs and personas are compared by
-the same rule.
+They are counted in the kinds of rooms and the activities of each second, so that logs and personas
+are compared by the same rule.
 """
 
-from collections.abc import Sequence
-from datetime import timedelta
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
+from datetime import date, timedelta
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from pydantic import TypeAdapter
 
 from fleet2d.fit.timeline import read_seconds, runs
-from fleet2d.kernels import I16
+from fleet2d.kernels import I16, Bool
 from fleet2d.logs.layouts import read_log
 from fleet2d.logs.log import AWAY, ActivityLog, LogError
+from fleet2d.routines.life import Life
+from fleet2d.routines.persona import AnyPersona
 
 DAY_S, HOUR_S = 86_400, 3_600
 # A shorter time in a room is not counted as a visit [s].
@@ -40,8 +44,20 @@ class RoomTrace(NamedTuple):
     kinds: tuple[str, ...]
 
 
-def trace_of_log(path: Path) -> RoomTrace:
-    """Return the trace of a log of rooms and activities.
+class ActivityTrace(NamedTuple):
+    """The activity of each second, from midnight on.
+
+    Attributes:
+        seconds: Index of the activity, -1 if unknown, int16 (seconds,).
+        names: The activities.
+    """
+
+    seconds: I16
+    names: tuple[str, ...]
+
+
+def traces_of_log(path: Path) -> tuple[RoomTrace, ActivityTrace]:
+    """Return the rooms and the activities of a log.
 
     Raises:
         LogError: The log can't be read, or is one of positions.
@@ -52,11 +68,18 @@ def trace_of_log(path: Path) -> RoomTrace:
     states, seconds = read_seconds(log)
     kinds = tuple(sorted({state.place for state in states}))
     index = np.array([kinds.index(state.place) for state in states] + [-1], np.int16)
-    return RoomTrace(index[seconds], kinds)
+    names = tuple(state.activity for state in states)
+    return RoomTrace(index[seconds], kinds), ActivityTrace(seconds, names)
 
 
-def trace_of_persona(persona: str, days: int, seed: int) -> RoomTrace:
-    """Return the trace of a persona that lives alone in the bundled home, with furniture."""
+def traces_of_persona(persona: Any, days: int, seed: int) -> tuple[RoomTrace, ActivityTrace]:
+    """Return the rooms and activities of one who lives alone in the bundled home, with furniture.
+
+    Args:
+        persona: The persona, as in a scenario.
+        days: The number of days.
+        seed: The seed of the run.
+    """
     from fleet2d.engine.simulation import run
 
     stored = run(
@@ -69,7 +92,16 @@ def trace_of_persona(persona: str, days: int, seed: int) -> RoomTrace:
     of_room = [room.type for room in stored.plan.rooms]
     kinds = tuple(sorted({*of_room, AWAY}))
     index = np.array([kinds.index(kind) for kind in (*of_room, AWAY)], np.int16)
-    return RoomTrace(index[stored.path("ana", every=timedelta(seconds=1)).room], kinds)
+    rooms = RoomTrace(index[stored.path("ana", every=timedelta(seconds=1)).room], kinds)
+    life = Life(TypeAdapter(AnyPersona).validate_python(persona), seed, "users.ana")
+    names: dict[str, int] = {}
+    seconds = np.full(days * DAY_S, -1, np.int16)
+    first = date.fromisoformat(START).toordinal()
+    for day in range(-1, days):
+        for episode in life.day(first + day):
+            begin, end = (max(0, day * DAY_S + at) for at in episode[1:3])
+            seconds[begin:end] = names.setdefault(episode.activity, len(names))
+    return rooms, ActivityTrace(seconds, tuple(names))
 
 
 class Visits(NamedTuple):
@@ -150,3 +182,131 @@ def spread(homes: Sequence[Visits]) -> tuple[list[int], list[int]]:
         lows.append(min(days))
         highs.append(max(days))
     return lows, highs
+
+
+class Measures(NamedTuple):
+    """What is measured of a person's days.
+
+    Attributes:
+        bathroom: Visits to bathrooms and toilets, of each day.
+        bathroom_min: The length of each of them [min].
+        night_bathroom: Those during each night.
+        short: Visits of less than three minutes at home, of each day.
+        transitions: Changes of room, or to and from out, of each day.
+        outings: Times out for more than five minutes, of each day.
+        away_h: Time of these [h], of each day.
+        return_h: When the last outing of a day ended [h], of each day with one.
+        sleep_h: The length of each night's sleep [h].
+        bed_h: When it began [h], after midnight more than 24.
+        wake_h: When it ended [h].
+        meals: Meals and snacks, of each day.
+        main_meals: Breakfasts, lunches and dinners, of each day.
+        stays_min: The length of each stay in a room at home [min].
+    """
+
+    bathroom: list[float]
+    bathroom_min: list[float]
+    night_bathroom: list[float]
+    short: list[float]
+    transitions: list[float]
+    outings: list[float]
+    away_h: list[float]
+    return_h: list[float]
+    sleep_h: list[float]
+    bed_h: list[float]
+    wake_h: list[float]
+    meals: list[float]
+    main_meals: list[float]
+    stays_min: list[float]
+
+
+# Those of which the median is printed; of the others it is the mean.
+MEDIANS = ("bathroom_min", "stays_min")
+# Main meals, and the least pause between two of them, and between two of any kind [s].
+MAIN_MEALS, MAIN_PAUSE_S, PAUSE_S = ("breakfast", "lunch", "dinner"), 1800, 600
+# A day counts if more than this share of it is known.
+KNOWN_SHARE = 0.8
+# An absence and a sleep that are counted last longer than this [s].
+ABSENCE_S, SLEEP_S, UP_AT_NIGHT_S = 300, 3 * HOUR_S, HOUR_S
+
+
+def grouped_stays(trace: RoomTrace) -> list[Stay]:
+    """Return stays without a gap: hallways and glances count for the room before them.
+
+    Bathrooms and toilets are one kind, as are kitchens and dining rooms.
+    """
+    one = {"toilet": "bathroom", "dining_room": "kitchen"}
+    result: list[Stay] = []
+    for label, begin, length in runs(trace.rooms):
+        kind = "" if label < 0 else trace.kinds[label]
+        kind = one.get(kind, kind)
+        passes = not kind or kind in PASSAGES or (length < PASSING_S and kind != AWAY)
+        if result and (passes or result[-1].kind == kind):
+            result[-1] = result[-1]._replace(length=begin + length - result[-1].begin)
+        elif not passes:
+            result.append(Stay(kind, begin, length))
+    return result
+
+
+def _spans(flags: Bool, pause_s: int) -> list[tuple[int, int]]:
+    """Return begins and ends of the times that are flagged; shorter pauses don't end one."""
+    joined: list[tuple[int, int]] = []
+    for flag, begin, length in runs(flags.astype(np.int16)):
+        if not flag:
+            continue
+        if joined and begin - joined[-1][1] <= pause_s:
+            joined[-1] = joined[-1][0], begin + length
+        else:
+            joined.append((begin, begin + length))
+    return joined
+
+
+def measure(trace: RoomTrace, activities: ActivityTrace) -> Measures:
+    """Measure the days of a person.
+
+    Args:
+        trace: The kind of room in each second, from midnight.
+        activities: The activity in each second.
+    """
+    known = (trace.rooms[: len(trace.rooms) // DAY_S * DAY_S] >= 0).reshape(-1, DAY_S)
+    days = np.flatnonzero(known.mean(axis=1) > KNOWN_SHARE).tolist()
+    all_stays = grouped_stays(trace)
+
+    def by_day(begins: Iterable[int]) -> list[float]:
+        counts = Counter(begin // DAY_S for begin in begins)
+        return [float(counts[day]) for day in days]
+
+    def doing(test: Callable[[str], bool]) -> Bool:
+        which = np.array([test(name) for name in activities.names] + [False])
+        return which[activities.seconds]
+
+    bathroom = [stay for stay in all_stays if stay.kind == "bathroom"]
+    outings = [(s.begin, s.begin + s.length) for s in all_stays if s.kind == AWAY]
+    outings = [(begin, end) for begin, end in outings if end - begin > ABSENCE_S]
+    returns = [max((e % DAY_S for _, e in outings if e // DAY_S == d), default=-1) for d in days]
+    nights = _spans(doing(lambda name: "sleep" in name or "toilet_trans" in name), UP_AT_NIGHT_S)
+    nights = [(begin, end) for begin, end in nights if end - begin > SLEEP_S]
+    is_main = doing(lambda name: name.removeprefix("eat_") in MAIN_MEALS)
+    is_meal = is_main | doing(lambda name: name == "snack")
+    return Measures(
+        bathroom=by_day(stay.begin for stay in bathroom),
+        bathroom_min=[stay.length / 60 for stay in bathroom],
+        night_bathroom=[
+            float(sum(begin + 60 <= stay.begin <= end - 180 for stay in bathroom))
+            for begin, end in nights
+        ],
+        short=by_day(s.begin for s in all_stays if s.length < SHORT_S and s.kind != AWAY),
+        transitions=by_day(stay.begin for stay in all_stays),
+        outings=by_day(begin for begin, _ in outings),
+        away_h=[
+            sum(max(0, min(e, DAY_S * (d + 1)) - max(b, DAY_S * d)) for b, e in outings) / HOUR_S
+            for d in days
+        ],
+        return_h=[end / HOUR_S for end in returns if end >= 0],
+        sleep_h=[(end - begin) / HOUR_S for begin, end in nights],
+        bed_h=[(begin / HOUR_S - 12) % 24 + 12 for begin, _ in nights],
+        wake_h=[end / HOUR_S % 24 for _, end in nights],
+        meals=by_day(begin for begin, _ in _spans(is_meal, PAUSE_S)),
+        main_meals=by_day(begin for begin, _ in _spans(is_main, MAIN_PAUSE_S)),
+        stays_min=[s.length / 60 for s in all_stays[1:-1] if s.kind != AWAY],
+    )

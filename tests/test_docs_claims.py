@@ -148,7 +148,7 @@ def test_the_readme_names_the_tables_of_the_bundled_scenario(day: fleet2d.Run) -
     listed = re.search(r"Parquet file per table \(([^)]*)\)", text)
     assert listed is not None
     assert set(day.tables) == set(names(listed[1]))
-    assert {6: "six"}[len(bundled_names())] in text
+    assert {7: "seven"}[len(bundled_names())] in text
 
 
 # Behaviors, algorithms, layers, reactions

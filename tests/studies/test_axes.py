@@ -93,7 +93,7 @@ def test_synthetic_homes_are_called_by_their_seeds() -> None:
 def test_all_personas_are_those_that_come_with_fleet2d() -> None:
     axis_labels = labels(axis(personas="all", user="ana"))
     assert ("retired",) in axis_labels
-    assert 6 == len(axis_labels)
+    assert 7 == len(axis_labels)
 
 
 @pytest.mark.parametrize("method", ["random", "latin_hypercube", "orthogonal", "sobol"])

@@ -124,7 +124,17 @@ def usual_needs() -> dict[str, Need]:
     >>> sorted(usual_needs())
     ['call', 'drink', 'toilet']
     """
-    data = read_document(FOLDER / "needs.yaml").data["needs"]
+    return _needs("needs")
+
+
+@cache
+def population_needs() -> dict[str, Need]:
+    """Return the needs of people of the survey: an adult's, and a meal that it doesn't record."""
+    return {**usual_needs(), **_needs("population")}
+
+
+def _needs(section: str) -> dict[str, Need]:
+    data = read_document(FOLDER / "needs.yaml").data[section]
     return {name: Need.model_validate(fields) for name, fields in data.items()}
 
 

@@ -92,7 +92,7 @@ class Manners(Settings):
 
 
 FOLDER = Path(__file__).parent
-BUNDLED = FOLDER / "personas"
+BUNDLED, PARTS = FOLDER / "personas", FOLDER / "parts"
 DAY = timedelta(days=1)
 Dates = tuple[date | tuple[date, date], ...]
 
@@ -518,7 +518,9 @@ def _without_nulls(data: Any, keys: tuple[str, ...]) -> Any:
 
 
 def read_persona(value: object, chain: tuple[str, ...] = ()) -> Any:
-    """Read a persona: a bundled name, the path of a YAML file, or a mapping that may `extend` one.
+    """Read a persona: a bundled name, the path of a YAML file, or a mapping that may `extend` some.
+
+    Of a list, each changes those before it; a part, such as short_stays, changes any persona.
 
     Raises:
         PydanticCustomError: There is no such persona, or its file can't be read.
@@ -528,7 +530,13 @@ def read_persona(value: object, chain: tuple[str, ...] = ()) -> Any:
     if isinstance(value, str) and value in bundled_names() and not chain:
         return bundled_persona(str(value))
     if isinstance(value, Mapping):
-        below = read_persona(value["extends"], (*chain, ""))
+        names = value["extends"]
+        below: Any = {}
+        for name in names if isinstance(names, list | tuple) else [names]:
+            above = read_persona(name, (*chain, ""))
+            if below and "needs" in above and "needs" not in below:
+                below = {**below, "needs": usual_needs()}  # a part adds to them
+            below = merge(below, above)
         return merge(below, {key: v for key, v in value.items() if key != "extends"})
     if not isinstance(value, str | Path) or not str(value):
         raise problem(
@@ -537,11 +545,19 @@ def read_persona(value: object, chain: tuple[str, ...] = ()) -> Any:
         )
     if str(value) in bundled_names():
         path = BUNDLED / f"{value}.yaml"
+    elif chain and str(value) in part_names():
+        path = PARTS / f"{value}.yaml"
     else:
         path = folder_of(value) / Path(value).expanduser()
     if not path.is_file():
+        if str(value) in part_names():
+            raise problem(
+                f"{str(value)!r} is a part of a persona: extend one with it, like"
+                f" {{extends: [retired, {value}]}}"
+            )
+        known = [*bundled_names(), *(part_names() if chain else ())]
         raise problem(
-            f"there is no persona {str(value)!r}{suggest(value, bundled_names())}; your own is the"
+            f"there is no persona {str(value)!r}{suggest(value, known)}; your own is the"
             " path of a YAML file"
         )
     if str(path.resolve()) in chain:
@@ -558,9 +574,19 @@ def bundled_names() -> list[str]:
     """Return the names of the personas that come with Fleet2D.
 
     >>> bundled_names()
-    ['child', 'night_shift', 'retired', 'student', 'works_from_home', 'works_outside']
+    ['child', 'night_shift', 'retired', 'retired_active', 'student', 'works_from_home', 'works_outside']
     """
     return sorted(path.stem for path in BUNDLED.glob("*.yaml"))
+
+
+@cache
+def part_names() -> list[str]:
+    """Return the names of the parts that come with Fleet2D, which personas extend.
+
+    >>> part_names()
+    ['short_stays']
+    """
+    return sorted(path.stem for path in PARTS.glob("*.yaml"))
 
 
 def merge(below: Any, above: Any) -> Any:
@@ -577,7 +603,7 @@ _LOADED: dict[str, Persona] = {}  # bundled personas, by name
 def bundled_persona(name: str) -> Persona:
     """Return a persona that comes with Fleet2D: the same each time."""
     if name not in _LOADED:
-        _LOADED[name] = Persona.model_validate(read_document(BUNDLED / f"{name}.yaml").data)
+        _LOADED[name] = Persona.model_validate(read_persona(name, ("",)))
     return _LOADED[name]
 
 

@@ -63,6 +63,21 @@ def test_days_follow_each_other_without_a_gap() -> None:
         assert 4 * HOUR == after[0].begin
 
 
+def test_hardly_a_day_of_the_retired_has_no_meal_at_home() -> None:
+    """Without what the survey doesn't record, as eating in front of the television, 29 % had none."""
+    simulation = Simulation(scenario("5 min", users=users(40, group="retired")))
+    meals = [
+        sum(
+            episode.activity in ("breakfast", "lunch", "dinner")
+            for episode in actor.behaviors[0].day(day)
+        )
+        for actor in simulation.actors.values()
+        for day in range(MONDAY, MONDAY + 7)
+    ]
+    assert meals.count(0) < 0.06 * len(meals)
+    assert 2 < statistics.mean(meals) < 3
+
+
 def test_an_hour_of_television_lasts_as_long_as_in_the_survey() -> None:
     group = survey.group("retired")
     lasted = []

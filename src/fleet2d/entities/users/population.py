@@ -13,8 +13,8 @@ from fleet2d.routines.interruptions import (
     activities_of,
     interrupt,
     interruption_rules,
+    population_needs,
     usual_errands,
-    usual_needs,
 )
 from fleet2d.routines.planner import REST, Episode
 from fleet2d.routines.survey import activities, draw_works_at_home, to_activities
@@ -35,8 +35,9 @@ class Population(ResidentBehavior):
 
     Attributes:
         group: Group of people; any: drawn by the groups' shares of the people.
-        bodily_needs: Whether bodily needs and short errands interrupt an adult's activities. The
-            survey doesn't record them: it counts their time as that of the interrupted activity.
+        bodily_needs: Whether bodily needs, short errands, and a meal after hours without one,
+            interrupt activities. The survey doesn't record them: it counts their time as that of
+            the interrupted activity.
     """
 
     group: Literal["any", "workers", "retired", "working_parents", "at_home"] = "any"
@@ -57,8 +58,8 @@ class Population(ResidentBehavior):
         names = {*activities(self.people), REST}
         self.rules, self.interruptions = None, actor.stream("needs")
         if self.bodily_needs:
-            self.rules = interruption_rules(usual_needs(), usual_errands(), known)
-            names |= activities_of(usual_needs(), usual_errands())
+            self.rules = interruption_rules(population_needs(), usual_errands(), known)
+            names |= activities_of(population_needs(), usual_errands())
         self.settle(actor, {name: known[name] for name in sorted(names)}, Spots(actor))
 
     def begins_at(self, time: datetime) -> "RoomChoice | Point | None":
