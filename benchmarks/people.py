@@ -11,15 +11,15 @@
 share of them that do each activity is from the survey's, by hour: the total variation distance, and
 the largest difference of each activity. `measures` prints fourteen measures of the days of each
 persona, with and without the part short_stays, and of the logs; then how far the days of a persona
-fitted to each log are from days held back, beside copied days and a Markov chain. `visits` prints how often each persona visits bathrooms,
-goes somewhere for less than three minutes, and comes back, and how long it stays in which kind of
-room, and how its hours differ from the survey's, beside the real homes of CASAS and UCI ADL and the
-simulated one of HOMER+; it fails where a persona is outside the spread of the real ones. `rooms`
-simulates a user who samples rooms and prints how far the shares of time are from the given ones
-after 1, 2, 4, … days. `speed` times the planning of days, the base month with a routine beside the
-one with a schedule (in processor time: other work on the machine doesn't count), and a month of N
-people. `derive` makes the table that `population`
-draws from of the survey's summary files.
+fitted to each log are from days held back, beside copied days and a Markov chain. `visits` prints
+how often each persona visits bathrooms, goes somewhere for less than three minutes, and comes back,
+and how long it stays in which kind of room, and how its hours differ from the survey's, beside the
+real homes of CASAS and UCI ADL and the simulated one of HOMER+; it fails where a persona is outside
+the spread of the real ones. `rooms` simulates a user who samples rooms and prints how far the
+shares of time are from the given ones after 1, 2, 4, … days. `speed` times the planning of days,
+the base month with a routine beside the one with a schedule (in processor time: other work on the
+machine doesn't count), and a month of N people. `derive` makes the table that `population` draws
+from of the survey's summary files.
 """
 
 import argparse
@@ -458,8 +458,8 @@ def time_crowd(users: int, days: int) -> None:
     )
 
 
-def main() -> None:
-    """Do what is asked for."""
+def parsed() -> argparse.Namespace:
+    """Read the command line."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawTextHelpFormatter
     )
@@ -483,30 +483,36 @@ def main() -> None:
     four = commands.add_parser("speed")
     four.add_argument("--users", type=int, default=50)
     four.add_argument("--days", type=int, default=30)
-    arguments = parser.parse_args()
+    return parser.parse_args()
+
+
+def main() -> None:
+    """Do what is asked for."""
+    arguments = parsed()
     if arguments.command == "visits":
         if not show_visits(arguments.data, arguments.days, arguments.seed):
             raise SystemExit(1)
-        return
-    if arguments.command == "measures":
+    elif arguments.command == "measures":
         show_measures(arguments.data, arguments.days, arguments.seed)
-        return
-    if arguments.command == "rooms":
+    elif arguments.command == "rooms":
         rooms = rooms_over_time(arguments.days, arguments.seeds)
         print("days   error of a share   to be expected")
         for day, error, expected in rooms:
             print(f"{day:>4}   {error:>16.4f}   {expected:>14.4f}")
         if arguments.figure:
             draw_rooms(rooms, arguments.figure)
-        return
-    if arguments.command == "speed":
+    elif arguments.command == "speed":
         time_planning()
         time_month()
         time_crowd(arguments.users, arguments.days)
-        return
-    if arguments.command == "derive":
+    elif arguments.command == "derive":
         survey.TABLE.write_text(written(derive(arguments.folder)), encoding="utf-8")
-        return
+    else:
+        show_compared(arguments)
+
+
+def show_compared(arguments: argparse.Namespace) -> None:
+    """Print how far people are from the survey, and write rows and a figure if asked for."""
     found = compare(arguments.people, arguments.weeks)
     show(found)
     if arguments.json:
