@@ -27,6 +27,7 @@ from fleet2d.floorplan.home_change import ALL_ROOMS, HomeChange
 from fleet2d.floorplan.mesh import Segment
 from fleet2d.floorplan.placed_objects import move_object
 from fleet2d.floorplan.rooms.room import PRIORITY, usual_type
+from fleet2d.floorplan.slow_area import SlowArea
 from fleet2d.floorplan.space import grow_shape
 from fleet2d.kernels import F64
 from fleet2d.kernels.motion import Breakpoints
@@ -115,6 +116,8 @@ class ChangeQueue:
         self.names = list(self.doors)
         self._used_us = [-1] * len(self.names)
         self._switches = PeopleSwitches(basis)
+        self._floor = basis.scenario.floorplan.slows
+        self.slow((), 0, ())
         self._queue: list[DueChange] = []
         self._count = 0
         for number, door in enumerate(self.doors.values()):
@@ -123,6 +126,14 @@ class ChangeQueue:
             if not door.open:
                 self._put(0, HomeChange(shut=self.names[number]), "at first")
             self._schedule(number, door)
+
+    def slow(self, areas: Sequence[SlowArea], step: int, actors: Sequence[Actor]) -> None:
+        """Set the areas that slow robots down, besides those of the floor plan, at a step."""
+        lattice, before = self.home.plan.lattice, self.home.slows
+        self.home.slows = tuple(area.on(lattice) for area in (*self._floor, *areas))
+        robots = [actor for actor in actors if actor.entity.minds_floor]
+        for region in {*before} ^ {*self.home.slows}:
+            self._stop(step, robots, np.array(region.corners, np.float64))
 
     def next_due(self) -> int | None:
         """Return the step of the next change; None if there is none."""

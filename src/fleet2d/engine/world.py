@@ -27,6 +27,7 @@ from fleet2d.entities.objects.home_object import SensorFault
 from fleet2d.errors import ScenarioError
 from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.home_change import HomeChange
+from fleet2d.floorplan.slow_area import SlowArea
 from fleet2d.interventions.intervention import (
     ENTRY_KEYS,
     ClockTime,
@@ -175,6 +176,10 @@ class EngineWorld:
     def change(self, change: HomeChange) -> None:
         """Change the home at the present step."""
         self._state.changes.ask(change, self.step, "a script")
+
+    def slow(self, areas: Sequence[SlowArea]) -> None:
+        """Set the areas that slow robots down, besides those of the floor plan."""
+        self._state.changes.slow(areas, self.step, self._state.actors)
 
     def emit(self, entity: str, event: EventKind, detail: str) -> None:
         """Record an event at the present step."""

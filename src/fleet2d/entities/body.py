@@ -28,6 +28,7 @@ from fleet2d.errors import ComponentError, PlacementError, ScenarioError, blame
 from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.placed_objects import PlacedObject, Posture
 from fleet2d.floorplan.plan import Room
+from fleet2d.floorplan.slow_area import SlowRegion
 from fleet2d.floorplan.space import Space
 from fleet2d.kernels import F64, I64
 from fleet2d.kernels.motion import Breakpoints, WalkRule
@@ -96,6 +97,8 @@ class BodySettings(Settings):
     opens_doors: bool = False
     # Whether its routes are the cheapest by the costmap, if there is one, and not the shortest.
     minds_costs: ClassVar[bool] = False
+    # Whether wet floors, carpets and edges slow it down.
+    minds_floor: ClassVar[bool] = False
     # Whether it sits or lies on furniture that a place names, instead of stopping before it.
     uses_furniture: ClassVar[bool] = False
     # What happens when its cameras lose somebody, and when they see somebody.
@@ -290,6 +293,11 @@ class Body:
     def event_kinds(self) -> frozenset[str]:
         """The kinds of events that its behaviors declare in `records`."""
         return frozenset()
+
+    @property
+    def slows(self) -> tuple[SlowRegion, ...]:
+        """The regions that slow it down at present: robots only."""
+        return self.home.slows if self.entity.minds_floor else ()
 
     @property
     def way_out(self) -> tuple[int, int]:

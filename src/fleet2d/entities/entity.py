@@ -93,6 +93,7 @@ class Robot(Entity):
     perceives: Annotated[EvidenceSource, OneOf("evidence_source")] | None = None
 
     minds_costs: ClassVar[bool] = True
+    minds_floor: ClassVar[bool] = True
     battery: Battery | None = None
     gives_way: GivesWay | None = None
     localization: Localization | None = None

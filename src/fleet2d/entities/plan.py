@@ -14,6 +14,7 @@ from fleet2d.entities.body import Motion, RandomWalk, Track
 from fleet2d.entities.place import seat_at
 from fleet2d.errors import ComponentError, NoWayError
 from fleet2d.floorplan.placed_objects import POSTURES, PlacedObject, Posture
+from fleet2d.floorplan.slow_area import slowed
 from fleet2d.floorplan.space import Space, straight_way
 from fleet2d.kernels import I8, I64
 from fleet2d.kernels.motion import Breakpoints, Legs, WalkRule
@@ -135,7 +136,7 @@ class Plan:
     def _go_shortest(self, space: Space, x: int, y: int, off: tuple[int, int] | None) -> bool:
         """Step `off` an object and walk a shortest route, if that is all; return whether it was."""
         body, routes = self._body, space.shortest
-        if routes is None or body.drive is not None:
+        if routes is None or body.drive is not None or body.slows:
             return False
         now = self.time_us, self.x, self.y, self.heading
         end = self.legs.go(*now, routes, x, y, body.speed, body.turn_rate, off)
@@ -145,12 +146,25 @@ class Plan:
 
     def _walk(self, route: I64) -> None:
         body = self._body
+        if body.slows:
+            self.follow(self._slowed(route))
+            return
         if body.drive is not None:
             self.follow(body.breakpoints(route, self.time_us, self.heading))
             return
         self.time_us, self.x, self.y, self.heading, _ = self.legs.walk(
             self.time_us, self.heading, route, body.speed, body.turn_rate
         )
+
+    def _slowed(self, route: I64) -> I64:
+        """Return the breakpoints on a route that may lead through areas that slow robots down."""
+        body, legs = self._body, Legs()
+        legs.mark(self.time_us, self.x, self.y, self.heading, self.away)
+        if body.drive is not None:
+            legs.add(body.breakpoints(route, self.time_us, self.heading))
+        else:
+            legs.walk(self.time_us, self.heading, route, body.speed, body.turn_rate)
+        return slowed(legs.rows(), body.slows)[1:]
 
     def use(self, thing: PlacedObject | str, place: int = 0) -> Self:
         """Walk to an object and use it, with the heading and the posture of one of its places.

@@ -18,6 +18,7 @@ from fleet2d.floorplan.placed_objects import PlacedObject, UsePlace, find_named
 from fleet2d.floorplan.plan import Cache, FloorPlan, Room
 from fleet2d.floorplan.rooms.doorways import Doorway, doorway_segments
 from fleet2d.floorplan.rooms.room import room_type
+from fleet2d.floorplan.slow_area import SlowRegion
 from fleet2d.floorplan.space import Space
 from fleet2d.kernels import I32
 from fleet2d.kernels.space import Mesh
@@ -63,6 +64,7 @@ class Home:
         self.shut: frozenset[int] = NO_DOORS
         self.locked: frozenset[int] = NO_DOORS
         self.unlit: frozenset[int] = frozenset()
+        self.slows: tuple[SlowRegion, ...] = ()
         self.version = 0
         self.layers = Layers(plan)
         self._shapes = _shapes_of(plan, doorway_segments(plan.lattice, self.doors))

@@ -30,6 +30,7 @@ from fleet2d.floorplan.rooms.room import (
     snap_regions,
     usual_type,
 )
+from fleet2d.floorplan.slow_area import SlowArea
 from fleet2d.floorplan.space import BODY_RADIUS, standing_cells, with_approaches
 from fleet2d.kernels import I64
 from fleet2d.kernels.numbers import TURN
@@ -300,6 +301,7 @@ class FloorPlanSource(Component):
         layers: Named arrays with a value for each cell; explored, first_seen, last_seen and
             time_since_seen are maintained by the run, for each robot with a camera.
         costmap: Costs that routes of robots pay; null: they take the shortest.
+        slows: Areas that slow robots down: wet floors, carpets, edges at which they stop.
     """
 
     kind: ClassVar[str] = "floorplan"
@@ -322,6 +324,10 @@ class FloorPlanSource(Component):
         default={}, examples=[{"explored": {"every": "1 d"}, "dust": {"unit": "g"}}]
     )
     costmap: CostmapSettings | None = None
+    slows: tuple[SlowArea, ...] = Field(
+        default=(),
+        examples=[[{"area": [[1, 0.5], [2.5, 0.5], [2.5, 2]], "speed": "40 %", "stop": "2 s"}]],
+    )
 
     @abstractmethod
     def load(self) -> FloorPlan:
@@ -351,7 +357,7 @@ class FloorPlanSource(Component):
             files = [(path, hashlib.sha256(path.read_bytes()).digest()) for path in self.files()]
         except (OSError, FloorPlanError):
             return None  # the reader raises it with its reason
-        return cls, self.model_dump_json(exclude={"layers", "costmap"}), tuple(files)
+        return cls, self.model_dump_json(exclude={"layers", "costmap", "slows"}), tuple(files)
 
     def _read(self) -> FloorPlan:
         rules = Furnishing() if self.furnish is True else self.furnish or None

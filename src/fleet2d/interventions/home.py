@@ -10,6 +10,7 @@ from fleet2d.entities.objects.home_object import SensorFault
 from fleet2d.entities.place import Point
 from fleet2d.errors import ScenarioError
 from fleet2d.floorplan.home_change import HomeChange
+from fleet2d.floorplan.slow_area import SlowArea
 from fleet2d.interventions.intervention import Intervention, Lasting, World
 
 
@@ -140,6 +141,27 @@ class Lights(HomeIntervention):
     def home_change(self) -> HomeChange:
         """The change."""
         return HomeChange(lights=self.room, turn=self.turn)
+
+
+@register("intervention", "slow")
+class Slow(SlowArea, Lasting):
+    """Let a wet floor or a carpet slow robots down, or its edge stop them; they don't know of it.
+
+    Attributes:
+        area: Its corners [m].
+        speed: Their speed in it, as a share of the usual one; turning on the spot is as ever.
+        stop: How long they stop when they enter it.
+    """
+
+    subject: ClassVar[str] = "area"
+
+    def begin(self, world: World) -> None:
+        """Apply all that are active."""
+        world.slow([act for act in world.lasting if isinstance(act, Slow)])
+
+    def end(self, world: World) -> None:
+        """Apply the others."""
+        self.begin(world)
 
 
 @register("intervention", "report")

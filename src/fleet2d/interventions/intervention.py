@@ -44,6 +44,7 @@ from fleet2d.entities.objects.home_object import SensorFault
 from fleet2d.errors import ScenarioError
 from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.home_change import HomeChange, format_moment, parse_moment
+from fleet2d.floorplan.slow_area import SlowArea
 from fleet2d.runtime.clock import Clock, midnight_of
 from fleet2d.runtime.events import Event, EventKind
 from fleet2d.sight.camera import Disturbance, FalseSighting
@@ -131,6 +132,9 @@ class World(Protocol):
 
     def change(self, change: HomeChange) -> None:
         """Change the home at the present step."""
+
+    def slow(self, areas: Sequence[SlowArea]) -> None:
+        """Set the areas that slow robots down, besides those of the floor plan."""
 
     def emit(self, entity: str, event: EventKind, detail: str) -> None:
         """Record an event at the present step."""

@@ -1,7 +1,7 @@
 """Interventions as methods of a simulation, and of a trial of one."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from datetime import timedelta
 from typing import Any, Literal, cast
 
@@ -438,6 +438,27 @@ class InterventionMethods(ABC):
             ScenarioError: There is no such room, or no such room type.
         """
         self._do("room", name=name, type=type)
+
+    def slow(
+        self,
+        area: Sequence[tuple[float, float]],
+        *,
+        speed: float = 1.0,
+        stop: Time = timedelta(0),
+        duration: Time | None = None,
+    ) -> None:
+        """Let a wet floor or a carpet slow robots down, or its edge stop them.
+
+        Args:
+            area: Its corners [m].
+            speed: Their speed in it, as a share of the usual one.
+            stop: How long they stop when they enter it.
+            duration: For how long; None: to the end of the run.
+
+        Raises:
+            ScenarioError: The sides of the area cross, or it slows nobody down.
+        """
+        self._do("slow", area=area, speed=speed, stop=stop, duration=duration)
 
     def lights(self, room: str, turn: Literal["on", "off"]) -> None:
         """Switch the light of a room, of all rooms of a kind, or of "all", on or off.
