@@ -87,7 +87,8 @@ def test_a_learner_is_as_good_on_a_real_log_as_the_page_says(
     from starlette.testclient import TestClient
 
     from fleet2d.fit.command import fit_routine
-    from fleet2d.viewer.page_server import ServedRuns, new_token, page_app
+    from fleet2d.viewer.page_server import new_token, page_app
+    from fleet2d.viewer.served_runs import ServedRuns
 
     log = shared_data / "activity" / "uci_adl_a"
     content = {

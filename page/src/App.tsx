@@ -5,6 +5,7 @@ import type { ComponentType } from "preact";
 import { useRef } from "preact/hooks";
 import { KEYS } from "./keyboard";
 import { LiveControls } from "./live/LiveControls";
+import { branchHere, branching, refusal } from "./live/orders";
 import { BeliefsPanel } from "./panels/BeliefsPanel";
 import { EventsPanel, KindChoice } from "./panels/EventsPanel";
 import { Inspect } from "./panels/Inspect";
@@ -36,7 +37,7 @@ export function App() {
       <main>
         <div class="plans">
           {runs.map((run, i) => (
-            <Plan key={i} run={run} other={two ? (runs[i === 0 ? 1 : 0] ?? null) : null} title={two ? run.facts.title : ""} />
+            <Plan key={run.path || i} run={run} other={two ? (runs[i === 0 ? 1 : 0] ?? null) : null} title={two ? run.facts.title : ""} />
           ))}
         </div>
         <Panels />
@@ -136,6 +137,21 @@ function Controls() {
         </button>
       )}
       {!state.live.value && <SpeedChoice />}
+      {run.path && state.runs.value.length === 1 && (
+        <button
+          type="button"
+          disabled={branching.value}
+          title="A second future from this moment, beside this one"
+          onClick={() => void branchHere(run)}
+        >
+          {branching.value ? "Repeating the run …" : "Continue from here"}
+        </button>
+      )}
+      {refusal.value && (
+        <strong role="alert" class="status">
+          {refusal.value}
+        </strong>
+      )}
       <GoTo />
       <Ask />
       <output class="clock" aria-label="Shown moment">

@@ -61,7 +61,7 @@ export interface CameraFacts {
   pan_us: number;
 }
 
-/** A user or a robot. */
+/** A user or a robot; `keys` are those of its behaviors while the run is under way. */
 export interface BodyFacts {
   name: string;
   robot: boolean;
@@ -69,6 +69,7 @@ export interface BodyFacts {
   radius: number;
   cameras: CameraFacts[];
   behaviors: string[];
+  keys: Record<string, Record<string, unknown>>;
 }
 
 /** A column of a table. */
@@ -147,11 +148,25 @@ export interface Problem {
   message: string;
 }
 
-/** The runs that the page shows, by title; the first may be live. */
+/** The stored runs that the page shows, by title, and those that are under way. */
 export interface SessionFacts {
   runs: string[];
-  live: boolean;
+  live: LiveSession[];
   version: string;
+}
+
+/** A run that is under way, at a path of the server. A branch repeats the run at the path `of` until before the step `since`. */
+export interface LiveSession {
+  path: string;
+  title: string;
+  of: string;
+  since: number;
+}
+
+/** A wish of the page to continue the run at a path of the server from a step. */
+export interface BranchOrder {
+  of: string;
+  step: number;
 }
 
 /** A body at a step of a running simulation [lattice], and its path ahead: time [us], x, y. */
@@ -174,7 +189,7 @@ export interface LiveEvent {
   detail: string;
 }
 
-/** The state of a running simulation; `speed` 0 is as fast as it goes. */
+/** The state of a running simulation; `speed` 0 is as fast as it goes. `served_as` is the number of the stored run that it has become; -1 while it is under way. */
 export interface LiveFrame {
   step: number;
   paused: boolean;
@@ -189,13 +204,16 @@ export interface LiveFrame {
   marks: MarkFacts[];
   walls: number;
   message: string;
+  served_as: number;
 }
 
-/** A command of the page to a running simulation; `x` and `y` in metres. */
+/** A command of the page to a running simulation; `x` and `y` in metres. `configure` changes the `key` of a behavior, such as `hangout.tau`, to the value that `text` is in YAML. */
 export interface LiveOrder {
-  action: "pause" | "resume" | "step" | "speed" | "door" | "place" | "call" | "replan" | "end";
+  action: "pause" | "resume" | "step" | "speed" | "door" | "place" | "call" | "replan" | "configure" | "end";
   target: string;
   value: number;
   x: number;
   y: number;
+  key: string;
+  text: string;
 }

@@ -1,7 +1,7 @@
 /** The whole page by keyboard alone. */
 
 import { status } from "./live/feed";
-import { order } from "./live/orders";
+import { orderAll } from "./live/orders";
 import * as state from "./state";
 
 export const KEYS: [string, string][] = [
@@ -25,7 +25,7 @@ const DAY_US = 86_400e6;
 
 const ACTIONS: Record<string, (event: KeyboardEvent) => void> = {
   " ": () => {
-    if (state.live.value) void order({ action: status.value?.paused ? "resume" : "pause" });
+    if (state.live.value) void orderAll({ action: status.value?.paused ? "resume" : "pause" });
     else state.playing.value = !state.playing.value;
   },
   ",": () => step(-1),

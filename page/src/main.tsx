@@ -6,20 +6,27 @@ import { App } from "./App";
 import { Run } from "./data/run";
 import { openSession } from "./data/source";
 import { followKeyboard } from "./keyboard";
-import { Feed } from "./live/feed";
+import { Feed, show } from "./live/feed";
 import { followPlaying } from "./player";
 import * as state from "./state";
 import "./style.css";
 import { followTheme } from "./theme";
 
+/** Runs beside each other at first, as many as the command takes; branches join them. */
+const MOST_RUNS = 4;
+
 async function start(box: HTMLElement): Promise<void> {
   followTheme();
   const session = await openSession();
-  const feed = session.facts.live ? await Feed.open() : null;
-  const runs = feed ? [feed.run] : await Promise.all(session.sources.map((source) => Run.open(source)));
+  const stored = await Promise.all(session.sources.map((source) => Run.open(source)));
+  const live = session.facts.live[session.facts.live.length - 1];
+  const past = stored.find((run) => run.path === live?.of) ?? null;
+  if (past) await past.readPoses().then(() => past.readRest());
+  const feed = live && (past || !live.of) ? await Feed.open(live, past) : null;
+  const runs = feed ? [...(past ? [past] : []), feed.run] : stored.slice(0, MOST_RUNS);
   if (runs.length === 0) throw new Error("There is no run to show.");
   state.runs.value = runs;
-  state.live.value = feed !== null;
+  show(feed ? [feed] : []);
   state.setRange(state.beginUs.value, state.endUs.value);
   state.goTo(state.beginUs.value);
   applyAddress(location.hash, runs[0]!);

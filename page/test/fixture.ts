@@ -17,6 +17,7 @@ export const held = content.run;
 export const expected = content.expected;
 
 export const source: RunSource = {
+  path: "",
   facts: () => Promise.resolve(held.facts),
   sightings: () => Promise.resolve(held.sightings),
   walls: (number) => Promise.resolve(held.walls[number]!),

@@ -12,6 +12,7 @@ from fleet2d.datasets.reader import Dataset as Dataset
 from fleet2d.datasets.reader import open_dataset as open_dataset
 from fleet2d.engine.interrupts.interrupt import Interrupt as Interrupt
 from fleet2d.engine.interrupts.interrupt import SpanView as SpanView
+from fleet2d.engine.repeat import branch as branch
 from fleet2d.engine.repeat import reproduce as reproduce
 from fleet2d.engine.repeat import resume as resume
 from fleet2d.engine.simulation import Simulation as Simulation

@@ -96,6 +96,12 @@ ACTS = st.one_of(
     act("hold", bodies, **lasting),
     act("release", bodies),
     act("replan", bodies),
+    st.builds(
+        dict,
+        configure=robots,
+        behavior=any_of("patrol", "follow"),
+        keys=any_of({"cooldown": "1 min"}),
+    ),
     act("drive", bodies),
     act("away", users, **lasting),
     act("call_home", users, to=places, **lasting),
@@ -291,12 +297,12 @@ class Page:
         content = {"action": action, "target": target, "value": value, "x": 2.0, "y": 2.0, **place}
         origin = "/".join(self.address.split("/")[:3])
         headers = {"content-type": "application/json", "Origin": origin}
-        url, data = f"{self.address}/live/order", json.dumps(content).encode()
+        url, data = f"{self.address}/live/0/order", json.dumps(content).encode()
         urllib.request.urlopen(urllib.request.Request(url, data, headers)).read()
 
     def watch(self) -> None:
         """Read the stream of frames until the server ends it."""
-        with urllib.request.urlopen(f"{self.address}/live/frames") as stream:
+        with urllib.request.urlopen(f"{self.address}/live/0/frames") as stream:
             for _ in stream:
                 self.frames += 1
 

@@ -2,6 +2,7 @@
 
 import json
 import math
+import shutil
 from collections.abc import Callable, Iterator
 from datetime import timedelta
 from pathlib import Path
@@ -313,8 +314,11 @@ def test_live_run_is_stepped_paused_and_steered(browser: Any) -> None:
         page.wait_for_selector("[data-inspected=ana] >> text=living_room_0")
         page.select_option("select[aria-label='Speed of the simulation']", "0")
         page.click("button.play")
-        page.wait_for_selector(".live[data-done=true]", timeout=60_000)
+        page.wait_for_selector("html[data-ended='1']", timeout=60_000)
         assert 6 * 3600 - 1 == moment(page)
+        page.keyboard.press("Home")
+        page.click("button.play")  # it plays like a stored run
+        until(page, lambda: moment(page) > 0)
     stop()
     live.end()
     assert live.run is not None
@@ -322,6 +326,47 @@ def test_live_run_is_stepped_paused_and_steered(browser: Any) -> None:
     assert {"change", "put"} == {entry["do"] for entry in live.run.manifest["interventions"]}
     events = live.run.tables["events"].to_pylist()
     assert ("bath_door", "shut") in [(row["entity"], row["event"]) for row in events]
+
+
+def test_moment_of_a_stored_run_is_continued_otherwise_beside_it(
+    browser: Any, run_dir: Path, tmp_path: Path
+) -> None:
+    parent = shutil.copytree(run_dir, tmp_path / "day")
+    server = PageServer([parent])
+    stop = server.start()
+    at = 4 * 3600
+    with page_at(browser, server.address) as page:
+        page.fill("#goto", f"step {at}")
+        page.press("#goto", "Enter")
+        page.click("text=Continue from here")
+        page.wait_for_selector(f".live[data-paused=true][data-step='{at}']")
+        tables = [page.locator(f"table.now[data-step='{at}']").nth(i) for i in range(2)]
+        places = [t.locator("tr[data-body=astro]").get_attribute("data-x") for t in tables]
+        assert places[0] == places[1]
+        page.locator("tr[data-body=astro] button").first.click()
+        page.select_option("select[aria-label='Key of a behavior of astro']", "hangout.tau")
+        page.fill("input[aria-label='Value of hangout.tau']", "10 min")
+        page.get_by_role("button", name="Change", exact=True).click()
+        page.click("text=Call astro")
+        box = page.locator(".plan canvas").nth(1).bounding_box()
+        page.mouse.click(box["x"] + box["width"] * 0.6, box["y"] + box["height"] * 0.75)
+        page.click("button.play")
+        page.wait_for_selector("html[data-ended='1']", timeout=60_000)
+        page.click("#tab-now")
+        shows_step(page, 9 * 3600 - 1)
+        rooms = [
+            page.locator("table.now")
+            .nth(i)
+            .locator("tr[data-body=astro]")
+            .get_attribute("data-room")
+            for i in range(2)
+        ]
+        assert "living_room_0" == rooms[1] != rooms[0]
+    stop()
+    branch = tmp_path / "day-branch-1"
+    done = fleet2d.open_run(branch).manifest["interventions"]
+    assert [("configure", at), ("send", at)] == [(act["do"], act["step"]) for act in done]
+    assert fleet2d.reproduce(branch).same
 
 
 def test_page_works_in_the_frame_of_a_notebook(browser: Any, run_dir: Path) -> None:

@@ -12,8 +12,10 @@ import fleet2d
 from fleet2d.errors import InputError
 from fleet2d.viewer.contract import LiveOrder
 from fleet2d.viewer.live import LiveRun, read_order
+from fleet2d.viewer.live_runs import LiveRuns
 from fleet2d.viewer.page_data import PageData
-from fleet2d.viewer.page_server import ServedRuns, page_app
+from fleet2d.viewer.page_server import page_app
+from fleet2d.viewer.served_runs import ServedRuns
 
 PORT = 8765
 OWN = f"http://127.0.0.1:{PORT}"
@@ -183,7 +185,8 @@ def test_what_is_no_order_is_refused(body: bytes) -> None:
 
 
 def test_orders_need_the_page_s_origin_and_json(live: LiveRun) -> None:
-    client = TestClient(page_app(ServedRuns([]), "token", PORT, live), base_url=OWN)
+    served = ServedRuns([])
+    client = TestClient(page_app(served, "token", PORT, LiveRuns(served, live)), base_url=OWN)
     body = json.dumps(order("step", value=1))
     own_headers = {"Origin": OWN, "Content-Type": "application/json"}
     for wrong in (
@@ -192,19 +195,20 @@ def test_orders_need_the_page_s_origin_and_json(live: LiveRun) -> None:
         {**own_headers, "Host": "evil.example"},
         {**own_headers, "Sec-Fetch-Site": "cross-site"},
     ):
-        assert 403 == client.post("/token/live/order", content=body, headers=wrong).status_code
+        assert 403 == client.post("/token/live/0/order", content=body, headers=wrong).status_code
     form = {"Origin": OWN, "Content-Type": "text/plain"}
-    assert 415 == client.post("/token/live/order", content=body, headers=form).status_code
-    assert 403 == client.post("/wrong/live/order", content=body, headers=own_headers).status_code
+    assert 415 == client.post("/token/live/0/order", content=body, headers=form).status_code
+    assert 403 == client.post("/wrong/live/0/order", content=body, headers=own_headers).status_code
     assert 0 == live.engine.step
-    assert 200 == client.post("/token/live/order", content=body, headers=own_headers).status_code
+    assert 200 == client.post("/token/live/0/order", content=body, headers=own_headers).status_code
     assert 1 == live.engine.step
 
 
 def test_facts_of_a_run_under_way_name_home_and_bodies(live: LiveRun) -> None:
-    client = TestClient(page_app(ServedRuns([]), "token", PORT, live), base_url=OWN)
-    facts = client.get("/token/live/facts.json").json()
+    served = ServedRuns([])
+    client = TestClient(page_app(served, "token", PORT, LiveRuns(served, live)), base_url=OWN)
+    facts = client.get("/token/live/0/facts.json").json()
     assert ["ana", "astro"] == [body["name"] for body in facts["bodies"]]
     assert ["bath_door"] == [door["name"] for door in facts["home"]["doors"]]
-    assert client.get("/token/live/walls/0.json").json()["triangles"]
-    assert 422 == client.get("/token/live/walls/99.json").status_code
+    assert client.get("/token/live/0/walls/0.json").json()["triangles"]
+    assert 422 == client.get("/token/live/0/walls/99.json").status_code

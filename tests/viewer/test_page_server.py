@@ -14,7 +14,8 @@ from starlette.testclient import TestClient
 import fleet2d
 from fleet2d.errors import InputError
 from fleet2d.viewer.page_data import PageData
-from fleet2d.viewer.page_server import PageServer, ServedRuns, kept_token, new_token, page_app
+from fleet2d.viewer.page_server import PageServer, kept_token, new_token, page_app
+from fleet2d.viewer.served_runs import ServedRuns
 
 TOKEN = "0123456789abcdefghijABCDEFGHIJ01"
 PORT = 8765
@@ -66,7 +67,7 @@ def test_request_that_a_browser_marks_as_of_another_site_is_refused(
 
 
 def test_change_that_names_no_origin_is_refused(client: TestClient) -> None:
-    assert 403 == client.post(f"/{TOKEN}/live/order", json={}).status_code
+    assert 403 == client.post(f"/{TOKEN}/live/0/order", json={}).status_code
 
 
 @pytest.mark.parametrize(

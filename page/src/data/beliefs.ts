@@ -2,7 +2,7 @@
 
 import type { Home } from "./home";
 import type { Table } from "./parquet";
-import { lastAtMost } from "./search";
+import { firstAtLeast, lastAtMost } from "./search";
 
 /** Columns of tables with the share of time, or the probability, of a user in a room. */
 const SHARE_COLUMNS = ["share", "probability", "p"];
@@ -26,6 +26,15 @@ export class Beliefs {
     /** Whether they are of where a user is now, and not of shares of time. */
     readonly isOfNow = false,
   ) {}
+
+  /** A copy of the outputs before a moment, which can grow. */
+  until(us: number): Beliefs {
+    const series = [...this.series].map(([user, { us: moments, shares }]) => {
+      const count = firstAtLeast(moments, us);
+      return [user, { us: moments.slice(0, count), shares: shares.slice(0, count) }] as const;
+    });
+    return new Beliefs(this.name, new Map(series), this.isOfNow);
+  }
 
   of(user: string): BeliefSeries | null {
     return this.series.get(user) ?? null;

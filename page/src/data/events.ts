@@ -2,7 +2,7 @@
 
 import type { Clock } from "./clock";
 import type { Table } from "./parquet";
-import { lastAtMost } from "./search";
+import { firstAtLeast, lastAtMost } from "./search";
 
 export interface EventRow {
   index: number;
@@ -34,6 +34,11 @@ export class Events {
 
   ofKind(kind: string): EventRow[] {
     return (this.byKind.get(kind) ?? []).map((index) => this.rows[index]!);
+  }
+
+  /** The number of events before a moment. */
+  before(us: number): number {
+    return firstAtLeast(this.us, us);
   }
 
   /** Index of the first event after a moment. */

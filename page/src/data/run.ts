@@ -1,7 +1,7 @@
 /** One run: everything that the page shows of it, read when it is needed. */
 
 import { signal } from "@preact/signals";
-import type { BodyFacts, RunFacts, SightingFacts, TableFacts } from "../contract";
+import type { BodyFacts, RunFacts, SightingFacts, TableFacts, WallsFacts } from "../contract";
 import { type Beliefs, readBeliefs } from "./beliefs";
 import { Clock } from "./clock";
 import { Events, readEvents } from "./events";
@@ -36,6 +36,9 @@ export class Run {
   /** What behaviors of a live run say of themselves. */
   behaviorNotes = new Map<string, string>();
 
+  /** What is known of the run ends here: the step that its simulation has come to. */
+  knownUs = Infinity;
+
   private readonly walls = new Map<number, Walls | null>();
   private readonly layers = new Map<string, Promise<LayerTable>>();
 
@@ -51,12 +54,22 @@ export class Run {
     return new Run(await source.facts(), source);
   }
 
+  /** The path of the run on the server; empty where there is no server. */
+  get path(): string {
+    return this.source.path;
+  }
+
   get beginUs(): number {
     return this.facts.first_step * this.clock.stepUs;
   }
 
   get endUs(): number {
     return Math.min(this.facts.end_step, this.clock.steps) * this.clock.stepUs;
+  }
+
+  /** The end of what is known [us]. */
+  get presentUs(): number {
+    return Math.min(this.clock.endUs, this.knownUs);
   }
 
   /** Whether an algorithm says where users are now, and not for which shares of their time. */
@@ -159,10 +172,14 @@ export class Run {
     if (cached !== undefined) return cached;
     this.walls.set(number, null);
     void this.attempt(async () => {
-      this.walls.set(number, new Walls(await this.source.walls(number)));
+      this.walls.set(number, new Walls(await this.readWalls(number)));
       this.changed();
     });
     return null;
+  }
+
+  readWalls(number: number): Promise<WallsFacts> {
+    return this.source.walls(number);
   }
 
   layer(name: string): Promise<LayerTable> {

@@ -7,6 +7,8 @@ const WHOLE_BYTES = 8_000_000;
 const BLOCK_BYTES = 1 << 20;
 
 export interface RunSource {
+  /** The path of the run on the server; empty where there is no server. */
+  readonly path: string;
   facts(): Promise<RunFacts>;
   sightings(): Promise<SightingFacts[]>;
   walls(number: number): Promise<WallsFacts>;
@@ -41,22 +43,22 @@ async function json<T>(url: string): Promise<T> {
 }
 
 export class ServedRun implements RunSource {
-  constructor(private readonly base: string) {}
+  constructor(readonly path: string) {}
 
   facts(): Promise<RunFacts> {
-    return json(`${this.base}/facts.json`);
+    return json(`${this.path}/facts.json`);
   }
 
   sightings(): Promise<SightingFacts[]> {
-    return json(`${this.base}/sightings.json`);
+    return json(`${this.path}/sightings.json`);
   }
 
   walls(number: number): Promise<WallsFacts> {
-    return json(`${this.base}/walls/${number}.json`);
+    return json(`${this.path}/walls/${number}.json`);
   }
 
   async table(name: string, bytes: number): Promise<AsyncBuffer> {
-    const url = `${this.base}/tables/${encodeURIComponent(name)}.parquet`;
+    const url = `${this.path}/tables/${encodeURIComponent(name)}.parquet`;
     if (bytes > WHOLE_BYTES) return rangedBuffer(url, bytes);
     return await (await fetched(url)).arrayBuffer();
   }
@@ -98,6 +100,8 @@ export function rangedBuffer(url: string, byteLength: number): AsyncBuffer {
 }
 
 class HeldRun implements RunSource {
+  readonly path = "";
+
   constructor(private readonly held: EmbeddedRun) {}
 
   facts(): Promise<RunFacts> {
@@ -128,7 +132,7 @@ export async function openSession(): Promise<Session> {
     const runs = JSON.parse(held.textContent) as EmbeddedRun[];
     const titles = runs.map((run) => run.facts.title);
     return {
-      facts: { runs: titles, live: false, version: runs[0]?.facts.version ?? "" },
+      facts: { runs: titles, live: [], version: runs[0]?.facts.version ?? "" },
       sources: runs.map((run) => new HeldRun(run)),
     };
   }

@@ -1,6 +1,6 @@
 /** Lanes of a timeline: stretches of time, each with one value. */
 
-import { lastAtMost } from "./search";
+import { firstAtLeast, lastAtMost } from "./search";
 
 /** Stretches in order: each begins at `from[i]` [us] and ends at `to[i]`. */
 export interface Stretches {
@@ -29,6 +29,13 @@ export function stretchesOf(moments: readonly number[], values: readonly number[
   });
   const to = from.map((_, i) => from[i + 1] ?? endUs);
   return { from, to, value };
+}
+
+/** The stretches before a moment, as lists that can grow. */
+export function stretchesUntil({ from, to, value }: Stretches, us: number): Stretches {
+  const count = firstAtLeast(from, us);
+  const ends = Array.from(to.slice(0, count), (end) => Math.min(end, us));
+  return { from: Array.from(from.slice(0, count)), to: ends, value: Array.from(value.slice(0, count)) };
 }
 
 /** The stretches in which two lanes have different values; the value is 1. */

@@ -154,6 +154,21 @@ export class Track {
     }
   }
 
+  /** A copy up to a moment, to which poses can be added. */
+  until(us: number): Track {
+    const track = Track.none();
+    if (this.empty) return track;
+    const piece = Math.max(0, lastAtMost(this.froms, us));
+    const begin = this.begins[piece]!;
+    track.count = Math.max(begin, lastAtMost(this.time, us, begin, this.ends[piece]!)) + 1;
+    for (const name of ["time", "x", "y", "heading", "away"] as const) (track[name] as Float64Array) = this[name].slice(0, track.count) as Float64Array;
+    track.begins.push(...this.begins.slice(0, piece + 1));
+    track.ends.push(...this.ends.slice(0, piece), track.count);
+    track.froms.push(...this.froms.slice(0, piece + 1));
+    track.append(us, this.poseAt(us));
+    return track;
+  }
+
   private grow(): void {
     const size = Math.max(1024, 2 * this.time.length);
     const larger = <T extends { set(values: T): void }>(values: T, made: T): T => {

@@ -1,17 +1,20 @@
-/** Follow a running simulation: frames from the server become the tracks and lanes of a run. */
+/** Follow running simulations: frames from the server become the tracks and lanes of runs. */
 
-import { signal } from "@preact/signals";
-import type { LiveFrame, RunFacts, SightingFacts, WallsFacts } from "../contract";
-import { Beliefs } from "../data/beliefs";
-import type { Observation } from "../data/observations";
+import { batch, computed, signal } from "@preact/signals";
+import type { LiveFrame, LiveSession, RunFacts, SightingFacts, WallsFacts } from "../contract";
+import { Beliefs, type BeliefSeries } from "../data/beliefs";
+import type { Observation, ObservationSource } from "../data/observations";
 import { AWAY } from "../data/rooms";
 import { Run } from "../data/run";
-import type { RunSource } from "../data/source";
+import { type RunSource, ServedRun } from "../data/source";
+import { stretchesUntil } from "../data/stretches";
 import { Track } from "../data/tracks";
 import * as state from "../state";
 
-/** The newest state of the simulation. */
-export const status = signal<LiveFrame | null>(null);
+/** The simulations that are under way and shown. */
+export const feeds = signal<readonly Feed[]>([]);
+/** The newest state of the last of them. */
+export const status = computed<LiveFrame | null>(() => feeds.value[feeds.value.length - 1]?.status.value ?? null);
 export const connected = signal(true);
 
 async function json<T>(url: string): Promise<T> {
@@ -21,22 +24,46 @@ async function json<T>(url: string): Promise<T> {
 }
 
 const NOTHING = "a run that is under way has no tables yet";
+/** Numbers of the walls that a branch shares with its past begin here. */
+const PAST_WALLS = 1_000_000;
 
-const source: RunSource = {
-  facts: () => json<RunFacts>("live/facts.json"),
-  sightings: () => Promise.resolve([]),
-  walls: (number) => json<WallsFacts>(`live/walls/${number}.json`),
-  table: () => Promise.reject(new Error(NOTHING)),
-};
+class LiveSource implements RunSource {
+  constructor(
+    readonly path: string,
+    private readonly past: Run | null,
+  ) {}
 
-/** What robots have in view now; earlier moments are not kept. */
-class LiveObservations {
+  facts(): Promise<RunFacts> {
+    return json(`${this.path}/facts.json`);
+  }
+
+  sightings(): Promise<SightingFacts[]> {
+    return Promise.resolve([]);
+  }
+
+  walls(number: number): Promise<WallsFacts> {
+    if (this.past && number >= PAST_WALLS) return this.past.readWalls(number - PAST_WALLS);
+    return json(`${this.path}/walls/${number}.json`);
+  }
+
+  table(): Promise<never> {
+    return Promise.reject(new Error(NOTHING));
+  }
+}
+
+/** What robots have in view now, and of a branch what they observed before it began. */
+class LiveObservations implements ObservationSource {
   step = -1;
   seen: [string, string][] = [];
 
-  constructor(private readonly run: Run) {}
+  constructor(
+    private readonly run: Run,
+    private readonly past: Run | null,
+    private readonly since: number,
+  ) {}
 
-  at(step: number): Observation[] {
+  at(step: number): Observation[] | null {
+    if (step < this.since) return this.past?.observations?.at(step) ?? [];
     if (step !== this.step) return [];
     return this.seen.map(([robot, user]) => {
       const pose = this.run.tracks.get(user)?.poseAt(step * this.run.clock.stepUs);
@@ -46,36 +73,65 @@ class LiveObservations {
     });
   }
 
-  load(): Promise<void> {
-    return Promise.resolve();
+  async load(step: number): Promise<void> {
+    if (step < this.since) await this.past?.observations?.load(step);
   }
 }
 
 export class Feed {
+  readonly status = signal<LiveFrame | null>(null);
   private readonly observations: LiveObservations;
-  private readonly shares = new Map<string, { us: number[]; shares: Float64Array[] }>();
-  private lastStep = -1;
+  private readonly shares = new Map<string, BeliefSeries>();
+  private stream: EventSource | null = null;
+  private lastStep: number;
 
-  private constructor(readonly run: Run) {
-    this.observations = new LiveObservations(run);
+  private constructor(
+    readonly run: Run,
+    past: Run | null,
+    readonly since: number,
+  ) {
+    this.lastStep = since - 1;
+    this.observations = new LiveObservations(run, past, since);
     run.observations = this.observations;
-    for (const body of run.bodies) {
-      run.tracks.set(body.name, Track.none());
-      run.rooms.set(body.name, { from: [], to: [], value: [] });
+    const us = since * run.clock.stepUs;
+    run.knownUs = us;
+    for (const { name } of run.bodies) {
+      run.tracks.set(name, past?.tracks.get(name)?.until(us) ?? Track.none());
+      run.rooms.set(name, stretchesUntil(past?.roomsOf(name) ?? { from: [], to: [], value: [] }, us));
     }
+    if (past) this.takePast(past, us);
   }
 
-  static async open(): Promise<Feed> {
-    return new Feed(new Run(await source.facts(), source));
+  /** Follow a simulation; a branch begins with what the run before it was. */
+  static async open(session: LiveSession, past: Run | null): Promise<Feed> {
+    const source = new LiveSource(session.path, past);
+    const feed = new Feed(new Run(await source.facts(), source), past, session.since);
+    feed.run.facts.title = session.title;
+    return feed;
+  }
+
+  private takePast(past: Run, us: number): void {
+    const { run, since } = this;
+    for (const row of past.events.rows.slice(0, past.events.before(us))) run.events.add(row.step, row.us, row.entity, row.event, row.user, row.detail);
+    run.facts.marks = past.facts.marks.filter((mark) => mark.kind === "intervention" && mark.step < since);
+    const walls = past.facts.walls.filter((change) => change.step < since);
+    run.facts.walls = [...walls.map(({ step, walls }) => ({ step, walls: walls + PAST_WALLS })), { step: since, walls: 0 }];
+    run.sightings = past.sightings.map((lane) => {
+      const count = lane.first.filter((first) => first < since).length;
+      const last = lane.last.slice(0, count).map((step) => Math.min(step, since - 1));
+      return { ...lane, first: lane.first.slice(0, count), last, false: lane.false.slice(0, count) };
+    });
+    run.beliefs = past.beliefs.map((beliefs) => beliefs.until(us));
+    for (const beliefs of run.beliefs) this.shares.set(beliefs.name, beliefs.of(beliefs.users[0] ?? "")!);
   }
 
   follow(): void {
-    const stream = new EventSource("live/frames");
-    stream.onmessage = (event) => this.take(JSON.parse(event.data as string) as LiveFrame[]);
-    stream.onopen = () => {
+    this.stream = new EventSource(`${this.run.path}/frames`);
+    this.stream.onmessage = (event) => this.take(JSON.parse(event.data as string) as LiveFrame[]);
+    this.stream.onopen = () => {
       connected.value = true;
     };
-    stream.onerror = () => {
+    this.stream.onerror = () => {
       connected.value = false;
     };
   }
@@ -85,9 +141,40 @@ export class Feed {
     const last = frames[frames.length - 1];
     if (!last) return;
     for (const frame of frames) this.add(frame);
-    status.value = last;
-    this.run.changed();
-    if (state.follow.value) state.goTo(last.step * this.run.clock.stepUs);
+    batch(() => {
+      this.status.value = last;
+      this.run.changed();
+      if (state.follow.value) state.goTo(this.present());
+    });
+    if (last.served_as >= 0) void this.end(last.served_as);
+  }
+
+  /** The moment up to which all simulations that are shown have come. */
+  private present(): number {
+    const steps = feeds.value.map((feed) => feed.status.value?.step ?? Infinity);
+    return Math.min(this.lastStep, ...steps) * this.run.clock.stepUs;
+  }
+
+  close(): void {
+    this.stream?.close();
+    feeds.value = feeds.value.filter((feed) => feed !== this);
+    state.live.value = feeds.value.length > 0;
+  }
+
+  /** The simulation is over: from now on its run is shown as a stored one. */
+  private async end(number: number): Promise<void> {
+    this.stream?.close();
+    await this.run.attempt(async () => {
+      const run = await Run.open(new ServedRun(`run/${number}`));
+      await run.readPoses();
+      await run.readRest();
+      batch(() => {
+        state.runs.value = state.runs.value.map((entry) => (entry === this.run ? run : entry));
+        this.close();
+        // Read by tests and by nobody else: what was live is a stored run from now on.
+        document.documentElement.dataset.ended = String(Number(document.documentElement.dataset.ended ?? 0) + 1);
+      });
+    });
   }
 
   private add(frame: LiveFrame): void {
@@ -112,6 +199,7 @@ export class Feed {
     for (const [robot, user] of frame.seen) this.addSighting(robot, user, frame.step);
     for (const [name, shares] of Object.entries(frame.beliefs)) this.addBelief(name, us, shares);
     this.lastStep = frame.step;
+    this.run.knownUs = us;
   }
 
   private addRoom(name: string, us: number, room: number): void {
@@ -153,4 +241,15 @@ export class Feed {
     series.us.push(us);
     series.shares.push(Float64Array.from([...shares, 0]));
   }
+}
+
+/** The simulation of a run; undefined for a stored one. */
+export function feedOf(run: Run): Feed | undefined {
+  return feeds.value.find((feed) => feed.run === run);
+}
+
+/** Show simulations from now on. */
+export function show(shown: readonly Feed[]): void {
+  feeds.value = shown;
+  state.live.value = shown.length > 0;
 }

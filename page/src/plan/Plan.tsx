@@ -4,7 +4,8 @@ import { effect } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 import type { Run } from "../data/run";
 import type { Layer } from "../data/layers";
-import { askCall, askPlace, calling, placing } from "../live/orders";
+import { feedOf } from "../live/feed";
+import { askCall, askPlace, branchHere, branching, calling, closeRun, placing } from "../live/orders";
 import * as state from "../state";
 import { colors, dark, scaleColor } from "../theme";
 import { drawBeliefs } from "./beliefs";
@@ -147,7 +148,7 @@ export function Plan({ run, other, title }: { run: Run; other: Run | null; title
     const stopReading = readAtMoment(run, painter, repaint);
     const observer = new ResizeObserver(repaint);
     observer.observe(canvas.current!);
-    const stopPointing = followPointer(canvas.current!, painter, repaint);
+    const stopPointing = followPointer(canvas.current!, run, painter, repaint);
     return () => {
       stopPainting();
       stopReading();
@@ -158,7 +159,19 @@ export function Plan({ run, other, title }: { run: Run; other: Run | null; title
   return (
     <figure class="plan">
       <canvas ref={canvas} role="img" aria-label={`Floor plan of ${run.facts.home.name}, ${title}`} />
-      {title && <figcaption>{title}</figcaption>}
+      {title && (
+        <figcaption>
+          {title}
+          {run.path && (
+            <button type="button" disabled={branching.value} onClick={() => void branchHere(run)}>
+              Continue from here
+            </button>
+          )}
+          <button type="button" aria-label={`Close ${title}`} onClick={() => closeRun(run)}>
+            ×
+          </button>
+        </figcaption>
+      )}
     </figure>
   );
 }
@@ -182,12 +195,12 @@ function readAtMoment(run: Run, painter: PlanPainter, repaint: () => void): () =
   });
 }
 
-function followPointer(canvas: HTMLCanvasElement, painter: PlanPainter, repaint: () => void): () => void {
+function followPointer(canvas: HTMLCanvasElement, run: Run, painter: PlanPainter, repaint: () => void): () => void {
   let held: Pointer | null = null;
   const at = (event: PointerEvent | WheelEvent): [number, number] => [event.offsetX, event.offsetY];
   const down = (event: PointerEvent): void => {
     const [x, y] = at(event);
-    held = { x, y, moved: false, body: state.live.value ? painter.bodyAt(x, y) : "" };
+    held = { x, y, moved: false, body: feedOf(run) ? painter.bodyAt(x, y) : "" };
     canvas.setPointerCapture(event.pointerId);
   };
   const move = (event: PointerEvent): void => {
@@ -203,9 +216,9 @@ function followPointer(canvas: HTMLCanvasElement, painter: PlanPainter, repaint:
   const up = (event: PointerEvent): void => {
     const [x, y] = at(event);
     const place = painter.placeAt(x, y);
-    if (held?.moved && held.body && place) void askPlace(held.body, ...place);
-    else if (held && !held.moved && calling.value && place) void askCall(calling.value, ...place);
-    else if (held && !held.moved && placing.value && place) void askPlace(placing.value, ...place);
+    if (held?.moved && held.body && place) void askPlace(run, held.body, ...place);
+    else if (held && !held.moved && calling.value && place) void askCall(run, calling.value, ...place);
+    else if (held && !held.moved && placing.value && place) void askPlace(run, placing.value, ...place);
     else if (held && !held.moved) state.select(painter.thingAt(x, y));
     held = null;
   };

@@ -154,7 +154,7 @@ function activityLane(run: Run, name: string, prefix: string): Lane | null {
   const words = [...new Set(rows.map((row) => row.detail))];
   const stretches: Stretches = {
     from: rows.map((row) => row.us),
-    to: rows.map((_, i) => rows[i + 1]?.us ?? run.clock.endUs),
+    to: rows.map((_, i) => rows[i + 1]?.us ?? run.presentUs),
     value: rows.map((row) => words.indexOf(row.detail)),
   };
   const color = (value: number): string => wordColor(words[value] ?? "");
@@ -241,7 +241,7 @@ function doorLanes(run: Run, prefix: string): Lane[] {
     const open = [door.open, ...rows.map((row) => row.event === "opened")];
     const stretches: Stretches = {
       from: us,
-      to: us.map((_, i) => us[i + 1] ?? run.clock.endUs),
+      to: us.map((_, i) => us[i + 1] ?? run.presentUs),
       value: open.map(Number),
     };
     const color = (value: number): string | null => (value ? null : colors.value.door);
@@ -287,7 +287,7 @@ async function sensorLanes(run: Run, prefix: string): Promise<Lane[]> {
     const rows = [...sensor.codes.keys()].filter((row) => sensor.codes[row] === code);
     const us = rows.map((row) => steps[row]! * run.clock.stepUs);
     const on = rows.map((row) => Number(["ON", "OPEN", "PRESENT"].includes((state.words[state.codes[row]!] ?? "").toUpperCase())));
-    const stretches: Stretches = { from: us, to: us.map((_, i) => us[i + 1] ?? run.clock.endUs), value: on };
+    const stretches: Stretches = { from: us, to: us.map((_, i) => us[i + 1] ?? run.presentUs), value: on };
     const color = (value: number): string | null => (value ? "#44aa99" : null);
     return stretchLane(`${prefix}${name}/sensor`, name, name, stretches, color, (value) => (value ? "on" : "off"), 10);
   });

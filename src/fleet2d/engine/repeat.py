@@ -6,8 +6,11 @@ import tempfile
 from collections.abc import Iterable, Mapping
 from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
+from datetime import timedelta
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from fleet2d.artifacts.manifest import FILE_NAME, FLOORPLAN_NAME, LEARNED_NAME, SLOW, Manifest
 from fleet2d.artifacts.seal import verify_run
@@ -19,7 +22,7 @@ from fleet2d.artifacts.unfinished import (
     last_commit,
     remove_leftovers,
 )
-from fleet2d.configuration.trust import Trust, refuse_untrusted, restrict
+from fleet2d.configuration.trust import Trust, refuse_untrusted, restrict, restrict_stored
 from fleet2d.engine.checkpoint import Checkpoint, UnusableCheckpointError
 from fleet2d.engine.expectations import TABLE
 from fleet2d.engine.inputs import changed_inputs
@@ -133,6 +136,56 @@ def judge_again(run: Run, expectation: Expectation | str, name: str = "") -> Ver
         )
     verdict = simulation.verdicts()[label]
     return replace(verdict, name=name or verdict.expectation)
+
+
+def branch(run: Run, step: int, out: Path | None = None) -> Simulation:
+    """Return a simulation that has repeated a stored run up to a step, to continue it otherwise.
+
+    Interventions from outside at that step and later are left out.
+
+    Args:
+        run: The run, complete or not.
+        step: The next step to simulate.
+        out: Directory to store it in; None keeps it in memory.
+
+    Raises:
+        InputError: The run has no such step, or its scenario or an input file is wrong by now.
+        RunDirectoryError: An input file has changed, or code isn't trusted.
+        ArtifactError: The run can't be repeated: bodies would be elsewhere at that step.
+
+    Example:
+        >>> import fleet2d
+        >>> run = fleet2d.run("bundled:base", "simulation.duration=8 h", seed=4)
+        >>> future = branch(run, step=3600)
+        >>> future.put("ana", "kitchen")
+        >>> future.run().digest == run.digest
+        False
+    """
+    steps = int(run.manifest["steps"])
+    if not 0 <= step < steps:
+        raise InputError(f"the run can't be continued from step {step}: its last is {steps - 1}")
+    if run.directory is not None and (paths := changed_inputs(Manifest.read(run.directory))):
+        raise RunDirectoryError(f"{paths[0]} has changed since the run: put it back as it was")
+    simulation = repeat_until(run.manifest, step, out)
+    interval = timedelta(microseconds=step * run.manifest["step_us"])
+    for name in simulation.actors if step and "key_frames" in run.tables else ():
+        path, state = run.path(name, interval), simulation.state[name]
+        if not np.allclose((path.x[1], path.y[1]), (state["x"], state["y"]), atol=1e-6):
+            simulation.finish("failed")
+            raise ArtifactError(
+                f"the run can't be repeated: at step {step} {name} would be elsewhere than it was;"
+                " `fleet2d reproduce` says what has changed"
+            )
+    return simulation
+
+
+def repeat_until(content: Mapping[str, Any], step: int, out: Path | None) -> Simulation:
+    """Return a simulation that has repeated the run of a manifest up to a step; see `branch`."""
+    earlier = [record for record in content["interventions"] if record["step"] < step]
+    with restrict_stored():
+        simulation = _simulation({**content, "interventions": earlier}, out)
+    simulation.advance(step)
+    return simulation
 
 
 def _simulation(content: Mapping[str, Any], out: Path | None) -> Simulation:

@@ -396,12 +396,20 @@ class Actor(Body):
             self.charge = None if battery is None else Charge(battery, self)
             for behavior in self.behaviors:
                 behavior.start(self)
-            claims = ((behavior, behavior.attention(self)) for behavior in self.behaviors)
-            self._attentive = next((pair for pair in claims if pair[1] is not None), None)
+            self._find_attention()
         self.command: Command | None = None
         self.plan: Plan = Plan(self, 0).stay()
         self.motion: Motion = self.plan.finish()
         self.planned_at = 0
+
+    def _find_attention(self) -> None:
+        claims = ((behavior, behavior.attention(self)) for behavior in self.behaviors)
+        self._attentive = next((pair for pair in claims if pair[1] is not None), None)
+
+    def replace(self, number: int, behavior: Behavior) -> None:
+        """Replace a behavior, by its number, with another one that was started."""
+        self.behaviors[number] = behavior
+        self._find_attention()
 
     def ask(self, step: int | None) -> None:
         """Set the step at which it decides next; None: never."""

@@ -3,12 +3,12 @@
 from datetime import timedelta
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator, Field, ValidationError
 
 from fleet2d.configuration.components import register
-from fleet2d.configuration.problems import suggest
+from fleet2d.configuration.problems import refusal, suggest
 from fleet2d.configuration.units import AngleDeg, PositiveDuration
-from fleet2d.entities.behavior import Actor
+from fleet2d.entities.behavior import Actor, Behavior
 from fleet2d.entities.body import Pose
 from fleet2d.entities.decisions import DoActivity, GoOut, GoTo, StandStill
 from fleet2d.entities.place import Place, Point, RoomChoice, furniture_of, is_point, matching_rooms
@@ -143,6 +143,58 @@ class Replan(BodyIntervention):
     def begin(self, world: World) -> None:
         """Let its behaviors decide at the present step."""
         body(world, self.entity).decide_again(world.step)
+
+
+@register("intervention", "configure")
+class Configure(BodyIntervention):
+    """Change keys of a behavior of a body: it starts anew with them, and the body replans.
+
+    What else the behavior was doing, or remembered, is lost.
+
+    Attributes:
+        behavior: The behavior, by its type.
+        keys: The keys that change, with their values, as in the scenario.
+    """
+
+    behavior: str
+    keys: dict[str, Any] = Field(min_length=1)
+
+    def check(self, world: World) -> None:
+        """Refuse an unknown behavior or key, and a value with which the behavior can't start."""
+        actor = body(world, self.entity)
+        behavior = self._behavior(actor)
+        behavior.start(actor)
+        for name in behavior.reads():
+            if name not in world.algorithms:
+                raise ScenarioError(
+                    f"there is no algorithm {name!r}{suggest(name, world.algorithms)}"
+                )
+
+    def begin(self, world: World) -> None:
+        """Replace the behavior."""
+        actor = body(world, self.entity)
+        behavior = self._behavior(actor)
+        behavior.start(actor)
+        actor.replace(self._number(actor), behavior)
+        actor.decide_again(world.step)
+
+    def _number(self, actor: Actor) -> int:
+        names = [behavior.type_name for behavior in actor.behaviors]
+        if self.behavior not in names:
+            raise ScenarioError(
+                f"{self.entity} has no behavior {self.behavior!r}"
+                f"{suggest(self.behavior, names, 'It has')}"
+            )
+        return names.index(self.behavior)
+
+    def _behavior(self, actor: Actor) -> Behavior:
+        """Return the behavior with the changed keys, not started."""
+        behavior = actor.behaviors[self._number(actor)]
+        present = behavior.model_dump(mode="json", exclude_defaults=True)
+        try:
+            return type(behavior).model_validate({**present, **self.keys})
+        except ValidationError as error:
+            raise refusal(f"behavior {self.behavior} of {self.entity}", error) from None
 
 
 @register("intervention", "drive")

@@ -118,6 +118,27 @@ class InterventionMethods(ABC):
         """
         self._do("replan", entity=name)
 
+    def configure(self, name: str, behavior: str, **keys: Any) -> None:
+        """Change keys of a behavior, which starts anew with them; the body replans.
+
+        Args:
+            name: The person or robot.
+            behavior: The behavior, by its type.
+            keys: The keys that change, with values as in a scenario.
+
+        Raises:
+            ScenarioError: There is no such body, behavior or key, or the value is wrong.
+
+        Example:
+            >>> import fleet2d
+            >>> simulation = fleet2d.Simulation(None, "simulation.duration=1 d", seed=4)
+            >>> simulation.configure("astro", "hangout", tau="10 min")
+            >>> simulation.advance()
+            >>> simulation.actors["astro"].behaviors[-1].tau
+            datetime.timedelta(seconds=600)
+        """
+        self._do("configure", entity=name, behavior=behavior, keys=keys)
+
     # People
 
     def away(self, name: str, *, duration: Time | None = None) -> None:

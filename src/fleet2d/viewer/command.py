@@ -46,7 +46,7 @@ def view(
     scenario, overrides = split(names)
     if scenario is not None and scenario.endswith("/"):
         raise RunDirectoryError(f"{scenario} does not exist: give a run directory or a scenario")
-    from fleet2d.viewer.live import watch_scenario
+    from fleet2d.viewer.page_server import watch_scenario
 
     with restrict_to(trust, trust_dir):
         run = watch_scenario(
@@ -89,6 +89,8 @@ def _view_runs(directories: list[Path], port: int, seen_at: str, *, browser: boo
             raise RunDirectoryError(f"{path} holds no run: give what `fleet2d run --out` wrote")
     server = PageServer(directories, port=port, seen_at=seen_at)
     server.show(open_browser=browser, announce=_announce)
+    for run in server.end_branches():
+        typer.echo(_where(run), err=True)
     raise typer.Exit(130)
 
 

@@ -81,7 +81,7 @@ class CameraFacts(TypedDict):
 
 
 class BodyFacts(TypedDict):
-    """A user or a robot."""
+    """A user or a robot; `keys` are those of its behaviors while the run is under way."""
 
     name: str
     robot: bool
@@ -89,6 +89,7 @@ class BodyFacts(TypedDict):
     radius: float
     cameras: list[CameraFacts]
     behaviors: list[str]
+    keys: dict[str, dict[str, Any]]
 
 
 class ColumnFacts(TypedDict):
@@ -182,11 +183,30 @@ class Problem(TypedDict):
 
 
 class SessionFacts(TypedDict):
-    """The runs that the page shows, by title; the first may be live."""
+    """The stored runs that the page shows, by title, and those that are under way."""
 
     runs: list[str]
-    live: bool
+    live: list["LiveSession"]
     version: str
+
+
+class LiveSession(TypedDict):
+    """A run that is under way, at a path of the server.
+
+    A branch repeats the run at the path `of` until before the step `since`.
+    """
+
+    path: str
+    title: str
+    of: str
+    since: int
+
+
+class BranchOrder(TypedDict):
+    """A wish of the page to continue the run at a path of the server from a step."""
+
+    of: str
+    step: int
 
 
 class LiveBody(TypedDict):
@@ -212,7 +232,10 @@ class LiveEvent(TypedDict):
 
 
 class LiveFrame(TypedDict):
-    """The state of a running simulation; `speed` 0 is as fast as it goes."""
+    """The state of a running simulation; `speed` 0 is as fast as it goes.
+
+    `served_as` is the number of the stored run that it has become; -1 while it is under way.
+    """
 
     step: int
     paused: bool
@@ -227,13 +250,22 @@ class LiveFrame(TypedDict):
     marks: list[MarkFacts]
     walls: int
     message: str
+    served_as: int
 
 
 class LiveOrder(TypedDict):
-    """A command of the page to a running simulation; `x` and `y` in metres."""
+    """A command of the page to a running simulation; `x` and `y` in metres.
 
-    action: Literal["pause", "resume", "step", "speed", "door", "place", "call", "replan", "end"]
+    `configure` changes the `key` of a behavior, such as `hangout.tau`, to the value that `text`
+    is in YAML.
+    """
+
+    action: Literal[
+        "pause", "resume", "step", "speed", "door", "place", "call", "replan", "configure", "end"
+    ]
     target: str
     value: float
     x: float
     y: float
+    key: str
+    text: str

@@ -8,15 +8,14 @@ import queue
 import threading
 import time
 from collections.abc import Callable, Iterator
+from contextvars import copy_context
+from functools import partial
 from pathlib import Path
 from typing import Any, get_args, get_type_hints
 
 import numpy as np
-from starlette.concurrency import run_in_threadpool
-from starlette.requests import Request
-from starlette.responses import Response, StreamingResponse
-from starlette.routing import Route
 
+from fleet2d.configuration.documents import parse_yaml
 from fleet2d.engine.simulation import Simulation
 from fleet2d.entities.body import Track
 from fleet2d.errors import Fleet2DError, InputError, PlacementError
@@ -27,10 +26,7 @@ from fleet2d.runs.run import Run
 from fleet2d.runtime.clock import DAY_S
 from fleet2d.runtime.events import EventKind
 from fleet2d.viewer.contract import LiveBody, LiveEvent, LiveFrame, LiveOrder, MarkFacts
-from fleet2d.viewer.home_facts import walls_facts
-from fleet2d.viewer.page_data import compact_json
-from fleet2d.viewer.page_server import PageServer, json_answer, problem
-from fleet2d.viewer.run_facts import intervention_marks, live_facts
+from fleet2d.viewer.run_facts import intervention_marks
 
 AHEAD_US = 120_000_000
 MAX_CORNERS = 60
@@ -185,6 +181,9 @@ class LiveEngine:
             self._called.add(name)
         elif order["action"] == "replan":
             self.simulation.replan(name)
+        elif order["action"] == "configure":
+            behavior, _, key = order["key"].partition(".")
+            self.simulation.configure(name, behavior, **{key: read_value(order["text"])})
         else:
             raise InputError(f"there is no intervention {order['action']!r}")
 
@@ -231,6 +230,7 @@ MAX_ORDER_BYTES = 4_096  # bytes of an order
 ORDER_WAIT_S = 10.0
 IDLE_S = 0.1
 FRAME_WAIT_S = 0.5  # less than the server waits for open responses when it ends
+OVER = "the run is over: it can't be changed any more"
 ACTIONS = get_args(get_type_hints(LiveOrder)["action"])
 
 
@@ -261,12 +261,19 @@ class LiveRun:
         self._watchers: list[queue.Queue[LiveFrame]] = []
         self._lock = threading.Lock()
         self._is_ending = self._streams_end = False
+        self._serve: Callable[[Run], int] | None = None
         self._frame = self._state()
-        self._thread = threading.Thread(target=self._run_loop, daemon=True, name="fleet2d-live")
+        # In the present context: what code is trusted there, is in the thread.
+        run_loop = partial(copy_context().run, self._run_loop)
+        self._thread = threading.Thread(target=run_loop, daemon=True, name="fleet2d-live")
 
     def start(self) -> None:
         """Start the simulation."""
         self._thread.start()
+
+    def serve_by(self, serve: Callable[[Run], int]) -> None:
+        """Have the run served when it is over: the function returns its number."""
+        self._serve = serve
 
     def end(self) -> None:
         """Stop the simulation at its current step, and close the run."""
@@ -280,25 +287,29 @@ class LiveRun:
     def submit(self, order: LiveOrder) -> str:
         """Apply an order in the thread of the simulation; return why it is refused, or nothing."""
         answer: queue.Queue[str] = queue.Queue()
+        if self.run is not None:
+            return OVER
         self._orders.put((order, answer))
         try:
             return answer.get(timeout=ORDER_WAIT_S)
         except queue.Empty:
-            return "the simulation is over" if self.run else "the simulation does not answer"
+            return "the simulation does not answer" if self._thread.is_alive() else OVER
 
     def _run_loop(self) -> None:
         """Advance the simulation and apply orders until the end; this is the thread."""
         try:
-            while not self._is_ending:
-                is_idle = self._paused or self.engine.done
-                self._apply_orders(IDLE_S if is_idle else 0.0)
-                if not self._paused and not self.engine.done:
+            while not self._is_ending and not self.engine.done:
+                self._apply_orders(IDLE_S if self._paused else 0.0)
+                if not self._paused:
                     self._advance()
         except BaseException as error:  # noqa: BLE001 - shown on the page and raised by the command
             self.failure = error
-            self._send({**self._frame, "message": f"the simulation failed: {error}"})
+            self._frame = {**self._frame, "message": f"the simulation failed: {error}"}
         finally:
             self.run = self.engine.finish()
+            served_as = self._serve(self.run) if self._serve is not None else -1
+            self._frame = {**self._frame, "events": [], "marks": [], "served_as": served_as}
+            self._send(self._frame)
 
     def _advance(self) -> None:
         """Advance the simulation by a frame, send the frame, and wait as the speed requires."""
@@ -349,12 +360,11 @@ class LiveRun:
             if not 0 <= order["value"] <= 1e6:
                 raise InputError("a speed is 0 (as fast as it goes) to 1,000,000 times real time")
             self._speed = order["value"]
+        elif self.engine.done:
+            raise InputError(OVER)
         elif action == "step":
             self._paused = True
-            if not self.engine.done:
-                self.engine.advance(max(1, min(DAY_S, round(order["value"]))))
-        elif self.engine.done:
-            raise InputError("the run is over: it can't be changed any more")
+            self.engine.advance(max(1, min(DAY_S, round(order["value"]))))
         else:
             self.engine.apply(order)
 
@@ -375,6 +385,7 @@ class LiveRun:
             marks=engine.marks(),
             walls=engine.walls(),
             message="",
+            served_as=-1,
         )
         return self._frame
 
@@ -410,45 +421,6 @@ class LiveRun:
         """End all `frames`, though the simulation goes on; lock-free for signal handlers."""
         self._streams_end = True
 
-    def routes(self) -> list[Route]:
-        """Return the routes of a running simulation."""
-        return [
-            Route("/live/facts.json", self._facts),
-            Route("/live/frames", self._stream),
-            Route("/live/order", self._order, methods=["POST"]),
-            Route("/live/walls/{walls:int}.json", self._mesh),
-        ]
-
-    async def _facts(self, _: Request) -> Response:
-        facts = await run_in_threadpool(live_facts, self.engine.simulation)
-        return json_answer(compact_json(facts))
-
-    async def _mesh(self, request: Request) -> Response:
-        try:
-            return json_answer(
-                compact_json(walls_facts(self.engine.mesh(request.path_params["walls"])))
-            )
-        except InputError as error:
-            return problem(str(error))
-
-    async def _stream(self, _: Request) -> Response:
-        def lines() -> Iterator[bytes]:
-            for frames in self.frames():
-                yield b"data: " + compact_json(frames) + b"\n\n" if frames else b": wait\n\n"
-
-        return StreamingResponse(lines(), media_type="text/event-stream")
-
-    async def _order(self, request: Request) -> Response:
-        if request.headers.get("content-type", "").split(";")[0] != "application/json":
-            return problem("an order must be JSON", 415)
-        body = await request.body()
-        try:
-            order = read_order(body)
-        except InputError as error:
-            return problem(str(error))
-        refusal = await run_in_threadpool(self.submit, order)
-        return problem(refusal) if refusal else json_answer(b"{}")
-
 
 def read_order(body: bytes) -> LiveOrder:
     """Return the order in the body of a request.
@@ -463,47 +435,22 @@ def read_order(body: bytes) -> LiveOrder:
         action, target = content["action"], content["target"]
     except (ValueError, KeyError, TypeError):
         raise refusal from None
+    key, text = content.get("key", ""), content.get("text", "")
     is_finite = all(abs(number) < 1e9 for number in (value, x, y))
-    if action not in ACTIONS or not isinstance(target, str) or not is_finite:
+    are_texts = all(isinstance(word, str) for word in (target, key, text))
+    if action not in ACTIONS or not are_texts or not is_finite:
         raise refusal
-    return LiveOrder(action=action, target=target, value=value, x=x, y=y)
+    return LiveOrder(action=action, target=target, value=value, x=x, y=y, key=key, text=text)
 
 
-def watch_scenario(
-    scenario: str | Path | None,
-    overrides: list[str],
-    *,
-    seed: int | None = None,
-    out: Path | None = None,
-    port: int = 0,
-    seen_at: str = "",
-    open_browser: bool = True,
-    announce: Callable[[str], None] = print,
-) -> Run:
-    """Run a scenario while it is watched, until Ctrl-C; return the run as it is then.
-
-    Args:
-        scenario: As for ``fleet2d.run``.
-        overrides: Changes of the scenario.
-        seed: Its seed.
-        out: The directory of the run; None: the run stays in memory.
-        port: The port of the page; 0: a free one.
-        seen_at: Another address under which browsers reach it.
-        open_browser: Whether to open the page.
-        announce: Called with the address of the page.
+def read_value(text: str) -> Any:
+    """Return the value of a key as it is written in a scenario.
 
     Raises:
-        InputError: The scenario is wrong, or the port is in use.
+        InputError: It isn't YAML.
+
+    Example:
+        >>> read_value("10 min"), read_value("0.5"), read_value("[kitchen, office]")
+        ('10 min', 0.5, ['kitchen', 'office'])
     """
-    settings: dict[str, Any] = {} if seed is None else {"seed": seed}
-    live = LiveRun(Simulation(scenario, *overrides, out=out, **settings), paused=True)
-    server = PageServer([], port=port, live=live, seen_at=seen_at)
-    live.start()
-    try:
-        server.show(open_browser=open_browser, announce=announce)
-    finally:
-        live.end()
-    if live.failure is not None:
-        raise live.failure
-    assert live.run is not None
-    return live.run
+    return parse_yaml(text, Path(), "the value")

@@ -8,16 +8,15 @@ import signal
 import socket
 import threading
 import webbrowser
-from collections.abc import Awaitable, Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from http import HTTPStatus
 from pathlib import Path
 from types import FrameType
-from typing import Protocol
+from typing import Any
 from urllib.parse import urlsplit
 
 from starlette.applications import Starlette
-from starlette.concurrency import run_in_threadpool
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.requests import Request
 from starlette.responses import FileResponse, JSONResponse, Response
@@ -26,21 +25,14 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from fleet2d import __version__
 from fleet2d.bounds import one_line
-from fleet2d.errors import ArtifactError, Fleet2DError, InputError, end_by_signal, extra
-from fleet2d.runs.run import open_run
-from fleet2d.viewer.contract import Problem, SessionFacts
+from fleet2d.engine.simulation import Simulation
+from fleet2d.errors import InputError, end_by_signal, extra
+from fleet2d.runs.run import Run
+from fleet2d.viewer.contract import SessionFacts
+from fleet2d.viewer.live import LiveRun
+from fleet2d.viewer.live_runs import LiveRuns
 from fleet2d.viewer.page_data import PageData, compact_json
-
-
-def json_answer(content: bytes, status: int = 200) -> Response:
-    """Return a response of JSON bytes."""
-    return Response(content, status, media_type="application/json")
-
-
-def problem(message: str, status: int = 422) -> Response:
-    """Return a response with the reason why something can't be shown or done."""
-    return json_answer(compact_json(Problem(message=message)), status)
-
+from fleet2d.viewer.served_runs import ServedRuns, json_answer, problem
 
 TOKEN = re.compile(r"[\w-]{32,64}", re.ASCII)
 HOSTS = ("127.0.0.1", "localhost", "[::1]")
@@ -172,66 +164,12 @@ MEDIA = {
     ".svg": "image/svg+xml",
 }
 
-Endpoint = Callable[[Request], Awaitable[Response]]
-
-
-class LiveRoutes(Protocol):
-    """The routes that a running simulation adds to the server."""
-
-    def routes(self) -> list[Route]:
-        """Return its routes."""
-
-    def end_streams(self) -> None:
-        """End all open responses; called in the handler of a signal."""
-
-
-class ServedRuns:
-    """The runs that are served; each is opened when it is first requested."""
-
-    def __init__(self, sources: Sequence[Path | PageData]) -> None:
-        """Name run directories, or data of runs; nothing is opened."""
-        self._sources = list(sources)
-        self._data: dict[int, PageData] = {}
-
-    @property
-    def titles(self) -> list[str]:
-        """The titles of the runs."""
-        return [
-            source.title if isinstance(source, PageData) else source.resolve().name
-            for source in self._sources
-        ]
-
-    def data(self, number: int) -> PageData:
-        """Return the data of a run.
-
-        Raises:
-            ArtifactError: There is no such run.
-            Fleet2DError: It can't be read.
-        """
-        if not 0 <= number < len(self._sources):
-            raise ArtifactError(f"there is no run {number}")
-        if number not in self._data:
-            source = self._sources[number]
-            self._data[number] = (
-                source if isinstance(source, PageData) else PageData(open_run(source))
-            )
-        return self._data[number]
-
-    def preload(self) -> None:
-        """Compute the data that the page requests first; errors are reported on its request."""
-        for number in range(len(self._sources)):
-            with suppress(Fleet2DError, OSError, ValueError, KeyError):
-                data = self.data(number)
-                _ = data.facts_json
-                data.walls(0)
-                _ = data.sightings
-
 
 def page_app(
     runs: ServedRuns,
     token: str,
     port: int,
-    live: LiveRoutes | None = None,
+    live: LiveRuns | None = None,
     page: Path = PAGE,
     seen_at: str = "",
 ) -> ASGIApp:
@@ -241,13 +179,14 @@ def page_app(
         runs: The runs.
         token: The first part of every path.
         port: The port of the server.
-        live: A running simulation, beside or instead of runs.
+        live: Running simulations, beside or instead of runs; None: there are none yet.
         page: The folder of the page's bundle.
         seen_at: Another address under which browsers reach it.
     """
+    live = LiveRuns(runs) if live is None else live
 
     async def session(_: Request) -> Response:
-        facts = SessionFacts(runs=runs.titles, live=live is not None, version=__version__)
+        facts = SessionFacts(runs=runs.titles, live=live.sessions(), version=__version__)
         return json_answer(compact_json(facts))
 
     async def file(request: Request) -> Response:
@@ -260,11 +199,8 @@ def page_app(
     routes = [
         Route("/", file),
         Route("/session.json", session),
-        Route("/run/{number:int}/facts.json", _endpoint(runs, _facts)),
-        Route("/run/{number:int}/sightings.json", _endpoint(runs, _sightings)),
-        Route("/run/{number:int}/walls/{walls:int}.json", _endpoint(runs, _walls)),
-        Route("/run/{number:int}/tables/{table}.parquet", _endpoint(runs, _table)),
-        *(live.routes() if live else ()),
+        *runs.routes(),
+        *live.routes(),
         Route("/{name}", file),
     ]
     return Guard(_strip_token(token, Starlette(routes=routes)), token, port, seen_at)
@@ -283,40 +219,6 @@ def _strip_token(token: str, app: ASGIApp) -> ASGIApp:
     return serve
 
 
-def _endpoint(runs: ServedRuns, respond: Callable[[PageData, Request], Response]) -> Endpoint:
-    """Return the endpoint of data of a run; its response to errors is their message."""
-
-    def work(request: Request) -> Response:
-        try:
-            return respond(runs.data(request.path_params["number"]), request)
-        except Fleet2DError as error:
-            return problem(str(error))
-        except (OSError, ValueError, KeyError) as error:
-            return problem(f"the run can't be read: its files are damaged ({error!r})")
-
-    async def endpoint(request: Request) -> Response:
-        return await run_in_threadpool(work, request)
-
-    return endpoint
-
-
-def _facts(data: PageData, _: Request) -> Response:
-    return json_answer(data.facts_json)
-
-
-def _sightings(data: PageData, _: Request) -> Response:
-    return json_answer(compact_json(data.sightings))
-
-
-def _walls(data: PageData, request: Request) -> Response:
-    return json_answer(compact_json(data.walls(request.path_params["walls"])))
-
-
-def _table(data: PageData, request: Request) -> Response:
-    path = data.table_path(request.path_params["table"])
-    return FileResponse(path, media_type="application/vnd.apache.parquet")
-
-
 with extra("view", "watching needs a server"):
     import starlette  # noqa: F401 - the server needs it, too
     import uvicorn
@@ -329,14 +231,13 @@ MAX_RUNS = 4
 class _Server(uvicorn.Server):
     """A server that ends the streams of a running simulation, which would keep it open."""
 
-    def __init__(self, config: uvicorn.Config, live: LiveRoutes | None) -> None:
+    def __init__(self, config: uvicorn.Config, live: LiveRuns) -> None:
         super().__init__(config)
         self._live = live
 
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:
         """End the server on a signal."""
-        if self._live is not None:
-            self._live.end_streams()
+        self._live.end_streams()
         super().handle_exit(sig, frame)
 
 
@@ -353,7 +254,7 @@ class PageServer:
         sources: Sequence[Path | PageData],
         *,
         port: int = 0,
-        live: LiveRoutes | None = None,
+        live: LiveRun | None = None,
         seen_at: str = "",
     ) -> None:
         """Bind a port of this machine.
@@ -386,12 +287,13 @@ class PageServer:
         base = seen_at.rstrip("/") or f"http://{HOST}:{self._port}"
         self.address = f"{base}/{token}/"
         self._runs = ServedRuns(sources)
-        app = page_app(self._runs, token, self._port, live, seen_at=seen_at)
+        self._live = LiveRuns(self._runs, live)
+        app = page_app(self._runs, token, self._port, self._live, seen_at=seen_at)
         # Quiet: a page that is open when the server ends is no error.
         config = uvicorn.Config(
             app, log_level="critical", lifespan="off", ws="none", timeout_graceful_shutdown=1
         )
-        self._server = _Server(config, live)
+        self._server = _Server(config, self._live)
 
     def show(self, *, open_browser: bool, announce: Callable[[str], None]) -> None:
         """Announce the address, open a browser if requested, serve until Ctrl-C or SIGTERM."""
@@ -415,6 +317,10 @@ class PageServer:
         """Free the port of a server that was never run."""
         self._socket.close()
 
+    def end_branches(self) -> list[Run]:
+        """End the branches that pages began, and return their runs."""
+        return self._live.end_branches()
+
     def start(self) -> Callable[[], None]:
         """Serve in a thread; return a function that stops it."""
         thread = threading.Thread(target=self.run, daemon=True, name="fleet2d-view")
@@ -425,3 +331,44 @@ class PageServer:
             thread.join(timeout=5)
 
         return stop
+
+
+def watch_scenario(
+    scenario: str | Path | None,
+    overrides: list[str],
+    *,
+    seed: int | None = None,
+    out: Path | None = None,
+    port: int = 0,
+    seen_at: str = "",
+    open_browser: bool = True,
+    announce: Callable[[str], None] = print,
+) -> Run:
+    """Run a scenario while it is watched, until Ctrl-C; return the run as it is then.
+
+    Args:
+        scenario: As for ``fleet2d.run``.
+        overrides: Changes of the scenario.
+        seed: Its seed.
+        out: The directory of the run; None: the run stays in memory.
+        port: The port of the page; 0: a free one.
+        seen_at: Another address under which browsers reach it.
+        open_browser: Whether to open the page.
+        announce: Called with the address of the page.
+
+    Raises:
+        InputError: The scenario is wrong, or the port is in use.
+    """
+    settings: dict[str, Any] = {} if seed is None else {"seed": seed}
+    live = LiveRun(Simulation(scenario, *overrides, out=out, **settings), paused=True)
+    server = PageServer([], port=port, live=live, seen_at=seen_at)
+    live.start()
+    try:
+        server.show(open_browser=open_browser, announce=announce)
+    finally:
+        live.end()
+        server.end_branches()
+    if live.failure is not None:
+        raise live.failure
+    assert live.run is not None
+    return live.run

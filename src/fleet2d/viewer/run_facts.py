@@ -235,6 +235,7 @@ def bodies_of(scenario: Mapping[str, Any], entities: Mapping[str, Any]) -> list[
                     radius=float(settings.get("radius", 0.15 if robot else 0.2)),
                     cameras=_cameras(settings),
                     behaviors=[b.get("type", "") for b in settings.get("behaviors", ())],
+                    keys={},
                 )
             )
     return bodies
@@ -324,6 +325,11 @@ def live_facts(simulation: Simulation) -> RunFacts:
         "users": list(simulation.scenario.users),
         "robots": list(simulation.scenario.robots),
     }
+    bodies = bodies_of(scenario, entities)
+    for body in bodies:
+        for behavior in simulation.actors[body["name"]].behaviors:
+            keys = behavior.model_dump(mode="json")
+            body["keys"].setdefault(behavior.type_name, keys)
     return RunFacts(
         title=simulation.scenario.name or "live run",
         status="running",
@@ -337,7 +343,7 @@ def live_facts(simulation: Simulation) -> RunFacts:
         digest=None,
         version=__version__,
         home=home_facts(simulation.home.plan, _doors(simulation)),
-        bodies=bodies_of(scenario, entities),
+        bodies=bodies,
         tables=[],
         walls=[WallsChange(step=0, walls=0)],
         marks=[],

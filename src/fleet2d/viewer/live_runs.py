@@ -1,0 +1,209 @@
+"""The simulations that run while pages watch them: one of a scenario, and branches of runs."""
+
+import json
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from starlette.concurrency import run_in_threadpool
+from starlette.requests import Request
+from starlette.responses import Response, StreamingResponse
+from starlette.routing import Route
+
+from fleet2d.artifacts.manifest import plain
+from fleet2d.configuration.trust import restrict_stored
+from fleet2d.engine.repeat import branch, repeat_until
+from fleet2d.engine.simulation import Simulation
+from fleet2d.errors import Fleet2DError, InputError
+from fleet2d.runs.run import Run
+from fleet2d.viewer.contract import BranchOrder, LiveSession
+from fleet2d.viewer.home_facts import walls_facts
+from fleet2d.viewer.live import MAX_ORDER_BYTES, LiveRun, read_order
+from fleet2d.viewer.page_data import PageData, compact_json
+from fleet2d.viewer.run_facts import live_facts
+from fleet2d.viewer.served_runs import ServedRuns, json_answer, problem
+
+MAX_BRANCHES = 4
+
+
+class LiveRuns:
+    """The running simulations of a server; when one is over, its run is served as a stored one."""
+
+    def __init__(self, served: ServedRuns, first: LiveRun | None = None) -> None:
+        """Begin with one simulation, or with none.
+
+        Args:
+            served: The runs that are served: branches begin from them, and ended runs join them.
+            first: A simulation that somebody else starts and ends.
+        """
+        self._served = served
+        self._runs: list[LiveRun] = []
+        self._sessions: list[LiveSession] = []
+        self._lock = threading.Lock()
+        self._branches: list[LiveRun] = []
+        if first is not None:
+            title = first.engine.simulation.scenario.name or "live run"
+            self._add(first, title, "", 0)
+
+    def _add(self, live: LiveRun, title: str, of: str, since: int) -> LiveSession:
+        live.serve_by(lambda run: self._served.add(PageData(run)))
+        path = f"live/{len(self._runs)}"
+        session = LiveSession(path=path, title=title, of=of, since=since)
+        self._runs.append(live)
+        self._sessions.append(session)
+        return session
+
+    def sessions(self) -> list[LiveSession]:
+        """Return the simulations that are under way."""
+        pairs = zip(self._runs, self._sessions, strict=True)
+        return [session for live, session in pairs if live.run is None]
+
+    def branch(self, order: BranchOrder) -> LiveSession:
+        """Continue a run from a step in a simulation of its own, which waits there.
+
+        A run in a directory gets a branch in a new directory beside it, another one in memory.
+
+        Raises:
+            InputError: There is no such run or step, or too many branches are under way.
+            Fleet2DError: The run can't be repeated.
+        """
+        with self._lock:
+            if sum(live.run is None for live in self._branches) >= MAX_BRANCHES:
+                raise InputError(f"{MAX_BRANCHES} branches are under way: run one to its end first")
+            simulation = self._branch(order["of"], order["step"])
+            with restrict_stored():  # no code but the user's trusted one runs in its thread
+                live = LiveRun(simulation, paused=True)
+            title = (
+                simulation.directory.name if simulation.directory else f"branch of {order['of']}"
+            )
+            session = self._add(live, title, order["of"], order["step"])
+            self._branches.append(live)
+        live.start()
+        return session
+
+    def _branch(self, of: str, step: int) -> Simulation:
+        kind, _, text = of.partition("/")
+        number = int(text) if text.isdecimal() else -1
+        if kind == "run":
+            run = self._served.data(number).run
+            return branch(run, step, free_directory(run.directory))
+        simulation = self._live(number).engine.simulation
+        if step > simulation.step:
+            raise InputError(f"step {step} is not simulated yet: the run is at {simulation.step}")
+        scenario: dict[str, Any] = plain(simulation.scenario.resolved())
+        scenario["simulation"]["seed"] = simulation.seed
+        content = {
+            "scenario": scenario,
+            "interventions": simulation.interventions,
+            "expectations": {},
+        }
+        return repeat_until(content, step, free_directory(simulation.directory))
+
+    def _live(self, number: int) -> LiveRun:
+        if not 0 <= number < len(self._runs):
+            raise InputError(f"there is no running simulation {number}")
+        return self._runs[number]
+
+    def end_streams(self) -> None:
+        """End all open responses; lock-free for signal handlers."""
+        for live in self._runs:
+            live.end_streams()
+
+    def end_branches(self) -> list[Run]:
+        """Stop all branches at their present steps, and return their runs."""
+        for live in self._branches:
+            live.end()
+        return [live.run for live in self._branches if live.run is not None]
+
+    def routes(self) -> list[Route]:
+        """Return the routes of running simulations."""
+        return [
+            Route("/branch", self._begin, methods=["POST"]),
+            Route("/live/{number:int}/facts.json", self._facts),
+            Route("/live/{number:int}/frames", self._frames),
+            Route("/live/{number:int}/order", self._order, methods=["POST"]),
+            Route("/live/{number:int}/walls/{walls:int}.json", self._walls),
+        ]
+
+    async def _begin(self, request: Request) -> Response:
+        def begin(body: bytes) -> Response:
+            try:
+                return json_answer(compact_json(self.branch(read_branch(body))))
+            except (Fleet2DError, ValueError) as error:
+                return problem(str(error))
+
+        body = await _json_body(request)
+        return body if isinstance(body, Response) else await run_in_threadpool(begin, body)
+
+    async def _facts(self, request: Request) -> Response:
+        def facts() -> Response:
+            try:
+                simulation = self._live(request.path_params["number"]).engine.simulation
+                return json_answer(compact_json(live_facts(simulation)))
+            except Fleet2DError as error:
+                return problem(str(error))
+
+        return await run_in_threadpool(facts)
+
+    async def _walls(self, request: Request) -> Response:
+        try:
+            mesh = self._live(request.path_params["number"]).engine.mesh
+            return json_answer(compact_json(walls_facts(mesh(request.path_params["walls"]))))
+        except InputError as error:
+            return problem(str(error))
+
+    async def _frames(self, request: Request) -> Response:
+        try:
+            live = self._live(request.path_params["number"])
+        except InputError as error:
+            return problem(str(error))
+
+        def lines() -> Iterator[bytes]:
+            for frames in live.frames():
+                yield b"data: " + compact_json(frames) + b"\n\n" if frames else b": wait\n\n"
+
+        return StreamingResponse(lines(), media_type="text/event-stream")
+
+    async def _order(self, request: Request) -> Response:
+        body = await _json_body(request)
+        if isinstance(body, Response):
+            return body
+        try:
+            live, order = self._live(request.path_params["number"]), read_order(body)
+        except InputError as error:
+            return problem(str(error))
+        refusal = await run_in_threadpool(live.submit, order)
+        return problem(refusal) if refusal else json_answer(b"{}")
+
+
+async def _json_body(request: Request) -> bytes | Response:
+    if request.headers.get("content-type", "").split(";")[0] != "application/json":
+        return problem("an order must be JSON", 415)
+    return await request.body()
+
+
+def read_branch(body: bytes) -> BranchOrder:
+    """Return the wish for a branch in the body of a request.
+
+    Raises:
+        InputError: The body is none.
+    """
+    try:
+        content: Any = json.loads(body) if len(body) <= MAX_ORDER_BYTES else None
+        of, step = content["of"], content["step"]
+    except (ValueError, KeyError, TypeError):
+        of, step = None, None
+    if not isinstance(of, str) or type(step) is not int:
+        raise InputError("the request is not a valid wish for a branch")
+    return BranchOrder(of=of, step=step)
+
+
+def free_directory(beside: Path | None) -> Path | None:
+    """Return a directory for a branch beside that of its run; None for a run in memory."""
+    if beside is None:
+        return None
+    root = beside.resolve()
+    taken = {path.name for path in root.parent.glob(f"{root.name}-branch-*")}
+    number = next(n for n in range(1, len(taken) + 2) if f"{root.name}-branch-{n}" not in taken)
+    return root.parent / f"{root.name}-branch-{number}"

@@ -1,0 +1,117 @@
+"""The stored runs that a page shows, as responses of the server."""
+
+from collections.abc import Awaitable, Callable, Sequence
+from contextlib import suppress
+from pathlib import Path
+
+from starlette.concurrency import run_in_threadpool
+from starlette.requests import Request
+from starlette.responses import FileResponse, Response
+from starlette.routing import Route
+
+from fleet2d.errors import ArtifactError, Fleet2DError
+from fleet2d.runs.run import open_run
+from fleet2d.viewer.contract import Problem
+from fleet2d.viewer.page_data import PageData, compact_json
+
+Endpoint = Callable[[Request], Awaitable[Response]]
+
+
+def json_answer(content: bytes, status: int = 200) -> Response:
+    """Return a response of JSON bytes."""
+    return Response(content, status, media_type="application/json")
+
+
+def problem(message: str, status: int = 422) -> Response:
+    """Return a response with the reason why something can't be shown or done."""
+    return json_answer(compact_json(Problem(message=message)), status)
+
+
+class ServedRuns:
+    """The runs that are served; each is opened when it is first requested."""
+
+    def __init__(self, sources: Sequence[Path | PageData]) -> None:
+        """Name run directories, or data of runs; nothing is opened."""
+        self._sources = list(sources)
+        self._data: dict[int, PageData] = {}
+
+    def add(self, data: PageData) -> int:
+        """Serve another run; return its number."""
+        self._sources.append(data)
+        return len(self._sources) - 1
+
+    @property
+    def titles(self) -> list[str]:
+        """The titles of the runs."""
+        return [
+            source.title if isinstance(source, PageData) else source.resolve().name
+            for source in self._sources
+        ]
+
+    def data(self, number: int) -> PageData:
+        """Return the data of a run.
+
+        Raises:
+            ArtifactError: There is no such run.
+            Fleet2DError: It can't be read.
+        """
+        if not 0 <= number < len(self._sources):
+            raise ArtifactError(f"there is no run {number}")
+        if number not in self._data:
+            source = self._sources[number]
+            self._data[number] = (
+                source if isinstance(source, PageData) else PageData(open_run(source))
+            )
+        return self._data[number]
+
+    def preload(self) -> None:
+        """Compute the data that the page requests first; errors are reported on its request."""
+        for number in range(len(self._sources)):
+            with suppress(Fleet2DError, OSError, ValueError, KeyError):
+                data = self.data(number)
+                _ = data.facts_json
+                data.walls(0)
+                _ = data.sightings
+
+    def routes(self) -> list[Route]:
+        """Return the routes of the data of all runs."""
+        return [
+            Route("/run/{number:int}/facts.json", _endpoint(self, _facts)),
+            Route("/run/{number:int}/sightings.json", _endpoint(self, _sightings)),
+            Route("/run/{number:int}/walls/{walls:int}.json", _endpoint(self, _walls)),
+            Route("/run/{number:int}/tables/{table}.parquet", _endpoint(self, _table)),
+        ]
+
+
+def _endpoint(runs: ServedRuns, respond: Callable[[PageData, Request], Response]) -> Endpoint:
+    """Return the endpoint of data of a run; its response to errors is their message."""
+
+    def work(request: Request) -> Response:
+        try:
+            return respond(runs.data(request.path_params["number"]), request)
+        except Fleet2DError as error:
+            return problem(str(error))
+        except (OSError, ValueError, KeyError) as error:
+            return problem(f"the run can't be read: its files are damaged ({error!r})")
+
+    async def endpoint(request: Request) -> Response:
+        return await run_in_threadpool(work, request)
+
+    return endpoint
+
+
+def _facts(data: PageData, _: Request) -> Response:
+    return json_answer(data.facts_json)
+
+
+def _sightings(data: PageData, _: Request) -> Response:
+    return json_answer(compact_json(data.sightings))
+
+
+def _walls(data: PageData, request: Request) -> Response:
+    return json_answer(compact_json(data.walls(request.path_params["walls"])))
+
+
+def _table(data: PageData, request: Request) -> Response:
+    path = data.table_path(request.path_params["table"])
+    return FileResponse(path, media_type="application/vnd.apache.parquet")

@@ -1,0 +1,55 @@
+"""A behavior whose keys change in mid-run starts anew with them; everything before stays the same."""
+
+import copy
+from datetime import timedelta
+from pathlib import Path
+
+import pytest
+
+import fleet2d
+from fleet2d.errors import PlacementError, ScenarioError
+
+
+def simulation() -> fleet2d.Simulation:
+    return fleet2d.Simulation("bundled:base", "simulation.duration=10 h", seed=4)
+
+
+def test_changed_key_changes_what_follows_and_nothing_before() -> None:
+    changed = simulation()
+    changed.advance(6 * 3600)
+    plain = copy.deepcopy(changed)
+    changed.configure("astro", "hangout", avoid=["bathroom", "living_room"], period="10 min")
+    paths = [run.run().path("astro") for run in (changed, plain)]
+    same = paths[0].x == paths[1].x
+    assert same[: 6 * 60].all()
+    assert not same.all()
+
+
+def test_configured_run_is_saved_and_loaded(tmp_path: Path) -> None:
+    run = simulation()
+    run.advance(3600)
+    run.configure("astro", "hangout", tau="10 min")
+    run.advance()
+    run.save(tmp_path / "saved")
+    loaded = fleet2d.Simulation.load(tmp_path / "saved")
+    assert timedelta(minutes=10) == loaded.actors["astro"].behaviors[1].tau  # type: ignore[attr-defined]
+    assert loaded.run().digest == run.run().digest
+
+
+@pytest.mark.parametrize(
+    ("behavior", "keys", "error", "words"),
+    [
+        ("hangot", {"tau": 3}, ScenarioError, "did you mean 'hangout'"),
+        ("hangout", {"tao": 3}, ScenarioError, "did you mean 'tau'"),
+        ("hangout", {"source": "lpt"}, ScenarioError, "did you mean 'ltp'"),
+        ("hangout", {"avoid": ["bethroom"]}, PlacementError, "did you mean 'bathroom'"),
+        ("hangout", {}, ScenarioError, "at least 1"),
+    ],
+)
+def test_wrong_keys_are_refused_and_nothing_is_recorded(
+    behavior: str, keys: dict[str, object], error: type[Exception], words: str
+) -> None:
+    run = simulation()
+    with pytest.raises(error, match=words):
+        run.configure("astro", behavior, **keys)
+    assert [] == run.interventions
