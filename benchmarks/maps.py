@@ -185,12 +185,12 @@ def damaged(number: int) -> dict[str, Any]:
     damage = Damage(number)
     with TemporaryDirectory() as name:
         path = damage.write(Path(name))
-        begin = time.perf_counter()
+        begin = time.process_time()
         try:
             plan = Ros(path=path).load()
         except FloorPlanError as error:
             return {"number": number, "defects": damage.names, "refused": str(error)}
-        seconds = time.perf_counter() - begin
+        seconds = time.process_time() - begin
     rows, columns = damage.shape
     truth = damage.truth()
     rooms = room_pixels(plan, damage.pixel, rows, columns)
@@ -292,14 +292,14 @@ def captured_table() -> None:
     for kind, path, truth in pictures():
         grey, name = np.asarray(Image.open(path).convert("L")), path.stem
         with TemporaryDirectory() as folder:
-            begin = time.perf_counter()
+            begin = time.process_time()
             try:
                 plan = Ros.model_construct(path=write_map(Path(folder), grey, PIXEL_M)).load()
             except FloorPlanError as error:
                 print(f"{path.name} is refused: {error}")
                 sets[kind].append(dict.fromkeys((*SCORES, "rooms", "true"), 0.0) | {"name": name})
                 continue
-            seconds = time.perf_counter() - begin
+            seconds = time.process_time() - begin
         rooms = room_pixels(plan, PIXEL_M, *grey.shape)
         sets[kind].append({"name": name, "seconds": seconds, **score(rooms, truth())})
     captured = DATA / "captured" / "vacuum"

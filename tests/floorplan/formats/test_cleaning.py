@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from fleet2d.floorplan.formats.cleaning import OccupancyMap, bridge_gaps, drop_scraps
+from fleet2d.kernels.space import label_parts
 
 
 def two_rooms(gap: str, rows: slice = slice(0, 20), thickness: int = 1) -> OccupancyMap:
@@ -79,3 +80,44 @@ def test_scraps_are_parts_below_the_area_but_never_the_largest() -> None:
     assert 20 * 6 == np.count_nonzero(drop_scraps(raw, 1.3)[0])
     assert 20 * 6 == np.count_nonzero(drop_scraps(raw, 100)[0])
     assert not drop_scraps(raw, 0)[0].any()
+
+
+def turned_rooms(degrees: float, door: slice) -> OccupancyMap:
+    """Two rooms of 4 m x 3 m beside each other, turned; the wall between is 3 pixels thick, and the
+    shut door in it one to two."""
+    y, x = np.mgrid[0:130, 0:170] - np.array([65, 85])[:, None, None]
+    cosine, sine = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    u, v = x * cosine + y * sine, y * cosine - x * sine
+    home, wall = (abs(u) < 41.5) & (abs(v) < 30), abs(u) < 1.5
+    in_door = (abs(u) < 0.8) & (v > door.start) & (v < door.stop)
+    free = home & ~(wall & ~((v > door.start) & (v < door.stop))) & ~in_door
+    return OccupancyMap(free, ~free, 0.1)
+
+
+@pytest.mark.parametrize("degrees", [0, 17, 33, 45])
+def test_shut_door_opens_however_the_map_is_turned(degrees: float) -> None:
+    raw = turned_rooms(degrees, slice(-5, 4))
+
+    opened, _ = bridge_gaps(raw, 2)
+
+    assert label_parts(raw.free, False).max() == 1
+    assert label_parts(raw.free | opened, False).max() == 0
+    assert np.count_nonzero(opened) < 30
+
+
+def test_shut_door_opens_though_a_ray_joins_the_rooms() -> None:
+    raw = turned_rooms(0, slice(-5, 4))
+    raw.free[90] |= abs(np.arange(170) - 85) < 5
+
+    assert not bridge_gaps(raw, 2)[0].any()
+    assert np.count_nonzero(bridge_gaps(raw, 2, ray_width=0.3)[0]) == 8
+
+
+def test_room_behind_a_wide_shut_door_gets_a_door_in_its_middle() -> None:
+    raw = turned_rooms(0, slice(-20, 20))
+
+    opened, _ = bridge_gaps(raw, 2)
+
+    rows = np.flatnonzero(opened.any(axis=1))
+    assert 0.7 <= (rows[-1] - rows[0] + 1) * raw.pixel <= 0.9
+    assert abs(rows.mean() - 65) < 1.5

@@ -254,6 +254,24 @@ def test_grey_of_unknown_in_the_middle_of_a_map_is_no_floor(tmp_path: Path) -> N
     assert plan.area_m2 == pytest.approx(2.5 - 36 * 0.05**2)
 
 
+def test_grey_that_fills_furniture_is_no_floor_but_all_shades_of_a_map_of_chances_are(
+    tmp_path: Path,
+) -> None:
+    pixels = np.full((60, 80), UNKNOWN, np.uint8)
+    pixels[5:-5, 5:-5] = FREE
+    pixels[20:30, 20:40] = 211  # a sofa of 0.5 m x 1 m
+    chances = pixels.copy()
+    chances[20:30, 20:40] = np.arange(210, 230, dtype=np.uint8)
+
+    filled = read_ros(write(tmp_path, pixels))
+    (tmp_path / "chances").mkdir()
+    shaded = read_ros(write(tmp_path / "chances", chances))
+
+    assert 50 * 70 * 0.05**2 - 0.5 == pytest.approx(filled.area_m2)
+    assert 50 * 70 * 0.05**2 == pytest.approx(shaded.area_m2)
+    assert "grey 211 is taken for unknown" in filled.notes[0]
+
+
 def test_unknown_grey_names_the_shade_or_takes_all_for_floor(tmp_path: Path) -> None:
     pixels = ROOM.copy()
     pixels[20:26, 30:36] = 230

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from fleet2d.errors import FloorPlanError
 from fleet2d.kernels import F64, I32, I64, Bool
-from fleet2d.kernels.space import count_steps, label_parts, squared_distance
+from fleet2d.kernels.space import count_steps, label_parts, spread_labels, squared_distance
 
 # Tolerance of decimal lengths in pixels: 0.3 m are six pixels of 0.05 m, and not 5.999….
 TINY = 1e-9
@@ -20,6 +20,8 @@ DOOR_M = (0.4, 1.4)
 USUAL_DOOR_M = 0.8
 # A part of a map in which this can't stand is no part of a home: its area and width [m², m].
 SCRAP_M2, SCRAP_WIDTH_M = 1.0, 0.3
+# A part that nothing joins is a room of the home from this area on [m²].
+ROOM_M2 = 4.0
 
 
 @dataclass(frozen=True)
@@ -58,39 +60,43 @@ class OccupancyMap:
         return replace(self, free=free, occupied=occupied, origin=(x, y))
 
 
-def bridge_gaps(raw: OccupancyMap, widest: int, evidence: Bool | None = None) -> tuple[Bool, str]:
+def bridge_gaps(
+    raw: OccupancyMap, widest: int, evidence: Bool | None = None, ray_width: float = 0.0
+) -> tuple[Bool, str]:
     """Return the pixels of gaps between parts of the free space that belong together, and a note.
 
     Two parts belong together if a strip of at most `widest` pixels lies between them that is as
     long as a doorway, that nobody knows to be wall, or that a robot drove across. Of several
     strips between two parts the first in this order is opened: driven across, unknown, thinnest,
-    as long as a door.
+    as long as a door. A part as large as a room that is behind a longer strip of wall, such as a
+    curtain or a sliding door, gets a door in the middle of that.
 
     Args:
         raw: The map.
         widest: Largest width of a gap [pixels]; 0 opens none.
         evidence: Pixels that a robot drove across, bool (rows, columns).
+        ray_width: Parts that only narrower space joins are apart [m].
 
     Returns:
         The pixels to open, bool (rows, columns), and a note, empty without any.
     """
     opened = np.zeros(raw.free.shape, np.bool_)
-    part = label_parts(raw.free, False)
-    roomy = _roomy_parts(raw, part)
+    part, areas = _parts(raw, ray_width)
+    roomy = areas >= SCRAP_M2
     if widest == 0 or np.count_nonzero(roomy) < 2:
         return opened, ""
-    gap = np.zeros(raw.free.shape, np.int8)  # its width where it is one
-    first, second = (np.full(raw.free.shape, -1, np.int32) for _ in range(2))
-    for width in range(1, widest + 1):
-        for axis in (0, 1):
-            _mark_gaps(part, roomy, width, axis, gap, first, second)
-    strips = _candidates(raw, gap, evidence)
+    gap, first, second = _find_gaps(part, roomy, raw.free, widest)
     places = []
     owner = np.arange(len(roomy))
-    for strip in strips:
+    for strip, least_m2 in _candidates(raw, gap, evidence):
         pixels = tuple(strip.T)
         pairs = np.unique(np.stack([first[pixels], second[pixels]], axis=1), axis=0)
-        joins = [(a, b) for a, b in pairs.tolist() if owner[a] != owner[b]]
+        joins = [
+            (a, b)
+            for a, b in pairs.tolist()
+            if owner[a] != owner[b]
+            and min(areas[owner == owner[a]].sum(), areas[owner == owner[b]].sum()) >= least_m2
+        ]
         for a, b in joins:
             owner[owner == owner[b]] = owner[a]
         if joins:
@@ -105,18 +111,29 @@ def bridge_gaps(raw: OccupancyMap, widest: int, evidence: Bool | None = None) ->
     )
 
 
-def _candidates(raw: OccupancyMap, gap: NDArray[np.int8], evidence: Bool | None) -> list[I64]:
-    """Return the pixels of each strip that may open, the likeliest first, int64 (n, 2)."""
+def _candidates(
+    raw: OccupancyMap, gap: NDArray[np.int8], evidence: Bool | None
+) -> list[tuple[I64, float]]:
+    """Return what may open, the likeliest first.
+
+    Returns:
+        The pixels of each strip, int64 (n, 2), and the least area of both parts that it joins [m²].
+    """
     strips = [(strip, 0) for strip in _strips((gap > 0) & ~raw.occupied)]
     for width in range(1, int(gap.max()) + 1):  # a shut door is thinner than the wall that it is in
-        strips += [(strip, width) for strip in _strips((gap == width) & raw.occupied)]
-    candidates = []
+        strips += [(strip, width) for strip in _strips((gap > 0) & (gap <= width) & raw.occupied)]
+    candidates: list[tuple[tuple[int, int, float, int], I64, float]] = []
     for index, (strip, wall) in enumerate(strips):
         length = float((np.ptp(strip, axis=0).max() + 1) * raw.pixel)
         driven = evidence is not None and bool(evidence[tuple(strip.T)].any())
         if driven or (length >= DOOR_M[0] and (wall == 0 or length <= DOOR_M[1])):
-            candidates.append((not driven, wall, abs(length - USUAL_DOOR_M), index))
-    return [strips[index][0] for *_, index in sorted(candidates)]
+            rank = 0 if driven else 1, wall, abs(length - USUAL_DOOR_M), index
+            candidates.append((rank, strip, 0.0))
+        elif length > DOOR_M[1]:
+            nearest = np.abs(strip - strip.mean(axis=0)).max(axis=1).argmin()
+            away = np.abs(strip - strip[nearest]).max(axis=1) * raw.pixel
+            candidates.append(((2, wall, length, index), strip[away <= USUAL_DOOR_M / 2], ROOM_M2))
+    return [(strip, area) for _, strip, area in sorted(candidates, key=lambda c: c[0])]
 
 
 def _strips(gap: Bool) -> list[I64]:
@@ -127,39 +144,61 @@ def _strips(gap: Bool) -> list[I64]:
     return np.split(np.argwhere(gap)[order], ends) if len(number) else []
 
 
-def _roomy_parts(raw: OccupancyMap, part: I32) -> Bool:
-    """Return which parts of the free space a person can stand in, bool (parts,)."""
-    reach = max(SCRAP_WIDTH_M / 2 / raw.pixel, 1)
-    core = squared_distance(np.pad(raw.free, 1))[1:-1, 1:-1] >= reach**2
+def _parts(raw: OccupancyMap, ray_width: float) -> tuple[I32, F64]:
+    """Return the parts of the free space that a disc can move about in, and their areas.
+
+    Args:
+        raw: The map.
+        ray_width: Diameter of the disc [m]; 0: all that is connected is one part.
+
+    Returns:
+        The part of each pixel, -1 for others, and the area of each [m²], 0 where no person stands.
+    """
+    distance2 = squared_distance(np.pad(raw.free, 1))[1:-1, 1:-1]
+    part = label_parts(raw.free, False)
+    if ray_width > 0:
+        core = label_parts(distance2 >= _reach(raw.pixel, ray_width) ** 2, False)
+        part = spread_labels(core, raw.free)
     count = int(part.max(initial=-1)) + 1
-    sizes = np.bincount(part[part >= 0], minlength=count)
-    cores = np.bincount(part[core], minlength=count)
-    roomy: Bool = (sizes * raw.pixel**2 >= SCRAP_M2) & (cores > 0)
-    return roomy
+    areas = np.bincount(part[part >= 0], minlength=count) * raw.pixel**2
+    stand = distance2 >= max(SCRAP_WIDTH_M / 2 / raw.pixel, 1) ** 2
+    areas[np.bincount(part[stand & (part >= 0)], minlength=count) == 0] = 0
+    return part, areas
 
 
-def _mark_gaps(
-    part: I32,
-    roomy: Bool,
-    width: int,
-    axis: int,
-    gap: NDArray[np.int8],
-    first: I32,
-    second: I32,
-) -> None:
-    """Mark the pixels of gaps of a width along an axis, with the parts on their two sides."""
-    along = np.moveaxis(part, axis, 0)
-    before, after = along[: -width - 1], along[width + 1 :]
-    between = np.stack([along[k : k + len(before)] for k in range(1, width + 1)])
-    is_gap = (before >= 0) & (after >= 0) & (before != after) & (between < 0).all(axis=0)
-    is_gap &= roomy[before] & roomy[after]
-    low, high = np.minimum(before, after), np.maximum(before, after)
-    for k in range(1, width + 1):
-        window = (slice(k, k + len(before)),)
-        new = is_gap & (np.moveaxis(gap, axis, 0)[window] == 0)
-        np.moveaxis(gap, axis, 0)[window][new] = width
-        np.moveaxis(first, axis, 0)[window][new] = low[new]
-        np.moveaxis(second, axis, 0)[window][new] = high[new]
+def _reach(pixel: float, width: float) -> int:
+    """Return the radius of a disc [pixels], which covers what is nearer than this to its centre."""
+    return max((math.floor(width / pixel + TINY) + 1) // 2, 1)
+
+
+def _find_gaps(
+    part: I32, roomy: Bool, free: Bool, widest: int
+) -> tuple[NDArray[np.int8], I32, I32]:
+    """Return the width of the gap that each pixel is in, 0 for none, and the parts beside it.
+
+    Along an axis a slanted gap is longer than it is wide, and its pixels are nearer to its sides.
+    """
+    gap = np.zeros(part.shape, np.int8)
+    first, second = (np.full(part.shape, -1, np.int32) for _ in range(2))
+    to_side2 = squared_distance(~free)
+    for length in range(1, math.ceil(widest * math.sqrt(2)) + 1):
+        for axis in (0, 1):
+            along = np.moveaxis(part, axis, 0)
+            before, after = along[: -length - 1], along[length + 1 :]
+            between = [slice(k, k + len(before)) for k in range(1, length + 1)]
+            is_gap = (before >= 0) & (after >= 0) & (before != after)
+            is_gap &= roomy[before] & roomy[after]
+            for window in between:
+                is_gap &= ~np.moveaxis(free, axis, 0)[window]
+                if length > widest:
+                    is_gap &= np.moveaxis(to_side2, axis, 0)[window] < ((length + 1) // 2) ** 2
+            low, high = np.minimum(before, after), np.maximum(before, after)
+            for window in between:
+                new = is_gap & (np.moveaxis(gap, axis, 0)[window] == 0)
+                np.moveaxis(gap, axis, 0)[window][new] = min(length, widest)
+                np.moveaxis(first, axis, 0)[window][new] = low[new]
+                np.moveaxis(second, axis, 0)[window][new] = high[new]
+    return gap, first, second
 
 
 def drop_scraps(raw: OccupancyMap, scrap_area_m2: float) -> tuple[Bool, str]:
@@ -209,8 +248,7 @@ def remove_specks(raw: OccupancyMap, speck_area_m2: float) -> tuple[Bool, list[s
 
 def home_pixels(free: Bool, pixel: float, ray_width: float) -> Bool:
     """Return the pixels of the largest part that a disc reaches, and of what belongs to it."""
-    across = math.floor(ray_width / pixel + TINY)
-    reach = max((across + 1) // 2, 1)  # the disc covers what is nearer than this to its centre
+    across, reach = math.floor(ray_width / pixel + TINY), _reach(pixel, ray_width)
     core = squared_distance(np.pad(free, 1))[1:-1, 1:-1] >= reach**2
     if not core.any():
         raise FloorPlanError(

@@ -111,7 +111,7 @@ class PictureSource(OccupancySource):
             return free
         edge, share = picture.edge_grey()
         greys = [edge] if share >= EDGE_SHARE else []
-        greys += [SAVED_UNKNOWN] if saved else []
+        greys += [SAVED_UNKNOWN, *picture.light_greys(free)] if saved else []
         if self.unknown_grey != "auto":
             greys = [self.unknown_grey]
         for grey in greys:
@@ -201,7 +201,7 @@ def free_space(
     raw = raw.crop()
     specks, notes = remove_specks(raw, speck_area_m2)
     raw = replace(raw, free=raw.free | specks)
-    gaps, note = bridge_gaps(raw, bridge_pixels)
+    gaps, note = bridge_gaps(raw, bridge_pixels, ray_width=ray_width)
     free = raw.free | gaps
     notes += [note] * bool(note)
     home = home_pixels(free, raw.pixel, ray_width)

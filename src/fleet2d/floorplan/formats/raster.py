@@ -20,6 +20,9 @@ from fleet2d.kernels import U8, Bool
 
 MAX_SIDE = 2**15
 """Pixels along a side of a picture: each step in cleaning it needs further rows round it."""
+# A shade of at least this share of the light pixels, this many times as frequent as those two
+# shades beside it, and by this much darker than the floor is that of furniture or of walls.
+FILLED_SHARE, FILLED_PEAK, FILLED_CONTRAST = 0.02, 4, 12
 
 _PNG = b"\x89PNG\r\n\x1a\n"
 _JPEG = b"\xff\xd8\xff"
@@ -59,6 +62,18 @@ class GreyPicture:
         edge = np.concatenate([greys[0], greys[-1], greys[1:-1, 0], greys[1:-1, -1]])
         counts = np.bincount(edge, minlength=256)
         return int(counts.argmax()), float(counts.max() / len(edge))
+
+    def light_greys(self, light: Bool) -> list[int]:
+        """Return shades of light pixels that something else than the floor is filled with.
+
+        The floor has the most frequent shade. A map of probabilities has all shades below it.
+        """
+        counts = np.bincount(self.greys[light], minlength=256)
+        floor = int(counts.argmax())
+        beside = np.maximum(np.roll(counts, 2), np.roll(counts, -2))
+        is_filled = (counts >= FILLED_SHARE * counts.sum()) & (counts > FILLED_PEAK * beside)
+        filled: list[int] = np.flatnonzero(is_filled[: max(floor - FILLED_CONTRAST, 0)]).tolist()
+        return filled[::-1]
 
 
 def read_grey(path: Path) -> GreyPicture:
