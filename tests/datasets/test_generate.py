@@ -16,6 +16,7 @@ from tests.datasets.small import SOURCE, make
 
 import fleet2d
 from fleet2d.datasets.reader import Dataset
+from fleet2d.datasets.tasks import windows
 from fleet2d.errors import Fleet2DError, InputError
 
 
@@ -68,11 +69,36 @@ def test_an_interrupted_data_set_goes_on(data: Dataset, tmp_path: Path) -> None:
     process.wait()
     with pytest.raises(InputError, match="run the same command again"):
         fleet2d.open_dataset(out)
-    with pytest.raises(InputError, match="of another file"):
-        fleet2d.dataset({**SOURCE, "seed": 5}, out)
+    for change in ({"seed": 5}, {"runs_per_shard": 3}):
+        with pytest.raises(InputError, match="of another file"):
+            fleet2d.dataset({**SOURCE, **change}, out)
 
     assert records(data) == records(make(out))
     assert not (out / "unfinished").exists()
+
+
+def test_damaged_parts_and_records_of_an_unfinished_one_are_made_again(
+    data: Dataset, tmp_path: Path
+) -> None:
+    out, parts = tmp_path / "damaged", tmp_path / "damaged" / "unfinished"
+    shutil.copytree(data.root, out)
+    (out / "dataset.json").unlink()
+    parts.mkdir()
+    (parts / "plan.txt").write_text(f"{data.manifest['plan']} {fleet2d.__version__}")
+    files = data.manifest["files"]
+    whole = {name: files[name] for name in files if "train" not in name or "00001" in name}
+    for record in ("train-00001", "test-00000"):
+        (parts / f"{record}.json").write_text(json.dumps(whole))
+    (parts / "train-00000.json").write_text('{"../secret": {"bytes": 0}}')
+    (parts / "000000.arrow").write_bytes(b"no table")
+    (parts / "000001.arrow").write_bytes(b"no table")
+
+    for number in range(2):
+        with pytest.raises(InputError, match=rf"00000{number}\.arrow was damaged, and is deleted"):
+            make(out)
+    (parts / "train-00000.json").write_text("[")
+
+    assert records(data) == records(make(out))
 
 
 def test_a_complete_one_is_opened_and_another_refused(data: Dataset) -> None:
@@ -128,6 +154,16 @@ def test_the_card_says_what_is_in_it(data: Dataset) -> None:
     assert "| train | 3 | 0.75 | 2 |" in card
     assert "household: " in card
     assert (data.root / "pictures" / "place.png").stat().st_size > 1000
+
+
+def test_workers_share_the_shards(data: Dataset) -> None:
+    whole, *shared = (
+        [part.truth.tolist() for part in windows(data, "train", worker, workers)]
+        for worker, workers in ((0, 1), (0, 2), (1, 2), (5, 6))
+    )
+
+    assert sorted(whole) == sorted(one for part in shared for one in part)
+    assert all(shared[:2])
 
 
 def test_duckdb_and_polars_read_it(data: Dataset) -> None:

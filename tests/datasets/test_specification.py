@@ -24,9 +24,11 @@ def test_every_run_has_its_own_seed_and_home_in_turn() -> None:
         file(train=split(5, 0, ["retired"]), test=split(3, 50, ["student", "child"]))
     )
 
-    assert 8 == len({run.seed for run in plan.runs})
-    assert ["0", "1", "0", "1", "0", "50", "51", "50"] == [r.labels["home"] for r in plan.runs]
-    assert ["ana", "ben"] == list(plan.runs[-1].scenario["users"])
+    runs = [*plan.runs("train"), *plan.runs("test")]
+    assert [*range(8)] == [run.number for run in runs]
+    assert 8 == len({run.seed for run in runs})
+    assert ["0", "1", "0", "1", "0", "50", "51", "50"] == [run.labels["home"] for run in runs]
+    assert ["ana", "ben"] == list(runs[-1].scenario["users"])
     assert plan.digest == plan_dataset(plan_source(plan)).digest
 
 
@@ -39,7 +41,8 @@ def test_another_seed_draws_other_runs() -> None:
 
     one, other = plan_dataset(source), plan_dataset({**source, "seed": 1})
 
-    assert not {run.seed for run in one.runs} & {run.seed for run in other.runs}
+    seeds = [{run.seed for run in plan.runs("train")} for plan in (one, other)]
+    assert not seeds[0] & seeds[1]
 
 
 @pytest.mark.parametrize(
@@ -67,7 +70,9 @@ def test_axes_vary_each_run() -> None:
 
     plan = plan_dataset({**file(train=split(20, 0, ["retired"])), "vary": {"robot": robot}})
 
-    drawn = {run.labels["robot"]: run.scenario["robots"]["astro"]["speed"] for run in plan.runs}
+    drawn = {
+        run.labels["robot"]: run.scenario["robots"]["astro"]["speed"] for run in plan.runs("train")
+    }
     assert {"slow": 0.3, "fast": 0.8} == drawn
 
 
@@ -80,8 +85,33 @@ def test_axes_vary_each_run() -> None:
         ({"splits": {"train": split(1, 0, ["retird"])}}, "retired"),
         ({"splits": {"train": split(1, 0, ["retired"] * 9)}}, "household of 9"),
         ({"beliefs": ["routin"]}, "routine"),
+        (
+            {"splits": {"train": split(1, 0, ["retired"], ["child", "retird"])}},
+            r"train, households: child \+ retird: .*did you mean 'retired'|no persona 'retird'",
+        ),
+        (
+            {
+                "vary": {
+                    "robot": {
+                        "options": {
+                            "one": {"robots.astro.speed": 1},
+                            "two": {"robots.astro.sped": 1},
+                        }
+                    }
+                }
+            },
+            "vary.robot: robot = two: .*unknown key 'sped'",
+        ),
+        ({"vary": {"robot": {"options": {"none": {"robots.astra.speed": 1}}}}}, "astra"),
     ],
 )
 def test_mistakes_are_named_before_the_first_run(change: dict[str, Any], words: str) -> None:
     with pytest.raises(InputError, match=words):
         plan_dataset({**file(train=split(1, 0, ["retired"])), **change})
+
+
+def test_a_million_runs_are_planned_without_being_drawn() -> None:
+    plan = plan_dataset(file(train=split(1_000_000, 0, ["retired"])))
+
+    assert 62_500 == sum(1 for _ in plan.shards())
+    assert 999_999 == plan.run("train", 999_999).number

@@ -3,8 +3,8 @@
 import hashlib
 import json
 import shutil
-from collections.abc import Mapping
-from contextlib import suppress
+import sys
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import timedelta
 from pathlib import Path
@@ -13,18 +13,24 @@ from typing import TYPE_CHECKING, Any
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from fleet2d import __version__
 from fleet2d.datasets.reader import FORMAT, MANIFEST, Dataset, open_dataset
-from fleet2d.datasets.specification import DatasetPlan, PlannedRun, plan_dataset
+from fleet2d.datasets.specification import DatasetPlan, PlannedRun, Shard, plan_dataset
 from fleet2d.datasets.tables import SCHEMAS, tables_of
 from fleet2d.errors import InputError
 from fleet2d.storage.files import FolderLock, partial_file, write_atomically
 from fleet2d.studies.api import map_runs
+from fleet2d.studies.progress import progress_bar
 
 if TYPE_CHECKING:
+    from rich.progress import Progress
+
     from fleet2d.runs.run import Run
 
 PARTS = "unfinished"
-PLAN = "plan.json"
+PLAN = "plan.txt"
+# Runs that are planned at a time: they are what a data set of any size keeps in memory.
+BLOCK_RUNS = 512
 
 
 def dataset(
@@ -61,7 +67,8 @@ def dataset(
     lock = FolderLock(parts, "dataset.lock")
     try:
         _check_plan(parts, plan)
-        files = _write_shards(root, parts, plan, workers)
+        with progress_bar(show=sys.stderr.isatty()) as bar:
+            files = _write_shards(root, parts, plan, workers, bar)
         _finish(root, plan, files)
     finally:
         lock.release()
@@ -70,54 +77,94 @@ def dataset(
 
 
 def _check_plan(parts: Path, plan: DatasetPlan) -> None:
-    """Refuse to continue a data set of another file; begin one."""
-    path = parts / PLAN
-    if path.is_file() and path.read_text() != plan.digest:
+    """Refuse to continue a data set of another file or version; begin one."""
+    path, identity = parts / PLAN, f"{plan.digest} {__version__}"
+    if path.is_file() and path.read_text() != identity:
         raise InputError(
-            f"{parts.parent} holds the unfinished data set of another file: choose another folder,"
-            " or delete it"
+            f"{parts.parent} holds the unfinished data set of another file, or another version of"
+            " Fleet2D: choose another folder, or delete it"
         )
-    write_atomically(path, plan.digest.encode())
+    write_atomically(path, identity.encode())
 
 
 def _write_shards(
-    root: Path, parts: Path, plan: DatasetPlan, workers: int | None
+    root: Path, parts: Path, plan: DatasetPlan, workers: int | None, bar: "Progress | None"
 ) -> dict[str, dict[str, Any]]:
-    """Simulate the runs that have no part yet, then join the parts; return each file's record."""
-    shards = list(plan.shards())
-    lacking = [
-        run
-        for split, number, runs in shards
-        if not _is_whole(root, parts, split, number)
-        for run in runs
-        if not (parts / _part_name(run)).is_file()
-    ]
-    by_seed = {run.seed: run for run in lacking}
-    writer = PartWriter(str(parts), by_seed, plan.file.labels)
-    map_runs(writer, [run.scenario for run in lacking], workers=workers)
+    """Simulate the runs that are lacking, block by block; return the record of each file."""
+    total = sum(split.runs for split in plan.file.splits.values())
+    task = bar.add_task("runs", total=total) if bar else None
+
+    def advance(runs: int = 1) -> None:
+        if bar is not None and task is not None:
+            bar.advance(task, runs)
+
     files: dict[str, dict[str, Any]] = {}
-    for split, number, runs in shards:
-        record = parts / f"{split}-{number:05}.json"
-        if not _is_whole(root, parts, split, number):
-            made = _join(root, parts, split, number, runs)
-            write_atomically(record, json.dumps(made).encode())
-        files |= json.loads(record.read_text())
-        for run in runs:
-            with suppress(FileNotFoundError):
-                (parts / _part_name(run)).unlink()
+    block: list[Shard] = []
+    for shard in plan.shards():
+        record = _record_of(root, parts, shard)
+        if record:
+            files |= record
+            advance(shard.end - shard.first)
+            continue
+        block.append(shard)
+        if sum(each.end - each.first for each in block) >= BLOCK_RUNS:
+            files |= _write_block(root, parts, plan, block, workers, advance)
+            block = []
+    return files | _write_block(root, parts, plan, block, workers, advance)
+
+
+def _write_block(
+    root: Path,
+    parts: Path,
+    plan: DatasetPlan,
+    block: Sequence[Shard],
+    workers: int | None,
+    advance: Callable[[int], None],
+) -> dict[str, dict[str, Any]]:
+    """Simulate the runs of some shards that have no part yet, then join the parts to shards."""
+    runs = {
+        shard: [plan.run(shard.split, k) for k in range(shard.first, shard.end)] for shard in block
+    }
+    lacking = [
+        run for own in runs.values() for run in own if not (parts / _part_name(run)).is_file()
+    ]
+    advance(sum(map(len, runs.values())) - len(lacking))
+    writer = PartWriter(str(parts), {run.seed: run for run in lacking}, plan.file.labels)
+    map_runs(
+        writer,
+        [run.scenario for run in lacking],
+        workers=workers,
+        on_result=lambda _: advance(1),
+    )
+    files: dict[str, dict[str, Any]] = {}
+    for shard, own in runs.items():
+        made = _join(root, parts, shard, own)
+        write_atomically(_record_path(parts, shard), json.dumps(made).encode())
+        files |= made
+        for run in own:
+            (parts / _part_name(run)).unlink()
     return files
 
 
-def _is_whole(root: Path, parts: Path, split: str, number: int) -> bool:
-    """Whether a shard was written, and its files have their lengths."""
-    record = parts / f"{split}-{number:05}.json"
-    if not record.is_file():
-        return False
-    files: dict[str, dict[str, Any]] = json.loads(record.read_text())
-    return all(
-        (root / name).is_file() and (root / name).stat().st_size == file["bytes"]
-        for name, file in files.items()
-    )
+def _record_path(parts: Path, shard: Shard) -> Path:
+    return parts / f"{shard.split}-{shard.number:05}.json"
+
+
+def _record_of(root: Path, parts: Path, shard: Shard) -> dict[str, dict[str, Any]]:
+    """Return the record of a shard that was written whole, else nothing."""
+    paths = {path.relative_to(root).as_posix(): path for path in _files_of(root, shard).values()}
+    try:
+        record: dict[str, dict[str, Any]] = json.loads(_record_path(parts, shard).read_text())
+        sizes = {name: record[name]["bytes"] for name in paths}
+        is_whole = all(path.stat().st_size == sizes[name] for name, path in paths.items())
+    except (OSError, ValueError, LookupError, TypeError):
+        return {}
+    return {name: record[name] for name in paths} if is_whole else {}
+
+
+def _files_of(root: Path, shard: Shard) -> dict[str, Path]:
+    """Return the file of each table of a shard."""
+    return {name: root / shard.split / f"{name}-{shard.number:05}.parquet" for name in SCHEMAS}
 
 
 def _part_name(run: PlannedRun) -> str:
@@ -152,19 +199,25 @@ class PartWriter:
 
 
 def _join(
-    root: Path, parts: Path, split: str, number: int, runs: tuple[PlannedRun, ...]
+    root: Path, parts: Path, shard: Shard, runs: Sequence[PlannedRun]
 ) -> dict[str, dict[str, Any]]:
     """Write the tables of a shard from the parts of its runs; return a record of each file."""
     tables: dict[str, list[pa.Table]] = {name: [] for name in SCHEMAS}
     for run in runs:
-        with pa.OSFile(str(parts / _part_name(run)), "rb") as file:
-            for name in SCHEMAS:
-                tables[name].append(pa.ipc.open_stream(file).read_all())
+        part = parts / _part_name(run)
+        try:
+            with pa.OSFile(str(part), "rb") as file:
+                for name in SCHEMAS:
+                    tables[name].append(pa.ipc.open_stream(file).read_all())
+        except (OSError, pa.ArrowException) as error:
+            part.unlink(missing_ok=True)
+            raise InputError(
+                f"{part} was damaged, and is deleted ({error}): run the same command again"
+            ) from None
     records = {}
-    for name, rows in tables.items():
-        path = root / split / f"{name}-{number:05}.parquet"
+    for name, path in _files_of(root, shard).items():
         path.parent.mkdir(exist_ok=True)
-        table = pa.concat_tables(rows)
+        table = pa.concat_tables(tables[name])
         with partial_file(path) as partial:
             pq.write_table(table, partial, compression="zstd", compression_level=9)
         content = path.read_bytes()

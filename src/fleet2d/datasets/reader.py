@@ -63,17 +63,30 @@ class Dataset:
             InputError: There is no such table or split, or a file is damaged.
         """
         import pyarrow as pa
-        import pyarrow.parquet as pq
 
-        parts = []
-        for path in self.files(table, split):
-            try:
-                parts.append(pq.read_table(path, partitioning=None))
-            except (OSError, pa.ArrowException) as error:
-                raise InputError(
-                    f"{path} can't be read: {error}; make the data set again"
-                ) from None
-        return pa.concat_tables(parts)
+        return pa.concat_tables(_read(path) for path in self.files(table, split))
+
+    def shards(self, split: str) -> int:
+        """Return the number of shards of a split, each with a file of every table.
+
+        Raises:
+            InputError: There is no such split.
+        """
+        return len(self.files("runs", split))
+
+    def shard(self, split: str, number: int) -> "dict[str, pa.Table]":
+        """Return the tables of some runs of a split, by name: of those in one file of each.
+
+        Raises:
+            InputError: There is no such split, or a file is damaged.
+        """
+        prefix, suffix = f"{split}/", f"-{number:05}.parquet"
+        names = [
+            name.removeprefix(prefix).removesuffix(suffix)
+            for name in self.manifest["files"]
+            if name.startswith(prefix) and name.endswith(suffix)
+        ]
+        return {name: _read(path_in(self.root / split, f"{name}{suffix}")) for name in names}
 
     def polars(self, table: str, split: str) -> "pl.LazyFrame":
         """Return a table of a split as a lazy frame of polars."""
@@ -89,6 +102,16 @@ class Dataset:
             if not (path := path_in(self.root / Path(name).parent, Path(name).name)).is_file()
             or hashlib.sha256(path.read_bytes()).hexdigest() != record["sha256"]
         ]
+
+
+def _read(path: Path) -> "pa.Table":
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    try:
+        return pq.read_table(path, partitioning=None)
+    except (OSError, pa.ArrowException) as error:
+        raise InputError(f"{path} can't be read: {error}; make the data set again") from None
 
 
 def open_dataset(directory: str | Path) -> Dataset:

@@ -2,12 +2,13 @@
 
 import hashlib
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from copy import deepcopy
 from dataclasses import dataclass
 from datetime import timedelta
 from itertools import combinations
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from pydantic import Field, ValidationError
@@ -18,6 +19,7 @@ from fleet2d.configuration.trust import check_code
 from fleet2d.configuration.units import PositiveDuration
 from fleet2d.errors import InputError, ScenarioError
 from fleet2d.runtime.determinism import Draws, stream_key
+from fleet2d.scenario.compose import apply_changes, assignment
 from fleet2d.scenario.model import explain, load_scenario
 from fleet2d.studies.axes import AnyAxis, Choice
 
@@ -92,36 +94,134 @@ class PlannedRun:
         return int(self.scenario["simulation"]["seed"])
 
 
+class Shard(NamedTuple):
+    """Runs of a split that are stored in one file of each table.
+
+    Attributes:
+        split: The split.
+        number: Its number in the split, from 0 on.
+        first: The number in the split of its first run.
+        end: That after its last run.
+    """
+
+    split: str
+    number: int
+    first: int
+    end: int
+
+
 @dataclass(frozen=True)
 class DatasetPlan:
-    """A data set that is checked, and its runs.
+    """A data set that is checked. Its runs are drawn when they are needed, however many there are.
 
     Attributes:
         file: The settings.
-        runs: The runs, those of a split one after the other.
+        base: The scenario that all runs share.
+        homes: The homes of each split.
     """
 
     file: DatasetFile
-    runs: tuple[PlannedRun, ...]
+    base: Document
+    homes: Mapping[str, Sequence[Choice]]
 
     @property
     def digest(self) -> str:
         """SHA-256 of all that its content depends on, but the code."""
-        content = [[run.split, dict(run.labels), run.scenario] for run in self.runs]
-        text = json.dumps([content, str(self.file.labels)], sort_keys=True, default=str)
+        homes = {name: [home.changes for home in homes] for name, homes in self.homes.items()}
+        file = self.file.model_dump(mode="json", exclude={"base"})
+        text = json.dumps([file, self.base.data, homes], sort_keys=True, default=str)
         return hashlib.sha256(text.encode()).hexdigest()
 
-    def shards(self) -> Iterator[tuple[str, int, tuple[PlannedRun, ...]]]:
-        """Yield the split, the number and the runs of each shard."""
-        for split in self.file.splits:
-            runs = tuple(run for run in self.runs if run.split == split)
-            size = self.file.runs_per_shard
-            for number, first in enumerate(range(0, len(runs), size)):
-                yield split, number, runs[first : first + size]
+    def runs(self, split: str) -> Iterator[PlannedRun]:
+        """Draw the runs of a split."""
+        return (self.run(split, k) for k in range(self.file.splits[split].runs))
+
+    def shards(self) -> Iterator[Shard]:
+        """Yield the shards of all splits."""
+        size = self.file.runs_per_shard
+        for split, settings in self.file.splits.items():
+            for number, first in enumerate(range(0, settings.runs, size)):
+                yield Shard(split, number, first, min(first + size, settings.runs))
+
+    def run(self, split: str, k: int) -> PlannedRun:
+        """Draw run k of a split: homes are taken in turn, the rest is drawn at random."""
+        settings, homes = self.file.splits[split], self.homes[split]
+        draws = Draws(np.uint64(stream_key(self.file.seed, f"datasets.{split}", "run")), k)
+        household = draws.choice(settings.households)
+        varied = [draws.choice(axis.choices(name)) for name, axis in self.file.vary.items()]
+        home, number = homes[k % len(homes)], self._first_number(split) + k
+        scenario = self._scenario(home, household, varied)
+        scenario["simulation"]["seed"] = (self.file.seed * 1_000_003 + number) % MAX_SEED
+        labels = {
+            "home": home.words.partition("= ")[2],
+            "household": " + ".join(personas_of(household)),
+        }
+        for choice in varied:
+            labels.update({name: str(label) for name, label in choice.labels.items()})
+        return PlannedRun(number, split, labels, scenario)
+
+    def check(self) -> None:
+        """Check each household, home and varied value in a scenario, before the first run.
+
+        Raises:
+            InputError: A scenario would be wrong.
+        """
+        varied = {name: axis.choices(name) for name, axis in self.file.vary.items()}
+        usual = [choices[0] for choices in varied.values()]
+        for split, settings in self.file.splits.items():
+            homes = self.homes[split]
+            firsts = [axis.choices("home")[0] for axis in settings.homes]
+            cases = [
+                *((f"homes: {home.words}", home, settings.households[0], usual) for home in firsts),
+                *(
+                    (f"households: {' + '.join(personas_of(people))}", homes[0], people, usual)
+                    for people in settings.households
+                ),
+            ]
+            for k, (name, choices) in enumerate(varied.items()):
+                for choice in choices:
+                    values = [*usual[:k], choice, *usual[k + 1 :]]
+                    cases.append(
+                        (f"vary.{name}: {choice.words}", homes[0], settings.households[0], values)
+                    )
+            for words, home, household, values in cases:
+                try:
+                    load_scenario(self._scenario(home, household, values))
+                except InputError as error:
+                    raise ScenarioError(f"{split}, {words}: {error}") from None
+
+    def _first_number(self, split: str) -> int:
+        """Return the number of the first run of a split."""
+        numbers = 0
+        for name, settings in self.file.splits.items():
+            if name == split:
+                break
+            numbers += settings.runs
+        return numbers
+
+    def _scenario(self, home: Choice, household: Any, varied: Sequence[Choice]) -> dict[str, Any]:
+        changes = [
+            assignment(keys, value, choice.words)
+            for choice in (home, *varied)
+            for keys, value in choice.changes
+        ]
+        scenario = deepcopy(apply_changes(self.base, changes).data)
+        scenario["users"] = members_of(household)
+        every = f"{self.file.every.total_seconds()} s"
+        scenario["algorithms"] = {
+            **scenario.get("algorithms", {}),
+            EVIDENCE: {"type": "evidence_table"},
+            **{
+                f"{BELIEF}{model}": {"type": "rtp", "model": model, "period": every}
+                for model in self.file.beliefs
+            },
+        }
+        scenario["metrics"] = {STAYS: {}}
+        return scenario
 
 
 def plan_dataset(source: str | Path | Mapping[str, Any]) -> DatasetPlan:
-    """Read the file of a data set, check that its splits don't overlap, and draw its runs.
+    """Read the file of a data set, and check that its splits don't overlap.
 
     Args:
         source: A YAML file, or the same as a mapping.
@@ -148,64 +248,9 @@ def plan_dataset(source: str | Path | Mapping[str, Any]) -> DatasetPlan:
         for name, split in file.splits.items()
     }
     _check_splits(file, homes)
-    runs: list[PlannedRun] = []
-    for split, settings in file.splits.items():
-        for k in range(settings.runs):
-            runs.append(_draw(file, base, len(runs), split, homes[split], k))
-    for run in {run.split: run for run in runs}.values():
-        load_scenario(run.scenario)  # a mistake is reported before the first run
-    return DatasetPlan(file, tuple(runs))
-
-
-def _draw(
-    file: DatasetFile,
-    base: Mapping[str, Any],
-    number: int,
-    split: str,
-    homes: list[Choice],
-    k: int,
-) -> PlannedRun:
-    """Draw a run: homes and households in turn, in a random order, the rest at random."""
-    draws = Draws(np.uint64(stream_key(file.seed, f"datasets.{split}", "run")), k)
-    settings = file.splits[split]
-    home = homes[k % len(homes)]
-    household = draws.choice(settings.households)
-    varied = [draws.choice(axis.choices(name)) for name, axis in file.vary.items()]
-    scenario: dict[str, Any] = json.loads(json.dumps(dict(base), default=str))
-    for keys, value in [change for choice in (home, *varied) for change in choice.changes]:
-        _set(scenario, keys, value)
-    scenario["users"] = members_of(household)
-    scenario["simulation"]["seed"] = (file.seed * 1_000_003 + number) % MAX_SEED
-    scenario["algorithms"] = {
-        **scenario.get("algorithms", {}),
-        EVIDENCE: {"type": "evidence_table"},
-        **{
-            f"{BELIEF}{model}": {
-                "type": "rtp",
-                "model": model,
-                "period": f"{_seconds(file.every)} s",
-            }
-            for model in file.beliefs
-        },
-    }
-    scenario["metrics"] = {STAYS: {}}
-    labels = {
-        "home": home.words.partition("= ")[2],
-        "household": " + ".join(personas_of(household)),
-    }
-    for choice in varied:
-        labels.update({name: str(label) for name, label in choice.labels.items()})
-    return PlannedRun(number, split, labels, scenario)
-
-
-def _set(scenario: dict[str, Any], keys: tuple[str, ...], value: Any) -> None:
-    for key in keys[:-1]:
-        scenario = scenario.setdefault(key, {})
-    scenario[keys[-1]] = value
-
-
-def _seconds(duration: timedelta) -> float:
-    return duration.total_seconds()
+    plan = DatasetPlan(file, Document(base), homes)
+    plan.check()
+    return plan
 
 
 def members_of(household: Any) -> dict[str, Any]:

@@ -19,7 +19,6 @@ import numpy as np
 from fleet2d.algorithms.presence.belief import ANYONE, AWAY
 from fleet2d.algorithms.presence.learned import Weights, shipped_weights
 from fleet2d.datasets.reader import Dataset
-from fleet2d.datasets.tables import SCHEMAS
 from fleet2d.datasets.training import predict
 from fleet2d.datasets.windows import Windows, windows_of
 from fleet2d.errors import InputError
@@ -48,9 +47,18 @@ class LeaderboardEntry(NamedTuple):
     cases: int
 
 
-def windows(data: Dataset, split: str) -> Iterator[Windows]:
-    """Yield the windows of a split, as `windows_of`."""
-    yield from windows_of({name: data.arrow(name, split) for name in SCHEMAS})
+def windows(data: Dataset, split: str, worker: int = 0, workers: int = 1) -> Iterator[Windows]:
+    """Yield the windows of a split, as `windows_of`, shard by shard.
+
+    Args:
+        data: The data set.
+        split: The split.
+        worker: Which of the workers this is, from 0 on: it gets each shard whose number is `worker`
+            modulo `workers`.
+        workers: Among how many the shards are shared.
+    """
+    for number in range(worker, data.shards(split), workers):
+        yield from windows_of(data.shard(split, number))
 
 
 def leaderboard(

@@ -23,7 +23,7 @@ except ImportError:
 
 
 def torch_windows(data: Dataset, split: str, *, shuffle: int = 0, seed: int = 0) -> "TorchWindows":
-    """Return the windows of a split, for a `DataLoader` with any number of workers.
+    """Return the windows of a split, for a `DataLoader`, whose workers share its shards.
 
     Args:
         data: The data set.
@@ -35,7 +35,7 @@ def torch_windows(data: Dataset, split: str, *, shuffle: int = 0, seed: int = 0)
         >>> windows = torch_windows(data, "train", shuffle=1000)  # doctest: +SKIP
         >>> loader = torch.utils.data.DataLoader(windows, num_workers=2)  # doctest: +SKIP
     """
-    return TorchWindows(partial(_of_worker, data, split), shuffle, seed)
+    return TorchWindows(partial(windows, data, split), shuffle, seed)
 
 
 def fresh_windows(
@@ -96,24 +96,17 @@ def _tensors(part: Windows) -> Iterator[dict[str, Any]]:
         }
 
 
-def _of_worker(data: Dataset, split: str, worker: int, workers: int) -> Iterator[Windows]:
-    for k, part in enumerate(windows(data, split)):
-        if k % workers == worker:
-            yield part
-
-
 def _fresh(
     source: str | Path | Mapping[str, Any], split: str, seed: int, worker: int, workers: int
 ) -> Iterator[Windows]:
     from fleet2d.engine.simulation import run
 
     plan = plan_dataset(source)
-    runs = [planned for planned in plan.runs if planned.split == split]
-    if not runs:
+    if split not in plan.file.splits:
         raise InputError(f"there is no split {split!r}: splits are {', '.join(plan.file.splits)}")
     number = worker
     while True:
-        planned = runs[number % len(runs)]
+        planned = plan.run(split, number)
         # Seeds of the data set itself are below those of fresh runs.
         simulation = {
             **planned.scenario["simulation"],

@@ -76,6 +76,7 @@ def map_runs(
     *,
     workers: int | None = None,
     executor: ExecutorName | Executor = "local",
+    on_result: Callable[[int], None] | None = None,
 ) -> list[Result]:
     """Run scenarios in worker processes, and return the result of a function for each run.
 
@@ -85,6 +86,7 @@ def map_runs(
         scenarios: The scenarios, as `fleet2d.run` takes them, each with a seed.
         workers: The number of worker processes; None: one per core.
         executor: Where they run, as for `study`.
+        on_result: Called with the number of each scenario whose result has come, for progress.
 
     Returns:
         The results in the order of the scenarios.
@@ -114,6 +116,8 @@ def map_runs(
                 value.add_note(f"in scenario {event.task.index}")
                 raise value
             results[event.task.index] = value
+            if on_result is not None:
+                on_result(event.task.index)
     finally:
         events.close()
     return [results[i] for i in range(len(resolved))]
