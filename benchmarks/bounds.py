@@ -210,8 +210,7 @@ def regions_of(name: str) -> float | None:
     import numpy as np
 
     import fleet2d
-    from fleet2d.kernels.sight import regions_of_cells
-    from fleet2d.kernels.space import rasterize_cells
+    from fleet2d.kernels import rasterize_cells, regions_of_cells
 
     found = sorted((DATA / "houseexpo").glob(f"{name}*.json"))
     if not found:

@@ -134,8 +134,7 @@ def measure_regions(plan: Path, runs: int) -> Row:
     import numpy as np
 
     from fleet2d.floorplan.load import load_floorplan
-    from fleet2d.kernels.sight import regions_of_cells
-    from fleet2d.kernels.space import rasterize_cells
+    from fleet2d.kernels import rasterize_cells, regions_of_cells
 
     home = load_floorplan(plan)
     triangles = rasterize_cells(home.mesh, home.lattice.rows, home.lattice.columns)

@@ -129,8 +129,7 @@ def measure(name: str, plan: Any, peers: str | None) -> Row:
     """Measure one home."""
     from fleet2d import Home
     from fleet2d.floorplan.plan import FloorPlan
-    from fleet2d.kernels.sight import regions_of_cells
-    from fleet2d.kernels.space import rasterize_cells
+    from fleet2d.kernels import rasterize_cells, regions_of_cells
 
     bare = Home(FloorPlan.build(name, plan.free_space, cell=plan.lattice.cell))  # no furniture
     mesh, lattice, rng = bare.walls, bare.plan.lattice, np.random.default_rng(1)
@@ -162,7 +161,7 @@ def measure(name: str, plan: Any, peers: str | None) -> Row:
 
 def measure_points(row: Row, home: Any, pairs: tuple[Any, Any], region: tuple[Any, ...]) -> None:
     """Measure and compare what tells whether a point is visible."""
-    from fleet2d.kernels.sight import region_contains_points
+    from fleet2d.kernels import region_contains_points
     from fleet2d.sight.line_of_sight import LineOfSight
     from fleet2d.sight.visibility_polygon import VisibilityPolygon
 
@@ -191,7 +190,7 @@ def measure_points(row: Row, home: Any, pairs: tuple[Any, Any], region: tuple[An
 
 def measure_cells(row: Row, home: Any, poses: list[Any]) -> None:
     """Measure and compare what finds the cells in view of a pose."""
-    from fleet2d.kernels.sight import cells_in_view
+    from fleet2d.kernels import cells_in_view
     from fleet2d.sight.flashlight import Flashlight
     from fleet2d.sight.line_of_sight import LineOfSight
 
@@ -211,14 +210,14 @@ def measure_cells(row: Row, home: Any, poses: list[Any]) -> None:
 
 def reach_in(home: Any) -> Any:
     """Return the camera's range and angle."""
-    from fleet2d.kernels.sight import Reach
+    from fleet2d.kernels import Reach
 
     return Reach(0, round(RANGE_M * home.plan.lattice.units_per_m) ** 2, HALF_ANGLE)
 
 
 def some_pairs(centres: Any, units_per_m: float, rng: Any) -> tuple[Any, Any]:
     """Return pairs of free places within a few metres, SHOWN from each eye: (n, 2) each."""
-    from fleet2d.kernels.space import CELL_CENTRE, SUB
+    from fleet2d.kernels import CELL_CENTRE, SUB
 
     eyes = np.repeat(rng.choice(centres, PAIRS // SHOWN), SHOWN, axis=0)
     free = {tuple(cell) for cell in (centres // SUB).tolist()}
@@ -236,7 +235,7 @@ def some_pairs(centres: Any, units_per_m: float, rng: Any) -> tuple[Any, Any]:
 
 def compiled_lines() -> Callable[..., int]:
     """Return what counts the pairs in sight: it locates each eye, then follows the line."""
-    from fleet2d.kernels.space import pairs_in_sight
+    from fleet2d.kernels import pairs_in_sight
 
     return lambda mesh, eyes, points: int(pairs_in_sight(mesh, eyes, points).sum())
 

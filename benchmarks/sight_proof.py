@@ -24,16 +24,20 @@ from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.load import load_floorplan
 from fleet2d.floorplan.mesh import Gates, build_mesh
 from fleet2d.floorplan.plan import FloorPlan
-from fleet2d.kernels import I64, Bool
-from fleet2d.kernels.sight import (
+from fleet2d.kernels import (
+    CELL_CENTRE,
+    I64,
+    SUB,
+    Bool,
+    Mesh,
     Reach,
     cells_in_view,
     mark_spans,
+    pairs_in_sight,
     points_in_sight,
     region_contains_points,
     visible_region,
 )
-from fleet2d.kernels.space import CELL_CENTRE, SUB, Mesh, pairs_in_sight
 
 Turn = Callable[[Any], Any]
 

@@ -12,8 +12,7 @@ from shapely.geometry import Polygon
 from tests.thorough import some
 
 from fleet2d.floorplan.mesh import build_mesh, snap_polygon
-from fleet2d.kernels import F64, I64
-from fleet2d.kernels.space import Mesh, rasterize_cells
+from fleet2d.kernels import F64, I64, Mesh, rasterize_cells
 
 Turn = Callable[[F64], F64]
 

@@ -23,8 +23,7 @@ from fleet2d.floorplan.costmap import CostmapSettings
 from fleet2d.floorplan.layers import LayerSettings
 from fleet2d.floorplan.synthetic.source import Synthetic
 from fleet2d.interventions.intervention import verbs
-from fleet2d.kernels.numbers import TURN
-from fleet2d.kernels.space import SUB
+from fleet2d.kernels import SUB, TURN
 from fleet2d.routines.persona import Manners, bundled_names
 from fleet2d.studies.specification import StudyFile
 from fleet2d.testing.claim import rate_test

@@ -1184,7 +1184,23 @@ class Legs:
 WHOLE_PATCH: int = 255
 
 def merge_bins(minute: numpy.typing.NDArray[numpy.int64], view: numpy.typing.NDArray[numpy.int64], bin: numpy.typing.NDArray[numpy.int64], patch: numpy.typing.NDArray[numpy.int64], steps: numpy.typing.NDArray[numpy.int64], longest: int) -> tuple[numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.float64]]:
-    """Merge bins with equal evidence; see `fleet2d.kernels.presence`."""
+    """
+    Merge consecutive bins with the same view and the same sightings.
+
+    Bins in which the user was perceived in several patches aren't merged.
+
+    Args:
+        minute: int64 (bins,), beginning of each bin [minutes since midnight]; no stretch crosses an
+            hour.
+        view: int64 (bins,), the row of `views`; consecutive bins with the same view have the same.
+        bin: int64 (sightings,), ascending; where the user was perceived.
+        patch: int64 (sightings,), ascending within each bin.
+        steps: int64 (sightings,), number of steps with a sighting there.
+        longest: Largest number of bins in a stretch.
+
+    Returns:
+        The fields of `Stretches` without `views`.
+    """
 
 def follow(model: tuple[Any, ...], stretches: tuple[Any, ...], now: numpy.typing.NDArray[numpy.float64], shown: numpy.typing.NDArray[numpy.int64]) -> numpy.typing.NDArray[numpy.float64]:
     """
@@ -1211,7 +1227,7 @@ def follow_people(model: tuple[Any, ...], day: tuple[Any, ...], longest: int, no
 
     Args:
         model: The transition probabilities: as of one person, with people as the first dimension.
-        day: The evidence, see `fleet2d.kernels.presence`.
+        day: The evidence.
         longest: Largest number of bins in a stretch.
         now: float64 (people, stages, patches), probability before the first bin; becomes that after the last.
 
@@ -1229,7 +1245,7 @@ def smooth_people(model: tuple[Any, ...], day: tuple[Any, ...], longest: int, pr
 
     Args:
         model: The transition probabilities: as of one person, with people as the first dimension.
-        day: The evidence, see `fleet2d.kernels.presence`.
+        day: The evidence.
         longest: Largest number of bins in a stretch.
         prior: float64 (people, stages, patches), probability before the first bin.
         future: float64 (people, stages, patches), likelihood of the evidence after the last one.
@@ -1255,7 +1271,7 @@ def trace_evidence(memory: numpy.typing.NDArray[numpy.float64], home: tuple[Any,
 
     Args:
         memory: float64 (trace_size(home),), zeros before the first bin; it is updated.
-        home: The rooms, see `fleet2d.kernels.presence`.
+        home: The rooms.
         evidence: The evidence of one person in consecutive bins.
 
     Returns:
@@ -1267,7 +1283,7 @@ def place_probabilities(network: tuple[Any, ...], places: numpy.typing.NDArray[n
     Return the probability of each place by a network over the set of places.
 
     Args:
-        network: The weights, see `fleet2d.kernels.presence`.
+        network: The weights.
         places: float64 (places, hidden), what the first layer makes of what doesn't change.
         features: float64 (bins, places, features), the last one the logarithm of the belief that is corrected.
 

@@ -4,7 +4,7 @@ import numpy as np
 from tests.sight.watching import agree
 
 from fleet2d.algorithms.observations import ROBOT, Activities, ActivitySense
-from fleet2d.kernels.sight import SightingColumn as Column
+from fleet2d.kernels import SightingColumn as Column
 
 KEYS = np.array([3, 4], np.uint64)
 CONFUSION = {"cook": {"bake": 0.5, "read": 0.2}, "sleep": {"rest": 1.0}}

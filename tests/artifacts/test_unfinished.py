@@ -29,7 +29,7 @@ from fleet2d.artifacts.unfinished import (
     last_commit,
 )
 from fleet2d.errors import ArtifactError, RunDirectoryError
-from fleet2d.kernels.numbers import encode_arrays
+from fleet2d.kernels import encode_arrays
 from fleet2d.runs.run import open_run, open_store
 from fleet2d.storage.journal import FrameWriter, read_frames
 

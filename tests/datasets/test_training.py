@@ -12,7 +12,7 @@ from fleet2d.datasets.reader import Dataset
 from fleet2d.datasets.training import TrainingSettings, fine_tune, predict, train
 from fleet2d.datasets.windows import Windows
 from fleet2d.errors import InputError
-from fleet2d.kernels.presence import TRACE_FEATURES
+from fleet2d.kernels import TRACE_FEATURES
 
 
 def random_windows(seed: int, places: int = 4, count: int = 300) -> Windows:

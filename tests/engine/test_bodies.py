@@ -11,7 +11,7 @@ import fleet2d
 from fleet2d.engine import state
 from fleet2d.engine.bodies import Bodies, poses_of
 from fleet2d.entities.body import NEVER, Pose, Track
-from fleet2d.kernels.motion import Breakpoints
+from fleet2d.kernels import Breakpoints
 
 SECOND = 1_000_000
 

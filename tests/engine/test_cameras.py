@@ -11,7 +11,7 @@ import fleet2d
 from fleet2d.engine import loop
 from fleet2d.engine.cameras import Cameras
 from fleet2d.engine.loop import PHASES, Span
-from fleet2d.kernels.sight import new_memory
+from fleet2d.kernels import new_memory
 
 
 def test_a_robot_that_has_seen_nobody_remembers_nothing() -> None:

@@ -12,9 +12,7 @@ from fleet2d._core import camera_pose
 from fleet2d.engine.cameras import points_seen
 from fleet2d.errors import ComponentError, Fleet2DError, InputError
 from fleet2d.floorplan.home import Home
-from fleet2d.kernels import U64, Bool
-from fleet2d.kernels.motion import Poses
-from fleet2d.kernels.sight import Lenses, Reach, UserPoses
+from fleet2d.kernels import U64, Bool, Lenses, Poses, Reach, UserPoses
 from fleet2d.sight.camera import Camera, TableContext, stack_lenses
 from fleet2d.sight.flashlight import Flashlight
 from fleet2d.sight.fov import FieldOfView

@@ -14,7 +14,7 @@ import fleet2d
 from fleet2d import Algorithm, ComponentError, InputError
 from fleet2d.engine.change_queue import crossings
 from fleet2d.floorplan.home_change import HomeChange, HomeChanges
-from fleet2d.kernels.motion import Breakpoints
+from fleet2d.kernels import Breakpoints
 
 
 def flat() -> dict[str, Any]:

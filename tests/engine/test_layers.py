@@ -16,8 +16,7 @@ import fleet2d
 from fleet2d import Algorithm, Behavior, History, Home, Metric, Present
 from fleet2d.engine.simulation import Simulation
 from fleet2d.errors import ArtifactError, Fleet2DError, InputError
-from fleet2d.kernels import I64
-from fleet2d.kernels.numbers import half_sine
+from fleet2d.kernels import I64, half_sine
 from fleet2d.runs.layers import layer_names, layer_steps, read_layer
 
 HERE = f"{TESTS.as_posix()}/engine/test_layers"

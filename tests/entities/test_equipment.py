@@ -10,7 +10,7 @@ import fleet2d
 from fleet2d import Algorithm
 from fleet2d.entities.equipment import Drift, Localization
 from fleet2d.errors import InputError
-from fleet2d.kernels.numbers import (
+from fleet2d.kernels import (
     TURN,
     UNIT,
     cosine,

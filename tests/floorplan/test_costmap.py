@@ -21,8 +21,7 @@ from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.layers import LayerSettings
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.space import Space
-from fleet2d.kernels.sight import line_of_sight
-from fleet2d.kernels.space import locate
+from fleet2d.kernels import line_of_sight, locate
 
 HALL = FloorPlan.build(
     "hall", shapely.box(0, 0, 6, 4), no_go=[shapely.box(2, 1, 4, 3), shapely.box(5, 3.5, 5.5, 4)]

@@ -7,7 +7,7 @@ import pytest
 
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.furniture import FURNITURE, Furniture, furniture_type, stand_furniture
-from fleet2d.kernels.numbers import QUARTER, TURN
+from fleet2d.kernels import QUARTER, TURN
 
 PAGE = Path(__file__).parents[2] / "docs" / "objects.md"
 TALL = {"wardrobe", "fridge", "bookshelf", "shelf"}

@@ -12,7 +12,7 @@ from tests.strategies import homes, quick
 
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.mesh import build_mesh, snap_polygon
-from fleet2d.kernels.space import Mesh
+from fleet2d.kernels import Mesh
 
 SQUARE = [(0, 0), (640, 0), (640, 640), (0, 640)]
 

@@ -16,9 +16,7 @@ from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.lattice import Lattice
 from fleet2d.floorplan.mesh import Gates, Segment, build_mesh
 from fleet2d.floorplan.rooms.doorways import DoorLine, fit_lines
-from fleet2d.kernels import I64, Bool
-from fleet2d.kernels.sight import line_of_sight, visible_region
-from fleet2d.kernels.space import Mesh, locate
+from fleet2d.kernels import I64, Bool, Mesh, line_of_sight, locate, visible_region
 
 ROOM = [shapely.box(0, 0, 640, 640)]
 MIDDLE: Segment = ((320, 0), (320, 640))

@@ -2,7 +2,6 @@
 
 import ast
 import copy
-import importlib
 import pickle
 import re
 from collections.abc import Callable, Iterator
@@ -18,31 +17,31 @@ from hypothesis import strategies as st
 from tests.homes import home_of
 
 import fleet2d
-from fleet2d import _core
+from fleet2d import _core, kernels
 from fleet2d.floorplan.lattice import Lattice
-from fleet2d.kernels.motion import Breakpoints, WalkRule, empty_poses
-from fleet2d.kernels.presence import (
-    Moments,
-    PeopleEvidence,
-    PlaceNetwork,
-    StayModel,
-    Stretches,
-    TracedEvidence,
-    TracedRooms,
-    trace_size,
-)
-from fleet2d.kernels.sight import (
+from fleet2d.kernels import (
     NEVER,
+    Breakpoints,
+    Corners,
     CoverageRecord,
     CoverageSetup,
     DetectionRule,
     ErrorTables,
     Lenses,
+    Moments,
+    PeopleEvidence,
+    PlaceNetwork,
     Reach,
+    StayModel,
+    Stretches,
+    TracedEvidence,
+    TracedRooms,
+    WalkRule,
     empty_pose_cache,
+    empty_poses,
     new_memory,
+    trace_size,
 )
-from fleet2d.kernels.space import Corners
 from fleet2d.sight.camera import Camera, TableContext, error_tables, stack_lenses
 from fleet2d.sight.perception import Perception
 
@@ -111,7 +110,7 @@ def test_the_core_is_imported_by_kernels_only_and_numba_by_nobody() -> None:
     for path in SOURCES:
         names = imported(path)
         assert not {name for name in names if name.partition(".")[0] == "numba"}, path
-        if path.parent != PACKAGE / "kernels":
+        if path != PACKAGE / "kernels.py":
             assert "fleet2d._core" not in names, path
 
 
@@ -119,17 +118,10 @@ def test_kernels_pass_on_only_what_others_import() -> None:
     passed_on, imported = set(), set()
     for path in PACKAGE.rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            if not isinstance(node, ast.ImportFrom):
-                continue
-            if node.module == "fleet2d._core":
-                names = {
-                    (path.stem, alias.name) for alias in node.names if alias.asname == alias.name
-                }
-                passed_on |= names
-            elif (node.module or "").startswith("fleet2d.kernels."):
-                imported |= {
-                    (str(node.module).rpartition(".")[2], alias.name) for alias in node.names
-                }
+            if isinstance(node, ast.ImportFrom) and node.module == "fleet2d._core":
+                passed_on |= {alias.name for alias in node.names if alias.asname == alias.name}
+            elif isinstance(node, ast.ImportFrom) and node.module == "fleet2d.kernels":
+                imported |= {alias.name for alias in node.names}
 
     assert passed_on
     assert set() == passed_on - imported
@@ -153,10 +145,7 @@ def test_named_tuples_have_the_members_of_their_structs_in_order() -> None:
             members[match[1]] = tuple(re.findall(r"::(\w+)", match[2]))
     del members["Chains"]  # plain tuples of the probabilities, bins and offsets of `PeoplePlaces`
     fields = {
-        name: value._fields
-        for module in ("motion", "presence", "sight", "space")
-        for name, value in vars(importlib.import_module(f"fleet2d.kernels.{module}")).items()
-        if hasattr(value, "_fields")
+        name: value._fields for name, value in vars(kernels).items() if hasattr(value, "_fields")
     }
 
     assert len(members) > 15

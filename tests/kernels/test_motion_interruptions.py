@@ -4,8 +4,7 @@ from typing import Any
 
 import pytest
 
-from fleet2d.kernels.motion import Interruptions, RoomUse
-from fleet2d.kernels.numbers import StepDraws
+from fleet2d.kernels import Interruptions, RoomUse, StepDraws
 
 OFTEN = list(range(1, 257))
 

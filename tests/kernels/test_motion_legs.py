@@ -10,8 +10,7 @@ import shapely
 from tests.homes import home_of
 from tests.kernels.test_space_routes import routes_of
 
-from fleet2d.kernels.motion import Legs, time_route
-from fleet2d.kernels.numbers import TURN, turn_between
+from fleet2d.kernels import TURN, Legs, time_route, turn_between
 
 SPEED, TURN_RATE = 768.0, 1023.7
 # With a pillar, and less than the places that the tests go to.

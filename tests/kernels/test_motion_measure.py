@@ -7,8 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fleet2d.kernels.motion import Poses, count_together, rooms_at, sum_moves
-from fleet2d.kernels.space import SUB
+from fleet2d.kernels import SUB, Poses, count_together, rooms_at, sum_moves
 
 ROWS, COLUMNS = 4, 6
 ROOMS = np.random.default_rng(0).integers(-1, 5, (ROWS, COLUMNS)).astype(np.int16)

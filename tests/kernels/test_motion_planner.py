@@ -5,8 +5,7 @@ from typing import Any
 
 import pytest
 
-from fleet2d.kernels.motion import DayPlanner, RoomUse
-from fleet2d.kernels.numbers import StepDraws
+from fleet2d.kernels import DayPlanner, RoomUse, StepDraws
 
 LAW = ([60, 600], 60, 600, 0, 1 << 24)
 NONE = ([0, 1], 0, 1, 0, 1 << 24)

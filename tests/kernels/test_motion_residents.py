@@ -15,7 +15,7 @@ import fleet2d
 from fleet2d.entities.plan import Plan
 from fleet2d.entities.users.resident import MOVE_KINDS, SECOND_US, KnownHome, Venue
 from fleet2d.floorplan.placed_objects import POSTURES
-from fleet2d.kernels.motion import CoreVenue, LastStint, Legs, Resident, Waits
+from fleet2d.kernels import CoreVenue, LastStint, Legs, Resident, Waits
 from fleet2d.routines.activity import Activity
 from fleet2d.routines.distributions import uniform
 

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tests.reference import signals as slow
 
-from fleet2d.kernels.motion import (
+from fleet2d.kernels import (
     Breakpoints,
     Timelines,
     Window,

@@ -20,7 +20,7 @@ from tests.homes import Home, home_of
 from tests.reference import motion as slow
 from tests.strategies import quick
 
-from fleet2d.kernels.motion import Breakpoints, Timelines, WalkRule, Window
+from fleet2d.kernels import Breakpoints, Timelines, WalkRule, Window
 
 Pose = tuple[int, int, int, int, int]
 """x, y, heading, away, posture."""

@@ -16,8 +16,9 @@ from tests.reference import motion as slow
 from tests.reference.line_of_sight import is_inside, touches_any_wall
 from tests.strategies import homes, quick, seeds
 
-from fleet2d.kernels import I64
-from fleet2d.kernels.motion import (
+from fleet2d.kernels import (
+    I64,
+    TURN,
     Breakpoints,
     Poses,
     WalkRule,
@@ -25,7 +26,6 @@ from fleet2d.kernels.motion import (
     trace_meander,
     trace_track,
 )
-from fleet2d.kernels.numbers import TURN
 
 DAY_US = 86_400_000_000
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from tests.reference import encoding as slow
 
 from fleet2d.artifacts.unfinished import GROWTH, HEADER, LINE, NARROW, RAW, RUNS, ArrayReader
-from fleet2d.kernels.numbers import encode_arrays
+from fleet2d.kernels import encode_arrays
 
 RNG = np.random.default_rng(0)
 INT64 = [-(2**63), -1, 0, 1, 254, 255, 256, 2**16, 2**32, 2**63 - 1]

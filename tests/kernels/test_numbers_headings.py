@@ -11,7 +11,7 @@ from tests.reference import headings as slow
 from tests.strategies import quick
 
 from fleet2d._core import SINES
-from fleet2d.kernels.numbers import (
+from fleet2d.kernels import (
     HALF_TURN,
     QUARTER,
     TURN,

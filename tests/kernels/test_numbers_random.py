@@ -10,7 +10,7 @@ from tests.reference import random as slow
 from tests.strategies import quick
 
 from fleet2d._core import BELL_MEAN, Bits, random_bits
-from fleet2d.kernels.numbers import (
+from fleet2d.kernels import (
     BELL_STD,
     StepDraws,
     random_bell,

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from fleet2d.algorithms.presence.belief import with_anyone
-from fleet2d.kernels import F64, I64, Bool
-from fleet2d.kernels.presence import PeoplePlaces, gather_views, sum_places
+from fleet2d.kernels import F64, I64, Bool, PeoplePlaces, gather_views, sum_places
 
 
 def views(seed: int, robots: int) -> tuple[I64, ...]:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from tests.reference.flows import earth_mover as slow_earth_mover
 
-from fleet2d.kernels.presence import earth_mover
+from fleet2d.kernels import earth_mover
 
 
 @pytest.mark.parametrize("seed", range(40))

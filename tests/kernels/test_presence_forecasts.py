@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from fleet2d._core import random_bits
-from fleet2d.kernels.numbers import random_below
-from fleet2d.kernels.presence import advance, list_sightings, resampled
+from fleet2d.kernels import advance, list_sightings, random_below, resampled
 
 
 def test_a_forecast_is_the_row_of_the_power() -> None:

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from tests.kernels.test_presence_stays import PATCHES, SIZES, by_place, case, no_moments
 from tests.reference import presence as slow
 
-from fleet2d.kernels.presence import (
+from fleet2d.kernels import (
     Moments,
     PeopleEvidence,
     PeoplePlaces,

@@ -12,7 +12,7 @@ from tests.reference import presence as slow
 from fleet2d._core import smooth
 from fleet2d.algorithms.presence.chain_model import steps_of
 from fleet2d.algorithms.presence.people import distinct
-from fleet2d.kernels.presence import Moments, StayModel, Stretches, advance, follow
+from fleet2d.kernels import Moments, StayModel, Stretches, advance, follow
 
 SIZES = (2, 1, 3, 1)  # three rooms of so many patches, and away
 ROOM = np.array([0, 0, 1, 2, 2, 2, 3])

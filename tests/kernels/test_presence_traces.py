@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from tests.reference import traces as slow
 
-from fleet2d.kernels.presence import (
+from fleet2d.kernels import (
     TRACE_FEATURES,
     PlaceNetwork,
     TracedEvidence,

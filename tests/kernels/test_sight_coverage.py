@@ -13,15 +13,17 @@ from tests.strategies import quick, seeds
 
 from fleet2d._core import camera_pose
 from fleet2d.floorplan.lattice import Lattice
-from fleet2d.kernels import I16, I64
-from fleet2d.kernels.motion import Poses, Window
-from fleet2d.kernels.numbers import half_sine
-from fleet2d.kernels.sight import (
+from fleet2d.kernels import (
+    I16,
+    I64,
     NEVER,
     CoverageRecord,
     CoverageSetup,
     Lenses,
+    Poses,
+    Window,
     empty_pose_cache,
+    half_sine,
     record_coverage,
     settle_coverage,
 )

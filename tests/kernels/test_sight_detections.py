@@ -17,10 +17,10 @@ from tests.strategies import homes, quick, seeds
 
 from fleet2d._core import in_wedge
 from fleet2d.floorplan.lattice import Lattice
-from fleet2d.kernels import I64, U64
-from fleet2d.kernels.motion import Window
-from fleet2d.kernels.sight import (
+from fleet2d.kernels import (
+    I64,
     MAX_GHOSTS,
+    U64,
     USER_LOST,
     USER_SEEN,
     About,
@@ -29,6 +29,7 @@ from fleet2d.kernels.sight import (
     Lenses,
     SightMemory,
     UserDraw,
+    Window,
     detect,
     new_memory,
 )

@@ -11,7 +11,7 @@ from tests.sight.watching import HALL, PILLAR, SIDE_M, UNITS_PER_M, hall, scene
 from tests.strategies import quick
 
 from fleet2d._core import camera_pose, hides, in_wedge, near_wedge, points_in_view
-from fleet2d.kernels.sight import Lenses, camera_poses
+from fleet2d.kernels import Lenses, camera_poses
 from fleet2d.sight.camera import Camera, stack_lenses
 
 MIDDLE = round(SIDE_M / 2 * UNITS_PER_M)

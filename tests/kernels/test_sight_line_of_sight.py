@@ -22,9 +22,7 @@ from tests.reference.line_of_sight import vertices_seen, visible, visible_exactl
 from tests.strategies import homes, quick, seeds
 
 from fleet2d._core import build_fans, vertices_seen_from_point, vertices_seen_from_vertex
-from fleet2d.kernels import I64, Bool
-from fleet2d.kernels.sight import line_of_sight
-from fleet2d.kernels.space import Mesh, locate, pairs_in_sight
+from fleet2d.kernels import I64, Bool, Mesh, line_of_sight, locate, pairs_in_sight
 
 EYES, POINTS = 2, 24
 

@@ -9,10 +9,9 @@ from hypothesis import strategies as st
 from tests.sight.watching import scene
 from tests.strategies import quick
 
-import fleet2d.kernels.sight as k
+import fleet2d.kernels as k
 from fleet2d import _core
-from fleet2d.kernels import I64
-from fleet2d.kernels.numbers import heading_of
+from fleet2d.kernels import I64, heading_of
 from fleet2d.sight.camera import Camera, error_tables
 from fleet2d.sight.perception import Perception
 

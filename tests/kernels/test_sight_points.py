@@ -10,9 +10,7 @@ from tests.homes import all_homes, awkward_points, behind_corners, home_of
 from tests.reference.line_of_sight import visible
 from tests.strategies import homes, quick, seeds
 
-from fleet2d.kernels import I64
-from fleet2d.kernels.numbers import half_sine
-from fleet2d.kernels.sight import Reach, points_in_reach, points_in_sight
+from fleet2d.kernels import I64, Reach, half_sine, points_in_reach, points_in_sight
 
 HALVES = [1, 700, 1229, 2047, 2048, 2049, 3000, 4095, 4096]
 

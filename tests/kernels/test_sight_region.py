@@ -21,15 +21,18 @@ from tests.reference.line_of_sight import visible_area
 from tests.strategies import homes, quick, seeds
 
 from fleet2d._core import region_contains
-from fleet2d.kernels import F64, I32
-from fleet2d.kernels.sight import (
+from fleet2d.kernels import (
+    F64,
+    I32,
+    Mesh,
     points_in_sight,
+    rasterize_cells,
     region_contains_points,
     region_outline,
     regions_of_cells,
+    strictly_inside,
     visible_region,
 )
-from fleet2d.kernels.space import Mesh, rasterize_cells, strictly_inside
 
 ROOM = home_of([shapely.box(128, 128, 1280, 640).difference(shapely.box(500, 300, 700, 400))])
 

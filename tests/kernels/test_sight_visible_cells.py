@@ -11,10 +11,17 @@ from tests.homes import Home, all_homes, awkward_points, home_of, shuffled, tran
 from tests.reference import visible_cells as slow
 from tests.strategies import homes, quick, seeds
 
-from fleet2d.kernels import Bool
-from fleet2d.kernels.numbers import half_sine
-from fleet2d.kernels.sight import Reach, cells_in_view, mark_spans, points_in_reach, points_in_sight
-from fleet2d.kernels.space import Mesh, rasterize_cells
+from fleet2d.kernels import (
+    Bool,
+    Mesh,
+    Reach,
+    cells_in_view,
+    half_sine,
+    mark_spans,
+    points_in_reach,
+    points_in_sight,
+    rasterize_cells,
+)
 
 SINES = np.array([half_sine(half) for half in range(8192)], np.int64)
 HALVES = [1, 700, 1229, 2047, 2048, 2049, 3000, 4095, 4096]

@@ -7,7 +7,7 @@ from tests.homes import home_of
 from tests.reference.routes import parts_of
 from tests.strategies import homes, quick
 
-from fleet2d.kernels.space import label_triangles, rasterize_cells
+from fleet2d.kernels import label_triangles, rasterize_cells
 
 
 @quick

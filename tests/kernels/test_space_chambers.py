@@ -5,11 +5,12 @@ from hypothesis import strategies as st
 from tests.reference.chambers import nearest_labels
 
 from fleet2d.floorplan.mesh import build_mesh
-from fleet2d.kernels import I32, Bool
-from fleet2d.kernels.sight import line_of_sight
-from fleet2d.kernels.space import (
+from fleet2d.kernels import (
+    I32,
+    Bool,
     fill_from_neighbors,
     label_frames,
+    line_of_sight,
     locate,
     pairs_in_sight,
     spread_labels,

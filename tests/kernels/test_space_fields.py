@@ -3,7 +3,7 @@ import pytest
 from tests.reference.fields import squared_distance as slow_squared_distance
 from tests.reference.fields import walking_distance as slow_walking_distance
 
-from fleet2d.kernels.space import squared_distance, walking_distance
+from fleet2d.kernels import squared_distance, walking_distance
 
 
 @pytest.mark.parametrize("shape", [(1, 1), (1, 17), (17, 1), (2, 2), (13, 29), (40, 25)])

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 import shapely
 
-from fleet2d.kernels import I32, Bool
-from fleet2d.kernels.space import count_steps, label_parts, trace_rings
+from fleet2d.kernels import I32, Bool, count_steps, label_parts, trace_rings
 
 SHAPES = [(1, 1), (1, 9), (9, 1), (2, 2), (6, 7), (14, 11)]
 SHARES = [0.0, 0.2, 0.5, 0.6, 0.9, 1.0]

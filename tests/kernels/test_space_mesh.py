@@ -19,7 +19,7 @@ from tests.reference.line_of_sight import is_inside, on_any_wall
 from tests.strategies import homes, quick, seeds
 
 from fleet2d._core import BUCKET, contains_triangle, orient
-from fleet2d.kernels.space import locate, rasterize_cells, strictly_inside
+from fleet2d.kernels import locate, rasterize_cells, strictly_inside
 
 
 @pytest.mark.parametrize(

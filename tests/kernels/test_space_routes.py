@@ -14,8 +14,7 @@ from tests.reference.routes import graph_of, length_of, region_of, shortest, str
 from tests.strategies import homes, quick, seeds
 
 from fleet2d._core import distance
-from fleet2d.kernels import I64
-from fleet2d.kernels.space import Corners, Routes
+from fleet2d.kernels import I64, Corners, Routes
 
 
 def corners_of(home: Home) -> Corners:

@@ -9,7 +9,7 @@ from tests.homes import home_of
 from tests.reference.costs import cost_distance as slow_cost_distance
 
 from fleet2d._core import leg_cost, step_cost
-from fleet2d.kernels.space import cost_distance, descend, pull_taut, walking_distance
+from fleet2d.kernels import cost_distance, descend, pull_taut, walking_distance
 
 HALL = home_of([shapely.box(0, 0, 64 * 20, 64 * 12)])
 

@@ -11,7 +11,7 @@ from tests.scenes import flat_path
 import fleet2d
 from fleet2d.errors import InputError, PlacementError
 from fleet2d.floorplan.plan import FloorPlan
-from fleet2d.kernels.sight import Reach
+from fleet2d.kernels import Reach
 from fleet2d.pictures.layers import CameraPose, cells_panel, draw_fov, parse_pose, region_panel
 from fleet2d.sight.flashlight import Flashlight
 

@@ -1,4 +1,4 @@
-"""Slow, obvious twins of `fleet2d.kernels.space`."""
+"""Slow, obvious twins of `fleet2d.kernels`."""
 
 import numpy as np
 

@@ -13,7 +13,7 @@ from tests.reference.line_of_sight import visible
 from tests.reference.motion import half_up
 from tests.reference.random import random_bell, random_below, random_bits
 
-import fleet2d.kernels.sight as k
+import fleet2d.kernels as k
 from fleet2d import _core
 from fleet2d.kernels import I64
 

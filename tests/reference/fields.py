@@ -1,4 +1,4 @@
-"""Slow, obvious twins of the kernels in `fleet2d.kernels.space`."""
+"""Slow, obvious twins of the kernels in `fleet2d.kernels`."""
 
 from itertools import product
 

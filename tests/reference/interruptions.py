@@ -25,7 +25,7 @@ Step = tuple[int, int, Quantiles]
 
 
 class CoreNeed(NamedTuple):
-    """A row of `needs` of `fleet2d.kernels.motion.Interruptions`."""
+    """A row of `needs` of `fleet2d.kernels.Interruptions`."""
 
     steps: Sequence[Step]
     every: Quantiles
@@ -37,7 +37,7 @@ class CoreNeed(NamedTuple):
 
 
 class CoreErrand(NamedTuple):
-    """A row of `errands` of `fleet2d.kernels.motion.Interruptions`."""
+    """A row of `errands` of `fleet2d.kernels.Interruptions`."""
 
     step: Step
     after: Sequence[int] | None
@@ -65,7 +65,7 @@ class PartRow(NamedTuple):
 
 
 class SlowInterruptions:
-    """Interrupts days, as `fleet2d.kernels.motion.Interruptions`."""
+    """Interrupts days, as `fleet2d.kernels.Interruptions`."""
 
     def __init__(
         self,

@@ -14,7 +14,7 @@ Row = tuple[int, int, int, int, int]
 
 
 class RoomTimes:
-    """When rooms are in use, as `fleet2d.kernels.motion.RoomUse`."""
+    """When rooms are in use, as `fleet2d.kernels.RoomUse`."""
 
     def __init__(self) -> None:
         self.times: dict[int, list[tuple[int, int]]] = {}
@@ -47,7 +47,7 @@ class RoomTimes:
 
 
 class CoreJob(NamedTuple):
-    """A row of `jobs` of `fleet2d.kernels.motion.DayPlanner`."""
+    """A row of `jobs` of `fleet2d.kernels.DayPlanner`."""
 
     activity: int
     starts: Distribution | None
@@ -60,7 +60,7 @@ class CoreJob(NamedTuple):
 
 
 class CorePastime(NamedTuple):
-    """A row of `pastimes` of `fleet2d.kernels.motion.DayPlanner`."""
+    """A row of `pastimes` of `fleet2d.kernels.DayPlanner`."""
 
     activity: int
     weight: int
@@ -78,7 +78,7 @@ class JobChain(NamedTuple):
 
 
 class SlowPlanner:
-    """Draws days, as `fleet2d.kernels.motion.DayPlanner`."""
+    """Draws days, as `fleet2d.kernels.DayPlanner`."""
 
     def __init__(
         self,

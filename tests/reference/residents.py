@@ -7,7 +7,7 @@ from typing import Any
 from fleet2d._core import Bits
 from fleet2d.entities.plan import Plan
 from fleet2d.entities.users.resident import KnownHome, Seat, Spot, Venue
-from fleet2d.kernels.numbers import TURN, turn_between
+from fleet2d.kernels import TURN, turn_between
 from fleet2d.routines.distributions import exponential
 from fleet2d.routines.planner import PLANNED, RESUMES
 from fleet2d.runtime.determinism import Draws

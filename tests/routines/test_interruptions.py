@@ -14,7 +14,7 @@ from tests.reference.interruptions import CERTAIN, MOST, SlowInterruptions
 from tests.reference.planner import RoomTimes
 from tests.routines.days import DAY_S, MONDAY
 
-from fleet2d.kernels.motion import Interruptions, RoomUse
+from fleet2d.kernels import Interruptions, RoomUse
 from fleet2d.routines.interruptions import interrupt, without_interruptions
 from fleet2d.routines.life import Life
 from fleet2d.routines.persona import Persona, bundled_names, bundled_persona

@@ -13,7 +13,7 @@ from tests.reference.planner import RoomTimes, SlowPlanner
 from tests.routines.days import DAY_S, MONDAY, violations
 from tests.thorough import THOROUGH, examples
 
-from fleet2d.kernels.motion import RoomUse
+from fleet2d.kernels import RoomUse
 from fleet2d.routines.interruptions import without_interruptions
 from fleet2d.routines.life import Life
 from fleet2d.routines.persona import Persona, bundled_names, bundled_persona

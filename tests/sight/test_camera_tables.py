@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from tests.sight.watching import LATTICE, UNITS_PER_M, scene
 
-import fleet2d.kernels.sight as k
+import fleet2d.kernels as k
 from fleet2d.errors import ScenarioError
 from fleet2d.sight.camera import Camera, error_tables, is_perfect, stack_lenses
 from fleet2d.sight.perception import Perception

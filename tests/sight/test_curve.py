@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 from tests.strategies import quick
 
-from fleet2d.kernels.sight import ONE
+from fleet2d.kernels import ONE
 from fleet2d.sight.curve import Curve, chance, cumulative, decay
 
 SHARE = st.floats(0, 1)

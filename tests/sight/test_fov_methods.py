@@ -16,9 +16,7 @@ from fleet2d.errors import InputError
 from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.rooms.doorways import DoorLine
-from fleet2d.kernels import Bool
-from fleet2d.kernels.sight import Reach
-from fleet2d.kernels.space import SUB
+from fleet2d.kernels import SUB, Bool, Reach
 from fleet2d.sight.flashlight import Flashlight
 from fleet2d.sight.fov import FieldOfView
 from fleet2d.sight.line_of_sight import LineOfSight

@@ -12,7 +12,7 @@ import shapely
 from tests.sight.watching import PILLAR, SIDE_M, UNITS_PER_M, Watch, agree, around, changed, hall
 
 from fleet2d.kernels import F64, I64, Bool
-from fleet2d.kernels.sight import SightingColumn as Column
+from fleet2d.kernels import SightingColumn as Column
 
 N = 60_000
 RNG = np.random.default_rng(0)

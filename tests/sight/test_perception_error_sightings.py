@@ -5,7 +5,7 @@ import pytest
 from tests.sight.sightings import sightings
 
 import fleet2d
-from fleet2d.kernels.numbers import random_bell
+from fleet2d.kernels import random_bell
 from fleet2d.runtime.determinism import stream_key
 from fleet2d.sight.perception_error import PerceptionError
 

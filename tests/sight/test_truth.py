@@ -15,8 +15,7 @@ from shapely.geometry import Polygon
 from tests.homes import SUB, Home, home_of
 
 from fleet2d.floorplan.mesh import snap_polygon
-from fleet2d.kernels.sight import line_of_sight, region_outline, visible_region
-from fleet2d.kernels.space import locate
+from fleet2d.kernels import line_of_sight, locate, region_outline, visible_region
 
 # A user's position is rounded by at most half a lattice unit on each axis.
 MARGIN_PX = 1

@@ -11,10 +11,18 @@ import shapely
 from tests.homes import home_of
 
 from fleet2d.floorplan.lattice import Lattice
-from fleet2d.kernels import F64, I8, I64
-from fleet2d.kernels.motion import Window
-from fleet2d.kernels.sight import MAX_GHOSTS, DetectionRule, SightMemory, detect, new_memory
-from fleet2d.kernels.space import Mesh
+from fleet2d.kernels import (
+    F64,
+    I8,
+    I64,
+    MAX_GHOSTS,
+    DetectionRule,
+    Mesh,
+    SightMemory,
+    Window,
+    detect,
+    new_memory,
+)
 from fleet2d.runtime.determinism import stream_key
 from fleet2d.sight.camera import Camera, TableContext, error_tables, stack_lenses
 from fleet2d.sight.perception import Perception

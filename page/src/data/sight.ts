@@ -1,6 +1,6 @@
 /**
  * The region that is visible from a place, exact in lattice units: triangular expansion through the
- * mesh of free space, as `fleet2d.kernels.sight.visible_region` does it.
+ * mesh of free space, as `fleet2d.kernels.visible_region` does it.
  */
 
 import type { WallsFacts } from "../contract";

@@ -1,4 +1,4 @@
-// Lenses as Python holds them: the named tuple `fleet2d.kernels.sight.Lenses`.
+// Lenses as Python holds them: the named tuple `fleet2d.kernels.Lenses`.
 #pragma once
 
 #include "../lens.hpp"

@@ -6,7 +6,7 @@
 
 namespace fleet2d {
 
-// The named tuples of `fleet2d.kernels.motion`.
+// The named tuples of `fleet2d.kernels`.
 template <>
 inline constexpr auto border::members_of<Breakpoints> =
     std::tuple(&Breakpoints::time, &Breakpoints::x, &Breakpoints::y, &Breakpoints::heading, &Breakpoints::away);

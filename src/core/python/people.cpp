@@ -69,7 +69,7 @@ void bind_people(nb::module_& m) {
 
 Args:
     model: The transition probabilities: as of one person, with people as the first dimension.
-    day: The evidence, see `fleet2d.kernels.presence`.
+    day: The evidence.
     longest: Largest number of bins in a stretch.
     now: float64 (people, stages, patches), probability before the first bin; becomes that after the last.
 
@@ -103,7 +103,7 @@ Raises:
 
 Args:
     model: The transition probabilities: as of one person, with people as the first dimension.
-    day: The evidence, see `fleet2d.kernels.presence`.
+    day: The evidence.
     longest: Largest number of bins in a stretch.
     prior: float64 (people, stages, patches), probability before the first bin.
     future: float64 (people, stages, patches), likelihood of the evidence after the last one.

@@ -1,4 +1,4 @@
-// Error tables as Python holds them: the named tuple `fleet2d.kernels.sight.ErrorTables`.
+// Error tables as Python holds them: the named tuple `fleet2d.kernels.ErrorTables`.
 #pragma once
 
 #include "../perception.hpp"

@@ -1,4 +1,4 @@
-// Poses as Python holds them: the named tuple `fleet2d.kernels.motion.Poses`.
+// Poses as Python holds them: the named tuple `fleet2d.kernels.Poses`.
 #pragma once
 
 #include "../poses.hpp"

@@ -21,7 +21,21 @@ void bind_stays(nb::module_& m) {
                               std::move(result.patch), std::move(result.share));
         },
         "minute"_a, "view"_a, "bin"_a, "patch"_a, "steps"_a, "longest"_a, Unlocked(),
-        "Merge bins with equal evidence; see `fleet2d.kernels.presence`.");
+        R"(Merge consecutive bins with the same view and the same sightings.
+
+Bins in which the user was perceived in several patches aren't merged.
+
+Args:
+    minute: int64 (bins,), beginning of each bin [minutes since midnight]; no stretch crosses an
+        hour.
+    view: int64 (bins,), the row of `views`; consecutive bins with the same view have the same.
+    bin: int64 (sightings,), ascending; where the user was perceived.
+    patch: int64 (sightings,), ascending within each bin.
+    steps: int64 (sightings,), number of steps with a sighting there.
+    longest: Largest number of bins in a stretch.
+
+Returns:
+    The fields of `Stretches` without `views`.)");
     m.def(
         "follow",
         [](const StayModel& model, const Stretches& stretches, View<f64, 3> now, View<i64> shown) {

@@ -1,4 +1,4 @@
-// Stays as Python holds them: the named tuples of `fleet2d.kernels.presence`.
+// Stays as Python holds them: the named tuples of `fleet2d.kernels`.
 #pragma once
 
 #include "../stays.hpp"

@@ -59,7 +59,7 @@ void bind_traces(nb::module_& m) {
 
 Args:
     memory: float64 (trace_size(home),), zeros before the first bin; it is updated.
-    home: The rooms, see `fleet2d.kernels.presence`.
+    home: The rooms.
     evidence: The evidence of one person in consecutive bins.
 
 Returns:
@@ -68,7 +68,7 @@ Returns:
           R"(Return the probability of each place by a network over the set of places.
 
 Args:
-    network: The weights, see `fleet2d.kernels.presence`.
+    network: The weights.
     places: float64 (places, hidden), what the first layer makes of what doesn't change.
     features: float64 (bins, places, features), the last one the logarithm of the belief that is corrected.
 

@@ -1,4 +1,4 @@
-// What a camera sees, as Python holds it: the named tuple `fleet2d.kernels.sight.Reach`.
+// What a camera sees, as Python holds it: the named tuple `fleet2d.kernels.Reach`.
 #pragma once
 
 #include "../visible_cells.hpp"

@@ -14,9 +14,17 @@ import numpy as np
 
 from fleet2d.algorithms.observations import NOWHERE, frozen
 from fleet2d.floorplan.plan import FloorPlan, read_only
-from fleet2d.kernels import F64, I16, I64, U8, Bool
-from fleet2d.kernels.presence import gather_views, list_sightings
-from fleet2d.kernels.space import label_triangles, rasterize_cells
+from fleet2d.kernels import (
+    F64,
+    I16,
+    I64,
+    U8,
+    Bool,
+    gather_views,
+    label_triangles,
+    list_sightings,
+    rasterize_cells,
+)
 from fleet2d.runtime.clock import DAY_US, MICROSECOND, Clock, midnight_of
 
 # Side of a patch [m], approximately; larger where a room would have more than about MAX_PATCHES.

@@ -21,10 +21,19 @@ from fleet2d.errors import ComponentError
 from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.plan import read_only
 from fleet2d.interactions.answers import AnswerRecord, Wanted
-from fleet2d.kernels import F64, I16, I64, Bool
-from fleet2d.kernels.motion import Poses, Window, count_together, rooms_at, sum_moves
-from fleet2d.kernels.numbers import in_radians
-from fleet2d.kernels.sight import SightingColumn as Column
+from fleet2d.kernels import (
+    F64,
+    I16,
+    I64,
+    Bool,
+    Poses,
+    Window,
+    count_together,
+    in_radians,
+    rooms_at,
+    sum_moves,
+)
+from fleet2d.kernels import SightingColumn as Column
 from fleet2d.runtime.clock import Clock
 from fleet2d.runtime.events import HOME, Event, EventKind
 

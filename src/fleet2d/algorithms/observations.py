@@ -9,12 +9,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fleet2d.floorplan.plan import FloorPlan, read_only
-from fleet2d.kernels import F64, I8, I16, I32, I64, U64
-from fleet2d.kernels.motion import rooms_at
-from fleet2d.kernels.numbers import in_radians
-from fleet2d.kernels.sight import ONE, random_shares
-from fleet2d.kernels.sight import SightingColumn as Column
-from fleet2d.kernels.space import fill_from_neighbors
+from fleet2d.kernels import (
+    F64,
+    I8,
+    I16,
+    I32,
+    I64,
+    ONE,
+    U64,
+    fill_from_neighbors,
+    in_radians,
+    random_shares,
+    rooms_at,
+)
+from fleet2d.kernels import SightingColumn as Column
 
 Names = NDArray[np.object_]  # str, or None where no activity is known
 

@@ -30,8 +30,7 @@ from fleet2d.artifacts.table import (
     new_dictionaries,
 )
 from fleet2d.errors import ArtifactError
-from fleet2d.kernels import I64
-from fleet2d.kernels.numbers import encode_arrays
+from fleet2d.kernels import I64, encode_arrays
 from fleet2d.storage.files import PARTIAL, FolderLock, path_in, replacing, sync_directory
 from fleet2d.storage.journal import FrameWriter, JournalFormat, read_frames
 

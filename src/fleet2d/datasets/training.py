@@ -9,7 +9,7 @@ import numpy as np
 from fleet2d.algorithms.presence.learned import PLACE_FEATURES, Weights
 from fleet2d.datasets.windows import Windows, joined
 from fleet2d.errors import InputError
-from fleet2d.kernels.presence import TRACE_FEATURES, PlaceNetwork, place_probabilities
+from fleet2d.kernels import TRACE_FEATURES, PlaceNetwork, place_probabilities
 
 FLOOR = 1e-6
 FACTORS = tuple(k / 10 for k in range(16))  # of the correction, of which fine-tuning tries each

@@ -13,8 +13,7 @@ from fleet2d.algorithms.presence.learned import PlaceFacts
 from fleet2d.datasets.specification import BELIEF, EVIDENCE, STAYS, PlannedRun
 from fleet2d.datasets.tables import tables_of
 from fleet2d.errors import InputError
-from fleet2d.kernels import F64, I64
-from fleet2d.kernels.presence import TracedEvidence, trace_evidence, trace_size
+from fleet2d.kernels import F64, I64, TracedEvidence, trace_evidence, trace_size
 from fleet2d.runtime.clock import DAY_MINUTES, DAY_US
 
 if TYPE_CHECKING:

@@ -13,8 +13,7 @@ from fleet2d.entities.body import NEVER, Pose, RandomWalk
 from fleet2d.entities.decisions import DecidingActor
 from fleet2d.entities.plan import Plan
 from fleet2d.floorplan.home import Home
-from fleet2d.kernels import I8, I64, U8
-from fleet2d.kernels.motion import Breakpoints, Poses, Timelines, Window
+from fleet2d.kernels import I8, I64, U8, Breakpoints, Poses, Timelines, Window
 from fleet2d.runtime.clock import Clock
 from fleet2d.runtime.events import Event
 from fleet2d.scenario.model import Scenario

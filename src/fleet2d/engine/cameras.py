@@ -19,18 +19,20 @@ from fleet2d.entities.behavior import Actor, SightEvent
 from fleet2d.entities.equipment import Drift, Localization
 from fleet2d.errors import ComponentError, ScenarioError, blame
 from fleet2d.floorplan.home import Home
-from fleet2d.kernels import I64, U64
-from fleet2d.kernels.motion import Poses
-from fleet2d.kernels.sight import (
+from fleet2d.kernels import (
     FORCED_IDENTITY,
     FORCED_MISS,
+    I64,
     MAX_GHOSTS,
+    SUB,
+    U64,
     USER_LOST,
     USER_SEEN,
     About,
     DetectionRule,
     GhostDraw,
     Lenses,
+    Poses,
     Reach,
     SightingColumn,
     SightMemory,
@@ -40,10 +42,9 @@ from fleet2d.kernels.sight import (
     new_memory,
     view_queries,
 )
-from fleet2d.kernels.sight import (
+from fleet2d.kernels import (
     ViewQueryColumn as Query,
 )
-from fleet2d.kernels.space import SUB
 from fleet2d.runtime.clock import midnight_of
 from fleet2d.runtime.determinism import stream_key
 from fleet2d.runtime.events import Event

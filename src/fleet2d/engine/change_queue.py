@@ -29,8 +29,7 @@ from fleet2d.floorplan.placed_objects import move_object
 from fleet2d.floorplan.rooms.room import PRIORITY, usual_type
 from fleet2d.floorplan.slow_area import SlowArea
 from fleet2d.floorplan.space import grow_shape
-from fleet2d.kernels import F64
-from fleet2d.kernels.motion import Breakpoints
+from fleet2d.kernels import F64, Breakpoints
 from fleet2d.runtime.clock import midnight_of
 from fleet2d.runtime.events import HOME, Event, EventKind
 

@@ -21,10 +21,7 @@ from fleet2d.entities.decisions import DecidingActor
 from fleet2d.entities.entity import Robot
 from fleet2d.entities.giving_way import TOUCHING_GAP_M, Surroundings, plan_after_step, plan_around
 from fleet2d.entities.plan import Note, Plan
-from fleet2d.kernels import I64, U8, Bool
-from fleet2d.kernels.motion import Poses
-from fleet2d.kernels.sight import line_of_sight
-from fleet2d.kernels.space import locate
+from fleet2d.kernels import I64, U8, Bool, Poses, line_of_sight, locate
 
 # Time for which a body ignores another one that it goes round or squeezes past.
 PASSING_TIME = timedelta(seconds=10)

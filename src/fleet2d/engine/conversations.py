@@ -19,9 +19,7 @@ from fleet2d.floorplan.placed_objects import POSTURES
 from fleet2d.interactions.answers import AnswerRecord, Answers, Circumstances, Reply, Wanted
 from fleet2d.interactions.attitude import AttitudeState
 from fleet2d.interactions.interaction import Interaction, Outcome, RequestQueue
-from fleet2d.kernels.numbers import TURN, heading_of
-from fleet2d.kernels.sight import line_of_sight
-from fleet2d.kernels.space import locate
+from fleet2d.kernels import TURN, heading_of, line_of_sight, locate
 from fleet2d.runtime.events import Event, EventKind
 
 LYING = POSTURES.index("lie")

@@ -14,9 +14,7 @@ from fleet2d.engine.bodies import Bodies, PoseBlock, Watcher
 from fleet2d.entities.behavior import Attention, SightEvent
 from fleet2d.entities.decisions import DecidingActor
 from fleet2d.floorplan.placed_objects import POSTURES
-from fleet2d.kernels import I64, Bool
-from fleet2d.kernels.sight import line_of_sight
-from fleet2d.kernels.space import locate
+from fleet2d.kernels import I64, Bool, line_of_sight, locate
 from fleet2d.runtime.events import Event, EventKind
 
 # The squared distance of a person who can't be met: larger than any home [lattice units²].

@@ -30,8 +30,7 @@ from fleet2d.expectations.verdict import (
     evidence_of,
     verdict_of,
 )
-from fleet2d.kernels import I64
-from fleet2d.kernels.sight import SightMemory
+from fleet2d.kernels import I64, SightMemory
 from fleet2d.metrics.metric import Metric
 from fleet2d.runtime.events import Event
 from fleet2d.scenario.model import Scenario

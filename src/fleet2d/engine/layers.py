@@ -22,16 +22,18 @@ from fleet2d.floorplan.costmap import CostmapSettings, costs_of
 from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.layers import COSTMAP, SEEN_LAYERS, Layer, LayerSettings, LayerType
 from fleet2d.floorplan.source import FloorPlanSource
-from fleet2d.kernels import F64, I64, Bool
-from fleet2d.kernels.sight import (
+from fleet2d.kernels import (
+    F64,
+    I64,
     NEVER,
+    Bool,
     CoverageRecord,
     CoverageSetup,
+    Mesh,
     empty_pose_cache,
     record_coverage,
     settle_coverage,
 )
-from fleet2d.kernels.space import Mesh
 from fleet2d.metrics.metric import Metric
 from fleet2d.runs.layers import layer_rows, layer_table
 from fleet2d.runtime.events import Event

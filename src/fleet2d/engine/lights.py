@@ -10,7 +10,7 @@ from fleet2d.entities.body import Track
 from fleet2d.entities.decisions import DecidingActor, StandStill
 from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.placed_objects import POSTURES
-from fleet2d.kernels.motion import rooms_at
+from fleet2d.kernels import rooms_at
 from fleet2d.runtime.events import HOME, Event, EventKind
 
 LYING = POSTURES.index("lie")

@@ -10,10 +10,17 @@ from fleet2d.engine.sighting_errors import sight_events
 from fleet2d.entities.evidence.evidence_source import SIGHTING, EvidenceSource
 from fleet2d.entities.evidence.live import LiveDetections
 from fleet2d.errors import blame
-from fleet2d.kernels import I64
-from fleet2d.kernels.numbers import TURN, turned
-from fleet2d.kernels.sight import NOBODY, UNKNOWN_TRUTH, USER_LOST, USER_SEEN, SightMemory
-from fleet2d.kernels.sight import SightingColumn as Column
+from fleet2d.kernels import (
+    I64,
+    NOBODY,
+    TURN,
+    UNKNOWN_TRUTH,
+    USER_LOST,
+    USER_SEEN,
+    SightMemory,
+    turned,
+)
+from fleet2d.kernels import SightingColumn as Column
 from fleet2d.sight.camera import FalseSighting
 
 # A look that may end a span sees no farther ahead, so that many events in a row cost little.

@@ -29,8 +29,7 @@ from fleet2d.engine.trajectories import (
     trajectory_table,
 )
 from fleet2d.floorplan.placed_objects import POSTURES
-from fleet2d.kernels import I8, I32, I64
-from fleet2d.kernels.sight import NOBODY, UNKNOWN_TRUTH
+from fleet2d.kernels import I8, I32, I64, NOBODY, UNKNOWN_TRUTH
 from fleet2d.runtime.events import HOME, RANKS, Event, EventKind
 
 

@@ -9,19 +9,20 @@ import numpy as np
 
 from fleet2d.errors import ComponentError, blame
 from fleet2d.floorplan.lattice import Lattice
-from fleet2d.kernels import I64
-from fleet2d.kernels.motion import Window
-from fleet2d.kernels.numbers import TURN, in_radians
-from fleet2d.kernels.sight import (
+from fleet2d.kernels import (
+    I64,
     NOBODY,
     ONE,
+    TURN,
     USER_LOST,
     USER_SEEN,
     About,
     SightMemory,
+    Window,
     camera_poses,
+    in_radians,
 )
-from fleet2d.kernels.sight import SightingColumn as Column
+from fleet2d.kernels import SightingColumn as Column
 from fleet2d.sight.curve import Curve
 from fleet2d.sight.perception import Detection, Perception
 from fleet2d.sight.perception_error import CameraSightings, ErrorStream, PerceptionError

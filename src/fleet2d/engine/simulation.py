@@ -46,7 +46,7 @@ from fleet2d.floorplan.formats.native import native_document
 from fleet2d.floorplan.home import Home
 from fleet2d.interventions.intervention import ClockTime, Intervention, parse_when
 from fleet2d.interventions.methods import InterventionMethods
-from fleet2d.kernels.numbers import in_radians
+from fleet2d.kernels import in_radians
 from fleet2d.memory import free_bodies, rare_collections
 from fleet2d.runs.run import Run, open_store
 from fleet2d.runtime.clock import Clock, midnight_of

@@ -46,8 +46,7 @@ from fleet2d.floorplan.costmap import CostedSpace
 from fleet2d.floorplan.placed_objects import PlacedObject, UsePlace
 from fleet2d.floorplan.plan import FloorPlan, Room
 from fleet2d.floorplan.space import Space
-from fleet2d.kernels.motion import Timelines
-from fleet2d.kernels.space import Mesh
+from fleet2d.kernels import Mesh, Timelines
 from fleet2d.routines.persona import Persona
 from fleet2d.runtime.events import Event
 from fleet2d.scenario.model import Scenario

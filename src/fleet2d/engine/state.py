@@ -26,7 +26,7 @@ from fleet2d.entities.behavior import SightEvent
 from fleet2d.entities.decisions import DecidingActor
 from fleet2d.floorplan.home import Home
 from fleet2d.kernels import I64
-from fleet2d.kernels.sight import SightingColumn as Column
+from fleet2d.kernels import SightingColumn as Column
 from fleet2d.runtime.events import Event, EventKind, EventStream, new_event
 from fleet2d.scenario.model import Scenario
 

@@ -12,10 +12,7 @@ from fleet2d.artifacts.table import PLANNED, TRACK, WALK, Column, TableSpec
 from fleet2d.configuration.units import whole_steps
 from fleet2d.engine.bodies import Basis, Bodies
 from fleet2d.entities.body import Track
-from fleet2d.kernels import I64
-from fleet2d.kernels.motion import Breakpoints
-from fleet2d.kernels.numbers import in_radians
-from fleet2d.kernels.space import SUB
+from fleet2d.kernels import I64, SUB, Breakpoints, in_radians
 from fleet2d.runtime.clock import HOUR_US, Clock
 
 STEP = Column("step", "step", description="step at which the row takes effect")

@@ -16,7 +16,7 @@ from fleet2d.entities.place import ANY, Point, is_kind, is_point
 from fleet2d.entities.plan import Plan
 from fleet2d.errors import blame
 from fleet2d.floorplan.placed_objects import PlacedObject
-from fleet2d.kernels.numbers import TURN
+from fleet2d.kernels import TURN
 from fleet2d.runtime.clock import midnight_of
 from fleet2d.runtime.determinism import Draws
 

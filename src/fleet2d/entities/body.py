@@ -30,10 +30,7 @@ from fleet2d.floorplan.placed_objects import PlacedObject, Posture
 from fleet2d.floorplan.plan import Room
 from fleet2d.floorplan.slow_area import SlowRegion
 from fleet2d.floorplan.space import Space
-from fleet2d.kernels import F64, I64
-from fleet2d.kernels.motion import Breakpoints, WalkRule
-from fleet2d.kernels.numbers import TURN
-from fleet2d.kernels.space import Mesh
+from fleet2d.kernels import F64, I64, TURN, Breakpoints, Mesh, WalkRule
 from fleet2d.runtime.clock import Clock
 from fleet2d.runtime.determinism import Draws, stream_key
 from fleet2d.sight.camera import Camera

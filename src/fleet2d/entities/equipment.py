@@ -12,11 +12,12 @@ from fleet2d.configuration.units import AngleDeg, Length, PositiveDuration, Shar
 from fleet2d.entities.body import Body, Motion, Track
 from fleet2d.entities.place import Place, stop_at
 from fleet2d.entities.plan import Note, Plan
-from fleet2d.kernels import F64, I64
-from fleet2d.kernels.motion import Window
-from fleet2d.kernels.numbers import (
+from fleet2d.kernels import (
     BELL_STD,
+    F64,
+    I64,
     TURN,
+    Window,
     random_bell,
     random_below,
     random_uniform,

@@ -19,10 +19,7 @@ from fleet2d.entities.body import Arrangement, Body, Track
 from fleet2d.entities.plan import Note, Plan
 from fleet2d.errors import NoWayError
 from fleet2d.floorplan.costmap import CLOSED, route_by_cost
-from fleet2d.kernels import I64
-from fleet2d.kernels.motion import Breakpoints
-from fleet2d.kernels.numbers import TURN, turn_between
-from fleet2d.kernels.space import SUB
+from fleet2d.kernels import I64, SUB, TURN, Breakpoints, turn_between
 
 Detour = Callable[[tuple[int, int], tuple[int, int]], I64 | None]
 

@@ -9,8 +9,7 @@ from fleet2d.configuration.components import register
 from fleet2d.configuration.units import AngleDeg
 from fleet2d.entities.behavior import Actor, Behavior, Situation
 from fleet2d.entities.plan import Plan
-from fleet2d.kernels.motion import WalkRule
-from fleet2d.kernels.numbers import BELL_STD, TURN
+from fleet2d.kernels import BELL_STD, TURN, WalkRule
 
 # A step longer than any home is never possible; this limit keeps products within 64 bits.
 MAX_STRIDE = 256 << 21

@@ -21,8 +21,7 @@ from fleet2d.floorplan.furniture import FURNITURE
 from fleet2d.floorplan.placed_objects import PlacedObject
 from fleet2d.floorplan.plan import Room
 from fleet2d.floorplan.rooms.room import PRIORITY, usual_type
-from fleet2d.kernels import I64
-from fleet2d.kernels.numbers import TURN, UNIT, cosine, sine
+from fleet2d.kernels import I64, TURN, UNIT, cosine, sine
 from fleet2d.runtime.determinism import Draws
 
 if TYPE_CHECKING:

@@ -16,10 +16,17 @@ from fleet2d.errors import ComponentError, NoWayError
 from fleet2d.floorplan.placed_objects import POSTURES, PlacedObject, Posture
 from fleet2d.floorplan.slow_area import slowed
 from fleet2d.floorplan.space import Space, straight_way
-from fleet2d.kernels import I8, I64
-from fleet2d.kernels.motion import Breakpoints, Legs, WalkRule
-from fleet2d.kernels.numbers import TURN, heading_of, turn_between
-from fleet2d.kernels.space import SUB
+from fleet2d.kernels import (
+    I8,
+    I64,
+    SUB,
+    TURN,
+    Breakpoints,
+    Legs,
+    WalkRule,
+    heading_of,
+    turn_between,
+)
 from fleet2d.runtime.events import KINDS
 
 if TYPE_CHECKING:

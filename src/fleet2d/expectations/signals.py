@@ -36,7 +36,7 @@ from fleet2d.expectations.traces import INFINITE, TINY, Trace, combine, constant
 from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.rooms.room import PRIORITY, usual_type
 from fleet2d.kernels import F64, I64
-from fleet2d.kernels.motion import Window as PoseRuns
+from fleet2d.kernels import Window as PoseRuns
 from fleet2d.runtime.clock import Clock
 from fleet2d.runtime.events import KINDS, Event, EventKind
 

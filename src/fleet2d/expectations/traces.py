@@ -5,8 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fleet2d.kernels import F64, I64
-from fleet2d.kernels.motion import sliding_max, until
+from fleet2d.kernels import F64, I64, sliding_max, until
 
 INFINITE = float("inf")
 TINY = float(np.finfo(np.float64).tiny)

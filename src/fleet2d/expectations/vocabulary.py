@@ -34,9 +34,16 @@ from fleet2d.expectations.traces import Trace, combine, constant, pulses, shorte
 from fleet2d.floorplan.home import Home, lattice_footprint
 from fleet2d.floorplan.lattice import UNITS_PER_CELL
 from fleet2d.floorplan.placed_objects import PlacedObject
-from fleet2d.kernels import F64, I64, Bool
-from fleet2d.kernels.motion import distances_between, distances_to_shape, rooms_at, speeds
-from fleet2d.kernels.sight import SightingColumn
+from fleet2d.kernels import (
+    F64,
+    I64,
+    Bool,
+    SightingColumn,
+    distances_between,
+    distances_to_shape,
+    rooms_at,
+    speeds,
+)
 from fleet2d.runtime.clock import midnight_of
 from fleet2d.runtime.events import EventKind
 

@@ -13,11 +13,13 @@ from fleet2d.configuration.units import Length
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.space import Space
-from fleet2d.kernels import I32, I64, Bool
-from fleet2d.kernels.space import (
+from fleet2d.kernels import (
     CELL_CENTRE,
+    I32,
+    I64,
     MAX_COST,
     SUB,
+    Bool,
     cost_distance,
     descend,
     label_parts,

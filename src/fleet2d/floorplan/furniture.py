@@ -9,7 +9,7 @@ from shapely import Polygon
 from fleet2d.configuration.problems import suggest
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.placed_objects import Blocks, PlacedObject, Point, Posture, UsePlace
-from fleet2d.kernels.numbers import QUARTER, TURN, UNIT, cosine, in_radians, sine
+from fleet2d.kernels import QUARTER, TURN, UNIT, cosine, in_radians, sine
 
 Range = tuple[float, float]
 

@@ -27,9 +27,7 @@ from fleet2d.floorplan.space import (
     shrink,
     with_approaches,
 )
-from fleet2d.kernels import I64, Bool
-from fleet2d.kernels.numbers import QUARTER, TURN
-from fleet2d.kernels.space import label_parts, squared_distance
+from fleet2d.kernels import I64, QUARTER, TURN, Bool, label_parts, squared_distance
 from fleet2d.runtime.determinism import Draws
 
 # Largest distance of a wall behind a piece, to allow for the steps of jagged walls [m].

@@ -20,8 +20,7 @@ from fleet2d.floorplan.rooms.doorways import Doorway, doorway_segments
 from fleet2d.floorplan.rooms.room import room_type
 from fleet2d.floorplan.slow_area import SlowRegion
 from fleet2d.floorplan.space import Space
-from fleet2d.kernels import I32
-from fleet2d.kernels.space import Mesh
+from fleet2d.kernels import I32, Mesh
 
 # Types of rooms through which people leave a home without an entrance, the likeliest first.
 EXIT_ROOMS = ("entryway", "lobby", "hallway", "hall", "living_room", "kitchen")

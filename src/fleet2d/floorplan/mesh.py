@@ -11,8 +11,7 @@ from shapely.geometry.base import BaseGeometry
 from fleet2d.bounds import CROSSINGS
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.lattice import COORDINATE_LIMIT, Lattice
-from fleet2d.kernels import I32, I64
-from fleet2d.kernels.space import SUB, WALL, Mesh
+from fleet2d.kernels import I32, I64, SUB, WALL, Mesh
 from fleet2d.runtime.determinism import sum_in_order
 
 # Edges that are looked up at once: each may cross all others.
@@ -288,8 +287,8 @@ class Gates:
         >>> gate = ((320, 0), (320, 640))
         >>> mesh = build_mesh([shapely.box(0, 0, 640, 640)], 10, 10, corners=gate)
         >>> gates = Gates(mesh, [gate])
-        >>> from fleet2d.kernels.space import locate
-        >>> from fleet2d.kernels.sight import line_of_sight
+        >>> from fleet2d.kernels import locate
+        >>> from fleet2d.kernels import line_of_sight
         >>> for walls in (gates.mesh, gates.shut({0})):
         ...     line_of_sight(walls, 11, 11, locate(walls, 11, 11), 631, 11)
         True

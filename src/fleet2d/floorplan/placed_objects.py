@@ -13,8 +13,7 @@ from shapely import Polygon
 from fleet2d.configuration.problems import suggest
 from fleet2d.errors import FloorPlanError, InputError
 from fleet2d.floorplan.lattice import Lattice
-from fleet2d.kernels import F64
-from fleet2d.kernels.numbers import TURN, UNIT, cosine, in_radians, sine
+from fleet2d.kernels import F64, TURN, UNIT, cosine, in_radians, sine
 
 
 class Named(Protocol):

@@ -40,8 +40,7 @@ from fleet2d.floorplan.rooms.doorways import (
     room_links,
 )
 from fleet2d.floorplan.rooms.room import NO_ROOM, LabelledRegion, Room, room_type
-from fleet2d.kernels import I16, Bool
-from fleet2d.kernels.space import Mesh, fill_from_neighbors, rasterize_cells, strictly_inside
+from fleet2d.kernels import I16, Bool, Mesh, fill_from_neighbors, rasterize_cells, strictly_inside
 from fleet2d.runtime.determinism import sum_in_order
 
 T = TypeVar("T")

@@ -15,8 +15,7 @@ from fleet2d.configuration.components import Settings
 from fleet2d.configuration.problems import problem, problem_at
 from fleet2d.configuration.units import Duration, Length, Share, micros
 from fleet2d.floorplan.lattice import Lattice
-from fleet2d.kernels import I64
-from fleet2d.kernels.numbers import TURN, turn_between
+from fleet2d.kernels import I64, TURN, turn_between
 
 PointXY = tuple[int, int]
 

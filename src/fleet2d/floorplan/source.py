@@ -32,9 +32,7 @@ from fleet2d.floorplan.rooms.room import (
 )
 from fleet2d.floorplan.slow_area import SlowArea
 from fleet2d.floorplan.space import BODY_RADIUS, standing_cells, with_approaches
-from fleet2d.kernels import I64
-from fleet2d.kernels.numbers import TURN
-from fleet2d.kernels.space import fill_from_neighbors
+from fleet2d.kernels import I64, TURN, fill_from_neighbors
 
 
 class RoomCorrection(Settings):

@@ -16,14 +16,17 @@ from fleet2d.floorplan.lattice import UNITS_PER_CELL, Lattice
 from fleet2d.floorplan.mesh import Segment, build_mesh, snap_polygon
 from fleet2d.floorplan.placed_objects import PlacedObject, UsePlace
 from fleet2d.floorplan.plan import FloorPlan, read_only
-from fleet2d.kernels import F64, I32, I64, Bool
-from fleet2d.kernels.sight import line_of_sight
-from fleet2d.kernels.space import (
+from fleet2d.kernels import (
+    F64,
+    I32,
+    I64,
     SUB,
+    Bool,
     Corners,
     Mesh,
     Routes,
     label_triangles,
+    line_of_sight,
     locate,
     rasterize_cells,
     strictly_inside,

@@ -17,7 +17,7 @@ from fleet2d.entities.users.guest import Guest
 from fleet2d.errors import PlacementError, ScenarioError
 from fleet2d.floorplan.placed_objects import Posture
 from fleet2d.interventions.intervention import Intervention, World, body, user
-from fleet2d.kernels.numbers import TURN
+from fleet2d.kernels import TURN
 
 
 class BodyIntervention(Intervention):

@@ -13,9 +13,7 @@ import numpy as np
 
 from fleet2d.engine.simulation import Simulation
 from fleet2d.errors import InputError, extra
-from fleet2d.kernels import F64
-from fleet2d.kernels.sight import region_outline, visible_region
-from fleet2d.kernels.space import Mesh
+from fleet2d.kernels import F64, Mesh, region_outline, visible_region
 from fleet2d.live.bridge import LiveStep, Post
 from fleet2d.runs.run import Run
 

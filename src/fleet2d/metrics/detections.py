@@ -9,8 +9,7 @@ from fleet2d.algorithms.algorithm import Present
 from fleet2d.algorithms.history import History
 from fleet2d.configuration.components import register
 from fleet2d.floorplan.home import Home
-from fleet2d.kernels import I64
-from fleet2d.kernels.sight import UNKNOWN_TRUTH
+from fleet2d.kernels import I64, UNKNOWN_TRUTH
 from fleet2d.metrics.metric import Metric
 
 UNKNOWN = "unknown"  # name in the confusion of a person not recognized

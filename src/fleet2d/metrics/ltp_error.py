@@ -18,9 +18,8 @@ from fleet2d.configuration.units import PositiveDuration, Share, micros
 from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.plan import read_only
 from fleet2d.floorplan.space import Space
-from fleet2d.kernels import F64, I64, Bool
-from fleet2d.kernels.presence import earth_mover as minimal_cost
-from fleet2d.kernels.space import SUB
+from fleet2d.kernels import F64, I64, SUB, Bool
+from fleet2d.kernels import earth_mover as minimal_cost
 from fleet2d.metrics.belief_reader import presence_of
 from fleet2d.metrics.metric import Metric
 from fleet2d.runtime.clock import DAY_S, HOUR_US, midnight_of

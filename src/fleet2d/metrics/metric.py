@@ -13,8 +13,7 @@ from fleet2d.configuration.components import Component
 from fleet2d.configuration.units import PositiveDuration
 from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.plan import FloorPlan
-from fleet2d.kernels import F64, I64, Bool
-from fleet2d.kernels.sight import points_in_sight
+from fleet2d.kernels import F64, I64, Bool, points_in_sight
 from fleet2d.runtime.determinism import sum_in_order
 from fleet2d.runtime.events import EventKind
 

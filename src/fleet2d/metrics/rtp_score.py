@@ -15,8 +15,7 @@ from fleet2d.algorithms.presence.estimator import natural_log
 from fleet2d.configuration.components import register
 from fleet2d.configuration.units import PositiveDuration
 from fleet2d.floorplan.home import Home
-from fleet2d.kernels import F64, I64, Bool
-from fleet2d.kernels.sight import UNKNOWN_TRUTH
+from fleet2d.kernels import F64, I64, UNKNOWN_TRUTH, Bool
 from fleet2d.metrics.belief_reader import BeliefReader
 from fleet2d.metrics.metric import Metric, UnknownPlaces
 from fleet2d.runtime.determinism import sum_in_order

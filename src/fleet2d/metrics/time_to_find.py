@@ -12,8 +12,7 @@ from fleet2d.algorithms.history import History
 from fleet2d.configuration.components import register
 from fleet2d.configuration.units import Length, PositiveDuration
 from fleet2d.floorplan.home import Home
-from fleet2d.kernels import F64
-from fleet2d.kernels.sight import points_in_sight
+from fleet2d.kernels import F64, points_in_sight
 from fleet2d.metrics.metric import Metric, kaplan_meier, quantile, restricted_mean
 from fleet2d.runtime.determinism import sum_in_order
 from fleet2d.runtime.events import Event

@@ -28,8 +28,7 @@ from fleet2d.floorplan.placed_objects import PlacedObject
 from fleet2d.floorplan.plan import FloorPlan, Room
 from fleet2d.floorplan.rooms.room import NO_ROOM
 from fleet2d.floorplan.space import grown_cells
-from fleet2d.kernels import F64, I16, Bool
-from fleet2d.kernels.space import squared_distance
+from fleet2d.kernels import F64, I16, Bool, squared_distance
 from fleet2d.palette import (
     ACCENT_COLOR,
     BORDER_COLOR,

@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 from fleet2d.errors import InputError
 from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.plan import FloorPlan
-from fleet2d.kernels.numbers import TURN
-from fleet2d.kernels.sight import Reach
+from fleet2d.kernels import TURN, Reach
 from fleet2d.palette import TEXT_COLOR, VIEW_COLOR, VIEW_EDGE
 from fleet2d.pictures.floorplan import check_picture, figure_size, floorplan_axes, picture
 from fleet2d.pictures.life import SightWalls, field_of_view

@@ -23,8 +23,7 @@ from fleet2d.errors import ArtifactError, PlacementError
 from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.lattice import Lattice
 from fleet2d.floorplan.plan import FloorPlan
-from fleet2d.kernels import F64, I16, I64, Bool
-from fleet2d.kernels.space import Mesh
+from fleet2d.kernels import F64, I16, I64, Bool, Mesh
 from fleet2d.palette import TEXT_COLOR, VIEW_COLOR, VIEW_EDGE, body_color
 from fleet2d.runs.run import Run
 from fleet2d.runs.trajectory import rebuild_path

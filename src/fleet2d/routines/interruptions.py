@@ -12,7 +12,7 @@ from fleet2d.configuration.components import Settings
 from fleet2d.configuration.documents import read_document
 from fleet2d.configuration.problems import problem
 from fleet2d.configuration.units import Duration, Share, TimeOfDay
-from fleet2d.kernels.motion import CHANCE_BITS, QUANTILE_BITS, Interruptions
+from fleet2d.kernels import CHANCE_BITS, QUANTILE_BITS, Interruptions
 from fleet2d.routines.activity import (
     Activity,
     AnyDurationDistribution,

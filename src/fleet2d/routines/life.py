@@ -6,7 +6,7 @@ from datetime import date, datetime
 from itertools import pairwise
 
 from fleet2d.configuration.units import weekdays_of
-from fleet2d.kernels.motion import ANY_ROOM, NO_GAP_S, RoomUse
+from fleet2d.kernels import ANY_ROOM, NO_GAP_S, RoomUse
 from fleet2d.routines.activity import find_activity
 from fleet2d.routines.distributions import uniform
 from fleet2d.routines.household import SECOND, Household, Period, RandomVisits, with_absences

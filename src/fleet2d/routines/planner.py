@@ -28,7 +28,7 @@ from typing import Annotated, Any, NamedTuple
 from pydantic import BeforeValidator, PlainSerializer, WithJsonSchema
 
 from fleet2d.configuration.problems import problem
-from fleet2d.kernels.motion import ANY_ROOM, DayPlanner, Role, RoomUse
+from fleet2d.kernels import ANY_ROOM, DayPlanner, Role, RoomUse
 from fleet2d.routines.distributions import Distribution
 from fleet2d.runtime.clock import DAY_S
 from fleet2d.runtime.determinism import Draws

@@ -26,8 +26,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fleet2d.kernels import F64, I32
-from fleet2d.kernels.motion import NO_GAP_S
+from fleet2d.kernels import F64, I32, NO_GAP_S
 from fleet2d.routines.distributions import KNOTS, draw_weighted, lognormal, position
 from fleet2d.routines.planner import Episode
 from fleet2d.runtime.clock import HOUR_S

@@ -20,16 +20,20 @@ from fleet2d.entities.meander import Meander
 from fleet2d.errors import ArtifactError
 from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.plan import FloorPlan
-from fleet2d.kernels import F64, I16, I64, Bool
-from fleet2d.kernels.motion import (
+from fleet2d.kernels import (
+    F64,
+    I16,
+    I64,
+    SUB,
+    TURN,
+    Bool,
     Breakpoints,
     Poses,
     empty_poses,
+    in_radians,
     trace_meander,
     trace_track,
 )
-from fleet2d.kernels.numbers import TURN, in_radians
-from fleet2d.kernels.space import SUB
 from fleet2d.runtime.clock import Clock
 from fleet2d.scenario.model import load_scenario
 

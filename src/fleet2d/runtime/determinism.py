@@ -12,7 +12,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from fleet2d.kernels.numbers import StepDraws
+from fleet2d.kernels import StepDraws
 
 T = TypeVar("T")
 

@@ -24,20 +24,25 @@ from fleet2d.configuration.units import (
 from fleet2d.errors import ScenarioError
 from fleet2d.floorplan.lattice import Lattice
 from fleet2d.floorplan.placed_objects import POSTURES
-from fleet2d.kernels import I64
-from fleet2d.kernels.numbers import BELL_STD, HALF_TURN, TURN, UNIT, cosine, sine
-from fleet2d.kernels.sight import (
+from fleet2d.kernels import (
+    BELL_STD,
     BINS,
     DOUBLINGS,
+    HALF_TURN,
+    I64,
     MAX_GHOSTS,
     MINUTES,
     ONE,
     TABLE,
+    TURN,
+    UNIT,
     ErrorTables,
     GhostDraw,
     Lenses,
     TablePart,
     UserDraw,
+    cosine,
+    sine,
 )
 from fleet2d.runtime.clock import HOUR_US
 from fleet2d.runtime.determinism import sum_in_order
@@ -78,7 +83,7 @@ class Pan(Settings):
 
 
 class Lens(NamedTuple):
-    """A camera in integer units for the sight kernel; see `fleet2d.kernels.sight.Lenses`."""
+    """A camera in integer units for the sight kernel; see `fleet2d.kernels.Lenses`."""
 
     near: int  # lattice units
     far: int

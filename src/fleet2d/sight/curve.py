@@ -12,8 +12,7 @@ from pydantic_core import CoreSchema
 from fleet2d.configuration.components import Settings
 from fleet2d.configuration.problems import problem, problem_at
 from fleet2d.configuration.units import Share
-from fleet2d.kernels import F64, I64
-from fleet2d.kernels.sight import ONE
+from fleet2d.kernels import F64, I64, ONE
 
 EXACT = 20  # digits: far more than a probability in units of 2**-31 needs
 LIMIT = 200  # beyond exp(-200) or exp(200) a probability is 0 or 1

@@ -8,9 +8,7 @@ from pydantic import Field
 
 from fleet2d.configuration.components import register
 from fleet2d.floorplan.home import Home
-from fleet2d.kernels import I64, U8, Bool
-from fleet2d.kernels.numbers import TURN
-from fleet2d.kernels.space import SUB, Mesh
+from fleet2d.kernels import I64, SUB, TURN, U8, Bool, Mesh
 from fleet2d.sight.fov import FieldOfView, Reach
 from fleet2d.sight.visibility_polygon import filled_cells
 

@@ -11,10 +11,19 @@ from fleet2d.configuration.components import Component
 from fleet2d.errors import PlacementError
 from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.lattice import Lattice
-from fleet2d.kernels import F64, I64, Bool
-from fleet2d.kernels.sight import Reach, points_in_reach, region_contains_points, region_outline
-from fleet2d.kernels.sight import visible_region as visible_region_fast
-from fleet2d.kernels.space import CELL_CENTRE, SUB, Mesh
+from fleet2d.kernels import (
+    CELL_CENTRE,
+    F64,
+    I64,
+    SUB,
+    Bool,
+    Mesh,
+    Reach,
+    points_in_reach,
+    region_contains_points,
+    region_outline,
+)
+from fleet2d.kernels import visible_region as visible_region_fast
 
 
 class WallPlan(Protocol):

@@ -2,8 +2,7 @@
 
 from fleet2d.configuration.components import register
 from fleet2d.floorplan.home import Home
-from fleet2d.kernels import I64, Bool
-from fleet2d.kernels.sight import points_in_sight
+from fleet2d.kernels import I64, Bool, points_in_sight
 from fleet2d.sight.fov import FieldOfView
 
 

@@ -15,10 +15,22 @@ from fleet2d.configuration.units import micros
 from fleet2d.errors import ComponentError
 from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.placed_objects import POSTURES
-from fleet2d.kernels import F64, I16, I64, Bool
-from fleet2d.kernels.motion import rooms_at
-from fleet2d.kernels.numbers import BELL_STD, QUARTER, TURN, UNIT, half_sines, random_bells
-from fleet2d.kernels.sight import NOBODY, ONE, random_shares
+from fleet2d.kernels import (
+    BELL_STD,
+    F64,
+    I16,
+    I64,
+    NOBODY,
+    ONE,
+    QUARTER,
+    TURN,
+    UNIT,
+    Bool,
+    half_sines,
+    random_bells,
+    random_shares,
+    rooms_at,
+)
 from fleet2d.runtime.clock import DAY_US, HOUR_US, midnight_of
 from fleet2d.runtime.determinism import stream_key
 

@@ -14,15 +14,19 @@ from fleet2d.configuration.components import register
 from fleet2d.configuration.problems import problem_at
 from fleet2d.errors import ScenarioError
 from fleet2d.floorplan.home import Home
-from fleet2d.kernels import I32, I64, Bool
-from fleet2d.kernels.sight import (
+from fleet2d.kernels import (
+    I32,
+    I64,
+    SUB,
+    Bool,
+    Mesh,
     cells_in_view,
     mark_spans,
+    rasterize_cells,
     region_contains_points,
     regions_of_cells,
     visible_region,
 )
-from fleet2d.kernels.space import SUB, Mesh, rasterize_cells
 from fleet2d.sight.fov import FieldOfView, Reach
 
 Pieces = tuple[I32, I32]

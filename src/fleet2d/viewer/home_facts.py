@@ -19,8 +19,7 @@ from fleet2d.floorplan.lattice import UNITS_PER_CELL
 from fleet2d.floorplan.placed_objects import PlacedObject, move_object
 from fleet2d.floorplan.plan import FloorPlan, Room
 from fleet2d.floorplan.rooms.doorways import Doorway
-from fleet2d.kernels import I16
-from fleet2d.kernels.space import Mesh
+from fleet2d.kernels import I16, Mesh
 from fleet2d.palette import deep_color, room_color
 from fleet2d.runs.run import Run
 from fleet2d.viewer.contract import (

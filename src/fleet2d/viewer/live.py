@@ -20,8 +20,7 @@ from fleet2d.engine.simulation import Simulation
 from fleet2d.entities.body import Track
 from fleet2d.errors import Fleet2DError, InputError, PlacementError
 from fleet2d.floorplan.home_change import HomeChange
-from fleet2d.kernels.numbers import TURN
-from fleet2d.kernels.space import Mesh
+from fleet2d.kernels import TURN, Mesh
 from fleet2d.runs.run import Run
 from fleet2d.runtime.clock import DAY_S
 from fleet2d.runtime.events import EventKind

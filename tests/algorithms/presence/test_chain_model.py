@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fleet2d.algorithms.presence.chain_model import Habits, steps_of
-from fleet2d.kernels.presence import StayModel
+from fleet2d.kernels import StayModel
 
 PLACES = 4
 

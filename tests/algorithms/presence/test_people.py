@@ -19,7 +19,7 @@ from fleet2d.algorithms.presence.people import (
     distinct,
     model_of,
 )
-from fleet2d.kernels.presence import Moments, Stretches, merge_bins
+from fleet2d.kernels import Moments, Stretches, merge_bins
 
 PRIOR = Prior(0.9, 0.05)
 
@@ -200,7 +200,8 @@ def test_merging_bins_loses_nothing() -> None:
         seen = random.choice([0, 3], (90, 3), p=[0.95, 0.05]).astype(np.int64)
         view, views = distinct(shown)
         sightings = (*np.nonzero(seen), seen[seen > 0])
-        merged = merge_bins(np.arange(90), view, views, sightings, 4)
+        bins, row, *places = merge_bins(np.arange(90), view, *sightings, 4)
+        merged = Stretches(bins, row, views, *places)
         assert 90 == merged.bins.sum()
         assert merged.bins.max() <= 4
         at = np.repeat(np.arange(len(merged.bins)), merged.bins)

@@ -6,7 +6,7 @@ import numpy as np
 
 from fleet2d import Drive
 from fleet2d.entities.drives.drive import breakpoints
-from fleet2d.kernels.numbers import TURN
+from fleet2d.kernels import TURN
 
 CORNER = [(0, 0), (3, 0), (3, 2)]
 """A route that turns left after three metres [m]."""

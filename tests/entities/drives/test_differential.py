@@ -7,8 +7,7 @@ from tests.entities.drives.drives import driven
 
 from fleet2d.entities.drives.differential import Differential
 from fleet2d.entities.drives.drive import breakpoints
-from fleet2d.kernels.motion import time_route
-from fleet2d.kernels.numbers import TURN
+from fleet2d.kernels import TURN, time_route
 
 POINTS = st.lists(st.tuples(*[st.integers(-5000, 5000)] * 2), min_size=1, max_size=6)
 

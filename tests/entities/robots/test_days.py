@@ -16,7 +16,7 @@ from tests.scenes import digests, path, run
 from tests.thorough import THOROUGH
 
 import fleet2d
-from fleet2d.kernels.space import strictly_inside
+from fleet2d.kernels import strictly_inside
 
 PATROL = {"type": "patrol", "dwell": "5 min"}
 # Short, for the patrol charges a little each time that it stops in the charger's room.

@@ -12,9 +12,7 @@ import fleet2d
 from fleet2d import Simulation
 from fleet2d.entities.robots.policy import COLUMNS, NEVER, Policy, SightingMemory
 from fleet2d.errors import ComponentError, InputError, PlacementError, ScenarioError
-from fleet2d.kernels import F32, Bool
-from fleet2d.kernels.sight import SightingColumn
-from fleet2d.kernels.space import SUB
+from fleet2d.kernels import F32, SUB, Bool, SightingColumn
 from fleet2d.runtime.clock import Clock
 
 AT = {name: number for number, name in enumerate(COLUMNS)}

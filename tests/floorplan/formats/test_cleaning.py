@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from fleet2d.floorplan.formats.cleaning import OccupancyMap, bridge_gaps, drop_scraps
-from fleet2d.kernels.space import label_parts
+from fleet2d.kernels import label_parts
 
 
 def two_rooms(gap: str, rows: slice = slice(0, 20), thickness: int = 1) -> OccupancyMap:

@@ -12,7 +12,7 @@ from fleet2d.configuration.components import lookup
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.formats.houseexpo import HouseExpo, read_houseexpo
 from fleet2d.floorplan.plan import FloorPlan
-from fleet2d.kernels.space import label_parts
+from fleet2d.kernels import label_parts
 
 SQUARE = [[0, 0], [4, 0], [4, 3], [0, 3]]
 

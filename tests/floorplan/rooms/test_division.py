@@ -10,7 +10,7 @@ from shapely import Polygon
 from fleet2d.floorplan.load import load_floorplan
 from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
 from fleet2d.floorplan.rooms.division import MAX_CORNERS
-from fleet2d.kernels.space import label_parts
+from fleet2d.kernels import label_parts
 
 # Two rooms of 3 x 3 m with a wall of 0.1 m and a door between them.
 LEFT, RIGHT, DOOR = (1.0, 1.0, 4.0, 4.0), (4.1, 1.0, 7.1, 4.0), (4.0, 2.0, 4.1, 2.9)

@@ -6,7 +6,7 @@ import shapely
 from fleet2d.floorplan.lattice import Lattice
 from fleet2d.floorplan.mesh import build_mesh
 from fleet2d.floorplan.rooms.segmentation import Chambers, cut_chambers
-from fleet2d.kernels.space import rasterize_cells
+from fleet2d.kernels import rasterize_cells
 
 LATTICE = Lattice(0.05, (0.0, 0.0), 120, 60)
 M = int(LATTICE.units_per_m)

@@ -17,8 +17,7 @@ from fleet2d.algorithms.presence.people import DayEvidence, StateLayout
 from fleet2d.configuration.components import register
 from fleet2d.configuration.units import Share
 from fleet2d.floorplan.home import Home
-from fleet2d.kernels import F64, I64, Bool
-from fleet2d.kernels.presence import StayModel, Stretches, advance, follow
+from fleet2d.kernels import F64, I64, Bool, StayModel, Stretches, advance, follow
 from fleet2d.runtime.clock import DAY_MINUTES
 
 WEEKEND = 5  # its first day, Monday being 0

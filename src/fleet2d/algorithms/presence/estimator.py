@@ -13,8 +13,7 @@ from fleet2d.algorithms.evidence import Evidence
 from fleet2d.algorithms.presence.belief import HOURS, Presence, WeeklyPresence
 from fleet2d.configuration.components import Component
 from fleet2d.errors import ComponentError
-from fleet2d.kernels import F64, I64
-from fleet2d.kernels.presence import resampled
+from fleet2d.kernels import F64, I64, resampled
 
 EXACT = 1 << 40
 REPLICATES = 200  # of the bootstrap

@@ -18,8 +18,8 @@ from fleet2d.configuration.components import register
 from fleet2d.configuration.units import InputPath
 from fleet2d.errors import InputError
 from fleet2d.floorplan.home import Home
-from fleet2d.kernels import F64
-from fleet2d.kernels.presence import (
+from fleet2d.kernels import (
+    F64,
     TRACE_FEATURES,
     PlaceNetwork,
     TracedEvidence,

@@ -13,8 +13,7 @@ from fleet2d.algorithms.presence.people import DayEvidence, People, Prior, State
 from fleet2d.configuration.components import register
 from fleet2d.configuration.units import Share
 from fleet2d.errors import ComponentError
-from fleet2d.kernels import F64, I64, Bool
-from fleet2d.kernels.presence import PeoplePlaces, sum_places
+from fleet2d.kernels import F64, I64, Bool, PeoplePlaces, sum_places
 
 # Number of earlier days that are revisited in turn when a day is over, and of those stored.
 REVISITS = 2

@@ -11,8 +11,7 @@ from fleet2d.bounds import one_line
 from fleet2d.configuration.components import register
 from fleet2d.configuration.units import InputPath
 from fleet2d.errors import ComponentError, InputError
-from fleet2d.kernels import F64
-from fleet2d.kernels.presence import TRACE_FEATURES
+from fleet2d.kernels import F64, TRACE_FEATURES
 
 INPUTS = ("features", "places")
 

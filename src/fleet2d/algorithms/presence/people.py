@@ -7,8 +7,11 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 
 from fleet2d.algorithms.evidence import Evidence, SightingCounts
-from fleet2d.kernels import F64, I64, U8, Bool
-from fleet2d.kernels.presence import (
+from fleet2d.kernels import (
+    F64,
+    I64,
+    U8,
+    Bool,
     Moments,
     PeopleEvidence,
     PeoplePlaces,
@@ -93,7 +96,8 @@ class DayEvidence(NamedTuple):
             longest: Largest number of bins in a stretch.
         """
         seen = self.sightings.of_user(user)
-        return merge_bins(self.minute, self.view, self.views, seen, longest)
+        bins, view, begin, patch, share = merge_bins(self.minute, self.view, *seen, longest)
+        return Stretches(bins, view, self.views, begin, patch, share)
 
     def of_people(self, count: int) -> PeopleEvidence:
         """Return the evidence of the first `count` users; without users, the first is anybody."""

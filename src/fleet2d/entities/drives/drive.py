@@ -10,8 +10,7 @@ import numpy as np
 
 from fleet2d.configuration.components import Component
 from fleet2d.errors import ComponentError
-from fleet2d.kernels import F64, I64
-from fleet2d.kernels.numbers import TURN, heading_of, turn_between
+from fleet2d.kernels import F64, I64, TURN, heading_of, turn_between
 
 
 class Leg(NamedTuple):

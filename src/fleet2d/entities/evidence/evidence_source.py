@@ -5,8 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
 from fleet2d.configuration.components import Component
-from fleet2d.kernels import I64
-from fleet2d.kernels.sight import SightingColumn
+from fleet2d.kernels import I64, SightingColumn
 
 if TYPE_CHECKING:
     from fleet2d.entities.behavior import Actor

@@ -8,7 +8,7 @@ import numpy as np
 from fleet2d.configuration.components import register
 from fleet2d.entities.evidence.evidence_source import SIGHTING, EvidenceSource
 from fleet2d.kernels import I64
-from fleet2d.kernels.sight import SightingColumn as Column
+from fleet2d.kernels import SightingColumn as Column
 
 if TYPE_CHECKING:
     from fleet2d.entities.behavior import Actor

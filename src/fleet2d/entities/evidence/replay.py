@@ -12,10 +12,8 @@ from fleet2d.configuration.components import register
 from fleet2d.configuration.problems import suggest
 from fleet2d.configuration.units import InputFileOrFolder, Length
 from fleet2d.entities.evidence.evidence_source import SIGHTING, EvidenceSource
-from fleet2d.kernels import F64, I64, Bool
-from fleet2d.kernels.numbers import TURN
-from fleet2d.kernels.sight import NOBODY, UNKNOWN_TRUTH
-from fleet2d.kernels.sight import SightingColumn as Column
+from fleet2d.kernels import F64, I64, NOBODY, TURN, UNKNOWN_TRUTH, Bool
+from fleet2d.kernels import SightingColumn as Column
 from fleet2d.logs.log import Day, LogError, begin_of_run, files_of
 from fleet2d.logs.placement import LogFrame
 

@@ -11,9 +11,7 @@ from fleet2d.entities.objects.home_object import Sensor, SensorView, first_cause
 from fleet2d.entities.place import Point
 from fleet2d.errors import PlacementError
 from fleet2d.floorplan.home import Home
-from fleet2d.kernels import I64, Bool
-from fleet2d.kernels.numbers import TURN, half_sine
-from fleet2d.kernels.sight import region_contains_points, visible_region
+from fleet2d.kernels import I64, TURN, Bool, half_sine, region_contains_points, visible_region
 
 
 @register("object", "motion_sensor")

@@ -11,10 +11,7 @@ from fleet2d.entities.place import points_at_distance
 from fleet2d.entities.plan import Plan
 from fleet2d.errors import ComponentError, ScenarioError
 from fleet2d.floorplan.plan import Room
-from fleet2d.kernels import F64, I64, Bool
-from fleet2d.kernels.numbers import heading_of
-from fleet2d.kernels.sight import points_in_sight
-from fleet2d.kernels.space import CELL_CENTRE, SUB
+from fleet2d.kernels import CELL_CENTRE, F64, I64, SUB, Bool, heading_of, points_in_sight
 from fleet2d.runtime.determinism import sum_in_order
 
 ANYONE = "anyone"

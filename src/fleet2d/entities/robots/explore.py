@@ -12,9 +12,7 @@ from fleet2d.entities.behavior import Actor, Behavior, Situation
 from fleet2d.entities.place import avoided_rooms
 from fleet2d.entities.plan import Plan
 from fleet2d.entities.robots.approach import centres, check_has_camera, spread, visible_from
-from fleet2d.kernels import Bool
-from fleet2d.kernels.numbers import TURN
-from fleet2d.kernels.space import squared_distance
+from fleet2d.kernels import TURN, Bool, squared_distance
 
 # Maximum number of cells of the home that are tried as viewpoints, and as targets to be seen.
 MAX_VIEWPOINT_CELLS = 800

@@ -31,8 +31,7 @@ from fleet2d.entities.robots.approach import (
     way_seconds,
 )
 from fleet2d.errors import PlacementError
-from fleet2d.kernels import F64
-from fleet2d.kernels.numbers import TURN
+from fleet2d.kernels import F64, TURN
 from fleet2d.runtime.clock import midnight_of
 from fleet2d.runtime.determinism import sum_in_order
 from fleet2d.search.policies import MAX_EXACT_SITES, Policy, after_empty_looks, order_by

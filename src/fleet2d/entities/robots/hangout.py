@@ -21,9 +21,7 @@ from fleet2d.entities.robots.approach import (
 from fleet2d.errors import PlacementError
 from fleet2d.floorplan.plan import Room, read_only
 from fleet2d.floorplan.space import Space
-from fleet2d.kernels import F64, I64
-from fleet2d.kernels.sight import points_in_sight
-from fleet2d.kernels.space import CELL_CENTRE, SUB
+from fleet2d.kernels import CELL_CENTRE, F64, I64, SUB, points_in_sight
 
 # Radius of the bodies whose ways count as the ways of people [m].
 PERSON = 0.2

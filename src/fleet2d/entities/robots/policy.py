@@ -35,10 +35,8 @@ from fleet2d.entities.robots.approach import (
 from fleet2d.entities.robots.find import Sites
 from fleet2d.errors import ComponentError, InputError, PlacementError, extra
 from fleet2d.floorplan.plan import FloorPlan, Room, read_only
-from fleet2d.kernels import F32, F64, I64, Bool
-from fleet2d.kernels.numbers import TURN, UNIT, cosine, sine
-from fleet2d.kernels.sight import SightingColumn as Column
-from fleet2d.kernels.space import SUB
+from fleet2d.kernels import F32, F64, I64, SUB, TURN, UNIT, Bool, cosine, sine
+from fleet2d.kernels import SightingColumn as Column
 from fleet2d.runtime.clock import (
     DAY_MINUTES,
     HOUR_S,

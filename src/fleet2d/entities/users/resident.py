@@ -15,7 +15,7 @@ from fleet2d.entities.place import is_kind, matching_rooms
 from fleet2d.entities.plan import Plan, new_note
 from fleet2d.errors import PlacementError
 from fleet2d.floorplan.placed_objects import POSTURES
-from fleet2d.kernels.motion import (
+from fleet2d.kernels import (
     ANY_ROOM,
     NO_GAP_S,
     CoreVenue,

@@ -22,7 +22,7 @@ from fleet2d.entities.users.resident import (
     seats_at,
 )
 from fleet2d.errors import PlacementError
-from fleet2d.kernels.motion import ANY_ROOM, NO_GAP_S
+from fleet2d.kernels import ANY_ROOM, NO_GAP_S
 from fleet2d.routines.activity import Activity, catalogue
 from fleet2d.routines.household import AWAY, AnyHousehold, AnyPeriod, Household, with_absences
 from fleet2d.routines.life import WELCOME, Life, Lives, MemberRooms

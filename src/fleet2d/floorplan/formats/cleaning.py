@@ -10,8 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fleet2d.errors import FloorPlanError
-from fleet2d.kernels import F64, I32, I64, Bool
-from fleet2d.kernels.space import count_steps, label_parts, spread_labels, squared_distance
+from fleet2d.kernels import (
+    F64,
+    I32,
+    I64,
+    Bool,
+    count_steps,
+    label_parts,
+    spread_labels,
+    squared_distance,
+)
 
 # Tolerance of decimal lengths in pixels: 0.3 m are six pixels of 0.05 m, and not 5.999….
 TINY = 1e-9

@@ -16,8 +16,7 @@ from fleet2d.floorplan.formats.occupancy import OBJECT_M2, PictureSource
 from fleet2d.floorplan.formats.raster import GreyPicture, read_grey
 from fleet2d.floorplan.lattice import MAX_CELL_M, MIN_CELL_M
 from fleet2d.floorplan.plan import FloorPlan
-from fleet2d.kernels import Bool
-from fleet2d.kernels.space import label_parts, squared_distance
+from fleet2d.kernels import Bool, label_parts, squared_distance
 
 # Widths of gaps in outer walls that are tried in turn [m], from pixels to a door.
 GAPS = (0.1, 0.2, 0.3, 0.45, 0.6, 0.9, 1.2)

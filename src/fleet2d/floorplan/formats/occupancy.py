@@ -21,8 +21,7 @@ from fleet2d.floorplan.formats.raster import GreyPicture
 from fleet2d.floorplan.lattice import MIN_CELL_M
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.source import PixelSource
-from fleet2d.kernels import Bool
-from fleet2d.kernels.space import trace_rings
+from fleet2d.kernels import Bool, trace_rings
 
 UnknownGrey = Literal["auto", "none"] | Annotated[int, Field(ge=0, le=255)]
 """The shade that stands for unknown, from 0 to 255; `auto` to find it, `none` for no such shade."""

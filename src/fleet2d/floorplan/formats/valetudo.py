@@ -45,8 +45,7 @@ from fleet2d.floorplan.placed_objects import PlacedObject, UsePlace, distinct_na
 from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
 from fleet2d.floorplan.rooms.room import UNKNOWN, usual_type
 from fleet2d.floorplan.source import PixelSource
-from fleet2d.kernels import F64, I64, Bool
-from fleet2d.kernels.space import label_parts, spread_labels, squared_distance
+from fleet2d.kernels import F64, I64, Bool, label_parts, spread_labels, squared_distance
 
 VERSIONS = (1, 2)
 

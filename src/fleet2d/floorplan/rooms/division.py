@@ -42,8 +42,18 @@ from fleet2d.floorplan.rooms.segmentation import (
     find_passages,
     segment_rooms,
 )
-from fleet2d.kernels import F64, I16, I32, I64, Bool
-from fleet2d.kernels.space import Mesh, label_frames, label_parts, spread_labels, squared_distance
+from fleet2d.kernels import (
+    F64,
+    I16,
+    I32,
+    I64,
+    Bool,
+    Mesh,
+    label_frames,
+    label_parts,
+    spread_labels,
+    squared_distance,
+)
 
 MIN_OUTLINE_OVERLAP = 0.5
 """A box outlines a chamber if the intersection of box and chamber's frame is at least this share

@@ -15,8 +15,7 @@ from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.lattice import UNITS_PER_CELL, Lattice
 from fleet2d.floorplan.placed_objects import number_names
 from fleet2d.floorplan.rooms.doorways import open_borders
-from fleet2d.kernels import I16, I64, Bool
-from fleet2d.kernels.space import label_frames, label_parts, squared_distance
+from fleet2d.kernels import I16, I64, Bool, label_frames, label_parts, squared_distance
 
 UNKNOWN = "unknown"
 

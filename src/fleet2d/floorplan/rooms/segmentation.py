@@ -20,9 +20,12 @@ from shapely import Polygon
 
 from fleet2d.floorplan.lattice import Lattice
 from fleet2d.floorplan.mesh import Gates, Segment, build_mesh
-from fleet2d.kernels import F64, I32, I64, Bool
-from fleet2d.kernels.space import (
+from fleet2d.kernels import (
+    F64,
+    I32,
+    I64,
     WALL,
+    Bool,
     Mesh,
     label_frames,
     label_triangles,

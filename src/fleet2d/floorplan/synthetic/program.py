@@ -10,7 +10,7 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 
 from fleet2d.errors import FloorPlanError
-from fleet2d.kernels.numbers import random_below
+from fleet2d.kernels import random_below
 
 T = TypeVar("T")
 
