@@ -1,5 +1,6 @@
 """Faults of robots and falls of people: what is lost, broken, carried off, dismissed, or lies."""
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -141,3 +142,58 @@ def test_methods_do_the_same_as_entries_of_a_script() -> None:
 
     for name in ("trajectories", "observations", "events"):
         assert scripted.manifest["tables"][name] == by_hand.manifest["tables"][name]
+
+
+RELOCALIZES = {"relocalizes": "20 s"}
+KIDNAP = {"at": "07:05", "kidnap": "astro", "to": "bathroom", "duration": "10 min"}
+
+
+def place_events(simulation: fleet2d.Simulation) -> list[tuple[int, str]]:
+    """Return when a robot lost its place and found it: step, event."""
+    rows = table(simulation.run(), "events", entity="astro")
+    kinds = ("localization_lost", "relocalized")
+    pairs = zip(rows["step"].tolist(), rows["event"].astype(str).tolist(), strict=True)
+    return [(step, kind) for step, kind in pairs if kind in kinds]
+
+
+@pytest.mark.parametrize("act", [KIDNAP, {"at": "07:05", "fault": "astro", "lost": True}])
+def test_a_robot_localizes_again_by_sight_after_its_time(act: dict[str, Any]) -> None:
+    lost, found = (300, "localization_lost"), (320, "relocalized")
+    assert [lost, found] == place_events(home(act, localization=RELOCALIZES))
+
+
+def test_a_robot_that_cannot_localize_by_sight_is_lost_until_that_is_over() -> None:
+    assert [300, 900] == [step for step, _ in place_events(home(KIDNAP))]
+
+
+def test_a_robot_with_a_dark_camera_localizes_again_once_it_sees() -> None:
+    dark = {"at": "07:04", "fault": "astro", "dark": True, "duration": "2 min"}
+    steps = [step for step, _ in place_events(home(dark, KIDNAP, localization=RELOCALIZES))]
+    assert [300, 360] == steps  # it tries at 320, 340 and 360
+
+
+def test_a_script_can_tell_a_lost_robot_where_it_is() -> None:
+    told = {"at": "07:06", "relocalize": "astro"}
+    assert [300, 360] == [step for step, _ in place_events(home(KIDNAP, told))]
+
+
+def test_a_kidnapped_robot_places_whom_it_sees_where_it_believes_to_be() -> None:
+    """It is carried 2 m along x with its heading kept, so what it sees is perceived 2 m off."""
+    content = scenario(
+        users={"ana": {"type": "schedule", "days": [{"items": [{"at": "00:00", "place": [4.5, 2.0]}]}]}},
+        robots={"astro": {"start": [1.0, 3.0], "start_heading_deg": 0, "camera": {"range": [0.1, 8], "angle_deg": 360}, "localization": {"relocalizes": "1 min"}}},
+        script=[{"at": "07:02", "kidnap": "astro", "to": [3.0, 3.0], "duration": "5 min"}],
+    )  # fmt: skip
+    rows = table(fleet2d.run(content), "observations")
+    off = (rows["x"] - rows["true_x"]).round(2)
+    lost = (rows["step"] >= 120) & (rows["step"] < 180)
+    assert {-2.0} == set(off[lost].tolist())
+    assert {0.0} == set(off[~lost].tolist())
+
+
+def test_localizing_again_is_reproduced_and_needs_a_camera(tmp_path: Path) -> None:
+    scene = home(KIDNAP, localization=RELOCALIZES).scenario
+    fleet2d.run(scene, out=tmp_path / "run")
+    assert fleet2d.reproduce(tmp_path / "run").same
+    with pytest.raises(ScenarioError, match=r"localization\.relocalizes: it needs a camera"):
+        home(localization=RELOCALIZES, camera=None)

@@ -400,7 +400,9 @@ def _drift_of(owner: Actor) -> Drift | None:
     if settings is None:
         return None
     lattice, clock = owner.home.plan.lattice, owner.clock
-    return Drift(settings, lattice.units_per_m, clock.step_us, owner.seed, owner.path)
+    return Drift(
+        settings, lattice.units_per_m, clock.step_us, owner.seed, owner.path, owner.displacements
+    )
 
 
 class Look(NamedTuple):

@@ -22,8 +22,11 @@ from fleet2d.interventions.intervention import (
 from fleet2d.runtime.clock import Clock
 from fleet2d.runtime.events import Event
 
-# The order at one step: first the ends of interventions, then those of the script and from outside.
-ENDS, SCRIPT, OUTSIDE = range(3)
+# The order at one step: first the ends of interventions, then those that follow from others, then
+# those of the script and from outside.
+ENDS, FOLLOWS, SCRIPT, OUTSIDE = range(4)
+FOLLOWED = "another intervention"
+"""What the manifest names as the origin of those that follow from others."""
 
 
 class DueIntervention(NamedTuple):
@@ -31,7 +34,7 @@ class DueIntervention(NamedTuple):
 
     Attributes:
         step: The step.
-        rank: ENDS, SCRIPT or OUTSIDE.
+        rank: ENDS, FOLLOWS, SCRIPT or OUTSIDE.
         number: Its order within a rank: its place in the script or among the requests.
         act: The intervention.
         by: Its place in the scenario, like "script.0"; empty for one from outside.
@@ -122,6 +125,11 @@ class InterventionQueue:
     def add(self, due: DueIntervention) -> None:
         """Schedule an intervention."""
         insort(self._queue, due, key=lambda due: due[:3])
+
+    def follow(self, act: Intervention, step: int) -> None:
+        """Schedule what follows from another intervention, before all that is due at that step."""
+        self._ends += 1
+        self.add(DueIntervention(step, FOLLOWS, self._ends, act, FOLLOWED))
 
     def next_due(self) -> int | None:
         """Return the step of the next intervention; None if none is scheduled."""

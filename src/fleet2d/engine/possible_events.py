@@ -12,6 +12,8 @@ from fleet2d.runtime.events import KINDS, EventKind
 PERSON_EVENTS = frozenset(
     {EventKind.ACTIVITY, EventKind.CAME_HOME, EventKind.LEFT_HOME, EventKind.USES}
 )
+# Events of every robot: interventions cause them.
+ROBOT_EVENTS = frozenset({EventKind.CALLED, EventKind.LOCALIZATION_LOST, EventKind.RELOCALIZED})
 DOOR_EVENTS = frozenset({EventKind.OPENED, EventKind.SHUT, EventKind.LOCKED, EventKind.UNLOCKED})
 HOME_EVENTS = frozenset(
     {EventKind.MOVED, EventKind.ROOM_CHANGED, EventKind.LIGHT_ON, EventKind.LIGHT_OFF}
@@ -38,7 +40,7 @@ def possible_events(
     may_block = bool(doors or home.costs_version)
     kinds: dict[str, frozenset[str]] = {"": frozenset(HOME_EVENTS)}
     kinds |= {u.name: _kinds_of(u, PERSON_EVENTS, bool(robots), may_block) for u in users}
-    kinds |= {r.name: _kinds_of(r, {EventKind.CALLED}, bool(users), may_block) for r in robots}
+    kinds |= {r.name: _kinds_of(r, ROBOT_EVENTS, bool(users), may_block) for r in robots}
     return kinds | dict.fromkeys(doors, DOOR_EVENTS) | dict.fromkeys(sensors, SENSOR_EVENTS)
 
 

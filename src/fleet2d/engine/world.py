@@ -5,7 +5,7 @@ or until their event.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from datetime import datetime
+from datetime import datetime, timedelta
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -158,6 +158,12 @@ class EngineWorld:
         """Put a body at a pose, where it replans."""
         self._state.recorder.move_body(actor.row, self.step)
         actor.put(pose, self.step)
+
+    def later(self, act: Intervention, delay: timedelta) -> None:
+        """Apply an intervention that follows from this one, after a time."""
+        queue = self._state.interventions
+        steps = max(1, self.clock.step_at_or_after(micros(delay)))
+        queue.follow(act, self.step + steps)
 
     def drive(self, actor: DecidingActor) -> None:
         """Let a body follow only plans from outside from now on, not its behaviors."""

@@ -11,7 +11,7 @@ from fleet2d.configuration.components import Component
 from fleet2d.configuration.problems import problem, shown
 from fleet2d.configuration.units import Duration, format_time_of_day, parse_time_of_day, weekdays_of
 from fleet2d.entities.body import NEVER, Body, Motion, Pose
-from fleet2d.entities.equipment import Charge
+from fleet2d.entities.equipment import Charge, Displacement
 from fleet2d.entities.place import ANY, Point, is_kind, is_point
 from fleet2d.entities.plan import Plan
 from fleet2d.errors import blame
@@ -374,6 +374,7 @@ class Actor(Body):
         charge: The charge of its battery; None without a battery.
         requests: What it wants of people; None without interactions.
         command: What it was called to do, until a behavior takes it up.
+        displacements: When it believes to be elsewhere, as it was carried off.
         in_view: Returns the people that its cameras have in view, and the last place of each [m].
         recall: Returns the robot's `SightingMemory`, if a behavior of it `remembers`.
         plan: The plan that it follows.
@@ -390,6 +391,7 @@ class Actor(Body):
         behaviors = getattr(self.entity, "behaviors", ())
         self.requests: RequestQueue | None = None  # set if the scenario has interactions
         self.behaviors = [behavior.model_copy(deep=True) for behavior in behaviors]
+        self.displacements: list[Displacement] = []
         with blame(self.path, None):
             self._state = self._first_pose()
             battery = getattr(self.entity, "battery", None)

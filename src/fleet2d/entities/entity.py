@@ -115,6 +115,12 @@ class Robot(Entity):
         return {**data, "camera": None, "cameras": cameras}
 
     @model_validator(mode="after")
+    def _localizes_by_sight(self) -> Self:
+        if self.localization is not None and self.localization.relocalizes and not self.eyes:
+            raise problem_at(("localization", "relocalizes"), "it needs a camera")
+        return self
+
+    @model_validator(mode="after")
     def _perceives_in_one_way(self) -> Self:
         if self.perceives is None:
             return self

@@ -1,5 +1,6 @@
 """Equipment of robots with a state of its own: batteries, and errors of localization."""
 
+from collections.abc import Sequence
 from datetime import timedelta
 from typing import NamedTuple, Self
 
@@ -188,6 +189,8 @@ class Localization(Settings):
         jumps_per_hour: How often the error jumps.
         corrected_every: Time from correction to correction.
         left: Standard deviation per axis that remains after a correction [m].
+        relocalizes: After a kidnapping or a loss of localization it knows where it is once its
+            camera has seen the home for this long; null: when that is over.
     """
 
     drift: Length = Field(default=0.0, ge=0, le=10)
@@ -196,6 +199,7 @@ class Localization(Settings):
     jumps_per_hour: float = Field(default=0.0, ge=0)
     corrected_every: PositiveDuration = timedelta(minutes=10)
     left: Length = Field(default=0.0, ge=0, le=10)
+    relocalizes: PositiveDuration | None = None
 
     @model_validator(mode="after")
     def _jumps_at_most_once(self) -> Self:
@@ -209,6 +213,24 @@ class Localization(Settings):
                 " correct more often, or have fewer",
             )
         return self
+
+
+class Displacement(NamedTuple):
+    """A time in which a robot believes to be where it was before it was carried off.
+
+    Attributes:
+        first: The first step.
+        end: The step after the last one.
+        x: Its believed x minus the true one [lattice].
+        y: Likewise.
+        turn: Its believed heading minus the true one [1/4096 turn].
+    """
+
+    first: int
+    end: int
+    x: int
+    y: int
+    turn: int
 
 
 class Offsets(NamedTuple):
@@ -236,7 +258,13 @@ class Drift:
     """
 
     def __init__(
-        self, settings: Localization, units_per_m: float, step_us: int, seed: int, path: str
+        self,
+        settings: Localization,
+        units_per_m: float,
+        step_us: int,
+        seed: int,
+        path: str,
+        displacements: Sequence[Displacement] = (),
     ) -> None:
         """Derive one random stream per kind of draw.
 
@@ -246,7 +274,9 @@ class Drift:
             step_us: Length of a step [us].
             seed: The seed of the run.
             path: The path of the robot in the scenario, "robots.astro".
+            displacements: When it was carried off; a list that may grow.
         """
+        self._displacements = displacements
         self._step_us, self._every_us = step_us, micros(settings.corrected_every)
         hours = settings.corrected_every / timedelta(hours=1)
         self._jump_chance = settings.jumps_per_hour * hours
@@ -278,7 +308,15 @@ class Drift:
             for axis in "xy"
         )
         turn = _after(sample("turn", self._turn), elapsed_us)
-        return Offsets(x // FINE, y // FINE, turn // FINE)
+        off = Offsets(x // FINE, y // FINE, turn // FINE)
+        for moved in self._displacements:
+            is_moved = (steps >= moved.first) & (steps < moved.end)
+            off = Offsets(
+                off.x + is_moved * moved.x,
+                off.y + is_moved * moved.y,
+                off.turn + is_moved * moved.turn,
+            )
+        return off
 
     def misplace(self, x: I64, y: I64, robot_x: I64, robot_y: I64, steps: I64) -> tuple[I64, I64]:
         """Return where the robot takes points that it sees to be: x and y [lattice].

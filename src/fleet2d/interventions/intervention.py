@@ -120,6 +120,9 @@ class World(Protocol):
     def move(self, actor: DecidingActor, pose: Pose) -> None:
         """Put a body at a pose, where it replans."""
 
+    def later(self, act: "Intervention", delay: timedelta) -> None:
+        """Apply an intervention that follows from this one, after a time."""
+
     def drive(self, actor: DecidingActor) -> None:
         """Let a body follow only plans from outside from now on, not its behaviors."""
 

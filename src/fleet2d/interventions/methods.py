@@ -229,6 +229,14 @@ class InterventionMethods(ABC):
         """
         self._do("kidnap", entity=name, to=to, duration=duration)
 
+    def relocalize(self, name: str) -> None:
+        """Let a robot that was kidnapped or lost know where it is.
+
+        Raises:
+            ScenarioError: There is no such robot.
+        """
+        self._do("relocalize", entity=name)
+
     def battery(self, name: str, charge: float | str) -> None:
         """Set the charge of a robot's battery: 0.2, or "20 %".
 

@@ -9,10 +9,13 @@ from fleet2d.configuration.components import Settings, register
 from fleet2d.configuration.problems import problem, suggest
 from fleet2d.configuration.units import AngleDeg, PositiveDuration, Share
 from fleet2d.entities.behavior import Actor, Command
+from fleet2d.entities.body import NEVER
+from fleet2d.entities.equipment import Displacement
 from fleet2d.entities.place import Place
 from fleet2d.errors import PlacementError, ScenarioError
 from fleet2d.interventions.bodies import Put, check_reach, heading_of
 from fleet2d.interventions.intervention import Intervention, Lasting, World, body, robot, user
+from fleet2d.kernels import turn_between
 from fleet2d.runtime.events import EventKind
 from fleet2d.sight.camera import Disturbance, FalseSighting
 from fleet2d.sight.perception import Perception
@@ -273,6 +276,17 @@ class Fault(Lasting):
 
     def begin(self, world: World) -> None:
         """Let it fail."""
+        if self.lost:
+            lose(world, self.entity)
+        self._apply(world)
+
+    def end(self, world: World) -> None:
+        """Repair it."""
+        self._apply(world)  # all active faults, without this one
+        if self.lost:
+            find_place(world, self.entity)
+
+    def _apply(self, world: World) -> None:
         if self.disturbance is not None:
             disturb(world, self.entity)
         if self.immobilizes:
@@ -285,10 +299,6 @@ class Fault(Lasting):
             now_us = world.step * world.clock.step_us
             actor.charge.set_broken(is_broken, actor.motion, now_us)
             actor.decide_again(world.step)
-
-    def end(self, world: World) -> None:
-        """Repair it."""
-        self.begin(world)  # which applies all active faults, without this one
 
 
 class RealDetection(Settings):
@@ -352,16 +362,79 @@ def immobilize(world: World, name: str) -> None:
     actor.decide_again(world.step)
 
 
+def is_lost(act: object, name: str) -> bool:
+    """Return whether an active intervention is a kidnapping or a loss of localization."""
+    lost = isinstance(act, Kidnap) or (isinstance(act, Fault) and act.lost)
+    return lost and getattr(act, "entity", None) == name
+
+
+def lose(world: World, name: str) -> None:
+    """Let a robot lose its place, which it may find again by sight."""
+    world.emit(name, EventKind.LOCALIZATION_LOST, "")
+    after = relocalizes_after(world, name)
+    if after is not None:
+        world.later(Relocalize(entity=name, by_sight=True), after)
+
+
+def find_place(world: World, name: str) -> None:
+    """Let a robot know its place again, unless it is lost for another reason."""
+    if any(is_lost(act, name) for act in world.lasting):
+        return
+    displacements = robot(world, name).displacements
+    if displacements and displacements[-1].end > world.step:
+        displacements[-1] = displacements[-1]._replace(end=world.step)
+    world.emit(name, EventKind.RELOCALIZED, "")
+
+
+def relocalizes_after(world: World, name: str) -> timedelta | None:
+    """Return for how long a robot has to see the home to know its place; None: it can't."""
+    settings = getattr(robot(world, name).entity, "localization", None)
+    return None if settings is None else settings.relocalizes
+
+
+@register("intervention", "relocalize")
+class Relocalize(RobotIntervention):
+    """Let a robot know where it is: what keeps it lost is over.
+
+    Attributes:
+        by_sight: Only if one of its cameras sees; else it tries again, as often as its
+            `localization.relocalizes` says.
+    """
+
+    by_sight: bool = False
+
+    def begin(self, world: World) -> None:
+        """End what keeps it lost, if it sees."""
+        if not any(is_lost(act, self.entity) for act in world.lasting):
+            return
+        after = relocalizes_after(world, self.entity)
+        if self.by_sight and after is not None and not self._sees(world):
+            world.later(self, after)
+        else:
+            world.undo(lambda act: is_lost(act, self.entity))
+
+    def _sees(self, world: World) -> bool:
+        """Return whether one of its cameras isn't dark."""
+        disturbances = disturbances_of(world, self.entity)
+        return any(
+            not any(d.dark and d.is_of(name) for d in disturbances)
+            for name in robot(world, self.entity).entity.eyes
+        )
+
+
 @register("intervention", "kidnap")
 class Kidnap(Lasting):
     """Carry a robot elsewhere without its knowledge: it is lost there, until it knows its place.
 
-    Meanwhile it stands still, and its behaviors don't decide. `put` moves it with its knowledge.
+    Meanwhile it stands still, and its behaviors don't decide. If it has errors of `localization`,
+    it believes to be where it was, and places whom it sees accordingly. `put` moves it with its
+    knowledge.
 
     Attributes:
         entity: The robot.
         to: The place: a room, furniture, or a point.
-        duration: How long it takes until it knows where it is; left out: until it is restored.
+        duration: How long it takes at most until it knows where it is; left out: until it is
+            restored, or knows it by sight (`localization.relocalizes`).
     """
 
     entity: str
@@ -377,16 +450,41 @@ class Kidnap(Lasting):
 
     def begin(self, world: World) -> None:
         """Put it there, lost."""
+        actor = robot(world, self.entity)
+        before = actor.state
         self._put.begin(world)
+        after = actor.state
+        if getattr(actor.entity, "localization", None) is not None:
+            turn = turn_between(after.heading, before.heading)
+            off = (before.x - after.x, before.y - after.y, turn)
+            carry_off(actor.displacements, world.step, off)
         immobilize(world, self.entity)
+        lose(world, self.entity)
 
     def end(self, world: World) -> None:
         """Let it know where it is."""
         immobilize(world, self.entity)
+        find_place(world, self.entity)
 
     @property
     def _put(self) -> Put:
         return Put(entity=self.entity, to=self.to)
+
+
+def carry_off(displacements: list[Displacement], step: int, off: tuple[int, int, int]) -> None:
+    """Note that a robot believes to be elsewhere from a step on, besides what it believed before.
+
+    Args:
+        displacements: What it believed so far.
+        step: The step.
+        off: Its last place minus the new one: x, y [lattice], heading [1/4096 turn].
+    """
+    x, y, turn = off
+    if displacements and displacements[-1].end > step:  # carried off again before it knew
+        last = displacements[-1]
+        displacements[-1] = last._replace(end=step)
+        x, y, turn = x + last.x, y + last.y, turn + last.turn
+    displacements.append(Displacement(step, NEVER, x, y, turn))
 
 
 def camera_name(camera: bool | str | None) -> str | None:
@@ -428,11 +526,16 @@ def check_truth(world: World, name: str) -> None:
         )
 
 
-def disturb(world: World, name: str) -> None:
-    """Apply the disturbances of all active interventions to the cameras of a robot."""
+def disturbances_of(world: World, name: str) -> list[Disturbance]:
+    """Return the disturbances of all active interventions on the cameras of a robot."""
     acts = (act for act in world.lasting if getattr(act, "entity", None) == name)
     disturbances = (getattr(act, "disturbance", None) for act in acts)
-    world.disturb(name, [item for item in disturbances if item is not None])
+    return [item for item in disturbances if item is not None]
+
+
+def disturb(world: World, name: str) -> None:
+    """Apply the disturbances of all active interventions to the cameras of a robot."""
+    world.disturb(name, disturbances_of(world, name))
 
 
 class PerceptionIntervention(Lasting):
