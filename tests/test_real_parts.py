@@ -29,7 +29,7 @@ CELLS = [
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     """Return a folder with the files of the page, and the logs that its commands write."""
     pytest.importorskip("rosbags", reason="the extra ros is not installed")
-    pytest.importorskip("foxglove", reason="the extra ros is not installed")
+    pytest.importorskip("rosbags", reason="the extra ros is not installed")
     folder = tmp_path_factory.mktemp("parts")
     for name, text in re.findall(r"```\w+ title=(\S+)\n(.*?)```", PAGE, re.DOTALL):
         (folder / name).write_text(text, encoding="utf-8")

@@ -74,13 +74,18 @@ class Chunk:
         first: The first step.
         end: The step after the last one.
         poses: The poses of each user and robot, by name.
-        rows: The rows of each table, by name, as mappings from columns to values, by step.
+        tables: The rows of each table, by name, by step.
     """
 
     first: int
     end: int
     poses: dict[str, Trajectory]
-    rows: dict[str, list[dict[str, Any]]]
+    tables: "dict[str, pa.Table]"
+
+    @cached_property
+    def rows(self) -> dict[str, list[dict[str, Any]]]:
+        """The rows of each table, by name, as mappings from columns to values."""
+        return {name: table.to_pylist() for name, table in self.tables.items()}
 
 
 @dataclass(frozen=True)
@@ -151,24 +156,28 @@ class _Rows:
 
     def __init__(self, run: "Run", name: str) -> None:
         self._batches = _batches(run, name)
+        self._schema = run.tables[name].schema
         self._waiting: list[pa.RecordBatch] = []
 
-    def between(self, first: int, end: int) -> list[dict[str, Any]]:
+    def between(self, first: int, end: int) -> "pa.Table":
         """Return the rows of steps from `first` to before `end`, which follow those before."""
-        rows: list[dict[str, Any]] = []
+        import pyarrow as pa
+
+        parts: list[pa.RecordBatch] = []
         while True:
             if not self._waiting:
                 batch = next(self._batches, None)
                 if batch is None:
-                    return rows
+                    break
                 self._waiting.append(batch)
             batch = self._waiting.pop()
             step = batch.column("step").to_numpy(zero_copy_only=False)
             low, high = np.searchsorted(step, (first, end))
-            rows += batch.slice(low, high - low).to_pylist()
+            parts.append(batch.slice(low, high - low))
             if high < len(step):
                 self._waiting.append(batch.slice(high))
-                return rows
+                break
+        return pa.Table.from_batches(parts, self._schema)
 
 
 def _batches(run: "Run", name: str) -> "Iterator[pa.RecordBatch]":

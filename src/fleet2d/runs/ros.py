@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Sequence
 from datetime import UTC, datetime
 from functools import cached_property
 from operator import itemgetter
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -19,6 +19,9 @@ from fleet2d.errors import extra
 from fleet2d.kernels import F64, I64, U8
 from fleet2d.runs.records import Chunk, Records
 from fleet2d.storage.bags import VISION_TYPES
+
+if TYPE_CHECKING:
+    import pyarrow as pa
 
 MAP, TRANSFORMS, STATIC = "/map", "/tf", "/tf_static"
 UNKNOWN = "unknown"
@@ -50,6 +53,22 @@ class Message(NamedTuple):
     data: bytes
 
 
+class Block(NamedTuple):
+    """Messages of a topic, in order of time.
+
+    Attributes:
+        topic: The topic.
+        times: Their times [ns since 1970], int64 (n,).
+        sizes: The size of each, with a margin before it for the writer of a file, int64 (n,).
+        data: One after the other, uint8 (sum of sizes,).
+    """
+
+    topic: str
+    times: I64
+    sizes: I64
+    data: U8
+
+
 class RosMessages:
     """The ROS 2 messages of a part of a run.
 
@@ -58,8 +77,12 @@ class RosMessages:
         types: The library's store of message types.
     """
 
-    def __init__(self, records: Records) -> None:
+    def __init__(self, records: Records, margin: int = 0) -> None:
         """Find out what topics there are.
+
+        Args:
+            records: The part of a run.
+            margin: The number of bytes that `blocks` leaves free before each message.
 
         Raises:
             InputError: rosbags isn't installed.
@@ -70,7 +93,8 @@ class RosMessages:
         self.types = get_typestore(Stores.ROS2_HUMBLE)
         for name, definition in VISION_TYPES.items():
             self.types.register(get_types_from_msg(definition, name))
-        self._records = records
+        self._records, self._margin = records, margin
+        self._templates: dict[tuple[str, ...], Template] = {}
         self._run = records.run
         start = datetime.fromisoformat(self._run.manifest["start"])
         self._start_ns = int(start.replace(tzinfo=UTC).timestamp()) * 1_000_000_000
@@ -103,22 +127,46 @@ class RosMessages:
         Raises:
             ArtifactError: The run stored no key frames, or a table can't be read.
         """
-        begin = self._time(self._records.part.first)
-        yield Message(begin, MAP, self._map(begin))
-        yield Message(begin, STATIC, self._static_transforms(begin))
-        last: dict[str, tuple[float, float, float]] = {}
-        for chunk in self._records.chunks():
-            messages: list[Message] = []
-            if chunk.poses:
-                messages += self._transforms(chunk)
-                for robot in self._records.robots:
-                    messages += self._odometry(chunk, robot, last)
-            for name, rows in chunk.rows.items():
-                messages += (
-                    self._detections(rows) if name == "observations" else self._rows(name, rows)
-                )
+        for blocks in self.blocks():
+            messages = []
+            for topic, times, sizes, data in blocks:
+                ends, content = np.cumsum(sizes), data.tobytes()
+                places = zip(times.tolist(), (ends - sizes).tolist(), ends.tolist(), strict=True)
+                messages += [
+                    Message(time, topic, content[begin + self._margin : end])
+                    for time, begin, end in places
+                ]
             messages.sort(key=itemgetter(0))
             yield from messages
+
+    def blocks(self) -> Iterator[list[Block]]:
+        """Yield the messages of one stretch of time after the other.
+
+        Raises:
+            ArtifactError: The run stored no key frames, or a table can't be read.
+        """
+        begin = self._time(self._records.part.first)
+        once = [(MAP, self._map(begin)), (STATIC, self._static_transforms(begin))]
+        yield [self._block(topic, [begin], [data]) for topic, data in once]
+        last: dict[str, tuple[float, float, float]] = {}
+        for chunk in self._records.chunks():
+            blocks: list[Block] = []
+            if chunk.poses:
+                blocks += self._transforms(chunk)
+                for robot in self._records.robots:
+                    blocks += self._odometry(chunk, robot, last)
+            for name, table in chunk.tables.items():
+                if name == "observations":
+                    blocks += self._detections(table)
+                else:
+                    blocks.append(self._rows(name, table.to_pylist()))
+            yield [block for block in blocks if len(block.times)]
+
+    def _block(self, topic: str, times: Sequence[int], messages: Sequence[bytes]) -> Block:
+        margin = bytes(self._margin)
+        data = np.frombuffer(bytearray(b"".join([margin + m for m in messages])), np.uint8)
+        sizes = np.array([self._margin + len(message) for message in messages], np.int64)
+        return Block(topic, np.array(times, np.int64), sizes, data)
 
     def _time(self, step: int) -> int:
         return self._start_ns + int(step) * self._step_ns
@@ -175,26 +223,27 @@ class RosMessages:
         is_robot = name in self._records.robots
         return (f"{name}/odom", f"{name}/base_link") if is_robot else ("map", name)
 
-    def _transforms(self, chunk: Chunk) -> list[Message]:
-        """Return a message for each time, with all bodies that are at home."""
+    def _transforms(self, chunk: Chunk) -> Iterator[Block]:
+        """Yield a message for each time, with all bodies that are at home."""
         names = list(chunk.poses)
         home = np.stack([~path.away for path in chunk.poses.values()], axis=-1)
         times = self._start_ns + chunk.poses[names[0]].step * self._step_ns
-        messages: list[Message] = []
-        for present in np.unique(home, axis=0):
+        changes = np.flatnonzero((home[1:] != home[:-1]).any(axis=1)) + 1
+        for present in np.unique(home[[0, *changes]], axis=0):
             at = np.flatnonzero((home == present).all(axis=1))
             who = [name for name, is_home in zip(names, present, strict=True) if is_home]
-            template = self._transform_template(tuple(who))
-            values = [_planar(chunk.poses[name], at) for name in who]
-            stamps = times[at]
-            data = template.fill([stamps] * len(who), [v for four in values for v in four], len(at))
-            messages += [
-                Message(time, TRANSFORMS, one)
-                for time, one in zip(stamps.tolist(), data, strict=True)
-            ]
-        return messages
+            template = self._template(self._transform_template, *who)
+            values = [v for name in who for v in _planar(chunk.poses[name], at)]
+            yield template.fill(TRANSFORMS, times[at], values, self._margin)
 
-    def _transform_template(self, names: tuple[str, ...]) -> "Template":
+    def _template(self, make: Callable[..., "Template"], *names: str) -> "Template":
+        """Return a template by its names, made at most once."""
+        key = (make.__name__, *names)
+        if key not in self._templates:
+            self._templates[key] = make(*names)
+        return self._templates[key]
+
+    def _transform_template(self, *names: str) -> "Template":
         def message(times: Sequence[int], values: Sequence[float]) -> bytes:
             fours = [values[4 * i : 4 * i + 4] for i in range(len(names))]
             parts = [
@@ -207,7 +256,7 @@ class RosMessages:
 
     def _odometry(
         self, chunk: Chunk, robot: str, last: dict[str, tuple[float, float, float]]
-    ) -> list[Message]:
+    ) -> list[Block]:
         path = chunk.poses[robot]
         if not len(path.x):
             return []
@@ -222,9 +271,8 @@ class RosMessages:
         at = np.flatnonzero(~path.away)
         stamps = self._start_ns + path.step[at] * self._step_ns
         values = [*_planar(path, at), *(speed[at] for speed in speeds)]
-        data = self._odometry_template(robot).fill([stamps], values, len(at))
-        topic = f"/{robot}/odom"
-        return [Message(time, topic, one) for time, one in zip(stamps.tolist(), data, strict=True)]
+        template = self._template(self._odometry_template, robot)
+        return [template.fill(f"/{robot}/odom", stamps, values, self._margin)]
 
     def _odometry_template(self, robot: str) -> "Template":
         def message(times: Sequence[int], values: Sequence[float]) -> bytes:
@@ -249,30 +297,34 @@ class RosMessages:
 
         return Template(message, 1, 7)
 
-    def _detections(self, rows: Sequence[dict[str, Any]]) -> list[Message]:
-        """Return a message for each look in which a robot perceived somebody."""
-        looks: dict[tuple[int, str], list[dict[str, Any]]] = {}
-        for row in rows:
-            looks.setdefault((row["step"], row["robot"]), []).append(row)
-        alike: dict[tuple[str, ...], list[tuple[int, list[float]]]] = {}
-        for (step, robot), seen in looks.items():
-            who = (robot, *(row["user"] or UNKNOWN for row in seen))
-            poses = [v for row in seen for v in (row["x"], row["y"], row.get("heading") or 0.0)]
-            alike.setdefault(who, []).append((self._time(step), poses))
-        messages: list[Message] = []
-        for (robot, *users), these in alike.items():
-            times = np.array([time for time, _ in these], np.int64)
-            numbers = np.array([poses for _, poses in these]).T.reshape(len(users), 3, len(these))
-            values = [v for x, y, h in numbers for v in (x, y, *_quaternion(h)) * 2]
-            stamps = [times] * (len(users) + 1)
-            data = self._detection_template(tuple(users)).fill(stamps, values, len(these))
-            topic = f"/{robot}/detections"
-            messages += [
-                Message(t, topic, one) for t, one in zip(times.tolist(), data, strict=True)
-            ]
-        return messages
+    def _detections(self, table: "pa.Table") -> Iterator[Block]:
+        """Yield a message for each look in which a robot perceived somebody."""
+        if not table.num_rows:
+            return
+        step, x, y = (table[name].to_numpy() for name in ("step", "x", "y"))
+        robot, robots = _codes(table["robot"])
+        user, users = _codes(table["user"])
+        users = [*users, UNKNOWN]  # the code -1
+        has_heading = "heading" in table.column_names
+        heading = np.nan_to_num(table["heading"].to_numpy()) if has_heading else np.zeros(len(x))
+        is_new = (np.diff(step, prepend=-1) != 0) | (np.diff(robot, prepend=-1) != 0)
+        first = np.flatnonzero(is_new)
+        count = np.diff(first, append=len(step))
+        for of, size in np.unique(np.stack([robot[first], count], axis=-1), axis=0).tolist():
+            looks = first[(robot[first] == of) & (count == size)]
+            rows = looks[:, None] + np.arange(size)  # (looks, people)
+            people = user[rows]
+            changes = np.flatnonzero((people[1:] != people[:-1]).any(axis=1)) + 1
+            for who in np.unique(people[[0, *changes]], axis=0):
+                at = rows[(people == who).all(axis=1)].T
+                poses = [(x[i], y[i], *_quaternion(heading[i])) for i in at]
+                template = self._template(self._detection_template, *(users[u] for u in who))
+                stamps = self._start_ns + step[at[0]] * self._step_ns
+                values = [v for pose in poses for v in pose * 2]
+                topic = f"/{robots[of]}/detections"
+                yield template.fill(topic, stamps, values, self._margin)
 
-    def _detection_template(self, users: tuple[str, ...]) -> "Template":
+    def _detection_template(self, *users: str) -> "Template":
         def message(times: Sequence[int], values: Sequence[float]) -> bytes:
             numbers = [values[8 * i : 8 * i + 8] for i in range(len(users))]
             detections = [
@@ -301,9 +353,10 @@ class RosMessages:
     def _encoders(self) -> "_Encoders":
         return _Encoders(self)
 
-    def _rows(self, name: str, rows: Sequence[dict[str, Any]]) -> list[Message]:
+    def _rows(self, name: str, rows: Sequence[dict[str, Any]]) -> Block:
         _, encode = self._encoders[name]
-        return [Message(self._time(row["step"]), f"/{name}", encode(row)) for row in rows]
+        times = [self._time(row["step"]) for row in rows]
+        return self._block(f"/{name}", times, [encode(row) for row in rows])
 
     def log_entry(self, row: dict[str, Any]) -> bytes:
         """Return an event as an entry of a log: who, what, details."""
@@ -350,17 +403,24 @@ class Template:
         self._stamps = [data.index(struct.pack("<iI", *divmod(s, 1_000_000_000))) for s in stamps]
         self._floats = [data.index(struct.pack("<d", value)) for value in floats]
 
-    def fill(self, stamps: Sequence[I64], values: Sequence[F64], count: int) -> Iterator[bytes]:
-        """Yield messages with other times [ns] and numbers, each an array (count,)."""
-        filled: U8 = np.tile(self._bytes, (count, 1))
-        for place, times in zip(self._stamps, stamps, strict=True):
-            pairs = np.stack(np.divmod(times, 1_000_000_000), axis=-1).astype("<u4")
-            filled[:, place : place + 8] = pairs.view(np.uint8)
+    def fill(self, topic: str, times: I64, values: Sequence[F64], margin: int) -> Block:
+        """Return messages with other times [ns] and numbers, each an array (n,)."""
+        count, size = len(times), margin + len(self._bytes)
+        filled = np.empty((count, size), np.uint8)
+        filled[:, margin:] = self._bytes
+        for part, numbers in enumerate(np.divmod(times, 1_000_000_000)):
+            for place in self._stamps:
+                at = margin + place + 4 * part
+                np.ndarray((count,), "<u4", filled, at, (size,))[:] = numbers
         for place, numbers in zip(self._floats, values, strict=True):
-            column = np.ascontiguousarray(numbers, dtype="<f8").view(np.uint8).reshape(count, 8)
-            filled[:, place : place + 8] = column
-        size, data = filled.shape[1], filled.tobytes()
-        return (data[at : at + size] for at in range(0, size * count, size))
+            np.ndarray((count,), "<f8", filled, margin + place, (size,))[:] = numbers
+        return Block(topic, times, np.full(count, size), filled.ravel())
+
+
+def _codes(column: "pa.ChunkedArray") -> tuple[I64, list[str]]:
+    """Return a column of words as indices of its words, -1 where there is none."""
+    words = column.combine_chunks().dictionary_encode()
+    return words.indices.fill_null(-1).to_numpy().astype(np.int64), words.dictionary.to_pylist()
 
 
 def _quaternion(heading: Any) -> tuple[Any, Any]:

@@ -187,6 +187,36 @@ def test_messages_are_in_order_of_time(messages: Messages) -> None:
         assert sorted(times) == times, topic
 
 
+def test_chunks_of_mcap_files_are_whole_and_indexed(tmp_path: Path) -> None:
+    """Readers without an index find the messages in order, too."""
+    from mcap.reader import make_reader
+
+    path = tmp_path / "day.mcap"
+    said = mcap.export(day(), path, part())
+
+    with path.open("rb") as file:
+        reader = make_reader(file, validate_crcs=True)
+        summary = reader.get_summary()
+        assert summary is not None
+        assert summary.statistics is not None
+        names = {channel.id: channel.topic for channel in summary.channels.values()}
+        stored = [(c.topic, m) for _, c, m in reader.iter_messages(log_time_order=False)]
+        noon = BEGIN_NS + (FIRST + END) // 2 * 1_000_000_000
+        later = list(reader.iter_messages(topics=["/tf"], starting_at=noon))
+    times = [message.log_time for _, message in stored]
+    assert said.startswith(f"{len(stored):,} messages")
+    assert times == sorted(times)
+    assert (times[0], times[-1]) == (
+        summary.statistics.message_start_time,
+        summary.statistics.message_end_time,
+    )
+    for number, count in summary.statistics.channel_message_counts.items():
+        own = [message.sequence for topic, message in stored if topic == names[number]]
+        assert own == list(range(count))
+    expected = [m.log_time for topic, m in stored if topic == "/tf" and m.log_time >= noon]
+    assert [message.log_time for _, _, message in later] == expected
+
+
 def test_layout_for_foxglove_names_the_topics_of_the_file(tmp_path: Path) -> None:
     line = mcap.export(day(), tmp_path / "day.mcap", part())
 
