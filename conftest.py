@@ -1,6 +1,23 @@
-"""Examples in docstrings of modules that need an extra run where it is installed."""
+"""What holds for all tests, and for the examples in docstrings."""
 
+import os
+import sys
 from importlib.util import find_spec
 
+import pytest
+
+# Examples in docstrings of modules that need an extra run where it is installed.
 EXTRAS = {"gymnasium": "src/fleet2d/gym", "torch": "src/fleet2d/datasets/torch_data.py"}
 collect_ignore = [path for package, path in EXTRAS.items() if find_spec(package) is None]
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Keep bytecode in pytest's cache if it isn't written beside the sources.
+
+    Else every process that a test starts compiles all that it imports.
+    """
+    cache = getattr(config, "cache", None)
+    if sys.dont_write_bytecode and cache is not None:
+        os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+        os.environ["PYTHONPYCACHEPREFIX"] = sys.pycache_prefix = str(cache.mkdir("bytecode"))
+        sys.dont_write_bytecode = False

@@ -1,9 +1,11 @@
 """Small scenarios for the tests of whole runs, and what they are judged by."""
 
+import atexit
 import json
 import os
 import subprocess
 import sys
+import tempfile
 from collections.abc import Callable, Mapping
 from functools import cache
 from pathlib import Path
@@ -70,10 +72,10 @@ def write_flat(folder: Path) -> Path:
 
 @cache
 def flat_path() -> Path:
-    """The flat's floor plan in a file that is there for the whole test session."""
-    import tempfile
-
-    return write_flat(Path(tempfile.mkdtemp(prefix="fleet2d-flat-")))
+    """The flat's floor plan in a file that is there until the process ends."""
+    folder = tempfile.TemporaryDirectory(prefix="fleet2d-flat-")
+    atexit.register(folder.cleanup)
+    return write_flat(Path(folder.name))
 
 
 def scenario(duration: str = "10 min", **sections: Any) -> dict[str, Any]:

@@ -94,6 +94,8 @@ EXTENDED_FILES = Bound("EXTENDED_FILES", 100, "files")
 """Files of a scenario: its own and those that they extend."""
 ENTRIES = Bound("ENTRIES", 2_500, "entries")
 """Entries of a section of a scenario, such as its users."""
+MEMBERS = Bound("MEMBERS", 100, "members")
+"""Members of a household, each of whom depends on all others."""
 ITEMS = Bound("ITEMS", 20_000, "entries")
 """Entries of a list of mappings or texts, such as a script."""
 JSON_VALUES = Bound("JSON_VALUES", 3_000_000, "values")

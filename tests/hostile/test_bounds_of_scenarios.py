@@ -102,6 +102,40 @@ def test_scenario_is_refused_within_seconds(tmp_path: Path, name: str) -> None:
     assert megabytes < MEGABYTES
 
 
+def test_a_household_is_read_once_for_all_its_members(tmp_path: Path) -> None:
+    """It was read and validated for each of them, which took a minute for some hundreds."""
+    from fleet2d.scenario.model import load_scenario
+
+    names = [f"u{i}" for i in range(20)]
+    (tmp_path / "own.yaml").write_text("extends: retired\npace: 0.9\n")
+    members = "".join(f"  {name}: own.yaml\n" for name in names)
+    (tmp_path / "house.yaml").write_text(f"members:\n{members}")
+    text = "".join(f"  {name}: {{type: routine, household: house.yaml}}\n" for name in names)
+    (tmp_path / "home.yaml").write_text(
+        f"{BASE}users:\n{text}  bob: {{type: routine, persona: own.yaml}}\n"
+    )
+
+    users = load_scenario(tmp_path / "home.yaml").users
+
+    households = [users[name].behaviors[0].household for name in names]
+    assert all(household is households[0] for household in households)
+    assert 1 == len({id(persona) for persona in households[0].members.values()})
+
+
+def test_a_household_has_a_bound(tmp_path: Path) -> None:
+    """Each member is stored with all others in the manifest: 2,500 were too many to read again."""
+    from fleet2d.errors import ScenarioError
+    from fleet2d.scenario.model import load_scenario
+
+    members = "".join(f"  u{i}: retired\n" for i in range(101))
+    (tmp_path / "house.yaml").write_text(f"members:\n{members}")
+    user = "users: {u0: {type: routine, household: house.yaml}}\n"
+    (tmp_path / "home.yaml").write_text(BASE + user)
+
+    with pytest.raises(ScenarioError, match=r"household: the household has 101 members, and at mo"):
+        load_scenario(tmp_path / "home.yaml")
+
+
 def test_places_of_replaced_values_are_forgotten(tmp_path: Path) -> None:
     """Messages name where a value is written now, not where one that it replaced was."""
     from fleet2d.scenario.compose import compose

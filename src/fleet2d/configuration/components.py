@@ -54,6 +54,8 @@ if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
 
 
+T = TypeVar("T")
+
 _SECTION = re.compile(r"^(?:Attributes|Examples?|Raises):$", re.MULTILINE)
 _ENTRY = re.compile(r"^    (\w[\w, ]*): (.*(?:\n {5,}.*)*)", re.MULTILINE)
 
@@ -126,6 +128,30 @@ def _check_names(entries: Any) -> Any:
                     " letter first, 100 characters at most",
                 )
     return entries
+
+
+def once(info: ValidationInfo, key: object, validate: Callable[[], T]) -> T:
+    """Return what many entries of a scenario name, such as a file, validated for the first of them.
+
+    Args:
+        info: Of the entry's validation, in whose context, if there is any, the result is kept.
+        key: What they name.
+        validate: Reads and validates it.
+
+    Raises:
+        ValueError: It is invalid, which the first entry found.
+    """
+    if info.context is None:
+        return validate()
+    if key not in info.context:
+        try:
+            info.context[key] = validate()
+        except ValueError as error:  # the errors of pydantic are
+            info.context[key] = error
+    result = info.context[key]
+    if isinstance(result, ValueError):
+        raise result
+    return result
 
 
 def _name_as_type(entries: Any) -> Any:

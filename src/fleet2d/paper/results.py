@@ -1,5 +1,6 @@
 """The paper's results over months: studies in YAML beside this file, and what their tables say."""
 
+import atexit
 import json
 import tempfile
 import time
@@ -143,7 +144,7 @@ def run_months(name: str, options: PaperOptions) -> "Study":
         ComponentError: A month failed.
         InputError: polars or scipy is missing, or the folder can't be used.
     """
-    folder = options.folder or Path(tempfile.mkdtemp(prefix="fleet2d-paper-"))
+    folder = options.folder or _temporary_folder()
     months = study(
         study_content(name, *options.size(name)),
         folder / name,
@@ -155,6 +156,13 @@ def run_months(name: str, options: PaperOptions) -> "Study":
     if months.counts.failed:
         raise ComponentError(f"a month failed: {months.failures['error'][0]}")
     return months
+
+
+def _temporary_folder() -> Path:
+    """Return a folder that is there until the process ends, as long as a study may be read."""
+    folder = tempfile.TemporaryDirectory(prefix="fleet2d-paper-")
+    atexit.register(folder.cleanup)
+    return Path(folder.name)
 
 
 def interval(values: Iterable[float]) -> tuple[float, float, float]:

@@ -1,13 +1,21 @@
 """Households: people whose days depend on each other."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Annotated, Any, Self
 
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import (
+    BeforeValidator,
+    Field,
+    ValidationInfo,
+    ValidatorFunctionWrapHandler,
+    WrapValidator,
+    model_validator,
+)
 
-from fleet2d.configuration.components import Settings
+from fleet2d.bounds import MEMBERS
+from fleet2d.configuration.components import Settings, once
 from fleet2d.configuration.documents import read_document
 from fleet2d.configuration.problems import (
     Location,
@@ -18,7 +26,7 @@ from fleet2d.configuration.problems import (
     suggest,
 )
 from fleet2d.configuration.units import OnDays, PositiveDuration, Share, folder_of
-from fleet2d.errors import ScenarioError
+from fleet2d.errors import InputError, ScenarioError
 from fleet2d.routines.activity import (
     AnyDurationDistribution,
     DurationDistribution,
@@ -172,6 +180,14 @@ class RandomVisits(Timing):
         return self
 
 
+def _check_size(members: Any) -> Any:
+    try:
+        MEMBERS.check(len(members) if isinstance(members, Mapping) else 0, "the household")
+    except InputError as error:
+        raise problem(str(error)) from None
+    return members
+
+
 class Household(Settings):
     """The members of a household, and their joint activities.
 
@@ -189,7 +205,7 @@ class Household(Settings):
     """
 
     name: str = Field(default="home", min_length=1)
-    members: dict[str, AnyPersona] = Field(min_length=1)
+    members: Annotated[dict[str, AnyPersona], BeforeValidator(_check_size)] = Field(min_length=1)
     couples: tuple[tuple[str, str], ...] = ()
     together: dict[str, Annotated[JointActivity, SchemaForms("text")]] = Field(default_factory=dict)
     away: tuple[AnyPeriod, ...] = ()
@@ -227,10 +243,16 @@ class Household(Settings):
 
     def bedrooms(self) -> dict[str, int]:
         """Return the number of each member's bedroom, from 0; couples share one."""
+        partners: dict[str, list[str]] = {}
+        for first, second in self.couples:
+            partners.setdefault(first, []).append(second)
+            partners.setdefault(second, []).append(first)
         groups: dict[str, int] = {}
+        count = 0
         for member in self.members:
-            partners = [n for pair in self.couples if member in pair for n in pair if n in groups]
-            groups[member] = groups[partners[0]] if partners else len(set(groups.values()))
+            known = [name for name in partners.get(member, ()) if name in groups]
+            groups[member] = groups[known[0]] if known else count
+            count += not known
         return groups
 
     def side_of_bed(self, member: str) -> tuple[int, int]:
@@ -239,20 +261,26 @@ class Household(Settings):
         return pair.index(member), len(pair)
 
 
-def read_household(value: object) -> Any:
-    """Read a household: a mapping, or the path of a YAML file."""
+def _read_household(
+    value: object, validate: ValidatorFunctionWrapHandler, info: ValidationInfo
+) -> Household:
+    """Read a household: a mapping, or the path of a YAML file, which is read for all members."""
     if not isinstance(value, str | Path):
-        return value
+        return validate(value)
     path = folder_of(value) / Path(value).expanduser()
     if not str(value) or not path.is_file():
         raise problem(
             f"expected a household (a mapping with 'members', or a YAML file), got {shown(value)}"
         )
-    try:
-        return read_document(path).data
-    except ScenarioError as error:
-        raise problem(str(error)) from None
+
+    def read() -> Household:
+        try:
+            return validate(read_document(path).data)
+        except ScenarioError as error:
+            raise problem(str(error)) from None
+
+    return once(info, (Household, path), read)
 
 
-AnyHousehold = Annotated[Household, BeforeValidator(read_household), SchemaForms("text")]
+AnyHousehold = Annotated[Household, WrapValidator(_read_household), SchemaForms("text")]
 """A household in a scenario: a mapping or a YAML file; dumped whole."""

@@ -173,6 +173,7 @@ class Lives:
             for name in household.members
         }
         self._cache: dict[int, Mapping[str, Sequence[Episode]]] = {}
+        self._uses: dict[int, list[tuple[str, int, int, int]]] = {}  # of private rooms
         self.first = self._next = first
 
     def day(self, ordinal: int) -> Mapping[str, Sequence[Episode]]:
@@ -190,6 +191,7 @@ class Lives:
             self._next = self.first
         while self._next <= ordinal:
             self._cache.pop(self._next - CACHED_HOUSEHOLD_DAYS, None)
+            self._uses.pop(self._next - CACHED_HOUSEHOLD_DAYS, None)
             self._cache[self._next] = self._draw(self._next)
             self._next += 1
         return self._cache[ordinal]
@@ -209,15 +211,24 @@ class Lives:
     def in_use(self, ordinal: int, member: str, room: int) -> list[tuple[int, int]]:
         """Return when others use a private room [s since the midnight of a date]."""
         return [
-            (episode.begin + shift, episode.end + shift)
+            (begin + shift, end + shift)
             for day, shift in ((ordinal - 1, -DAY_S), (ordinal, 0), (ordinal + 1, DAY_S))
             if day >= self.first
-            for name, episodes in self.day(day).items()
-            for episode in episodes
-            if name != member
-            and episode.room in (ANY_ROOM, room)
-            and self._is_exclusive(name, episode)
+            for name, of, begin, end in self._private_uses(day)
+            if name != member and of in (ANY_ROOM, room)
         ]
+
+    def _private_uses(self, ordinal: int) -> list[tuple[str, int, int, int]]:
+        """Return the member, room, begin and end of all uses of private rooms on a day."""
+        days = self.day(ordinal)
+        if ordinal not in self._uses:
+            self._uses[ordinal] = [
+                (name, episode.room, episode.begin, episode.end)
+                for name, episodes in days.items()
+                for episode in episodes
+                if self._is_exclusive(name, episode)
+            ]
+        return self._uses[ordinal]
 
     def _is_exclusive(self, name: str, episode: Episode) -> bool:
         activity = self.household.members[name].activity(episode.activity)

@@ -10,12 +10,15 @@ from pydantic import (
     BeforeValidator,
     Field,
     SerializerFunctionWrapHandler,
+    ValidationInfo,
+    ValidatorFunctionWrapHandler,
     WithJsonSchema,
     WrapSerializer,
+    WrapValidator,
     model_validator,
 )
 
-from fleet2d.configuration.components import Settings
+from fleet2d.configuration.components import Settings, once
 from fleet2d.configuration.documents import read_document
 from fleet2d.configuration.problems import did_you_mean, problem, problem_at, shown, suggest
 from fleet2d.configuration.units import (
@@ -584,6 +587,16 @@ def _persona_file(value: str | Path, *, is_extended: bool) -> Path:
     return path
 
 
+def _validate_persona(
+    value: object, validate: ValidatorFunctionWrapHandler, info: ValidationInfo
+) -> Persona:
+    """Read and validate a persona; one in a file for all who name it."""
+    if isinstance(value, str | Path) and str(value) not in bundled_names():
+        path = folder_of(value) / Path(value).expanduser()
+        return once(info, (Persona, path), lambda: validate(read_persona(value)))
+    return validate(read_persona(value))
+
+
 @cache
 def bundled_names() -> list[str]:
     """Return the names of the personas that come with Fleet2D.
@@ -628,7 +641,10 @@ def _dump(persona: Persona, dump: SerializerFunctionWrapHandler) -> Any:
 
 
 AnyPersona = Annotated[
-    Persona, BeforeValidator(read_persona), WrapSerializer(_dump), SchemaForms("text", "extension")
+    Persona,
+    WrapValidator(_validate_persona),
+    WrapSerializer(_dump),
+    SchemaForms("text", "extension"),
 ]
 """A persona in a scenario: a bundled name, a file, or a mapping that may extend either."""
 

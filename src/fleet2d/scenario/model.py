@@ -316,7 +316,7 @@ def scenario_of(document: Document, folder: Path) -> Scenario:
     """
     check_code("the scenario", document.data)
     try:
-        scenario = Scenario.model_validate(document.data)
+        scenario = Scenario.model_validate(document.data, context={})
     except ValidationError as error:
         raise explain(error, document) from None
     scenario._folder, scenario._document = folder, document

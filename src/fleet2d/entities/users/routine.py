@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from datetime import datetime, timedelta
 from functools import partial
+from itertools import islice
 from typing import TYPE_CHECKING, NamedTuple, Self
 
 from pydantic import model_validator
@@ -362,12 +363,13 @@ class Routine(ResidentBehavior):
 
     def _note_strangers(self, actor: "Actor") -> None:
         """Note, once per scenario, that people without a household may share a seat."""
-        others = [
+        strangers = (
             name
             for name, body in actor.people.items()
             for behavior in getattr(body, "behaviors", ())
             if body is not actor and isinstance(behavior, Routine) and behavior.household is None
-        ]
+        )
+        others = list(islice(strangers, 2))  # of a thousand, too
         if len(others) == 1:
             members = f"{others[0]}: works_outside, {actor.name}: works_outside"
             actor.notes.append(
