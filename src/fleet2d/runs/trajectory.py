@@ -10,15 +10,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fleet2d.artifacts.arrow import values_of
 from fleet2d.artifacts.table import KEY_KINDS, PLANNED, WALK
 from fleet2d.bounds import one_line
 from fleet2d.configuration.trust import restrict_stored
 from fleet2d.configuration.units import whole_steps
-from fleet2d.entities.behavior import Actor
 from fleet2d.entities.body import Pose
-from fleet2d.entities.meander import Meander
 from fleet2d.errors import ArtifactError
-from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.kernels import (
     F64,
@@ -35,9 +33,11 @@ from fleet2d.kernels import (
     trace_track,
 )
 from fleet2d.runtime.clock import Clock
-from fleet2d.scenario.model import load_scenario
 
 if TYPE_CHECKING:
+    from fleet2d.entities.behavior import Actor
+    from fleet2d.entities.meander import Meander
+    from fleet2d.floorplan.home import Home
     from fleet2d.runs.run import Run
 
 # The sections of a scenario that bodies depend on; the components of all others are not imported.
@@ -223,21 +223,20 @@ def _segments(kind: I64) -> Iterator[tuple[int, int]]:
 def _keys_of(run: "Run", plan: FloorPlan, entity: str) -> dict[str, Any]:
     """Return the key frames of a body in lattice units, each column (n,)."""
     entities = run.manifest["entities"]
-    names = [*entities["users"], *entities["robots"]]
-    if entity not in names:
-        raise ArtifactError(f"there is no {entity!r} in the run; there are: {', '.join(names)}")
-    from pyarrow import array, compute
-
+    bodies = [*entities["users"], *entities["robots"]]
+    if entity not in bodies:
+        raise ArtifactError(f"there is no {entity!r} in the run; there are: {', '.join(bodies)}")
     table = run.tables["key_frames"]
-    rows = table.filter(compute.equal(table["entity"].cast("string"), entity))
-    column = {n: rows[n].to_numpy() for n in ("step", "time", "x", "y", "heading", "away")}
-    kind = compute.index_in(rows["kind"].cast("string"), array(KEY_KINDS)).to_numpy()
+    own = values_of(table["entity"]) == entity
+    names = ("step", "time", "x", "y", "heading", "away", "kind")
+    column = {name: values_of(table[name])[own] for name in names}
+    kind = np.array([KEY_KINDS.index(name) for name in column["kind"]], np.int64)
     xy = plan.lattice.to_lattice(np.stack([column["x"], column["y"]], axis=-1))
     start = np.datetime64(run.manifest["start"], "us")
     return {
         "step": column["step"],
-        "time": (column["time"].astype("M8[us]") - start).astype(np.int64),
-        "kind": kind.astype(np.int64),
+        "time": column["time"] - start.astype(np.int64),
+        "kind": kind,
         "x": np.ascontiguousarray(xy[:, 0]),
         "y": np.ascontiguousarray(xy[:, 1]),
         "heading": np.rint(column["heading"] * (TURN / (2 * np.pi))).astype(np.int64) % TURN,
@@ -245,9 +244,16 @@ def _keys_of(run: "Run", plan: FloorPlan, entity: str) -> dict[str, Any]:
     }
 
 
-def _walker(run: "Run", plan: FloorPlan, entity: str, clock: Clock) -> tuple[Home, Actor, Meander]:
+def _walker(
+    run: "Run", plan: FloorPlan, entity: str, clock: Clock
+) -> "tuple[Home, Actor, Meander]":
     """Return the home, the body and its behavior that repeats its random walk."""
     sections = run.manifest["scenario"]
+    from fleet2d.entities.behavior import Actor  # few paths need a walker
+    from fleet2d.entities.meander import Meander
+    from fleet2d.floorplan.home import Home
+    from fleet2d.scenario.model import load_scenario
+
     with restrict_stored():
         scenario = load_scenario({key: sections[key] for key in _BODIES if key in sections})
     bucket = "users" if entity in scenario.users else "robots"
