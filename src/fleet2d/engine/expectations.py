@@ -28,6 +28,7 @@ from fleet2d.expectations.verdict import (
     VerdictEvidence,
     check_judged,
     evidence_of,
+    is_decided,
     verdict_of,
 )
 from fleet2d.kernels import I64, SightMemory
@@ -204,6 +205,15 @@ class RunExpectations:
             for name, entry in self.entries.items()
             if self.first > entry.since
         }
+
+    @property
+    def are_decided(self) -> bool:
+        """Whether nothing can change the verdicts any more, before the end of the run."""
+        return all(
+            self.first > entry.since
+            and is_decided(entry.expectation, self._signals(entry, ended=False))
+            for entry in self.entries.values()
+        )
 
     def evidence(self, name: str) -> VerdictEvidence:
         """Return what an expectation is about, with its signals so far."""

@@ -255,6 +255,15 @@ def verdict_of(name: str, expectation: Expectation, run: RunSignals, text: str =
     )
 
 
+def is_decided(expectation: Expectation, run: RunSignals) -> bool:
+    """Return whether the rest of a run can't change a verdict any more."""
+    first = run.first
+    return (
+        expectation.robustness(run, True).at(first) < 0
+        or expectation.robustness(run, False).at(first) > 0
+    )
+
+
 def _violations(expectation: Expectation, run: RunSignals) -> list[Violation]:
     if isinstance(expectation, Temporal):
         return expectation.violations(run)

@@ -86,23 +86,23 @@ class Trial(Simulation):
         if not self.expected:
             return ()
         minute = max(1, timedelta(minutes=1) // self.scenario.simulation.step)
-        while not self.done and not self._is_decided():
+        expectations = self._state.expectations
+        assert expectations is not None
+        while not self.done:
+            self._state.settle(self.step)
+            if expectations.are_decided:
+                break
             self._run_to(min(self.clock.steps, self.step + minute))
             minute *= 2
         if self.done:
             self.finish()  # some metrics are known at the end only
-        entries = self._state.expectations.entries if self._state.expectations else {}
         return tuple(
             replace(
-                result_of(verdict, entries[name].expectation),
+                result_of(verdict, expectations.entries[name].expectation),
                 evidence=self.evidence(name) if verdict.fails else None,
             )
             for name, verdict in self.verdicts().items()
         )
-
-    def _is_decided(self) -> bool:
-        verdicts = self.verdicts()
-        return len(verdicts) == len(self.expected) and all(v.decided for v in verdicts.values())
 
 
 def names_in(act: Intervention | Mapping[str, Any]) -> frozenset[str]:

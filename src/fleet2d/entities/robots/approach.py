@@ -1,6 +1,7 @@
 """What behaviors toward people share: where a person likely is, where to look, how near to come."""
 
 import math
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -281,8 +282,9 @@ def check_has_camera(actor: Actor, behavior: str) -> None:
 
 def _legs(route: I64) -> list[float]:
     """Return the lengths of the legs of a route [lattice]."""
-    legs = np.diff(route, axis=0)
-    return np.sqrt((legs * legs).sum(axis=1).astype(np.float64)).tolist()
+    # A route has few legs: numbers of Python are faster than arrays here.
+    legs = pairwise(route.tolist())
+    return [math.sqrt((bx - ax) ** 2 + (by - ay) ** 2) for (ax, ay), (bx, by) in legs]
 
 
 def _distance(one: object, other: object) -> float:
