@@ -2,17 +2,19 @@
 
     python benchmarks/fit.py --data ../shared/data/activity --out fit
 
-Writes for each log a picture (time shares by hour, durations of stays) and prints two tables: the
-distances of days sampled from the persona, and from a first-order Markov chain of minutes fitted to
-the same days, to the days held back; and the shares of time per room.
+Writes for each log a picture (time shares by hour, durations of stays) and prints how far days are
+from the days held back, by minutes and by seconds: days sampled from the persona, from a private
+one and from one of laws, copied days, and those of a first-order Markov chain; then what a persona
+repeats of its log, and the shares of time per room.
 """
 
 import argparse
 from pathlib import Path
 
 from fleet2d.fit.command import table
-from fleet2d.fit.persona import fit_persona, sample_persona, validate
+from fleet2d.fit.persona import fit_persona, sample_persona, simulated_repeats, validate
 from fleet2d.fit.picture import SAMPLED, draw_persona
+from fleet2d.fit.privacy import repeats
 from fleet2d.fit.timeline import find_days, read_timeline, shares
 from fleet2d.logs.layouts import read_log
 from fleet2d.logs.log import ActivityLog
@@ -39,6 +41,17 @@ def main() -> None:
         fitted = fit_persona(timeline, days)
         print(f"\n## {name}")
         print("\n".join(table(validate(timeline, seed=options.seed))))
+        private = fit_persona(timeline, days, private=True)
+        for title, validation in (
+            ("a private persona", validate(timeline, seed=options.seed, private=True)),
+            ("laws", validate(timeline, seed=options.seed, model="laws")),
+        ):
+            for unit, distances in (("", validation.rooms), (" to the second", validation.seconds)):
+                cells = " ".join(f"{value:.3f}" for value in distances[0])
+                print(f"{title + unit:34}{cells}")
+        print(f"the persona repeats of its log: {simulated_repeats(fitted)}")
+        print(f"a private one: {simulated_repeats(private)}")
+        print(f"days of the log, of each other: {repeats(fitted.log, fitted.log)}")
         count = len(timeline.places)
         real = shares(timeline.rooms[[day.number for day in days]], count)
         sampled = shares(sample_persona(fitted, timeline, SAMPLED, options.seed)[1], count)

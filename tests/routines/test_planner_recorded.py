@@ -16,6 +16,7 @@ DAYS = [
     "07:00 wash, 07:20 breakfast, 07:50 work, 17:10 tv, 22:40 sleep, 26:10 wash, 26:20 sleep, 30:50 end",
     "07:10 wash, 07:25 breakfast, 09:00 read, 12:00 cook, 12:40 read, 17:05 tv, 23:00 sleep, 31:10 end",
 ]
+SECONDS = "06:50 wash, 06:50:20 tv, 06:50:37 wash, 07:10:05 tv, 22:30 sleep, 31:00 end"
 
 
 def persona(*days: str) -> Persona:
@@ -23,9 +24,16 @@ def persona(*days: str) -> Persona:
     return Persona.model_validate({"needs": None, "errands": None, "days": {"any_day": template}})
 
 
-@pytest.mark.parametrize("text", DAYS)
+@pytest.mark.parametrize("text", [*DAYS, SECONDS])
 def test_a_day_is_written_as_it_is_read(text: str) -> None:
     assert text == write_day(parse_day(text))
+
+
+def test_a_stay_of_seconds_lasts_as_recorded() -> None:
+    life = Life(persona(SECONDS), 4, "users.ana")
+    lengths = {e.end - e.begin for i in range(20) for e in life.day(MONDAY + i)}
+    assert {17, 20} <= lengths
+    assert min(lengths) == 17
 
 
 def test_days_have_no_gap_and_end_asleep_when_the_next_begins() -> None:
@@ -72,6 +80,7 @@ def test_what_a_household_does_together_takes_the_place_of_what_would_be_done() 
         (["07:00 wash, 06:00 sleep, 31:00 end"], "06:00 follows 07:00; write 30:00 if"),
         (["07:00 wash, 23:00 tv, 31:00 end"], "asleep"),
         (["7 wash"], "a time and an activity"),
+        (["07:00:00:00 wash, 23:00 sleep, 31:00 end"], "a time and an activity"),
         (["07:00 wsh, 23:00 sleep, 31:00 end"], "wash"),
     ],
 )

@@ -7,7 +7,7 @@ import typer
 
 if TYPE_CHECKING:
     from fleet2d.fit.perception import Calibration, FittedProbability
-    from fleet2d.fit.persona import Validation
+    from fleet2d.fit.persona import FittedPersona, Validation
 
 
 fitting = typer.Typer(help="Learn from a real log.", no_args_is_help=True)
@@ -32,9 +32,15 @@ def routine(
         str, typer.Option(help="recorded: days that switch between those of the log; laws.")
     ] = "recorded",
     sort: Annotated[bool, typer.Option(help="Sort lines whose time runs backwards.")] = False,
+    private: Annotated[
+        bool,
+        typer.Option("--private", "--share", help="A persona for others: no day of the log in it."),
+    ] = False,
 ) -> None:
     """Learn a persona from a log, and report how well its days match days held back."""
-    for line in fit_routine(log, out, layout, picture, seed, sort=sort, model=model):
+    for line in fit_routine(
+        log, out, layout, picture, seed, sort=sort, model=model, private=private
+    ):
         typer.echo(line)
 
 
@@ -47,6 +53,7 @@ def fit_routine(
     *,
     sort: bool = False,
     model: str = "recorded",
+    private: bool = False,
 ) -> list[str]:
     """Fit a persona to a log, write it, and return a report in lines.
 
@@ -58,11 +65,12 @@ def fit_routine(
         seed: The seed of the days that are sampled to compare.
         sort: Sort lines of the log whose time runs backwards.
         model: "recorded" or "laws", see `fit_persona`.
+        private: Make new days of those of the log, so that the persona can be given to others.
 
     Raises:
         LogError: The log can't be read, is of positions, or has too few days.
     """
-    from fleet2d.fit.persona import fit_persona, to_yaml, validate
+    from fleet2d.fit.persona import fit_persona, gaps, to_yaml, validate
     from fleet2d.fit.timeline import find_days, read_timeline
     from fleet2d.logs.layouts import layout_names, read_log
     from fleet2d.logs.log import ActivityLog, LogError
@@ -72,20 +80,26 @@ def fit_routine(
         raise LogError(f"--format: expected one of {', '.join(layouts)}, got {layout!r}")
     if model not in ("recorded", "laws"):
         raise LogError(f"--model: expected recorded or laws, got {model!r}")
+    if private and model != "recorded":
+        raise LogError("--private: laws hold durations of the log; leave out --model")
     log = read_log(path, layout, sort=sort)
     if not isinstance(log, ActivityLog):
         raise LogError(f"{path} is a log of positions: a persona is fitted to a log of rooms")
     timeline = read_timeline(log)
     days = find_days(timeline)
-    validation = validate(timeline, seed=seed, model=model)  # type: ignore[arg-type]
-    about = f"fitted to {len(days)} days of {log.path.name}"
-    fitted = fit_persona(timeline, days, about, model=model)  # type: ignore[arg-type]
+    validation = validate(timeline, seed=seed, model=model, private=private)  # type: ignore[arg-type]
+    about = (
+        "like the days of a log" if private else f"fitted to {len(days)} days of {log.path.name}"
+    )
+    fitted = fit_persona(timeline, days, about, model=model, private=private)  # type: ignore[arg-type]
     try:
         out.write_text(to_yaml(fitted.document), encoding="utf-8")
     except OSError as error:
         raise LogError(f"{out} can't be written: {error.strerror}") from error
-    lines = [f"note: {note}" for note in (*log.notes, *fitted.notes)]
+    lines = [f"note: {note}" for note in (*log.notes, *fitted.notes, *gaps(timeline, days))]
     lines += table(validation)
+    if fitted.log:
+        lines += privacy(fitted, private)
     if picture is not None:
         from fleet2d.fit.picture import draw_persona
 
@@ -101,18 +115,45 @@ def table(validation: "Validation") -> list[str]:
     lines = [
         f"{validation.days} days in {validation.folds} parts, each held back in turn: distances of"
         " days sampled from models of the other parts",
-        f"{'':30}{'time shares':>12}{'by hour':>10}{'stays KS':>10}{'stays [min]':>12}",
+        f"{'':30}{'time shares':>12}{'by hour':>10}{'stays KS':>10}{'stays [min]':>12}"
+        f"{'transitions':>13}",
     ]
-    for title, distances in (("rooms", validation.rooms), ("activities", validation.activities)):
+    for title, distances in (
+        ("rooms", validation.rooms),
+        ("activities", validation.activities),
+        ("rooms, to the second", validation.seconds),
+    ):
         lines.append(title)
         lines += [
             f"  {name:28}{d.share:12.3f}{d.hours:10.3f}{d.ks:10.3f}{d.stay_min:12.1f}"
+            f"{d.transitions:13.3f}"
             for name, d in zip(MODELS, distances, strict=True)
         ]
     worse = validation.worse_than_copying()
     verdict = "; ".join(worse) or "in no distance of rooms"
     lines.append(f"the persona is worse than copies of whole days: {verdict}")
     return lines
+
+
+def privacy(fitted: "FittedPersona", private: bool) -> list[str]:
+    """Return how much of its log a persona repeats, as lines of text."""
+    from fleet2d.fit.persona import simulated_repeats
+    from fleet2d.fit.privacy import repeats
+
+    lines = [
+        "successive changes of activity, to the minute, that a day shares with one of the log:",
+        f"  simulated days: {simulated_repeats(fitted)}",
+        f"  days of the log, with each other: {repeats(fitted.log, fitted.log)}",
+    ]
+    if private:
+        return [
+            *lines,
+            "no day of the log is in the persona; docs/fit.md says what it still tells",
+        ]
+    return [
+        *lines,
+        "the persona holds every day of the log to the second: --private, to give it away",
+    ]
 
 
 calibrating = typer.Typer(help="Fit a model to a log of a real device.", no_args_is_help=True)

@@ -11,14 +11,18 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 import yaml
 
+from fleet2d.fit.privacy import Repeats, private_days, repeats
 from fleet2d.fit.timeline import (
     ActivityPlace,
     Distances,
     LivedDay,
     Stretch,
     Timeline,
+    by_minute,
     distances,
     find_days,
+    is_sleep,
+    runs,
     sleep_states,
 )
 from fleet2d.kernels import I16
@@ -28,7 +32,7 @@ from fleet2d.routines.activity import Activity, seconds
 from fleet2d.routines.distributions import KNOTS, exponential
 from fleet2d.routines.life import Life
 from fleet2d.routines.persona import Persona
-from fleet2d.routines.planner import Episode, RecordedDay, write_day
+from fleet2d.routines.planner import Episode, RecordedDay, parse_day, write_day
 from fleet2d.runtime.clock import DAY_MINUTES, DAY_S
 from fleet2d.runtime.determinism import Draws, stream_key
 
@@ -56,6 +60,7 @@ EQUAL = 0.0005
 FOLDS = 3
 SAMPLED = 700  # the number of days drawn from a persona, whole weeks
 CHAIN_DAYS = 140  # the number of days drawn from the chain
+SAMPLED_BY_SECOND, CHAIN_DAYS_BY_SECOND = 140, 7  # the same where seconds are compared
 
 
 @dataclass
@@ -67,21 +72,29 @@ class FittedPersona:
         persona: The persona.
         states: The timeline's state of each of its activities.
         notes: Decisions that the fit had to make.
+        log: The recorded days of the log; none with the model `laws`.
     """
 
     document: dict[str, Any]
     persona: Persona
     states: dict[str, int]
     notes: list[str] = field(default_factory=list)
+    log: list[RecordedDay] = field(default_factory=list)
 
 
 def fit_persona(
-    timeline: Timeline, days: Sequence[LivedDay], about: str = "", *, model: Model = "recorded"
+    timeline: Timeline,
+    days: Sequence[LivedDay],
+    about: str = "",
+    *,
+    model: Model = "recorded",
+    private: bool = False,
 ) -> FittedPersona:
     """Fit a persona to days of a log.
 
     With the model `recorded`, its days are drawn from those of the log, and switch from one to
-    another where both have the same activity at about the same time.
+    another where both have the same activity at about the same time. If it is private, it has days
+    that are like those of the log instead (see `private_days`), and no measured durations.
 
     With the model `laws`, an activity that is done once on most days at about the same time becomes
     a task, with the mean and spread of its beginning, the measured law of its duration and the
@@ -97,23 +110,40 @@ def fit_persona(
     names = _names(timeline)
     fitter = _Fitter(timeline, names, min(day.wake for day in days))
     kinds, notes = _kinds_of_days(timeline, days)
-    templates = {}
+    templates: dict[str, dict[str, Any]] = {}
+    log: list[RecordedDay] = []
     for name, (on, members) in kinds.items():
         if model == "recorded":
-            templates[name] = {"on": on, "recorded": fitter.recorded(members)}
+            recorded = fitter.recorded(members)
+            log += recorded
+            new = private_days(recorded, 0, name) if private else recorded
+            templates[name] = {"on": on, "recorded": [write_day(day) for day in new]}
         else:
             kind = name if len(kinds) > 1 else ""
             templates[name] = {"on": on, **fitter.template(members, kind)}
     fitter.sleep(days, gets_up=model == "laws")
     fitter.rest(days)
+    activities = fitter.activities
+    if private:
+        used = {"rest", *(name for t in templates.values() for name in _activities_of(t))}
+        activities = {
+            name: {key: value for key, value in fields.items() if key != "takes"}
+            for name, fields in activities.items()
+            if name in used
+        }
     document = {
         "about": about or f"fitted to {len(days)} days of a log",
-        "activities": fitter.activities,
+        "activities": activities,
         "needs": {},  # their activities are in the log
         "errands": {},
         "days": templates,
     }
-    return FittedPersona(document, Persona.model_validate(document), fitter.states, notes)
+    persona = Persona.model_validate(document)
+    return FittedPersona(document, persona, fitter.states, notes, log)
+
+
+def _activities_of(template: Mapping[str, Any]) -> set[str]:
+    return {name for text in template["recorded"] for name in parse_day(text).activities}
 
 
 def _kinds_of_days(
@@ -133,6 +163,32 @@ def _kinds_of_days(
         )
         return {"every_day": ("daily", list(days))}, [note]
     return {"weekday": ("weekdays", weekdays), "weekend": ("weekend", weekend)}, []
+
+
+# What nearly every home has; the kinds of days of a week.
+USUAL_PLACES = ("bathroom", "bedroom", "kitchen", AWAY)
+MUCH_UNKNOWN = 0.05  # share of the time
+
+
+def gaps(timeline: Timeline, days: Sequence[LivedDay]) -> list[str]:
+    """Return what isn't in a log, and what that means for a persona that is fitted to it."""
+    notes = []
+    left_out = len(timeline.minutes) - len(days)
+    if left_out > 2:  # the first and the last
+        notes.append(
+            f"{left_out} of {len(timeline.minutes)} days are left out: the night before or after"
+            " them isn't in the log"
+        )
+    unknown = float(np.mean(timeline.seconds[[day.number for day in days]] < 0)) if days else 0.0
+    if unknown > MUCH_UNKNOWN:
+        notes.append(f"{unknown:.0%} of the time is unknown: what was done before it goes on")
+    for place in USUAL_PLACES:
+        if all(state.place != place for state in timeline.states):
+            where = "out of the home" if place == AWAY else f"in a {place}"
+            notes.append(f"nobody is ever {where} in this log, nor will the persona be")
+    if not any(state.activity and not is_sleep(state) for state in timeline.states):
+        notes.append("activities have no names: postures and furniture follow from rooms alone")
+    return notes
 
 
 def _names(timeline: Timeline) -> list[str]:
@@ -248,15 +304,20 @@ class _Fitter:
         state = max(lasts, key=lambda s: (lasts[s], -s))
         return state, 2 * lasts[state] > sum(lasts.values())
 
-    def recorded(self, days: Sequence[LivedDay]) -> list[str]:
-        """Return days as texts of recorded days."""
+    def recorded(self, days: Sequence[LivedDay]) -> list[RecordedDay]:
+        """Return days as recorded days."""
         by_state: dict[int, list[Stretch]] = defaultdict(list)
         for day in days:
             for run in (*day.awake, *day.up):
                 by_state[run.state].append(run)
         for state, done in sorted(by_state.items()):
             self._add(self.names[state], state, done)
-        return [write_day(_recorded_day(day, self.names)) for day in days]
+        recorded = [_recorded_day(self.timeline, day, self.names) for day in days]
+        used = {name for day in recorded for name in day.activities} - set(self.activities)
+        for name in sorted(used - {"sleep", "rest"}):  # never for most of a minute
+            state = self.names.index(name)
+            self._add(name, state, [Stretch(state, 0, 1)])
+        return recorded
 
     def sleep(self, days: Sequence[LivedDay], *, gets_up: bool) -> None:
         """Describe sleep, and how often and how long the person is up at night."""
@@ -313,20 +374,30 @@ def usual_posture(activity: str) -> str:
     return next((p for p, names in words.items() if any(n in activity for n in names)), "stand")
 
 
-def _recorded_day(day: LivedDay, names: Sequence[str]) -> RecordedDay:
-    """Return a day of a log as a recorded day; in unknown times, the activity before continues."""
-    entries = [(run.begin, names[run.state]) for run in day.awake] or [(day.wake, "rest")]
-    entries[0] = (day.wake, entries[0][1])
-    entries.append((day.bed, "sleep"))
-    for run in day.up:
-        entries += [(run.begin, names[run.state]), (run.begin + run.length, "sleep")]
-    entries = [e for e in dict(entries).items() if e[0] < day.next_wake]
-    last = [e for e in entries if e[0] < day.next_wake - 1]
+def _recorded_day(timeline: Timeline, day: LivedDay, names: Sequence[str]) -> RecordedDay:
+    """Return a day of a log, to the second; in unknown times, the activity before continues."""
+    midnight = day.number * DAY_S
+    wake, bed, next_wake = (60 * minute for minute in (day.wake, day.bed, day.next_wake))
+    flat = timeline.seconds.ravel()
+    awake = flat[midnight + wake : midnight + bed]
+    entries = [(wake + at, names[state]) for state, at, _ in runs(awake) if state >= 0]
+    entries = entries or [(wake, "rest")]
+    entries[0] = (wake, entries[0][1])
+    asleep = sleep_states(timeline)
+    entries.append((bed, "sleep"))
+    for up in day.up:
+        begin, end = 60 * up.begin, 60 * (up.begin + up.length)
+        for state, at, _ in runs(flat[midnight + begin : midnight + end]):
+            if state >= 0:
+                entries.append((begin + at, "sleep" if state in asleep else names[state]))
+        entries.append((end, "sleep"))
+    ordered = sorted(dict(entries).items())
+    last = [entry for entry in ordered if entry[0] < next_wake - 60]
     if last[-1][1] != "sleep":
-        last.append((day.next_wake - 1, "sleep"))
+        last.append((next_wake - 60, "sleep"))
     changes = [e for i, e in enumerate(last) if not i or e[1] != last[i - 1][1]]
     begins, activities = zip(*changes, strict=True)
-    return RecordedDay(tuple(60 * at for at in begins), tuple(activities), 60 * day.next_wake)
+    return RecordedDay(tuple(begins), tuple(activities), next_wake)
 
 
 def _clusters(done: Sequence[tuple[int, Stretch]]) -> list[list[tuple[int, Stretch]]]:
@@ -418,12 +489,13 @@ def _flow(fields: Mapping[str, Any]) -> str:
 
 
 def sample_persona(
-    fitted: FittedPersona, timeline: Timeline, days: int, seed: int = 0
+    fitted: FittedPersona, timeline: Timeline, days: int, seed: int = 0, *, to_second: bool = False
 ) -> tuple[I16, I16]:
-    """Return days drawn from a persona: for each minute a state and a place.
+    """Return days drawn from a persona: for each minute, or second, a state and a place.
 
     Returns:
-        Indices of `timeline.states`, and of `timeline.places`; int16 (days, 1440) each.
+        Indices of `timeline.states`, and of `timeline.places`; int16 (days, 1440) each, or
+        (days, 86400) to the second.
     """
     life = Life(fitted.persona, seed, "fit")
     key = stream_key(seed, "fit", "up at night")
@@ -442,8 +514,10 @@ def sample_persona(
                 place = places.index(activity.fetches_from[0])
                 for first, last in _fetches(activity, episode, Draws(key, ordinal * 1024 + i)):
                     rooms[day * DAY_S + first : day * DAY_S + last] = place
-    sample = slice(DAY_S + 30, (days + 1) * DAY_S + 30, 60)  # the middles of the minutes
-    return states[sample].reshape(-1, DAY_MINUTES), rooms[sample].reshape(-1, DAY_MINUTES)
+    states, rooms = (labels[DAY_S : (days + 1) * DAY_S] for labels in (states, rooms))
+    if to_second:
+        return states.reshape(days, -1), rooms.reshape(days, -1)
+    return by_minute(states, len(timeline.states)), by_minute(rooms, len(places))
 
 
 def _fetches(activity: Activity, episode: Episode, draws: Draws) -> list[tuple[int, int]]:
@@ -461,16 +535,16 @@ def _fetches(activity: Activity, episode: Episode, draws: Draws) -> list[tuple[i
 
 
 def sample_days(labels: I16, days: int, seed: int = 0) -> I16:
-    """Return copies of whole days, drawn with replacement, int16 (days, 1440)."""
+    """Return copies of whole days, drawn with replacement, int16 (days, n)."""
     draws = Draws(stream_key(seed, "fit", "whole days"), 0)
     return labels[[draws.below(len(labels)) for _ in range(days)]]
 
 
 def sample_markov(labels: I16, count: int, days: int, seed: int = 0) -> I16:
-    """Return days of the first-order Markov chain of some days' minutes, int16 (days, 1440).
+    """Return days of the first-order Markov chain of some days' labels, int16 (days, n).
 
-    Its transition probabilities are the relative frequencies of the label in the next minute. The
-    first label is drawn by the frequency of the labels.
+    Its transition probabilities are the relative frequencies of the next label. The first label is
+    drawn by the frequency of the labels.
     """
     follows = np.zeros((count, count), np.int64)
     known = (labels[:, :-1] >= 0) & (labels[:, 1:] >= 0)
@@ -481,12 +555,23 @@ def sample_markov(labels: I16, count: int, days: int, seed: int = 0) -> I16:
             follows[label] = share
     limits: list[list[int]] = follows.cumsum(axis=1).tolist()
     draws = Draws(stream_key(seed, "fit", "markov"), 0)
-    out = np.empty(days * DAY_MINUTES, np.int16)
+    out = np.empty(days * labels.shape[1], np.int16)
     at = bisect_right(share.cumsum().tolist(), draws.below(int(share.sum())))
-    for minute in range(len(out)):
-        out[minute] = at
+    for i in range(len(out)):
+        out[i] = at
         at = bisect_right(limits[at], draws.below(limits[at][-1]))
-    return out.reshape(-1, DAY_MINUTES)
+    return out.reshape(days, -1)
+
+
+def simulated_repeats(fitted: FittedPersona, days: int = 140, seed: int = 0) -> Repeats:
+    """Return how much of its log the simulated days of a persona repeat."""
+    life = Life(fitted.persona, seed, "fit")
+    lived = []
+    for ordinal in range(MONDAY, MONDAY + days):
+        day = life.day(ordinal)
+        names = tuple(episode.activity for episode in day)
+        lived.append(RecordedDay(tuple(e.begin for e in day), names, day[-1].end))
+    return repeats(lived, fitted.log)
 
 
 class Validation(NamedTuple):
@@ -495,31 +580,41 @@ class Validation(NamedTuple):
     Attributes:
         days: The number of days, each held back once.
         folds: The number of parts that were held back in turn.
-        rooms: The distances of rooms, for each model of MODELS.
-        activities: The distances of activities, for each model of MODELS.
+        rooms: The distances of rooms by minutes, for each model of MODELS.
+        activities: The distances of activities by minutes, for each model of MODELS.
+        seconds: The distances of rooms by seconds, for each model of MODELS.
     """
 
     days: int
     folds: int
     rooms: tuple[Distances, ...]
     activities: tuple[Distances, ...]
+    seconds: tuple[Distances, ...]
 
     def worse_than_copying(self) -> list[str]:
         """Return a line for each measure in which the persona is worse than days copied from a log.
 
         The measures compare in which rooms somebody is with the days held back.
         """
-        persona, copies = self.rooms[0], self.rooms[1]
-        keys = {"dwell times (KS)": "ks", "hours": "hours", "time shares": "share"}
+        keys = {
+            "dwell times (KS)": "ks", "hours": "hours", "time shares": "share",
+            "transitions": "transitions",
+        }  # fmt: skip
         return [
-            f"{name} {getattr(persona, key):.3f}, copies {getattr(copies, key):.3f}"
+            f"{name}{unit} {getattr(persona, key):.3f}, copies {getattr(copies, key):.3f}"
+            for unit, (persona, copies, *_) in (("", self.rooms), (" to the second", self.seconds))
             for name, key in keys.items()
             if getattr(persona, key) > getattr(copies, key) + EQUAL
         ]
 
 
 def validate(
-    timeline: Timeline, folds: int = FOLDS, seed: int = 0, *, model: Model = "recorded"
+    timeline: Timeline,
+    folds: int = FOLDS,
+    seed: int = 0,
+    *,
+    model: Model = "recorded",
+    private: bool = False,
 ) -> Validation:
     """Fit a persona to a part of the days and compare it with the others, for each part in turn.
 
@@ -535,35 +630,45 @@ def validate(
             " at least, to hold one back"
         )
     folds = min(folds, len(days))
-    rooms, activities = [], []
+    by_fold = []
     for fold in range(folds):
         held = days[fold::folds]
         rest = [day for day in days if day not in held]
-        of_rooms, of_activities = _fold(timeline, rest, held, seed, model)
-        rooms.append(of_rooms)
-        activities.append(of_activities)
-    return Validation(len(days), folds, _mean(rooms), _mean(activities))
+        by_fold.append(_fold(timeline, rest, held, seed, model, private))
+    return Validation(len(days), folds, *(_mean(found) for found in zip(*by_fold, strict=True)))
 
 
 def _fold(
-    timeline: Timeline, rest: Sequence[LivedDay], held: Sequence[LivedDay], seed: int, model: Model
-) -> tuple[tuple[Distances, ...], tuple[Distances, ...]]:
-    """Return how far the days of each model are from days held back: in rooms, in activities."""
-    fitted = fit_persona(timeline, rest, model=model)
+    timeline: Timeline,
+    rest: Sequence[LivedDay],
+    held: Sequence[LivedDay],
+    seed: int,
+    model: Model,
+    private: bool,
+) -> list[tuple[Distances, ...]]:
+    """Return how far the days of each model are from days held back.
+
+    They are compared in rooms and in activities by minutes, and in rooms by seconds.
+    """
+    fitted = fit_persona(timeline, rest, model=model, private=private)
     states, rooms = sample_persona(fitted, timeline, SAMPLED, seed)
+    rooms_by_second = sample_persona(fitted, timeline, SAMPLED_BY_SECOND, seed, to_second=True)[1]
     rest_days, held_days = ([day.number for day in part] for part in (rest, held))
     place_count, state_count = len(timeline.places), len(timeline.states)
     result = []
-    for sampled, labels, count in (
-        (rooms, timeline.rooms, place_count),
-        (states, timeline.minutes, state_count),
+    for sampled, of_log, places, count, chain_days in (
+        (rooms, timeline.minutes, True, place_count, CHAIN_DAYS),
+        (states, timeline.minutes, False, state_count, CHAIN_DAYS),
+        (rooms_by_second, timeline.seconds, True, place_count, CHAIN_DAYS_BY_SECOND),
     ):
-        real: I16 = labels[held_days]
-        copies = sample_days(labels[rest_days], SAMPLED, seed)
-        chain = sample_markov(labels[rest_days], count, CHAIN_DAYS, seed)
-        models = (sampled, copies, chain, labels[rest_days])
+        real, known = of_log[held_days], of_log[rest_days]
+        if places:
+            real, known = timeline.places_of(real), timeline.places_of(known)
+        copies = sample_days(known, len(sampled), seed)
+        chain = sample_markov(known, count, chain_days, seed)
+        models = (sampled, copies, chain, known)
         result.append(tuple(distances(real, other, count) for other in models))
-    return result[0], result[1]
+    return result
 
 
 def _mean(folds: Sequence[tuple[Distances, ...]]) -> tuple[Distances, ...]:

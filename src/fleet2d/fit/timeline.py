@@ -1,4 +1,4 @@
-"""The days of a log minute by minute, and distances between sets of days."""
+"""The days of a log by minutes and by seconds, and distances between sets of days."""
 
 from collections import Counter
 from dataclasses import dataclass
@@ -40,16 +40,18 @@ class ActivityPlace(NamedTuple):
 
 @dataclass(frozen=True)
 class Timeline:
-    """The state in each minute: that of most of its seconds.
+    """The state in each second, and in each minute: that of most of its seconds.
 
     Attributes:
         states: The states.
         minutes: Index of the state in each minute, -1 if unknown, int16 (days, 1440).
+        seconds: The same of each second, int16 (days, 86400).
         weekdays: Day of the week of each day, 0 = Monday; None if the log has no dates.
     """
 
     states: tuple[ActivityPlace, ...]
     minutes: I16
+    seconds: I16
     weekdays: tuple[int, ...] | None
 
     @property
@@ -60,9 +62,13 @@ class Timeline:
     @property
     def rooms(self) -> I16:
         """Index of the place in each minute, -1 if unknown, int16 (days, 1440)."""
+        return self.places_of(self.minutes)
+
+    def places_of(self, states: I16) -> I16:
+        """Return the indices of the places of some states, -1 where unknown."""
         places = self.places
         index = np.array([places.index(s.place) for s in self.states] + [-1], np.int16)
-        return index[self.minutes]
+        return index[states]
 
 
 def read_timeline(log: ActivityLog) -> Timeline:
@@ -72,15 +78,17 @@ def read_timeline(log: ActivityLog) -> Timeline:
         LogError: The state is unknown for most of the time.
     """
     pairs, seconds = read_seconds(log)
-    minutes = _by_minute(seconds, len(pairs))
-    states, minutes = _without_rare(pairs, _one_per_stay(pairs, minutes))
+    minutes = _one_per_stay(pairs, by_minute(seconds, len(pairs)))
+    seconds = _one_per_stay(pairs, seconds.reshape(-1, DAY_S))
+    states, index = _without_rare(pairs, minutes, seconds)
+    minutes, seconds = index[minutes], index[seconds]
     if np.count_nonzero(minutes >= 0) < minutes.size // 4:
         raise LogError(
             f"{log.path} has no readings for most of its {log.days} days: there is nothing to fit"
         )
     first = log.first_day
     weekdays = tuple((first.weekday() + i) % 7 for i in range(log.days)) if first else None
-    return Timeline(states, minutes, weekdays)
+    return Timeline(states, minutes, seconds, weekdays)
 
 
 def read_seconds(log: ActivityLog) -> tuple[list[ActivityPlace], I16]:
@@ -119,15 +127,27 @@ def _by_second(visits: list[LoggedVisit], count: int) -> tuple[list[ActivityPlac
     return list(index), seconds
 
 
-def _by_minute(seconds: I16, states: int) -> I16:
-    """Return the most frequent state of each minute, the first of equals; unknown counts, too."""
-    by_minute = seconds.reshape(-1, 60)
-    best = np.full(len(by_minute), UNKNOWN_STATE, np.int16)
-    most = (by_minute == UNKNOWN_STATE).sum(axis=1)
+def by_minute(seconds: I16, states: int) -> I16:
+    """Return the most frequent state of each minute, the first of equals; unknown counts, too.
+
+    Args:
+        seconds: Index of the state in each second, -1 if unknown, int16 (whole days,).
+        states: The number of states.
+
+    Returns:
+        int16 (days, 1440).
+    """
+    of_minute = seconds.reshape(-1, 60)
+    best = of_minute[:, 0].copy()
+    changes = np.flatnonzero((of_minute[:, 1:] != of_minute[:, :-1]).any(axis=1))
+    varied = of_minute[changes]
+    found = np.full(len(varied), UNKNOWN_STATE, np.int16)
+    most = (varied == UNKNOWN_STATE).sum(axis=1)
     for state in range(states):
-        count = (by_minute == state).sum(axis=1)
-        best[count > most] = state
+        count = (varied == state).sum(axis=1)
+        found[count > most] = state
         most = np.maximum(most, count)
+    best[changes] = found
     return best.reshape(-1, DAY_MINUTES)
 
 
@@ -136,12 +156,12 @@ def is_sleep(state: ActivityPlace) -> bool:
     return "sleep" in state.activity and not state.activity.startswith("go_to")
 
 
-def _one_per_stay(pairs: list[ActivityPlace], minutes: I16) -> I16:
+def _one_per_stay(pairs: list[ActivityPlace], labels: I16) -> I16:
     """Give every stay in a room the activity with the most time; sleep is a separate stay.
 
     Short activities during a stay, such as washing hands after the toilet, are dropped.
     """
-    flat = minutes.ravel().copy()
+    flat = labels.ravel().copy()
     kinds: dict[tuple[str, bool], int] = {}
     kind = [kinds.setdefault((s.place, is_sleep(s)), len(kinds)) for s in pairs]
     of_state = np.array([*kind, UNKNOWN_STATE], np.int16)
@@ -149,29 +169,34 @@ def _one_per_stay(pairs: list[ActivityPlace], minutes: I16) -> I16:
         if label >= 0:
             stay = flat[begin : begin + length]
             stay[:] = np.argmax(np.bincount(stay, minlength=len(pairs)))
-    return flat.reshape(-1, DAY_MINUTES)
+    return flat.reshape(labels.shape)
 
 
 def _without_rare(
-    pairs: list[ActivityPlace], minutes: I16
+    pairs: list[ActivityPlace], minutes: I16, seconds: I16
 ) -> tuple[tuple[ActivityPlace, ...], I16]:
-    """Return the states that occur, without the names of rare activities, and the minutes."""
+    """Return the states that occur, without the names of rare activities, and their indices.
+
+    Returns:
+        The states, and for each of the pairs, and last for unknown, the index of its state.
+    """
     flat = minutes.ravel()
     firsts = flat[np.append(True, flat[1:] != flat[:-1])]
     run_counts, minute_counts = Counter(firsts.tolist()), Counter(flat.tolist())
+    occur = set(np.unique(seconds).tolist()) | set(minute_counts)
     result: dict[ActivityPlace, int] = {}
     index = np.full(len(pairs) + 1, UNKNOWN_STATE, np.int16)
     for i, state in enumerate(pairs):
-        if not minute_counts[i]:
+        if i not in occur:
             continue
         is_rare = run_counts[i] < RARE_RUNS and minute_counts[i] < RARE_MINUTES
         renamed = ActivityPlace("", state.place) if is_rare else state
         index[i] = result.setdefault(renamed, len(result))
-    return tuple(result), index[minutes]
+    return tuple(result), index
 
 
 def runs(labels: I16) -> list[tuple[int, int, int]]:
-    """Return the runs of equal labels in a row of minutes: label, first minute, length."""
+    """Return the runs of equal labels in a row: label, first index, length."""
     begins = np.flatnonzero(np.append(True, labels[1:] != labels[:-1]))
     ends = np.append(begins[1:], len(labels))
     return list(
@@ -269,16 +294,20 @@ class Distances(NamedTuple):
         hours: The same hour by hour, on average over the hours of a day.
         ks: Largest gap between the distribution functions of the durations of stays, 0 to 1.
         stay_min: Wasserstein distance between those durations [min].
+        transitions: Total variation between the shares of the changes from one label to another.
     """
 
     share: float
     hours: float
     ks: float
     stay_min: float
+    transitions: float
 
 
 def distances(real: I16, other: I16, count: int) -> Distances:
-    """Return the distances between days, labels int16 (days, 1440), -1 where unknown.
+    """Return the distances between days, labels int16 (days, n), -1 where unknown.
+
+    A label is that of a minute (n = 1440) or of a second (n = 86400).
 
     Durations are compared place by place, weighted by the number of stays in the real days. Stays
     that midnight cuts, or of which an end is unknown, are left out in both.
@@ -296,7 +325,18 @@ def distances(real: I16, other: I16, count: int) -> Distances:
         hours=float(np.mean(total_variation(by_hour(real, count), by_hour(other, count)))),
         ks=sum_in_order(len(a) * ks_distance(a, b) for a, b in pairs) / total,
         stay_min=sum_in_order(len(a) * wasserstein(a, b) for a, b in pairs) / total,
+        transitions=float(
+            total_variation(transition_shares(real, count), transition_shares(other, count))
+        ),
     )
+
+
+def transition_shares(labels: I16, count: int) -> F64:
+    """Return the share of each change from one known label to another, float64 (count**2,)."""
+    before, after = labels[:, :-1].ravel(), labels[:, 1:].ravel()
+    changes = np.flatnonzero((before != after) & (before >= 0) & (after >= 0))
+    pairs = before[changes].astype(np.int64) * count + after[changes]
+    return np.bincount(pairs, minlength=count * count) / max(len(pairs), 1)
 
 
 def shares(labels: I16, count: int) -> F64:
@@ -307,12 +347,18 @@ def shares(labels: I16, count: int) -> F64:
 
 def by_hour(labels: I16, count: int) -> F64:
     """Return the shares of the labels in each hour of the day, (24, count)."""
-    hours = labels.reshape(len(labels), HOURS, DAY_MINUTES // HOURS)
+    hours = labels.reshape(len(labels), HOURS, -1)
     return np.stack([shares(hours[:, hour], count) for hour in range(HOURS)])
 
 
 def dwell_times(labels: I16, count: int) -> list[F64]:
-    """Return the durations of the complete stays at each label [min], sorted."""
+    """Return the durations of the complete stays at each label [min], sorted.
+
+    Args:
+        labels: The labels of days, by minutes or by seconds, int16 (days, n).
+        count: The number of labels.
+    """
+    per_minute = labels.shape[1] // DAY_MINUTES
     times: list[list[int]] = [[] for _ in range(count)]
     for day in labels:
         parts = runs(day)
@@ -320,7 +366,7 @@ def dwell_times(labels: I16, count: int) -> list[F64]:
             is_inside = 0 < i < len(parts) - 1
             if label >= 0 and is_inside and min(parts[i - 1][0], parts[i + 1][0]) >= 0:
                 times[label].append(length)
-    return [np.sort(np.array(lengths, np.float64)) for lengths in times]
+    return [np.sort(np.array(lengths, np.float64)) / per_minute for lengths in times]
 
 
 def ks_distance(a: F64, b: F64) -> float:

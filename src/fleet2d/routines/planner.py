@@ -210,7 +210,7 @@ def plan_day(
 CROSSING, REACH_S = 6, 1200
 # An episode that lasts at least this many times the shift ends at its recorded time.
 TAKES_UP = 4
-MIN_EPISODE_S = 30  # minimum duration of an episode
+MIN_EPISODE_S = 30  # minimum duration of an episode that was recorded with at least as much
 END = "end"
 
 
@@ -229,9 +229,9 @@ class RecordedDay(NamedTuple):
 
 
 def parse_day(value: Any) -> RecordedDay:
-    """Read a recorded day: ``06:43 wash, 06:55 breakfast, 22:31 sleep, 30:45 end``.
+    """Read a recorded day: ``06:43 wash, 06:55:20 breakfast, 22:31 sleep, 30:45 end``.
 
-    Hours from 24 on are those of the next date.
+    Hours from 24 on are those of the next date; seconds are left out where they are 0.
 
     >>> parse_day("07:00 wash, 23:00 sleep, 31:10 end").end
     112200
@@ -243,12 +243,14 @@ def parse_day(value: Any) -> RecordedDay:
     times, names = [], []
     for entry in value.split(","):
         time, _, name = entry.strip().partition(" ")
-        hours, colon, minutes = time.partition(":")
-        if not (colon and hours.isdigit() and minutes.isdigit() and name):
+        parts = time.split(":")
+        if len(parts) not in (2, 3) or not (all(map(str.isdigit, parts)) and name):
             raise problem(
                 f"expected a time and an activity like '07:00 wash', got {entry.strip()!r}"
             )
-        times.append(int(hours) * 3600 + int(minutes) * 60)
+        times.append(
+            sum(int(part) * unit for part, unit in zip(parts, (3600, 60, 1), strict=False))
+        )
         names.append(name.strip())
     for before, after in pairwise(times):
         if after <= before:
@@ -269,7 +271,7 @@ def write_day(day: RecordedDay) -> str:
 
 
 def _clock(at: int) -> str:
-    return f"{at // 3600:02}:{at // 60 % 60:02}"
+    return f"{at // 3600:02}:{at // 60 % 60:02}" + (f":{at % 60:02}" if at % 60 else "")
 
 
 AnyRecordedDay = Annotated[
@@ -333,7 +335,8 @@ def draw_recorded(recording: Recording, first: int, draws: Draws, next_wake: int
         over = day.begins[i + 1]
         if shift and over - day.begins[i] >= TAKES_UP * abs(shift):
             shift = 0
-        end = min(max(over + shift, now + MIN_EPISODE_S), next_wake)
+        shortest = min(MIN_EPISODE_S, over - day.begins[i])
+        end = min(max(over + shift, now + shortest), next_wake)
         result.append(Episode(day.activities[i], now, end))
         now = end
         if draws.below(16) < CROSSING:
