@@ -162,7 +162,7 @@ def measure(name: str, plan: Any, peers: str | None) -> Row:
 def measure_points(row: Row, home: Any, pairs: tuple[Any, Any], region: tuple[Any, ...]) -> None:
     """Measure and compare what tells whether a point is visible."""
     from fleet2d.kernels import region_contains_points
-    from fleet2d.sight.line_of_sight import LineOfSight
+    from fleet2d.sight.fov import LineOfSight
     from fleet2d.sight.visibility_polygon import VisibilityPolygon
 
     (eyes, points), lines, walls = pairs, compiled_lines(), walls_of(home.plan)
@@ -192,7 +192,7 @@ def measure_cells(row: Row, home: Any, poses: list[Any]) -> None:
     """Measure and compare what finds the cells in view of a pose."""
     from fleet2d.kernels import cells_in_view
     from fleet2d.sight.flashlight import Flashlight
-    from fleet2d.sight.line_of_sight import LineOfSight
+    from fleet2d.sight.fov import LineOfSight
 
     grid, reach = (home.plan.lattice.rows, home.plan.lattice.columns), reach_in(home)
     flashlight, line = Flashlight(memory_mb=500), LineOfSight()
@@ -287,7 +287,7 @@ def areas_differ(home: Any, poses: list[Any], answer: dict[str, Any]) -> str:
 
 def cells_differ(home: Any, poses: list[Any], answer: dict[str, Any]) -> str:
     """Say how many of the cells that either has in view differ."""
-    from fleet2d.sight.line_of_sight import LineOfSight
+    from fleet2d.sight.fov import LineOfSight
 
     whole, free = reach_in(home)._replace(half_angle=4096), home.plan.free
     off = total = 0

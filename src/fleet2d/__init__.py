@@ -21,7 +21,7 @@ def __getattr__(name: str) -> Any:
     """Import a public name when it is first used."""
     if name not in _MODULES:
         raise AttributeError(f"module 'fleet2d' has no attribute {name!r}")
-    from fleet2d.memory import library_imports
+    from fleet2d.runtime.memory import library_imports
 
     with library_imports():
         value = getattr(import_module(_MODULES[name]), name)

@@ -31,7 +31,7 @@ from fleet2d.artifacts.unfinished import (
 from fleet2d.errors import ArtifactError, RunDirectoryError
 from fleet2d.kernels import encode_arrays
 from fleet2d.runs.run import open_run, open_store
-from fleet2d.storage.journal import FrameWriter, read_frames
+from fleet2d.storage.files import FrameWriter, read_frames
 
 from .tables import EVERY_KIND, part, rows_of_every_kind, stored
 
@@ -350,7 +350,7 @@ def test_a_disk_that_fails_when_the_journal_is_closed_ends_no_run(
 
     assert store._unfinished is not None
     handle = store._unfinished.journal.frames._handle
-    monkeypatch.setattr("fleet2d.storage.journal.os.close", lambda h: (fail if h == handle else close)(h))  # fmt: skip
+    monkeypatch.setattr("fleet2d.storage.files.os.close", lambda h: (fail if h == handle else close)(h))  # fmt: skip
     store.close(status)
     assert status == open_run(tmp_path / "run").status
     UnfinishedRun(tmp_path / "run").lock()  # nobody holds it any more

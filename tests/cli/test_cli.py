@@ -467,7 +467,7 @@ UNUSED = (
     "fleet2d.logs",
     "fleet2d.paper",
     "fleet2d.published",
-    "fleet2d.search",
+    "fleet2d.entities.robots.search",
     "fleet2d.studies",
     "fleet2d.testing",
     "fleet2d.pictures",

@@ -15,8 +15,7 @@ from fleet2d.floorplan.home import Home
 from fleet2d.kernels import U64, Bool, Lenses, Poses, Reach, UserPoses
 from fleet2d.sight.camera import Camera, TableContext, stack_lenses
 from fleet2d.sight.flashlight import Flashlight
-from fleet2d.sight.fov import FieldOfView
-from fleet2d.sight.line_of_sight import LineOfSight
+from fleet2d.sight.fov import FieldOfView, LineOfSight
 from fleet2d.sight.visibility_polygon import VisibilityPolygon
 
 HERE = f"{TESTS.as_posix()}/engine/test_cameras_points"

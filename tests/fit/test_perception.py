@@ -16,8 +16,7 @@ from fleet2d.fit.perception import DetectionLog, calibrate, read_detections
 from fleet2d.kernels import SightingColumn as Column
 from fleet2d.scenario.model import load_scenario
 from fleet2d.sight.camera import Camera, TableContext, error_tables
-from fleet2d.sight.curve import Curve
-from fleet2d.sight.perception import Perception
+from fleet2d.sight.perception import Curve, Perception
 
 
 def test_factors_without_effect_are_left_out_and_named() -> None:

@@ -26,8 +26,7 @@ import fleet2d
 from fleet2d.artifacts.seal import verify_run
 from fleet2d.engine.repeat import reproduce, resume
 from fleet2d.errors import Fleet2DError, RunDirectoryError
-from fleet2d.runs.exporters import exporter
-from fleet2d.runs.records import Selection
+from fleet2d.runs.exporters import Selection, exporter
 from fleet2d.runs.run import open_run
 from fleet2d.viewer.page_data import export_html
 from fleet2d.viewer.report import write_report

@@ -10,7 +10,7 @@ from fleet2d.configuration.components import Component, OneOf, register
 from fleet2d.configuration.units import Duration, InputPath, Length, Share
 from fleet2d.entities.behavior import Behavior
 from fleet2d.entities.drives.differential import Differential
-from fleet2d.sight.line_of_sight import LineOfSight
+from fleet2d.sight.fov import LineOfSight
 
 
 class Plan(Component):

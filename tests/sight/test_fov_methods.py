@@ -18,8 +18,7 @@ from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.rooms.doorways import DoorLine
 from fleet2d.kernels import SUB, Bool, Reach
 from fleet2d.sight.flashlight import Flashlight
-from fleet2d.sight.fov import FieldOfView
-from fleet2d.sight.line_of_sight import LineOfSight
+from fleet2d.sight.fov import FieldOfView, LineOfSight
 from fleet2d.sight.visibility_polygon import VisibilityPolygon
 
 POINTS = 300

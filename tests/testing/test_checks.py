@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from fleet2d import Algorithm, CameraSightings, PerceptionError, RoomDistribution
-from fleet2d.sight.miscalibration import Miscalibration
-from fleet2d.sight.outliers import Outliers
+from fleet2d.sight.perception_error import Miscalibration, Outliers
 from fleet2d.testing import check_algorithm, check_perception_error
 
 SHARED = [0]

@@ -31,8 +31,16 @@ from fleet2d.artifacts.table import (
 )
 from fleet2d.errors import ArtifactError
 from fleet2d.kernels import I64, encode_arrays
-from fleet2d.storage.files import PARTIAL, FolderLock, path_in, replacing, sync_directory
-from fleet2d.storage.journal import FrameWriter, JournalFormat, read_frames
+from fleet2d.storage.files import (
+    PARTIAL,
+    FolderLock,
+    FrameWriter,
+    JournalFormat,
+    path_in,
+    read_frames,
+    replacing,
+    sync_directory,
+)
 
 if TYPE_CHECKING:
     import pyarrow as pa

@@ -11,7 +11,7 @@ import sys
 from typing import Any, NoReturn, TextIO
 
 from fleet2d.errors import Fleet2DError, InputError, ctrl_c_watch
-from fleet2d.memory import keep_free_memory, rare_collections
+from fleet2d.runtime.memory import keep_free_memory, rare_collections
 
 
 def main() -> NoReturn:

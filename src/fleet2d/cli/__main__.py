@@ -18,7 +18,7 @@ from typer.core import TyperGroup
 from typer.main import get_group
 
 from fleet2d import __version__, cli
-from fleet2d.memory import rare_collections
+from fleet2d.runtime.memory import rare_collections
 
 GROUP = "fleet2d.command"
 

@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 import typer
 
 from fleet2d.errors import ArtifactError, RunDirectoryError, blame
-from fleet2d.memory import rare_collections
 from fleet2d.options import file_name, split
+from fleet2d.runtime.memory import rare_collections
 
 if TYPE_CHECKING:
     from fleet2d.engine.simulation import Simulation

@@ -485,9 +485,8 @@ def _import_builtins(kind: str, name: str | None = None) -> None:
     if kind in _COMPLETE or kind not in PACKAGES:
         return
     package = importlib.import_module(PACKAGES[kind])
-    modules = sorted(
-        m.name for m in pkgutil.walk_packages(package.__path__, f"{package.__name__}.")
-    )
+    folders = getattr(package, "__path__", [])  # a module has all components of its kind
+    modules = sorted(m.name for m in pkgutil.walk_packages(folders, f"{package.__name__}."))
     for module in [m for m in modules if name and name.startswith(m.rpartition(".")[2])]:
         importlib.import_module(module)
         if name and _registered(kind, name):

@@ -56,8 +56,7 @@ from fleet2d.sight.camera import (
     of_camera,
     stack_lenses,
 )
-from fleet2d.sight.fov import FieldOfView
-from fleet2d.sight.line_of_sight import LineOfSight
+from fleet2d.sight.fov import FieldOfView, LineOfSight
 from fleet2d.sight.perception import Perception
 
 if TYPE_CHECKING:

@@ -21,8 +21,8 @@ from fleet2d.engine.snapshot import (
 )
 from fleet2d.engine.state import State
 from fleet2d.errors import ArtifactError, RunDirectoryError
-from fleet2d.memory import release_memory
 from fleet2d.runtime.clock import DAY_US, Clock
+from fleet2d.runtime.memory import release_memory
 from fleet2d.storage import files
 
 # Longest wall time between commits of rows [s]; they are also committed every simulated day.

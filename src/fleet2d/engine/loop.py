@@ -24,8 +24,8 @@ from fleet2d.engine.world import EngineWorld
 from fleet2d.entities.behavior import Situation
 from fleet2d.errors import InputError, blame
 from fleet2d.floorplan.home_change import HomeChanges
-from fleet2d.memory import rare_collections
 from fleet2d.runtime.clock import Clock
+from fleet2d.runtime.memory import rare_collections
 
 # Fewer steps are simulated without a handler for Ctrl-C: they end before a user could press it.
 SHORT = 100

@@ -23,8 +23,7 @@ from fleet2d.kernels import (
     in_radians,
 )
 from fleet2d.kernels import SightingColumn as Column
-from fleet2d.sight.curve import Curve
-from fleet2d.sight.perception import Detection, Perception
+from fleet2d.sight.perception import Curve, Detection, Perception
 from fleet2d.sight.perception_error import CameraSightings, ErrorStream, PerceptionError
 
 if TYPE_CHECKING:

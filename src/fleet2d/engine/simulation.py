@@ -47,10 +47,10 @@ from fleet2d.floorplan.home import Home
 from fleet2d.interventions.intervention import ClockTime, Intervention, parse_when
 from fleet2d.interventions.methods import InterventionMethods
 from fleet2d.kernels import in_radians
-from fleet2d.memory import free_bodies, rare_collections
 from fleet2d.runs.run import Run, open_store
 from fleet2d.runtime.clock import Clock, midnight_of
 from fleet2d.runtime.events import Event, EventKind, Listener
+from fleet2d.runtime.memory import free_bodies, rare_collections
 from fleet2d.scenario.model import Scenario, load_scenario
 
 if TYPE_CHECKING:

@@ -12,6 +12,7 @@ from typing import Any
 
 from fleet2d.configuration.problems import did_you_mean, suggest
 from fleet2d.configuration.units import format_duration, micros
+from fleet2d.engine.expectations import possible_details, possible_events
 from fleet2d.engine.intervention_queue import (
     OUTSIDE,
     SCRIPT,
@@ -19,7 +20,6 @@ from fleet2d.engine.intervention_queue import (
     PendingIntervention,
     read_record,
 )
-from fleet2d.engine.possible_events import possible_details, possible_events
 from fleet2d.engine.state import State
 from fleet2d.entities.body import Pose
 from fleet2d.entities.decisions import Arbiter, DecidingActor

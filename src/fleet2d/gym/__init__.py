@@ -10,6 +10,7 @@ with extra("gym", "fleet2d.gym needs gymnasium and pettingzoo"):
     import gymnasium
     import pettingzoo  # noqa: F401
 
+from fleet2d.gym.env import DiscountByTime as DiscountByTime
 from fleet2d.gym.env import RobotEnv as RobotEnv
 from fleet2d.gym.env import RobotLife as RobotLife
 from fleet2d.gym.parallel import RobotsEnv as RobotsEnv
@@ -17,7 +18,6 @@ from fleet2d.gym.task import REWARDS as REWARDS
 from fleet2d.gym.task import LearningTask as LearningTask
 from fleet2d.gym.task import load_task as load_task
 from fleet2d.gym.vector import VectorRobotEnv as VectorRobotEnv
-from fleet2d.gym.wrappers import DiscountByTime as DiscountByTime
 
 for _name in ("Hangout", "Find", "Patrol"):
     gymnasium.register(

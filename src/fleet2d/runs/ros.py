@@ -17,7 +17,7 @@ import numpy as np
 
 from fleet2d.errors import extra
 from fleet2d.kernels import F64, I64, U8
-from fleet2d.runs.records import Chunk, Records
+from fleet2d.runs.exporters import Chunk, Records
 from fleet2d.storage.bags import VISION_TYPES
 
 if TYPE_CHECKING:

@@ -46,9 +46,7 @@ from fleet2d.kernels import (
 )
 from fleet2d.runtime.clock import HOUR_US
 from fleet2d.runtime.determinism import sum_in_order
-from fleet2d.sight.curve import chance, cumulative, decay
-from fleet2d.sight.fov import FieldOfView
-from fleet2d.sight.line_of_sight import LineOfSight
+from fleet2d.sight.fov import FieldOfView, LineOfSight
 from fleet2d.sight.perception import (
     SUM_ERROR,
     Attributes,
@@ -56,6 +54,9 @@ from fleet2d.sight.perception import (
     FalsePositives,
     Identity,
     Perception,
+    chance,
+    cumulative,
+    decay,
 )
 
 # Squares of distances in lattice units stay far inside 64 bits.

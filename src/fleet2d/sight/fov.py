@@ -1,4 +1,4 @@
-"""Fields of view: the region visible from a place, and the base of all methods."""
+"""Fields of view: the region visible from a place, the base of all methods, and lines of sight."""
 
 from abc import abstractmethod
 from functools import cached_property
@@ -7,7 +7,7 @@ from typing import ClassVar, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from fleet2d.configuration.components import Component
+from fleet2d.configuration.components import Component, register
 from fleet2d.errors import PlacementError
 from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.lattice import Lattice
@@ -20,6 +20,7 @@ from fleet2d.kernels import (
     Mesh,
     Reach,
     points_in_reach,
+    points_in_sight,
     region_contains_points,
     region_outline,
 )
@@ -122,7 +123,7 @@ class FieldOfView(Component):
 
     Example:
         >>> import fleet2d
-        >>> from fleet2d.sight.line_of_sight import LineOfSight
+        >>> from fleet2d.sight.fov import LineOfSight
         >>> home = fleet2d.Home(fleet2d.load_floorplan())
         >>> x, y = home.plan.lattice.to_lattice(home.rooms[0].anchor_xy).tolist()
         >>> reach = Reach(near_squared=0, far_squared=5000**2, half_angle=1024)
@@ -174,3 +175,16 @@ class FieldOfView(Component):
         rows, columns = np.indices((lattice.rows, lattice.columns))
         centres = np.stack([columns.ravel(), rows.ravel()], axis=1) * SUB + CELL_CENTRE
         return self.sees(home, x, y, heading, reach, centres.astype(np.int64)).reshape(rows.shape)
+
+
+@register("sight", "line_of_sight")
+class LineOfSight(FieldOfView):
+    """Follow the line to each point through the home, without a cache.
+
+    This is the default: robots look at a few people at a time from ever new places, and a line
+    costs a twentieth of a microsecond, less than a lookup in a cache.
+    """
+
+    def visible(self, home: Home, x: int, y: int, points: I64) -> Bool:
+        """Return which points have a line of sight to (x, y)."""
+        return points_in_sight(home.walls, x, y, points)

@@ -19,7 +19,7 @@ from types import ModuleType
 from typing import Any, Generic, Protocol, TypeVar
 
 from fleet2d.errors import InputError
-from fleet2d.memory import rare_collections
+from fleet2d.runtime.memory import rare_collections
 from fleet2d.studies.simulator import peak_rss_mb
 
 TASKS_PER_WORKER = 2  # tasks of a worker: one runs, one waits, so that it is never idle

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fleet2d.artifacts.manifest import plain
-from fleet2d.storage.journal import Frame, FrameWriter, JournalFormat, read_frames
+from fleet2d.storage.files import Frame, FrameWriter, JournalFormat, read_frames
 from fleet2d.studies.executors import WorkerTask
 from fleet2d.studies.simulator import VariantOutcome
 from fleet2d.studies.storage import DAMAGE, damaged, write_error

@@ -18,9 +18,8 @@ from tests.scenes import path, run
 import fleet2d
 from fleet2d import Algorithm
 from fleet2d.entities.robots.find import Sites
+from fleet2d.entities.robots.search import SearchProblem, exact, order_by, play
 from fleet2d.errors import InputError
-from fleet2d.search.policies import exact, order_by
-from fleet2d.search.problem import SearchProblem, play
 
 POLICIES = ["random", "nearest", "likeliest", "greedy", "exact", "receding"]
 OUT = {"type": "schedule", "days": [{"items": [{"at": "00:00", "away": True}]}]}

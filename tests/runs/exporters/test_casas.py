@@ -9,8 +9,8 @@ from tests.scenes import run, scenario
 
 from fleet2d.errors import RunDirectoryError
 from fleet2d.logs.layouts import casas
+from fleet2d.runs.exporters import Selection
 from fleet2d.runs.exporters.casas import export
-from fleet2d.runs.records import Selection
 
 
 def test_file_has_a_line_per_reading_in_the_columns_of_casas(plan: str, tmp_path: Path) -> None:  # noqa: F811

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 import fleet2d
-from fleet2d.runs import records
+from fleet2d.runs import exporters
 
 
 def ways(path: Path) -> list[tuple[str, str, str, int]]:
@@ -24,7 +24,7 @@ def test_ways_do_not_end_where_chunks_do(
 ) -> None:
     run = fleet2d.run("simulation.duration=10 min", "simulation.start=2026-01-05T07:00", seed=4)
     fleet2d.export(run, tmp_path / "whole.geojson")
-    monkeypatch.setattr(records, "MAX_POSES", size)
+    monkeypatch.setattr(exporters, "MAX_POSES", size)
 
     fleet2d.export(run, tmp_path / "parts.geojson")
 

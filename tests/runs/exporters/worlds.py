@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 import fleet2d
-from fleet2d.runs.records import Selection
+from fleet2d.runs.exporters import Selection
 from fleet2d.runs.run import Run
 
 FIRST, END, EVERY = 6 * 3600, 10 * 3600, timedelta(seconds=30)

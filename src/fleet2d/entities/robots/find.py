@@ -30,12 +30,18 @@ from fleet2d.entities.robots.approach import (
     viewpoints_of,
     way_seconds,
 )
+from fleet2d.entities.robots.search import (
+    MAX_EXACT_SITES,
+    Policy,
+    SearchProblem,
+    after_empty_looks,
+    order_by,
+    search_problem,
+)
 from fleet2d.errors import PlacementError
 from fleet2d.kernels import F64, TURN
 from fleet2d.runtime.clock import midnight_of
 from fleet2d.runtime.determinism import sum_in_order
-from fleet2d.search.policies import MAX_EXACT_SITES, Policy, after_empty_looks, order_by
-from fleet2d.search.problem import SearchProblem, search_problem
 
 # The part of a room to be shown by its viewpoints, if there are few enough of them.
 SHARE_TO_SHOW = 0.9
@@ -151,8 +157,9 @@ class Find(BeliefBehavior):
 
     A site is a room, with enough viewpoints that little of it stays out of view. The `policy`
     chooses the order of the sites by the probabilities of `source` for the present time, and by
-    travel times: see :mod:`fleet2d.search.policies`. `receding` decides again after every empty
-    look, by the remaining probabilities; the others decide once, when the search begins.
+    travel times: see :mod:`fleet2d.entities.robots.search`. `receding` decides again after
+    every empty look, by the remaining probabilities; the others decide once, when the search
+    begins.
 
     The person is found when the cameras perceive somebody as that person, who may be somebody else
     whom they mistake for the person. On a command to find somebody, the robot begins at once, or as

@@ -188,8 +188,8 @@ class WaitingPoses:
         return self._ways[1]
 
 
-class Ways(NamedTuple):
-    """The ways from where a robot is.
+class TravelTimes(NamedTuple):
+    """How far the rooms are from where a robot is.
 
     Attributes:
         seconds: How long each takes [s], float64 (places,); inf for none.
@@ -310,7 +310,7 @@ class Policy(BeliefBehavior):
         self._tally = dict.fromkeys(TALLIED, 0.0)
         self._fixed = self._describe_home(actor)
         self._shown = Shown.of(self.names, self.user)
-        self._from_here = Ways(np.zeros(0), np.zeros(0), np.zeros(0, np.bool_))
+        self._from_here = TravelTimes(np.zeros(0), np.zeros(0), np.zeros(0, np.bool_))
 
     # What it knows
 
@@ -359,7 +359,7 @@ class Policy(BeliefBehavior):
         """Return which actions are possible, bool (rooms + 1,): rooms with a way, and to rest."""
         return self._ways(now).mask
 
-    def _ways(self, now: Situation) -> "Ways":
+    def _ways(self, now: Situation) -> "TravelTimes":
         """Return the ways from where the robot is."""
         seconds = self.poses.seconds()
         if self._from_here.seconds is not seconds:  # as long as it stays, it is the same array
@@ -367,7 +367,7 @@ class Policy(BeliefBehavior):
             mask[self.poses.index] = np.isfinite(seconds)
             mask[-1] = True
             share = np.minimum(seconds, LONGEST_WAY_S) / LONGEST_WAY_S
-            self._from_here = Ways(seconds, share, read_only(mask))
+            self._from_here = TravelTimes(seconds, share, read_only(mask))
         return self._from_here
 
     def _describe_home(self, actor: Actor) -> F32:

@@ -3,8 +3,7 @@
 from pathlib import Path
 from typing import Any
 
-from fleet2d.runs.exporters import new_file
-from fleet2d.runs.records import Records, Selection
+from fleet2d.runs.exporters import Records, Selection, new_file
 from fleet2d.runs.run import Run
 from fleet2d.runs.trajectory import Trajectory
 

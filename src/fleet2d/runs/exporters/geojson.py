@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 
 from fleet2d.floorplan.formats.geojson import geojson_document
-from fleet2d.runs.exporters import new_file
-from fleet2d.runs.records import Records, Selection
+from fleet2d.runs.exporters import Records, Selection, new_file
 from fleet2d.runs.run import Run
 from fleet2d.runs.trajectory import Trajectory
 

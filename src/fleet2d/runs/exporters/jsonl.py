@@ -6,8 +6,7 @@ from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
-from fleet2d.runs.exporters import new_file
-from fleet2d.runs.records import Chunk, Records, Selection
+from fleet2d.runs.exporters import Chunk, Records, Selection, new_file
 from fleet2d.runs.run import Run
 
 

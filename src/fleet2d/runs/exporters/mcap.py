@@ -11,8 +11,7 @@ from typing import BinaryIO, NamedTuple
 import numpy as np
 
 from fleet2d.kernels import I64, U8
-from fleet2d.runs.exporters import new_file
-from fleet2d.runs.records import Records, Selection
+from fleet2d.runs.exporters import Records, Selection, new_file
 from fleet2d.runs.ros import Block, RosMessages, Topic
 from fleet2d.runs.run import Run
 

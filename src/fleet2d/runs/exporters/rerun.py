@@ -8,8 +8,7 @@ import numpy as np
 from fleet2d.errors import RunDirectoryError, extra
 from fleet2d.kernels import I64, Bool
 from fleet2d.palette import WALL_COLOR, body_color, deep_color
-from fleet2d.runs.exporters import new_file
-from fleet2d.runs.records import Chunk, Records, Selection
+from fleet2d.runs.exporters import Chunk, Records, Selection, new_file
 from fleet2d.runs.run import Run
 from fleet2d.runs.trajectory import Trajectory
 

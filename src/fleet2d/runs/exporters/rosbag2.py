@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from fleet2d.errors import RunDirectoryError, extra
-from fleet2d.runs.records import Records, Selection
+from fleet2d.runs.exporters import Records, Selection
 from fleet2d.runs.ros import RosMessages
 from fleet2d.runs.run import Run
 

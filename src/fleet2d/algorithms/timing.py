@@ -1,20 +1,23 @@
-"""The algorithm `timing`, its output, and the base of its policies."""
+"""When to address whom: the algorithm `timing`, its output, and its policies."""
 
+import math
 from collections.abc import Mapping, Sequence
 from datetime import datetime, timedelta
 from typing import Annotated, Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
 from fleet2d.algorithms.algorithm import Algorithm, Present
 from fleet2d.algorithms.history import History
 from fleet2d.configuration.components import Component, OneOf, register
-from fleet2d.configuration.units import PositiveDuration
+from fleet2d.configuration.units import PositiveDuration, Share
 from fleet2d.errors import ComponentError
 from fleet2d.floorplan.home import Home
 from fleet2d.interactions.interaction import Outcome
 from fleet2d.kernels import F64
+from fleet2d.runtime.determinism import logistic
 
 HOURS = 24
 OUTCOMES = frozenset(str(outcome) for outcome in Outcome)
@@ -161,3 +164,116 @@ class TimingAlgorithm(Algorithm):
         policy = self.policies[asked.user, asked.name]
         policy.learn(asked._replace(was_accepted=was_accepted))
         return True
+
+
+@register("timing_policy", "fixed_times")
+class FixedTimes(TimingPolicy):
+    """Address people in some hours, in any room.
+
+    Attributes:
+        hours: The hours of the day, 0 to 23; left out: all.
+    """
+
+    hours: tuple[int, ...] = Field(default=tuple(range(HOURS)))
+
+    def chances(self) -> F64:
+        """Return 1 in these hours, else 0."""
+        chances = np.zeros((HOURS, self.rooms))
+        chances[list(self.hours)] = 1
+        return chances
+
+
+@register("timing_policy", "logistic")
+class LogisticTiming(TimingPolicy):
+    """Ask where the probability of a yes, by logistic regression, is high enough.
+
+    Without exploration it is greedy: an hour with an unlucky first answer is never tried again, so
+    that it never learns better.
+
+    Attributes:
+        ask_at: Minimum probability of a yes at which it asks.
+        explore: Probability of asking nevertheless.
+        rate: Learning rate of the gradient steps.
+    """
+
+    ask_at: Share = 0.5
+    explore: Share = 0.0
+    rate: float = Field(default=0.5, gt=0, le=10)
+
+    def start(self, rooms: int) -> None:
+        """Begin with even odds, slightly in favor."""
+        super().start(rooms)
+        self.base, self.by_hour, self.by_room = 0.5, np.zeros(HOURS), np.zeros(rooms)
+
+    def _logit(self, hour: int, room: int) -> float:
+        by_room = float(self.by_room[room]) if room >= 0 else 0.0
+        return float(self.base) + float(self.by_hour[hour]) + by_room
+
+    def learn(self, asked: Asked) -> None:
+        """Make a step along the gradient of the log likelihood; neighboring hours share half."""
+        step = self.rate * (asked.was_accepted - logistic(self._logit(asked.hour, asked.room)))
+        self.base += step / 4
+        for hour, part in ((-1, 0.5), (0, 1.0), (1, 0.5)):
+            self.by_hour[(asked.hour + hour) % HOURS] += part * step
+        if asked.room >= 0:
+            self.by_room[asked.room] += step
+
+    def chances(self) -> F64:
+        """Return 1 where a yes is likely, else the probability of exploring."""
+        likely = [
+            [logistic(self._logit(hour, room)) >= self.ask_at for room in range(self.rooms)]
+            for hour in range(HOURS)
+        ]
+        return np.where(likely, 1.0, self.explore)
+
+
+@register("timing_policy", "thompson")
+class ThompsonTiming(TimingPolicy):
+    """Ask with the probability that a yes is likelier than usual, given the answers so far.
+
+    A contextual bandit with probability matching (Thompson 1933): where little is known, that
+    probability is near a half, so that it explores; it stops where the answers are clear. The
+    rate of yes in a cell of hours and rooms is a beta variable, whose distribution is approximated
+    by a logistic one; each answer counts in neighboring hours, and in other rooms, by a part.
+
+    Attributes:
+        ask_at: Minimum probability of a yes that is worth asking; null: the share of yeses so
+            far, so that it asks at the better times of the day.
+        min_chance: Minimum probability of asking anywhere: off-policy estimates need one above 0.
+        prior: Number of imagined answers, at even odds.
+    """
+
+    ask_at: Share | None = 0.5
+    min_chance: Share = 0.02
+    prior: float = Field(default=2.0, gt=0)
+
+    def start(self, rooms: int) -> None:
+        """Begin with imagined answers only."""
+        super().start(rooms)
+        self.answers = [0.6 * self.prior, self.prior]  # yeses, and all
+        self.yes = np.full((HOURS, rooms), self.prior * 0.6)
+        self.no = np.full((HOURS, rooms), self.prior * 0.4)
+
+    def learn(self, asked: Asked) -> None:
+        """Count an answer, and less of it near by."""
+        self.answers[0] += asked.was_accepted
+        self.answers[1] += 1
+        counts = self.yes if asked.was_accepted else self.no
+        for hour, near in ((-2, 0.25), (-1, 0.5), (0, 1.0), (1, 0.5), (2, 0.25)):
+            row = counts[(asked.hour + hour) % HOURS]
+            row += 0.3 * near
+            if asked.room >= 0:
+                row[asked.room] += 0.7 * near
+
+    def chances(self) -> F64:
+        """Return the probability that the rate of yes is above `ask_at`."""
+        ask_at = self.answers[0] / self.answers[1] if self.ask_at is None else self.ask_at
+        chances = np.empty((HOURS, self.rooms))
+        for hour in range(HOURS):
+            for room in range(self.rooms):
+                yes, no = float(self.yes[hour, room]), float(self.no[hour, room])
+                total = yes + no
+                spread = math.sqrt(yes * no / (total * total * (total + 1)))
+                above = logistic(1.7 * (yes / total - ask_at) / spread)
+                chances[hour, room] = max(self.min_chance, min(above, 1.0))
+        return chances

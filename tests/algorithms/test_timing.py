@@ -8,10 +8,13 @@ from tests.entities.robots.test_interact import PILL, ana, events_of, home
 from tests.scenes import digests, table
 
 import fleet2d
-from fleet2d.algorithms.timing.fixed_times import FixedTimes
-from fleet2d.algorithms.timing.logistic import LogisticTiming
-from fleet2d.algorithms.timing.thompson import ThompsonTiming
-from fleet2d.algorithms.timing.timing import Asked, TimingPolicy
+from fleet2d.algorithms.timing import (
+    Asked,
+    FixedTimes,
+    LogisticTiming,
+    ThompsonTiming,
+    TimingPolicy,
+)
 
 ROOMS, KITCHEN, BEDROOM = 3, 0, 1
 

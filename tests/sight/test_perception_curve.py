@@ -13,7 +13,7 @@ from pydantic import ValidationError
 from tests.strategies import quick
 
 from fleet2d.kernels import ONE
-from fleet2d.sight.curve import Curve, chance, cumulative, decay
+from fleet2d.sight.perception import Curve, chance, cumulative, decay
 
 SHARE = st.floats(0, 1)
 PLACES = st.lists(st.floats(-50, 50), min_size=1, max_size=6, unique=True).map(sorted)

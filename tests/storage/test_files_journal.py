@@ -7,7 +7,7 @@ import pytest
 
 from fleet2d.errors import ArtifactError
 from fleet2d.storage import files
-from fleet2d.storage.journal import FrameWriter, JournalFormat, read_frames
+from fleet2d.storage.files import FrameWriter, JournalFormat, read_frames
 
 NOTES = JournalFormat(b"notes 1\n", ("note", "end"))
 

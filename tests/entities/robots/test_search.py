@@ -9,19 +9,22 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.thorough import examples
 
-from fleet2d.runtime.determinism import Draws, stream_key
-from fleet2d.search.policies import (
+from fleet2d.entities.robots.search import (
     MAX_EXACT_SITES,
+    SearchProblem,
     after_empty_looks,
+    clairvoyant_time,
     exact,
     greedy,
     likeliest_first,
     nearest_first,
     order_by,
+    play,
     random_order,
     receding,
+    search_problem,
 )
-from fleet2d.search.problem import SearchProblem, clairvoyant_time, play, search_problem
+from fleet2d.runtime.determinism import Draws, stream_key
 
 DRAWS = Draws(stream_key(4, "robots.astro", "order"), 0)
 HEURISTICS = (nearest_first, likeliest_first, greedy, receding)

@@ -14,7 +14,7 @@ from tests.scenes import scenario
 import fleet2d
 from fleet2d.entities.behavior import Actor
 from fleet2d.entities.plan import Plan
-from fleet2d.memory import OBJECTS, library_imports, rare_collections, release_memory
+from fleet2d.runtime.memory import OBJECTS, library_imports, rare_collections, release_memory
 
 PATROL = {"astro": {"type": "patrol", "dwell": "1 min"}}
 
@@ -101,7 +101,7 @@ def test_memory_of_freed_arrays_is_used_again_without_new_pages() -> None:
     code = """
 import resource, sys
 import numpy as np
-from fleet2d.memory import keep_free_memory
+from fleet2d.runtime.memory import keep_free_memory
 if sys.argv[1] == "keep":
     keep_free_memory()
 faults = [resource.getrusage(resource.RUSAGE_SELF).ru_minflt for _ in range(2) if np.ones(2_500_000).all()]

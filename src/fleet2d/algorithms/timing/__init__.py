@@ -1,1 +1,0 @@
-"""Timing: when and where a person welcomes what, learned from answers alone."""

@@ -1,1 +1,0 @@
-"""Search: orders in which to look for a person, as functions of probabilities and distances."""
