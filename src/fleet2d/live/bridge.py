@@ -4,11 +4,14 @@ What arrives becomes an intervention at the next step, so that the manifest repe
 late, lost, wrong or too much is counted and told, and never stops the run.
 """
 
+import gc
 import json
 import queue
+import sys
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from datetime import datetime
 from functools import cached_property
@@ -28,6 +31,12 @@ from fleet2d.live.messages import (
 from fleet2d.runs.run import Run
 from fleet2d.runtime.events import Event
 
+# A wait ends so long before a step, and the rest is spent awake: a busy machine wakes late [s]. Of
+# short steps it is this share.
+LEAD_S = 0.003
+LEAD_SHARE = 0.01
+# How long another thread may keep this one from going on [s]. Python's 5 ms are late for a step.
+SWITCH_S = 0.0005
 # A body that gets poses stands when nothing arrived for so long [s].
 SILENCE_S = 5.0
 # A message that was sent longer ago is late, and left out [s].
@@ -167,7 +176,8 @@ class Bridge:
             peer.open(simulation, self._post_of(number))
         status = "complete"
         try:
-            self._simulate()
+            with _prompt_threads():
+                self._simulate()
         except KeyboardInterrupt:
             status = "interrupted"
         finally:
@@ -199,13 +209,14 @@ class Bridge:
         while not simulation.done:
             if self.speed:
                 due = began + (simulation.step - first) * step_s / self.speed
-                while (ahead := due - time.monotonic()) > 0:
-                    time.sleep(min(ahead, 0.1))
+                _wait(due, min(LEAD_S, LEAD_SHARE * step_s / self.speed))
                 self.lateness_s.append(time.monotonic() - due)
             self._apply(self._received())
             self._stop_the_silent()
             simulation.advance()
             self._send()
+            if self.speed:
+                gc.collect()  # now, and not when a step is due
 
     # What arrives
 
@@ -320,6 +331,30 @@ class Bridge:
         frame = LiveStep(step, simulation.clock.time(step), bodies, events, rows)
         for peer in self.peers:
             peer.send(frame)
+
+
+def _wait(until: float, lead_s: float) -> None:
+    """Wait until a time of the machine's clock, the last `lead_s` of it awake."""
+    while (ahead := until - time.monotonic()) > 0:
+        if ahead > lead_s:
+            time.sleep(min(ahead - lead_s, 0.1))
+
+
+@contextmanager
+def _prompt_threads() -> Iterator[None]:
+    """Let neither other threads nor garbage collection hold this one up for long."""
+    interval, was_enabled = sys.getswitchinterval(), gc.isenabled()
+    sys.setswitchinterval(SWITCH_S)
+    gc.collect()
+    gc.freeze()  # what is there stays to the end: looking through it takes 0.1 s
+    gc.disable()
+    try:
+        yield
+    finally:
+        sys.setswitchinterval(interval)
+        gc.unfreeze()
+        if was_enabled:
+            gc.enable()
 
 
 def _acts_of(message: LiveMessage) -> Iterator[dict[str, Any]]:
