@@ -106,6 +106,34 @@ def test_a_room_named_twice_is_visited_once_a_round() -> None:
     assert ["kitchen_0", "bedroom_0"] * 2 == names[:4]
 
 
+def bent(**fields: Any) -> dict[str, Any]:
+    """A synthetic home in which a bed is out of view from the middle of its room."""
+    return {
+        **scenario("5 min"),
+        "floorplan": {"type": "synthetic", "seed": 1, "furnish": True},
+        "robots": {
+            "astro": {"camera": {"range": [0.3, 4.5]}, "behaviors": [{"type": "patrol", **fields}]}
+        },
+    }
+
+
+def test_a_patrol_says_which_places_it_never_sees_and_stops_where_it_does() -> None:
+    """In one of forty homes presence erred by a third: the bed was never in view."""
+    by_middle = fleet2d.Simulation(bent()).actors["astro"]
+    (note,) = by_middle.notes
+    assert "bedroom_4 (29% of its places: bed_4, nightstand_8)" in note
+    assert "stop_at: view" in note
+    by_view = fleet2d.Simulation(bent(stop_at="view")).actors["astro"]
+    assert [] == by_view.notes
+    assert len(by_view.behaviors[0].stops) >= len(by_middle.behaviors[0].stops)
+
+
+def test_a_robot_that_also_does_something_else_is_not_warned() -> None:
+    content = bent()
+    content["robots"]["astro"]["behaviors"].append({"type": "hangout"})
+    assert [] == fleet2d.Simulation(content).actors["astro"].notes
+
+
 def test_a_round_that_takes_no_time_does_not_hang_the_run() -> None:
     content = patrol("1 min", waypoints=[[1.0, 3.0]], dwell=0, look_around=False)
     assert 60 == run(content).manifest["steps"]

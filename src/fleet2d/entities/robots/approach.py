@@ -1,6 +1,7 @@
 """What behaviors toward people share: where a person likely is, where to look, how near to come."""
 
 import math
+from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -135,11 +136,17 @@ def viewpoints_of(actor: Actor, room: Room, enough: float, most: int) -> Viewpoi
 
 
 def _choose_viewpoints(actor: Actor, room: Room, enough: float, most: int) -> Viewpoints:
-    plan = actor.home.plan
+    targets = spread(np.argwhere(actor.home.plan.room_of_cell == room.index), MAX_TARGET_CELLS)
+    points, seen = _cover(actor, room, centres(targets), enough, most)
+    return Viewpoints(points, seen) if points else Viewpoints((actor.middle(room),), 0.0)
+
+
+def _cover(
+    actor: Actor, room: Room, goals: I64, enough: float, most: int
+) -> tuple[tuple[tuple[int, int], ...], float]:
+    """Choose points in a room, greedily, from which goals (n, 2) are seen; return their share."""
     stands = spread(actor.space.cells(room.index, actor.part), MAX_VIEWPOINT_CELLS)
-    targets = spread(np.argwhere(plan.room_of_cell == room.index), MAX_TARGET_CELLS)
     places = np.concatenate([[actor.middle(room)], centres(stands)])
-    goals = centres(targets)
     visible = np.array([visible_from(actor, place, goals) for place in places])
     points: list[tuple[int, int]] = []
     unseen = np.ones(len(goals), np.bool_)
@@ -150,9 +157,65 @@ def _choose_viewpoints(actor: Actor, room: Room, enough: float, most: int) -> Vi
             break
         points.append((int(places[best, 0]), int(places[best, 1])))
         unseen &= ~visible[best]
-    if not points:
-        return Viewpoints((actor.middle(room),), 0.0)
-    return Viewpoints(tuple(points), 1 - float(unseen.sum()) / len(goals))
+    return tuple(points), 1 - float(unseen.sum()) / len(goals)
+
+
+# The part of a room without furniture to be seen, and the maximum number of stops in a room.
+FLOOR_TO_SEE, MOST_STOPS = 0.95, 4
+
+
+def places_to_see(actor: Actor, room: Room) -> tuple[list[str], I64]:
+    """Return where people usually are in a room: at its furniture, else anywhere.
+
+    Returns:
+        The names of the furniture, of each point; and the points [lattice], int64 (n, 2). In a
+        room without furniture that is used there are no names, and points all over the floor.
+    """
+    home, plan = actor.home, actor.home.plan
+    uses = [
+        (thing.name, (use.x, use.y))
+        for thing in home.objects
+        for use in thing.uses
+        if thing.type != "charger" and plan.room_at(use.x, use.y) == plan.rooms[room.index]
+    ]
+    if uses:
+        return [name for name, _ in uses], plan.lattice.to_lattice([at for _, at in uses])
+    cells = spread(np.argwhere(plan.room_of_cell == room.index), MAX_TARGET_CELLS)
+    return [], centres(cells)
+
+
+def stops_with_view(actor: Actor, room: Room) -> tuple[tuple[int, int], ...]:
+    """Return the stops in a room from which its places are seen: the middle first, if that helps.
+
+    Walls and tall furniture count as they are at present.
+    """
+    names, goals = places_to_see(actor, room)
+    enough = 1.0 if names else FLOOR_TO_SEE
+    key = "stops", actor.home.walls, actor.home.objects, actor.space, actor.part, sight_range(actor)
+    points, _ = actor.home.cached(
+        (*key, room.index), lambda: _cover(actor, room, goals, enough, MOST_STOPS)
+    )
+    return points or (actor.middle(room),)
+
+
+def unwatched(actor: Actor, stops: Sequence[tuple[int, int]]) -> list[str]:
+    """Return what is never in view of a body that looks round at some stops, by room.
+
+    A line has the room, and its furniture that is out of view; or, of a room without furniture,
+    the share of the floor, if it is more than half.
+    """
+    lines = []
+    for room in actor.home.rooms:
+        names, goals = places_to_see(actor, room)
+        seen = np.zeros(len(goals), np.bool_)
+        for stop in stops:
+            seen |= visible_from(actor, np.array(stop), goals)
+        if names and not seen.all():
+            hidden = list(dict.fromkeys(names[i] for i in np.flatnonzero(~seen)))
+            lines.append(f"{room.name} ({np.mean(~seen):.0%} of its places: {', '.join(hidden)})")
+        elif not names and np.mean(seen) < 1 / 2:
+            lines.append(f"{room.name} ({np.mean(~seen):.0%} of its floor)")
+    return lines
 
 
 def visible_from(actor: Actor, place: I64, goals: I64) -> Bool:
