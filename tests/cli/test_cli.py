@@ -18,6 +18,7 @@ import yaml
 from tests.scenes import Cli, every_step, everything, flat_path, fleet2d_process, scenario
 
 import fleet2d as package
+from fleet2d.cli import main
 from fleet2d.configuration import components
 from fleet2d.configuration.documents import read_document
 from fleet2d.scenario.compose import bundled_path
@@ -478,6 +479,22 @@ USED = {
     "annotated_doc", "annotated_types", "cloudpickle", "cython_runtime", "numpy", "pyarrow", "pydantic", "pydantic_core", "shapely",
     "shellingham", "typer", "typing_extensions", "typing_inspection", "yaml",
 }  # fmt: skip
+
+
+def test_file_that_can_not_be_written_is_one_line(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    def fail(**_: object) -> None:
+        (tmp_path / "missing" / "table.csv").write_text("")
+
+    monkeypatch.setattr("fleet2d.cli.__main__.app", fail)
+
+    with pytest.raises(SystemExit) as end:
+        main()
+
+    expected = f"error: {tmp_path}/missing/table.csv can't be read or written: No such file"
+    assert 1 == end.value.code
+    assert capsys.readouterr().err.startswith(expected)
 
 
 def test_run_imports_only_what_its_scenario_needs(tmp_path: Path) -> None:

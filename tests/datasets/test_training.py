@@ -108,3 +108,14 @@ def test_a_data_set_trains_weights_that_a_run_uses(
     assert 0 == code, err
     for word in ("rtp (", "tuned ", "next_room (", "time_to_return (", "activity (", "ltp ("):
         assert word in out
+
+
+def test_weights_that_could_not_be_written_are_refused_before_training(
+    data: Dataset, tmp_path: Path, fleet2d: Cli
+) -> None:
+    code, _, err = fleet2d(
+        "train", "rtp", "--on", str(data.root), "--out", str(tmp_path / "x/own.npz")
+    )
+
+    assert code == 2
+    assert err == f"error: --out {tmp_path}/x/own.npz: there is no folder {tmp_path}/x\n"

@@ -37,9 +37,14 @@ def main() -> NoReturn:
         code = 2 if isinstance(error, InputError) else 1
     except KeyboardInterrupt:
         code = 130
-    except OSError:
+    except OSError as error:
         if not output_problem():
-            raise
+            if error.filename is None:
+                raise
+            sys.stderr.write(
+                f"error: {error.filename} can't be read or written: {error.strerror}\n"
+            )
+            code = 1
     if problem := output_problem():
         if not code:
             sys.stderr.write(f"error: the output can't be written ({problem})\n")

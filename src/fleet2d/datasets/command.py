@@ -48,7 +48,7 @@ def dataset(
             raise typer.Exit(1)
     size = sum(file["bytes"] for file in made.manifest["files"].values())
     runs = ", ".join(f"{name} {count}" for name, count in made.manifest["splits"].items())
-    typer.echo(f"{out}: {runs} runs, {size / 1e6:.1f} MB")
+    typer.echo(f"{out}: {runs} runs, {size / 1e6:.2f} MB")
 
 
 @training.command()
@@ -67,6 +67,8 @@ def rtp(
     from fleet2d.algorithms.presence.learned import Weights, shipped_weights
     from fleet2d.datasets.training import TrainingSettings, fine_tune, train
 
+    if not out.absolute().parent.is_dir():
+        raise InputError(f"--out {out}: there is no folder {out.absolute().parent}")
     began = time.process_time()
     train_on, check_on = _windows(on)
     weights: Weights | None = None

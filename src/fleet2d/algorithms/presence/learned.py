@@ -28,6 +28,7 @@ from fleet2d.kernels import (
     trace_evidence,
     trace_size,
 )
+from fleet2d.storage.files import partial_file
 
 WEIGHTS = Path(__file__).with_name("learned.npz")
 FORMAT = "fleet2d presence network 1"  # changes with the features, and with the network
@@ -149,7 +150,7 @@ class Weights(NamedTuple):
     def save(self, path: Path) -> None:
         """Write the weights to a .npz file, as float32."""
         arrays = {"places": self.places, "start": self.start, **self.network._asdict()}
-        with path.open("wb") as file:
+        with partial_file(path) as partial, partial.open("wb") as file:
             np.savez(
                 file,
                 format=np.array(FORMAT),
