@@ -1,18 +1,409 @@
-"""Histories: what happened in a stretch of steps, as algorithms and metrics may know it."""
+"""Histories: what happened in a stretch of steps, as algorithms and metrics may know it.
 
+They read the log of the run: poses, observations and events, as far back as components may look.
+"""
+
+from bisect import bisect_left, bisect_right
+from collections.abc import Callable, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
-from fleet2d.algorithms.evidence import Evidence
-from fleet2d.algorithms.log import BodyPoses
-from fleet2d.algorithms.log import Log as Log
-from fleet2d.algorithms.observations import Looks, Observations, Truth, frozen
+from fleet2d.algorithms.evidence import Evidence, Patches, gather
+from fleet2d.algorithms.observations import (
+    NOWHERE,
+    Activities,
+    Looks,
+    NearestRooms,
+    Observations,
+    Truth,
+    frozen,
+)
 from fleet2d.errors import ComponentError
+from fleet2d.floorplan.home import Home
+from fleet2d.floorplan.plan import read_only
 from fleet2d.interactions.answers import AnswerRecord, Wanted
-from fleet2d.kernels import I32, I64, Bool
-from fleet2d.runtime.events import Event
+from fleet2d.kernels import (
+    F64,
+    I16,
+    I32,
+    I64,
+    Bool,
+    Poses,
+    Window,
+    count_together,
+    in_radians,
+    rooms_at,
+    sum_moves,
+)
+from fleet2d.kernels import SightingColumn as Column
+from fleet2d.runtime.clock import Clock
+from fleet2d.runtime.events import HOME, Event, EventKind
+
+
+class Blocks:
+    """Consecutive arrays, each for an interval of steps; only their first dimension differs.
+
+    Example:
+        >>> blocks = Blocks()
+        >>> blocks.append(0, 2, np.array([1, 2]))
+        >>> blocks.append(2, 5, np.array([3, 4, 5]))
+        >>> blocks.touching(1, 3)[0], blocks.touching(2, 4)[1].tolist()
+        (0, [3, 4, 5])
+        >>> blocks.forget(2)
+        >>> blocks.touching(0, 9)
+        (2, array([3, 4, 5]))
+    """
+
+    def __init__(self) -> None:
+        """Begin without blocks."""
+        self._begins: list[int] = []
+        self._ends: list[int] = []
+        self._rows: list[NDArray[Any]] = []
+
+    def append(self, begin: int, end: int, rows: NDArray[Any]) -> None:
+        """Append the rows of the stretch from `begin` up to before `end`, the latest so far."""
+        self._begins.append(begin)
+        self._ends.append(end)
+        self._rows.append(rows)
+
+    def touching(self, begin: int, end: int) -> tuple[int, NDArray[Any] | None]:
+        """Return all blocks that overlap a stretch of time, joined, and their begin."""
+        overlap = self._touching(begin, end)
+        blocks = self._rows[overlap]
+        if not blocks:
+            return begin, None
+        rows = blocks[0] if len(blocks) == 1 else np.concatenate(blocks)
+        return self._begins[overlap.start], rows
+
+    def each_touching(self, begin: int, end: int) -> list[NDArray[Any]]:
+        """Return each block that overlaps a stretch of time."""
+        return self._rows[self._touching(begin, end)]
+
+    def _touching(self, begin: int, end: int) -> slice:
+        return slice(bisect_right(self._ends, begin), bisect_left(self._begins, end))
+
+    def forget(self, before: int) -> None:
+        """Drop the blocks that end by `before`."""
+        past = slice(bisect_right(self._ends, before))
+        del self._begins[past], self._ends[past], self._rows[past]
+
+
+class BodyPoses:
+    """Poses of one body, one entry per step; columns are computed on demand."""
+
+    def __init__(self, home: Home, runs: Window) -> None:
+        self._home, self._runs = home, runs
+
+    def __len__(self) -> int:
+        """Return the number of steps."""
+        return self._runs.end - self._runs.first
+
+    @cached_property
+    def _lengths(self) -> I64:
+        """Number of steps of each run of equal pose."""
+        return np.diff(self._runs.step, append=self._runs.end)
+
+    @cached_property
+    def xy(self) -> F64:
+        """Positions: float64 (n, 2) [m]; while away, the place at which the body left."""
+        lattice = self._home.plan.lattice
+        xy = lattice.to_metres(np.stack([self._runs.x, self._runs.y], axis=-1))
+        return read_only(np.repeat(xy, self._lengths, axis=0))
+
+    def at(self, index: int) -> tuple[float, float]:
+        """Return the position (x, y) [m] at one step; -1 is the last."""
+        runs = self._runs
+        step = runs.first + range(len(self))[index]
+        run = int(np.searchsorted(runs.step, step, side="right")) - 1
+        x, y = self._home.plan.lattice.to_metres((runs.x[run], runs.y[run])).tolist()
+        return x, y
+
+    @property
+    def x(self) -> F64:
+        """Positions along x [m]."""
+        return self.xy[:, 0]
+
+    @property
+    def y(self) -> F64:
+        """Positions along y [m]."""
+        return self.xy[:, 1]
+
+    @cached_property
+    def heading(self) -> F64:
+        """Headings, counter-clockwise from +x, 0 to 2 pi [rad]."""
+        radians: F64 = in_radians(self._runs.heading)
+        return read_only(np.repeat(radians, self._lengths))
+
+    @cached_property
+    def away(self) -> Bool:
+        """Whether the body is away from home: bool (n,)."""
+        return read_only(np.repeat(self._runs.away.astype(bool), self._lengths))
+
+    @cached_property
+    def room(self) -> I16:
+        """Index of the room, NOWHERE while the body is away: int16 (n,)."""
+        return read_only(np.repeat(self._rooms, self._lengths))
+
+    @cached_property
+    def _rooms(self) -> I16:
+        """Index of the room of each run."""
+        runs = self._runs
+        room = rooms_at(self._home.plan.room_of_place, runs.x, runs.y)
+        return np.where(runs.away != 0, np.int16(NOWHERE), room)
+
+    @cached_property
+    def visits(self) -> tuple[I64, I64, I16]:
+        """Stretches of steps in one room: begin, end and room of each, each (stretches,).
+
+        Steps are counted from `first`; the room is NOWHERE while the body is away.
+        """
+        rooms = self._rooms
+        first = np.flatnonzero(np.append(True, rooms[1:] != rooms[:-1])[: len(rooms)])
+        begin = self._runs.step[first] - self._runs.first
+        return frozen((begin, np.append(begin, len(self))[1:], rooms[first]))
+
+    @cached_property
+    def time_in_rooms(self) -> I64:
+        """Number of steps in each room, and last away: int64 (rooms + 1,)."""
+        begin, end, room = self.visits
+        counts = np.zeros(len(self._home.rooms) + 1, np.int64)
+        np.add.at(counts, room, end - begin)  # NOWHERE is the last
+        return read_only(counts)
+
+    @cached_property
+    def steps_at_home(self) -> int:
+        """Number of steps at which the body isn't away."""
+        return int(self._lengths[self._runs.away == 0].sum())
+
+    def steps_together(self, other: "BodyPoses") -> int:
+        """Return the number of steps at which two bodies are in the same room."""
+        (begin, _, room), (other_begin, _, other_room) = self.visits, other.visits
+        return count_together(begin, room, other_begin, other_room, len(self))
+
+    @cached_property
+    def distance(self) -> float:
+        """Distance travelled from the first to the last step [m]."""
+        runs = self._runs
+        moved = sum_moves(Poses(runs.x, runs.y, runs.heading, runs.away))
+        return moved / self._home.plan.lattice.units_per_m
+
+
+class SensorRow(NamedTuple):
+    """A reading of a sensor, as the table of sensors has it."""
+
+    step: int
+    sensor: int
+    on: bool
+    activity: str
+
+
+class Motions(Protocol):
+    """Protocol of the motions of all bodies of a run."""
+
+    def runs(self, row: int, first: int, end: int) -> Window:
+        """Return the runs of equal pose of one body in the steps from `first` to `end` - 1."""
+
+
+class Log:
+    """The motions and observations of a run, as far back as components may look."""
+
+    def __init__(
+        self,
+        home: Home,
+        clock: Clock,
+        names: Sequence[str],
+        motions: Motions,
+        activities: Activities,
+    ) -> None:
+        """Begin an empty log.
+
+        Args:
+            home: The home.
+            clock: The steps of the run.
+            names: Names of the bodies, users first.
+            motions: The motions of the bodies.
+            activities: What users do.
+        """
+        self.home, self.clock = home, clock
+        self.index = {name: row for row, name in enumerate(names)}
+        self.activities = activities
+        self.answers: Sequence[AnswerRecord] = ()  # how people answered: truth
+        self.wanted: Sequence[Wanted] = ()  # the requests that came up
+        self._motions = motions
+        self._observations = Blocks()  # (n, OBSERVATION), by step
+        self._events: list[Event] = []
+        self.readings: list[SensorRow] = []
+        self.cameras: list[tuple[int, str]] = []  # index of the robot, and name of the camera
+        self._looks: dict[int, I64] = {}
+        self._exposures: dict[int, I64] = {}
+        self.bin_steps = 0  # steps of a bin of evidence; 0: no component needs evidence
+        self._bins = Blocks()  # int64 (n, robots, 2, patches), by bin
+        self._next_bin = 0
+        self.patches: Patches | None = None  # the patches of evidence
+        self._rooms = NearestRooms(home.plan)
+        self._nearest_patches: NearestRooms | None = None
+        self.untracked: frozenset[str] = frozenset()  # users whose place may be unknown
+        # For robots with `localization`: the believed poses from the true ones.
+        self.beliefs: dict[str, Callable[[Window], Window]] = {}
+        self._poses: dict[tuple[str, int, int, bool], BodyPoses] = {}
+
+    def forget(self, before: int) -> None:
+        """Drop everything that belongs to steps earlier than `before`."""
+        self._poses.clear()
+        self._observations.forget(before)
+        self.readings = [row for row in self.readings if row.step >= before]
+        self._events = [event for event in self._events if event.step >= before]
+        self._looks = {step: counts for step, counts in self._looks.items() if step >= before}
+        self._exposures = {k: cells for k, cells in self._exposures.items() if k >= before}
+        if self.bin_steps:
+            self._bins.forget(before // self.bin_steps)
+
+    def take_events(self, events: Sequence[Event]) -> None:
+        """Store the events of bodies."""
+        self._events += [event for event in events if event.entity in self.index]
+
+    def next_event(self, step: int, kinds: Set[str]) -> int | None:
+        """Return the step of the first known event of these kinds from `step` on."""
+        steps = (e.step for e in self._events if e.event in kinds and e.step >= step)
+        return min(steps, default=None)
+
+    def events(self, first: int, end: int) -> list[Event]:
+        """Return the events in the steps from `first` to `end` - 1, in order.
+
+        These are the notes of plans, and users and robots that came into view or were lost.
+        """
+        order = self.index
+        events = [event for event in self._events if first <= event.step < end]
+        return sorted(events, key=lambda e: (e.step, order[e.entity], e.rank))
+
+    def happened(self, step: int) -> list[Event]:
+        """Return the events at one step, with one for readings of sensors."""
+        events = self.events(step, step + 1)
+        if any(row.step == step for row in self.readings):
+            events.append(Event(step, HOME, EventKind.SENSOR, ""))
+        return events
+
+    def poses(self, name: str, first: int, end: int, *, true: bool = True) -> BodyPoses:
+        """Return the poses of a body in the steps from `first` to `end` - 1.
+
+        Args:
+            name: Name of the body.
+            first: First step.
+            end: One past the last step.
+            true: Whether to return the true poses, or those that a robot believes.
+        """
+        true = true or name not in self.beliefs
+        key = (name, first, end, true)
+        if key not in self._poses:  # components that are updated at the same step share them
+            runs = self._motions.runs(self.index[name], first, end)
+            path = runs if true else self.beliefs[name](runs)
+            self._poses[key] = BodyPoses(self.home, path)
+        return self._poses[key]
+
+    def observe(self, rows: I64) -> None:
+        """Store the observations of a span: int64 (n, OBSERVATION), in order of step."""
+        if len(rows):
+            self._observations.append(
+                int(rows[0, Column.STEP]), int(rows[-1, Column.STEP]) + 1, rows
+            )
+
+    def observations(self, first: int, end: int) -> Observations:
+        """Return the observations of the steps from `first` to `end` - 1."""
+        blocks = self._observations.each_touching(first, end)
+        return Observations(
+            self.home.plan,
+            self._rooms,
+            [
+                rows[slice(*np.searchsorted(rows[:, Column.STEP], (first, end)).tolist())]
+                for rows in blocks
+            ],
+            self.activities,
+        )
+
+    def count_looks(self, step: int, counts: Sequence[I64]) -> None:
+        """Store how often each robot's cameras have looked and noticed before `step`."""
+        if counts:
+            self._looks[step] = np.concatenate(counts)
+
+    def looks(self, first: int, end: int) -> Looks:
+        """Return the looks in the steps from `first` to `end` - 1.
+
+        Raises:
+            ComponentError: No counts were stored at `first` or `end`.
+        """
+        none = np.zeros((len(self.cameras), self.activities.users, 2), np.int64)
+        counts = _known_at(self._looks, end, none) - _known_at(self._looks, first, none)
+        robots = np.array([robot for robot, _ in self.cameras], np.int32)
+        names = tuple(name for _, name in self.cameras)
+        return Looks(robots, names, counts[..., 0], counts[..., 1])
+
+    def expose(self, step: int, exposure: I64) -> None:
+        """Store how much of each room each robot has had in view before `step`."""
+        self._exposures[step] = exposure
+
+    def expose_bins(self, bins: I64) -> None:
+        """Store what each robot has had in view in the next bins: int64 (n, robots, 2, patches).
+
+        Entry 0 is the number of cells of each patch in view, summed over the steps of the bin;
+        entry 1 the maximum over them.
+        """
+        begin, self._next_bin = self._next_bin, self._next_bin + len(bins)
+        self._bins.append(begin, self._next_bin, bins)
+
+    def evidence(self, first: int, end: int) -> Evidence:
+        """Return the evidence of the steps from `first` to `end` - 1.
+
+        Raises:
+            ComponentError: The steps aren't whole bins.
+        """
+        assert self.patches is not None, "nobody needs evidence"
+        if first % self.bin_steps or end % self.bin_steps:
+            raise ComponentError(
+                f"evidence comes in bins of {self.bin_steps} steps, but the period from step"
+                f" {first} to {end} isn't made of whole ones: choose a period of whole minutes"
+            )
+        begin, last = first // self.bin_steps, end // self.bin_steps
+        since, bins = self._bins.touching(begin, last)
+        assert bins is not None, "a history is not empty"
+        bins = bins[begin - since : last - since]
+        if self._nearest_patches is None:
+            self._nearest_patches = NearestRooms(self.home.plan, self.patches.of_cell)
+        seen = self.observations(first, end)
+        patch = seen.room_in(self._nearest_patches).astype(np.int64)
+        return gather(
+            self.clock,
+            first,
+            self.bin_steps,
+            self.patches,
+            bins,
+            (seen.step, seen.user.astype(np.int64), patch),
+            self.activities.users,
+        )
+
+    def exposure(self, first: int, end: int) -> I64:
+        """Return how much of each room each robot had in view in the steps `first` to `end` - 1.
+
+        It is only summed if a component declared before the run that it needs it.
+
+        Raises:
+            ComponentError: No sums were stored at `first` or `end`.
+        """
+        none = np.zeros_like(next(iter(self._exposures.values())))
+        return _known_at(self._exposures, end, none) - _known_at(self._exposures, first, none)
+
+
+def _known_at(sums: Mapping[int, I64], step: int, zero: I64) -> I64:
+    """Return the sums up to before a step."""
+    if step in sums or step == 0 or not sums:  # without cameras there are no sums
+        return sums.get(step, zero)
+    raise ComponentError(
+        f"exposure and looks are summed from update to update, and none is at step {step}: request"
+        f" them between the updates at {', '.join(map(str, sorted(sums)[-5:]))}, or use evidence"
+    )
 
 
 @dataclass(frozen=True)

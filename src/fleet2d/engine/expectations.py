@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fleet2d.algorithms.log import SensorRow
+from fleet2d.algorithms.history import SensorRow
 from fleet2d.algorithms.observations import Activities
 from fleet2d.artifacts.store import RunStore
 from fleet2d.artifacts.table import Column, TableSpec

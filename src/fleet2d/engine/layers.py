@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from fleet2d.algorithms.algorithm import Algorithm
 from fleet2d.algorithms.evidence import Patches, patches_of, steps_of_bin, whole_rooms
-from fleet2d.algorithms.log import Log
+from fleet2d.algorithms.history import Log
 from fleet2d.configuration.components import Component
 from fleet2d.configuration.problems import suggest
 from fleet2d.configuration.units import whole_steps

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from time import perf_counter
 from typing import Any
 
-from fleet2d.algorithms.log import Log
+from fleet2d.algorithms.history import Log
 from fleet2d.configuration.trust import current_trust, restrict
 from fleet2d.engine.checkpoint import CheckpointWriter
 from fleet2d.engine.state import State

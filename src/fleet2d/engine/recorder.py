@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from fleet2d.algorithms.log import SensorRow
+from fleet2d.algorithms.history import SensorRow
 from fleet2d.algorithms.observations import Activities, NearestRooms, Observations, Truth
 from fleet2d.artifacts.table import KEY_KINDS, Column, TableSpec
 from fleet2d.engine.bodies import Basis

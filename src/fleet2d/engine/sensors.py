@@ -9,7 +9,7 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 
-from fleet2d.algorithms.log import SensorRow
+from fleet2d.algorithms.history import SensorRow
 from fleet2d.configuration.problems import suggest
 from fleet2d.engine.bodies import Basis, Bodies, PoseBlock, Watcher
 from fleet2d.entities.objects.home_object import (

@@ -5,7 +5,7 @@ from contextlib import contextmanager
 
 import numpy as np
 
-from fleet2d.algorithms.log import Log
+from fleet2d.algorithms.history import Log
 from fleet2d.artifacts.store import RunStore
 from fleet2d.configuration.problems import suggest
 from fleet2d.engine.bodies import Basis, Bodies

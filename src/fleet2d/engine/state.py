@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fleet2d.algorithms.log import Log
+from fleet2d.algorithms.history import Log
 from fleet2d.algorithms.observations import OBSERVATION, ROBOT
 from fleet2d.artifacts.store import RunStore
 from fleet2d.engine.bodies import Bodies, Watcher

@@ -13,17 +13,17 @@ with extra("gym", "fleet2d.gym needs gymnasium and pettingzoo"):
 from fleet2d.gym.env import DiscountByTime as DiscountByTime
 from fleet2d.gym.env import RobotEnv as RobotEnv
 from fleet2d.gym.env import RobotLife as RobotLife
+from fleet2d.gym.env import VectorRobotEnv as VectorRobotEnv
 from fleet2d.gym.parallel import RobotsEnv as RobotsEnv
 from fleet2d.gym.task import REWARDS as REWARDS
 from fleet2d.gym.task import LearningTask as LearningTask
 from fleet2d.gym.task import load_task as load_task
-from fleet2d.gym.vector import VectorRobotEnv as VectorRobotEnv
 
 for _name in ("Hangout", "Find", "Patrol"):
     gymnasium.register(
         id=f"fleet2d/{_name}-v1",
         entry_point="fleet2d.gym.env:RobotEnv",
-        vector_entry_point="fleet2d.gym.vector:VectorRobotEnv",
+        vector_entry_point="fleet2d.gym.env:VectorRobotEnv",
         kwargs={"task": _name.lower()},
         disable_env_checker=True,  # it draws masked actions
         order_enforce=False,

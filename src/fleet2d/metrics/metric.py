@@ -7,8 +7,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from fleet2d.algorithms.algorithm import Present
-from fleet2d.algorithms.history import History
-from fleet2d.algorithms.log import BodyPoses
+from fleet2d.algorithms.history import BodyPoses, History
 from fleet2d.configuration.components import Component
 from fleet2d.configuration.units import PositiveDuration
 from fleet2d.floorplan.home import Home
