@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 from tests.homes import plan_files
+from tests.thorough import some
 
 import fleet2d
 
@@ -29,7 +30,7 @@ def test_every_map_of_a_robot_is_lived_in_for_a_day(shared_data: Path) -> None:
         *(("valetudo", path) for path in sorted((shared_data / "valetudo").glob("*.json"))),
     ]
     assert 6 == len(maps)
-    for kind, path in maps:
+    for kind, path in some(maps, 2):
         overrides = (
             f"floorplan.type={kind}", f"floorplan.path={path}", "simulation.duration=1 d",
         )  # fmt: skip
@@ -41,7 +42,7 @@ def test_every_map_of_a_robot_is_lived_in_for_a_day(shared_data: Path) -> None:
         assert run.metrics["distance"]["astro"] > 10 or len(run.plan.rooms) == 1, path
 
 
-@pytest.mark.parametrize(("seed", "area"), [(5, 110), (11, 30), (12, 60), (13, 150)])
+@pytest.mark.parametrize(("seed", "area"), some([(5, 110), (11, 30), (12, 60), (13, 150)], 2))
 def test_a_furnished_synthetic_home_is_lived_in_for_a_day(seed: int, area: int) -> None:
     """In the first one a chair stands in a gap that its sitter fits into, but can't walk out of."""
     floorplan = {"type": "synthetic", "seed": seed, "area_m2": area, "furnish": True}

@@ -20,7 +20,8 @@ import fleet2d
 from fleet2d.runs.run import Run
 
 LEARNS = (
-    "simulation.duration=1 d",
+    "simulation.start=2026-01-05T06:00",
+    "simulation.duration=10 h",
     "artifacts.trajectories=5 min",
     "algorithms.rtp={type: rtp, model: hmm, period: 5 min}",
     "metrics.rtp_score={of: rtp}",
@@ -46,7 +47,7 @@ def test_the_loop_is_closed() -> None:
     assert digests(base())["key_frames"] != digests(naive)["key_frames"]
 
 
-@pytest.mark.parametrize("span", [997, 61])
+@pytest.mark.parametrize("span", some([61, 997], 2))
 def test_every_table_is_the_same_for_every_max_span(span: int) -> None:
     other = lived(max_span=span)
     assert digests(base()) == digests(other)
@@ -99,7 +100,7 @@ def test_users_live_the_same_whatever_the_robot_does(behaviors: str) -> None:
         assert mine == theirs
 
 
-@pytest.mark.parametrize("at", some([30_000, 1], 2))
+@pytest.mark.parametrize("at", some([20_000, 1], 2))
 def test_branches_of_a_learning_run_live_the_same_future(at: int) -> None:
     simulation = fleet2d.Simulation("bundled:base", *LEARNS)
     simulation.advance(at)
@@ -114,7 +115,7 @@ def digest_of(seed: int) -> str:
     return str(stored.digest)
 
 
-@pytest.mark.parametrize("workers", some([2, 1, 3], 3))
+@pytest.mark.parametrize("workers", some([1, 2, 3], 3))
 def test_runs_in_any_number_of_processes_are_those_of_one(workers: int) -> None:
     expected = [base().digest, digest_of(5)]
     assert expected[0] != expected[1]

@@ -148,7 +148,7 @@ def run_prints(folder: Path, how: str, duration: str = "3 h") -> subprocess.Comp
     return fleet2d_process(*arguments, cwd=folder)
 
 
-@pytest.mark.parametrize("how", ["gone", "gone in a thread", "gone as a thread"])
+@pytest.mark.parametrize("how", some(["gone", "gone in a thread", "gone as a thread"], 3))
 def test_a_component_that_ends_the_process_leaves_the_run(tmp_path: Path, how: str) -> None:
     """What was committed can be read, and the run can be resumed."""
     done = run_prints(tmp_path, how, "2 d")
@@ -224,7 +224,7 @@ class Odd(fleet2d.Algorithm):
             ("start: interrupt", "algorithms.odd failed when it was started: KeyboardInterrupt"),
             ("check: interrupt", "mine:Odd failed while its keys were checked: KeyboardInterrupt"),
         ],
-        2,
+        3,
     ),
 )
 def test_code_that_ends_the_program_before_the_run_is_named(
@@ -265,7 +265,7 @@ class Stops(fleet2d.Algorithm):
                 ("study", "run", "study.yaml", "--executor", "serial", "--trust", "mine.py"),
             ),
         ],
-        2,
+        3,
     ),
 )
 def test_a_signal_during_the_code_of_a_component_is_not_its_error(
@@ -284,7 +284,9 @@ def test_a_signal_during_the_code_of_a_component_is_not_its_error(
     assert 130 == process("-c", code, cwd=tmp_path).returncode
 
 
-@pytest.mark.parametrize("code", ["raise KeyboardInterrupt", "class B(BaseException): pass\nraise B"])  # fmt: skip
+@pytest.mark.parametrize(
+    "code", some(["raise KeyboardInterrupt", "class B(BaseException): pass\nraise B"], 2)
+)
 def test_no_exception_at_import_ends_the_program(tmp_path: Path, code: str) -> None:
     (tmp_path / "mine.py").write_text(code)
     done = fleet2d_process("run", "metrics.odd.type=mine:Odd", cwd=tmp_path)
@@ -292,7 +294,7 @@ def test_no_exception_at_import_ends_the_program(tmp_path: Path, code: str) -> N
     assert "can't import 'mine:Odd': mine.py:" in done.stderr
 
 
-@pytest.mark.parametrize("is_at_import", [True, False])
+@pytest.mark.parametrize("is_at_import", some([True, False], 2))
 def test_a_run_is_stored_where_it_was_begun(tmp_path: Path, is_at_import: bool) -> None:
     """A component that changes the current folder had its run stored, and then not found."""
     (tmp_path / "mine.py").write_text(f"{ODD}\nos.chdir('/')" if is_at_import else ODD)

@@ -5,6 +5,7 @@ from typing import Any
 
 import pytest
 from tests.scenes import digests, every_step, everything, run, scenario, table
+from tests.thorough import some
 
 from fleet2d.engine import recorder
 
@@ -19,7 +20,7 @@ def small(**artifacts: Any) -> dict[str, Any]:
     )
 
 
-@pytest.mark.parametrize("span", [None, 1, 13])
+@pytest.mark.parametrize("span", some([1, None, 13], 3))
 def test_tables_do_not_depend_on_when_rows_are_handed_over(
     monkeypatch: pytest.MonkeyPatch, span: int | None
 ) -> None:

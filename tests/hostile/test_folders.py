@@ -220,7 +220,7 @@ def test_a_run_that_leads_elsewhere_harms_nothing(
     make: Callable[[Path], Path],
 ) -> None:
     source, use = make(root), READERS[command]
-    attacks = some(ATTACKS, 29 if command in ("reproduce", "resume") else 9)
+    attacks = some(ATTACKS, 58 if command in ("reproduce", "resume") else 27)
     for name, trick in attacks:
         run = shutil.copytree(source, tmp_path / "run")
         target = run / name
@@ -245,7 +245,7 @@ def test_a_figure_of_a_run_that_leads_elsewhere_harms_nothing(
 ) -> None:
     pytest.importorskip("matplotlib")
     names = ("key_frames.parquet", "floorplan.json", *FILES[FILES.index("picture.png") :])
-    attacks = some([(name, trick) for name in names for trick in TRICKS], 23)
+    attacks = some([(name, trick) for name in names for trick in TRICKS], 47)
     for name, trick in attacks:
         run = shutil.copytree(complete(root), tmp_path / "run")
         (run / name).unlink(missing_ok=True)

@@ -88,16 +88,16 @@ def two_rooms(width: float, degrees: float, kind: str) -> FloorPlan:
 
 
 @pytest.mark.parametrize("degrees", some([0, 10, 22.5, 33, 45], 2))
-@pytest.mark.parametrize("width", [0.36, 0.42, 0.48, 0.52, 0.54])
+@pytest.mark.parametrize("width", some([0.36, 0.42, 0.48, 0.52, 0.54], 3))
 def test_a_narrow_gap_stays_passable(width: float, degrees: float) -> None:
     """A bed or a nightstand stood before a gap that the largest body doesn't fit through.
 
     That cut off 4 to 8 m² from users and robots, who do; and at 0.52 m and 0.54 m from the largest
     body, too, because no two neighboring cells in the gap were free.
     """
-    for kind in ("bedroom", "living_room"):
+    for kind in some(("bedroom", "living_room"), 2):
         plan = two_rooms(width, degrees, kind)
-        for seed in some(range(4), 2) if degrees else range(4):
+        for seed in some(range(4), 2):
             check(plan, seed)
 
 
@@ -109,7 +109,9 @@ def turned_home(plan: FloorPlan, degrees: float, cell: float) -> FloorPlan:
     return FloorPlan.build(plan.name, turned(plan.free_space), regions, cell, doorways=None)
 
 
-@pytest.mark.parametrize(("degrees", "cell"), [(7, 0.05), (30, 0.1), (45, 0.05), (61, 0.2)])
+@pytest.mark.parametrize(
+    ("degrees", "cell"), some([(61, 0.2), (7, 0.05), (30, 0.1), (45, 0.05)], 4)
+)
 def test_turned_homes_stay_connected(degrees: float, cell: float, shared_data: Path) -> None:
     """At cells of 0.2 m furniture cut 0.7 m² and 0.8 m² off a turned home."""
     furnished = 0
@@ -136,7 +138,7 @@ def test_two_nooks_that_are_one_are_not_cut_off() -> None:
     check(slanted_room(14, "bedroom"))
 
 
-@pytest.mark.parametrize("number", some(range(40), 4))
+@pytest.mark.parametrize("number", some(range(40), 8))
 def test_slanted_rooms_stay_connected(number: int) -> None:
     for kind in some(sorted(RULES), 4):
         plan = slanted_room(number, kind)
@@ -146,11 +148,12 @@ def test_slanted_rooms_stay_connected(number: int) -> None:
 
 def captured(folder: Path) -> Iterator[FloorPlan]:
     """Yield homes as robots and scanners deliver them, their rooms with types in turn."""
-    maps = ["homes/movecare_map.yaml", "homes/map_05_03_2019_4.yaml"]
-    drawings = ["buildings/lab_ipa_furnitures.png", "buildings/lab_c_scan.png"]
-    scans = sorted(path.name for path in (folder / "floors").glob("*.png"))
-    drawings += [f"floors/{name}" for name in scans] if THOROUGH else ["floors/area6_floor_0.png"]
-    for name in [*maps[: 2 if THOROUGH else 1], *drawings]:
+    names = ["homes/movecare_map.yaml"]
+    if THOROUGH:
+        names += ["homes/map_05_03_2019_4.yaml", "buildings/lab_ipa_furnitures.png"]
+        names += ["buildings/lab_c_scan.png"]
+        names += [f"floors/{path.name}" for path in sorted((folder / "floors").glob("*.png"))]
+    for name in names:
         resolution = 0.05 if name.endswith(".png") else None
         plan = load_floorplan(folder / name, resolution=resolution)
         types = [KINDS[room.index % len(KINDS)] for room in plan.rooms]
@@ -161,4 +164,4 @@ def captured(folder: Path) -> Iterator[FloorPlan]:
 def test_captured_homes_stay_connected(shared_data: Path) -> None:
     pieces = [check(plan) for plan in captured(shared_data / "captured")]
 
-    assert sum(pieces) > 100
+    assert sum(pieces) > (100 if THOROUGH else 5)

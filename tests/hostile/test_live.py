@@ -17,7 +17,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.engine.test_repeat_resume import cut_off
 from tests.scenes import AGENDA, OWN, scenario
-from tests.thorough import examples
+from tests.thorough import examples, some
 
 import fleet2d
 from fleet2d.errors import InputError
@@ -159,7 +159,7 @@ def request(run: fleet2d.Simulation, order: Any) -> None:
 
 
 @pytest.mark.parametrize("doors", [False, True])
-@settings(max_examples=examples(75))
+@settings(max_examples=examples(50))
 @given(orders=st.lists(ORDERS, max_size=12))
 def test_no_intervention_lets_a_run_fail(doors: bool, orders: list[Any]) -> None:
     """A plan for a body that was then put elsewhere, or a room without a way out, ended the run."""
@@ -307,7 +307,7 @@ class Page:
                 self.frames += 1
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", some([signal.SIGINT, signal.SIGTERM], 2))
 def test_a_signal_with_an_open_page_is_one_line_and_loses_nothing(
     number: signal.Signals, tmp_path: Path
 ) -> None:

@@ -38,18 +38,21 @@ def shell(
 
 @pytest.mark.parametrize(
     ("redirect", "options", "code", "message"),
-    [
-        ("2>&-", (), 0, ""),
-        ("2>/dev/full", (), 0, ""),
-        ("<&- 2>&-", ("--json",), 0, ""),
-        ("2>&-", ("--quiet",), 0, ""),
-        (">&-", ("--quiet",), 0, ""),
-        (">&-", (), 1, "error: the results can't be printed (Bad file descriptor)"),
-        (">/dev/full", ("--json",), 1, "error: the results can't be printed (No space left"),
-        (">/dev/full", (), 1, "error: the results can't be printed (No space left on device)"),
-        (">/dev/full 2>&1", ("--json",), 1, ""),
-        ("<&- >&- 2>&-", (), 1, ""),
-    ],
+    some(
+        [
+            ("2>&-", (), 0, ""),
+            ("2>/dev/full", (), 0, ""),
+            ("<&- 2>&-", ("--json",), 0, ""),
+            ("2>&-", ("--quiet",), 0, ""),
+            (">/dev/full", ("--json",), 1, "error: the results can't be printed (No space left"),
+            (">/dev/full", (), 1, "error: the results can't be printed (No space left on device)"),
+            (">&-", ("--quiet",), 0, ""),
+            (">&-", (), 1, "error: the results can't be printed (Bad file descriptor)"),
+            ("<&- >&- 2>&-", (), 1, ""),
+            (">/dev/full 2>&1", ("--json",), 1, ""),
+        ],
+        4,
+    ),
 )
 def test_a_run_needs_no_output(
     tmp_path: Path, redirect: str, options: tuple[str, ...], code: int, message: str
@@ -64,7 +67,7 @@ def test_a_run_needs_no_output(
     assert [] == run.verify()
 
 
-@pytest.mark.parametrize("encoding", ["ascii", "utf-8"])
+@pytest.mark.parametrize("encoding", some(["ascii", "utf-8"], 2))
 def test_a_summary_in_any_encoding(tmp_path: Path, encoding: str) -> None:
     result = shell(tmp_path, "", *RUN, PYTHONIOENCODING=encoding)
     assert (0, "") == (result.returncode, result.stderr)
@@ -77,15 +80,15 @@ def test_a_summary_in_any_encoding(tmp_path: Path, encoding: str) -> None:
     some(
         [
             ("verify", "run"),
-            ("components",),
-            ("--version",),
             ("--help",),
+            ("--version",),
+            ("components",),
             ("schema",),
             ("show", "run", "--out", "picture.png"),
             ("validate", "bundled:base"),
             ("reproduce", "run"),
         ],
-        2,
+        6,
     ),
 )
 def test_every_command_says_that_its_output_cannot_be_written(

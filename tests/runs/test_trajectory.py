@@ -137,7 +137,7 @@ def assert_rebuilt(run: Run, stride: int = 1) -> None:
 
 
 @pytest.mark.parametrize("bodies", BODIES)
-@pytest.mark.parametrize("step", ["1 s", "0.5 s", "7 s"])
+@pytest.mark.parametrize("step", some(["1 s", "0.5 s", "7 s"], 3))
 def test_every_step_is_rebuilt(bodies: str, step: str) -> None:
     assert_rebuilt(run_of(bodies, step=step))
 

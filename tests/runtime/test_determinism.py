@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.thorough import some
 
 import fleet2d
 from fleet2d.runtime.determinism import Draws, stream_key, sum_in_order
@@ -89,13 +90,16 @@ def test_floats_are_added_one_after_the_other() -> None:
 
 @pytest.mark.parametrize(
     "scenario",
-    [
-        [None],
-        [EXAMPLES / "family.yaml"],
-        [EXAMPLES / "learning_robot.yaml"],
-        [EXAMPLES / "smart_home.yaml"],
-        [None, "floorplan={type: synthetic, area_m2: 60}"],
-    ],
+    some(
+        [
+            [None],
+            [EXAMPLES / "family.yaml"],
+            [EXAMPLES / "learning_robot.yaml"],
+            [EXAMPLES / "smart_home.yaml"],
+            [None, "floorplan={type: synthetic, area_m2: 60}"],
+        ],
+        3,
+    ),
 )
 def test_a_run_adds_no_floats_by_the_built_in_sum(
     scenario: list[Any], monkeypatch: pytest.MonkeyPatch

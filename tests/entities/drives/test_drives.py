@@ -10,6 +10,7 @@ import pytest
 from tests.entities.drives.drives import CORNER, driven
 from tests.entities.robots.robots import assert_same_for_every_max_span, events, home_with
 from tests.scenes import digests, path, run, table
+from tests.thorough import some
 
 import fleet2d
 from fleet2d import Behavior, Drive, Moment, Plan, Route, Situation
@@ -78,7 +79,7 @@ def busy(drive: Any) -> dict[str, Any]:
     return content
 
 
-@pytest.mark.parametrize("drive", OTHERS)
+@pytest.mark.parametrize("drive", some(list(OTHERS), 2))
 def test_a_run_is_the_same_for_every_span_and_continues_from_a_copy_and_from_a_file(
     drive: str, tmp_path: Path
 ) -> None:

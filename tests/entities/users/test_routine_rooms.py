@@ -64,13 +64,13 @@ def odd(minutes: Counter[tuple[str, str]]) -> dict[tuple[str, str], int]:
     }
 
 
-@pytest.mark.parametrize("name", some(range(29), 15))
+@pytest.mark.parametrize("name", some(range(29), 29))
 def test_nothing_is_done_in_an_odd_room_of_a_real_home(shared_data: Path, name: int) -> None:
     """Children played in bathrooms of 11 of 20 homes, up to an hour a day, while others showered."""
     plan = sorted((shared_data / "houseexpo").glob("*.json"))[name]
     assert odd(minutes_still({"type": "houseexpo", "path": str(plan)})) == {}
 
 
-@pytest.mark.parametrize("floorplan", some(SYNTHETIC, 36), ids=lambda plan: plan["seed"])
+@pytest.mark.parametrize("floorplan", some(SYNTHETIC, 72), ids=lambda plan: plan["seed"])
 def test_nothing_is_done_in_an_odd_room_of_a_synthetic_home(floorplan: dict[str, Any]) -> None:
     assert odd(minutes_still(floorplan)) == {}
