@@ -23,8 +23,8 @@ def taught(policy: TimingPolicy, count: int = 30) -> TimingPolicy:
     """Teach a policy that it is welcome in the kitchen at 8, and never at 14 in the bedroom."""
     policy.start(ROOMS)
     for _ in range(count):
-        policy.learn(Asked("ana", "tea", 8, KITCHEN, True))
-        policy.learn(Asked("ana", "tea", 14, BEDROOM, False))
+        policy.learn(Asked("ana", "tea", 8, KITCHEN, "accepted"))
+        policy.learn(Asked("ana", "tea", 14, BEDROOM, "declined"))
     return policy
 
 
@@ -44,10 +44,22 @@ def test_a_greedy_learner_never_learns_of_an_unlucky_hour_again() -> None:
     for policy in (greedy, exploring):
         policy.start(ROOMS)
         for _ in range(3):
-            policy.learn(Asked("ana", "tea", 8, KITCHEN, False))
+            policy.learn(Asked("ana", "tea", 8, KITCHEN, "declined"))
 
     assert 0 == greedy.chances()[8, KITCHEN]
     assert 0.1 == exploring.chances()[8, KITCHEN]
+
+
+def test_thompson_learns_who_has_time_from_other_interactions() -> None:
+    policy = ThompsonTiming()
+    policy.start(ROOMS)
+    for _ in range(10):
+        policy.learn_from_other(Asked("ana", "pill", 8, KITCHEN, "declined"))
+        policy.learn_from_other(Asked("ana", "pill", 14, KITCHEN, "ignored"))
+    chances = policy.chances()
+
+    assert chances[8, KITCHEN] > 0.9
+    assert chances[14, KITCHEN] < 0.1
 
 
 def test_thompson_explores_less_the_more_it_knows() -> None:
@@ -76,7 +88,8 @@ def timed(policy: Any, duration: str = "3 h", **changes: Any) -> dict[str, Any]:
 
 
 def test_answers_reach_the_learner_and_its_chances_reach_the_robot() -> None:
-    run = fleet2d.run(timed("thompson", users={"ana": ana(outcomes=("declined",))}))
+    policy = {"type": "thompson", "ask_at": 0.5}
+    run = fleet2d.run(timed(policy, users={"ana": ana(outcomes=("declined",))}))
     rows = table(run, "when")
     last = rows["step"] == rows["step"].max()
     asked_in = {

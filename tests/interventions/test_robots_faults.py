@@ -8,7 +8,7 @@ import pytest
 from tests.scenes import AGENDA, scenario, table
 
 import fleet2d
-from fleet2d.errors import ScenarioError
+from fleet2d.errors import PlacementError, ScenarioError
 
 BATTERY = {"driving": "1 h", "standing": "2 h", "charging": "1 h", "charger": [0.5, 6.5]}
 
@@ -197,3 +197,27 @@ def test_localizing_again_is_reproduced_and_needs_a_camera(tmp_path: Path) -> No
     assert fleet2d.reproduce(tmp_path / "run").same
     with pytest.raises(ScenarioError, match=r"localization\.relocalizes: it needs a camera"):
         home(localization=RELOCALIZES, camera=None)
+
+
+def test_a_robot_keeps_out_of_rooms_until_it_may_enter_again() -> None:
+    content = scenario(
+        "1 h",
+        robots={"astro": {"behaviors": [{"type": "patrol"}]}},
+        artifacts={"trajectories": "1 s"},
+        script=[{"at": "10 min", "keep_out": "astro", "of": "kitchen", "duration": "30 min"}],
+    )
+    run = fleet2d.run(content)
+    rows, events = table(run, "trajectories"), table(run, "events")
+    rooms = rows["room"][rows["entity"] == "astro"]
+    told = {str(e): int(s) for s, e in zip(events["step"], events["event"], strict=True)}
+
+    assert (600, 2400) == (told["banned"], told["allowed"])
+    assert "kitchen_0" in set(rooms[:600])
+    assert "kitchen_0" not in set(rooms[660:2400])
+    assert "kitchen_0" in set(rooms[2400:])
+
+
+def test_rooms_to_keep_out_of_are_checked() -> None:
+    script = [{"at": "10 min", "keep_out": "astro", "of": "kitchn"}]
+    with pytest.raises(PlacementError, match="no room 'kitchn': did you mean 'kitchen'"):
+        fleet2d.run(scenario("1 h", robots={"astro": {}}, script=script))

@@ -31,14 +31,24 @@ class Asked(NamedTuple):
         name: The interaction.
         hour: Hour of the day, 0 to 23.
         room: Index of the room that the robot was in; -1: none.
-        was_accepted: Whether the answer was yes.
+        outcome: The answer, an `Outcome`; empty: none.
     """
 
     user: str
     name: str
     hour: int
     room: int
-    was_accepted: bool
+    outcome: str = ""
+
+    @property
+    def was_accepted(self) -> bool:
+        """Whether the answer was yes."""
+        return self.outcome == Outcome.ACCEPTED
+
+    @property
+    def was_available(self) -> bool:
+        """Whether the person had time for an answer, yes or no."""
+        return self.outcome in (Outcome.ACCEPTED, Outcome.DECLINED)
 
 
 class TimingPolicy(Component):
@@ -61,6 +71,9 @@ class TimingPolicy(Component):
 
     def learn(self, asked: Asked) -> None:
         """Learn from an answer."""
+
+    def learn_from_other(self, asked: Asked) -> None:
+        """Learn from the answer to another interaction with the same person; by default nothing."""
 
     def chances(self) -> F64:
         """Return the probability of addressing the person now, by hour and room: (24, rooms)."""
@@ -135,17 +148,18 @@ class TimingAlgorithm(Algorithm):
         learned = 0
         for event in history.events:
             if event.event == "asks":
-                self._close(event.entity, was_accepted=False)
+                self._close(event.entity, "")
                 name, _, user = event.detail.rpartition(" ")
                 pose = history.poses(event.entity)
                 at = pose.xy[event.step - history.first]
                 room = state.home.plan.room_at(float(at[0]), float(at[1]))
                 hour = (state.start + event.step * timedelta(seconds=history.step_s)).hour
                 index = -1 if room is None else room.index
-                self.open[event.entity] = Asked(user, name, hour, index, False)
+                self.open[event.entity] = Asked(user, name, hour, index)
                 self._policy(user, name, len(state.home.rooms))
             elif event.event in OUTCOMES or event.event == "withdraws":
-                learned += self._close(event.entity, was_accepted=event.event == Outcome.ACCEPTED)
+                outcome = event.event if event.event in OUTCOMES else ""
+                learned += self._close(event.entity, outcome)
         if not learned and len(self.policies) == before:
             return None
         return TimingChances({pair: policy.chances() for pair, policy in self.policies.items()})
@@ -156,13 +170,15 @@ class TimingAlgorithm(Algorithm):
             policy.start(rooms)
         return self.policies[user, name]
 
-    def _close(self, robot: str, *, was_accepted: bool) -> bool:
+    def _close(self, robot: str, outcome: str) -> bool:
         """Learn from the answer to the last question of a robot; return whether there was one."""
         asked = self.open.pop(robot, None)
         if asked is None:
             return False
-        policy = self.policies[asked.user, asked.name]
-        policy.learn(asked._replace(was_accepted=was_accepted))
+        asked = asked._replace(outcome=outcome)
+        for (user, name), policy in self.policies.items():
+            if user == asked.user:
+                (policy.learn if name == asked.name else policy.learn_from_other)(asked)
         return True
 
 
@@ -235,17 +251,20 @@ class ThompsonTiming(TimingPolicy):
     probability is near a half, so that it explores; it stops where the answers are clear. The
     rate of yes in a cell of hours and rooms is a beta variable, whose distribution is approximated
     by a logistic one; each answer counts in neighboring hours, and in other rooms, by a part.
+    Answers to other interactions with the person count by whether there was time for an answer.
 
     Attributes:
         ask_at: Minimum probability of a yes that is worth asking; null: the share of yeses so
-            far, so that it asks at the better times of the day.
+            far, so that it asks at the better times of the day. People accept about a third.
         min_chance: Minimum probability of asking anywhere: off-policy estimates need one above 0.
         prior: Number of imagined answers, at even odds.
+        others: How much an answer to another interaction counts.
     """
 
-    ask_at: Share | None = 0.5
+    ask_at: Share | None = 0.35
     min_chance: Share = 0.02
     prior: float = Field(default=2.0, gt=0)
+    others: Share = 1.0
 
     def start(self, rooms: int) -> None:
         """Begin with imagined answers only."""
@@ -258,12 +277,19 @@ class ThompsonTiming(TimingPolicy):
         """Count an answer, and less of it near by."""
         self.answers[0] += asked.was_accepted
         self.answers[1] += 1
-        counts = self.yes if asked.was_accepted else self.no
+        self._count(asked, self.yes if asked.was_accepted else self.no, 1.0)
+
+    def learn_from_other(self, asked: Asked) -> None:
+        """Count whether the person had time, by a part."""
+        self._count(asked, self.yes if asked.was_available else self.no, self.others)
+
+    def _count(self, asked: Asked, counts: F64, weight: float) -> None:
+        """Count an answer in its cell, and less of it near by."""
         for hour, near in ((-2, 0.25), (-1, 0.5), (0, 1.0), (1, 0.5), (2, 0.25)):
             row = counts[(asked.hour + hour) % HOURS]
-            row += 0.3 * near
+            row += 0.3 * near * weight
             if asked.room >= 0:
-                row[asked.room] += 0.7 * near
+                row[asked.room] += 0.7 * near * weight
 
     def chances(self) -> F64:
         """Return the probability that the rate of yes is above `ask_at`."""

@@ -6,22 +6,35 @@ span ends when a request comes up and with each question and answer; the robot d
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from datetime import timedelta
 from typing import NamedTuple
 
 import numpy as np
 
 from fleet2d.configuration.units import micros
 from fleet2d.engine.bodies import Basis, Bodies, PoseBlock, Watcher
-from fleet2d.entities.behavior import SightEvent
+from fleet2d.entities.behavior import Command, SightEvent
 from fleet2d.entities.body import NEVER
 from fleet2d.entities.decisions import DecidingActor, StandStill
+from fleet2d.errors import ScenarioError
 from fleet2d.floorplan.placed_objects import POSTURES
-from fleet2d.interactions.answers import AnswerRecord, Answers, Circumstances, Reply, Wanted
+from fleet2d.interactions.answers import (
+    ASLEEP,
+    AnswerRecord,
+    Answers,
+    Circumstances,
+    Initiative,
+    Reply,
+    Wanted,
+)
 from fleet2d.interactions.attitude import AttitudeState
 from fleet2d.interactions.interaction import Interaction, Outcome, RequestQueue
 from fleet2d.kernels import TURN, heading_of, line_of_sight, locate
+from fleet2d.runtime.clock import midnight_of
+from fleet2d.runtime.determinism import Draws, stream_key
 from fleet2d.runtime.events import Event, EventKind
 
+DAY = timedelta(days=1)
 LYING = POSTURES.index("lie")
 # Nobody is taken for the person addressed, and nobody notices, from farther away [m].
 EARSHOT_M = 8.0
@@ -48,7 +61,7 @@ class PendingReply(NamedTuple):
 
 @dataclass
 class Conversations(Watcher):
-    """All questions and answers of a run; it does nothing without interactions.
+    """All questions and answers of a run; it does nothing if nobody wants anything.
 
     Attributes:
         actors: All bodies: users, then robots.
@@ -74,7 +87,12 @@ class Conversations(Watcher):
         self._questions: list[Question] = []  # at the ends of plans that were replaced
         self._replies: list[PendingReply] = []
         self._last: list[tuple[int, SightEvent]] = []
-        self._next: int | None = None  # the next step with a question, answer or request
+        # The next step with a question, an answer, a request or the end of a ban; None: unknown.
+        self._next: int | None = None
+        self._initiators: list[tuple[int, int]] = []  # users who start something, and robots
+        self._starts: list[tuple[int, int, int, str]] = []  # today: step, user, robot, kind
+        self._begun_days = 0
+        self._bans: list[tuple[int, int, int]] = []  # first step without, robot, room
 
     @classmethod
     def of(cls, basis: Basis) -> "Conversations":
@@ -86,13 +104,18 @@ class Conversations(Watcher):
         for name, interaction in basis.scenario.interactions.items():
             by = interaction.by or next(iter(basis.scenario.robots))
             wanted.setdefault(rows[by], {})[name] = interaction
+        people = [basis.scenario.users[actor.name].answers or Answers() for actor in basis.users]
+        if any(answers.initiative != Initiative() for answers in people):
+            wanted |= {row: wanted.get(row, {}) for row in range(users, len(basis.actors))}
         for row, interactions in wanted.items():
             queue = RequestQueue(interactions, clock.start)
             conversations.queues[row] = basis.actors[row].requests = queue
-            for user in range(users):
-                entity = basis.scenario.users[basis.actors[user].name]
-                answers = conversations.answers.setdefault(user, entity.answers or Answers())
+            for user, answers in enumerate(people):
+                conversations.answers[user] = answers
                 conversations.attitudes[user, row] = answers.months.begin(clock.start)
+                if answers.initiative != Initiative():
+                    _check_answers_calls(basis.actors[user], basis.actors[row], answers)
+                    conversations._initiators.append((user, row))
         return conversations
 
     @property
@@ -121,6 +144,9 @@ class Conversations(Watcher):
         first = self.next_step
         steps = [reply.step for reply in self._replies]
         steps += [question.step for question in self._questions]
+        steps += [start[0] for start in self._starts] + [ban[0] for ban in self._bans]
+        if self._initiators:
+            steps.append(max(self._day_begin(self._begun_days), first))
         for row, queue in self.queues.items():
             steps += [q.step for q in _questions(row, self.actors[row]) if q.step >= first]
             change = queue.next_change()
@@ -146,17 +172,19 @@ class Conversations(Watcher):
         for row, queue in self.queues.items():
             robot = self.actors[row]
             for change in queue.advance(robot.clock.time(step)):
-                events.append(Event(step, robot.name, change.event, change.request.text))
+                interaction = change.request.interaction
+                text = f"{change.request.name} {interaction.to}"
+                events.append(Event(step, robot.name, change.event, text))
                 if change.event == "due":
-                    worth = change.request.interaction.worth
-                    self.wanted.append(Wanted(step, robot.name, change.request.text, worth))
-                self._tell(row, change.event, change.request.text)
+                    self.wanted.append(Wanted(step, robot.name, text, interaction.worth))
+                self._tell(row, change.event, text)
             asked = [q for q in _questions(row, robot) if q.step == step]
             asked += [q for q in self._questions if q.step == step and q.robot == row]
             for question in dict.fromkeys(asked):
                 block = block or bodies.block(step, end + 1)
                 self._ask(question, block)
         self._questions = []
+        events += self._end_bans(step) + self._start(step, bodies)
         for pending in [reply for reply in self._replies if reply.step <= step]:
             self._replies.remove(pending)
             events += self._give(pending, step, bodies)
@@ -210,7 +238,8 @@ class Conversations(Watcher):
             self.actors[question.robot],
             self.queues[question.robot].find(question.text),
         )
-        value = 0.0 if request is None else request.value_at(robot.clock.time(question.step))
+        is_last = request is not None and request.is_last_stage
+        value = request.value_at(robot.clock.time(question.step)) if request and is_last else 0.0
         self.log.append(
             AnswerRecord(
                 step=question.step,
@@ -288,25 +317,109 @@ class Conversations(Watcher):
         )
 
     def _give(self, pending: PendingReply, step: int, bodies: Bodies) -> list[Event]:
-        """Give an answer: tell the robot, and let it be banned or switched off."""
+        """Give an answer: tell the robot, and let it keep to it."""
         row, text, reply = pending.robot, pending.text, pending.reply
-        robot, queue, detail = self.actors[row], self.queues[row], text
-        time = robot.clock.time(step)
+        queue, time = self.queues[row], self.actors[row].clock.time(step)
         request = queue.find(text)
         if request is not None:
             queue.settle(request, reply.outcome, time, time + reply.later)
-        if reply.outcome == Outcome.BANNED:
-            block = bodies.block(step, step + 1)
-            room = self._room(row, block)
-            if room is not None:
-                queue.banned |= {room}
-                detail = f"{text} {robot.home.rooms[room].name}"
-        if reply.outcome == Outcome.SWITCHED_OFF:
-            user = next(a for a in self.actors if a.name == text.rpartition(" ")[2])
-            off_for = self.answers[user.row].off_for
-            robot.follow_order(StandStill(off_for), step + 1)
         self._tell(row, str(reply.outcome), text)
-        return [Event(step, robot.name, str(reply.outcome), detail)]
+        user = next(a.row for a in self.actors if a.name == text.rpartition(" ")[2])
+        return [self._obey(row, user, reply.outcome, text, step, bodies)]
+
+    def _obey(
+        self, row: int, user: int, outcome: Outcome, text: str, step: int, bodies: Bodies
+    ) -> Event:
+        """Let a robot keep to what a person has said at a step; return the event."""
+        robot, answers = self.actors[row], self.answers[user]
+        room = self._room(row, bodies.block(step, step + 1))
+        lasts = {Outcome.SENT_AWAY: answers.away_for, Outcome.BANNED: answers.bans_for}.get(outcome)
+        if lasts is not None and room is not None:
+            until = step + max(1, micros(lasts) // robot.clock.step_us)
+            robot.keep_out(room, step + 1, until, text)
+            self._bans.append((until, row, room))
+            text = f"{text} {robot.home.rooms[room].name}"
+        if outcome == Outcome.SWITCHED_OFF:
+            robot.follow_order(StandStill(answers.off_for), step + 1)
+        return Event(step, robot.name, str(outcome), text)
+
+    def _end_bans(self, step: int) -> list[Event]:
+        """Let robots into the rooms whose bans are over at a step."""
+        ended = [ban for ban in self._bans if ban[0] <= step]
+        self._bans = [ban for ban in self._bans if ban[0] > step]
+        events = []
+        for until, row, room in ended:
+            robot = self.actors[row]
+            if robot.bans.get(room, until) <= until:
+                name = robot.home.rooms[room].name
+                events.append(Event(step, robot.name, EventKind.ALLOWED, name))
+        return events
+
+    def _day_begin(self, day: int) -> int:
+        """Return the step at which a day of the run begins."""
+        clock = self.actors[0].clock
+        return clock.step_at_or_after(clock.elapsed(midnight_of(clock.start) + day * DAY))
+
+    def _start(self, step: int, bodies: Bodies) -> list[Event]:
+        """Let people turn to robots by themselves."""
+        clock = self.actors[0].clock
+        while self._initiators and self._day_begin(self._begun_days) <= step:
+            midnight = midnight_of(clock.start) + self._begun_days * DAY
+            for user, row in self._initiators:
+                person, robot = self.actors[user], self.actors[row]
+                key = stream_key(person.seed, person.path, f"initiative {robot.name}")
+                for start in self.answers[user].initiative.starts(Draws(key, self._begun_days)):
+                    at = clock.step_at_or_after(clock.elapsed(midnight + start.day_share * DAY))
+                    if at > step:
+                        self._starts.append((at, user, row, start.kind))
+            self._begun_days += 1
+            self._starts.sort()
+        due = [start for start in self._starts if start[0] <= step]
+        self._starts = self._starts[len(due) :]
+        events = (self._turn_to(user, row, kind, step, bodies) for _, user, row, kind in due)
+        return [event for event in events if event is not None]
+
+    def _turn_to(self, user: int, row: int, kind: str, step: int, bodies: Bodies) -> Event | None:
+        """Let a person call a robot, ask it something, or complain; None: it doesn't happen."""
+        person, robot, block = self.actors[user], self.actors[row], bodies.block(step, step + 1)
+        if block.away[user, 0] or self._activity_at(user, step) in ASLEEP:
+            return None
+        lattice, point = robot.home.plan.lattice, (int(block.x[user, 0]), int(block.y[user, 0]))
+        if kind == "call":
+            near = robot.space.nearest(*point, robot.part) or (robot.state.x, robot.state.y)
+            robot.receive(Command("come", place=lattice.xy_of(*near)), step + 1)
+            return Event(step, robot.name, EventKind.CALLED, f"come {person.name}")
+        if kind == "question":
+            reach = EARSHOT_M * lattice.units_per_m
+            away2 = (int(block.x[row, 0]) - point[0]) ** 2 + (int(block.y[row, 0]) - point[1]) ** 2
+            if away2 > reach**2:
+                return None
+            self._last.append(
+                (row, SightEvent(EventKind.QUESTION, person.name, *lattice.xy_of(*point)))
+            )
+            return Event(step, robot.name, EventKind.QUESTION, person.name)
+        room, state = self._room(user, block), self.attitudes[user, row]
+        if room is None or room != self._room(row, block):
+            return None
+        self.answers[user].months.pass_time(state, person.clock.time(step))
+        outcome = self.answers[user].complaint(state, person.home.rooms[room].type)
+        if outcome is None:
+            return None
+        return self._obey(row, user, outcome, person.name, step, bodies)
+
+
+def _check_answers_calls(person: DecidingActor, robot: DecidingActor, answers: Answers) -> None:
+    """Refuse calls of a robot that can't come.
+
+    Raises:
+        ScenarioError: None of its behaviors does.
+    """
+    can_come = any(behavior.takes(Command("come")) for behavior in robot.behaviors)
+    if answers.initiative.calls and not can_come:
+        raise ScenarioError(
+            f"{person.path}.answers.initiative.calls: none of the behaviors of {robot.name} answers"
+            " calls: give it one, like behaviors: [{type: come}, …]"
+        )
 
 
 def _questions(row: int, robot: DecidingActor) -> list[Question]:

@@ -43,7 +43,12 @@ PERSON_EVENTS = frozenset(
     {EventKind.ACTIVITY, EventKind.CAME_HOME, EventKind.LEFT_HOME, EventKind.USES}
 )
 # Events of every robot: interventions cause them.
-ROBOT_EVENTS = frozenset({EventKind.CALLED, EventKind.LOCALIZATION_LOST, EventKind.RELOCALIZED})
+ROBOT_EVENTS = frozenset(
+    {
+        EventKind.ALLOWED, EventKind.BANNED, EventKind.CALLED, EventKind.LOCALIZATION_LOST,
+        EventKind.RELOCALIZED, EventKind.WITHDRAWS,
+    }
+)  # fmt: skip
 DOOR_EVENTS = frozenset({EventKind.OPENED, EventKind.SHUT, EventKind.LOCKED, EventKind.UNLOCKED})
 HOME_EVENTS = frozenset(
     {EventKind.MOVED, EventKind.ROOM_CHANGED, EventKind.LIGHT_ON, EventKind.LIGHT_OFF}
@@ -111,7 +116,8 @@ def possible_details(
     details: dict[str, list[str]] = {}
     if not any(_is_own(robot) for robot in robots):
         details |= dict.fromkeys(ABOUT_USERS, people)
-        details[EventKind.CALLED] = ["dock", *(f"find {name}" for name in people)]
+        calls = [f"{do} {name}" for do in ("come", "find") for name in people]
+        details[EventKind.CALLED] = ["dock", *calls]
     details |= dict.fromkeys(ABOUT_ROBOTS, names)
     for user in users:
         # A log may hold any activities, and so may a class of the user's own.

@@ -375,6 +375,7 @@ class Actor(Body):
         requests: What it wants of people; None without interactions.
         command: What it was called to do, until a behavior takes it up.
         displacements: When it believes to be elsewhere, as it was carried off.
+        bans: The rooms that it was told to keep out of, and the first step at which it may enter.
         in_view: Returns the people that its cameras have in view, and the last place of each [m].
         recall: Returns the robot's `SightingMemory`, if a behavior of it `remembers`.
         plan: The plan that it follows.
@@ -400,6 +401,7 @@ class Actor(Body):
                 behavior.start(self)
             self._find_attention()
         self.command: Command | None = None
+        self.bans: dict[int, int] = {}
         self.plan: Plan = Plan(self, 0).stay()
         self.motion: Motion = self.plan.finish()
         self.planned_at = 0
@@ -412,6 +414,10 @@ class Actor(Body):
         """Replace a behavior, by its number, with another one that was started."""
         self.behaviors[number] = behavior
         self._find_attention()
+
+    def banned(self, step: int) -> frozenset[int]:
+        """Return the indices of the rooms that it is told to keep out of at a step."""
+        return frozenset(room for room, until in self.bans.items() if until > step)
 
     def ask(self, step: int | None) -> None:
         """Set the step at which it decides next; None: never."""

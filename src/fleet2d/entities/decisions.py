@@ -292,6 +292,33 @@ class GoTo(Trip):
             plan.turn_to(self._heading)
 
 
+class LeaveRoom:
+    """Leave a room that it was told to keep out of, for the nearest one that is allowed.
+
+    Args:
+        about: What it was told, for the events table.
+    """
+
+    def __init__(self, about: str) -> None:
+        self._about, self._tried = about, False
+
+    def decide(self, now: Situation) -> Plan | None:
+        """Go to the nearest room that it may be in and isn't shut in by bans; once."""
+        actor, room = now.actor, now.room
+        if self._tried or room is None or room.index not in actor.banned(now.step):
+            return None
+        self._tried = True
+        plan = now.plan().note("withdraws", self._about)
+        banned = actor.banned(now.step)
+        allowed = actor.space_without(banned).rooms_of(0)
+        others = [r for r in actor.reachable_rooms() if r.index in allowed - banned]
+        if others:
+            x, y = now.xy
+            near = min(others, key=lambda r: (r.anchor_xy[0] - x) ** 2 + (r.anchor_xy[1] - y) ** 2)
+            plan.go_to([near.name], "withdraw")
+        return plan.stay(timedelta(seconds=1))
+
+
 class GoOut(Trip):
     """Leave the home, and stay away."""
 
@@ -374,6 +401,30 @@ class DecidingActor(Actor):
         self.ask(step)
         self.arbiter.wake_step = None
 
+    def keep_out(self, room: int, step: int, until: int, about: str) -> None:
+        """Keep out of a room from a step on; in the room, it leaves first.
+
+        Args:
+            room: The index of the room.
+            step: The step.
+            until: The first step at which it may enter again.
+            about: What it was told, for the events table.
+        """
+        self.bans = {**self.bans, room: max(until, self.bans.get(room, 0))}
+        is_here = not self.state.away and self._room_index() == room
+        self.follow_order(LeaveRoom(about) if is_here else self.order, step)
+
+    def _room_index(self) -> int | None:
+        x, y = self.home.plan.lattice.xy_of(self.state.x, self.state.y)
+        room = self.home.plan.room_at(x, y)
+        return None if room is None else room.index
+
+    def _keep_to_bans(self, step: int) -> None:
+        """Let the present bans hold for its ways, from when it is outside of those rooms on."""
+        banned = self.banned(step)
+        if banned != self.kept_out and self._room_index() not in banned:
+            self.kept_out = banned
+
     def receive(self, command: Command, step: int) -> bool:
         """Keep a command until a behavior takes it up; return whether one is asked at once.
 
@@ -409,6 +460,8 @@ class DecidingActor(Actor):
             self.charge.follow(self.motion, now.step * self.clock.step_us)
             if self.charge.is_empty:
                 return False
+        if self.bans or self.kept_out:
+            self._keep_to_bans(now.step)
         if self._chosen is not None or self.order is not None or self.is_stuck:
             return False
         with blame(self.path, now.step):

@@ -374,6 +374,49 @@ class AnswerRecord(NamedTuple):
     trust: float
 
 
+class Start(NamedTuple):
+    """A moment at which a person may turn to a robot.
+
+    Attributes:
+        day_share: The time, as a part of the day.
+        kind: What the person wants: that it comes, an answer, or to be left alone.
+    """
+
+    day_share: float
+    kind: Literal["call", "question", "complaint"]
+
+
+@register("initiative", "rates")
+class Initiative(Component):
+    """What people start by themselves: on average so often a day, at any time of it.
+
+    Nothing comes of the moments at which the person is out, sleeps, or is too far away.
+
+    Attributes:
+        calls: How often the person calls the robot, from anywhere in the home.
+        questions: How often the person asks a robot within 8 m something.
+        complaints: How often the person thinks about a robot in the same room: who is annoyed
+            enough sends it away, bans it or switches it off.
+    """
+
+    kind: ClassVar[str] = "initiative"
+
+    calls: float = Field(default=0.0, ge=0, le=1000)
+    questions: float = Field(default=0.0, ge=0, le=1000)
+    complaints: float = Field(default=0.0, ge=0, le=1000)
+
+    def starts(self, draws: Draws) -> list[Start]:
+        """Return the moments of one day, from its random draws."""
+        rates: tuple[tuple[Literal["call", "question", "complaint"], float], ...] = (
+            ("call", self.calls), ("question", self.questions), ("complaint", self.complaints)
+        )  # fmt: skip
+        starts = []
+        for kind, rate in rates:
+            count = int(rate) + (draws.uniform() < rate - int(rate))
+            starts += [Start(draws.uniform(), kind) for _ in range(count)]
+        return sorted(starts)
+
+
 PARTS = (
     "notice", "activity", "company", "movement", "importance", "manner", "recency", "burden",
     "attitude",
@@ -396,11 +439,14 @@ class Answers(Component):
         burden: What many prompts mean for it.
         attitude: What novelty, habit, trust and annoyance mean for it.
         months: How the attitude changes.
+        initiative: What the person starts without being addressed.
         defers: Probability that a person who isn't available asks for it later.
         later: Least and greatest time after which it may come again.
         answer_takes: Least and greatest time until the answer.
-        sends_away_at: Annoyance from which on the robot is sent away.
+        sends_away_at: Annoyance from which on the robot is sent away from the room.
+        away_for: For how long.
         bans_at: Annoyance from which on it is banned from a bedroom or bathroom.
+        bans_for: For how long.
         off_at: Annoyance from which on it is switched off.
         off_for: For how long.
     """
@@ -417,11 +463,14 @@ class Answers(Component):
     burden: Annotated[AnswerPart, OneOf("answer_part")] = BurdenPart()
     attitude: Annotated[AnswerPart, OneOf("answer_part")] = AttitudePart()
     months: Annotated[Attitude, OneOf("attitude")] = Attitude()
+    initiative: Annotated[Initiative, OneOf("initiative")] = Initiative()
     defers: Share = 0.3
     later: tuple[Duration, Duration] = (timedelta(minutes=15), timedelta(hours=1))
     answer_takes: tuple[Duration, Duration] = (timedelta(seconds=2), timedelta(seconds=8))
     sends_away_at: float = 3.0
+    away_for: PositiveDuration = timedelta(minutes=30)
     bans_at: float = 5.0
+    bans_for: PositiveDuration = timedelta(days=7)
     off_at: float = 8.0
     off_for: PositiveDuration = timedelta(hours=24)
 
@@ -431,7 +480,7 @@ class Answers(Component):
         """Let a part without a type be of the type of its name."""
         if not isinstance(data, Mapping):
             return data
-        types = {name: name for name in PARTS} | {"months": "fading"}
+        types = {name: name for name in PARTS} | {"months": "fading", "initiative": "rates"}
         return {
             name: {"type": types[name], **value}
             if name in types and isinstance(value, Mapping)
@@ -473,18 +522,19 @@ class Answers(Component):
         woke = now.activity in ASLEEP
         if available < willingness and accepts < self.chance("accept", now, state):
             return Reply(Outcome.ACCEPTED, delay, willingness=willingness)
-        if state.annoyance >= self.off_at:
-            outcome = Outcome.SWITCHED_OFF
-        elif state.annoyance >= self.bans_at and now.room in PRIVATE_ROOMS:
-            outcome = Outcome.BANNED
-        elif state.annoyance >= self.sends_away_at:
-            outcome = Outcome.SENT_AWAY
-        elif available < willingness:
-            outcome = Outcome.DECLINED
-        else:
-            outcome = Outcome.DEFERRED if defers < self.defers and not woke else Outcome.IGNORED
+        if (outcome := self.complaint(state, now.room)) is None:
+            mild = Outcome.DEFERRED if defers < self.defers and not woke else Outcome.IGNORED
+            outcome = Outcome.DECLINED if available < willingness else mild
         later = _between(self.later, late)
         return Reply(outcome, delay, later, willingness, woke)
+
+    def complaint(self, state: AttitudeState, room: str) -> Outcome | None:
+        """Return how a person who is annoyed enough gets rid of a robot in a type of room."""
+        if state.annoyance >= self.off_at:
+            return Outcome.SWITCHED_OFF
+        if state.annoyance >= self.bans_at and room in PRIVATE_ROOMS:
+            return Outcome.BANNED
+        return Outcome.SENT_AWAY if state.annoyance >= self.sends_away_at else None
 
 
 def _between(limits: tuple[timedelta, timedelta], share: float) -> timedelta:

@@ -39,8 +39,8 @@ class Outcome(StrEnum):
     SWITCHED_OFF = "switched_off"
 
 
-REQUEST_EVENTS = frozenset({"due", "expired", *map(str, Outcome)})
-"""What a robot hears about its requests: they come up, expire, and people answer."""
+REQUEST_EVENTS = frozenset({"due", "expired", "question", "allowed", *map(str, Outcome)})
+"""What a robot hears: requests come up and expire, people answer, ask it, and let it in again."""
 
 
 class Interaction(Settings):
@@ -54,6 +54,7 @@ class Interaction(Settings):
         to: The person.
         by: The robot; left out: the first one.
         about: What it is about, for reports; the person whom a question is about.
+        fetch_from: For `deliver`: the person who has to give the object to the robot first.
         at: Times of day at which a request comes up.
         on: The days on which it does.
         every: Interval between two requests, from the start on, instead of `at`.
@@ -80,6 +81,7 @@ class Interaction(Settings):
     to: str = Field(min_length=1)
     by: str | None = None
     about: str = ""
+    fetch_from: str | None = None
     at: tuple[TimeOfDay, ...] = ()
     on: Days | Annotated[tuple[Days, ...], Field(min_length=1)] = "daily"
     every: PositiveDuration | None = None
@@ -97,6 +99,8 @@ class Interaction(Settings):
     def _comes_up(self) -> Self:
         if bool(self.at) == (self.every is not None):
             raise problem("it comes up by 'at' (times of day) or 'every' (a duration): give one")
+        if self.fetch_from is not None and (self.do != "deliver" or self.fetch_from == self.to):
+            raise problem("'fetch_from' is for `do: deliver`, and names another person than 'to'")
         return self
 
     def value_after(self, age: timedelta) -> float:
@@ -136,6 +140,7 @@ class Request:
         since: When it came up.
         not_before: When the robot may try (again).
         tries: Number of times that the person was addressed.
+        is_fetched: Whether the robot has what it delivers.
     """
 
     name: str
@@ -143,6 +148,18 @@ class Request:
     since: datetime
     not_before: datetime
     tries: int = 0
+    is_fetched: bool = False
+
+    @property
+    def to(self) -> str:
+        """The person whom the robot has to address now."""
+        giver = self.interaction.fetch_from
+        return self.interaction.to if giver is None or self.is_fetched else giver
+
+    @property
+    def is_last_stage(self) -> bool:
+        """Whether it is done once that person accepts."""
+        return self.to == self.interaction.to
 
     @property
     def until(self) -> datetime:
@@ -151,8 +168,8 @@ class Request:
 
     @property
     def text(self) -> str:
-        """The interaction and the person, as events name them."""
-        return f"{self.name} {self.interaction.to}"
+        """The interaction and the person to address, as events name them."""
+        return f"{self.name} {self.to}"
 
     def value_at(self, time: datetime) -> float:
         """Return its value if it is carried out at a time."""
@@ -169,20 +186,18 @@ class RequestChange(NamedTuple):
 
 @dataclass
 class RequestQueue:
-    """What a robot wants of people at present, and what it has been told about itself.
+    """What a robot wants of people at present.
 
     Attributes:
         interactions: Its interactions, by name.
         start: The start of the run.
         open: The open requests, in the order in which they came up.
-        banned: Indices of the rooms that it was told to keep out of.
         opportunities: What it considered, for the events: step and text.
     """
 
     interactions: Mapping[str, Interaction]
     start: datetime
     open: list[Request] = field(default_factory=list)
-    banned: frozenset[int] = frozenset()
     opportunities: list[tuple[int, str]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
@@ -232,7 +247,7 @@ class RequestQueue:
         ready = [
             request
             for request in self.open
-            if request.not_before <= time and (chosen is None or request.interaction.to in chosen)
+            if request.not_before <= time and (chosen is None or request.to in chosen)
         ]
         return sorted(ready, key=lambda r: (-r.interaction.worth, r.until, r.name))
 
@@ -249,6 +264,9 @@ class RequestQueue:
             time: The present time.
             later: When the person wants to be asked again, if it was deferred.
         """
+        if outcome == Outcome.ACCEPTED and not request.is_last_stage:
+            request.is_fetched, request.tries, request.not_before = True, 0, time
+            return
         request.tries += 1
         may_retry = outcome in (Outcome.DEFERRED, Outcome.IGNORED, Outcome.MISTAKEN)
         if not may_retry or request.tries >= request.interaction.tries:

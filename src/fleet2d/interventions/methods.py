@@ -220,6 +220,22 @@ class InterventionMethods(ABC):
         """
         self._do("dismiss", entity=name)
 
+    def keep_out(
+        self, name: str, of: str | tuple[str, ...], *, duration: Time | None = None
+    ) -> None:
+        """Tell a robot to keep out of rooms, for a duration or until restored.
+
+        Args:
+            name: The robot.
+            of: The rooms, or kinds of rooms.
+            duration: For how long.
+
+        Raises:
+            ScenarioError: There is no such robot.
+            PlacementError: There is no such room.
+        """
+        self._do("keep_out", entity=name, of=of, duration=duration)
+
     def kidnap(self, name: str, to: Any, *, duration: Time | None = "1 min") -> None:
         """Carry a robot elsewhere without its knowledge: it stands there, lost, for a duration.
 

@@ -13,6 +13,7 @@ from fleet2d.entities.body import NEVER
 from fleet2d.entities.equipment import Displacement
 from fleet2d.entities.place import Place
 from fleet2d.errors import PlacementError, ScenarioError
+from fleet2d.floorplan.plan import Room
 from fleet2d.interventions.bodies import Put, check_reach, heading_of
 from fleet2d.interventions.intervention import Intervention, Lasting, World, body, robot, user
 from fleet2d.kernels import turn_between
@@ -102,6 +103,58 @@ class Dismiss(RobotIntervention):
     def begin(self, world: World) -> None:
         """Make it replan without that."""
         robot(world, self.entity).dismiss(world.step)
+
+
+@register("intervention", "keep_out")
+class KeepOut(Lasting):
+    """Tell a robot to keep out of rooms: it leaves them, and goes round them until it may again.
+
+    Events: `banned` and `allowed`, with the room.
+
+    Attributes:
+        entity: The robot.
+        of: The rooms, or kinds of rooms if the home has them.
+    """
+
+    entity: str
+    of: tuple[str, ...] | str
+
+    def check(self, world: World) -> None:
+        """Refuse an unknown robot or room."""
+        robot(world, self.entity)
+        self._rooms(world)
+
+    def begin(self, world: World) -> None:
+        """Tell it, and let it leave."""
+        for room in self._rooms(world):
+            world.emit(self.entity, EventKind.BANNED, room.name)
+            robot(world, self.entity).keep_out(room.index, world.step, NEVER, room.name)
+
+    def end(self, world: World) -> None:
+        """Let it in again, unless another one of these interventions doesn't."""
+        actor = robot(world, self.entity)
+        acts = [a for a in world.lasting if isinstance(a, KeepOut) and a.entity == self.entity]
+        others = {room.index for act in acts for room in act._rooms(world)}
+        for room in self._rooms(world):
+            if room.index not in others:
+                actor.bans = {r: until for r, until in actor.bans.items() if r != room.index}
+                world.emit(self.entity, EventKind.ALLOWED, room.name)
+        actor.decide_again(world.step)
+
+    def _rooms(self, world: World) -> list[Room]:
+        """Return the rooms.
+
+        Raises:
+            PlacementError: One of the names is no room of the home, and no kind of one.
+        """
+        rooms: dict[int, Room] = {}
+        for name in (self.of,) if isinstance(self.of, str) else self.of:
+            found = [room for room in world.home.rooms if name in (room.name, room.type)]
+            if not found:
+                known = {name for room in world.home.rooms for name in (room.name, room.type)}
+                raise PlacementError(f"there is no room {name!r}{suggest(name, known)}")
+            rooms |= {room.index: room for room in found}
+        return [rooms[index] for index in sorted(rooms)]
 
 
 @register("intervention", "battery")

@@ -14,6 +14,9 @@ from fleet2d.interactions.interaction import Outcome
 from fleet2d.metrics.metric import Metric
 from fleet2d.runtime.determinism import sum_in_order
 
+# What happens between a person and a robot without a request.
+TOLD = frozenset({"called", "question", "replies", "sent_away", "banned", "switched_off"})
+
 
 @register("metric", "interactions")
 class Interactions(Metric):
@@ -27,6 +30,8 @@ class Interactions(Metric):
     - `wait_s`: mean time to an answer; `woke`: times that it woke the person;
     - `interrupted`: how often each activity was interrupted at a bad time: the probability of being
       available was below a half;
+    - `called`, `question`, `replies`, `sent_away`, `banned`, `switched_off`: how often each of them
+      happened, if ever, whoever began;
     - `annoyance`, `trust`: at the end, and `mean_annoyance`, over the times of being addressed.
 
     Its table has a row for each time that a person was addressed, with the truth of it.
@@ -35,10 +40,11 @@ class Interactions(Metric):
     hidden: ClassVar[frozenset[str]] = frozenset({"interrupted", "wait_s", "trust", "asked"})
 
     def start(self, home: Home) -> None:
-        """Begin without any."""
+        """Begin without any interaction."""
         self.wanted: Counter[tuple[str, str]] = Counter()
         self.worth: Counter[tuple[str, str]] = Counter()
         self.records: dict[tuple[str, str], list[AnswerRecord]] = {}
+        self.told: dict[tuple[str, str], Counter[str]] = {}
 
     def update(self, history: History, state: Present) -> Any:
         """Take in what happened; return a row for each time that a person was addressed."""
@@ -46,6 +52,11 @@ class Interactions(Metric):
             key = wanted.robot, _person(wanted.text)
             self.wanted[key] += 1
             self.worth[key] += wanted.worth  # type: ignore[assignment]
+        for event in history.events:
+            if event.event in TOLD:
+                people = (word for word in reversed(event.detail.split()) if word in state.users)
+                if (person := next(people, None)) is not None:
+                    self.told.setdefault((event.entity, person), Counter())[event.event] += 1
         records = history.answers
         for record in records:
             key = record.robot, _person(record.text)
@@ -60,12 +71,13 @@ class Interactions(Metric):
     def result(self) -> dict[str, Any]:
         """Return {robot: {user: {number: value}}}."""
         result: dict[str, Any] = {}
-        for (robot, user), count in sorted(self.wanted.items()):
-            records = self.records.get((robot, user), [])
-            result.setdefault(robot, {})[user] = {
-                "wanted": count,
-                **_summary(records, count, float(self.worth[robot, user])),
-            }
+        for robot, user in sorted(self.wanted.keys() | self.told):
+            count, numbers = self.wanted[robot, user], {}
+            if count:
+                records = self.records.get((robot, user), [])
+                numbers = _summary(records, count, float(self.worth[robot, user]))
+            told = sorted(self.told.get((robot, user), {}).items())
+            result.setdefault(robot, {})[user] = {"wanted": count, **numbers, **dict(told)}
         return result
 
 

@@ -223,13 +223,14 @@ class Scenario(Settings):
     @model_validator(mode="after")
     def _interactions_name_bodies(self) -> Self:
         for name, interaction in self.interactions.items():
-            known: dict[str, Mapping[str, Any]] = {"to": self.users, "by": self.robots}
+            users, robots = self.users, self.robots
+            known: dict[str, Mapping[str, Any]] = {"to": users, "fetch_from": users, "by": robots}
             if interaction.by is None and not self.robots:
                 raise problem_at(("interactions", name), "there is no robot that could do it")
             for key, bodies in known.items():
                 body = getattr(interaction, key)
                 if body is not None and body not in bodies:
-                    noun = "user" if key == "to" else "robot"
+                    noun = "robot" if key == "by" else "user"
                     raise problem_at(
                         ("interactions", name, key),
                         f"there is no {noun} {body!r}{suggest(body, bodies)}",

@@ -281,6 +281,9 @@ class Hangout(BeliefBehavior):
         is_in_avoided_room = now.room is not None and now.room.index in self.avoided
         if quiet_until is not None and not is_in_avoided_room:
             return plan.stay(until=quiet_until)
+        if self.place is not None and now.actor.kept_out:
+            x, y = self.places.points[self.place].tolist()
+            self.place = self.place if plan.reaches(x, y) else None
         if self.place is None or (quiet_until is None and now.time >= self.decides_at):
             self.is_blocked = False
             self.decides_at = now.time + self.period
@@ -318,6 +321,8 @@ class Hangout(BeliefBehavior):
 
     def _explore(self, now: Situation, plan: Plan, room: int) -> None:
         """Look round in a room from viewpoints that show nearly all of it, by present walls."""
+        if room in now.actor.kept_out:
+            return
         plan.note("explores", now.home.rooms[room].name)
         for point in viewpoints_of(
             now.actor, now.home.rooms[room], SHARE_TO_SHOW, MAX_VIEWS

@@ -17,15 +17,14 @@ from fleet2d.entities.robots.approach import (
     BeliefBehavior,
     approach,
     check_has_camera,
+    is_in_rooms,
 )
-from fleet2d.errors import NoWayError
 from fleet2d.interactions.interaction import Outcome, Request
 from fleet2d.kernels import F64
 from fleet2d.runtime.determinism import sum_in_order
 
 Step = Literal["seek", "ask", "carry_out"]
 ANSWERS = frozenset(str(outcome) for outcome in Outcome)
-LEAVES_AFTER = frozenset({Outcome.SENT_AWAY, Outcome.BANNED})
 # A person who gave no answer isn't asked again before having moved this far [m].
 MOVED_M = 1.0
 # It looks into the likeliest rooms, until they have this part of the probability.
@@ -33,6 +32,8 @@ ENOUGH = 0.9
 # After a round without a find it looks for the person again after the shorter time, and after each
 # further one it waits twice as long, up to the longer time or as long as the request is open.
 SEARCH_PAUSES = timedelta(minutes=30), timedelta(hours=2)
+# How long its answer to a question takes.
+REPLY_TAKES = timedelta(seconds=10)
 # It tries again after this time if somebody was in the way.
 DETOUR_PAUSE = timedelta(minutes=2)
 
@@ -43,14 +44,16 @@ class ServedRequest(NamedTuple):
     Attributes:
         request: The request.
         step: What its last plan was for.
+        text: The interaction and the person, as events name them.
         place: Where the person was perceived when addressed [m].
-        came_from: Where the robot was when it came to the person [lattice].
+        came_from: Where the robot was before it approached the person [lattice].
     """
 
     request: Request
     step: Step
-    place: Point | None = None
-    came_from: tuple[int, int] | None = None
+    text: str
+    place: Point = (0.0, 0.0)
+    came_from: tuple[int, int] = (0, 0)
 
 
 @register("behavior", "interact")
@@ -62,18 +65,19 @@ class Interact(BeliefBehavior):
     person is likely out of the home. After a round without a find it looks for that person again
     after 30 min, then after 1 h and 2 h, or as long as the request is open. A person in view is
     approached and addressed; the robot waits for `patience`. What is accepted is carried out.
-    Otherwise the robot goes back to where it came from, or leaves the room if it was sent away, and
-    comes back at the time that the person named, or after `retry` of the interaction. A person who
-    gave no answer isn't addressed again in the same place: a sleeper isn't asked twice. Rooms that
-    it was told to keep out of are no part of its ways any more.
+    Otherwise the robot goes back to where it came from, and comes back at the time that the person
+    named, or after `retry` of the interaction. A person who gave no answer isn't addressed again in
+    the same place: a sleeper isn't asked twice. Nobody is addressed in a room that the robot was
+    told to keep out of.
 
     With `timing` it asks an algorithm first: when a request comes up, when the person comes into
     view, and at most every `look`, it serves it with the probability that the algorithm names for
     the hour and the room of the person, seen or believed. A request that was put off is taken up
     only at moments that are better than those before.
 
-    Events, with the interaction and the person: `opportunity`, with that probability and what was
-    drawn, `asks`, the answer, `delivered` and `withdraws`.
+    It answers the questions of people (`replies`). Events, with the interaction and the person:
+    `opportunity`, with that probability and what was drawn, `asks`, the answer, `delivered` and
+    `withdraws`.
 
     Attributes:
         user: Whose requests it serves, or anyone's.
@@ -87,8 +91,10 @@ class Interact(BeliefBehavior):
             waits for a better moment.
     """
 
-    records: ClassVar[frozenset[str]] = frozenset({"asks", "delivered", "withdraws", "opportunity"})
-    listens: ClassVar[frozenset[str]] = frozenset({"user_seen", "due"})
+    records: ClassVar[frozenset[str]] = frozenset(
+        {"asks", "collects", "delivered", "withdraws", "opportunity", "replies"}
+    )
+    listens: ClassVar[frozenset[str]] = frozenset({"user_seen", "due", "question"})
 
     serves_requests: ClassVar[bool] = True
 
@@ -117,9 +123,9 @@ class Interact(BeliefBehavior):
         self.not_found: dict[str, tuple[datetime, timedelta]] = {}
 
     def awaits(self, now: Situation) -> frozenset[str]:
-        """Return `due`, and `user_seen` while it waits for somebody to come into view."""
+        """Leave out `user_seen` unless it waits for somebody to come into view."""
         waits = any(self._waits_for(now, request) for request in self._ready(now))
-        return self.listens if waits else frozenset({"due"})
+        return self.listens if waits else self.listens - {"user_seen"}
 
     def wakes_at(self, now: Situation, plan: Plan) -> datetime | None:
         """Return when a request may be served that has to wait now."""
@@ -128,7 +134,7 @@ class Interact(BeliefBehavior):
             return None
         times = [queue.next_ready(now.time)]
         for request in queue.open:
-            name, to = request.text, request.interaction.to
+            name, to = request.text, request.to
             times += [self.left_alone.get(to), self._looks_again(now, request)]
             if (last := self.looked.get(name)) is not None:
                 times.append(last + self.look)
@@ -141,53 +147,75 @@ class Interact(BeliefBehavior):
     def give_up(self, now: Situation) -> None:
         """Drop the way to a person: somebody is in the way."""
         if self.served is not None:
-            self.not_found[self.served.request.interaction.to] = now.time, DETOUR_PAUSE
+            self.not_found[self.served.request.to] = now.time, DETOUR_PAUSE
         self.served = None
 
     def decide(self, now: Situation) -> Plan | None:
         """Go on with a person, begin with another, or leave the decision to later behaviors."""
-        if now.requests is None:
-            return None
-        self._keep_out(now)
-        served, self.served = self.served, None
-        if served is not None and now.actor.plan.root is not self.plan:
-            served = None  # another behavior has interrupted it
+        served = self._take_served(now)
         if served is not None and served.step == "ask":
             return self._react(now, served)
-        if not now.requests.open:
+        plan, ready = self._reply(now), self._ready(now)
+        if plan is not None or not ready:
+            return plan
+        in_view = now.in_view
+        return (
+            self._address(now, ready, in_view, served)
+            or self._look_on(now, ready, in_view, served)
+            or self._look_for_somebody(now, [r for r in ready if r.to not in in_view])
+        )
+
+    def _take_served(self, now: Situation) -> ServedRequest | None:
+        """Return and forget what it is doing; None if another behavior has interrupted that."""
+        served, self.served = self.served, None
+        if served is None or now.actor.plan.root is self.plan:
+            return served
+        if served.step == "ask":  # maybe it was sent away
+            self.left_alone[served.request.to] = now.time + self.again
+        return None
+
+    def _reply(self, now: Situation) -> Plan | None:
+        """Answer the question of a person, if there is one."""
+        event = next((event for event in now.events if event.event == "question"), None)
+        if event is None:
             return None
-        ready = self._ready(now)
-        in_view = now.in_view if ready else {}
+        plan = now.plan().face(*now.home.plan.lattice.point_at((event.x, event.y)))
+        return plan.note("replies", event.user).stay(REPLY_TAKES)
+
+    def _address(
+        self,
+        now: Situation,
+        ready: list[Request],
+        in_view: Mapping[str, Point],
+        served: ServedRequest | None,
+    ) -> Plan | None:
+        """Address the person of a request who is in view; None: of none."""
         for request in ready:
-            place = in_view.get(request.interaction.to)
+            place = in_view.get(request.to)
             if place is not None and self._may_address(now, request, place):
                 is_meant = served is not None and served.request is request
                 if is_meant or self._is_good_time(now, request):
                     return self._ask(now, request, place)
-        if served is not None and served.step == "seek" and served.request in ready:
-            plan = self._look_on(now, served, in_view)
-            if plan is not None:
-                return plan
-        return self._look_for_somebody(now, [r for r in ready if r.interaction.to not in in_view])
+        return None
 
     def _ready(self, now: Situation) -> list[Request]:
         """Return the open requests of its users that may be tried now, the most valuable first."""
         if now.requests is None or not now.requests.open:
             return []
         ready = now.requests.ready(now.time)
-        return [each for each in ready if self.user in (ANYONE, each.interaction.to)]
+        return [each for each in ready if self.user in (ANYONE, each.to)]
 
     def _waits_for(self, now: Situation, request: Request) -> bool:
         """Return whether it would address the person of a request now, if in view."""
         last = self.looked.get(request.text)
         if last is not None and now.time - last < self.look:
             return False
-        return self.left_alone.get(request.interaction.to, now.time) <= now.time
+        return self.left_alone.get(request.to, now.time) <= now.time
 
     def _look_for_somebody(self, now: Situation, ready: list[Request]) -> Plan | None:
         """Look for the person of one of some requests, if likely at home; None: of none."""
         for request in ready:
-            to = request.interaction.to
+            to = request.to
             if not self.seek or not request.interaction.seek:
                 continue
             if max(self._looks_again(now, request), self.left_alone.get(to, now.time)) > now.time:
@@ -201,9 +229,9 @@ class Interact(BeliefBehavior):
 
     def _looks_again(self, now: Situation, request: Request) -> datetime:
         """Return when it may look for the person of a request."""
-        if request.interaction.to not in self.not_found:
+        if request.to not in self.not_found:
             return now.time
-        since, pause = self.not_found[request.interaction.to]
+        since, pause = self.not_found[request.to]
         return since + min(pause, request.interaction.within)
 
     def _pause_search(self, now: Situation, person: str) -> None:
@@ -212,24 +240,17 @@ class Interact(BeliefBehavior):
         _, pause = self.not_found.get(person, (now.time, first / 2))
         self.not_found[person] = now.time, min(2 * pause, longest)
 
-    def _keep_out(self, now: Situation) -> None:
-        """Keep out of the rooms that it was told to, from when it is outside on."""
-        queue = now.requests
-        assert queue is not None
-        if queue.banned != now.actor.kept_out:
-            room = now.room
-            if room is None or room.index not in queue.banned:
-                now.actor.kept_out = queue.banned
-
     def _may_address(self, now: Situation, request: Request, place: Point) -> bool:
         """Return whether a person in view may be addressed: one who was left alone for a while."""
-        if self.left_alone.get(request.interaction.to, now.time) > now.time:
+        if self.left_alone.get(request.to, now.time) > now.time:
             return False
-        quiet_at = self.unanswered.get(request.interaction.to)
+        if is_in_rooms(now, *place, now.actor.banned(now.step)):
+            return False
+        quiet_at = self.unanswered.get(request.to)
         if quiet_at is not None and _squared(quiet_at, place) < MOVED_M**2:
             return False
-        self.unanswered.pop(request.interaction.to, None)
-        self.not_found.pop(request.interaction.to, None)
+        self.unanswered.pop(request.to, None)
+        self.not_found.pop(request.to, None)
         return True
 
     def _is_good_time(self, now: Situation, request: Request) -> bool:
@@ -241,7 +262,7 @@ class Interact(BeliefBehavior):
             return False
         assert now.requests is not None
         self.looked[request.text] = now.time
-        chances, chance, to = now.outputs.get(self.timing), 1.0, request.interaction.to
+        chances, chance, to = now.outputs.get(self.timing), 1.0, request.to
         age = (now.time - request.since) / request.interaction.within
         if chances is not None and age < self.only_urgent_at:
             chance = chances.chance(to, request.name, now.time, self._room_of(now, to))
@@ -270,7 +291,7 @@ class Interact(BeliefBehavior):
     def _ask(self, now: Situation, request: Request, place: Point) -> Plan:
         """Approach a person in view, address the person, and wait for the answer."""
         x, y = now.home.plan.lattice.point_at(now.nearest_free(*now.xy))
-        self.served = ServedRequest(request, "ask", place, (x, y))
+        self.served = ServedRequest(request, "ask", request.text, place, (x, y))
         plan = now.plan()
         approach(now, plan, *place, request.interaction.distance)
         plan.face(*now.home.plan.lattice.point_at(place))
@@ -280,49 +301,28 @@ class Interact(BeliefBehavior):
 
     def _react(self, now: Situation, served: ServedRequest) -> Plan:
         """Carry out what was accepted, or withdraw after another answer."""
-        request, to = served.request, served.request.interaction.to
-        answers = [e.event for e in now.events if e.event in ANSWERS and e.user == request.text]
+        request, to = served.request, served.text.rpartition(" ")[2]
+        answers = [e.event for e in now.events if e.event in ANSWERS and e.user == served.text]
         if Outcome.ACCEPTED in answers:
             self.served = served._replace(step="carry_out")
-            self.plan = now.plan().stay(request.interaction.takes).note("delivered", request.text)
+            done = "delivered" if to == request.interaction.to else "collects"
+            self.plan = now.plan().stay(request.interaction.takes).note(done, served.text)
             return self.plan.stay(timedelta(seconds=1))
         if not answers:
             assert now.requests is not None
             now.requests.settle(request, Outcome.IGNORED, now.time, now.time)
-        if served.place is not None and (not answers or Outcome.IGNORED in answers):
+        if not answers or Outcome.IGNORED in answers:
             self.unanswered[to] = served.place
         self.left_alone[to] = now.time + self.again
-        plan = now.plan().note("withdraws", request.text)
-        if LEAVES_AFTER.isdisjoint(answers) and served.came_from is not None:
-            return plan.go_to_point(*served.came_from).stay(timedelta(seconds=1))
-        return self._leave_room(now, plan)
-
-    def _leave_room(self, now: Situation, plan: Plan) -> Plan:
-        """Leave the room of the person for the nearest one in which it isn't shut in by bans."""
-        room, queue = now.room, now.requests
-        assert queue is not None
-        entity, others = now.actor.entity, now.actor.reachable_rooms()
-        if queue.banned:
-            space = now.home.space(
-                entity.radius, opens_doors=entity.opens_doors, without=queue.banned
-            )
-            others = [other for other in others if other.index in space.rooms_of(0)]
-        others = [other for other in others if room is None or other.index != room.index]
-        if others and room is not None:
-            here = now.xy
-            nearest = min(others, key=lambda r: _squared(r.anchor_xy, here))
-            try:
-                plan.go_to([nearest.name], "withdraw")
-            except NoWayError:
-                plan.stay(timedelta(seconds=10))
-        return plan.stay(timedelta(seconds=1))
+        plan = now.plan().note("withdraws", served.text)
+        return plan.go_to_point(*served.came_from).stay(timedelta(seconds=1))
 
     def _seek(self, now: Situation, request: Request, joint: F64) -> Plan:
         """Look into the likeliest rooms, on one round; the person may come into view on the way."""
         rooms = now.actor.reachable_rooms()
         rooms.sort(key=lambda room: (-float(joint[room.index]), room.index))
         total = sum_in_order(float(joint[room.index]) for room in rooms)
-        self.served, self.plan = ServedRequest(request, "seek"), now.plan()
+        self.served, self.plan = ServedRequest(request, "seek", request.text), now.plan()
         looked = 0.0
         for room in rooms:
             if looked > ENOUGH * total:
@@ -332,14 +332,20 @@ class Interact(BeliefBehavior):
         return self.plan.interrupt_on("user_seen")
 
     def _look_on(
-        self, now: Situation, served: ServedRequest, in_view: Mapping[str, Point]
+        self,
+        now: Situation,
+        ready: list[Request],
+        in_view: Mapping[str, Point],
+        served: ServedRequest | None,
     ) -> Plan | None:
         """Go on with a round that somebody has interrupted; None: it is over, without a find."""
+        if served is None or served.step != "seek" or served.request not in ready:
+            return None
         last, plan = now.actor.plan, None
-        if served.request.interaction.to not in in_view and not last.is_over(now.step):
+        if served.request.to not in in_view and not last.is_over(now.step):
             plan = resumed(now.actor, now.plan(), last, now.step)
         if plan is None:
-            self._pause_search(now, served.request.interaction.to)
+            self._pause_search(now, served.request.to)
             return None
         self.served = served
         return plan.interrupt_on("user_seen")

@@ -38,7 +38,7 @@ class Opportunistic(Behavior):
     """
 
     records: ClassVar[frozenset[str]] = frozenset(
-        {"approaches", "asks", "delivered", "interaction_over", "interacts"}
+        {"approaches", "asks", "collects", "delivered", "interaction_over", "interacts"}
     )
     listens: ClassVar[frozenset[str]] = frozenset({"user_seen"})
 
@@ -57,16 +57,20 @@ class Opportunistic(Behavior):
         """Check that it has a camera."""
         check_has_camera(actor, "opportunistic")
         self.avoided = avoided_rooms(actor, "opportunistic.avoid", self.avoid)
-        self.request: Request | None = None
+        self.asked: tuple[Request, str] | None = None  # the request, as events named it
         self.last_opportunity: dict[str, datetime] = {}  # by person
 
     def decide(self, now: Situation) -> Plan | None:
         """Approach somebody in view, or leave the decision to later behaviors."""
         if (accepted := self._accepted(now)) is not None:
-            plan = now.plan().stay(accepted.interaction.takes).note("delivered", accepted.text)
-            return plan.note("interaction_over", accepted.interaction.to)
+            request, text = accepted
+            person = text.rpartition(" ")[2]
+            done = "delivered" if person == request.interaction.to else "collects"
+            plan = now.plan().stay(request.interaction.takes).note(done, text)
+            return plan.note("interaction_over", person)
+        avoided = self.avoided | now.actor.banned(now.step)
         for name, (x, y) in sorted(now.in_view.items()):
-            if not self._is_opportunity(name, now) or is_in_rooms(now, x, y, self.avoided):
+            if not self._is_opportunity(name, now) or is_in_rooms(now, x, y, avoided):
                 continue
             self.last_opportunity[name] = now.time
             if now.random(f"chance {name}").uniform() < self.chance:
@@ -86,13 +90,13 @@ class Opportunistic(Behavior):
         plan.face(*now.home.plan.lattice.point_at((x, y)))
         plan.note("interacts", name)
         ready = [] if now.requests is None else now.requests.ready(now.time, (name,))
-        self.request = ready[0] if ready else None
-        if self.request is not None:
-            plan.note("asks", self.request.text).interrupt_on("accepted")
+        self.asked = (ready[0], ready[0].text) if ready else None
+        if self.asked is not None:
+            plan.note("asks", self.asked[1]).interrupt_on("accepted")
         return plan.stay(self.interaction).note("interaction_over", name)
 
-    def _accepted(self, now: Situation) -> Request | None:
-        """Return the request that the person it is with has just accepted."""
-        request, self.request = self.request, None
+    def _accepted(self, now: Situation) -> tuple[Request, str] | None:
+        """Return the request that the person it is with has just accepted, and its text."""
+        asked, self.asked = self.asked, None
         texts = [event.user for event in now.events if event.event == "accepted"]
-        return request if request is not None and request.text in texts else None
+        return asked if asked is not None and asked[1] in texts else None

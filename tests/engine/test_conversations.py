@@ -1,0 +1,127 @@
+"""Conversations: bans that end, objects from one person to another, and what people start."""
+
+from typing import Any
+
+import pytest
+from tests.entities.robots.test_interact import PILL, Scripted, ana, events_of, home
+from tests.scenes import digests, table
+
+import fleet2d
+from fleet2d.errors import ScenarioError
+
+PARCEL = {**PILL, "do": "deliver", "fetch_from": "ben"}
+
+
+def told(run: fleet2d.Run, *kinds: str) -> list[tuple[str, str]]:
+    rows = table(run, "events")
+    pairs = zip(rows["event"], rows["detail"], strict=True)
+    return [(str(event), str(detail)) for event, detail in pairs if event in kinds]
+
+
+def rooms_of(run: fleet2d.Run, body: str) -> list[str]:
+    """The room of a body at each step."""
+    rows = table(run, "trajectories")
+    return [str(room) for room in rows["room"][rows["entity"] == body]]
+
+
+def test_a_ban_ends() -> None:
+    users = {"ana": ana("bedroom", ("banned",))}
+    users["ana"]["answers"] = Scripted(outcomes=("banned",), bans_for="30 min")
+    run = fleet2d.run(home("3 h", users=users))
+    ((banned, _),) = events_of(run, "banned")
+    ((allowed, _),) = events_of(run, "allowed")
+
+    assert 1800 == allowed - banned
+    assert "bedroom_0" not in rooms_of(run, "astro")[banned + 60 : allowed]
+    assert "bedroom_0" in rooms_of(run, "astro")[allowed:]
+
+
+def test_who_sends_the_robot_away_is_left_alone_for_a_while() -> None:
+    users = {"ana": ana("kitchen", ("sent_away",))}
+    users["ana"]["answers"] = Scripted(outcomes=("sent_away",), away_for="20 min")
+    behaviors = [{"type": "opportunistic", "again": "1 min"}, {"type": "patrol"}]
+    run = fleet2d.run(home("50 min", users=users, robots={"astro": {"behaviors": behaviors}}))
+    ((away, _),) = events_of(run, "sent_away")
+    approached = [step for step, _ in events_of(run, "approaches")]
+
+    assert not [step for step in approached if away < step < away + 1200]
+    assert [step for step in approached if step > away + 1200]
+
+
+def test_a_parcel_is_fetched_from_one_and_brought_to_the_other() -> None:
+    users = {"ana": ana(), "ben": ana("bedroom")}
+    run = fleet2d.run(home(users=users, interactions={"parcel": PARCEL}))
+
+    assert [
+        ("due", "parcel ana"), ("asks", "parcel ben"), ("collects", "parcel ben"),
+        ("asks", "parcel ana"), ("delivered", "parcel ana"),
+    ] == told(run, "due", "asks", "collects", "delivered", "expired")  # fmt: skip
+
+
+def test_a_parcel_that_is_not_handed_over_is_not_delivered() -> None:
+    users = {"ana": ana(), "ben": ana("bedroom", ("declined",))}
+    run = fleet2d.run(home(users=users, interactions={"parcel": PARCEL}))
+
+    assert ["due", "asks", "declined", "withdraws"] == [event for _, event in events_of(run)]
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"do": "offer"}, {"fetch_from": "ana"}], ids=["not a delivery", "to oneself"]
+)
+def test_objects_are_fetched_for_deliveries_only(wrong: dict[str, str]) -> None:
+    with pytest.raises(ScenarioError, match="'fetch_from' is for `do: deliver`"):
+        fleet2d.run(home(interactions={"parcel": PARCEL | wrong}))
+
+
+def person_who(**rates: float) -> dict[str, Any]:
+    return ana() | {"answers": {"initiative": rates}}
+
+
+def test_people_call_robots_which_come() -> None:
+    behaviors = [{"type": "interact"}, {"type": "come", "stay": "1 min"}, {"type": "patrol"}]
+    content = home("3 h", users={"ana": person_who(calls=24)}, metrics={"interactions": {}})
+    content["robots"] = {"astro": {"behaviors": behaviors}}
+    run = fleet2d.run(content)
+    called, came = told(run, "called"), told(run, "visits")
+
+    assert len(came) >= len(called) > 0
+    assert ("called", "come ana") in called
+    assert len(called) == run.metrics["interactions"]["astro"]["ana"]["called"]
+
+
+def test_questions_near_by_are_replied_to() -> None:
+    run = fleet2d.run(home("3 h", users={"ana": person_who(questions=48)}))
+    asked = [step for step, _ in events_of(run, "question")]
+    replies = [step for step, _ in events_of(run, "replies")]
+
+    assert len(asked) > 2
+    assert len(replies) > len(asked) / 2  # others come while it is busy
+    assert all(any(0 < reply - step < 15 for step in asked) for reply in replies)
+
+
+def test_annoyed_people_send_robots_away_that_asked_nothing() -> None:
+    person = person_who(complaints=1000)
+    person["answers"] |= {"sends_away_at": -1, "away_for": "5 min"}
+    robots = {"astro": {"behaviors": [{"type": "patrol"}]}}
+    run = fleet2d.run(home("1 h", users={"ana": person}, interactions={}, robots=robots))
+    sent = [step for step, _ in events_of(run, "sent_away")]
+
+    assert len(sent) > 1
+    for step in sent:
+        assert "kitchen_0" in rooms_of(run, "astro")[step]
+        assert "kitchen_0" not in rooms_of(run, "astro")[step + 20 : step + 300]
+
+
+@pytest.mark.parametrize("max_span", [1, 7])
+def test_spans_are_invisible_to_what_people_start(max_span: int) -> None:
+    person = person_who(questions=200, complaints=500)
+    person["answers"] |= {"sends_away_at": 0.1, "away_for": "2 min"}
+    content = home("25 min", users={"ana": person})
+    other = {**content, "simulation": {**content["simulation"], "max_span": max_span}}
+
+    assert digests(fleet2d.run(content)) == digests(fleet2d.run(other))
+
+
+def test_calls_of_a_robot_that_can_not_come_are_refused() -> None:
+    with pytest.raises(ScenarioError, match=r"initiative\.calls: none of the behaviors of astro"):
+        fleet2d.run(home(users={"ana": person_who(calls=1)}))
