@@ -1,13 +1,18 @@
-"""How fast runs are watched: opening, scrubbing, memory, a live run, a film.
+"""How fast runs are watched: opening, scrubbing, questions, memory, a live run, a film.
 
     python benchmarks/viewer.py [RUN_DIR ...]
+    python benchmarks/viewer.py --crowd --year
 
-Without a run, one of a robot and five users over thirty days is simulated first. Needs Chromium at
-/usr/bin/chromium and the extra `test`.
+Without a run, one of a robot and five users over thirty days is simulated first; `--crowd` adds one
+of 50 users and 10 robots in 1,049 m² over 14 days, `--year` the base scenario over a year. Needs
+Chromium at /usr/bin/chromium and the extra `test`.
 """
 
 import argparse
+import json
+import os
 import statistics
+import subprocess
 import sys
 import tempfile
 import time
@@ -44,15 +49,82 @@ SCRUB = """async (frames) => {
 }"""
 
 
+ASK = """async (question) => {
+  const box = document.getElementById("ask");
+  box.value = question;
+  box.dispatchEvent(new Event("input", { bubbles: true }));
+  const began = performance.now();
+  box.dispatchEvent(new KeyboardEvent("keydown", { key: "Enter", bubbles: true }));
+  await new Promise(requestAnimationFrame);
+  return [performance.now() - began, document.getElementById("ask-answer").textContent];
+}"""
+QUESTIONS = (
+    "last seen {user}",
+    "nights {user} not in bedroom",
+    "{user} in bathroom > 10 min",
+    "user seen",
+)
+ROOMS = (
+    ["bedroom"] * 14
+    + ["bathroom"] * 5
+    + ["living_room", "kitchen", "dining_room"] * 2
+    + ["office"] * 3
+)
+
+
+def crowd_scenario(folder: Path) -> dict[str, Any]:
+    """Return the scenario of 50 users and 10 robots in a home of 1,049 m²: rooms on a corridor."""
+    rooms, free = [], [_box(0, 0, 59.35, 2)]
+    for number, kind in enumerate(ROOMS):
+        left, above = 4.25 * (number // 2), number % 2 == 0
+        low = 2.15 if above else -8.22
+        area = _box(left, low, left + 4.1, low + 8.07)
+        rooms.append({"type": kind, "polygon": area})
+        door = 2.0 if above else -0.15
+        free += [area, _box(left + 1.5, door, left + 2.4, door + 0.15)]
+    plan = folder / "corridor.json"
+    content = {"format": "fleet2d-floorplan", "version": 1, "entrance": [0.5, 1.0]}
+    rooms.append({"type": "hallway", "polygon": free[0]})
+    plan.write_text(
+        json.dumps({**content, "free": [{"outline": area} for area in free], "rooms": rooms})
+    )
+    personas = ("works_outside", "works_from_home", "retired")
+    behaviors = [{"type": "patrol", "dwell": "0 s", "cooldown": "4 h"}]
+    camera = {"range": [0.3, 4.5], "angle_deg": 108, "detection": 0.95}
+    return {
+        "simulation": {"start": "2026-01-05", "duration": "14 d", "seed": 4},
+        "floorplan": {"type": "native", "path": str(plan), "furnish": True},
+        "users": {f"u{i:02d}": {"type": "routine", "persona": personas[i % 3]} for i in range(50)},
+        "robots": {f"r{i}": {"camera": camera, "behaviors": behaviors} for i in range(10)},
+        "algorithms": {
+            "ltp": {"type": "long_term_presence", "estimator": "likelihood", "period": "1 d"}
+        },
+        "metrics": {"room_share": {}, "sightings": {}},
+    }
+
+
+def _box(left: float, bottom: float, right: float, top: float) -> list[list[float]]:
+    return [[left, bottom], [right, bottom], [right, top], [left, top]]
+
+
 def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("runs", nargs="*", type=Path)
-    runs = parser.parse_args().runs
+    parser.add_argument("--crowd", action="store_true")
+    parser.add_argument("--year", action="store_true")
+    options = parser.parse_args()
+    runs = options.runs
     with tempfile.TemporaryDirectory() as folder, chromium() as browser:
         if not runs:
             people = {name: {"type": "routine"} for name in ("ana", "ben", "cleo", "dan", "eva")}
             runs = [Path(folder) / "month"]
             fleet2d.run("bundled:base", seed=4, users=people, out=runs[0])
+        if options.crowd:
+            runs.append(Path(folder) / "crowd")
+            fleet2d.run(crowd_scenario(Path(folder)), out=runs[-1])
+        if options.year:
+            runs.append(Path(folder) / "year")
+            fleet2d.run("bundled:base", "simulation.duration=365 d", seed=4, out=runs[-1])
         for run in runs:
             measure_page(browser, run)
         measure_live(browser)
@@ -60,10 +132,14 @@ def main() -> None:
 
 
 def measure_page(browser: Any, run: Path) -> None:
-    server = PageServer([run])
-    stop = server.start()
+    """Measure a page; its server is a process of its own, as `fleet2d view` is."""
+    program = Path(sys.executable).with_name("fleet2d")
+    command = [program, "view", str(run), "--no-browser"]
+    server = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    assert server.stdout is not None
+    address = server.stdout.readline().strip()
     time.sleep(4)  # the server reads the run while the browser starts
-    with page_at(browser, server.address) as page:
+    with page_at(browser, address) as page:
         marks = "performance.getEntriesByName('first-picture')[0].startTime"
         print(f"{run.name}: first picture after {page.evaluate(marks):.0f} ms")
         for view in ("the whole run", "a day"):
@@ -71,10 +147,18 @@ def measure_page(browser: Any, run: Path) -> None:
             rate = 1000 / statistics.mean(times)
             slow = times[round(0.95 * FRAMES)]
             print(f"  scrubbing {view}: {rate:.0f} frames/s, 95 % under {slow:.0f} ms")
-            page.click("text=Day")
-        heap = page.evaluate("performance.memory.totalJSHeapSize / 1e6")
-        print(f"  {heap:.0f} MB of heap")
-    stop()
+            page.get_by_role("button", name="Day", exact=True).click()
+        user = page.locator("tr[data-body]").first.get_attribute("data-body")
+        for question in QUESTIONS:
+            words = question.format(user=user)
+            lasted, answer = page.evaluate(ASK, words)
+            print(f"  '{words}' ({answer}): {lasted:.0f} ms")
+        heap = page.evaluate("performance.memory.usedJSHeapSize / 1e6")
+        pages = int(Path(f"/proc/{server.pid}/statm").read_text().split()[1])
+        memory = pages * os.sysconf("SC_PAGE_SIZE") / 1e6
+        print(f"  {heap:.0f} MB of heap; {memory:.0f} MB of the server")
+    server.terminate()
+    server.wait()
 
 
 def measure_live(browser: Any) -> None:

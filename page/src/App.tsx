@@ -173,14 +173,14 @@ function Controls() {
         <button type="button" aria-label="Zoom out" onClick={() => state.zoom(2)}>
           −
         </button>
-        <button type="button" onClick={() => state.setRange(state.beginUs.value, state.endUs.value)}>
+        <button type="button" onClick={() => state.showRange(state.beginUs.value, state.endUs.value)}>
           Whole run
         </button>
         <button
           type="button"
           onClick={() => {
             const start = run.clock.dayStart(run.clock.day(state.moment.value));
-            state.setRange(start, start + 86_400e6);
+            state.showRange(start, start + 86_400e6);
           }}
         >
           Day

@@ -12,6 +12,9 @@ export const KEYS: [string, string][] = [
   ["p n", "previous, next answer, or event of the chosen kind"],
   ["+ −", "zoom in, out"],
   ["0", "the whole run"],
+  ["z", "the view before the last zoom"],
+  ["l", "filter the lanes"],
+  ["?", "these keys"],
   ["< >", "slower, faster"],
   ["Home End", "begin, end"],
   ["1 … 6", "panels"],
@@ -39,7 +42,18 @@ const ACTIONS: Record<string, (event: KeyboardEvent) => void> = {
   "+": () => state.zoom(0.5),
   "=": () => state.zoom(0.5),
   "-": () => state.zoom(2),
-  "0": () => state.setRange(state.beginUs.value, state.endUs.value),
+  "0": () => state.showRange(state.beginUs.value, state.endUs.value),
+  z: () => state.zoomBack(),
+  l: () => document.getElementById("filter")?.focus(),
+  "?": () => {
+    const help = document.querySelector<HTMLDetailsElement>("details.help");
+    if (help) help.open = !help.open;
+  },
+  Escape: () => {
+    state.marked.value = null;
+    const help = document.querySelector<HTMLDetailsElement>("details.help");
+    if (help) help.open = false;
+  },
   "<": () => state.faster(-1),
   ">": () => state.faster(1),
   Home: () => state.goTo(state.beginUs.value),

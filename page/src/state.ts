@@ -18,6 +18,8 @@ export const runs = signal<Run[]>([]);
 export const moment = signal(0);
 /** The part of the run that the timeline shows [us]. */
 export const range = signal<[number, number]>([0, 1]);
+/** A range whose totals are shown [us]. */
+export const marked = signal<[number, number] | null>(null);
 export const playing = signal(false);
 export const speed = signal(60);
 export const selected = signal("");
@@ -61,6 +63,32 @@ export function goTo(us: number): void {
   });
 }
 
+/** Ranges that were shown before, the last one at the end. */
+const ranges: [number, number][] = [];
+const MOST_RANGES = 50;
+const SAME_GESTURE_MS = 600;
+let zoomedAt = 0;
+
+/** Remember the range before a zoom; the steps of one gesture are one. */
+function remember(): void {
+  const now = performance.now();
+  if (now - zoomedAt > SAME_GESTURE_MS) ranges.push(range.value);
+  zoomedAt = now;
+  if (ranges.length > MOST_RANGES) ranges.shift();
+}
+
+/** Show the range before the last zoom again. */
+export function zoomBack(): void {
+  const before = ranges.pop();
+  if (before) range.value = before;
+}
+
+/** Show a range, which `zoomBack` undoes. */
+export function showRange(from: number, to: number): void {
+  remember();
+  setRange(from, to);
+}
+
 export function setRange(from: number, to: number): void {
   const [begin, end] = [beginUs.value, endUs.value];
   const total = end - begin;
@@ -72,7 +100,7 @@ export function setRange(from: number, to: number): void {
 /** Zoom about a moment: a factor below 1 shows less. */
 export function zoom(factor: number, about = moment.value): void {
   const [from, to] = range.value;
-  setRange(about - (about - from) * factor, about + (to - about) * factor);
+  showRange(about - (about - from) * factor, about + (to - about) * factor);
 }
 
 export function pan(us: number): void {

@@ -18,6 +18,7 @@ export const expected = content.expected;
 
 export const source: RunSource = {
   path: "",
+  tracks: () => Promise.resolve(null),
   facts: () => Promise.resolve(held.facts),
   sightings: () => Promise.resolve(held.sightings),
   walls: (number) => Promise.resolve(held.walls[number]!),

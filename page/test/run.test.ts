@@ -105,7 +105,7 @@ describe("a stored run", () => {
     const [heat, error] = beliefLanes(run);
     const room = run.facts.home.rooms[valueAt(run.roomsOf("ana"), 20 * 3600e6)!]!.name;
     expect(heat!.words(20 * 3600e6)).toContain(`true: ${room}`);
-    expect(heat!.paint.kind).toBe("heat");
+    expect(heat!.paint().kind).toBe("heat");
     expect(error!.label).toContain("error");
   });
 

@@ -10,7 +10,7 @@ function track(rows: [us: number, x: number, heading: number, away: number, plan
     Int16Array.from(of(2)),
     Uint8Array.from(of(3)),
     Uint8Array.from(of(4)),
-    Float64Array.from(of(5)),
+    (row) => of(5)[row]!,
   );
 }
 

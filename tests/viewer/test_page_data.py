@@ -7,6 +7,7 @@ import re
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
@@ -65,3 +66,19 @@ def test_empty_part_is_refused(run_dir: Path, tmp_path: Path, first: int, end: i
 def test_file_that_can_not_be_written_is_an_input_error(run_dir: Path, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="can't be written"):
         export_html(fleet2d.open_run(run_dir), tmp_path / "no" / "x.html")
+
+
+def test_tracks_are_the_key_frames_body_by_body(run_dir: Path) -> None:
+    run = fleet2d.open_run(run_dir)
+    data, frames = PageData(run), run.tables["key_frames"].to_pylist()
+    bodies = [*run.manifest["entities"]["users"], *run.manifest["entities"]["robots"]]
+    counts = np.frombuffer(data.tracks, "<f8", len(bodies))
+    assert [sum(row["entity"] == name for row in frames) for name in bodies] == counts.tolist()
+    total, offset = len(frames), 8 * len(bodies)
+    assert offset + total * 24 == len(data.tracks)
+    x = np.frombuffer(data.tracks, "<i4", total, offset + 8 * total)
+    first = [row for row in frames if row["entity"] == bodies[0]]
+    home = data.facts["home"]
+    assert [row["x"] for row in first] == pytest.approx(
+        ((x[: len(first)] + home["origin_units"][0]) / home["units_per_m"]).tolist(), abs=1e-9
+    )

@@ -8,6 +8,7 @@
  *     kitchen at 13 Jan 19:30
  */
 
+import type { EventRow } from "./events";
 import { AWAY } from "./rooms";
 import type { Run } from "./run";
 import { durationText } from "./clock";
@@ -205,10 +206,17 @@ function happened(run: Run, words: string): Span[] {
   const { rows } = run.events;
   const spans: Span[] = [];
   const ends = new Map<string, number>();
+  const known = new Map<string, boolean>(); // few texts are different
+  const fits = (row: EventRow): boolean => {
+    const key = `${row.entity}/${row.event}/${row.user}/${row.detail}`;
+    let is = known.get(key);
+    if (is === undefined) known.set(key, (is = hasWords(eventText(row), words)));
+    return is;
+  };
   for (let i = rows.length - 1; i >= 0; i--) {
     const row = rows[i]!;
     const key = `${row.entity} ${row.event}`;
-    if (hasWords(eventText(row), words)) {
+    if (fits(row)) {
       const lasts = row.event === "activity" || row.event === "way_blocked";
       const to = lasts ? (ends.get(row.event === "activity" ? key : row.entity) ?? run.endUs) : row.us;
       spans.push({ from: row.us, to, words: eventText(row).trim() });

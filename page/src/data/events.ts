@@ -18,14 +18,17 @@ export class Events {
   readonly us: number[] = [];
   readonly rows: EventRow[] = [];
   private readonly byKind = new Map<string, number[]>();
+  private readonly byEntity = new Map<string, number[]>();
+  private readonly byBoth = new Map<string, number[]>();
 
   add(step: number, us: number, entity: string, event: string, user: string, detail: string): void {
     const index = this.rows.length;
     this.us.push(us);
     this.rows.push({ index, us, step, entity, event, user, detail });
-    const indices = this.byKind.get(event);
-    if (indices) indices.push(index);
-    else this.byKind.set(event, [index]);
+    file(this.byKind, event, index);
+    file(this.byEntity, entity, index);
+    file(this.byBoth, `${entity}/${event}`, index);
+    if (user && user !== entity) file(this.byEntity, user, index);
   }
 
   get kinds(): string[] {
@@ -33,7 +36,7 @@ export class Events {
   }
 
   ofKind(kind: string): EventRow[] {
-    return (this.byKind.get(kind) ?? []).map((index) => this.rows[index]!);
+    return this.rowsAt(this.byKind.get(kind));
   }
 
   /** The number of events before a moment. */
@@ -46,14 +49,45 @@ export class Events {
     return lastAtMost(this.us, us) + 1;
   }
 
+  /** The kinds of events that happen to an entity. */
+  kindsOf(entity: string): string[] {
+    return this.kinds.filter((kind) => this.byBoth.has(`${entity}/${kind}`));
+  }
+
+  /** The events that happen to an entity or are about it. */
+  about(name: string): EventRow[] {
+    return this.rowsAt(this.byEntity.get(name));
+  }
+
+  ofEntity(entity: string): EventRow[] {
+    return this.about(entity).filter((row) => row.entity === entity);
+  }
+
+  of(entity: string, kind: string): EventRow[] {
+    return this.rowsAt(this.byBoth.get(`${entity}/${kind}`));
+  }
+
   /** The last event of an entity and kind up to a moment. */
   last(entity: string, kind: string, us: number): EventRow | null {
-    for (let i = this.after(us) - 1; i >= 0; i--) {
-      const row = this.rows[i]!;
-      if (row.entity === entity && (!kind || row.event === kind)) return row;
-    }
-    return null;
+    const indices = this.byBoth.get(`${entity}/${kind}`) ?? [];
+    const index = indices[lastAtMost(indices, this.after(us) - 1)];
+    return index === undefined ? null : this.rows[index]!;
   }
+
+  private rowsAt(indices: readonly number[] = []): EventRow[] {
+    return indices.map((index) => this.rows[index]!);
+  }
+}
+
+function file(index: Map<string, number[]>, key: string, row: number): void {
+  const rows = index.get(key);
+  if (rows) rows.push(row);
+  else index.set(key, [row]);
+}
+
+/** An event in words, without who and when. */
+export function shownText(row: EventRow): string {
+  return [row.event, row.user, row.detail].filter(Boolean).join(" ").replaceAll("_", " ");
 }
 
 export async function readEvents(table: Table, clock: Clock): Promise<Events> {

@@ -14,7 +14,7 @@ import { lastAtMost } from "./search";
 import { Walls } from "./sight";
 import type { RunSource } from "./source";
 import type { Stretches } from "./stretches";
-import { readTracks, Track } from "./tracks";
+import { readTracks, Track, tracksOf } from "./tracks";
 
 const NO_STRETCHES: Stretches = { from: [], to: [], value: [] };
 
@@ -99,10 +99,16 @@ export class Run {
       return;
     }
     await this.attempt(async () => {
+      const names = this.bodies.map((body) => body.name);
+      const arrays = await this.source.tracks();
+      if (arrays) {
+        this.tracks = tracksOf(arrays, names, this.clock.stepUs);
+        return;
+      }
       const table = await Table.open(await this.source.table(name, name === "poses" ? 0 : facts.bytes));
       this.tracks = await readTracks(
         table,
-        this.bodies.map((body) => body.name),
+        names,
         {
           unitsPerM: this.facts.home.units_per_m,
           originUnits: this.facts.home.origin_units,
@@ -121,12 +127,6 @@ export class Run {
       if (table) this.events = await readEvents(table, this.clock);
     });
     this.changed();
-    for (const body of this.bodies) {
-      const track = this.tracks.get(body.name);
-      if (track) this.rooms.set(body.name, roomStretches(track, this.home, this.clock));
-      this.changed();
-      await new Promise((resolve) => setTimeout(resolve));
-    }
     await this.attempt(async () => {
       this.sightings = await this.source.sightings();
     });
@@ -155,8 +155,15 @@ export class Run {
     return this.facts.tables.find((table) => table.name === name);
   }
 
+  /** The rooms of a body, computed when they are first needed. */
   roomsOf(name: string): Stretches {
-    return this.rooms.get(name) ?? NO_STRETCHES;
+    const rooms = this.rooms.get(name);
+    if (rooms) return rooms;
+    const track = this.tracks.get(name);
+    if (!track) return NO_STRETCHES;
+    const computed = roomStretches(track, this.home, this.clock);
+    this.rooms.set(name, computed);
+    return computed;
   }
 
   /** What ends sight at a moment; null while it isn't read yet. */
@@ -204,12 +211,10 @@ export class Run {
 
   private doorRows = new Map<string, { us: number[]; open: boolean[]; seen: number }>();
 
-  private doorEvents(name: string): { us: number[]; open: boolean[] } {
+  doorEvents(name: string): { us: number[]; open: boolean[] } {
     let rows = this.doorRows.get(name);
     if (!rows || rows.seen !== this.events.rows.length) {
-      const doorEvents = this.events.rows.filter(
-        (row) => row.entity === name && (row.event === "opened" || row.event === "shut"),
-      );
+      const doorEvents = this.events.ofEntity(name).filter((row) => row.event === "opened" || row.event === "shut");
       rows = {
         us: doorEvents.map((row) => row.us),
         open: doorEvents.map((row) => row.event === "opened"),

@@ -11,6 +11,8 @@ export interface RunSource {
   readonly path: string;
   facts(): Promise<RunFacts>;
   sightings(): Promise<SightingFacts[]>;
+  /** The key frames of all bodies as plain arrays; null where only their table is there. */
+  tracks(): Promise<ArrayBuffer | null>;
   walls(number: number): Promise<WallsFacts>;
   table(name: string, bytes: number): Promise<AsyncBuffer>;
 }
@@ -51,6 +53,10 @@ export class ServedRun implements RunSource {
 
   sightings(): Promise<SightingFacts[]> {
     return json(`${this.path}/sightings.json`);
+  }
+
+  async tracks(): Promise<ArrayBuffer> {
+    return await (await fetched(`${this.path}/tracks.bin`)).arrayBuffer();
   }
 
   walls(number: number): Promise<WallsFacts> {
@@ -110,6 +116,10 @@ class HeldRun implements RunSource {
 
   sightings(): Promise<SightingFacts[]> {
     return Promise.resolve(this.held.sightings);
+  }
+
+  tracks(): Promise<null> {
+    return Promise.resolve(null);
   }
 
   walls(number: number): Promise<WallsFacts> {

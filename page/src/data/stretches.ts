@@ -68,3 +68,14 @@ export function timeByValue(stretches: Stretches, values: number, untilUs: numbe
   }
   return time;
 }
+
+/** Time [us] between two moments by the word for each value. */
+export function timeByWord(stretches: Stretches, word: (value: number) => string, fromUs: number, toUs: number): Map<string, number> {
+  const time = new Map<string, number>();
+  for (let i = firstAtLeast(stretches.to, fromUs); i < stretches.from.length && stretches.from[i]! < toUs; i++) {
+    const lasts = Math.min(toUs, stretches.to[i]!) - Math.max(fromUs, stretches.from[i]!);
+    const name = word(stretches.value[i]!);
+    if (lasts > 0) time.set(name, (time.get(name) ?? 0) + lasts);
+  }
+  return time;
+}

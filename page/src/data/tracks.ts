@@ -38,7 +38,7 @@ export class Track {
     public heading: Int16Array,
     public away: Uint8Array,
     planned: Uint8Array,
-    fromUs: Float64Array,
+    fromUs: (row: number) => number,
     public count: number = time.length,
   ) {
     let begin = 0;
@@ -48,7 +48,7 @@ export class Track {
       if (end < count) end++; // an end that was never reached
       this.begins.push(begin);
       this.ends.push(end);
-      this.froms.push(fromUs[begin]!);
+      this.froms.push(fromUs(begin));
       begin = end;
     }
   }
@@ -184,8 +184,32 @@ export class Track {
 
   static none(): Track {
     const none = new Float64Array(0);
-    return new Track(none, new Int32Array(0), new Int32Array(0), new Int16Array(0), new Uint8Array(0), new Uint8Array(0), none);
+    return new Track(none, new Int32Array(0), new Int32Array(0), new Int16Array(0), new Uint8Array(0), new Uint8Array(0), () => 0);
   }
+}
+
+/** The tracks of bodies from the arrays that a server sends: see `PageData.tracks`. */
+export function tracksOf(content: ArrayBuffer, bodies: readonly string[], stepUs: number): Map<string, Track> {
+  const counts = new Float64Array(content, 0, bodies.length);
+  const total = counts.reduce((sum, count) => sum + count, 0);
+  let offset = counts.byteLength;
+  const next = <T>(kind: { new (buffer: ArrayBuffer, offset: number, length: number): T; BYTES_PER_ELEMENT: number }): T => {
+    const values = new kind(content, offset, total);
+    offset += total * kind.BYTES_PER_ELEMENT;
+    return values;
+  };
+  const time = next(Float64Array);
+  const [x, y, step] = [next(Int32Array), next(Int32Array), next(Int32Array)];
+  const heading = next(Int16Array);
+  const [away, planned] = [next(Uint8Array), next(Uint8Array)];
+  let from = 0;
+  const tracks = bodies.map((name, i) => {
+    const [begin, end] = [from, (from += counts[i]!)];
+    const part = <T extends { subarray(begin: number, end: number): T }>(values: T): T => values.subarray(begin, end);
+    const fromUs = (row: number): number => step[begin + row]! * stepUs;
+    return [name, new Track(part(time), part(x), part(y), part(heading), part(away), part(planned), fromUs)] as const;
+  });
+  return new Map(tracks);
 }
 
 export interface TrackScale {
@@ -226,7 +250,7 @@ export async function readTracks(
         pick((n) => new Int16Array(n), (row) => Math.round((heading![row]! * TURN) / (2 * Math.PI)) & (TURN - 1)),
         pick((n) => new Uint8Array(n), (row) => away![row]!),
         pick((n) => new Uint8Array(n), (row) => (kind.codes[row] === planned ? 1 : 0)),
-        pick((n) => new Float64Array(n), (row) => step![row]! * stepUs),
+        (row) => step![rowsOfBody[row]!]! * stepUs,
       ),
     );
   }

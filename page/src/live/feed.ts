@@ -41,6 +41,10 @@ class LiveSource implements RunSource {
     return Promise.resolve([]);
   }
 
+  tracks(): Promise<null> {
+    return Promise.resolve(null);
+  }
+
   walls(number: number): Promise<WallsFacts> {
     if (this.past && number >= PAST_WALLS) return this.past.readWalls(number - PAST_WALLS);
     return json(`${this.path}/walls/${number}.json`);

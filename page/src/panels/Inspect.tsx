@@ -60,7 +60,7 @@ function BodyView({ run, name }: { run: Run; name: string }) {
       <h3>{name}</h3>
       <Facts rows={rows} />
       <h4>History</h4>
-      <History run={run} rows={run.events.rows.filter((row) => row.entity === name || row.user === name)} us={us} />
+      <History run={run} rows={run.events.about(name)} us={us} />
     </div>
   );
 }
@@ -116,7 +116,7 @@ function DoorView({ run, name }: { run: Run; name: string }) {
       <h3>{name}</h3>
       <Facts rows={[["kind", "door"], ["now", run.doorOpen(name, us) ? "open" : "shut"]]} />
       <h4>History</h4>
-      <History run={run} rows={run.events.rows.filter((row) => row.entity === name)} us={us} />
+      <History run={run} rows={run.events.ofEntity(name)} us={us} />
     </div>
   );
 }

@@ -1,16 +1,23 @@
-/** The timeline: lanes that are zoomed and scrubbed, and a cursor at the moment. */
+/** The timeline: rows that fold, scroll and are zoomed, and a cursor at the moment. */
 
-import { effect, useSignal } from "@preact/signals";
-import { useEffect, useRef } from "preact/hooks";
+import { computed, effect, useSignal, type ReadonlySignal } from "@preact/signals";
+import { useEffect, useMemo, useRef } from "preact/hooks";
+import { durationText } from "../data/clock";
 import type { Run } from "../data/run";
+import { timeByWord } from "../data/stretches";
 import { fitted, oncePerFrame } from "../plan/canvas";
 import * as state from "../state";
 import { colors } from "../theme";
-import { AXIS_HEIGHT, drawCursor, drawLanes, GAP, heightOf, laneAt, type Scale, usOf, xOf } from "./draw";
+import { drawCursor, drawMarked, drawRows, heightOf, type PlacedRow, visibleRows, xOf } from "./draw";
 import { answerLane, beliefLanes, type Lane, lanesOf, tableLanes } from "./lanes";
+import { followPointer, scaleOf } from "./pointer";
+import * as shown from "./rows";
+
+/** The lanes of a live run are made anew at most this often [ms]. */
+const LIVE_MS = 250;
 
 /** Lanes of all runs; those of tables are read once. */
-function useLanes(): { value: Lane[] } {
+function useLanes(): ReadonlySignal<Lane[]> {
   const lanes = useSignal<Lane[]>([]);
   const extra = useSignal<Map<Run, Lane[]>>(new Map());
   useEffect(() => {
@@ -20,158 +27,238 @@ function useLanes(): { value: Lane[] } {
       });
     }
   }, [state.runs.value]);
-  useEffect(
-    () =>
-      effect(() => {
-        void colors.value;
-        const runs = state.runs.value;
-        const answer = state.answer.value;
-        const own = runs.flatMap((run, i) => {
-          void run.version.value;
-          const other = runs.length === 2 ? runs[1 - i]! : null;
-          if (other) void other.version.value;
-          const title = runs.length > 1 ? run.facts.title : "";
-          return [...lanesOf(run, `${i}:`, i === 0 ? other : null, title), ...(extra.value.get(run) ?? [])];
-        });
-        const asked = answer && answer.spans.length > 0 ? [answerLane(answer)] : [];
-        const showsBeliefs = state.panel.value === "beliefs" || state.shown.value.has("beliefs");
-        lanes.value = [...asked, ...(showsBeliefs && runs[0] ? beliefLanes(runs[0]) : []), ...own];
-      }),
-    [],
-  );
+  useEffect(() => {
+    let [timer, last]: [ReturnType<typeof setTimeout> | undefined, number] = [undefined, 0];
+    const make = (): void => {
+      last = performance.now();
+      const runs = state.runs.value;
+      const answer = state.answer.value;
+      const own = runs.flatMap((run, i) => {
+        const other = i === 1 ? runs[0]! : null;
+        const title = runs.length > 1 ? run.facts.title : "";
+        return [...lanesOf(run, `${i}:`, other, title), ...(extra.value.get(run) ?? [])];
+      });
+      const asked = answer && answer.spans.length > 0 ? [answerLane(answer)] : [];
+      const showsBeliefs = state.panel.value === "beliefs" || state.shown.value.has("beliefs");
+      lanes.value = [...asked, ...(showsBeliefs && runs[0] ? beliefLanes(runs[0]) : []), ...own];
+    };
+    const stop = effect(() => {
+      void [colors.value, state.answer.value, extra.value, state.panel.value, state.shown.value, state.belief.value];
+      for (const run of state.runs.value) void run.version.value;
+      clearTimeout(timer);
+      const wait = state.live.value ? last + LIVE_MS - performance.now() : 0;
+      if (wait > 0) timer = setTimeout(make, wait);
+      else make();
+    });
+    return () => {
+      clearTimeout(timer);
+      stop();
+    };
+  }, []);
   return lanes;
 }
 
 export function Timeline() {
+  const scroller = useRef<HTMLElement>(null);
   const box = useRef<HTMLDivElement>(null);
   const base = useRef<HTMLCanvasElement>(null);
   const top = useRef<HTMLCanvasElement>(null);
-  const words = useSignal("");
+  const view = useSignal({ scrolled: 0, height: 0 });
+  const hover = useSignal<{ words: string; x: number; y: number } | null>(null);
   const lanes = useLanes();
+  const rows = useMemo(() => computed(() => shown.rowsOf(lanes.value)), []);
+  const visible = useMemo(() => computed(() => visibleRows(rows.value, view.value.scrolled, view.value.height)), []);
   const clock = state.run.value!.clock;
   useEffect(() => {
-    const paintLanes = oncePerFrame(() => {
+    const paintRows = oncePerFrame(() => {
       const { context, width, height } = fitted(base.current!);
       context.clearRect(0, 0, width, height);
-      drawLanes(context, lanes.value, scaleOf(width), clock, colors.value);
+      drawRows(context, visible.value, scaleOf(width), clock, colors.value, height);
     });
     const paintCursor = oncePerFrame(() => {
       const { context, width, height } = fitted(top.current!);
       context.clearRect(0, 0, width, height);
+      if (state.marked.value) drawMarked(context, scaleOf(width), state.marked.value, height, colors.value);
       const x = xOf(scaleOf(width), state.moment.value);
       drawCursor(context, x, height, clock.timeText(state.moment.value), width, colors.value);
     });
+    const measure = (): void => {
+      const { scrollTop: scrolled, clientHeight: height } = scroller.current!;
+      if (scrolled !== view.value.scrolled || height !== view.value.height) view.value = { scrolled, height };
+      paintRows();
+      paintCursor();
+    };
     const stops = [
       effect(() => {
-        void [state.range.value, lanes.value, colors.value, state.endUs.value];
-        paintLanes();
+        void [state.range.value, visible.value, colors.value, state.endUs.value];
+        paintRows();
       }),
       effect(() => {
-        void [state.range.value, state.moment.value, lanes.value, colors.value];
+        void [state.range.value, state.moment.value, state.marked.value, visible.value, colors.value];
         paintCursor();
       }),
-      followPointer(box.current!, () => lanes.value, words),
+      followPointer({
+        box: box.current!,
+        rows: () => visible.value,
+        hover: (row, us, x, y) => {
+          const words = row?.lane?.words(us);
+          hover.value = words ? { words: `${row!.label}: ${words} · ${clock.text(us)}`, x, y } : null;
+        },
+      }),
     ];
-    const observer = new ResizeObserver(() => {
-      paintLanes();
-      paintCursor();
-    });
+    const observer = new ResizeObserver(measure);
     observer.observe(box.current!);
+    observer.observe(scroller.current!);
+    scroller.current!.addEventListener("scroll", measure, { passive: true });
     return () => {
       observer.disconnect();
+      scroller.current?.removeEventListener("scroll", measure);
       stops.forEach((stop) => stop());
     };
   }, []);
-  const height = heightOf(lanes.value);
   return (
-    <section class="timeline" aria-label="Timeline">
-      <div class="labels" style={{ paddingTop: `${AXIS_HEIGHT}px` }}>
-        {lanes.value.map((lane) => (
-          <button
-            key={lane.id}
-            type="button"
-            title={lane.label}
-            style={{ height: `${lane.height}px`, marginBottom: `${GAP}px` }}
-            onClick={() => lane.subject && state.select(lane.subject)}
-          >
-            {lane.label}
+    <>
+      <Totals lanes={lanes} />
+      <section ref={scroller} class="timeline" aria-label="Timeline" style={{ "--lanes": `${heightOf(rows.value)}px` }}>
+        <div
+          ref={box}
+          class="lanes"
+          role="slider"
+          tabIndex={0}
+          aria-label="Moment"
+          aria-valuemin={0}
+          aria-valuemax={clock.steps - 1}
+          aria-valuenow={clock.stepAt(state.moment.value)}
+          aria-valuetext={clock.text(state.moment.value)}
+        >
+          <canvas ref={base} aria-hidden="true" />
+          <canvas ref={top} aria-hidden="true" />
+          {hover.value && (
+            <output class="hover" aria-live="off" style={{ left: `${hover.value.x}px`, top: `${hover.value.y}px` }} data-side={hover.value.x > 500 ? "left" : "right"}>
+              {hover.value.words}
+            </output>
+          )}
+        </div>
+        <div class="labels">
+          <div class="corner">
+            <Filter lanes={lanes} />
+          </div>
+          {visible.value.map((row) => (
+            <Label key={row.key} row={row} />
+          ))}
+        </div>
+        <div class="spacer" />
+      </section>
+    </>
+  );
+}
+
+function Label({ row }: { row: PlacedRow }) {
+  const { lane, folds } = row;
+  const style = { top: `${row.top}px`, height: `${row.height}px`, paddingLeft: `${0.4 + 0.6 * row.indent}rem` };
+  const isPinned = lane !== null && shown.pinned.value.has(lane.id);
+  return (
+    <div class={`label${lane ? "" : " group-label"}${row.isPinned ? " pinned" : ""}`} style={style}>
+      {folds && (
+        <button
+          type="button"
+          class="fold"
+          aria-expanded={folds === "open"}
+          aria-label={lane ? `Lanes of ${row.label}` : row.label}
+          onClick={() => shown.change(shown.toggled, row.key)}
+        >
+          {folds === "open" ? "▾" : "▸"}
+        </button>
+      )}
+      <button type="button" class="name" title={row.label} onClick={() => (lane ? lane.subject && state.select(lane.subject) : shown.change(shown.toggled, row.key))}>
+        {row.label}
+      </button>
+      {lane && (
+        <span class="tools">
+          <button type="button" aria-pressed={isPinned} aria-label={`Pin ${row.label}`} title="Keep at the top" onClick={() => shown.change(shown.pinned, lane.id)}>
+            {isPinned ? "●" : "○"}
           </button>
+          <button type="button" aria-label={`Hide ${row.label}`} title="Hide" onClick={() => shown.change(shown.hidden, lane.id)}>
+            ×
+          </button>
+        </span>
+      )}
+    </div>
+  );
+}
+
+function Filter({ lanes }: { lanes: ReadonlySignal<Lane[]> }) {
+  const count = lanes.value.filter((lane) => shown.hidden.value.has(lane.id)).length;
+  return (
+    <>
+      <input
+        type="search"
+        id="filter"
+        aria-label="Filter the lanes of the timeline"
+        placeholder="lanes with …"
+        value={shown.filter.value}
+        onInput={(event) => {
+          shown.filter.value = event.currentTarget.value;
+        }}
+      />
+      {count > 0 && (
+        <button
+          type="button"
+          class="unhide"
+          onClick={() => {
+            shown.hidden.value = new Set();
+          }}
+        >
+          show {count} hidden
+        </button>
+      )}
+    </>
+  );
+}
+
+/** What each lane of rooms and activities holds within the marked range. */
+function Totals({ lanes }: { lanes: ReadonlySignal<Lane[]> }) {
+  const marked = state.marked.value;
+  if (!marked || marked[0] === marked[1]) return null;
+  const [from, to] = [Math.min(...marked), Math.max(...marked)];
+  const clock = state.run.value!.clock;
+  const selected = state.selected.value;
+  const ofLanes = lanes.value
+    .filter((lane) => (selected ? lane.subject === selected : lane.isMain))
+    .slice(0, 12)
+    .map((lane) => [lane.label, totalsOf(lane, from, to)] as const)
+    .filter(([, words]) => words);
+  return (
+    <section class="totals" aria-label="Totals of the marked range">
+      <strong>
+        {clock.text(from)} to {clock.text(to)}, {durationText(to - from)}
+      </strong>
+      <button type="button" aria-label="Close the totals" onClick={() => (state.marked.value = null)}>
+        ×
+      </button>
+      <dl>
+        {ofLanes.map(([label, words]) => (
+          <div key={label}>
+            <dt>{label}</dt>
+            <dd>{words}</dd>
+          </div>
         ))}
-      </div>
-      <div
-        ref={box}
-        class="lanes"
-        role="slider"
-        tabIndex={0}
-        aria-label="Moment"
-        aria-valuemin={0}
-        aria-valuemax={clock.steps - 1}
-        aria-valuenow={clock.stepAt(state.moment.value)}
-        aria-valuetext={clock.text(state.moment.value)}
-        style={{ height: `${height}px` }}
-      >
-        <canvas ref={base} aria-hidden="true" />
-        <canvas ref={top} aria-hidden="true" />
-      </div>
-      <output class="hover" aria-live="off">{words.value}</output>
+      </dl>
     </section>
   );
 }
 
-function scaleOf(width: number): Scale {
-  const [from, to] = state.range.value;
-  return { from, to, width };
-}
-
-function followPointer(box: HTMLElement, lanes: () => Lane[], words: { value: string }): () => void {
-  let mode: "scrub" | "pan" | null = null;
-  let lastX = 0;
-  const us = (event: MouseEvent): number => usOf(scaleOf(box.clientWidth), event.clientX - box.getBoundingClientRect().left);
-  const down = (event: PointerEvent): void => {
-    box.setPointerCapture(event.pointerId);
-    mode = event.shiftKey || event.button === 1 ? "pan" : "scrub";
-    lastX = event.clientX;
-    state.follow.value = false;
-    if (mode === "scrub") state.goTo(us(event));
-  };
-  const move = (event: PointerEvent): void => {
-    if (mode === "scrub") state.goTo(us(event));
-    else if (mode === "pan") {
-      const [from, to] = state.range.value;
-      state.pan(((lastX - event.clientX) / box.clientWidth) * (to - from));
-      lastX = event.clientX;
-    }
-    const lane = laneAt(lanes(), event.clientY - box.getBoundingClientRect().top);
-    const word = lane?.words(us(event)) ?? "";
-    words.value = word ? `${lane!.label}: ${word}` : "";
-  };
-  const up = (): void => {
-    mode = null;
-  };
-  const wheel = (event: WheelEvent): void => {
-    if (event.shiftKey || Math.abs(event.deltaX) > Math.abs(event.deltaY)) {
-      const [from, to] = state.range.value;
-      state.pan(((event.deltaX || event.deltaY) / box.clientWidth) * (to - from));
-    } else {
-      const scroller = box.parentElement!;
-      const onAxis = event.clientY - box.getBoundingClientRect().top < AXIS_HEIGHT;
-      const scrolls = scroller.scrollHeight > scroller.clientHeight + 1;
-      if (scrolls && !onAxis && !event.ctrlKey && !event.metaKey) return;
-      state.zoom(Math.exp(event.deltaY * 0.0018), us(event));
-    }
-    event.preventDefault();
-  };
-  const showWholeRun = (): void => state.setRange(state.beginUs.value, state.endUs.value);
-  box.addEventListener("pointerdown", down);
-  box.addEventListener("pointermove", move);
-  box.addEventListener("pointerup", up);
-  box.addEventListener("wheel", wheel, { passive: false });
-  box.addEventListener("dblclick", showWholeRun);
-  return () => {
-    box.removeEventListener("pointerdown", down);
-    box.removeEventListener("pointermove", move);
-    box.removeEventListener("pointerup", up);
-    box.removeEventListener("wheel", wheel);
-    box.removeEventListener("dblclick", showWholeRun);
-  };
+function totalsOf(lane: Lane, from: number, to: number): string {
+  const paint = lane.paint();
+  if (paint.kind === "ticks") {
+    const count = paint.us.filter((us) => us >= from && us < to).length;
+    return count > 0 ? `${count} times` : "";
+  }
+  if (paint.kind !== "stretches") return "";
+  const time = timeByWord(paint.stretches, paint.label, from, to);
+  return [...time]
+    .sort((a, b) => b[1] - a[1])
+    .slice(0, 8)
+    .map(([word, us]) => `${word.replaceAll("_", " ")} ${durationText(us)}`)
+    .join(", ");
 }

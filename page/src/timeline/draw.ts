@@ -3,7 +3,9 @@
 import type { Clock } from "../data/clock";
 import { firstAtLeast, lastAtMost } from "../data/search";
 import { type Colors } from "../theme";
-import type { Lane, LanePaint } from "./lanes";
+import type { LanePaint } from "./lanes";
+import { levelOf } from "./levels";
+import type { Row } from "./rows";
 
 export const AXIS_HEIGHT = 34;
 export const GAP = 3;
@@ -24,29 +26,50 @@ export function usOf(scale: Scale, x: number): number {
   return scale.from + (x / scale.width) * (scale.to - scale.from);
 }
 
-/** Height of all lanes and the axis. */
-export function heightOf(lanes: readonly Lane[]): number {
-  return AXIS_HEIGHT + lanes.reduce((sum, lane) => sum + lane.height + GAP, 0);
+/** A row where it is drawn: `top` in pixels from the top of the canvas. */
+export interface PlacedRow extends Row {
+  top: number;
 }
 
-export function laneAt(lanes: readonly Lane[], y: number): Lane | null {
-  let top = AXIS_HEIGHT;
-  for (const lane of lanes) {
-    if (y >= top && y < top + lane.height + GAP) return lane;
-    top += lane.height + GAP;
+/** Height of all rows and the axis. */
+export function heightOf(rows: readonly Row[]): number {
+  return AXIS_HEIGHT + rows.reduce((sum, row) => sum + row.height + GAP, 0);
+}
+
+/** The rows that are seen in a view that is scrolled; those that are pinned stay at its top. */
+export function visibleRows(rows: readonly Row[], scrolled: number, height: number): PlacedRow[] {
+  const placed: PlacedRow[] = [];
+  let [top, pinnedEnd] = [AXIS_HEIGHT, AXIS_HEIGHT];
+  for (const row of rows) {
+    const at = row.isPinned ? top : top - scrolled;
+    top += row.height + GAP;
+    if (row.isPinned) pinnedEnd = top;
+    if (at >= height) break;
+    if (at + row.height > (row.isPinned ? 0 : pinnedEnd)) placed.push({ ...row, top: at });
   }
-  return null;
+  return placed;
 }
 
-export function drawLanes(context: Context, lanes: readonly Lane[], scale: Scale, clock: Clock, colors: Colors): void {
-  drawAxis(context, scale, clock, colors, heightOf(lanes));
-  let top = AXIS_HEIGHT;
-  for (const lane of lanes) {
+export function rowAt(rows: readonly PlacedRow[], y: number): PlacedRow | null {
+  if (y < AXIS_HEIGHT) return null;
+  return rows.find((row) => y >= row.top && y < row.top + row.height + GAP) ?? null;
+}
+
+/** Draw the rows that are seen; those that scroll come first, and are covered by the pinned ones and the axis. */
+export function drawRows(context: Context, rows: readonly PlacedRow[], scale: Scale, clock: Clock, colors: Colors, height: number): void {
+  shadeNights(context, scale, clock, colors, height);
+  drawGrid(context, scale, clock, colors, height);
+  for (const row of [...rows].sort((a, b) => Number(a.isPinned) - Number(b.isPinned))) {
+    context.fillStyle = row.isPinned ? colors.ground : colors.panel;
+    if (row.isPinned) context.fillRect(0, row.top - GAP, scale.width, row.height + 2 * GAP);
+    if (!row.lane) continue;
     context.fillStyle = colors.panel;
-    context.fillRect(0, top, scale.width, lane.height);
-    paintLane(context, lane.paint, scale, top, lane.height, colors);
-    top += lane.height + GAP;
+    context.fillRect(0, row.top, scale.width, row.height);
+    paintLane(context, row.lane.paint(), scale, row.top, row.height, colors);
   }
+  context.fillStyle = colors.ground;
+  context.fillRect(0, 0, scale.width, AXIS_HEIGHT - GAP);
+  drawAxis(context, scale, clock, colors);
 }
 
 function paintLane(context: Context, paint: LanePaint, scale: Scale, top: number, height: number, colors: Colors): void {
@@ -97,8 +120,8 @@ function paintStretches(
   height: number,
   colors: Colors,
 ): void {
-  const { from, to, value } = paint.stretches;
   const pixel = (scale.to - scale.from) / scale.width;
+  const { from, to, value } = levelOf(paint.stretches, pixel, paint.rank);
   context.font = "10px system-ui, sans-serif";
   context.textBaseline = "middle";
   context.textAlign = "left";
@@ -126,32 +149,45 @@ function writeInside(context: Context, words: string, left: number, y: number, w
 
 function paintTicks(context: Context, us: readonly number[], color: string, scale: Scale, top: number, height: number): void {
   context.fillStyle = color;
-  let last = -1;
-  for (let i = firstAtLeast(us, scale.from); i < us.length && us[i]! <= scale.to; i++) {
+  for (let i = firstAtLeast(us, scale.from); i < us.length && us[i]! <= scale.to; ) {
     const x = Math.floor(xOf(scale, us[i]!));
-    if (x === last) continue;
-    last = x;
     context.fillRect(x, top, 1.5, height);
+    i = Math.max(i + 1, firstAtLeast(us, usOf(scale, x + 1))); // of those within a pixel one is drawn
   }
 }
 
 function paintLine(
   context: Context,
-  { series, color }: Extract<LanePaint, { kind: "line" }>,
+  { series, extent: [low, high], color }: Extract<LanePaint, { kind: "line" }>,
   scale: Scale,
   top: number,
   height: number,
 ): void {
-  const numbers = series.values.filter((value) => !Number.isNaN(value));
-  const [low, high] = [Math.min(0, ...numbers), Math.max(...numbers, 1e-12)];
+  const y = (value: number): number => top + height - 2 - ((value - low) / (high - low || 1)) * (height - 4);
   context.strokeStyle = color;
   context.lineWidth = 1.2;
   context.beginPath();
-  series.us.forEach((us, i) => {
-    const value = series.values[i]!;
-    if (Number.isNaN(value)) return;
-    context.lineTo(xOf(scale, us), top + height - 2 - ((value - low) / (high - low || 1)) * (height - 4));
-  });
+  // Of the values within a pixel the first, the least and the greatest are drawn.
+  let i = Math.max(0, lastAtMost(series.us, scale.from));
+  while (i < series.us.length) {
+    const x = xOf(scale, series.us[i]!);
+    const end = Math.max(i + 1, firstAtLeast(series.us, usOf(scale, x + 1)));
+    let [least, most] = [Infinity, -Infinity];
+    for (let k = i; k < end; k++) {
+      const value = series.values[k]!;
+      if (value < least) least = value;
+      if (value > most) most = value;
+    }
+    if (least <= most) {
+      context.lineTo(x, y(series.values[i]! >= least ? series.values[i]! : least));
+      if (end > i + 1) {
+        context.lineTo(x, y(least));
+        context.lineTo(x, y(most));
+      }
+    }
+    if (x > scale.width) break;
+    i = end;
+  }
   context.stroke();
 }
 
@@ -164,17 +200,26 @@ export function tickStep(scale: Scale, pixels = 84): number {
   return (STEPS.find((seconds) => seconds * SECOND >= leastStep) ?? STEPS[STEPS.length - 1]!) * SECOND;
 }
 
-function drawAxis(context: Context, scale: Scale, clock: Clock, colors: Colors, height: number): void {
+/** The ticks of the axis in view. */
+function* ticks(scale: Scale, clock: Clock): Generator<number> {
   const step = tickStep(scale);
   const midnight = clock.dayStart(clock.day(scale.from));
+  for (let us = midnight + Math.max(0, Math.floor((scale.from - midnight) / step) - 1) * step; us <= scale.to; us += step) yield us;
+}
+
+function drawGrid(context: Context, scale: Scale, clock: Clock, colors: Colors, height: number): void {
+  context.fillStyle = colors.line;
+  for (const us of ticks(scale, clock)) context.fillRect(Math.round(xOf(scale, us)), 18, 1, height);
+}
+
+function drawAxis(context: Context, scale: Scale, clock: Clock, colors: Colors): void {
+  const step = tickStep(scale);
   context.textBaseline = "middle";
   context.textAlign = "left";
-  shadeNights(context, scale, clock, colors, height);
-  for (let us = midnight; us <= scale.to; us += step) {
-    if (us < scale.from - step) continue;
+  for (const us of ticks(scale, clock)) {
     const x = xOf(scale, us);
     context.fillStyle = colors.line;
-    context.fillRect(Math.round(x), 18, 1, height);
+    context.fillRect(Math.round(x), 18, 1, AXIS_HEIGHT - GAP - 18);
     const atMidnight = clock.timeText(us) === "00:00:00";
     context.fillStyle = atMidnight ? colors.text : colors.quiet;
     context.font = `${atMidnight ? "600 " : ""}11px system-ui, sans-serif`;
@@ -195,6 +240,15 @@ function shadeNights(context: Context, scale: Scale, clock: Clock, colors: Color
     const [left, right] = [xOf(scale, midnight - 2 * 3600e6), xOf(scale, midnight + 6 * 3600e6)];
     context.fillRect(left, 18, right - left, height);
   }
+}
+
+/** Tint the range that was marked for its totals. */
+export function drawMarked(context: Context, scale: Scale, marked: readonly [number, number], height: number, colors: Colors): void {
+  const [left, right] = marked.map((us) => xOf(scale, us)).sort((a, b) => a - b) as [number, number];
+  context.fillStyle = colors.cursor;
+  context.globalAlpha = 0.15;
+  context.fillRect(left, AXIS_HEIGHT - GAP, right - left, height);
+  context.globalAlpha = 1;
 }
 
 export function drawCursor(context: Context, x: number, height: number, words: string, width: number, colors: Colors): void {

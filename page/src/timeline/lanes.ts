@@ -3,27 +3,41 @@
 import type { Answer } from "../data/ask";
 import type { BeliefSeries } from "../data/beliefs";
 import type { Run } from "../data/run";
-import { lastAtMost } from "../data/search";
+import type { BodyFacts } from "../contract";
+import { shownText } from "../data/events";
+import { firstAtLeast, lastAtMost } from "../data/search";
 import { differences, type Stretches, valueAt } from "../data/stretches";
 import { chosenBelief, errorsOf } from "../plan/beliefs";
 import { bodyColor, colors, dark, mix } from "../theme";
 import { type Series, readSeries } from "../data/metrics";
+import type { Group } from "./rows";
 
 export interface Lane {
   id: string;
   label: string;
   height: number;
+  group: Group;
+  /** Whether it stays when the lanes of its body are folded. */
+  isMain: boolean;
   /** What is under a moment, in words; empty where there is nothing. */
   words: (us: number) => string;
-  paint: LanePaint;
+  /** What is drawn; computed when the lane is seen first. */
+  paint: () => LanePaint;
   /** The body, door or room that a click on the label shows. */
   subject: string;
 }
 
 export type LanePaint =
-  | { kind: "stretches"; stretches: Stretches; color: (value: number) => string | null; label: (value: number) => string }
+  | {
+      kind: "stretches";
+      stretches: Stretches;
+      color: (value: number) => string | null;
+      label: (value: number) => string;
+      /** Which value is drawn where several are within a pixel; without it, that which lasts longest. */
+      rank?: (value: number) => number;
+    }
   | { kind: "ticks"; us: readonly number[]; color: string }
-  | { kind: "line"; series: Series; color: string }
+  | { kind: "line"; series: Series; extent: readonly [number, number]; color: string }
   | { kind: "heat"; beliefs: BeliefSeries; rows: readonly number[]; truth: Stretches; color: string; endUs: number };
 
 /** Distinct colours with any kind of colour blindness (Paul Tol's muted scheme). */
@@ -45,7 +59,7 @@ const ROUTINE_KINDS = new Set(["activity", "left_home", "came_home", "opened", "
 
 export function lanesOf(run: Run, prefix: string, other: Run | null, title = ""): Lane[] {
   const lanes = ownLanes(run, prefix, other);
-  if (title) lanes.forEach((lane) => (lane.label = `${title}: ${lane.label}`));
+  if (title) lanes.forEach((lane) => (lane.label = `${lane.label} · ${title}`));
   return lanes;
 }
 
@@ -77,9 +91,10 @@ export function beliefLanes(run: Run): Lane[] {
     return `${believed.join(", ")}${room === null ? "" : `; true: ${name(room)}`}`;
   };
   const paint: LanePaint = { kind: "heat", beliefs, rows, truth, color, endUs: run.endUs };
-  const heat = { id: "belief", label, height: rows.length * HEAT_ROW_HEIGHT, words, paint, subject: chosen.user };
+  const height = rows.length * HEAT_ROW_HEIGHT;
+  const heat: Lane = { id: "belief", label, height, group: "Beliefs", isMain: true, words, paint: () => paint, subject: chosen.user };
   const error = errorsOf(run, chosen);
-  return [heat, { ...lineLane("", label, error), label: `${label}: error` }];
+  return [heat, { ...lineLane("", label, error), label: `${label}: error`, group: "Beliefs" }];
 }
 
 /** What answers the question that was asked; its words are those of each mark. */
@@ -92,115 +107,136 @@ export function answerLane(answer: Answer): Lane {
     value: spans.map((_, i) => i),
   };
   const words = (value: number): string => spans[value]?.words ?? "";
-  return stretchLane("answer", answer.question, "", stretches, () => colors.value.cursor, words, 16);
+  const color = (): string => colors.value.cursor;
+  return stretchLane({ id: "answer", label: answer.question, subject: "", group: "Answers", height: 16 }, () => stretches, color, words, () => 1);
+}
+
+/** What a lane is called and where it stands; the lanes of a body are in its group. */
+type Place = Pick<Lane, "id" | "label" | "subject" | "group" | "height"> & { isMain?: boolean };
+
+function stretchLane(
+  place: Place,
+  stretches: () => Stretches,
+  color: (value: number) => string | null,
+  words: (value: number) => string,
+  rank?: (value: number) => number,
+): Lane {
+  const paint = once((): LanePaint => ({ kind: "stretches", stretches: stretches(), color, label: words, ...(rank && { rank }) }));
+  const wordsAt = (us: number): string => {
+    const { from, to, value } = stretchesOf(paint());
+    const i = firstAtLeast(to, us + 1);
+    return i < from.length && from[i]! <= us ? words(value[i]!) : "";
+  };
+  return { isMain: false, ...place, words: wordsAt, paint };
+}
+
+function stretchesOf(paint: LanePaint): Stretches {
+  return paint.kind === "stretches" ? paint.stretches : { from: [], to: [], value: [] };
+}
+
+function once<T>(compute: () => T): () => T {
+  let value: T | undefined;
+  return () => (value ??= compute());
 }
 
 function ownLanes(run: Run, prefix: string, other: Run | null): Lane[] {
-  const lanes: Lane[] = [];
-  for (const body of run.bodies) {
-    lanes.push(roomLane(run, body.name, prefix));
-    if (other) lanes.push(differenceLane(run, other, body.name, prefix));
-    const activity = activityLane(run, body.name, prefix);
-    if (activity) lanes.push(activity);
-  }
-  lanes.push(...sightingLanes(run, prefix), ...eventLanes(run, prefix), ...outputLanes(run, prefix));
-  lanes.push(...markLanes(run, prefix), ...doorLanes(run, prefix));
-  return lanes;
+  const byKind = new Map<string, string[]>();
+  for (const { name } of run.bodies) byKind.set(name, run.events.kindsOf(name));
+  const bodies = run.bodies.flatMap((body) => {
+    const kinds = byKind.get(body.name)!;
+    const group: Group = body.robot ? "Robots" : "Users";
+    const lanes = [roomLane(run, body.name, prefix, group)];
+    if (other) lanes.push(differenceLane(run, other, body.name, prefix, group));
+    if (kinds.includes("activity")) lanes.push(activityLane(run, body.name, prefix, group));
+    if (kinds.some((kind) => !ROUTINE_KINDS.has(kind))) lanes.push(eventLane(run, body, prefix, group));
+    return lanes;
+  });
+  return [...bodies, ...sightingLanes(run, prefix), ...outputLanes(run, prefix), ...markLanes(run, prefix), ...doorLanes(run, prefix)];
 }
 
-function stretchWords(stretches: Stretches, label: (value: number) => string): (us: number) => string {
-  return (us) => {
-    for (let low = 0, high = stretches.from.length; low < high; ) {
-      const middle = (low + high) >> 1;
-      if (stretches.to[middle]! <= us) low = middle + 1;
-      else if (stretches.from[middle]! > us) high = middle;
-      else return label(stretches.value[middle]!);
-    }
-    return "";
-  };
-}
-
-function stretchLane(
-  id: string,
-  label: string,
-  subject: string,
-  stretches: Stretches,
-  color: (value: number) => string | null,
-  words: (value: number) => string,
-  height = 16,
-): Lane {
-  const paint: LanePaint = { kind: "stretches", stretches, color, label: words };
-  return { id, label, subject, height, words: stretchWords(stretches, words), paint };
-}
-
-function roomLane(run: Run, name: string, prefix: string): Lane {
+function roomLane(run: Run, name: string, prefix: string, group: Group): Lane {
   const rooms = run.facts.home.rooms;
   const color = (value: number): string | null => {
     const deep = rooms[value]?.deep_color;
     return deep ? (dark.value ? mix(deep, "#16181c", 0.25) : deep) : null;
   };
-  return stretchLane(`${prefix}${name}/room`, name, name, run.roomsOf(name), color, (value) => run.home.roomName(value), 20);
+  const place = { id: `${prefix}${name}/room`, label: name, subject: name, group, height: 20, isMain: true };
+  return stretchLane(place, () => run.roomsOf(name), color, (value) => run.home.roomName(value));
 }
 
-function differenceLane(run: Run, other: Run, name: string, prefix: string): Lane {
-  const apart = differences(run.roomsOf(name), other.roomsOf(name));
-  const label = `${name}: rooms differ`;
-  return stretchLane(`${prefix}${name}/differs`, label, name, apart, () => colors.value.alarm, () => "another room", 10);
+/** A live run is known once a minute: shorter differences from it may be none. */
+const LIVE_MINIMUM_US = 61e6;
+
+function differenceLane(run: Run, other: Run, name: string, prefix: string, group: Group): Lane {
+  const place = { id: `${prefix}${name}/differs`, label: `${name}: rooms differ`, subject: name, group, height: 10, isMain: true };
+  const minimum = Math.min(run.knownUs, other.knownUs) < Infinity ? LIVE_MINIMUM_US : 0;
+  const apart = (): Stretches => longerThan(differences(run.roomsOf(name), other.roomsOf(name)), minimum);
+  return stretchLane(place, apart, () => colors.value.alarm, () => "another room", () => 1);
 }
 
-function activityLane(run: Run, name: string, prefix: string): Lane | null {
-  const rows = run.events.ofKind("activity").filter((row) => row.entity === name);
-  if (rows.length === 0) return null;
-  const words = [...new Set(rows.map((row) => row.detail))];
-  const stretches: Stretches = {
-    from: rows.map((row) => row.us),
-    to: rows.map((_, i) => rows[i + 1]?.us ?? run.presentUs),
-    value: rows.map((row) => words.indexOf(row.detail)),
+function longerThan({ from, to, value }: Stretches, minimum: number): Stretches {
+  const kept = [...from.keys()].filter((i) => to[i]! - from[i]! > minimum);
+  return { from: kept.map((i) => from[i]!), to: kept.map((i) => to[i]!), value: kept.map((i) => value[i]!) };
+}
+
+function activityLane(run: Run, name: string, prefix: string, group: Group): Lane {
+  const words: string[] = [];
+  const stretches = (): Stretches => {
+    const rows = run.events.of(name, "activity");
+    words.push(...new Set(rows.map((row) => row.detail)));
+    const code = new Map(words.map((word, i) => [word, i]));
+    return {
+      from: rows.map((row) => row.us),
+      to: rows.map((_, i) => rows[i + 1]?.us ?? run.presentUs),
+      value: rows.map((row) => code.get(row.detail)!),
+    };
   };
-  const color = (value: number): string => wordColor(words[value] ?? "");
-  return stretchLane(`${prefix}${name}/activity`, `${name} does`, name, stretches, color, (value) => words[value] ?? "");
+  const place = { id: `${prefix}${name}/activity`, label: `${name} does`, subject: name, group, height: 16 };
+  return stretchLane(place, stretches, (value) => wordColor(words[value] ?? ""), (value) => words[value] ?? "");
 }
 
 function sightingLanes(run: Run, prefix: string): Lane[] {
   return run.sightings.map((lane) => {
     const step = run.clock.stepUs;
-    const stretches: Stretches = {
+    const stretches = (): Stretches => ({
       from: lane.first.map((first) => first * step),
       to: lane.last.map((last) => (last + 1) * step),
       value: lane.false.map(Number),
-    };
+    });
     const color = bodyColor(run.body(lane.user)?.color ?? "#0077bb");
     const label = `${lane.robot} sees ${lane.user || "somebody"}`;
     const words = (value: number): string => (value ? "false observation" : "noticed");
     const paint = (value: number): string => (value ? colors.value.alarm : color);
-    return stretchLane(`${prefix}${lane.robot}/sees/${lane.user}`, label, lane.robot, stretches, paint, words, 12);
+    const place = { id: `${prefix}${lane.robot}/sees/${lane.user}`, label, subject: lane.robot, group: "Robots" as const, height: 12 };
+    return stretchLane(place, stretches, paint, words, (value) => value);
   });
 }
 
-function tickLane(id: string, label: string, subject: string, us: readonly number[], color: string): Lane {
-  return { id, label, subject, height: 12, words: () => "", paint: { kind: "ticks", us, color } };
+function tickLane(place: Place, us: () => readonly number[], color: string, words: (us: number) => string = () => ""): Lane {
+  return { isMain: false, ...place, words, paint: once((): LanePaint => ({ kind: "ticks", us: us(), color })) };
 }
 
-function eventLanes(run: Run, prefix: string): Lane[] {
-  const lanes: Lane[] = [];
-  for (const body of run.bodies) {
-    const rows = run.events.rows.filter((row) => row.entity === body.name && !ROUTINE_KINDS.has(row.event));
-    if (rows.length > 0) {
-      const us = rows.map((row) => row.us);
-      lanes.push(tickLane(`${prefix}${body.name}/events`, `${body.name} events`, body.name, us, bodyColor(body.color)));
-    }
-  }
-  return lanes;
+function eventLane(run: Run, body: BodyFacts, prefix: string, group: Group): Lane {
+  const rows = once(() => run.events.ofEntity(body.name).filter((row) => !ROUTINE_KINDS.has(row.event)));
+  const us = once(() => rows().map((row) => row.us));
+  const words = (at: number): string => {
+    const row = rows()[lastAtMost(us(), at)];
+    return row ? `${shownText(row)} (${run.clock.text(row.us)})` : "";
+  };
+  const place = { id: `${prefix}${body.name}/events`, label: `${body.name} events`, subject: body.name, group, height: 12 };
+  return tickLane(place, us, bodyColor(body.color), words);
 }
 
 function outputLanes(run: Run, prefix: string): Lane[] {
-  return run.beliefs.map((entry) =>
-    tickLane(`${prefix}${entry.name}/outputs`, `${entry.name} outputs`, "", entry.moments, colors.value.quiet),
-  );
+  return run.beliefs.map((entry) => {
+    const place = { id: `${prefix}${entry.name}/outputs`, label: `${entry.name} outputs`, subject: "", group: "Algorithms" as const, height: 12 };
+    return tickLane(place, () => entry.moments, colors.value.quiet);
+  });
 }
 
 const MARK_KINDS = ["intervention", "held", "violated", "open"] as const;
 const MARK_WORDS = { intervention: "done", held: "held", violated: "violated", open: "not decided" };
+const MARK_RANKS = [0, 1, 3, 2];
 
 /** Interventions as ticks, and a lane for each expectation: held, violated, or not decided. */
 function markLanes(run: Run, prefix: string): Lane[] {
@@ -217,35 +253,30 @@ function markLanes(run: Run, prefix: string): Lane[] {
       if (mark.kind !== "intervention" && at >= mark.end * step) return "";
       return `${MARK_WORDS[mark.kind]}: ${mark.label}`;
     };
-    if (marks.every((mark) => mark.kind === "intervention")) {
-      return { ...tickLane(`${prefix}${name}/marks`, name, "", us, colors.value.text), words };
-    }
+    const place = { id: `${prefix}${name}/marks`, label: name, subject: "", group: "Script" as const, height: 12 };
+    if (marks.every((mark) => mark.kind === "intervention")) return tickLane(place, () => us, colors.value.text, words);
     const shades = [colors.value.text, dark.value ? "#2fb6a3" : "#009988", colors.value.alarm, colors.value.quiet];
     const stretches: Stretches = {
       from: us,
       to: marks.map((mark) => mark.end * step),
       value: marks.map((mark) => MARK_KINDS.indexOf(mark.kind)),
     };
-    const paint = (value: number): string => shades[value]!;
-    const lane = stretchLane(`${prefix}${name}/marks`, `${name}: expected`, "", stretches, paint, (value) => MARK_WORDS[MARK_KINDS[value]!], 12);
+    const label = (value: number): string => MARK_WORDS[MARK_KINDS[value]!];
+    const lane = stretchLane({ ...place, label: `${name}: expected` }, () => stretches, (value) => shades[value]!, label, (value) => MARK_RANKS[value]!);
     return { ...lane, words };
   });
 }
 
 function doorLanes(run: Run, prefix: string): Lane[] {
   return run.facts.home.doors.map((door) => {
-    const rows = run.events.rows.filter(
-      (row) => row.entity === door.name && (row.event === "opened" || row.event === "shut"),
-    );
-    const us = [0, ...rows.map((row) => row.us)];
-    const open = [door.open, ...rows.map((row) => row.event === "opened")];
-    const stretches: Stretches = {
-      from: us,
-      to: us.map((_, i) => us[i + 1] ?? run.presentUs),
-      value: open.map(Number),
+    const stretches = (): Stretches => {
+      const { us: moments, open: states } = run.doorEvents(door.name);
+      const us = [0, ...moments];
+      return { from: us, to: us.map((_, i) => us[i + 1] ?? run.presentUs), value: [door.open, ...states].map(Number) };
     };
     const color = (value: number): string | null => (value ? null : colors.value.door);
-    return stretchLane(`${prefix}${door.name}/door`, `${door.name} shut`, door.name, stretches, color, (value) => (value ? "open" : "shut"), 10);
+    const place = { id: `${prefix}${door.name}/door`, label: `${door.name} shut`, subject: door.name, group: "Doors and sensors" as const, height: 10 };
+    return stretchLane(place, stretches, color, (value) => (value ? "open" : "shut"), (value) => 1 - value);
   });
 }
 
@@ -270,12 +301,13 @@ export async function tableLanes(run: Run, prefix: string): Promise<Lane[]> {
 
 function lineLane(prefix: string, name: string, series: Series): Lane {
   const words = (us: number): string => {
-    const i = series.us.findIndex((at) => at >= us);
-    const value = series.values[i < 0 ? series.values.length - 1 : i];
+    const i = Math.min(series.us.length - 1, firstAtLeast(series.us, us));
+    const value = series.values[i];
     return value === undefined || Number.isNaN(value) ? "" : `${series.name}: ${value.toPrecision(3)}`;
   };
-  const paint: LanePaint = { kind: "line", series, color: colors.value.text };
-  return { id: `${prefix}${name}/metric`, label: `${name} ${series.name}`, subject: "", height: 24, words, paint };
+  const paint: LanePaint = { kind: "line", series, extent: extentOf(series), color: colors.value.text };
+  const place = { id: `${prefix}${name}/metric`, label: `${name} ${series.name}`, subject: "", group: "Metrics" as const, height: 24 };
+  return { ...place, isMain: false, words, paint: () => paint };
 }
 
 async function sensorLanes(run: Run, prefix: string): Promise<Lane[]> {
@@ -283,12 +315,29 @@ async function sensorLanes(run: Run, prefix: string): Promise<Lane[]> {
   const steps = await table.numbers("step");
   const sensor = await table.words("sensor");
   const state = await table.words("state");
+  const rows = rowsByCode(sensor.codes, sensor.words.length);
   return sensor.words.map((name, code) => {
-    const rows = [...sensor.codes.keys()].filter((row) => sensor.codes[row] === code);
-    const us = rows.map((row) => steps[row]! * run.clock.stepUs);
-    const on = rows.map((row) => Number(["ON", "OPEN", "PRESENT"].includes((state.words[state.codes[row]!] ?? "").toUpperCase())));
+    const us = rows[code]!.map((row) => steps[row]! * run.clock.stepUs);
+    const on = rows[code]!.map((row) => Number(["ON", "OPEN", "PRESENT"].includes((state.words[state.codes[row]!] ?? "").toUpperCase())));
     const stretches: Stretches = { from: us, to: us.map((_, i) => us[i + 1] ?? run.presentUs), value: on };
     const color = (value: number): string | null => (value ? "#44aa99" : null);
-    return stretchLane(`${prefix}${name}/sensor`, name, name, stretches, color, (value) => (value ? "on" : "off"), 10);
+    const place = { id: `${prefix}${name}/sensor`, label: name, subject: name, group: "Doors and sensors" as const, height: 10 };
+    return stretchLane(place, () => stretches, color, (value) => (value ? "on" : "off"), (value) => value);
   });
+}
+
+function rowsByCode(codes: Int32Array, count: number): number[][] {
+  const rows: number[][] = Array.from({ length: count }, () => []);
+  codes.forEach((code, row) => rows[code]?.push(row));
+  return rows;
+}
+
+/** The least value, or 0, and the greatest one. */
+function extentOf({ values }: Series): [number, number] {
+  let [low, high] = [0, 1e-12];
+  for (const value of values) {
+    if (value < low) low = value;
+    if (value > high) high = value;
+  }
+  return [low, high];
 }

@@ -3,6 +3,7 @@
 import base64
 import io
 import json
+import math
 import shutil
 import tempfile
 import weakref
@@ -13,7 +14,9 @@ from typing import Any
 
 import numpy as np
 
+from fleet2d.artifacts.table import categories
 from fleet2d.errors import ArtifactError, InputError
+from fleet2d.kernels import TURN
 from fleet2d.runs.run import Run
 from fleet2d.storage.files import path_in, write_atomically
 from fleet2d.viewer.contract import RunFacts, SightingFacts, WallsFacts
@@ -133,6 +136,47 @@ class PageData:
             return 0
         step_us, steps = self.run.manifest["step_us"], self.run.manifest["steps"]
         return int(step_us * -(-steps // MAX_POSES))
+
+    @cached_property
+    def tracks(self) -> bytes:
+        """The key frames of all bodies as plain arrays, little-endian, which a page reads at once.
+
+        First the number of key frames of each body, float64, users before robots. Then for all of
+        them, body by body: time [us since the start], float64; x and y [lattice], int32; step,
+        int32; heading [1/4096 turn], int16; whether it is away, and whether it begins a piece that
+        was planned, uint8.
+        """
+        run = self.run
+        table = self._poses() if self._walks_every_us else run.tables[KEY_FRAMES]
+        entity, names = categories(table["entity"])
+        kind, kinds = categories(table["kind"])
+        entities = run.manifest["entities"]
+        number = {name: i for i, name in enumerate((*entities["users"], *entities["robots"]))}
+        body = np.array([number.get(name, len(number)) for name in names], np.int64)[entity]
+        order = np.argsort(body, kind="stable")
+        counts = np.bincount(body, minlength=len(number))[: len(number)]
+        order = order[: counts.sum()]
+        home = self.facts["home"]
+        origin, units = home["origin_units"], home["units_per_m"]
+        start = np.datetime64(run.manifest["start"], "us")
+        time = (table["time"].to_numpy().astype("M8[us]") - start).astype(np.float64)
+        x, y = (
+            np.floor(table[axis].to_numpy() * units + 0.5) - origin[i]
+            for i, axis in enumerate("xy")
+        )
+        heading = np.floor(table["heading"].to_numpy() * (TURN / math.tau) + 0.5).astype(np.int64)
+        planned = kind == (kinds.index("planned") if "planned" in kinds else len(kinds))
+        parts: list[tuple[str, Any]] = [
+            ("<f8", time),
+            ("<i4", x),
+            ("<i4", y),
+            ("<i4", table["step"].to_numpy()),
+            ("<i2", heading % TURN),
+            ("u1", table["away"].to_numpy()),
+            ("u1", planned),
+        ]
+        content = [values[order].astype(kind).tobytes() for kind, values in parts]
+        return counts.astype("<f8").tobytes() + b"".join(content)
 
     def _poses(self) -> Any:
         """Return positions of everybody at equal intervals, in the columns of key_frames."""

@@ -150,22 +150,22 @@ def sightings_of(run: Run) -> list[SightingFacts]:
         if "truth_known" in table.column_names:
             false &= table["truth_known"].to_numpy()
     gap = max(1, round(JOIN_S * 1e6 / run.manifest["step_us"]))
+    names_of_users = [*users, ""]  # the last one, code -1, is somebody unknown
+    lane = robot.astype(np.int64) * len(names_of_users) + user % len(names_of_users)
+    order = np.argsort(lane, kind="stable")
+    codes, begins = np.unique(lane[order], return_index=True)
     lanes = []
-    for r, robot_name in enumerate(robots):
-        for u, user_name in enumerate([*users, ""]):
-            code = u if user_name else -1
-            rows = (robot == r) & (user == code)
-            if rows.any():
-                first, last, is_false = _stretches(step[rows], false[rows], gap)
-                lanes.append(
-                    SightingFacts(
-                        robot=robot_name,
-                        user=user_name,
-                        first=first.tolist(),
-                        last=last.tolist(),
-                        false=is_false.tolist(),
-                    )
-                )
+    for code, rows in zip(codes.tolist(), np.split(order, begins[1:]), strict=True):
+        first, last, is_false = _stretches(step[rows], false[rows], gap)
+        lanes.append(
+            SightingFacts(
+                robot=robots[code // len(names_of_users)],
+                user=names_of_users[code % len(names_of_users)],
+                first=first.tolist(),
+                last=last.tolist(),
+                false=is_false.tolist(),
+            )
+        )
     return lanes
 
 

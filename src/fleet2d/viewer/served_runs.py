@@ -71,6 +71,7 @@ class ServedRuns:
                 data = self.data(number)
                 _ = data.facts_json
                 data.walls(0)
+                _ = data.tracks
                 _ = data.sightings
 
     def routes(self) -> list[Route]:
@@ -78,6 +79,7 @@ class ServedRuns:
         return [
             Route("/run/{number:int}/facts.json", _endpoint(self, _facts)),
             Route("/run/{number:int}/sightings.json", _endpoint(self, _sightings)),
+            Route("/run/{number:int}/tracks.bin", _endpoint(self, _tracks)),
             Route("/run/{number:int}/walls/{walls:int}.json", _endpoint(self, _walls)),
             Route("/run/{number:int}/tables/{table}.parquet", _endpoint(self, _table)),
         ]
@@ -102,6 +104,10 @@ def _endpoint(runs: ServedRuns, respond: Callable[[PageData, Request], Response]
 
 def _facts(data: PageData, _: Request) -> Response:
     return json_answer(data.facts_json)
+
+
+def _tracks(data: PageData, _: Request) -> Response:
+    return Response(data.tracks, media_type="application/octet-stream")
 
 
 def _sightings(data: PageData, _: Request) -> Response:
