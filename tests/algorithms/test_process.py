@@ -112,7 +112,7 @@ def program(folder: Path, answers: str) -> Path:
         ("print('hello', flush=True)", "which is no line of JSON with a type"),
         ("say({'type': 'error', 'text': 'no rooms'})", "reports: no rooms"),
         ("say({'type': 'output'})", "expected 'share' (one for each room)"),
-        ("say({'type': 'output', 'share': ['x']})", "answered wrong values"),
+        ("say({'type': 'output', 'share': ['x']})", "returned invalid values"),
         (
             "say({'type': 'output', 'share': [1, 2]})",
             "returned 2 shares, but the home has 14 rooms",

@@ -266,7 +266,7 @@ def test_own_component_that_cannot_be_had_is_explained(
 
 
 def test_component_that_lacks_a_method_is_refused() -> None:
-    with pytest.raises(ScenarioError, match="is not a whole floorplan: it lacks load"):
+    with pytest.raises(ScenarioError, match="is an incomplete floorplan: it lacks load"):
         lookup("floorplan", "fleet2d.floorplan.source:FloorPlanSource")
 
 

@@ -97,7 +97,7 @@ class Process(Algorithm):
             if "columns" in content:
                 return {name: np.array(values) for name, values in content["columns"].items()}
         except (TypeError, ValueError, AttributeError) as error:
-            raise ComponentError(f"{self.command} answered wrong values: {error}") from None
+            raise ComponentError(f"{self.command} returned invalid values: {error}") from None
         raise ComponentError(
             f"{self.command} answered {content!r:.200}: expected 'share' (one for each room),"
             " 'home' and 'away' (of each user, and of anyone), 'columns', or the type 'none'"

@@ -207,7 +207,7 @@ def _codes_of(array: pa.Array, column: Column, words: Mapping[str, Dictionary]) 
 
 
 def values_of(column: pa.ChunkedArray) -> NDArray[Any]:
-    """Return the values of a stored column that lacks none: numbers, times, flags, or names.
+    """Return the values of a stored column without nulls: numbers, times, flags, or names.
 
     Times are int64, in microseconds; names are objects. `to_numpy` would do, but it imports pandas
     where that is installed: a quarter of a second.

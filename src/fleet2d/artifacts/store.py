@@ -383,7 +383,7 @@ class RunStore:
         if not self._is_open:
             raise ArtifactError("the run directory is not open: call open() before append()")
         if table not in self._tables:
-            raise ArtifactError(f"there is no table {table!r}: add_table() it first")
+            raise ArtifactError(f"there is no table {table!r}: add it by add_table() first")
         entry = self._tables[table]
         batch = entry.buffer.check(columns)
         for listener in self.row_listeners:

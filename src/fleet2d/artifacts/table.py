@@ -164,7 +164,7 @@ def new_dictionaries(spec: TableSpec) -> dict[str, Dictionary]:
 
 
 def empty_chunk(column: Column) -> ColumnChunk:
-    """Return no values of a column."""
+    """Return an empty chunk of a column."""
     valid = np.empty(0, np.bool_) if column.nullable else None
     if column.kind == "string":
         return ColumnChunk(np.empty(0, np.uint8), valid, np.empty(0, np.int64))

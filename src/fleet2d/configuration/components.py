@@ -369,7 +369,7 @@ class Component(Settings):
 
 @lru_cache(maxsize=1000)
 def _names_of(cls: type[Component]) -> tuple[frozenset[str], frozenset[str]]:
-    """Return the names of the fields and the private attributes of a component, quickly."""
+    """Return the names of the fields and the private attributes of a component; cached."""
     return frozenset(cls.model_fields), frozenset(cls.__private_attributes__)
 
 
@@ -508,7 +508,7 @@ def _check_class(kind: str, name: str, cls: object) -> type[Component]:
             "for type checkers"
         )
     if methods := sorted(getattr(cls, "__abstractmethods__", ())):
-        raise ScenarioError(f"{name!r} is not a whole {kind}: it lacks {', '.join(methods)}")
+        raise ScenarioError(f"{name!r} is an incomplete {kind}: it lacks {', '.join(methods)}")
     return cls
 
 

@@ -207,7 +207,7 @@ def _shown_hash(file: Path) -> str:
 
 
 def code_of(scenario: object) -> dict[Path, list[str]]:
-    """Return the files that a scenario would run and that aren't loaded, each with the keys of it.
+    """Return the files that a scenario would run and aren't loaded, with the keys that name them.
 
     Example:
         >>> code_of({"algorithms": {"share": {"type": "/home/ana/mine:Share"}}})

@@ -28,7 +28,7 @@ PASSING_TIME = timedelta(seconds=10)
 
 
 class Wait(NamedTuple):
-    """A body waits for another one.
+    """A wait of one body for another.
 
     Attributes:
         since: The step at which it began to wait.

@@ -169,7 +169,7 @@ def move(state: State, span: Span) -> None:
 
 
 def watch(state: State, span: Span) -> None:
-    """Let watchers look ahead that may end the span, and interrupt plans by their events."""
+    """Let the watchers that may end the span look ahead; interrupt plans by their events."""
     watchers = [watcher for watcher in state.watchers if watcher.waits]
     for watcher in watchers:
         state.take(watcher, span.first)

@@ -233,7 +233,7 @@ def _check_reads(scenario: Scenario, actors: list[DecidingActor]) -> None:
 
 
 def _remember(state: State, basis: Basis) -> None:
-    """Let robots remember their sightings, if a behavior of theirs needs it."""
+    """Give robots a memory of their sightings if one of their behaviors needs it."""
     for actor in basis.robots:
         if not any(behavior.remembers for behavior in actor.behaviors):
             continue

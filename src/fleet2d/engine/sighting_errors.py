@@ -105,7 +105,7 @@ class CameraErrors(NamedTuple):
 
 
 class SightingErrors:
-    """Changes the sightings of a body in the span of their look, also those that still wait.
+    """Changes the sightings of a body in the span of their look, delayed ones included.
 
     Errors of perception come first, then the error of the belief about the body's own pose.
     """

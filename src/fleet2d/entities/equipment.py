@@ -216,7 +216,7 @@ class Localization(Settings):
 
 
 class Displacement(NamedTuple):
-    """A time in which a robot believes to be where it was before it was carried off.
+    """A period in which a robot believes that it is where it was before it was carried off.
 
     Attributes:
         first: The first step.

@@ -203,7 +203,7 @@ class Plan:
         return self.note("uses", at.name)
 
     def take(self, posture: Posture) -> Self:
-        """Stand, sit or lie from the moment up to which it is planned, until the next walk."""
+        """Stand, sit or lie from the present end of the plan until the next walk."""
         if posture != self.posture:
             self.postures.append((self.time_us, POSTURES.index(posture)))
             self.posture = posture

@@ -134,7 +134,7 @@ class metric(_Value):
             gauge.replace_last(self._read(results[self.name]))
 
     def _read(self, result: Any) -> float:
-        """Return the number of a result; NaN while the result is empty.
+        """Return a result as a number; NaN while it is empty.
 
         Raises:
             ScenarioError: The path leads to no number.
@@ -201,7 +201,7 @@ class likeliest(WordSignal):
         columns = to_columns(outputs[self.algorithm], names, f"algorithms.{self.algorithm}")
         number = next((c for c in columns.values() if c.dtype.kind == "f"), None)
         if "room" not in columns or number is None:
-            raise ScenarioError(f"{self}: its output has no numbers of rooms")
+            raise ScenarioError(f"{self}: its output has no number for each room")
         rooms, keep = columns["room"], np.ones(len(number), np.bool_)
         if self.user is not None:
             if "user" not in columns:

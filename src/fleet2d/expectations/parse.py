@@ -66,7 +66,9 @@ def parse_expectation(text: str) -> Expectation:
         fleet2d.errors.InputError: there is no 'allways': did you mean 'always'?
     """
     if len(text) > _LONGEST:
-        raise InputError(f"an expectation has {_LONGEST} characters at most, this has {len(text)}")
+        raise InputError(
+            f"an expectation may have at most {_LONGEST} characters; this one has {len(text)}"
+        )
     try:
         tree = ast.parse(_QUANTITY.sub(_quoted, text.strip()), mode="eval").body
     except (SyntaxError, ValueError, RecursionError, MemoryError):
@@ -87,7 +89,7 @@ class _Reader:
         self._depth = 0
 
     def expectation(self, node: ast.expr) -> Expectation:
-        """Read a part that holds or doesn't."""
+        """Read an operand that is true or false at each step."""
         value = self.value(node)
         if isinstance(value, Expectation):
             return value

@@ -77,7 +77,7 @@ class Temporal(Expectation):
 
 @dataclass(frozen=True, eq=False)
 class Windowed(Word, Expectation):
-    """Base of expectations about a time from each step on, or up to it: `within`, or all of it."""
+    """Base of expectations about a window before or after each step: `within`, or all time."""
 
     within: Any = field(default=None, kw_only=True)  # as it is written, then a timedelta or Window
 
@@ -387,7 +387,7 @@ class after(Limited):
 
 @dataclass(frozen=True, eq=False)
 class holds_for(Word, Expectation):
-    """The condition that a condition has held for at least `duration` up to this step."""
+    """True at steps up to which a condition has held for at least `duration`."""
 
     part: Expectation
     duration: Any  # of type Time, then a timedelta

@@ -212,7 +212,7 @@ def wilson(hits: int, total: int) -> ParameterEstimate:
 
 
 def share_of(logit: float) -> float:
-    """Return the probability that a logit stands for, exactly 1 from SURE_LOGIT on.
+    """Return the probability of a logit; exactly 1 from SURE_LOGIT on.
 
     >>> share_of(0.0), share_of(SURE_LOGIT)
     (0.5, 1.0)

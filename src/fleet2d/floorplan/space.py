@@ -128,7 +128,7 @@ class Space:
 
     @property
     def shortest(self) -> Routes | None:
-        """The routes between points strictly inside; None: other than the shortest ones are."""
+        """The routes between points strictly inside; None if routes aren't the shortest."""
         return self.routes
 
     def part_at(self, x: int, y: int) -> int:

@@ -95,7 +95,7 @@ class NoticePart(AnswerPart):
     per_metre: float = -1.0
 
     def logit(self, now: Circumstances, state: AttitudeState) -> float:
-        """Sum what makes it hard to notice."""
+        """Sum the terms that make it hard to notice."""
         total = self.base + self.per_metre * max(0.0, now.distance - self.reach)
         if now.activity in ASLEEP:
             total += self.asleep
@@ -241,7 +241,7 @@ class MannerPart(AnswerPart):
     in_the_way: float = -0.8
 
     def logit(self, now: Circumstances, state: AttitudeState) -> float:
-        """Add what is wrong with its manner."""
+        """Add the terms of its manner: from behind, too near or far, in the way."""
         total = self.behind if now.from_behind else 0.0
         if not self.nearest <= now.distance <= self.farthest:
             total += self.off
@@ -305,7 +305,7 @@ class AttitudePart(AnswerPart):
     annoyance: float = -0.4
 
     def logit(self, now: Circumstances, state: AttitudeState) -> float:
-        """Add up the attitude."""
+        """Sum the terms of the attitude."""
         return (
             self.novelty * state.novelty
             + self.habit * state.expects(now.name, now.time, self.expected_within)
@@ -477,7 +477,7 @@ class Answers(Component):
     @model_validator(mode="before")
     @classmethod
     def _types_by_name(cls, data: Any) -> Any:
-        """Let a part without a type be of the type of its name."""
+        """Give a part without a type the type of its name."""
         if not isinstance(data, Mapping):
             return data
         types = {name: name for name in PARTS} | {"months": "fading", "initiative": "rates"}

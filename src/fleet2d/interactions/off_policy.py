@@ -63,7 +63,7 @@ class Estimate(NamedTuple):
 
 
 def read_opportunities(run: StoredRun) -> LoggedOpportunities:
-    """Return what a stored run's robots considered, drew and were answered.
+    """Return the opportunities of a stored run: what robots considered and drew, and the answers.
 
     A reward belongs to the last opportunity of the same interaction and person before it.
     """

@@ -566,7 +566,7 @@ def check_camera(actor: Actor, camera: bool | str | None) -> None:
 
 
 def check_truth(world: World, name: str) -> None:
-    """Refuse to let a robot perceive an unknown person where no table can store that.
+    """Refuse detections of unknown people in a run whose tables can't store them.
 
     Raises:
         ScenarioError: The cameras of the robot don't err in this run.

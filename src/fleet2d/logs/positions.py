@@ -267,7 +267,7 @@ def read_table(path: Path) -> pa.Table:
         FIXES.check(table.num_rows, path, LogError)
         _ = table.column_names
     except UnicodeDecodeError:
-        raise LogError(f"{path}, line 1: the names of its columns are not text in UTF-8") from None
+        raise LogError(f"{path}, line 1: the column names are not text in UTF-8") from None
     except (pa.ArrowException, OSError) as error:
         raise LogError(f"{path} can't be read: {one_line(error, 200)}") from error
     return table

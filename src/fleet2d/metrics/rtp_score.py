@@ -192,7 +192,7 @@ def _gaps(forecast: F64, true: F64, masses: int) -> float:
 
 
 def _grouped(forecast: F64, true: F64, masses: int) -> tuple[I64, F64]:
-    """Return for each group of forecasts its size, and the sum of its truth minus forecast."""
+    """Return the size of each group of forecasts, and its sum of truth minus forecast."""
     group = groups_of(forecast, masses)
     size: I64 = np.bincount(group, minlength=masses)
     difference = np.bincount(group, true - forecast, masses).astype(np.float64)

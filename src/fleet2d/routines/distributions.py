@@ -211,7 +211,7 @@ def exp(x: float) -> float:
 
 
 def log(x: float) -> float:
-    """Return the natural logarithm of x > 0 by + - * / alone, the same on every machine.
+    """Return the natural logarithm of x > 0, using only + - * /: the same on every machine.
 
     >>> round(log(10.0), 12), round(log(0.05), 12)
     (2.302585092994, -2.995732273554)

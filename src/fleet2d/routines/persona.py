@@ -590,7 +590,7 @@ def _persona_file(value: str | Path, *, is_extended: bool) -> Path:
 def _validate_persona(
     value: object, validate: ValidatorFunctionWrapHandler, info: ValidationInfo
 ) -> Persona:
-    """Read and validate a persona; one in a file for all who name it."""
+    """Read and validate a persona; a file is read once for all users that name it."""
     if isinstance(value, str | Path) and str(value) not in bundled_names():
         path = folder_of(value) / Path(value).expanduser()
         return once(info, (Persona, path), lambda: validate(read_persona(value)))

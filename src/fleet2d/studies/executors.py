@@ -242,7 +242,7 @@ class CrewExecutor(ABC, Generic[AnyWorker]):
 
     @abstractmethod
     def _messages(self) -> Iterator[tuple[AnyWorker, Ready | Broken | Done | Died]]:
-        """Wait for messages of workers, at most one of each."""
+        """Wait for messages from workers, at most one from each."""
 
     @abstractmethod
     def _end(self, workers: list[AnyWorker]) -> None:
@@ -388,7 +388,7 @@ class LocalExecutor(CrewExecutor[LocalWorker]):
 
 @contextmanager
 def _worker_environment() -> Iterator[None]:
-    """Let processes start that ignore Ctrl-C and don't run the user's script again.
+    """Start processes that ignore Ctrl-C and don't run the user's script again.
 
     Ctrl-C is for the driver, which ends its workers. `spawn` would import the main module, which
     may start a study itself.

@@ -335,7 +335,7 @@ class Claim:
             self._check_power()
 
     def _check_power(self) -> None:
-        """Refuse a claim that tells too little, with the number of seeds that would do.
+        """Refuse a claim with too little power, and say how many seeds would suffice.
 
         Raises:
             SetUpError: The trials can't show what is claimed.

@@ -133,7 +133,7 @@ def write_film(
     height: int = HEIGHT_PX,
     on_progress: Callable[[int, int], None] | None = None,
 ) -> int:
-    """Write a stretch of a run as a film; return its number of different frames.
+    """Write a stretch of a run as a film; return the number of distinct frames.
 
     Args:
         run: The run.

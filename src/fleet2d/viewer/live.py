@@ -271,7 +271,7 @@ class LiveRun:
         self._thread.start()
 
     def serve_by(self, serve: Callable[[Run], int]) -> None:
-        """Have the run served when it is over: the function returns its number."""
+        """Serve the run when it is over; the function returns its number."""
         self._serve = serve
 
     def end(self) -> None:

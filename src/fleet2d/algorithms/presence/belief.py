@@ -179,7 +179,7 @@ class Presence:
         return self
 
     def __repr__(self) -> str:
-        """Show the shares of anyone."""
+        """Return the class name and the shares of anyone."""
         rounded = self.share().round(3).tolist()
         return f"{type(self).__name__}({self.time.isoformat()}, anyone: {rounded})"
 

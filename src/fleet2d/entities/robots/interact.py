@@ -338,7 +338,7 @@ class Interact(BeliefBehavior):
         in_view: Mapping[str, Point],
         served: ServedRequest | None,
     ) -> Plan | None:
-        """Go on with a round that somebody has interrupted; None: it is over, without a find."""
+        """Continue an interrupted round; None if it is over and nobody was found."""
         if served is None or served.step != "seek" or served.request not in ready:
             return None
         last, plan = now.actor.plan, None

@@ -360,7 +360,7 @@ class Policy(BeliefBehavior):
         return self._ways(now).mask
 
     def _ways(self, now: Situation) -> "TravelTimes":
-        """Return the ways from where the robot is."""
+        """Return the travel times from where the robot is."""
         seconds = self.poses.seconds()
         if self._from_here.seconds is not seconds:  # as long as it stays, it is the same array
             mask = np.zeros(self.rooms + 1, np.bool_)

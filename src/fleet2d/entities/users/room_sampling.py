@@ -144,7 +144,7 @@ class RoomSampling(Behavior):
 
 
 def _rooms_along(actor: "Actor", route: I64) -> list[tuple[int, float]]:
-    """Return the index of each room that a route leads through, and its share of the length."""
+    """Return the index of each room on a route, and its share of the route's length."""
     plan = actor.home.plan
     legs = np.diff(route, axis=0).astype(np.float64)
     lengths = np.sqrt(legs[:, 0] * legs[:, 0] + legs[:, 1] * legs[:, 1])

@@ -150,7 +150,7 @@ def _corner_to_corner(
 
 
 def _to_walls(walls: _Walls, batches: Sequence[Corners], units_per_m: float) -> Iterator[I64]:
-    """Yield lines from corners that stand out to the nearest point of a wall, int64 (n, 4)."""
+    """Yield lines from reflex corners to the nearest point of a wall, int64 (n, 4)."""
     lines_of = np.asarray(shapely.linestrings(np.stack([walls.start, walls.end], axis=1)))
     tree = shapely.STRtree(lines_of)
     for batch in batches:

@@ -219,7 +219,7 @@ def settle_wishes(wishes: Wishes, choices: Choices) -> Wishes:
 
 
 def _draw_area(choices: Choices) -> float:
-    """Draw an area [m²] as HouseExpo's plans have it."""
+    """Draw an area [m²] from the distribution in HouseExpo's plans."""
     share = choices.below(1000) / 10
     for (low, least), (high, most) in pairwise(AREA_QUANTILES):
         if share <= high:
