@@ -474,7 +474,7 @@ def test_known_failure_06_two_labels_on_one_box_are_one_room(tmp_path: Path) -> 
 # --- 7 -----------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("cell", [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0])
+@pytest.mark.parametrize("cell", some([0.02, 0.01, 0.05, 0.1, 0.2, 0.5, 1.0], 2))
 def test_known_failure_07_the_area_stays_within_a_tolerance_or_it_is_an_error(
     plan_paths: list[Path], cell: float
 ) -> None:

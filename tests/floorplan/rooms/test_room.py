@@ -3,8 +3,15 @@ import pytest
 import shapely
 
 from fleet2d.errors import FloorPlanError
-from fleet2d.floorplan.lattice import Lattice
-from fleet2d.floorplan.rooms.room import LabelledRegion, Room, assign_rooms
+from fleet2d.floorplan.lattice import UNITS_PER_CELL, Lattice
+from fleet2d.floorplan.rooms.room import (
+    TO_CENTRE,
+    LabelledRegion,
+    Room,
+    _is_met_more_along_x,
+    assign_rooms,
+    cells_in,
+)
 
 LATTICE = Lattice(0.1, (0.0, 0.0), columns=40, rows=30)
 FREE = np.zeros((30, 40), np.bool_)
@@ -165,3 +172,21 @@ def test_one_name_for_two_rooms_is_refused() -> None:
 
     with pytest.raises(FloorPlanError, match="two rooms are named 'den'"):
         assign_rooms(LATTICE, FREE, den)
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_cells_between_thin_teeth_are_those_of_the_plain_comparison(turned: bool) -> None:
+    """Which way the teeth lie decides along which axis edges are met: the cells are the same."""
+    xs = np.linspace(6400, 0, 1201)[1:-1].astype(int) // 2 * 2
+    tips = [(x, 3200 if k % 2 else 1600) for k, x in enumerate(xs.tolist())]
+    corners = np.array([(0, 0), (6400, 0), *tips, (0, 3200)])
+    comb = shapely.Polygon(corners[:, ::-1] if turned else corners)
+    free = np.ones((110, 110), np.bool_)
+
+    cells = cells_in(free, comb)
+
+    rows, columns = np.indices((110, 110)) * UNITS_PER_CELL + TO_CENTRE
+    expected = shapely.contains_xy(comb, columns, rows)
+    assert _is_met_more_along_x(comb) != turned
+    assert expected[cells.window].sum() == expected.sum()
+    assert (expected[cells.window] == cells.mask).all()

@@ -92,6 +92,7 @@ def _rank(kind: str) -> int:
 
 NOT_FREE = -1
 TO_CENTRE = UNITS_PER_CELL // 2 + 1
+MANY_CORNERS = 1000  # of a shape for which it is worth while to look which way it lies
 
 
 @dataclass(frozen=True)
@@ -190,9 +191,25 @@ def _inside(free: Bool, window: tuple[slice, slice], shape: Polygon | MultiPolyg
         y, x = np.nonzero(inside)
         centre_x = (x + window[1].start) * UNITS_PER_CELL + TO_CENTRE
         centre_y = (y + window[0].start) * UNITS_PER_CELL + TO_CENTRE
+        if _is_met_more_along_x(shape):
+            shape = shapely.transform(shape, lambda xy: xy[:, ::-1])
+            centre_x, centre_y = centre_y, centre_x
         shapely.prepare(shape)
         inside[y, x] = shapely.contains_xy(shape, centre_x, centre_y)
     return inside
+
+
+def _is_met_more_along_x(shape: Polygon | MultiPolygon) -> bool:
+    """Whether a line along x meets more edges of a shape of many corners than one along y.
+
+    GEOS compares a point with all edges that the line through it along x meets: with thousands, if
+    the shape has thin teeth along y.
+    """
+    if shapely.get_num_coordinates(shape) < MANY_CORNERS:
+        return False
+    edges = np.abs(np.diff(shapely.get_coordinates(shape), axis=0)).sum(axis=0)
+    x0, y0, x1, y1 = shape.bounds
+    return bool(edges[1] * (x1 - x0) > edges[0] * (y1 - y0))
 
 
 def cells_in(free: Bool, shape: Polygon | MultiPolygon) -> Patch:
