@@ -261,7 +261,7 @@ def test_grey_that_fills_furniture_is_no_floor_but_all_shades_of_a_map_of_chance
     pixels[5:-5, 5:-5] = FREE
     pixels[20:30, 20:40] = 211  # a sofa of 0.5 m x 1 m
     chances = pixels.copy()
-    chances[20:30, 20:40] = np.arange(210, 230, dtype=np.uint8)
+    chances[20:30, 20:40] = np.arange(220, 240, dtype=np.uint8)
 
     filled = read_ros(write(tmp_path, pixels))
     (tmp_path / "chances").mkdir()

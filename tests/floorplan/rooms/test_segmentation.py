@@ -10,10 +10,10 @@ CELL = 0.1
 
 
 def chambers(*areas_m2: float, links: tuple[Link, ...]) -> Chambers:
-    """Return chambers of these areas, in a row of cells."""
-    cells = [round(area / CELL**2) for area in areas_m2]
-    row = np.repeat(np.arange(len(cells)), cells).astype(np.int32)
-    return Chambers(np.append(row, -1)[None].astype(np.int32), len(cells), links)
+    """Return chambers of these areas beside each other, each 1 m deep."""
+    columns = [round(area / CELL) for area in areas_m2]
+    row = np.append(np.repeat(np.arange(len(columns)), columns), -1).astype(np.int32)
+    return Chambers(np.tile(row, (10, 1)), len(columns), links)
 
 
 def areas(rooms: np.ndarray) -> list[float]:
@@ -36,6 +36,14 @@ def test_what_is_too_small_for_a_toilet_goes_across_an_opening_rather_than_a_doo
     links = (Link(0, (0, 1)), Link(1, (1, 2)))
     rooms = segment_rooms(chambers(9.0, 1.0, 6.0, links=links), [False, True], [0.9, 0.9], CELL)
     assert [9.0, 7.0] == areas(rooms)
+
+
+def test_gap_among_furniture_is_no_room_though_it_is_as_large_as_a_toilet() -> None:
+    both = chambers(9.0, 2.0, links=(Link(0, (0, 1)),))
+    both.of_cell[:, -21:-1] = 0
+    both.of_cell[:5, -41:-1] = 1  # 0.5 m deep
+
+    assert [11.0] == areas(segment_rooms(both, [False], [0.9], CELL))
 
 
 def test_chamber_without_a_link_stays_a_room_however_small() -> None:

@@ -168,7 +168,8 @@ def _parts(raw: OccupancyMap, ray_width: float) -> tuple[I32, F64]:
         core = label_parts(distance2 >= _reach(raw.pixel, ray_width) ** 2, False)
         part = spread_labels(core, raw.free)
     count = int(part.max(initial=-1)) + 1
-    areas = np.bincount(part[part >= 0], minlength=count) * raw.pixel**2
+    sizes = np.bincount(part[part >= 0], minlength=count)
+    areas = sizes.astype(np.float64) * raw.pixel**2
     stand = distance2 >= max(SCRAP_WIDTH_M / 2 / raw.pixel, 1) ** 2
     areas[np.bincount(part[stand & (part >= 0)], minlength=count) == 0] = 0
     return part, areas

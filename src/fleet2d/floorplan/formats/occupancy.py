@@ -30,6 +30,10 @@ UnknownGrey = Literal["auto", "none"] | Annotated[int, Field(ge=0, le=255)]
 SAVED_UNKNOWN = 205
 # The ground around a home covers at least this share of the edge of a picture.
 EDGE_SHARE = 0.5
+# Share of a picture that is unknown, at least.
+UNKNOWN_SHARE = 0.05
+# A shade is unknown, too, up to this share of the way from that of unknown to that of the floor.
+RARE_SHARE = 0.25
 # Area of lighter floor from which on a light grey may be unknown [m²].
 FLOOR_M2 = 2.0
 # A home smaller than this, and than this share of all that is drawn, is the inside of an object.
@@ -89,7 +93,8 @@ class PictureSource(OccupancySource):
 
     Attributes:
         unknown_grey: Shade of what is unknown or outside though it is as light as floor, from 0 to
-            255; auto: the one that most of the edge has; none: there is no such shade.
+            255; auto: the one that most of the edge has, that map savers write, or that furniture
+            is filled with; none: there is no such shade.
     """
 
     unknown_grey: UnknownGrey = "auto"
@@ -106,23 +111,30 @@ class PictureSource(OccupancySource):
             notes: A note is added if pixels are taken for unknown.
             saved: Whether the grey that map savers write may stand for unknown anywhere.
         """
-        if self.unknown_grey == "none":
+        if self.unknown_grey == "none" or not free.any():
             return free
-        edge, share = picture.edge_grey()
-        greys = [edge] if share >= EDGE_SHARE else []
-        greys += [SAVED_UNKNOWN, *picture.light_greys(free)] if saved else []
-        if self.unknown_grey != "auto":
-            greys = [self.unknown_grey]
-        for grey in greys:
-            known: Bool = free & (picture.greys > grey)
-            unknown = int(np.count_nonzero(free & (picture.greys == grey)))
-            if unknown and np.count_nonzero(known) * pixel**2 >= FLOOR_M2:
-                notes.append(
-                    f"grey {grey} is taken for unknown, though it is as light as floor: {unknown}"
-                    " pixels; unknown_grey: none takes it for floor"
-                )
-                return known
-        return free
+        if self.unknown_grey == "auto":
+            edge, share = picture.edge_grey()
+            greys = [edge] if share >= EDGE_SHARE else []
+            if saved:
+                greys += [SAVED_UNKNOWN] * (picture.share(SAVED_UNKNOWN) > 0)
+                greys += picture.filled_greys(free)
+            greys = [g for g in greys if picture.count(free, g + 1) * pixel**2 >= FLOOR_M2]
+            grey = limit = max(greys, default=0)
+            if grey == SAVED_UNKNOWN and picture.share(grey) >= UNKNOWN_SHARE:
+                # What a robot saw rarely, such as rays, is nearer to unknown than to the floor.
+                limit = grey + int((picture.floor_grey(free, grey + 1) - grey) * RARE_SHARE)
+        else:
+            grey = limit = self.unknown_grey
+        known: Bool = free & (picture.greys > limit)
+        unknown = int(np.count_nonzero(free) - np.count_nonzero(known))
+        if not unknown or np.count_nonzero(known) * pixel**2 < FLOOR_M2:
+            return free
+        notes.append(
+            f"grey {grey} is taken for unknown, and so are shades up to {limit}, though they are as"
+            f" light as floor: {unknown} pixels; unknown_grey: none takes them for floor"
+        )
+        return known
 
     def home(self, raw: OccupancyMap, picture: GreyPicture, notes: list[str]) -> Polygon:
         """Return the home in an occupancy map [m], and add a note for each change.

@@ -63,17 +63,28 @@ class GreyPicture:
         counts = np.bincount(edge, minlength=256)
         return int(counts.argmax()), float(counts.max() / len(edge))
 
-    def light_greys(self, light: Bool) -> list[int]:
+    def count(self, light: Bool, first: int, last: int = 255) -> int:
+        """Return the number of some pixels whose shade is between two, inclusively."""
+        return int(np.count_nonzero(light & (self.greys >= first) & (self.greys <= last)))
+
+    def share(self, grey: int) -> float:
+        """Return the share of the picture that has a shade."""
+        return float(np.count_nonzero(self.greys == grey) / self.greys.size)
+
+    def floor_grey(self, light: Bool, first: int) -> int:
+        """Return the most frequent shade of light pixels from a shade on, which the floor has."""
+        return first + int(np.bincount(self.greys[light], minlength=256)[first:].argmax())
+
+    def filled_greys(self, light: Bool) -> list[int]:
         """Return shades of light pixels that something else than the floor is filled with.
 
-        The floor has the most frequent shade. A map of probabilities has all shades below it.
+        A map of probabilities has all shades below that of the floor.
         """
         counts = np.bincount(self.greys[light], minlength=256)
-        floor = int(counts.argmax())
         beside = np.maximum(np.roll(counts, 2), np.roll(counts, -2))
         is_filled = (counts >= FILLED_SHARE * counts.sum()) & (counts > FILLED_PEAK * beside)
-        filled: list[int] = np.flatnonzero(is_filled[: max(floor - FILLED_CONTRAST, 0)]).tolist()
-        return filled[::-1]
+        filled: list[int] = np.flatnonzero(is_filled[: counts.argmax() - FILLED_CONTRAST]).tolist()
+        return filled
 
 
 def read_grey(path: Path) -> GreyPicture:

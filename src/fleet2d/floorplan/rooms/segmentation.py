@@ -438,6 +438,9 @@ def _number_chambers(
 
 MIN_ROOM_M2 = 1.2
 """Least area of a room behind a doorway, such as a toilet."""
+NARROW_ROOM_M2, NARROW_ROOM_M = 3.0, 0.8
+"""Least area of a room in which no disc of this diameter has a place; smaller ones are gaps among
+furniture."""
 MIN_OPEN_ROOM_M2 = 4.0
 """Least area of a room behind an opening; a smaller space is an alcove."""
 
@@ -472,7 +475,8 @@ def segment_rooms(
             is_wide = widths_m[link.line] > WIDE_SHARE * min(across[one], across[other])
             least = MIN_OPEN_ROOM_M2 if opening else MIN_ROOM_M2
             for room, into in ((one, other), (other, one)):
-                if room != into and (areas[room] < least or (opening and is_wide)):
+                is_gap = areas[room] < NARROW_ROOM_M2 and across[room] < NARROW_ROOM_M
+                if room != into and (areas[room] < least or is_gap or (opening and is_wide)):
                     candidates.append((areas[room], not opening, link.line, room, into))
         if not candidates:
             break
