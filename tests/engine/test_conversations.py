@@ -125,3 +125,14 @@ def test_spans_are_invisible_to_what_people_start(max_span: int) -> None:
 def test_calls_of_a_robot_that_can_not_come_are_refused() -> None:
     with pytest.raises(ScenarioError, match=r"initiative\.calls: none of the behaviors of astro"):
         fleet2d.run(home(users={"ana": person_who(calls=1)}))
+
+
+def test_expectations_know_the_details_of_requests() -> None:
+    def expecting(detail: str) -> dict[str, Any]:
+        accepted = f"events(accepted, astro, detail={detail!r})"
+        text = f"after(events(due, astro, detail='pill ana'), {accepted}, within=30 min)"
+        return home("1 h", expect={"taken": text})
+
+    assert fleet2d.run(expecting("pill ana")).manifest["expectations"]["taken"]["holds"]
+    with pytest.raises(ScenarioError, match="'pil ana': did you mean 'pill ana'"):
+        fleet2d.run(expecting("pil ana"))

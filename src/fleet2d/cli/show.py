@@ -55,10 +55,10 @@ def show_diary(name: str | None, out: Path | None, days: int, seed: int) -> list
 
 
 Figure = Annotated[
-    Literal["life", "heat", "strip"],
+    Literal["life", "heat", "strip", "answers"],
     typer.Option(
         help="Of a run: life in the home; heat maps of where people and robots were; a strip of"
-        " time, a row for each."
+        " time, a row for each; what people answered robots."
     ),
 ]
 
@@ -125,7 +125,7 @@ class RunPicture(NamedTuple):
     at: str | None = None
     begin: str | None = None
     end: str | None = None
-    figure: Literal["life", "heat", "strip"] = "life"
+    figure: Literal["life", "heat", "strip", "answers"] = "life"
 
     def check(self) -> None:
         """Check that the options choose one picture.

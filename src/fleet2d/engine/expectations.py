@@ -60,6 +60,11 @@ ABOUT_USERS = (
     EventKind.GAVE_UP, EventKind.NOT_AT_HOME, EventKind.FOLLOWS, EventKind.LOST,
     EventKind.APPROACHES, EventKind.INTERACTS, EventKind.INTERACTION_OVER,
 )  # fmt: skip
+# Events whose detail is what a robot wants of whom.
+OF_REQUESTS = (
+    EventKind.DUE, EventKind.EXPIRED, EventKind.ASKS, EventKind.ACCEPTED, EventKind.DECLINED,
+    EventKind.DEFERRED, EventKind.IGNORED, EventKind.MISTAKEN, EventKind.DELIVERED,
+)  # fmt: skip
 ABOUT_ROBOTS = (EventKind.ROBOT_SEEN, EventKind.ROBOT_LOST)
 
 
@@ -119,6 +124,14 @@ def possible_details(
         calls = [f"{do} {name}" for do in ("come", "find") for name in people]
         details[EventKind.CALLED] = ["dock", *calls]
     details |= dict.fromkeys(ABOUT_ROBOTS, names)
+    for robot in robots:
+        wanted = {} if robot.requests is None else robot.requests.interactions
+        for name, interaction in wanted.items() if not _is_own(robot) else ():
+            texts = [f"{name} {person}" for person in interaction.people]
+            for kind in OF_REQUESTS:
+                details[f"{kind} {robot.name}"] = [
+                    *details.get(f"{kind} {robot.name}", []), *texts
+                ]  # fmt: skip
     for user in users:
         # A log may hold any activities, and so may a class of the user's own.
         if not _is_own(user) and "replay" not in {b.type_name for b in user.behaviors}:

@@ -103,6 +103,11 @@ class Interaction(Settings):
             raise problem("'fetch_from' is for `do: deliver`, and names another person than 'to'")
         return self
 
+    @property
+    def people(self) -> list[str]:
+        """The persons whom the robot addresses for it, in order."""
+        return [person for person in (self.fetch_from, self.to) if person is not None]
+
     def value_after(self, age: timedelta) -> float:
         """Return its value when it is carried out some time after it came up; 0 if too late."""
         if not timedelta(0) <= age <= self.within:

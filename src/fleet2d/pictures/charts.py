@@ -1,8 +1,8 @@
-"""Charts of people's days, and of how reliable estimates of presence are."""
+"""Charts of people's days, of how reliable estimates of presence are, and of what people answer."""
 
 from collections import Counter
-from collections.abc import Sequence
-from datetime import date, timedelta
+from collections.abc import Callable, Sequence
+from datetime import date, datetime, timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -13,7 +13,7 @@ from matplotlib.patches import Patch
 
 from fleet2d.algorithms.presence.belief import ANYONE
 from fleet2d.configuration.units import WEEKDAYS
-from fleet2d.errors import ArtifactError
+from fleet2d.errors import ArtifactError, InputError
 from fleet2d.kernels import F64, I64
 from fleet2d.metrics.rtp_score import (
     calibration_error,
@@ -29,7 +29,7 @@ from fleet2d.routines.persona import Persona
 from fleet2d.routines.planner import FINISHES, INTERRUPTS, RESUMES, Episode
 from fleet2d.runs.run import Run
 from fleet2d.runs.trajectory import rebuild_path
-from fleet2d.runtime.clock import HOUR_S
+from fleet2d.runtime.clock import HOUR_S, midnight_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -246,3 +246,137 @@ def draw_forecasts(name: str, belief: F64, truth: I64, path: Path) -> None:
 def _points(axes: "Axes", forecasts: F64, outcomes: F64, color: str, label: str) -> None:
     confidence, share, _ = reliability_curve(forecasts, outcomes)
     axes.plot(confidence, share, marker="o", markersize=4, color=color, label=label)
+
+
+# What came of a request or question, in the order in which it is stacked, and its color.
+ANSWER_COLORS = {
+    "accepted": "#009988",
+    "deferred": "#77aadd",
+    "declined": "#ee7733",
+    "no answer": "#bbbbbb",
+    "sent away": "#cc3311",
+}
+SHOWN_AS = {
+    "accepted": "accepted",
+    "deferred": "deferred",
+    "declined": "declined",
+    "sent_away": "sent away",
+    "banned": "sent away",
+    "switched_off": "sent away",
+}
+MOOD_COLOR, EXPIRED_COLOR = "#aa3377", "#9a9a9a"
+WEEKLY_FROM = 70  # days of a run from which on bars are weeks
+
+
+class Asked(NamedTuple):
+    """A time that a robot addressed a person.
+
+    Attributes:
+        robot: The robot.
+        user: The person meant.
+        hours: When, since the begin of the day on which the run began [h].
+        answer: What came of it: a key of ANSWER_COLORS.
+    """
+
+    robot: str
+    user: str
+    hours: float
+    answer: str
+
+
+def asked_of(run: Run) -> tuple[list[Asked], list[Asked]]:
+    """Return the times that robots addressed people, and the requests that expired, by the events.
+
+    Example:
+        >>> import fleet2d
+        >>> asked_of(fleet2d.run("simulation.duration=1 h"))
+        ([], [])
+    """
+    events, hours_of = run.tables["events"], _hours_of(run)
+    asked: list[Asked] = []
+    expired: list[Asked] = []
+    open_ones: dict[str, Asked] = {}  # by robot
+    columns = (events[name].to_pylist() for name in ("step", "entity", "event", "detail"))
+    for step, robot, event, detail in sorted(zip(*columns, strict=True), key=lambda row: row[0]):
+        user = detail.rpartition(" ")[2]
+        if event == "asks":
+            asked += [open_ones.pop(robot)] if robot in open_ones else []
+            open_ones[robot] = Asked(robot, user, hours_of(step), "no answer")
+        elif event in SHOWN_AS and robot in open_ones:
+            asked.append(open_ones.pop(robot)._replace(answer=SHOWN_AS[event]))
+        elif event == "expired":
+            expired.append(Asked(robot, user, hours_of(step), event))
+    return [*asked, *open_ones.values()], expired
+
+
+def _hours_of(run: Run) -> Callable[[int], float]:
+    """Return the function from steps to hours since the midnight before the run."""
+    start = datetime.fromisoformat(run.manifest["start"])
+    begin = (start - midnight_of(start)) / timedelta(hours=1)
+    return lambda step: begin + step * run.manifest["step_us"] / 1e6 / HOUR_S
+
+
+def answers_figure(run: Run) -> Figure:
+    """Return a figure of what people answered: by day or week, and by hour of the day.
+
+    Bars are the times that a robot addressed a person, by answer, and ticks below them requests
+    that expired. The line is the person's annoyance, if the run has the metric `interactions`.
+
+    Raises:
+        InputError: Robots wanted nothing of anybody.
+    """
+    asked, expired = asked_of(run)
+    pairs = sorted({(each.robot, each.user) for each in [*asked, *expired]})
+    if not pairs:
+        raise InputError("robots addressed nobody in this run: there are no answers to draw")
+    figure = Figure(figsize=(10.67, 0.6 + 2.3 * len(pairs)), dpi=100, facecolor="white")
+    panels = figure.subplots(len(pairs), 2, width_ratios=(3, 1), squeeze=False)
+    days = 1 + int(_hours_of(run)(run.manifest["steps"] - 1) // 24)
+    width = 7 if days >= WEEKLY_FROM else 1
+    for (robot, user), (by_day, by_hour) in zip(pairs, panels, strict=True):
+        own = [each for each in asked if (each.robot, each.user) == (robot, user)]
+        late = [each.hours / 24 for each in expired if (each.robot, each.user) == (robot, user)]
+        _stack(by_day, [(each.hours / 24, each.answer) for each in own], width, days)
+        _stack(by_hour, [(each.hours % 24, each.answer) for each in own], 1, 24)
+        by_day.plot(late, np.zeros(len(late)), "|", color=EXPIRED_COLOR, clip_on=False)
+        accepted = sum(each.answer == "accepted" for each in own)
+        title = f"{robot} asked {user} {len(own)} times: {accepted} accepted, {len(late)} expired"
+        by_day.set_title(title, loc="left", fontsize=10)
+        by_day.set(xlabel="day", ylabel="times a week" if width == 7 else "times a day")
+        by_hour.set(xlabel="hour of the day", xticks=range(0, 25, 6))
+        _draw_annoyance(run, robot, user, by_day)
+    panels[0, 1].legend(
+        loc="lower right", bbox_to_anchor=(1, 1), ncols=3, frameon=False, fontsize=7
+    )
+    figure.tight_layout()
+    return figure
+
+
+def _stack(axes: "Axes", answers: Sequence[tuple[float, str]], width: int, end: int) -> None:
+    """Draw the answers in intervals of a width up to an end, stacked."""
+    edges = np.arange(0, end + width, width)
+    below = np.zeros(len(edges) - 1)
+    for answer, color in ANSWER_COLORS.items():
+        counts, _ = np.histogram([at for at, each in answers if each == answer], edges)
+        middles = edges[:-1] + width / 2
+        axes.bar(middles, counts, width * 0.85, bottom=below, color=color, label=answer)
+        below += counts
+    axes.set_xlim(0, edges[-1])
+    axes.spines[["top", "right"]].set_visible(False)
+
+
+def _draw_annoyance(run: Run, robot: str, user: str, axes: "Axes") -> None:
+    """Draw the annoyance of a person over the days, if the run has stored it."""
+    tables = run.tables
+    if "interactions" not in tables or "annoyance" not in tables["interactions"].column_names:
+        return
+    table, hours_of = tables["interactions"], _hours_of(run)
+    columns = (table[name].to_pylist() for name in ("asked_at", "robot", "addressed", "annoyance"))
+    rows = [(hours_of(at) / 24, value) for at, r, u, value in zip(*columns, strict=True)
+            if (r, u) == (robot, user)]  # fmt: skip
+    if rows:
+        mood = axes.twinx()
+        mood.plot(*zip(*rows, strict=True), color=MOOD_COLOR, linewidth=1.2)
+        mood.set_ylabel("annoyance", color=MOOD_COLOR)
+        mood.set_ylim(bottom=0)
+        mood.spines["top"].set_visible(False)

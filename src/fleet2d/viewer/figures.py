@@ -35,7 +35,7 @@ from fleet2d.viewer.moments import clock_of, part_of_run
 from fleet2d.viewer.run_facts import bodies_of
 from fleet2d.viewer.stage import Stage, draw_strip, strip_rows
 
-FigureKind = Literal["life", "heat", "strip"]
+FigureKind = Literal["life", "heat", "strip", "answers"]
 
 BLUR_M = 0.15
 SAMPLES = 40_000
@@ -180,7 +180,8 @@ def draw_stretch(run: Run, first: int, end: int, path: Path, kind: FigureKind = 
         end: The step before which it ends.
         path: The file: .png, .svg or .pdf. An existing file is replaced.
         kind: `life`: paths and presence in the home, and rooms by day. `heat`: where people and
-            robots spent their time. `strip`: a row per body, coloured by room.
+            robots spent their time. `strip`: a row per body, coloured by room. `answers`: what
+            people answered robots, by day and by hour.
 
     Raises:
         InputError: The file can't be written.
@@ -196,6 +197,10 @@ def stretch_figure(run: Run, first: int, end: int, kind: FigureKind = "life") ->
     part = part_of_run(run, first, end)
     if kind == "life":
         return run_figure(part)
+    if kind == "answers":
+        from fleet2d.pictures.charts import answers_figure  # few pictures need it
+
+        return answers_figure(part)
     return _heat_figure(part) if kind == "heat" else strip_figure(part)
 
 

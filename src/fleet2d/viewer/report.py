@@ -133,6 +133,9 @@ def _figures(run: Run) -> list[str]:
         ("The first day", partial(stretch_figure, run, 0, day, "strip")),
         ("Where time was spent", partial(stretch_figure, run, 0, steps, "heat")),
     )
+    if run.manifest["scenario"].get("interactions"):
+        draw_answers = partial(stretch_figure, run, 0, steps, "answers")
+        kinds = (*kinds, ("What robots wanted of people, and what they answered", draw_answers))
     figures = []
     for caption, draw in kinds:
         try:
