@@ -18,7 +18,6 @@ from typing import Any
 
 import fleet2d
 from fleet2d.engine import loop
-from fleet2d.engine.bodies import Bodies
 from fleet2d.engine.cameras import Cameras
 from fleet2d.engine.collisions import Clearance
 from fleet2d.engine.encounters import Encounters
@@ -27,6 +26,7 @@ from fleet2d.engine.learners import Learners
 from fleet2d.engine.recorder import Recorder
 from fleet2d.engine.sensors import Sensors
 from fleet2d.engine.simulation import Simulation
+from fleet2d.entities.body import Bodies
 from fleet2d.entities.decisions import DecidingActor
 from fleet2d.metrics.metric import Metric
 

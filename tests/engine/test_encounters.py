@@ -8,9 +8,9 @@ from hypothesis import strategies as st
 from tests.scenes import scenario
 from tests.thorough import examples
 
-from fleet2d.engine.bodies import Bodies, PoseBlock
 from fleet2d.engine.encounters import Encounters
 from fleet2d.engine.simulation import Simulation
+from fleet2d.entities.body import Bodies, PoseBlock
 
 UNITS = 1280  # lattice units per metre
 LYING, SITTING = 2, 1

@@ -13,9 +13,10 @@ import numpy as np
 
 from fleet2d.algorithms.observations import ActivitySense
 from fleet2d.configuration.units import micros
-from fleet2d.engine.bodies import Bodies, Watcher, poses_of
+from fleet2d.engine.basis import Watcher
 from fleet2d.engine.sighting_errors import sight_events
 from fleet2d.entities.behavior import Actor, SightEvent
+from fleet2d.entities.body import Bodies, poses_of
 from fleet2d.entities.equipment import Drift, Localization
 from fleet2d.errors import ComponentError, ScenarioError, blame
 from fleet2d.floorplan.home import Home

@@ -16,7 +16,7 @@ from shapely import LineString
 
 from fleet2d.configuration.problems import suggest
 from fleet2d.configuration.units import micros
-from fleet2d.engine.bodies import Basis
+from fleet2d.engine.basis import Basis
 from fleet2d.engine.lights import PeopleSwitches, switch
 from fleet2d.entities.behavior import Actor
 from fleet2d.entities.body import Track

@@ -15,8 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fleet2d.configuration.units import micros
-from fleet2d.engine.bodies import Basis, Bodies, Watcher, poses_of
+from fleet2d.engine.basis import Basis, Watcher
 from fleet2d.entities.behavior import Situation
+from fleet2d.entities.body import Bodies, poses_of
 from fleet2d.entities.decisions import DecidingActor
 from fleet2d.entities.entity import Robot
 from fleet2d.entities.giving_way import TOUCHING_GAP_M, Surroundings, plan_after_step, plan_around

@@ -12,9 +12,9 @@ from typing import NamedTuple
 import numpy as np
 
 from fleet2d.configuration.units import micros
-from fleet2d.engine.bodies import Basis, Bodies, PoseBlock, Watcher
+from fleet2d.engine.basis import Basis, Watcher
 from fleet2d.entities.behavior import Command, SightEvent
-from fleet2d.entities.body import NEVER
+from fleet2d.entities.body import NEVER, Bodies, PoseBlock
 from fleet2d.entities.decisions import DecidingActor, StandStill
 from fleet2d.errors import ScenarioError
 from fleet2d.floorplan.placed_objects import POSTURES

@@ -10,8 +10,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fleet2d.engine.bodies import Bodies, PoseBlock, Watcher
+from fleet2d.engine.basis import Watcher
 from fleet2d.entities.behavior import Attention, SightEvent
+from fleet2d.entities.body import Bodies, PoseBlock
 from fleet2d.entities.decisions import DecidingActor
 from fleet2d.floorplan.placed_objects import POSTURES
 from fleet2d.kernels import I64, Bool, line_of_sight, locate

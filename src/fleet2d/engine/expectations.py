@@ -11,7 +11,6 @@ from fleet2d.algorithms.observations import Activities
 from fleet2d.artifacts.store import RunStore
 from fleet2d.artifacts.table import Column, TableSpec
 from fleet2d.configuration.units import MICROSECOND
-from fleet2d.engine.bodies import Bodies
 from fleet2d.engine.cameras import Cameras
 from fleet2d.engine.change_queue import ChangeQueue
 from fleet2d.engine.intervention_queue import InterventionQueue
@@ -19,6 +18,7 @@ from fleet2d.engine.learners import Learners
 from fleet2d.engine.sensors import Sensors
 from fleet2d.engine.trajectories import STEP, TIME
 from fleet2d.entities.behavior import Actor
+from fleet2d.entities.body import Bodies
 from fleet2d.entities.decisions import DecidingActor
 from fleet2d.errors import InputError
 from fleet2d.expectations.expectation import Expectation, RunSignals

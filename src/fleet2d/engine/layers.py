@@ -14,8 +14,9 @@ from fleet2d.algorithms.history import Log
 from fleet2d.configuration.components import Component
 from fleet2d.configuration.problems import suggest
 from fleet2d.configuration.units import whole_steps
-from fleet2d.engine.bodies import Basis, Bodies, Watcher
+from fleet2d.engine.basis import Basis, Watcher
 from fleet2d.entities.behavior import Actor
+from fleet2d.entities.body import Bodies
 from fleet2d.entities.entity import Robot
 from fleet2d.errors import ComponentError
 from fleet2d.floorplan.costmap import CostmapSettings, costs_of

@@ -25,7 +25,7 @@ from fleet2d.algorithms.history import History, Log
 from fleet2d.artifacts.table import Column, Kind, TableSpec
 from fleet2d.configuration.problems import suggest
 from fleet2d.configuration.units import micros, whole_steps
-from fleet2d.engine.bodies import Basis
+from fleet2d.engine.basis import Basis
 from fleet2d.errors import ComponentError, Fleet2DError, ScenarioError, blame
 from fleet2d.metrics.metric import Metric
 from fleet2d.runtime.events import HOME, Event

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fleet2d.engine.bodies import Basis
+from fleet2d.engine.basis import Basis
 from fleet2d.entities.behavior import Actor, holds
 from fleet2d.entities.body import Track
 from fleet2d.entities.decisions import DecidingActor, StandStill

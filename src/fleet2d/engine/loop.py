@@ -105,7 +105,7 @@ def decide(state: State, span: Span) -> None:
         if due:
             state.end_plan(row, step)
             actor.decide(situation)
-            state.bodies.follow(row, actor.plan)
+            _follow_plan(state, row)
         if row in clearance.robots:
             in_way = clearance.in_way(state.bodies, row)
         if in_way is not None:
@@ -113,13 +113,19 @@ def decide(state: State, span: Span) -> None:
                 state.end_plan(row, step)
             situation = Situation(actor, step, (), state.learners.readable_outputs)
             actor.give_way(situation, in_way.name, clearance.surroundings(actor))
-            state.bodies.follow(row, actor.plan)
+            _follow_plan(state, row)
         begins = due or in_way is not None
         if row in blocking.rows:
             begins |= _yield_to_bodies(state, row, step, begins=begins)
         if begins:
             state.changes.expect(row, actor)
             state.begin_plan(row, step)
+
+
+def _follow_plan(state: State, row: int) -> None:
+    """Let a body follow its plan from the present step on."""
+    plan = state.actors[row].plan
+    state.bodies.follow(row, plan.finish(), plan.began[1], plan.posture_times())
 
 
 def _yield_to_bodies(state: State, row: int, step: int, *, begins: bool) -> bool:
@@ -142,7 +148,7 @@ def _yield_to_bodies(state: State, row: int, step: int, *, begins: bool) -> bool
     if not begins:
         state.end_plan(row, step)
     actor.follow_instead(plan, situation)
-    state.bodies.follow(row, actor.plan)
+    _follow_plan(state, row)
     return True
 
 

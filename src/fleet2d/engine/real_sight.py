@@ -4,9 +4,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fleet2d.engine.bodies import Bodies
 from fleet2d.engine.cameras import Cameras, Look
 from fleet2d.engine.sighting_errors import sight_events
+from fleet2d.entities.body import Bodies
 from fleet2d.entities.evidence.evidence_source import SIGHTING, EvidenceSource
 from fleet2d.entities.evidence.live import LiveDetections
 from fleet2d.errors import blame

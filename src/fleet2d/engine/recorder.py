@@ -14,7 +14,7 @@ import numpy as np
 from fleet2d.algorithms.history import SensorRow
 from fleet2d.algorithms.observations import Activities, NearestRooms, Observations, Truth
 from fleet2d.artifacts.table import KEY_KINDS, Column, TableSpec
-from fleet2d.engine.bodies import Basis
+from fleet2d.engine.basis import Basis
 from fleet2d.engine.cameras import Cameras
 from fleet2d.engine.sensors import Sensors
 from fleet2d.engine.trajectories import (

@@ -11,7 +11,8 @@ import numpy as np
 
 from fleet2d.algorithms.history import SensorRow
 from fleet2d.configuration.problems import suggest
-from fleet2d.engine.bodies import Basis, Bodies, PoseBlock, Watcher
+from fleet2d.engine.basis import Basis, Watcher
+from fleet2d.entities.body import Bodies, PoseBlock
 from fleet2d.entities.objects.home_object import (
     Sensor,
     SensorFault,

@@ -8,7 +8,7 @@ import numpy as np
 from fleet2d.algorithms.history import Log
 from fleet2d.artifacts.store import RunStore
 from fleet2d.configuration.problems import suggest
-from fleet2d.engine.bodies import Basis, Bodies
+from fleet2d.engine.basis import Basis
 from fleet2d.engine.cameras import Cameras
 from fleet2d.engine.change_queue import ChangeQueue
 from fleet2d.engine.collisions import BlockedWays, Clearance
@@ -20,8 +20,9 @@ from fleet2d.engine.layers import LayerBook, add_layers
 from fleet2d.engine.learners import Learners
 from fleet2d.engine.recorder import Recorder, activities_of, table_specs
 from fleet2d.engine.sensors import Sensors
-from fleet2d.engine.state import InView, Recall, State
+from fleet2d.engine.state import EventStream, InView, Recall, State
 from fleet2d.engine.world import schedule_script
+from fleet2d.entities.body import Bodies
 from fleet2d.entities.decisions import DecidingActor
 from fleet2d.entities.objects.door import Door
 from fleet2d.errors import ComponentError, PlacementError, ScenarioError, blame
@@ -29,7 +30,7 @@ from fleet2d.floorplan.home import Home
 from fleet2d.interventions.intervention import causes_errors
 from fleet2d.kernels import I64
 from fleet2d.runtime.clock import Clock
-from fleet2d.runtime.events import EventKind, EventStream
+from fleet2d.runtime.events import EventKind
 from fleet2d.scenario.model import Scenario
 from fleet2d.sight.fov import FieldOfView
 

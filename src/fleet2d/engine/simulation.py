@@ -35,7 +35,7 @@ from fleet2d.engine.snapshot import (
     read_state,
     save_snapshot,
 )
-from fleet2d.engine.state import State
+from fleet2d.engine.state import Listener, State
 from fleet2d.engine.world import repeat, request
 from fleet2d.entities.behavior import Situation
 from fleet2d.entities.decisions import DecidingActor
@@ -49,7 +49,7 @@ from fleet2d.interventions.methods import InterventionMethods
 from fleet2d.kernels import in_radians
 from fleet2d.runs.run import Run, open_store
 from fleet2d.runtime.clock import Clock, midnight_of
-from fleet2d.runtime.events import Event, EventKind, Listener
+from fleet2d.runtime.events import Event, EventKind
 from fleet2d.runtime.memory import free_bodies, rare_collections
 from fleet2d.scenario.model import Scenario, load_scenario
 

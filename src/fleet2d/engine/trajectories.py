@@ -10,8 +10,8 @@ import numpy as np
 from fleet2d.artifacts.store import ArtifactSettings
 from fleet2d.artifacts.table import PLANNED, TRACK, WALK, Column, TableSpec
 from fleet2d.configuration.units import whole_steps
-from fleet2d.engine.bodies import Basis, Bodies
-from fleet2d.entities.body import Track
+from fleet2d.engine.basis import Basis
+from fleet2d.entities.body import Bodies, Track
 from fleet2d.kernels import I64, SUB, Breakpoints, in_radians
 from fleet2d.runtime.clock import HOUR_US, Clock
 

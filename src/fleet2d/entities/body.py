@@ -1,11 +1,12 @@
 """Bodies: how a scenario declares them, how they move, and where in a home they can be."""
 
 import copy
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, NamedTuple, Protocol
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
 from fleet2d.configuration.components import Settings, components, lookup
@@ -30,7 +31,19 @@ from fleet2d.floorplan.placed_objects import PlacedObject, Posture
 from fleet2d.floorplan.plan import Room
 from fleet2d.floorplan.slow_area import SlowRegion
 from fleet2d.floorplan.space import Space
-from fleet2d.kernels import F64, I64, TURN, Breakpoints, Mesh, WalkRule
+from fleet2d.kernels import (
+    F64,
+    I8,
+    I64,
+    TURN,
+    U8,
+    Breakpoints,
+    Mesh,
+    Poses,
+    Timelines,
+    WalkRule,
+    Window,
+)
 from fleet2d.runtime.clock import Clock
 from fleet2d.runtime.determinism import Draws, stream_key
 from fleet2d.sight.camera import Camera
@@ -131,22 +144,130 @@ NEVER = 1 << 62
 """The step of what never happens."""
 
 
-class RunBodies(Protocol):
-    """All bodies of a run.
+STANDING = np.zeros(1, np.int8), np.zeros(0, np.int64)
+
+
+class PoseBlock(NamedTuple):
+    """The poses of all bodies at consecutive steps: row b is body b, column j is step first + j.
 
     Attributes:
-        step: The present step.
-        ask_at: The step at which each body decides next, int64 (bodies,); NEVER for never.
+        x: int64 (bodies, steps), lattice units.
+        y: int64 (bodies, steps), lattice units.
+        heading: int64 (bodies, steps), 1/4096 turn.
+        away: uint8 (bodies, steps), nonzero while a body is away.
+        posture: int8 (bodies, steps), number of the posture.
     """
 
-    step: int
-    ask_at: I64
+    x: I64
+    y: I64
+    heading: I64
+    away: U8
+    posture: I8
+
+
+def poses_of(block: PoseBlock, row: int) -> Poses:
+    """Return the poses of one body, as views."""
+    return Poses(block.x[row], block.y[row], block.heading[row], block.away[row])
+
+
+class Bodies:
+    """All bodies of a run, users first, then robots.
+
+    Attributes:
+        step: The present step: decisions are made at it, poses beyond it may still change.
+        ask_at: int64 (bodies,), the step at which each body decides next; NEVER for never.
+        users: Number of users among the bodies.
+    """
+
+    def __init__(self, users: int, robots: int, step_us: int) -> None:
+        self.step = 0
+        self.users = users
+        self.ask_at = np.zeros(users + robots, np.int64)
+        self._step_us = step_us
+        self._timelines = Timelines(users + robots, step_us)
+        self._window: Window | None = None
+        self._block: tuple[int, int, PoseBlock] | None = None
+
+    def __len__(self) -> int:
+        """Return the number of bodies."""
+        return len(self.ask_at)
+
+    def __getstate__(self) -> dict[str, object]:
+        """Leave out caches, which follow from the timelines."""
+        return {**self.__dict__, "_window": None, "_block": None}
 
     def pose(self, row: int) -> Pose:
-        """Return where a body is at the present step."""
+        """Return the pose of a body at the present step."""
+        return Pose(*self._timelines.pose(row, self.step))
+
+    def pose_at(self, row: int, step: int) -> Pose:
+        """Return the pose of a body at a step that isn't forgotten."""
+        return Pose(*self._timelines.pose(row, step))
+
+    def poses(self, step: int) -> tuple[I64, I64, I64, U8]:
+        """Return x, y, heading and away of all bodies at a step, (bodies,) each."""
+        return self._timelines.poses(step)
+
+    def follow(self, row: int, motion: Motion, begin: Pose, postures: tuple[I64, I8]) -> None:
+        """Let a body move from the present step on.
+
+        Args:
+            row: The body.
+            motion: How it moves.
+            begin: Its pose at the present step.
+            postures: When its posture changes [us], int64 (n,), and the postures, int8 (n + 1,).
+        """
+        if isinstance(motion, RandomWalk):
+            self._timelines.walk(row, self.step, motion.walls, motion.space, motion.rule, begin[:3])
+        else:
+            self._timelines.follow(row, self.step, motion.breakpoints, *postures)
+        self._window = self._block = None
 
     def hold(self, row: int, pose: Pose) -> None:
-        """Set the pose of a body, at which it rests from the present step on."""
+        """Let a body rest at a pose from the present step on."""
+        moment = np.array([self.step * self._step_us], np.int64)
+        x, y, heading = (np.array([value], np.int64) for value in pose[:3])
+        track = Breakpoints(moment, x, y, heading, np.array([pose.away], np.uint8))
+        self._timelines.follow(row, self.step, track, *STANDING[::-1])
+        self._window = self._block = None
+
+    def window(self, first: int, end: int) -> Window:
+        """Return the runs of equal pose of all bodies in the steps from `first` to `end` - 1."""
+        window = self._window
+        if window is None or (window.first, window.end) != (first, end):
+            window = self._window = self._timelines.window(first, end)
+        return window
+
+    def runs(self, row: int, first: int, end: int) -> Window:
+        """Return the runs of equal pose of one body in the steps from `first` to `end` - 1."""
+        return self._timelines.runs(row, first, end)
+
+    def block(self, first: int, end: int) -> PoseBlock:
+        """Return the poses of all bodies at each of the steps from `first` to `end` - 1."""
+        if self._block is None or self._block[:2] != (first, end):
+            window = self.window(first, end)
+            rows = [window.dense(row, first, end) for row in range(len(self))]
+            columns = (np.array(column) for column in zip(*rows, strict=True))
+            block = PoseBlock(*columns) if rows else PoseBlock(*_none(end - first))
+            self._block = first, end, block
+        return self._block[2]
+
+    def next_decision(self) -> int:
+        """Return the step at which the next body decides, NEVER for none."""
+        return int(self.ask_at.min(initial=NEVER))
+
+    def due(self, step: int) -> Sequence[int]:
+        """Return the rows of the bodies that decide at a step."""
+        return np.flatnonzero(self.ask_at <= step).tolist()
+
+    def forget(self, before: int) -> None:
+        """Drop the poses at steps earlier than `before`."""
+        self._timelines.forget(before)
+
+
+def _none(steps: int) -> list[NDArray[Any]]:
+    """Return the columns of a block without bodies."""
+    return [np.zeros((0, steps), t) for t in (np.int64, np.int64, np.int64, np.uint8, np.int8)]
 
 
 class PlaceAt(NamedTuple):
@@ -214,12 +335,12 @@ class Body:
         self.part = 0
         self._places: tuple[Space | None, tuple[PlacedObject, ...], dict[tuple[str, int], PlaceAt]]
         self._places = None, (), {}
-        self._bodies: RunBodies | None = None
+        self._bodies: Bodies | None = None
         self._state: Pose
         self._state_step = 0
         self.row = 0
 
-    def join(self, bodies: RunBodies, row: int) -> None:
+    def join(self, bodies: Bodies, row: int) -> None:
         """Become one of the bodies of a run, whose clock and poses it uses from then on."""
         self._bodies, self.row = bodies, row
 

@@ -13,8 +13,9 @@ import numpy as np
 
 from fleet2d.configuration.components import Component, lookup
 from fleet2d.configuration.trust import source_files
-from fleet2d.engine.bodies import Basis, Bodies, PoseBlock, Watcher
+from fleet2d.engine.basis import Basis, Watcher
 from fleet2d.entities.behavior import Actor, SightEvent
+from fleet2d.entities.body import Bodies, PoseBlock
 from fleet2d.entities.entity import Robot, User
 from fleet2d.errors import ComponentError, blame
 from fleet2d.kernels import Bool

@@ -66,7 +66,7 @@ def export(run: Run, path: Path, part: Selection) -> str:
     return f"{writer.counts.total():,} messages in {path}, {size:.1f} MB; layout: {layout}"
 
 
-class _Chunk(NamedTuple):
+class _WrittenChunk(NamedTuple):
     """Where a chunk is in a file, for its summary."""
 
     begins: int  # the times of its first and last message
@@ -107,7 +107,7 @@ class McapWriter:
             )
             for i, (topic, definition) in enumerate(topics)
         )
-        self._chunks: list[_Chunk] = []
+        self._chunks: list[_WrittenChunk] = []
         self.counts: Counter[str] = Counter()
         self._put(MAGIC, _record(HEADER, _text("ros2"), _text("fleet2d")), self._definitions)
 
@@ -145,7 +145,7 @@ class McapWriter:
                 head = struct.pack("<HI", channel, index.nbytes)
                 indices[channel] = self._put(_record(MESSAGE_INDEX, head, index.tobytes()))
         self._chunks.append(
-            _Chunk(
+            _WrittenChunk(
                 begins, ends, at, length, indices, self._at - at - length, len(data), len(records)
             )
         )

@@ -9,34 +9,23 @@ from tests.scenes import everything
 
 import fleet2d
 from fleet2d.engine import state
-from fleet2d.engine.bodies import Bodies, poses_of
-from fleet2d.entities.body import NEVER, Pose, Track
+from fleet2d.entities.body import NEVER, Bodies, Pose, Track, poses_of
 from fleet2d.kernels import Breakpoints
 
 SECOND = 1_000_000
 
 
-class Planned:
-    """A plan as bodies know it: breakpoints (time [s], x), and postures from times [s] on."""
-
-    def __init__(
-        self,
-        *ways: tuple[float, int],
-        posture: int = 0,
-        postures: tuple[tuple[float, int], ...] = (),
-    ) -> None:
-        self.ways, self.posture, self.postures = ways, posture, postures
-
-    def finish(self) -> Track:
-        times = np.array([round(seconds * SECOND) for seconds, _ in self.ways], np.int64)
-        x = np.array([x for _, x in self.ways], np.int64)
-        zero = np.zeros_like(x)
-        return Track(Breakpoints(times, x, zero, zero, zero.astype(np.uint8)), SECOND)
-
-    def posture_times(self) -> Any:
-        times = [round(seconds * SECOND) for seconds, _ in self.postures]
-        codes = [self.posture, *(code for _, code in self.postures)]
-        return np.array(times, np.int64), np.array(codes, np.int8)
+def planned(
+    *ways: tuple[float, int], posture: int = 0, postures: tuple[tuple[float, int], ...] = ()
+) -> Any:
+    """Return a motion by breakpoints (time [s], x), and postures from times [s] on."""
+    times = np.array([round(seconds * SECOND) for seconds, _ in ways], np.int64)
+    x = np.array([x for _, x in ways], np.int64)
+    zero = np.zeros_like(x)
+    track = Track(Breakpoints(times, x, zero, zero, zero.astype(np.uint8)), SECOND)
+    changes = np.array([round(seconds * SECOND) for seconds, _ in postures], np.int64)
+    codes = np.array([posture, *(code for _, code in postures)], np.int8)
+    return track, Pose(ways[0][1], 0, 0, 0), (changes, codes)
 
 
 def bodies_at(*xs: int) -> Bodies:
@@ -62,7 +51,7 @@ def test_watchers_take_in_fewer_steps_the_more_bodies_there_are_but_never_few(
 
 def test_a_row_of_a_block_is_the_poses_of_a_body_at_each_step() -> None:
     bodies = bodies_at(5, 7, 9)
-    bodies.follow(1, Planned((0, 7), (4, 11)))  # type: ignore[arg-type]
+    bodies.follow(1, *planned((0, 7), (4, 11)))
     block = bodies.block(1, 6)
     assert [5] * 5 == block.x[0].tolist()
     assert [8, 9, 10, 11, 11] == block.x[1].tolist() == poses_of(block, 1).x.tolist()
@@ -79,7 +68,7 @@ def test_a_plan_holds_from_the_present_step_on() -> None:
     bodies = bodies_at(5, 7)
     bodies.step = 3
     assert [7] * 6 == bodies.block(0, 6).x[1].tolist()
-    bodies.follow(1, Planned((0, 20), (10, 30)))  # type: ignore[arg-type]
+    bodies.follow(1, *planned((0, 20), (10, 30)))
     assert [7, 7, 7, 23, 24, 25] == bodies.block(0, 6).x[1].tolist()
     bodies.hold(1, Pose(1, 2, 3, 1))
     assert [7, 7, 7, 1, 1, 1] == bodies.block(0, 6).x[1].tolist()
@@ -89,10 +78,10 @@ def test_a_plan_holds_from_the_present_step_on() -> None:
 def test_postures_are_taken_and_forgotten_when_a_plan_has_none() -> None:
     bodies = bodies_at(5)
     bodies.step = 10
-    bodies.follow(0, Planned((10, 5), posture=0, postures=((12, 2),)))  # type: ignore[arg-type]
+    bodies.follow(0, *planned((10, 5), posture=0, postures=((12, 2),)))
     assert [0, 0, 2, 2] == bodies.block(10, 14).posture[0].tolist()
     bodies.step = 14
-    bodies.follow(0, Planned((14, 5)))  # type: ignore[arg-type]
+    bodies.follow(0, *planned((14, 5)))
     assert [2, 0, 0, 0] == bodies.block(13, 17).posture[0].tolist()
 
 
@@ -109,7 +98,7 @@ def test_who_is_due_is_whose_step_has_come() -> None:
 
 def test_bodies_are_written_without_what_follows_and_read_the_same() -> None:
     bodies = bodies_at(5, 7)
-    bodies.follow(1, Planned((0, 7), (400, 5000)))  # type: ignore[arg-type]
+    bodies.follow(1, *planned((0, 7), (400, 5000)))
     small = len(pickle.dumps(bodies))
     before = [column.tolist() for column in bodies.block(0, 400)]
     assert small == len(pickle.dumps(bodies))
@@ -123,7 +112,7 @@ def test_bodies_are_written_without_what_follows_and_read_the_same() -> None:
 def test_what_is_forgotten_is_no_longer_told() -> None:
     bodies = bodies_at(5, 7)
     bodies.step = 4
-    bodies.follow(1, Planned((4, 20)))  # type: ignore[arg-type]
+    bodies.follow(1, *planned((4, 20)))
     bodies.forget(4)
     assert [20] == bodies.block(4, 5).x[1].tolist()
     with pytest.raises(ValueError, match="forgotten"):

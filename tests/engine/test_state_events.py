@@ -11,8 +11,9 @@ import pytest
 from tests.scenes import everything, run, scenario, table
 
 import fleet2d
+from fleet2d.engine.state import EventStream, Listener
 from fleet2d.errors import InputError
-from fleet2d.runtime.events import CHANGES, HOME, SIGHTS, Event, EventKind, EventStream, Listener
+from fleet2d.runtime.events import CHANGES, HOME, SIGHTS, Event, EventKind
 
 
 class Sink:
