@@ -1,12 +1,16 @@
 """Frames of logs: any similarity is undone, exactly told or fitted to matches."""
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from fleet2d.logs.placement import LogFrame
+from fleet2d.logs.log import LogError
+from fleet2d.logs.placement import LogFrame, map_rooms
 
 NUMBER = st.floats(-50, 50)
 
@@ -53,3 +57,21 @@ def test_a_frame_that_says_too_much_or_too_little_is_refused(
 ) -> None:
     with pytest.raises(ValidationError, match=message):
         LogFrame.model_validate(settings)
+
+
+@pytest.mark.parametrize(
+    ("label", "kinds", "proposal"),
+    [
+        ("Office", ["garage", "bedroom"], "bedroom"),
+        ("Kitchen", ["garage", "living_room"], "living_room"),
+        ("Toilet", ["bedroom", "garage"], "bedroom"),
+        ("Bedrom", ["garage", "living_room", "bedroom"], "bedroom"),  # misspelled
+        ("Sauna", ["garage", "living_room"], "living_room"),
+    ],
+)
+def test_a_label_without_its_room_proposes_the_most_similar_one(
+    label: str, kinds: list[str], proposal: str
+) -> None:
+    rooms: Any = [SimpleNamespace(name=f"{kind}_0", type=kind) for kind in kinds]
+    with pytest.raises(LogError, match=rf"rooms: {{{label}: {proposal}}}, or another: "):
+        map_rooms({label: 3}, {}, rooms)

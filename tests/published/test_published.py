@@ -469,6 +469,20 @@ def test_ranges_that_were_ignored_take_effect_and_are_remarked(folder: Path) -> 
     ] == [remark for remark in remarks if remark not in USUAL]
 
 
+def test_a_flashlight_sees_as_far_as_there(folder: Path) -> None:
+    remarks, scenario = converted(
+        folder,
+        ("distance: 3.0", "distance: 3.0\n      min_distance: 1.0\n      max_distance: 4.5"),
+        ("show_progress: True", "show_progress: True\n  fov_provider: Flashlight"),
+    )
+    camera = scenario.robots["robot"].camera
+    assert camera is not None
+    assert (0.0, 3.0) == camera.range
+    (remark,) = (remark for remark in remarks if "min_distance" in remark)
+    assert "left out, as they were ignored there: it sees from 0 to distance, 3 m" in remark
+    assert "camera.range: [1, 4.5]" in remark
+
+
 def test_angle_beyond_a_turn_sees_all_round(folder: Path) -> None:
     camera = converted(folder, ("angle: 108", "angle: 400"))[1].robots["robot"].camera
     assert camera is not None

@@ -1,5 +1,6 @@
 """How a log lies in a home: the frame of its positions, the rooms of its labels, and the visits."""
 
+import difflib
 from collections.abc import Collection, Mapping, Sequence
 from typing import NamedTuple, Self
 
@@ -10,7 +11,7 @@ from fleet2d.configuration.components import Settings
 from fleet2d.configuration.problems import problem, suggest
 from fleet2d.configuration.units import AngleDeg, Length
 from fleet2d.floorplan.plan import Room
-from fleet2d.floorplan.rooms.room import room_type
+from fleet2d.floorplan.rooms.room import room_type, usual_type
 from fleet2d.kernels import F64
 from fleet2d.logs.log import AWAY, ActivityLog, LogError, Reading
 from fleet2d.runtime.determinism import sum_in_order
@@ -190,8 +191,8 @@ def map_rooms(
         if choice is None and label not in overrides:
             raise LogError(
                 f"no room of this home stands for {label!r} (readings in the log: {count}); choose"
-                f" one by rooms: {{{label}: …}}: {', '.join(_names(rooms))}, away, door, or null to"
-                " leave these readings out"
+                f" one by rooms: {{{label}: {_nearest(label, rooms)}}}, or another:"
+                f" {', '.join(_names(rooms))}, away, door, or null to leave these readings out"
             )
         mapped[label] = choice
     return mapped
@@ -220,6 +221,36 @@ def _usual(label: str, rooms: Sequence[Room]) -> RoomChoice | None:
         return (label,)
     kind = room_type(label)
     return _first_fit(USUAL_ROOMS.get(kind, (kind,)), rooms)
+
+
+# Kinds of rooms in which much the same is done, the nearest first.
+SIMILAR_ROOMS: dict[str, RoomChoice] = {
+    "kitchen": ("dining_room", "living_room"),
+    "dining_room": ("kitchen", "living_room"),
+    "living_room": ("family_room", "lobby", "dining_room", "bedroom"),
+    "bedroom": ("child_room", "guest_room", "living_room"),
+    "child_room": ("bedroom", "living_room"),
+    "guest_room": ("bedroom", "living_room"),
+    "office": ("bedroom", "living_room"),
+    "bathroom": ("toilet", "laundry", "bedroom"),
+    "toilet": ("bathroom", "laundry", "bedroom"),
+    "laundry": ("bathroom", "storage", "kitchen"),
+    "storage": ("garage", "laundry", "hallway"),
+    "garage": ("storage", "hallway"),
+    "hallway": ("entryway", "lobby", "living_room"),
+    "entryway": ("hallway", "lobby", "living_room"),
+    "lobby": ("entryway", "hallway", "living_room"),
+}
+
+
+def _nearest(label: str, rooms: Sequence[Room]) -> str:
+    """Return the name or the kind of the room that is most like a label's."""
+    kinds = list(dict.fromkeys(room.type for room in rooms))
+    kind = usual_type(room_type(label))
+    close = difflib.get_close_matches(room_type(label), [*kinds, *(r.name for r in rooms)], 1)
+    similar = (other for other in SIMILAR_ROOMS.get(kind, ()) if other in kinds)
+    usual = "living_room" if "living_room" in kinds else kinds[0]
+    return close[0] if close else next(similar, usual)
 
 
 def _first_fit(choice: RoomChoice, rooms: Sequence[Room]) -> RoomChoice | None:

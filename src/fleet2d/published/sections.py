@@ -252,11 +252,15 @@ def _windows(reader: ConfigReader) -> None:
         reader.remark((*_SIMULATION, "show_progress"), "left out: `fleet2d run --quiet` shows none")
 
 
+# The method of sight there that is one here, too: such a scenario sees what it saw there.
+FLASHLIGHT = "Flashlight"
+
+
 def convert_sight(reader: ConfigReader) -> dict[str, Any]:
     """Return the section `sight`: the method that corresponds to the old `fov_provider`."""
     keys: Keys = (*_SIMULATION, "fov_provider")
     provider = reader.text(keys)
-    if provider == "Flashlight":
+    if provider == FLASHLIGHT:
         reader.remark(keys, "kept: sight.method is flashlight; left out, sight is exact")
         return {"method": {"type": "flashlight"}}
     if provider:
@@ -520,6 +524,14 @@ def _range(reader: ConfigReader, keys: Keys) -> list[float]:
             " beyond the nearest",
         )
     present = [(*keys, limit) for limit in limits if reader.get((*keys, limit)) is not None]
+    if present and reader.text((*_SIMULATION, "fov_provider")) == FLASHLIGHT:
+        reader.remark(
+            present[0],
+            f"left out, as they were ignored there: it sees from 0 to distance, {distance:g} m; for"
+            f" these limits write camera.range: [{near:g}, {far:g}]",
+            *present[1:],
+        )
+        return [0.0, distance]
     if present:
         reader.remark(
             present[0],
