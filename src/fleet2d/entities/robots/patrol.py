@@ -83,7 +83,11 @@ class Patrol(Behavior):
     def _stops_at(self, actor: Actor, place: Place) -> list[tuple[int, int]]:
         if self.stop_at == "middle" or is_point(place) or furniture_of(actor, place) is not None:
             return stops_at(actor, place)
-        return [stop for room in actor.rooms(place) for stop in self._stops_in(actor, room)]
+        return [
+            stop
+            for room in actor.rooms(place)  # type: ignore[arg-type]
+            for stop in self._stops_in(actor, room)
+        ]
 
     def _stops_in(self, actor: Actor, room: Room) -> Sequence[tuple[int, int]]:
         return stops_with_view(actor, room) if self.stop_at == "view" else [actor.middle(room)]
