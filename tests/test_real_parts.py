@@ -2,13 +2,17 @@
 
 import itertools
 import re
+import subprocess
+import sys
 from collections.abc import Iterator
+from datetime import timedelta
 from pathlib import Path
 
 import pytest
 from tests import thorough
 
 import fleet2d
+from fleet2d.live import Bridge, open_peers
 
 PAGE = (Path(__file__).parent.parent / "docs" / "real-parts.md").read_text(encoding="utf-8")
 ROWS = [
@@ -29,7 +33,6 @@ CELLS = [
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     """Return a folder with the files of the page, and the logs that its commands write."""
     pytest.importorskip("rosbags", reason="the extra ros is not installed")
-    pytest.importorskip("rosbags", reason="the extra ros is not installed")
     folder = tmp_path_factory.mktemp("parts")
     for name, text in re.findall(r"```\w+ title=(\S+)\n(.*?)```", PAGE, re.DOTALL):
         (folder / name).write_text(text, encoding="utf-8")
@@ -39,6 +42,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
         run = fleet2d.run("parts.yaml", "algorithms.ltp.period=30 min", sensor, out="first")
         fleet2d.export(run, Path("drive.mcap"))
         fleet2d.export(run, Path("poses.csv"))
+        fleet2d.export(run, Path("first.jsonl"))
         yield folder
 
 
@@ -71,6 +75,37 @@ def test_what_was_replayed_is_as_it_was(folder: Path) -> None:
     assert run.tables["sensors"].select(states) == first.tables["sensors"].select(states) or (
         run.tables["sensors"].num_rows == first.tables["sensors"].num_rows
     )
+
+
+def test_live_cells_hear_a_log_that_is_played_to_them(folder: Path) -> None:
+    """A program without Fleet2D plays the log, twenty times as fast as it was."""
+    cells = [row[2][0].replace(":9000", ":0") for row in ROWS[1:5]]
+    scenario = fleet2d.load_scenario("parts.yaml", *cells, "simulation.duration=1 min")
+    peers = open_peers(scenario)
+    bridge = Bridge(fleet2d.Simulation(scenario), peers, speed=20)
+    address = f"127.0.0.1:{next(iter(peers.values())).port}"
+    program = Path(__file__).parents[1] / "examples" / "live" / "play.py"
+    command = [sys.executable, "-I", "-S", str(program), "first.jsonl", address, "20"]
+    with subprocess.Popen(command) as player:
+        run = bridge.run()
+        player.terminate()
+
+    acts = run.manifest["interventions"]
+    for name in ("ana", "astro"):
+        path = fleet2d.open_run("first").path(name, every=timedelta(seconds=1))
+        logged = set(zip(path.x.tolist(), path.y.tolist(), strict=True))
+        heard = [tuple(a["to"]) for a in acts if a["do"] == "put" and a["entity"] == name]
+        assert len(heard) > 30
+        # At a wall some are moved to where the body fits on the lattice.
+        assert sum(place not in logged for place in heard) <= bridge.counts["moved"]
+    columns = ("user", "x", "y", "room")
+    logged = fleet2d.open_run("first").tables["observations"].select(columns).to_pylist()
+    seen = run.tables["observations"].select(columns).to_pylist()
+    assert seen
+    assert all(row in logged for row in seen)
+    assert [(row["sensor"], row["state"]) for row in run.tables["sensors"].to_pylist()][:1] == [
+        ("kitchen", "ON")
+    ]
 
 
 def test_parts_are_combined(folder: Path) -> None:

@@ -1,5 +1,6 @@
 """Bridges: what arrives late, lost, wrong or too much; what is passed on; and its repetition."""
 
+import re
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -9,7 +10,9 @@ import pytest
 from tests.live.scenes import LIVE, place
 
 import fleet2d
-from fleet2d.live import Bridge, LiveStep, from_iterator, to_function
+from fleet2d.configuration.trust import Trust, restrict
+from fleet2d.errors import InputError
+from fleet2d.live import Bridge, LiveStep, from_iterator, open_peers, to_function
 
 
 class Now:
@@ -207,3 +210,157 @@ def test_a_function_may_intervene() -> None:
     run = Bridge(simulation, [to_function(send)], speed=0).run()
 
     assert [act["step"] for act in run.manifest["interventions"]] == [4]
+
+
+# Who sends what
+
+
+def by(client: int, messages: dict[int, Any], **options: Any) -> tuple[Any, Now, Bridge]:
+    """Run with messages of a client, None when it disconnects, before some steps."""
+    peer = Now({})
+    peer.messages = {step: [message] for step, message in messages.items()}
+    bridge = Bridge(fleet2d.Simulation(LIVE), [peer], speed=0, **options)
+    own, peer.open = peer.open, lambda simulation, post: own(simulation, lambda m: post(m, client))  # type: ignore[method-assign]
+    return bridge.run(), peer, bridge
+
+
+GOAL = {"type": "goal", "entity": "astro", "to": "kitchen_0"}
+
+
+def test_goals_of_a_client_that_is_gone_are_withdrawn_and_the_body_stands() -> None:
+    run, peer, bridge = by(3, {0: GOAL, 5: None})
+
+    assert [act["do"] for act in run.manifest["interventions"]] == ["send", "release"]
+    assert peer.told == ["astro: who sent it to kitchen_0 is gone: the goal is withdrawn"]
+    places = [(frame.bodies["astro"]["x"], frame.bodies["astro"]["y"]) for frame in peer.frames]
+    assert len(set(places[:5])) > 1
+    assert len(set(places[6:])) == 1
+    assert bridge.counts["withdrawn"] == 1
+
+
+def test_goals_stay_if_they_are_to_be_kept() -> None:
+    run, peer, _ = by(3, {0: GOAL, 5: None}, keeps_goals=True)
+
+    assert [act["do"] for act in run.manifest["interventions"]] == ["send"]
+    assert peer.told == []
+
+
+def test_a_body_that_decides_goes_on_by_itself_after_a_goal_is_withdrawn() -> None:
+    content = LIVE | {"robots": {"astro": {"behaviors": [{"type": "patrol"}]}}}
+    peer = Now({0: [GOAL], 5: [None]})
+
+    Bridge(fleet2d.Simulation(content), [peer], speed=0).run()
+
+    places = {(frame.bodies["astro"]["x"], frame.bodies["astro"]["y"]) for frame in peer.frames[6:]}
+    assert len(places) > 1
+
+
+def test_a_goal_of_another_client_is_not_withdrawn() -> None:
+    peer = Now({})
+    bridge = Bridge(fleet2d.Simulation(LIVE), [peer], speed=0)
+    post = bridge._post_of(0)
+    post(GOAL, 1)
+    post(None, 2)
+
+    assert [act["do"] for act in bridge.run().manifest["interventions"]] == ["send"]
+
+
+def test_clients_of_one_peer_count_their_own_messages() -> None:
+    """The second one's number 0 came after the first one's 7, and was late."""
+    bridge = Bridge(fleet2d.Simulation(LIVE), [Now({})], speed=0)
+    post = bridge._post_of(0)
+    post(GOAL | {"number": 7}, 1)
+    post(pose(0, number=0), 2)
+    bridge.run()
+
+    assert bridge.counts["applied"] == 2
+    assert not bridge.counts["late"]
+
+
+SOURCE = "udp://127.0.0.1:9"
+
+
+def sourced() -> dict[str, Any]:
+    astro = {
+        "perceives": {"type": "live", "source": SOURCE},
+        "behaviors": [{"type": "live", "source": SOURCE}],
+    }
+    sensor = {"type": "live_sensor", "room": "hallway", "source": SOURCE}
+    return LIVE | {"robots": {"astro": astro}, "objects": {"front_door": sensor}}
+
+
+def test_only_the_source_of_a_part_speaks_for_it() -> None:
+    x, y = place()
+    messages = [
+        GOAL,
+        {"type": "detections", "entity": "astro", "detections": [{"user": "ana", "x": x, "y": y}]},
+        {"type": "reading", "sensor": "front_door", "on": True},
+    ]
+    source, other = Now({0: messages}), Now({1: [*messages, pose(0)]})
+
+    bridge = Bridge(fleet2d.Simulation(sourced()), {SOURCE: source, "function": other}, speed=0)
+    run = bridge.run()
+
+    acts = [(act["do"], act["step"]) for act in run.manifest["interventions"]]
+    assert acts == [("send", 0), ("perceive", 0), ("report", 0), ("put", 1)]
+    assert other.told[0] == "wrong: astro takes messages of its source only, not of others"
+    assert bridge.counts["wrong"] == 3
+    assert fleet2d.run(sourced()).status == "complete"  # without its sources
+
+
+def test_a_source_that_is_no_peer_is_refused() -> None:
+    with pytest.raises(InputError, match=r"astro takes messages of udp://127.0.0.1:9, which isn't"):
+        Bridge(fleet2d.Simulation(sourced()), [Now({})])
+
+
+def test_a_wrong_address_of_a_source_is_refused() -> None:
+    with pytest.raises(InputError, match="did you mean 'mqtt'"):
+        fleet2d.Simulation(LIVE, "users.ana={type: live, source: 'mqt://nas:1'}")
+
+
+def test_a_scenario_does_not_talk_to_other_machines_by_itself() -> None:
+    changed = fleet2d.load_scenario(LIVE, "users.ana={type: live, source: 'mqtt://example.com'}")
+    with restrict(Trust()), pytest.raises(InputError, match="would talk to mqtt"):
+        open_peers(changed)
+
+
+# Frames that don't fit
+
+
+def test_a_pose_in_a_wall_is_moved_to_where_the_body_fits_and_told() -> None:
+    home = fleet2d.Simulation(LIVE).actors["ana"]
+    x, y = place()
+    lattice, space = home.home.plan.lattice, home.space
+    while space.part_at(*lattice.point_at((x, y))) >= 0:
+        x += 0.01
+
+    run, peer, bridge = bridged({0: [{"type": "pose", "entity": "ana", "x": x + 0.1, "y": y}]})
+
+    (act,) = run.manifest["interventions"]
+    assert act["to"][0] == pytest.approx(x, abs=0.05)
+    assert bridge.counts["moved"] == 1
+    assert re.fullmatch(r"ana: a pose in or at a wall is moved by 0\.1\d m", peer.told[0])
+
+
+@pytest.mark.parametrize("off", [(-30.0, 0.0), (0.0, 1e4)])
+def test_a_pose_of_another_frame_is_told_with_its_distance(off: tuple[float, float]) -> None:
+    x, y = place()
+    message = {"type": "pose", "entity": "ana", "x": x + off[0], "y": min(y + off[1], 1e4)}
+
+    run, peer, bridge = bridged({0: [message]})
+
+    assert run.manifest["interventions"] == []
+    assert re.match(r"wrong: ana would be \d+\.\d m from any place where its body", peer.told[0])
+    assert bridge.counts["wrong"] == 1
+
+
+def test_detections_outside_of_the_home_are_left_out_and_told() -> None:
+    x, y = place()
+    seen = [{"user": "ana", "x": x, "y": y}, {"user": "ana", "x": x + 50, "y": y}]
+    message = {"type": "detections", "entity": "astro", "detections": seen}
+
+    run, peer, bridge = bridged({0: [message], 1: [message | {"detections": seen[1:]}]})
+
+    assert run.tables["observations"]["x"].to_pylist() == [pytest.approx(x, abs=1e-3)]
+    assert re.match(r"astro: 1 detections are outside of the home, by up to \d+", peer.told[0])
+    assert bridge.counts["outside"] == 2

@@ -29,6 +29,16 @@ def test_a_run_among_datagrams_is_stored_and_reproduced(tmp_path: Path) -> None:
     assert fleet2d.reproduce(tmp_path / "run").digest == digest
 
 
+def test_sources_of_the_scenario_are_opened(tmp_path: Path) -> None:
+    text = SCENARIO.replace("{type: live}", "{type: live, source: 'udp://127.0.0.1:0'}")
+    (tmp_path / "lab.yaml").write_text(text)
+
+    result = CliRunner().invoke(APP, [str(tmp_path / "lab.yaml"), "--speed", "0"])
+
+    assert result.exit_code == 0, result.output
+    assert "udp://127.0.0.1:0: listens at " in result.output
+
+
 def test_the_schema_of_messages_is_printed() -> None:
     schema = json.loads(CliRunner().invoke(APP, ["--schema"]).output)
 

@@ -21,7 +21,7 @@ BROKER = shutil.which("mosquitto") or shutil.which("mosquitto", path="/usr/sbin"
 
 
 @pytest.fixture
-def broker(tmp_path: Path) -> Iterator[int]:
+def mosquitto(tmp_path: Path) -> Iterator[tuple[int, "subprocess.Popen[bytes]"]]:
     """Start Mosquitto on a free port."""
     if BROKER is None:
         pytest.skip("mosquitto is not installed")
@@ -37,10 +37,15 @@ def broker(tmp_path: Path) -> Iterator[int]:
                 if probe.connect_ex(("127.0.0.1", port)) == 0:
                     break
             time.sleep(0.05)
-        yield port
+        yield port, process
     finally:
         process.terminate()
         process.wait()
+
+
+@pytest.fixture
+def broker(mosquitto: tuple[int, "subprocess.Popen[bytes]"]) -> int:
+    return mosquitto[0]
 
 
 class Client:
@@ -100,6 +105,27 @@ def test_a_broker_passes_on_what_happens_and_what_arrives(broker: int) -> None:
     assert json.loads(client.of("home/one/pose/ana")[-1])["x"] == pytest.approx(x, abs=1e-3)
     assert any("wrong: " in text for text in client.of("home/one/note"))
     assert bridge.counts["applied"] >= 2
+
+
+def test_goals_are_withdrawn_when_the_broker_is_gone(
+    mosquitto: tuple[int, "subprocess.Popen[bytes]"],
+) -> None:
+    port, process = mosquitto
+    peer = open_peer(f"mqtt://127.0.0.1:{port}/home")
+    told: list[str] = []
+    bridge = Bridge(fleet2d.Simulation(LIVE), [peer], speed=10, tell=told.append)
+    thread = threading.Thread(target=bridge.run)
+    thread.start()
+    client = Client(port)
+    goal = {"type": "goal", "entity": "astro", "to": "kitchen_0"}
+    client.mqtt.publish("home/in/any", json.dumps(goal), qos=1).wait_for_publish(5)
+    while thread.is_alive() and not bridge.counts["applied"]:
+        time.sleep(0.01)
+    process.kill()
+    thread.join()
+    client.close()
+
+    assert told == ["astro: who sent it to kitchen_0 is gone: the goal is withdrawn"]
 
 
 def test_no_broker_is_told() -> None:

@@ -6,11 +6,14 @@ import subprocess
 import sys
 import threading
 import time
+from functools import partial
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from typing import Any
 
 import pytest
 from tests.live.scenes import LIVE, place
+from tests.viewer.browser import chromium
 
 import fleet2d
 from fleet2d.errors import InputError
@@ -101,8 +104,48 @@ def test_a_client_that_leaves_does_not_stop_the_run() -> None:
     assert runs[0].status == "complete"
 
 
-def test_a_program_without_fleet2d_decides_where_the_robot_goes(tmp_path: Path) -> None:
+def test_pages_of_other_sites_are_refused() -> None:
+    """Any page that is open in a browser of this machine could send a robot somewhere."""
     pytest.importorskip("websockets", reason="the extra live is not installed")
+    from websockets.exceptions import InvalidStatus
+    from websockets.sync.client import connect
+
+    peer: Any = open_peer("ws://127.0.0.1:0")
+    thread, _ = in_background(Bridge(fleet2d.Simulation(LIVE), [peer], speed=60))
+    address = f"ws://127.0.0.1:{peer.port}"
+    for origin in ("https://example.com", "null", "http://localhost.example.com"):
+        with pytest.raises(InvalidStatus, match="403"), connect(address, origin=origin):  # type: ignore[arg-type]
+            pass
+    thread.join()
+
+
+def test_a_page_in_chromium_shows_a_run_and_sends_a_robot() -> None:
+    pytest.importorskip("websockets", reason="the extra live is not installed")
+    pages = partial(SimpleHTTPRequestHandler, directory=str(EXAMPLES / "live"))
+    with chromium() as browser, ThreadingHTTPServer(("127.0.0.1", 0), pages) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        peer: Any = open_peer("ws://127.0.0.1:0")
+        page = browser.new_page()
+        simulation = fleet2d.Simulation(LIVE)
+        thread, runs = in_background(Bridge(simulation, [peer], speed=10))
+        run = f"?run=ws://127.0.0.1:{peer.port}"
+        page.goto(f"http://127.0.0.1:{server.server_port}/page.html{run}")
+        page.get_by_role("button", name="kitchen_0").click()
+        page.get_by_text("the run is over: ").wait_for(timeout=20_000)
+        bodies, log = page.locator("#bodies").inner_text(), page.locator("#log").inner_text()
+        server.shutdown()
+    thread.join()
+
+    acts = runs[0].manifest["interventions"]
+    assert [(act["do"], act["entity"], act["to"]) for act in acts] == [
+        ("send", "astro", "kitchen_0")
+    ]
+    assert "astro: " in bodies
+    assert f"the run is over: {runs[0].digest}" in log
+
+
+def test_a_program_without_fleet2d_decides_where_the_robot_goes(tmp_path: Path) -> None:
+    websockets = pytest.importorskip("websockets", reason="the extra live is not installed")
     content = LIVE | {
         "users": {
             "ana": {
@@ -116,16 +159,21 @@ def test_a_program_without_fleet2d_decides_where_the_robot_goes(tmp_path: Path) 
     peer: Any = open_peer("ws://127.0.0.1:0")
     simulation = fleet2d.Simulation(content)
     thread, runs = in_background(Bridge(simulation, [peer], speed=40))
-    program = subprocess.run(
-        [sys.executable, "-I", str(EXAMPLES / "live/follow.py"), f"ws://127.0.0.1:{peer.port}"],
+    # An interpreter that has this library alone, and neither Fleet2D nor its environment.
+    (tmp_path / "websockets").symlink_to(Path(websockets.__file__).parent)
+    alone = {"env": {"PYTHONPATH": str(tmp_path)}, "cwd": tmp_path, "timeout": 30, "check": False}
+    python = [sys.executable, "-S"]
+    tried = subprocess.run([*python, "-c", "import fleet2d"], capture_output=True, **alone)  # type: ignore[call-overload]
+    program = subprocess.run(  # type: ignore[call-overload]
+        [*python, str(EXAMPLES / "live/follow.py"), f"ws://127.0.0.1:{peer.port}"],
         capture_output=True,
         text=True,
-        timeout=30,
-        check=False,
+        **alone,
     )
     thread.join()
 
+    assert tried.returncode == 1
     assert program.returncode == 0, program.stderr
     assert "astro goes to kitchen_0" in program.stdout
     assert runs[0].status == "complete"
-    assert simulation.state["astro"]["room"] == simulation.state["ana"]["room"] == "kitchen_0"
+    assert runs[0].manifest["interventions"][0]["do"] == "send"

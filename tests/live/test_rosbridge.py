@@ -28,6 +28,7 @@ def rosbridge(connection):
             published.append((message["topic"], message["msg"]))
         if message["op"] == "subscribe":
             subscribed.add(message["topic"])
+            threading.Timer(1.5, connection.close).start()
             position, turn = {"x": x, "y": y, "z": 0.0}, {"x": 0.0, "y": 0.0, "z": 1.0, "w": 0.0}
             pose = {"header": {}, "pose": {"position": position, "orientation": turn}}
             if message["topic"] in ("/ana/pose", "/astro/goal_pose"):
@@ -40,7 +41,7 @@ simulation = fleet2d.Simulation(LIVE)
 port = server.socket.getsockname()[1]
 bridge = Bridge(simulation, [open_peer(f"rosbridge://127.0.0.1:{port}")], speed=15)
 seen = {"type": "detections", "entity": "astro", "detections": [{"user": "ana", "x": x, "y": y}]}
-bridge._post_of(9)(seen)
+bridge._post_of(0)(seen)
 run = bridge.run()
 first = {}
 for topic, message in published:
@@ -76,6 +77,7 @@ def test_a_robot_program_hears_standard_messages_and_sends_goals() -> None:
     ]
     acts = {act["do"]: act for act in result["acts"]}
     assert acts["send"]["to"] == [x, y]
+    assert acts["release"] == {"do": "release", "entity": "astro", "step": acts["release"]["step"]}
     assert acts["put"]["heading_deg"] == pytest.approx(180)
     grid = result["first"]["/map"]
     assert len(grid["data"]) == result["cells"]

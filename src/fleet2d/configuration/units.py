@@ -15,11 +15,12 @@ from functools import partial
 from numbers import Real
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
+from urllib.parse import SplitResult, urlsplit
 
 from pydantic import AfterValidator, BeforeValidator, Field, PlainSerializer, WithJsonSchema
 from pydantic_core import PydanticCustomError
 
-from fleet2d.configuration.problems import problem, shown
+from fleet2d.configuration.problems import did_you_mean, problem, shown
 from fleet2d.errors import ScenarioError
 from fleet2d.runtime.clock import DAY_S, HOUR_S
 
@@ -77,6 +78,42 @@ InputFileOrFolder = Annotated[
     Path, BeforeValidator(partial(_existing, is_folder_allowed=True)), _SCHEMA
 ]
 """An existing file or folder, likewise."""
+
+
+PEER_SCHEMES = ("udp", "ws", "rosbridge", "mqtt")
+
+
+def parse_peer_address(text: str) -> SplitResult:
+    """Read the address of another program, `scheme://host:port`.
+
+    Raises:
+        PydanticCustomError: There is no such scheme, host or port.
+
+    Example:
+        >>> parse_peer_address("mqtt://nas:1883/lab").port
+        1883
+    """
+    parts = urlsplit(text)
+    try:
+        has_place = bool(parts.netloc) and (parts.port is None or parts.port >= 0)
+    except ValueError:  # a port that is no number
+        has_place = False
+    if parts.scheme not in PEER_SCHEMES or not has_place:
+        hint = did_you_mean(parts.scheme, PEER_SCHEMES) or "."
+        raise problem(
+            f"{text!r} is no address of a peer{hint} Write udp://HOST:PORT, ws://HOST:PORT,"
+            " rosbridge://HOST:PORT or mqtt://HOST:PORT/PREFIX"
+        )
+    return parts
+
+
+def _checked_peer_address(text: str) -> str:
+    parse_peer_address(text)
+    return text
+
+
+PeerAddress = Annotated[str, AfterValidator(_checked_peer_address)]
+"""The address of another program of a live run, such as ws://127.0.0.1:8765."""
 
 
 MAX_DURATION = timedelta(days=365_250)  # 1000 years: microseconds stay far inside int64

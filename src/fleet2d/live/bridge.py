@@ -6,6 +6,7 @@ late, lost, wrong or too much is counted and told, and never stops the run.
 
 import gc
 import json
+import math
 import queue
 import sys
 import time
@@ -16,6 +17,8 @@ from dataclasses import dataclass, field
 from datetime import datetime
 from functools import cached_property
 from typing import Any, Protocol
+
+import shapely
 
 from fleet2d.configuration.problems import suggest
 from fleet2d.engine.simulation import Simulation
@@ -30,6 +33,7 @@ from fleet2d.live.messages import (
 )
 from fleet2d.runs.run import Run
 from fleet2d.runtime.events import Event
+from fleet2d.scenario.model import Scenario
 
 # A wait ends so long before a step, and the rest is spent awake: a busy machine wakes late [s]. Of
 # short steps it is this share.
@@ -41,6 +45,8 @@ SWITCH_S = 0.0005
 SILENCE_S = 5.0
 # A message that was sent longer ago is late, and left out [s].
 MAX_AGE_S = 2.0
+# A pose or detection farther than this from any place where it can be is left out [m].
+REACH_M = 1.0
 # More messages than this in a step are left out.
 MAX_PER_STEP = 1000
 # The number of texts of one kind that are told in full.
@@ -90,14 +96,26 @@ class LiveStep:
         return [json.dumps(message, default=str) for message in self.messages]
 
 
-Post = Callable[[str | bytes | Mapping[str, Any]], None]
+Content = str | bytes | Mapping[str, Any] | None
+
+
+class Post(Protocol):
+    """Receives messages to a run, from any thread."""
+
+    def __call__(self, content: Content, client: int = 0) -> None:
+        """Receive a message.
+
+        Args:
+            content: The message; None: the client is gone, and with it what it was heading for.
+            client: Which of several clients of a peer sent it: each counts its own messages.
+        """
 
 
 class Peer(Protocol):
     """Another program, or a function: it may send messages to a run, and hear of it."""
 
     def open(self, simulation: Simulation, post: Post) -> None:
-        """Connect, before the first step; `post` receives messages, from any thread."""
+        """Connect, before the first step."""
 
     def send(self, frame: LiveStep) -> None:
         """Pass on a step, without waiting."""
@@ -109,6 +127,10 @@ class Peer(Protocol):
         """Disconnect, after the last step."""
 
 
+Sender = tuple[int, int]
+"""The number of a peer, and of its client."""
+
+
 @dataclass
 class _Sender:
     """What is known of the source of poses of a body."""
@@ -117,17 +139,46 @@ class _Sender:
     stands: bool = False
 
 
+def sources_of(scenario: Scenario) -> dict[tuple[str, str], str]:
+    """Return the addresses from which parts of a scenario take messages.
+
+    The keys are the kind of part and its name: ("body", "ana"), ("perceives", "astro"), ("sensor",
+    "front_door").
+
+    Example:
+        >>> from fleet2d.scenario.model import load_scenario
+        >>> changes = "users.ana={type: live, source: 'udp://127.0.0.1:9000'}"
+        >>> sources_of(load_scenario(None, changes))
+        {('body', 'ana'): 'udp://127.0.0.1:9000'}
+    """
+    sources = {
+        ("body", name): source
+        for name, entity in {**scenario.users, **scenario.robots}.items()
+        for behavior in entity.behaviors
+        if (source := getattr(behavior, "source", None)) and behavior.type_name == "live"
+    }
+    for name, robot in scenario.robots.items():
+        if robot.perceives is not None and robot.perceives.type_name == "live":
+            sources["perceives", name] = getattr(robot.perceives, "source", None)
+    for name, item in scenario.objects.items():
+        if item.type_name == "live_sensor":
+            sources["sensor", name] = getattr(item, "source", None)
+    return {key: source for key, source in sources.items() if source is not None}
+
+
 @dataclass
 class Bridge:
     """A simulation in real time, among other programs.
 
     Attributes:
         simulation: The simulation; it runs as fast as `speed` says, whatever its own speedup.
-        peers: The other programs.
+        peers: The other programs; by their addresses, if the scenario names some as sources.
         speed: Times real time; 0: as fast as it can, for tests.
         silence_s: A body that gets poses stands when none arrived for so long, which is told.
         max_age_s: A message that was sent longer ago is left out.
         max_per_step: More messages than this in a step are left out.
+        keeps_goals: Whether goals of a client that is gone stay; else they are withdrawn, and the
+            body does what its behaviors decide: one of the type `live` stands.
         rows: Whether rows of tables are passed on, besides poses and events.
         tell: Called with notes about what arrived.
         counts: How many messages were received, applied, late, lost, wrong, replaced, too many.
@@ -143,23 +194,40 @@ class Bridge:
     """
 
     simulation: Simulation
-    peers: Sequence[Peer]
+    peers: Sequence[Peer] | Mapping[str, Peer]
     speed: float = 1.0
     silence_s: float = SILENCE_S
     max_age_s: float = MAX_AGE_S
     max_per_step: int = MAX_PER_STEP
+    keeps_goals: bool = False
     rows: bool = True
     tell: Callable[[str], object] = str
     counts: Counter[str] = field(default_factory=Counter)
     lateness_s: list[float] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        """Begin with nothing heard."""
-        self._inbox: queue.SimpleQueue[tuple[float, int, Any]] = queue.SimpleQueue()
+        """Begin with nothing heard.
+
+        Raises:
+            InputError: The scenario names a source that isn't among the peers.
+        """
+        named = self.peers if isinstance(self.peers, Mapping) else {}
+        self._peers = list(self.peers.values() if isinstance(self.peers, Mapping) else self.peers)
+        numbers = {address: number for number, address in enumerate(named)}
+        self._sources: dict[tuple[str, str], int] = {}
+        for (kind, name), address in sources_of(self.simulation.scenario).items():
+            if address not in numbers:
+                raise InputError(
+                    f"{name} takes messages of {address}, which isn't among the peers: open them by"
+                    " fleet2d.live.open_peers(scenario)"
+                )
+            self._sources[kind, name] = numbers[address]
+        self._goals: dict[str, tuple[Sender, Any]] = {}  # who sent each body where
+        self._inbox: queue.SimpleQueue[tuple[float, Sender, Any]] = queue.SimpleQueue()
         self._events: list[Event] = []
         self._rows: list[tuple[str, Mapping[str, Any]]] = []
         self._senders: dict[str, _Sender] = {}
-        self._numbers: dict[int, int] = {}
+        self._numbers: dict[Sender, int] = {}
         self._told: Counter[str] = Counter()
 
     def run(self) -> Run:
@@ -172,7 +240,7 @@ class Bridge:
         simulation.listen(self._events.extend)
         if self.rows:
             simulation.listen_rows(self._hear)
-        for number, peer in enumerate(self.peers):
+        for number, peer in enumerate(self._peers):
             peer.open(simulation, self._post_of(number))
         status = "complete"
         try:
@@ -184,7 +252,7 @@ class Bridge:
             for note in self.notes():
                 simulation.note(note)
             run = simulation.finish("complete" if status == "complete" else "interrupted")
-            for peer in self.peers:
+            for peer in self._peers:
                 peer.close(run)
         return run
 
@@ -201,7 +269,10 @@ class Bridge:
         return [f"live: {counts['received']} messages were received: {', '.join(words)}"]
 
     def _post_of(self, number: int) -> Post:
-        return lambda content: self._inbox.put((time.monotonic(), number, content))
+        def post(content: Content, client: int = 0) -> None:
+            self._inbox.put((time.monotonic(), (number, client), content))
+
+        return post
 
     def _simulate(self) -> None:
         simulation, step_s = self.simulation, self.simulation.clock.step_us / 1e6
@@ -211,7 +282,10 @@ class Bridge:
                 due = began + (simulation.step - first) * step_s / self.speed
                 _wait(due, min(LEAD_S, LEAD_SHARE * step_s / self.speed))
                 self.lateness_s.append(time.monotonic() - due)
-            self._apply(self._received())
+            messages, gone = self._received()
+            self._apply(messages)
+            for sender in gone:
+                self._withdraw(sender)
             self._stop_the_silent()
             simulation.advance()
             self._send()
@@ -220,12 +294,16 @@ class Bridge:
 
     # What arrives
 
-    def _received(self) -> list[LiveMessage]:
-        """Return the messages to apply at the present step."""
-        messages: list[LiveMessage] = []
+    def _received(self) -> tuple[list[tuple[LiveMessage, Sender]], list[Sender]]:
+        """Return the messages to apply at the present step with their senders, and who is gone."""
+        messages: list[tuple[LiveMessage, Sender]] = []
         latest: dict[tuple[str, str], int] = {}
+        gone: list[Sender] = []
         for _ in range(self._inbox.qsize()):
             arrived, sender, content = self._inbox.get()
+            if content is None:
+                gone.append(sender)
+                continue
             self.counts["received"] += 1
             if len(messages) >= self.max_per_step:
                 self._leave_out("too many", f"more than {self.max_per_step} messages in a step")
@@ -240,14 +318,14 @@ class Bridge:
             if isinstance(message, PoseMessage | GoalMessage):
                 key = message.type, message.entity
                 if key in latest:  # only the last pose or goal of a body in a step counts
-                    messages[latest[key]] = message
+                    messages[latest[key]] = message, sender
                     self.counts["replaced"] += 1
                     continue
                 latest[key] = len(messages)
-            messages.append(message)
-        return messages
+            messages.append((message, sender))
+        return messages, gone
 
-    def _is_timely(self, message: LiveMessage, arrived: float, sender: int) -> bool:
+    def _is_timely(self, message: LiveMessage, arrived: float, sender: Sender) -> bool:
         """Return whether a message is neither late nor out of order, and count lost ones."""
         if message.time is not None:
             age = time.time() - message.time
@@ -266,24 +344,30 @@ class Bridge:
             self._numbers[sender] = message.number
         return True
 
-    def _apply(self, messages: Sequence[LiveMessage]) -> None:
-        for message in messages:
+    def _apply(self, messages: Sequence[tuple[LiveMessage, Sender]]) -> None:
+        for message, sender in messages:
             try:
-                self._check(message)
-                for act in _acts_of(message):
+                self._check(message, sender)
+                for act in _acts_of(self._mended(message)):
                     self.simulation.intervene(act)
             except InputError as error:
                 self._leave_out("wrong", str(error))
                 continue
             self.counts["applied"] += 1
+            if isinstance(message, GoalMessage):
+                self._goals[message.entity] = sender, message.to
             if isinstance(message, PoseMessage):
-                sender = self._senders.setdefault(message.entity, _Sender(0.0))
-                if sender.stands:
+                self._goals.pop(message.entity, None)
+                before = self._senders.setdefault(message.entity, _Sender(0.0))
+                if before.stands:
                     self._say("back", f"{message.entity}: poses arrive again")
                 self._senders[message.entity] = _Sender(time.monotonic())
 
-    def _check(self, message: LiveMessage) -> None:
-        """Refuse poses of bodies that decide themselves."""
+    def _check(self, message: LiveMessage, sender: Sender) -> None:
+        """Refuse messages from others than the source, and poses of bodies that decide."""
+        kind, name = _part_of(message)
+        if self._sources.get((kind, name), sender[0]) != sender[0]:
+            raise InputError(f"{name} takes messages of its source only, not of others")
         if not isinstance(message, PoseMessage):
             return
         actors = self.simulation.actors
@@ -297,6 +381,44 @@ class Bridge:
                 " gets poses"
             )
 
+    def _mended(self, message: LiveMessage) -> LiveMessage:
+        """Return a message with a pose that its body can have, and with detections in the home.
+
+        Raises:
+            InputError: The pose is farther than REACH_M from any such place.
+        """
+        if isinstance(message, PoseMessage):
+            actor = self.simulation.actors[message.entity]
+            lattice = actor.home.plan.lattice
+            place = lattice.point_at((message.x, message.y))
+            near = None if actor.space.part_at(*place) >= 0 else actor.space.nearest(*place)
+            if near is None:
+                return message
+            x, y = lattice.to_metres(near).tolist()
+            off = math.hypot(x - message.x, y - message.y)
+            if off > REACH_M:
+                raise InputError(
+                    f"{message.entity} would be {off:.1f} m from any place where its body fits: do"
+                    " its coordinates fit the floor plan?"
+                )
+            self.counts["moved"] += 1
+            self._say("moved", f"{message.entity}: a pose in or at a wall is moved by {off:.2f} m")
+            return message.model_copy(update={"x": x, "y": y})
+        if isinstance(message, DetectionsMessage):
+            robot = self.simulation.scenario.robots.get(message.entity)
+            if robot is None or robot.perceives is None or robot.perceives.relative:
+                return message
+            free = self.simulation.home.plan.free_space
+            places = [shapely.Point(d.x, d.y) for d in message.detections]
+            far = [float(free.distance(place)) for place in places]
+            inside = [d for d, m in zip(message.detections, far, strict=True) if m <= REACH_M]
+            if outside := len(far) - len(inside):
+                self.counts["outside"] += outside
+                text = f"{outside} detections are outside of the home, by up to {max(far):.1f} m"
+                self._say("outside", f"{message.entity}: {text}: left out")
+            return message.model_copy(update={"detections": tuple(inside)})
+        return message
+
     def _stop_the_silent(self) -> None:
         """Let bodies stand for which nothing has arrived for a while."""
         now = time.monotonic()
@@ -307,6 +429,15 @@ class Bridge:
                 self._say("silent", f"{name}: no pose arrived for {self.silence_s:g} s: it stands")
                 self.simulation.intervene({"hold": name})
 
+    def _withdraw(self, sender: Sender) -> None:
+        """Let bodies decide again that go where a client sent them which is gone."""
+        for name, (by, to) in list(self._goals.items()):
+            if by == sender and not self.keeps_goals:
+                del self._goals[name]
+                self.counts["withdrawn"] += 1
+                self._say("gone", f"{name}: who sent it to {to} is gone: the goal is withdrawn")
+                self.simulation.intervene({"release": name})
+
     def _leave_out(self, why: str, text: str) -> None:
         self.counts[why] += 1
         self._say(why, f"{why}: {text}")
@@ -316,7 +447,7 @@ class Bridge:
         self._told[kind] += 1
         if self._told[kind] > MAX_TOLD:
             return
-        for tell in (self.tell, *(peer.tell for peer in self.peers)):
+        for tell in (self.tell, *(peer.tell for peer in self._peers)):
             tell(text)
 
     # What happens
@@ -329,7 +460,7 @@ class Bridge:
         self._rows.clear()
         step = simulation.step - 1
         frame = LiveStep(step, simulation.clock.time(step), bodies, events, rows)
-        for peer in self.peers:
+        for peer in self._peers:
             peer.send(frame)
 
 
@@ -355,6 +486,15 @@ def _prompt_threads() -> Iterator[None]:
         gc.unfreeze()
         if was_enabled:
             gc.enable()
+
+
+def _part_of(message: LiveMessage) -> tuple[str, str]:
+    """Return the kind and name of the part of a scenario that a message is for."""
+    if isinstance(message, ReadingMessage):
+        return "sensor", message.sensor
+    kind = "perceives" if isinstance(message, DetectionsMessage) else "body"
+    assert isinstance(message, PoseMessage | GoalMessage | DetectionsMessage)
+    return kind, message.entity
 
 
 def _acts_of(message: LiveMessage) -> Iterator[dict[str, Any]]:

@@ -30,6 +30,9 @@ def live(  # noqa: PLR0913 - options of the command line
     silence: Annotated[
         float, typer.Option(min=0.1, help="A body stands if nothing arrived for so long [s].")
     ] = 5.0,
+    keep_goals: Annotated[
+        bool, typer.Option("--keep-goals", help="Keep the goals of a client that is gone.")
+    ] = False,
     seed: Annotated[int | None, typer.Option(help="Seed of all random draws.")] = None,
     out: Annotated[Path | None, typer.Option(help="Directory to store the run in.")] = None,
     schema: Annotated[
@@ -44,20 +47,23 @@ def live(  # noqa: PLR0913 - options of the command line
 
         typer.echo(json.dumps(message_schema(), indent=2))
         return
-    if not peers:
-        raise InputError(
-            "name at least one other program by --with, like --with ws://127.0.0.1:8765"
-        )
     from fleet2d.engine.simulation import Simulation
     from fleet2d.live.bridge import Bridge
-    from fleet2d.live.peers import open_peer
+    from fleet2d.live.peers import open_peers
+    from fleet2d.scenario.model import load_scenario
 
     scenario, overrides = split(arguments)
     changes = overrides if seed is None else [*overrides, f"simulation.seed={seed}"]
     with restrict_to(trust, trust_dir):
-        opened = [open_peer(address) for address in peers]
-        simulation = Simulation(scenario, *changes, out=out)
-        for address, peer in zip(peers, opened, strict=True):
+        checked = load_scenario(scenario, *changes)
+        opened = open_peers(checked, *peers or ())
+        if not opened:
+            raise InputError(
+                "name at least one other program by --with, like --with ws://127.0.0.1:8765, or as"
+                " the source of something live"
+            )
+        simulation = Simulation(checked, out=out)
+        for address, peer in opened.items():
             port = getattr(peer, "port", None)
             typer.echo(
                 f"{address}: {'connected' if port is None else f'listens at {port}'}", err=True
@@ -67,6 +73,7 @@ def live(  # noqa: PLR0913 - options of the command line
             opened,
             speed,
             silence_s=silence,
+            keeps_goals=keep_goals,
             tell=lambda text: typer.echo(text, err=True),
         )
         run = bridge.run()

@@ -69,6 +69,7 @@ class MqttPeer:
     def open(self, simulation: Simulation, post: Post) -> None:
         """Announce the sensors and bodies, and begin to receive."""
         self._client.on_message = lambda *args: post(args[-1].payload)
+        self._client.on_disconnect = lambda *_: post(None)
         for name, item in simulation.scenario.objects.items():
             if isinstance(item, Sensor):
                 self._on[name] = item.words[0]
@@ -118,6 +119,7 @@ class MqttPeer:
     def close(self, run: Run) -> None:
         """Publish that the run is over, and disconnect."""
         message = self._client.publish(f"{self.prefix}/status", "offline", qos=1, retain=True)
-        message.wait_for_publish(WAIT_S)
+        if self._client.is_connected():
+            message.wait_for_publish(WAIT_S)
         self._client.disconnect()
         self._client.loop_stop()

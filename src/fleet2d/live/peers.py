@@ -5,24 +5,31 @@ loses messages, one that is gone is left out.
 """
 
 import contextlib
+import itertools
 import json
 import queue
+import re
 import socket
 import threading
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
-from urllib.parse import urlsplit
 
-from fleet2d.configuration.problems import did_you_mean
+from pydantic_core import PydanticCustomError
+
+from fleet2d.configuration.trust import current_trust
+from fleet2d.configuration.units import parse_peer_address
 from fleet2d.engine.simulation import Simulation
 from fleet2d.errors import InputError, extra
-from fleet2d.live.bridge import LiveStep, Peer, Post
+from fleet2d.live.bridge import LiveStep, Peer, Post, sources_of
 from fleet2d.live.messages import MAX_BYTES
 from fleet2d.runs.run import Run
+from fleet2d.scenario.model import Scenario
 
-SCHEMES = ("udp", "ws", "rosbridge", "mqtt")
 # A client whose queue is longer is too slow, and is disconnected.
 MAX_QUEUE = 10_000
+# Programs, and pages of this machine: any other page that is open in a browser could connect, too.
+ORIGINS = [None, re.compile(r"https?://(localhost|127\.0\.0\.1|\[::1\])(:\d+)?")]
+THIS_MACHINE = (None, "localhost", "127.0.0.1", "::1")
 VERSION = 1
 """The version of the messages."""
 
@@ -140,12 +147,13 @@ class WebSocketPeer:
             from websockets.sync.server import serve
 
         try:
-            self._server = serve(self._serve, host, port, max_size=MAX_BYTES)
+            self._server = serve(self._serve, host, port, max_size=MAX_BYTES, origins=ORIGINS)
         except OSError as error:
             raise InputError(f"ws://{host}:{port}: {error.strerror or error}") from error
         self._clients: dict[Any, queue.Queue[str | None]] = {}
         self._lock = threading.Lock()
-        self._hello = ""
+        self._hello, self._numbers = "", itertools.count()
+        self._end: tuple[str | None, ...] = ()
         self._post: Post
 
     @property
@@ -162,14 +170,18 @@ class WebSocketPeer:
         from websockets.exceptions import ConnectionClosed
 
         texts: queue.Queue[str | None] = queue.Queue(MAX_QUEUE)
+        number = next(self._numbers)
         with contextlib.suppress(ConnectionClosed):
-            connection.send(self._hello)
+            texts.put(self._hello)
             with self._lock:
                 self._clients[connection] = texts
+                for text in self._end:
+                    texts.put(text)
             sender = threading.Thread(target=self._pass_on, args=(connection, texts), daemon=True)
             sender.start()
             for content in connection:
-                self._post(content)
+                self._post(content, number)
+        self._post(None, number)
         self._forget(connection)
 
     def _pass_on(self, connection: Any, texts: "queue.Queue[str | None]") -> None:
@@ -210,7 +222,9 @@ class WebSocketPeer:
     def close(self, run: Run) -> None:
         """Tell the end to all clients, and disconnect them."""
         end = {"type": "end", "status": run.status, "digest": run.digest}
-        self._put([json.dumps(end), None])
+        with self._lock:  # for clients that have just connected, too
+            self._end = json.dumps(end), None
+        self._put(self._end)
         self._server.shutdown()
 
 
@@ -230,17 +244,11 @@ def open_peer(address: str) -> Peer:
         fleet2d.errors.InputError: 'wss://localhost:1' is no address of a peer: did you mean 'ws'? \
 Write udp://HOST:PORT, ws://HOST:PORT, rosbridge://HOST:PORT or mqtt://HOST:PORT/PREFIX
     """
-    parts = urlsplit(address)
     try:
-        host, port = parts.hostname or "127.0.0.1", parts.port
-    except ValueError:
-        host, port = "", None
-    if parts.scheme not in SCHEMES or not host:
-        hint = did_you_mean(parts.scheme, SCHEMES) or "."
-        raise InputError(
-            f"{address!r} is no address of a peer{hint} Write udp://HOST:PORT, ws://HOST:PORT,"
-            " rosbridge://HOST:PORT or mqtt://HOST:PORT/PREFIX"
-        )
+        parts = parse_peer_address(address)
+    except PydanticCustomError as error:
+        raise InputError(error.message()) from None
+    host, port = parts.hostname or "127.0.0.1", parts.port
     if parts.scheme == "udp":
         return UdpPeer(host, port or 0)
     if parts.scheme == "ws":
@@ -252,3 +260,20 @@ Write udp://HOST:PORT, ws://HOST:PORT, rosbridge://HOST:PORT or mqtt://HOST:PORT
     from fleet2d.live.mqtt import MqttPeer
 
     return MqttPeer(host, port or 1883, parts.path.strip("/") or "fleet2d")
+
+
+def open_peers(scenario: Scenario, *addresses: str) -> dict[str, Peer]:
+    """Return the peers of a live run by their addresses: those given, and the scenario's sources.
+
+    Raises:
+        InputError: as `open_peer`; or the scenario names a source on another machine, as scenarios
+            of others may, and `addresses` doesn't.
+    """
+    sources = dict.fromkeys(sources_of(scenario).values())
+    for source in sources:
+        is_here = parse_peer_address(source).hostname in THIS_MACHINE
+        if source not in addresses and not is_here and current_trust() is not None:
+            raise InputError(
+                f"the scenario would talk to {source}, another machine: name it by --with, too"
+            )
+    return {address: open_peer(address) for address in dict.fromkeys([*addresses, *sources])}

@@ -51,6 +51,7 @@ class RosbridgePeer:
         self._last: dict[str, tuple[float, float, float]] = {}
         self._step_s = simulation.clock.step_us / 1e6
         self._simulation = simulation
+        self._ros.on("close", lambda *_: post(None))
         for robot in self._robots:
             self._advertise(f"/{robot}/odom", "nav_msgs/Odometry")
             self._advertise(f"/{robot}/scan", "sensor_msgs/LaserScan")

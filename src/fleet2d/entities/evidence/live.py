@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from fleet2d.configuration.components import register
+from fleet2d.configuration.units import PeerAddress
 from fleet2d.entities.evidence.evidence_source import SIGHTING, EvidenceSource
 from fleet2d.kernels import I64
 from fleet2d.kernels import SightingColumn as Column
@@ -24,9 +25,12 @@ class LiveDetections(EvidenceSource):
     Attributes:
         relative_to: Whether positions are in the floor plan, or in the frame of the robot: x ahead,
             y to the left.
+        source: The other program whose messages it takes, such as ws://127.0.0.1:8765, which
+            `fleet2d live` opens; left out: any of `--with`.
     """
 
     relative_to: Literal["map", "robot"] = "map"
+    source: PeerAddress | None = None
 
     @property
     def relative(self) -> bool:

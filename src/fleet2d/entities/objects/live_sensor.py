@@ -4,6 +4,7 @@ import numpy as np
 from pydantic import Field
 
 from fleet2d.configuration.components import register
+from fleet2d.configuration.units import PeerAddress
 from fleet2d.entities.objects.home_object import Sensor, SensorView
 from fleet2d.floorplan.home import Home
 from fleet2d.kernels import I64
@@ -15,9 +16,12 @@ class LiveSensor(Sensor):
 
     Attributes:
         room: The room that its readings name.
+        source: The other program whose messages it takes, such as ws://127.0.0.1:8765, which
+            `fleet2d live` opens; left out: any of `--with`.
     """
 
     room: str = Field(min_length=1)
+    source: PeerAddress | None = None
 
     def sense(self, view: SensorView, home: Home) -> tuple[I64, I64]:
         """Return no steps: only reports switch it."""

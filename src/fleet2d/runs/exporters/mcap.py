@@ -211,7 +211,7 @@ def _merged(blocks: Sequence[Block]) -> tuple[bytes, list[I64]]:
     # What is next to each other in a row and in time is one piece.
     piece = np.flatnonzero(np.diff(number[order], prepend=-1))
     last = order[np.append(piece[1:], len(order)) - 1]
-    data = [memoryview(_side_by_side([blocks[i] for i in row])) for row in rows]
+    data = [_side_by_side([blocks[i] for i in row]).data for row in rows]
     pieces = zip(
         number[order[piece]].tolist(),
         own[order[piece]].tolist(),
