@@ -3,6 +3,7 @@
 import { useSignal } from "@preact/signals";
 import type { ComponentType } from "preact";
 import { useRef } from "preact/hooks";
+import { copyLink } from "./address";
 import { KEYS } from "./keyboard";
 import { LiveControls } from "./live/LiveControls";
 import { branchHere, branching, refusal } from "./live/orders";
@@ -11,6 +12,7 @@ import { EventsPanel, KindChoice } from "./panels/EventsPanel";
 import { Inspect } from "./panels/Inspect";
 import { LayersPanel } from "./panels/LayersPanel";
 import { MetricsPanel } from "./panels/MetricsPanel";
+import { NotesPanel } from "./panels/NotesPanel";
 import { Now } from "./panels/Now";
 import { slowMoment } from "./panels/slow";
 import { Plan } from "./plan/Plan";
@@ -25,6 +27,7 @@ const PANELS: Record<state.Panel, [string, ComponentType]> = {
   events: ["Events", EventsPanel],
   metrics: ["Metrics", MetricsPanel],
   layers: ["Layers", LayersPanel],
+  notes: ["Notes", NotesPanel],
 };
 
 export function App() {
@@ -186,6 +189,7 @@ function Controls() {
           Day
         </button>
       </span>
+      {run.path && <CopyLink />}
       <Help />
     </div>
   );
@@ -241,6 +245,21 @@ function GoTo() {
       />
       <button onClick={go}>Go</button>
     </div>
+  );
+}
+
+function CopyLink() {
+  const words = useSignal("Copy link");
+  const copy = async (): Promise<void> => {
+    words.value = (await copyLink(state.run.value!)) ? "Copied" : "Copy the address above";
+    setTimeout(() => {
+      words.value = "Copy link";
+    }, 2000);
+  };
+  return (
+    <button type="button" title="A link to this moment and view" onClick={() => void copy()}>
+      {words.value}
+    </button>
   );
 }
 

@@ -24,6 +24,8 @@ export function addressOf(run: Run): string {
     layer: state.layer.value,
     belief: state.belief.value,
     kind: state.eventKind.value,
+    body: state.followed.value,
+    plot: state.plot.value,
     theme: state.theme.value === "auto" ? "" : state.theme.value,
   };
   for (const [name, value] of Object.entries(optional)) if (value) words.set(name, value);
@@ -53,8 +55,20 @@ export function applyAddress(text: string, run: Run): void {
   state.layer.value = words.get("layer") ?? "";
   state.belief.value = words.get("belief") ?? "";
   state.eventKind.value = words.get("kind") ?? "";
+  state.followed.value = words.get("body") ?? "";
+  state.plot.value = words.get("plot") ?? "";
   const theme = words.get("theme");
   if (theme === "light" || theme === "dark") state.theme.value = theme;
+}
+
+/** Copy a link to what is shown now; false where the browser refuses. */
+export async function copyLink(run: Run): Promise<boolean> {
+  try {
+    await navigator.clipboard.writeText(`${location.href.split("#")[0]}#${addressOf(run)}`);
+    return true;
+  } catch {
+    return false;
+  }
 }
 
 /** Keep the address up to date, and follow it when it is changed. */

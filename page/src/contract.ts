@@ -143,6 +143,12 @@ export interface RunFacts {
   walks_every_s: number;
 }
 
+/** A note at a step of a run; without a text it is a bookmark. */
+export interface NoteFacts {
+  step: number;
+  text: string;
+}
+
 /** The reason why something can't be shown. */
 export interface Problem {
   message: string;
@@ -169,7 +175,7 @@ export interface BranchOrder {
   step: number;
 }
 
-/** A body at a step of a running simulation [lattice], and its path ahead: time [us], x, y. */
+/** A body at a step of a running simulation [lattice], and its path ahead: time [us], x, y. At the step `decides` its behaviors are asked next, if nothing interrupts it; -1: at none. */
 export interface LiveBody {
   name: string;
   x: number;
@@ -178,6 +184,7 @@ export interface LiveBody {
   away: boolean;
   ahead: [number, number, number][];
   note: string;
+  decides: number;
 }
 
 /** An event of a running simulation. */

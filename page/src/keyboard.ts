@@ -17,9 +17,11 @@ export const KEYS: [string, string][] = [
   ["?", "these keys"],
   ["< >", "slower, faster"],
   ["Home End", "begin, end"],
-  ["1 … 6", "panels"],
+  ["1 … 7", "panels"],
   ["g", "go to a time"],
   ["a", "ask the timeline"],
+  ["b", "bookmark or note at the moment"],
+  ["c", "keep who is selected in the middle of the plan"],
   ["f", "search events"],
   ["t", "light, dark"],
 ];
@@ -60,6 +62,13 @@ const ACTIONS: Record<string, (event: KeyboardEvent) => void> = {
   End: () => state.goTo(state.endUs.value),
   t: () => {
     state.theme.value = document.documentElement.dataset.theme === "dark" ? "light" : "dark";
+  },
+  b: () => {
+    state.panel.value = "notes";
+    requestAnimationFrame(() => document.getElementById("note")?.focus());
+  },
+  c: () => {
+    state.followed.value = state.followed.value ? "" : state.selected.value;
   },
   a: () => document.getElementById("ask")?.focus(),
   g: () => document.getElementById("goto")?.focus(),

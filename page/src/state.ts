@@ -9,7 +9,7 @@ import { firstAtLeast, lastAtMost } from "./data/search";
 export const SPEEDS = [1, 10, 60, 600, 3600, 14_400, 86_400];
 export const SWITCHES = ["names", "furniture", "ways", "sight", "observations", "beliefs"] as const;
 export type Switch = (typeof SWITCHES)[number];
-export const PANELS = ["now", "inspect", "beliefs", "events", "metrics", "layers"] as const;
+export const PANELS = ["now", "inspect", "beliefs", "events", "metrics", "layers", "notes"] as const;
 export type Panel = (typeof PANELS)[number];
 export type Theme = "auto" | "light" | "dark";
 
@@ -23,6 +23,10 @@ export const marked = signal<[number, number] | null>(null);
 export const playing = signal(false);
 export const speed = signal(60);
 export const selected = signal("");
+/** The body that the plan follows; empty: none. */
+export const followed = signal("");
+/** A column that is plotted beside the metrics, as "table.column". */
+export const plot = signal("");
 export const eventKind = signal("");
 export const search = signal("");
 /** What was asked of the timeline, and what answers it. */

@@ -72,6 +72,17 @@ export function followTheme(): void {
   });
 }
 
+/** Colours of words and lines, distinct with any kind of colour blindness (Paul Tol's muted scheme). */
+export const PALETTE = ["#88ccee", "#ddcc77", "#cc6677", "#44aa99", "#aa4499", "#999933", "#332288", "#117733", "#882255"];
+/** What each camera of a robot has in view. */
+const CAMERA_COLORS = ["#ffd23f", "#33bbee", "#ee7733", "#bbbbbb"];
+
+/** The fill of the region that a camera sees, by the camera's number, and its edge. */
+export function cameraColors(number: number, { view, viewEdge }: Colors): [string, string] {
+  const color = CAMERA_COLORS[number % CAMERA_COLORS.length]!;
+  return number === 0 ? [view, viewEdge] : [`${color}55`, mix(color, "#000000", 0.3)];
+}
+
 type Rgb = [number, number, number];
 
 export function rgb(color: string): Rgb {

@@ -18,6 +18,8 @@ export const expected = content.expected;
 
 export const source: RunSource = {
   path: "",
+  notes: () => Promise.resolve([]),
+  storeNotes: () => Promise.resolve([]),
   tracks: () => Promise.resolve(null),
   facts: () => Promise.resolve(held.facts),
   sightings: () => Promise.resolve(held.sightings),

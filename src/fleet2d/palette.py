@@ -15,6 +15,9 @@ DOOR_COLOR = "#8a5a2b"
 DEEPER = 1.9
 """Factor of a room colour's distance from white in a timeline, whose lanes are thin."""
 
+SHADES = (1.0, 1.5, 0.7, 2.0)
+"""The same for rooms of one type, in turn."""
+
 ROOM_COLORS = MappingProxyType(
     {
         "living_room": "#f6e3c5",
@@ -50,20 +53,28 @@ TEXT_COLOR = "#2d3138"
 ACCENT_COLOR = "#c8452f"
 
 
-def room_color(kind: str) -> str:
-    """Return the colour of a type of room on a floor plan, such as ``#c9dcf2``."""
-    return ROOM_COLORS.get(kind, OTHER_COLOR)
+def room_color(kind: str, number: int = 0) -> str:
+    """Return the colour of a room on a floor plan by its type, and its number among those.
+
+    >>> room_color("bedroom"), room_color("bedroom", 1)
+    ('#c9dcf2', '#afcceb')
+    """
+    return _deeper(ROOM_COLORS.get(kind, OTHER_COLOR), SHADES[number % len(SHADES)])
 
 
-def deep_color(kind: str) -> str:
-    """Return the colour of a type of room in a timeline.
+def deep_color(kind: str, number: int = 0) -> str:
+    """Return the colour of a room in a timeline; see `room_color`.
 
     >>> deep_color("bedroom")
     '#98bce6'
     """
-    pale = room_color(kind)
-    parts = (int(pale[i : i + 2], 16) / 255 for i in (1, 3, 5))
-    deep = (max(0.0, 1 - DEEPER * (1 - part)) for part in parts)
+    return _deeper(ROOM_COLORS.get(kind, OTHER_COLOR), DEEPER * SHADES[number % len(SHADES)])
+
+
+def _deeper(color: str, factor: float) -> str:
+    """Return a colour whose distance from white is multiplied."""
+    parts = (int(color[i : i + 2], 16) / 255 for i in (1, 3, 5))
+    deep = (max(0.0, 1 - factor * (1 - part)) for part in parts)
     return "#" + "".join(f"{round(255 * part):02x}" for part in deep)
 
 

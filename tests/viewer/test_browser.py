@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 import shutil
 from collections.abc import Callable, Iterator
 from datetime import timedelta
@@ -63,7 +64,8 @@ def shows_step(page: Any, step: int) -> None:
 def test_what_is_shown_at_random_moments_is_what_the_tables_say(page: Any, run_dir: Path) -> None:
     run = fleet2d.open_run(run_dir)
     paths = {name: run.path(name, timedelta(seconds=1)) for name in ("ana", "astro")}
-    for step in np.random.default_rng(5).choice(run.manifest["steps"], 12).tolist():
+    count = 100 if THOROUGH else 12
+    for step in np.random.default_rng(5).choice(run.manifest["steps"], count).tolist():
         page.fill("#goto", f"step {step}")
         page.press("#goto", "Enter")
         shows_step(page, step)
@@ -86,16 +88,19 @@ def test_observations_at_a_moment_are_those_of_the_table(page: Any, run_dir: Pat
 
 def test_beliefs_are_those_of_the_table(page: Any, run_dir: Path) -> None:
     run = fleet2d.open_run(run_dir)
-    rows = [row for row in run.tables["ltp"].to_pylist() if row["step"] == 21_599]
-    page.keyboard.press("End")
+    table = run.tables["ltp"].to_pylist()
+    steps = np.random.default_rng(5).choice(run.manifest["steps"], 100 if THOROUGH else 4).tolist()
     page.click("#tab-beliefs")
-    page.wait_for_selector("table.bars tr[data-room]")
-    for row in rows:
-        bar = page.locator(f"tr[data-room={row['room']}]")
-        if bar.count():
-            assert row["share"] == pytest.approx(
-                float(bar.get_attribute("data-believed")), abs=1e-9
-            )
+    for step in [*steps, run.manifest["steps"] - 1]:
+        page.fill("#goto", f"step {step}")
+        page.press("#goto", "Enter")
+        page.wait_for_selector(f".lanes[aria-valuenow='{step}']")
+        page.wait_for_timeout(250)  # panels follow a few times a second
+        last = max((row["step"] for row in table if row["step"] <= step), default=-1)
+        believed = {row["room"]: row["share"] for row in table if row["step"] == last}
+        for bar in page.locator("table.bars tr[data-room]").all():
+            share = believed.get(bar.get_attribute("data-room"), 0.0)
+            assert share == pytest.approx(float(bar.get_attribute("data-believed")), abs=1e-9)
 
 
 def test_dragging_over_the_timeline_scrubs(page: Any) -> None:
@@ -185,6 +190,118 @@ def test_address_holds_the_moment_and_the_view(browser: Any, page: Any) -> None:
         assert "true" == second_page.get_attribute("#tab-layers", "aria-selected")
         assert not second_page.is_checked("input[name=ways]")
         assert second_page.url.split("#")[1] == page.url.split("#")[1]
+
+
+def test_note_at_a_moment_is_kept_and_found_again(
+    browser: Any, run_dir: Path, tmp_path: Path
+) -> None:
+    root = shutil.copytree(run_dir, tmp_path / "day")
+    server = PageServer([root])
+    stop = server.start()
+    with page_at(browser, server.address) as page:
+        page.fill("#goto", "step 7200")
+        page.press("#goto", "Enter")
+        page.keyboard.press("b")
+        page.wait_for_selector("#note:focus")
+        page.keyboard.type("waits here")
+        page.keyboard.press("Enter")
+        page.wait_for_selector("ol[data-count='1'] >> text=waits here")
+        page.keyboard.press("Home")
+    with page_at(browser, f"{server.address}#panel=notes") as page:
+        page.wait_for_selector(".label >> text=notes")
+        page.click("text=waits here")
+        assert 7200 == moment(page)
+        page.click("[aria-label='Remove waits here']")
+        page.wait_for_selector("ol[data-count='0']", state="attached")
+    stop()
+
+
+def test_link_to_a_moment_is_copied(browser: Any, address: str) -> None:
+    permissions = ["clipboard-read", "clipboard-write"]
+    with page_at(browser, address, permissions=permissions) as page:
+        page.fill("#goto", "day 1 05:00")
+        page.press("#goto", "Enter")
+        page.click("text=Copy link")
+        page.wait_for_selector("text=Copied")
+        link = page.evaluate("navigator.clipboard.readText()")
+    assert "at=2026-01-05T05%3A00%3A00" in link
+    with page_at(browser, link) as page:
+        assert 5 * 3600 == moment(page)
+
+
+@pytest.mark.parametrize("zone", ["Pacific/Auckland", "America/Los_Angeles", "Asia/Kathmandu"])
+def test_times_are_the_home_s_in_every_time_zone(browser: Any, address: str, zone: str) -> None:
+    with page_at(browser, f"{address}#panel=metrics", timezone_id=zone) as page:
+        page.fill("#goto", "Mon 5 Jan 08:30")
+        page.press("#goto", "Enter")
+        page.wait_for_selector(f".lanes[aria-valuenow='{8 * 3600 + 1800}']")
+        assert "Mon 5 Jan 08:30:00" in page.get_attribute(".lanes", "aria-valuetext")
+        assert "at=2026-01-05T08%3A30%3A00" in page.evaluate(
+            "new Promise((done) => setTimeout(() => done(location.hash), 400))"
+        )
+
+
+def test_lanes_fold_are_pinned_hidden_and_filtered(page: Any) -> None:
+    labels = page.locator(".label .name")
+    before = labels.all_inner_texts()
+    assert {"Users (1)", "Robots (1)", "ana", "ana does", "astro sees ana"} <= set(before)
+    page.click("[aria-label='Lanes of ana']")
+    assert "ana does" not in labels.all_inner_texts()
+    page.locator(".label", has_text="astro").first.hover()
+    page.click("[aria-label='Pin astro']")
+    assert "astro" == labels.first.inner_text()
+    labels.first.hover()
+    page.click("[aria-label='Hide astro']")
+    assert "astro" not in labels.all_inner_texts()
+    page.click("text=show 1 hidden")
+    page.keyboard.press("Escape")
+    page.locator("body").click(position={"x": 300, "y": 10})
+    page.keyboard.press("l")
+    page.keyboard.type("does")
+    assert ["astro", "Users (1)", "ana does"] == labels.all_inner_texts()
+
+
+def test_marked_range_has_totals_that_fill_it(page: Any) -> None:
+    box = page.locator(".lanes").bounding_box()
+    page.keyboard.down("Shift")
+    page.mouse.move(box["x"] + box["width"] / 3, box["y"] + 60)
+    page.mouse.down()
+    page.mouse.move(box["x"] + box["width"] * 2 / 3, box["y"] + 60, steps=3)
+    page.mouse.up()
+    page.keyboard.up("Shift")
+    words = page.inner_text(".totals div:has(dt:text-is('ana')) dd")
+    units = {"h": 3600, "min": 60, "s": 1}
+    parts = re.findall(r"(?<!_)\b(\d+) (h|min|s)\b", words)
+    assert 3 * 3600 == pytest.approx(sum(int(n) * units[unit] for n, unit in parts), abs=120)
+    page.keyboard.press("Escape")
+    assert 0 == page.locator(".totals").count()
+
+
+def test_zoom_is_undone_and_keys_are_shown(page: Any) -> None:
+    page.keyboard.press("+")
+    page.wait_for_timeout(400)
+    assert "from=" in page.url
+    page.keyboard.press("z")
+    page.wait_for_timeout(400)
+    assert "from=" not in page.url
+    page.keyboard.press("?")
+    assert page.locator("details.help dl").is_visible()
+
+
+def test_body_is_followed_and_pointed_at(page: Any) -> None:
+    page.click("tr[data-body=ana] button")
+    page.click("text=Follow ana")
+    box = page.locator(".plan canvas").bounding_box()
+    page.mouse.move(box["x"] + box["width"] / 2, box["y"] + (box["height"] - 18) / 2)
+    page.wait_for_selector(".plan .hover >> text=ana")
+    page.keyboard.press("c")
+    assert page.locator("text=Follow ana").is_visible()
+
+
+def test_any_column_of_a_table_is_plotted(page: Any) -> None:
+    page.click("#tab-metrics")
+    page.select_option("[aria-label='Column to plot']", "key_frames.x")
+    page.wait_for_selector("[aria-label='x of key_frames over the run'] canvas")
 
 
 def test_layers_and_switches_change_the_plan(page: Any) -> None:
@@ -390,7 +507,7 @@ def test_page_works_in_the_frame_of_a_notebook(browser: Any, run_dir: Path) -> N
     ("panel", "scheme"),
     [
         (panel, scheme)
-        for panel in ("now", "inspect", "beliefs", "events", "metrics", "layers")
+        for panel in ("now", "inspect", "beliefs", "events", "metrics", "layers", "notes")
         for scheme in ("light", "dark")
         if THOROUGH or scheme == "light" or panel == "now"
     ],
@@ -414,3 +531,11 @@ def test_axe_finds_nothing_serious(browser: Any, address: str, scheme: str, pane
 def test_narrow_screen_needs_no_sideways_scrolling(browser: Any, address: str, width: int) -> None:
     with page_at(browser, address, viewport={"width": width, "height": 844}) as page:
         assert page.evaluate("document.documentElement.scrollWidth") <= width
+
+
+def test_small_frame_of_a_notebook_shows_plan_and_timeline(browser: Any, address: str) -> None:
+    with page_at(browser, address, viewport={"width": 640, "height": 500}) as page:
+        for part in (".plan canvas", ".lanes"):
+            box = page.locator(part).bounding_box()
+            assert box["height"] > 100
+            assert box["y"] + 100 < 500

@@ -10,10 +10,28 @@ export interface Series {
 }
 
 const MOST_SERIES = 12;
+/** A line of more values is drawn with every second, third … of them. */
+const MOST_VALUES = 4000;
 
-/** Read a table as lines over time: one per number column and word, such as user or room. */
-export async function readSeries(facts: TableFacts, table: Table, stepUs: number): Promise<Series[]> {
-  const numbers = facts.columns.filter((column) => ["float64", "int64", "int32"].includes(column.kind));
+/** The columns of a table that can be drawn over time. */
+export function numberColumns(facts: TableFacts): string[] {
+  const numbers = facts.columns.filter((column) => ["float64", "int64", "int32", "bool"].includes(column.kind));
+  return numbers.map((column) => column.name).filter((name) => name !== "step" && name !== "time");
+}
+
+/** A line with at most so many values that they can be told apart. */
+export function thinned(line: Series): Series {
+  const every = Math.ceil(line.us.length / MOST_VALUES);
+  if (every <= 1) return line;
+  return { ...line, us: line.us.filter((_, i) => i % every === 0), values: line.values.filter((_, i) => i % every === 0) };
+}
+
+/**
+ * Read a table as lines over time: one per number column and word, such as user or room; or those of one column, named
+ * by their words alone.
+ */
+export async function readSeries(facts: TableFacts, table: Table, stepUs: number, column?: string): Promise<Series[]> {
+  const numbers = column ? [column] : numberColumns(facts);
   const words = facts.columns.filter((column) => column.kind === "category");
   const steps = await table.numbers("step");
   const labels = await Promise.all(words.map((column) => table.words(column.name)));
@@ -22,15 +40,15 @@ export async function readSeries(facts: TableFacts, table: Table, stepUs: number
     keys.push(labels.map((label) => label.words[label.codes[i]!] ?? "").join(" · "));
   }
   const series = new Map<string, Series>();
-  for (const column of numbers) {
-    const values = await table.numbers(column.name);
+  for (const name of numbers) {
+    const values = await table.numbers(name);
     for (let i = 0; i < steps.length; i++) {
-      const name = [keys[i], numbers.length > 1 || !keys[i] ? column.name : ""].filter(Boolean).join(" · ");
-      let line = series.get(name);
+      const label = [keys[i], numbers.length > 1 || !keys[i] ? name : ""].filter(Boolean).join(" · ");
+      let line = series.get(label);
       if (!line) {
         if (series.size >= MOST_SERIES) continue;
-        line = { name, us: [], values: [] };
-        series.set(name, line);
+        line = { name: label, us: [], values: [] };
+        series.set(label, line);
       }
       line.us.push(steps[i]! * stepUs);
       line.values.push(values[i]!);

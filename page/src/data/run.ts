@@ -1,7 +1,7 @@
 /** One run: everything that the page shows of it, read when it is needed. */
 
 import { signal } from "@preact/signals";
-import type { BodyFacts, RunFacts, SightingFacts, TableFacts, WallsFacts } from "../contract";
+import type { BodyFacts, NoteFacts, RunFacts, SightingFacts, TableFacts, WallsFacts } from "../contract";
 import { type Beliefs, readBeliefs } from "./beliefs";
 import { Clock } from "./clock";
 import { Events, readEvents } from "./events";
@@ -35,9 +35,14 @@ export class Run {
   ahead = new Map<string, number[]>();
   /** What behaviors of a live run say of themselves. */
   behaviorNotes = new Map<string, string>();
+  /** When bodies of a live run decide next [us]. */
+  decisions = new Map<string, number>();
 
   /** What is known of the run ends here: the step that its simulation has come to. */
   knownUs = Infinity;
+
+  /** Notes and bookmarks, which are stored beside the run. */
+  readonly notes = signal<readonly NoteFacts[]>([]);
 
   private readonly walls = new Map<number, Walls | null>();
   private readonly layers = new Map<string, Promise<LayerTable>>();
@@ -130,6 +135,9 @@ export class Run {
     await this.attempt(async () => {
       this.sightings = await this.source.sightings();
     });
+    await this.attempt(async () => {
+      this.notes.value = await this.source.notes();
+    });
     for (const facts of this.facts.tables.filter((entry) => entry.role === "algorithm")) {
       await this.attempt(async () => {
         const table = await this.open(facts.name);
@@ -183,6 +191,13 @@ export class Run {
       this.changed();
     });
     return null;
+  }
+
+  /** Store notes in place of the present ones. */
+  async storeNotes(notes: readonly NoteFacts[]): Promise<void> {
+    await this.attempt(async () => {
+      this.notes.value = await this.source.storeNotes(notes);
+    });
   }
 
   readWalls(number: number): Promise<WallsFacts> {

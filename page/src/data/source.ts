@@ -1,7 +1,7 @@
 /** Where the page's data come from: the server, or the page's own file. */
 
 import type { AsyncBuffer } from "hyparquet";
-import type { Problem, RunFacts, SessionFacts, SightingFacts, WallsFacts } from "../contract";
+import type { NoteFacts, Problem, RunFacts, SessionFacts, SightingFacts, WallsFacts } from "../contract";
 
 const WHOLE_BYTES = 8_000_000;
 const BLOCK_BYTES = 1 << 20;
@@ -11,6 +11,8 @@ export interface RunSource {
   readonly path: string;
   facts(): Promise<RunFacts>;
   sightings(): Promise<SightingFacts[]>;
+  notes(): Promise<NoteFacts[]>;
+  storeNotes(notes: readonly NoteFacts[]): Promise<NoteFacts[]>;
   /** The key frames of all bodies as plain arrays; null where only their table is there. */
   tracks(): Promise<ArrayBuffer | null>;
   walls(number: number): Promise<WallsFacts>;
@@ -53,6 +55,16 @@ export class ServedRun implements RunSource {
 
   sightings(): Promise<SightingFacts[]> {
     return json(`${this.path}/sightings.json`);
+  }
+
+  notes(): Promise<NoteFacts[]> {
+    return json(`${this.path}/notes.json`);
+  }
+
+  async storeNotes(notes: readonly NoteFacts[]): Promise<NoteFacts[]> {
+    const headers = { "Content-Type": "application/json" };
+    const response = await fetched(`${this.path}/notes`, { method: "POST", headers, body: JSON.stringify(notes) });
+    return (await response.json()) as NoteFacts[];
   }
 
   async tracks(): Promise<ArrayBuffer> {
@@ -116,6 +128,14 @@ class HeldRun implements RunSource {
 
   sightings(): Promise<SightingFacts[]> {
     return Promise.resolve(this.held.sightings);
+  }
+
+  notes(): Promise<NoteFacts[]> {
+    return Promise.resolve([]);
+  }
+
+  storeNotes(): Promise<never> {
+    return Promise.reject(new Error("a file holds no notes: open the run with fleet2d view"));
   }
 
   tracks(): Promise<null> {

@@ -41,6 +41,14 @@ class LiveSource implements RunSource {
     return Promise.resolve([]);
   }
 
+  notes(): Promise<never[]> {
+    return Promise.resolve([]);
+  }
+
+  storeNotes(): Promise<never> {
+    return Promise.reject(new Error("notes are stored beside a run that is over"));
+  }
+
   tracks(): Promise<null> {
     return Promise.resolve(null);
   }
@@ -196,6 +204,8 @@ export class Feed {
       track.append(us, body);
       this.run.ahead.set(body.name, [body.x, body.y, ...body.ahead.flatMap(([, x, y]) => [x, y])]);
       this.run.behaviorNotes.set(body.name, body.note);
+      if (body.decides >= 0) this.run.decisions.set(body.name, body.decides * this.run.clock.stepUs);
+      else this.run.decisions.delete(body.name);
       this.addRoom(body.name, us, body.away ? AWAY : this.run.home.roomAt(body.x, body.y));
     }
     this.observations.step = frame.step;

@@ -19,6 +19,7 @@ export function Inspect() {
   if (run.body(name)) return <BodyView run={run} name={name} />;
   if (run.facts.home.doors.some((door) => door.name === name)) return <DoorView run={run} name={name} />;
   if (run.home.roomIndex(name) >= 0) return <RoomView run={run} name={name} />;
+  if (run.facts.home.objects.some((thing) => thing.name === name)) return <FurnitureView run={run} name={name} />;
   return <p class="hint">There is no {name} in this run.</p>;
 }
 
@@ -42,7 +43,9 @@ function BodyView({ run, name }: { run: Run; name: string }) {
   const us = slowMoment.value;
   const body = run.body(name)!;
   const now = bodyState(run, name, us);
-  const why = run.behaviorNotes.get(name) ?? noteOf(run, name, us);
+  const isNow = run.clock.stepAt(us) >= run.clock.stepAt(run.presentUs);
+  const why = isNow ? run.behaviorNotes.get(name) : undefined;
+  const decides = isNow ? run.decisions.get(name) : undefined;
   const rows: [string, string][] = [
     ["kind", body.robot ? "robot" : "user"],
     ["room", now?.room ?? "not stored"],
@@ -52,13 +55,28 @@ function BodyView({ run, name }: { run: Run; name: string }) {
     ["activity", now?.activity ?? ""],
     ["sees", now?.sees.join(", ") ?? ""],
     ["next", nextPlace(run, name, us)],
-    ["why", why],
+    ["why", why ?? ""],
+    ["decides", decides === undefined ? "" : `in ${durationText(decides - us)}`],
+    ["last note", why ? "" : noteOf(run, name, us)],
     ["behaviors", body.behaviors.join(", ")],
+    ["cameras", body.cameras.map((camera) => `${camera.name}: ${camera.near} to ${camera.far} m, ${((camera.angle * 180) / Math.PI).toFixed(0)}°`).join("; ")],
   ];
   return (
     <div data-inspected={name}>
       <h3>{name}</h3>
+      <button
+        type="button"
+        aria-pressed={state.followed.value === name}
+        onClick={() => {
+          state.followed.value = state.followed.value === name ? "" : name;
+        }}
+      >
+        {state.followed.value === name ? "Follow no longer" : `Follow ${name}`}
+      </button>
       <Facts rows={rows} />
+      {body.robot && why === undefined && run.path !== "" && (
+        <p class="hint">Which behavior is active, why, and when it decides next: press Continue from here.</p>
+      )}
       <h4>History</h4>
       <History run={run} rows={run.events.about(name)} us={us} />
     </div>
@@ -117,6 +135,18 @@ function DoorView({ run, name }: { run: Run; name: string }) {
       <Facts rows={[["kind", "door"], ["now", run.doorOpen(name, us) ? "open" : "shut"]]} />
       <h4>History</h4>
       <History run={run} rows={run.events.ofEntity(name)} us={us} />
+    </div>
+  );
+}
+
+const BLOCKS: Record<string, string> = { nothing: "nothing", path: "ways", sight: "ways and sight" };
+
+function FurnitureView({ run, name }: { run: Run; name: string }) {
+  const thing = run.facts.home.objects.find((entry) => entry.name === name)!;
+  return (
+    <div data-inspected={name}>
+      <h3>{name.replaceAll("_", " ")}</h3>
+      <Facts rows={[["kind", thing.type.replaceAll("_", " ")], ["blocks", BLOCKS[thing.blocks] ?? thing.blocks]]} />
     </div>
   );
 }

@@ -1,7 +1,7 @@
 /** What the plan shows: switches, and the run's layers of cells. */
 
 import * as state from "../state";
-import { scaleColor } from "../theme";
+import { roomColor, scaleColor } from "../theme";
 
 const WORDS: Record<state.Switch, string> = {
   names: "names",
@@ -44,7 +44,47 @@ export function LayersPanel() {
         {layers.length === 0 && <p class="hint">The run stored none; a scenario asks for them under floorplan.layers.</p>}
         {state.layer.value && <ScaleBar />}
       </fieldset>
+      <Legend />
     </div>
+  );
+}
+
+const LEGEND: [string, string][] = [
+  ["●", "somebody; the point says where they face"],
+  ["■", "a robot"],
+  ["──", "its way of the last five minutes"],
+  ["┄┄", "its way of the next two minutes"],
+  ["◔", "what a camera has in view: yellow; further cameras blue, orange"],
+  ["◯", "somebody whom a robot notices"],
+  ["⊗", "a false observation, red"],
+  ["◌", "where somebody is in the other run, red"],
+  ["┅", "an area that robots keep out of"],
+];
+
+function Legend() {
+  const run = state.run.value!;
+  const kinds = new Map(run.facts.home.rooms.map((room) => [room.type, roomColor(room.color, room.deep_color)]).reverse() as [string, string][]);
+  return (
+    <fieldset class="legend">
+      <legend>Legend</legend>
+      <dl>
+        {LEGEND.map(([sign, words]) => (
+          <div key={sign}>
+            <dt aria-hidden="true">{sign}</dt>
+            <dd>{words}</dd>
+          </div>
+        ))}
+        {[...kinds].reverse().map(([kind, color]) => (
+          <div key={kind}>
+            <dt>
+              <span class="chip robot" style={{ background: color }} />
+            </dt>
+            <dd>{kind.replaceAll("_", " ")}</dd>
+          </div>
+        ))}
+      </dl>
+      <p class="hint">Rooms of one type differ in shade.</p>
+    </fieldset>
   );
 }
 

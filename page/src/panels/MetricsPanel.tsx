@@ -4,36 +4,73 @@ import { useSignal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 import uPlot from "uplot";
 import "uplot/dist/uPlot.min.css";
-import { type Series, readSeries } from "../data/metrics";
+import { numberColumns, readSeries, type Series, thinned } from "../data/metrics";
 import type { Run } from "../data/run";
 import * as state from "../state";
-import { bodyColor, colors } from "../theme";
-
-const PALETTE = ["#0077bb", "#ee7733", "#009988", "#aa3377", "#cc3311", "#33bbee", "#777777"];
+import { bodyColor, colors, PALETTE } from "../theme";
 
 export function MetricsPanel() {
   const run = state.run.value!;
   const tables = run.facts.tables.filter((table) => table.role === "metric" && table.rows > 0);
   return (
     <div>
-      {tables.map((table) => (
-        <Chart key={table.name} run={run} name={table.name} />
-      ))}
+      {tables.flatMap((table) => numberColumns(table).map((column) => <Chart key={`${table.name}.${column}`} run={run} name={table.name} column={column} />))}
+      <AnyColumn run={run} />
       <h3>Results</h3>
       <Results runs={state.runs.value} />
     </div>
   );
 }
 
-function Chart({ run, name }: { run: Run; name: string }) {
+/** A plot of any column of any table. */
+function AnyColumn({ run }: { run: Run }) {
+  const tables = run.facts.tables.filter((table) => table.rows > 0 && table.role !== "layer");
+  const [name = "", column = ""] = split(state.plot.value);
+  const exists = tables.some((table) => table.name === name && numberColumns(table).includes(column));
+  return (
+    <>
+      <label>
+        Plot{" "}
+        <select
+          aria-label="Column to plot"
+          value={exists ? state.plot.value : ""}
+          onChange={(event) => {
+            state.plot.value = event.currentTarget.value;
+          }}
+        >
+          <option value="">a column of a table …</option>
+          {tables.map((table) => (
+            <optgroup key={table.name} label={table.name}>
+              {numberColumns(table).map((entry) => (
+                <option key={entry} value={`${table.name}.${entry}`}>
+                  {table.name}.{entry}
+                </option>
+              ))}
+            </optgroup>
+          ))}
+        </select>
+      </label>
+      {exists && <Chart key={state.plot.value} run={run} name={name} column={column} />}
+    </>
+  );
+}
+
+/** Table and column of "table.column": names of tables may have dots, those of columns have none. */
+function split(plot: string): [string, string] {
+  const dot = plot.lastIndexOf(".");
+  return [plot.slice(0, Math.max(0, dot)), plot.slice(dot + 1)];
+}
+
+function Chart({ run, name, column }: { run: Run; name: string; column: string }) {
   const box = useRef<HTMLDivElement>(null);
   const lines = useSignal<Series[]>([]);
+  const unit = run.tableFacts(name)?.columns.find((entry) => entry.name === column)?.unit ?? "";
   useEffect(() => {
     void run.attempt(async () => {
       const table = await run.open(name);
-      if (table) lines.value = await readSeries(run.tableFacts(name)!, table, run.clock.stepUs);
+      if (table) lines.value = (await readSeries(run.tableFacts(name)!, table, run.clock.stepUs, column)).map(thinned);
     });
-  }, [run, name]);
+  }, [run, name, column]);
   useEffect(() => {
     if (lines.value.length === 0 || !box.current) return undefined;
     const chart = drawChart(box.current, run, lines.value);
@@ -41,8 +78,8 @@ function Chart({ run, name }: { run: Run; name: string }) {
   }, [lines.value, colors.value]);
   return (
     <figure class="chart">
-      <figcaption>{name.replaceAll("_", " ")}</figcaption>
-      <div ref={box} role="img" aria-label={`${name} over the run`} />
+      <figcaption>{`${name}: ${column}${unit ? ` [${unit}]` : ""}`.replaceAll("_", " ")}</figcaption>
+      <div ref={box} role="img" aria-label={`${column} of ${name} over the run`} />
     </figure>
   );
 }
@@ -61,6 +98,9 @@ function drawChart(box: HTMLElement, run: Run, lines: readonly Series[]): uPlot 
       return values;
     }),
   ];
+  const us = (seconds: number): number => (seconds * 1000 - run.clock.startMs) * 1000;
+  const dates = (_: uPlot, splits: number[]): string[] =>
+    splits.map((at) => (run.clock.timeText(us(at)) === "00:00:00" ? run.clock.dateText(us(at)).slice(4) : run.clock.timeText(us(at), false)));
   const axis: uPlot.Axis = { stroke: colors.value.text, grid: { stroke: colors.value.line }, ticks: { stroke: colors.value.line } };
   const options: uPlot.Options = {
     width: Math.max(200, box.clientWidth),
@@ -68,13 +108,15 @@ function drawChart(box: HTMLElement, run: Run, lines: readonly Series[]): uPlot 
     tzDate: (seconds) => new Date(seconds * 1000 + new Date(seconds * 1000).getTimezoneOffset() * 60_000),
     legend: { show: true, live: false },
     cursor: { drag: { x: false, y: false } },
-    axes: [axis, { ...axis, size: 44 }],
+    axes: [{ ...axis, values: dates }, { ...axis, size: 44 }],
     series: [
       {},
       ...lines.map((line, i) => ({
         label: line.name.replaceAll("_", " "),
         stroke: bodyColor(PALETTE[i % PALETTE.length]!),
         width: 1.5,
+        // With more lines than colours, the others are dashed: none looks like another.
+        ...(i >= PALETTE.length && { dash: [6, 4] }),
         spanGaps: true,
         points: { show: moments.length < 40, size: 4 },
       })),
@@ -83,7 +125,7 @@ function drawChart(box: HTMLElement, run: Run, lines: readonly Series[]): uPlot 
   const chart = new uPlot(options, data, box);
   chart.over.addEventListener("click", () => {
     const seconds = chart.posToVal(chart.cursor.left ?? 0, "x");
-    state.goTo((seconds * 1000 - run.clock.startMs) * 1000);
+    state.goTo(us(seconds));
   });
   return chart;
 }

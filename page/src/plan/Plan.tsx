@@ -1,6 +1,6 @@
 /** The plan of a run at the moment: ground, layers, people, robots. */
 
-import { effect } from "@preact/signals";
+import { effect, useSignal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 import type { Run } from "../data/run";
 import type { Layer } from "../data/layers";
@@ -9,10 +9,13 @@ import { askCall, askPlace, branchHere, branching, calling, closeRun, placing } 
 import * as state from "../state";
 import { colors, dark, scaleColor } from "../theme";
 import { drawBeliefs } from "./beliefs";
+import { bodyState } from "../panels/Now";
 import { bodyRadius, drawScene } from "./bodies";
 import { fitted, oncePerFrame } from "./canvas";
 import { FOOT, Frame } from "./frame";
 import { cellImage, drawCells, drawGround, tracePolygons } from "./ground";
+
+const FOLLOW_ZOOM = 3;
 
 interface Pointer {
   x: number;
@@ -40,6 +43,7 @@ class PlanPainter {
   paint(): void {
     const { context, width, height } = fitted(this.canvas);
     if (width === 0 || height === 0) return;
+    this.centre(width, height);
     const frame = Frame.fit(this.run.home, width, height, this.zoom, this.shift);
     this.frame = frame;
     this.paintGround(frame, width, height);
@@ -56,6 +60,15 @@ class PlanPainter {
       shows: (name) => state.shown.value.has(name as state.Switch),
       other: this.other,
     });
+  }
+
+  /** Keep the body that is followed in the middle. */
+  private centre(width: number, height: number): void {
+    const pose = state.followed.value && this.run.tracks.get(state.followed.value)?.poseAt(state.moment.value);
+    if (!pose || pose.away) return;
+    this.zoom = Math.max(this.zoom, FOLLOW_ZOOM);
+    const frame = Frame.fit(this.run.home, width, height, this.zoom);
+    this.shift = [width / 2 - frame.ux(pose.x), (height - FOOT) / 2 - frame.uy(pose.y)];
   }
 
   private paintGround(frame: Frame, width: number, height: number): void {
@@ -116,13 +129,38 @@ class PlanPainter {
       return Math.hypot(mx - x, my - y) * frame.scale < 14;
     });
     if (door) return door.name;
+    const thing = state.shown.value.has("furniture") ? run.facts.home.objects.find((entry) => isInside(entry.outline, x, y)) : undefined;
+    if (thing) return thing.name;
     const room = run.home.roomAt(run.home.units(x, 0), run.home.units(y, 1));
     return room >= 0 ? run.home.roomName(room) : "";
+  }
+
+  /** What is at a pixel, with its figures, in words. */
+  wordsAt(px: number, py: number): string {
+    const { run } = this;
+    const name = this.thingAt(px, py);
+    if (!name) return "";
+    const now = bodyState(run, name, state.moment.value);
+    if (now) return [name, now.room, now.activity, now.sees.length > 0 ? `sees ${now.sees.join(", ")}` : ""].filter(Boolean).join(" · ").replaceAll("_", " ");
+    const room = run.facts.home.rooms[run.home.roomIndex(name)];
+    if (room) return `${name} · ${room.area_m2.toFixed(1)} m²`.replaceAll("_", " ");
+    const door = run.facts.home.doors.some((entry) => entry.name === name);
+    return (door ? `${name} · ${run.doorOpen(name, state.moment.value) ? "open" : "shut"}` : name).replaceAll("_", " ");
   }
 
   placeAt(px: number, py: number): [number, number] | null {
     return this.frame?.place(px, py) ?? null;
   }
+}
+
+/** Whether a point is inside an outline. */
+function isInside(outline: readonly (readonly [number, number])[], x: number, y: number): boolean {
+  let inside = false;
+  outline.forEach(([x0, y0], i) => {
+    const [x1, y1] = outline[(i + 1) % outline.length]!;
+    if (y0 > y !== y1 > y && x < x0 + ((y - y0) / (y1 - y0)) * (x1 - x0)) inside = !inside;
+  });
+  return inside;
 }
 
 function layerImage(run: Run, layer: Layer): HTMLCanvasElement {
@@ -137,18 +175,19 @@ function layerImage(run: Run, layer: Layer): HTMLCanvasElement {
 
 export function Plan({ run, other, title }: { run: Run; other: Run | null; title: string }) {
   const canvas = useRef<HTMLCanvasElement>(null);
+  const hover = useSignal<{ words: string; x: number; y: number } | null>(null);
   useEffect(() => {
     const painter = new PlanPainter(canvas.current!, run, other);
     const repaint = oncePerFrame(() => painter.paint());
     const stopPainting = effect(() => {
       void [run.version.value, state.moment.value, state.shown.value, state.selected.value];
-      void [state.layer.value, state.belief.value, colors.value, other?.version.value];
+      void [state.layer.value, state.belief.value, state.followed.value, colors.value, other?.version.value];
       repaint();
     });
     const stopReading = readAtMoment(run, painter, repaint);
     const observer = new ResizeObserver(repaint);
     observer.observe(canvas.current!);
-    const stopPointing = followPointer(canvas.current!, run, painter, repaint);
+    const stopPointing = followPointer(canvas.current!, run, painter, repaint, hover);
     return () => {
       stopPainting();
       stopReading();
@@ -159,6 +198,11 @@ export function Plan({ run, other, title }: { run: Run; other: Run | null; title
   return (
     <figure class="plan">
       <canvas ref={canvas} role="img" aria-label={`Floor plan of ${run.facts.home.name}, ${title}`} />
+      {hover.value && (
+        <output class="hover" aria-live="off" style={{ left: `${hover.value.x}px`, top: `${hover.value.y}px` }} data-side={hover.value.x > 400 ? "left" : "right"}>
+          {hover.value.words}
+        </output>
+      )}
       {title && (
         <figcaption>
           {title}
@@ -195,26 +239,51 @@ function readAtMoment(run: Run, painter: PlanPainter, repaint: () => void): () =
   });
 }
 
-function followPointer(canvas: HTMLCanvasElement, run: Run, painter: PlanPainter, repaint: () => void): () => void {
+function followPointer(
+  canvas: HTMLCanvasElement,
+  run: Run,
+  painter: PlanPainter,
+  repaint: () => void,
+  hover: { value: { words: string; x: number; y: number } | null },
+): () => void {
   let held: Pointer | null = null;
+  /** Fingers on the plan, by their pointers: two of them zoom. */
+  const fingers = new Map<number, [number, number]>();
   const at = (event: PointerEvent | WheelEvent): [number, number] => [event.offsetX, event.offsetY];
   const down = (event: PointerEvent): void => {
     const [x, y] = at(event);
+    if (event.pointerType === "touch") fingers.set(event.pointerId, [x, y]);
+    hover.value = null;
     held = { x, y, moved: false, body: feedOf(run) ? painter.bodyAt(x, y) : "" };
     canvas.setPointerCapture(event.pointerId);
   };
   const move = (event: PointerEvent): void => {
-    if (!held) return;
     const [x, y] = at(event);
+    const other = [...fingers].find(([id]) => id !== event.pointerId)?.[1];
+    if (other && fingers.has(event.pointerId)) {
+      const before = fingers.get(event.pointerId)!;
+      const far = Math.hypot(x - other[0], y - other[1]);
+      zoomAbout((x + other[0]) / 2, (y + other[1]) / 2, far / Math.hypot(before[0] - other[0], before[1] - other[1]));
+      fingers.set(event.pointerId, [x, y]);
+      held = null;
+      return;
+    }
+    if (!held) {
+      const words = painter.wordsAt(x, y);
+      hover.value = words ? { words, x, y } : null;
+      return;
+    }
     if (!held.moved && Math.hypot(x - held.x, y - held.y) < 4) return;
     held.moved = true;
     if (held.body) return;
+    state.followed.value = "";
     painter.shift = [painter.shift[0] + x - held.x, painter.shift[1] + y - held.y];
     [held.x, held.y] = [x, y];
     repaint();
   };
   const up = (event: PointerEvent): void => {
     const [x, y] = at(event);
+    fingers.delete(event.pointerId);
     const place = painter.placeAt(x, y);
     if (held?.moved && held.body && place) void askPlace(run, held.body, ...place);
     else if (held && !held.moved && calling.value && place) void askCall(run, calling.value, ...place);
@@ -224,15 +293,19 @@ function followPointer(canvas: HTMLCanvasElement, run: Run, painter: PlanPainter
   };
   const wheel = (event: WheelEvent): void => {
     event.preventDefault();
-    const factor = Math.exp(-event.deltaY * 0.0015);
+    zoomAbout(event.offsetX, event.offsetY, Math.exp(-event.deltaY * 0.0015));
+  };
+  const zoomAbout = (px: number, py: number, factor: number): void => {
+    if (!Number.isFinite(factor)) return;
     const next = Math.max(1, Math.min(40, painter.zoom * factor));
-    const [x, y] = [event.offsetX - canvas.clientWidth / 2, event.offsetY - (canvas.clientHeight - FOOT) / 2];
+    const [x, y] = [px - canvas.clientWidth / 2, py - (canvas.clientHeight - FOOT) / 2];
     const share = next / painter.zoom;
     painter.shift = next === 1 ? [0, 0] : [x - (x - painter.shift[0]) * share, y - (y - painter.shift[1]) * share];
     painter.zoom = next;
     repaint();
   };
   const showWholePlan = (): void => {
+    state.followed.value = "";
     painter.zoom = 1;
     painter.shift = [0, 0];
     repaint();
@@ -241,12 +314,17 @@ function followPointer(canvas: HTMLCanvasElement, run: Run, painter: PlanPainter
   canvas.addEventListener("pointermove", move);
   canvas.addEventListener("pointerup", up);
   canvas.addEventListener("wheel", wheel, { passive: false });
+  const leave = (): void => {
+    hover.value = null;
+  };
+  canvas.addEventListener("pointerleave", leave);
   canvas.addEventListener("dblclick", showWholePlan);
   return () => {
     canvas.removeEventListener("pointerdown", down);
     canvas.removeEventListener("pointermove", move);
     canvas.removeEventListener("pointerup", up);
     canvas.removeEventListener("wheel", wheel);
+    canvas.removeEventListener("pointerleave", leave);
     canvas.removeEventListener("dblclick", showWholePlan);
   };
 }

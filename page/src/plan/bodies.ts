@@ -4,7 +4,7 @@ import type { BodyFacts, CameraFacts } from "../contract";
 import { isFalse } from "../data/observations";
 import type { Run } from "../data/run";
 import { type Pose, TURN } from "../data/tracks";
-import { bodyColor, type Colors } from "../theme";
+import { bodyColor, cameraColors, type Colors } from "../theme";
 import type { Frame } from "./frame";
 
 type Context = CanvasRenderingContext2D;
@@ -38,7 +38,7 @@ export function drawScene(context: Context, scene: Scene): void {
   if (shows("sight")) {
     for (const body of run.bodies) {
       const pose = poses.get(body.name);
-      if (pose && !pose.away) body.cameras.forEach((camera) => drawView(context, scene, pose, camera));
+      if (pose && !pose.away) body.cameras.forEach((camera, i) => drawView(context, scene, pose, camera, i, body.cameras.length));
     }
   }
   if (shows("ways")) run.bodies.forEach((body) => drawWay(context, scene, body));
@@ -76,7 +76,7 @@ export function cameraPose(run: Run, pose: Pose, camera: CameraFacts, us: number
   return [Math.round(x), Math.round(y), body + camera.heading + pan];
 }
 
-function drawView(context: Context, scene: Scene, pose: Pose, camera: CameraFacts): void {
+function drawView(context: Context, scene: Scene, pose: Pose, camera: CameraFacts, number: number, cameras: number): void {
   const { run, us, frame, colors } = scene;
   const walls = run.wallsAt(us);
   if (!walls) return;
@@ -95,12 +95,16 @@ function drawView(context: Context, scene: Scene, pose: Pose, camera: CameraFact
   if (camera.near > 0) context.arc(px, py, camera.near * frame.scale, to, from, true);
   else if (camera.angle < 2 * Math.PI - 1e-9) context.lineTo(px, py);
   context.closePath();
-  context.fillStyle = colors.view;
+  const [fill, edge] = cameraColors(number, colors);
+  context.fillStyle = fill;
   context.fill();
-  context.strokeStyle = colors.viewEdge;
+  context.strokeStyle = edge;
   context.lineWidth = 1;
   context.stroke();
   context.restore();
+  if (cameras < 2 || !scene.shows("names")) return;
+  const far = Math.min(camera.far * 0.4 * frame.scale, 60);
+  drawName(context, colors, camera.name, edge, px + far * Math.cos(-heading), py + far * Math.sin(-heading));
 }
 
 function drawWay(context: Context, scene: Scene, body: BodyFacts): void {

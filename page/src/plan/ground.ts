@@ -42,6 +42,7 @@ export function drawGround(context: Context, home: Home, frame: Frame, options: 
   drawCells(context, home, frame, roomImage(home, options.dark));
   context.restore();
   if (options.furniture) facts.objects.forEach((thing) => drawObject(context, frame, thing, options.colors));
+  if (options.furniture && options.names) facts.objects.forEach((thing) => nameObject(context, frame, thing, options.colors));
   for (const area of facts.no_go) {
     tracePolygons(context, frame, [area]);
     context.strokeStyle = options.colors.alarm;
@@ -125,6 +126,20 @@ function drawObject(context: Context, frame: Frame, thing: ObjectFacts, colors: 
   context.strokeStyle = colors.furnitureEdge;
   context.lineWidth = thing.blocks === "sight" ? 1.6 : 0.8;
   context.stroke();
+}
+
+/** Name a piece of furniture if the name fits into it. */
+function nameObject(context: Context, frame: Frame, thing: ObjectFacts, colors: Colors): void {
+  const [xs, ys] = [0, 1].map((axis) => thing.outline.map((corner) => corner[axis]!)) as [number[], number[]];
+  const [left, right] = [Math.min(...xs), Math.max(...xs)];
+  const words = thing.type.replaceAll("_", " ");
+  context.font = "9px system-ui, sans-serif";
+  const [wide, tall] = [(right - left) * frame.scale, (Math.max(...ys) - Math.min(...ys)) * frame.scale];
+  if (context.measureText(words).width > wide - 2 || tall < 11) return;
+  context.textAlign = "center";
+  context.textBaseline = "middle";
+  context.fillStyle = colors.quiet;
+  context.fillText(words, frame.x((left + right) / 2), frame.y((Math.min(...ys) + Math.max(...ys)) / 2));
 }
 
 function drawNames(context: Context, home: Home, frame: Frame, colors: Colors): void {

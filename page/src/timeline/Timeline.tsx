@@ -9,7 +9,7 @@ import { fitted, oncePerFrame } from "../plan/canvas";
 import * as state from "../state";
 import { colors } from "../theme";
 import { drawCursor, drawMarked, drawRows, heightOf, type PlacedRow, visibleRows, xOf } from "./draw";
-import { answerLane, beliefLanes, type Lane, lanesOf, tableLanes } from "./lanes";
+import { answerLane, beliefLanes, type Lane, lanesOf, noteLane, tableLanes } from "./lanes";
 import { followPointer, scaleOf } from "./pointer";
 import * as shown from "./rows";
 
@@ -40,11 +40,11 @@ function useLanes(): ReadonlySignal<Lane[]> {
       });
       const asked = answer && answer.spans.length > 0 ? [answerLane(answer)] : [];
       const showsBeliefs = state.panel.value === "beliefs" || state.shown.value.has("beliefs");
-      lanes.value = [...asked, ...(showsBeliefs && runs[0] ? beliefLanes(runs[0]) : []), ...own];
+      lanes.value = [...asked, ...(runs[0] ? noteLane(runs[0]) : []), ...(showsBeliefs && runs[0] ? beliefLanes(runs[0]) : []), ...own];
     };
     const stop = effect(() => {
       void [colors.value, state.answer.value, extra.value, state.panel.value, state.shown.value, state.belief.value];
-      for (const run of state.runs.value) void run.version.value;
+      for (const run of state.runs.value) void [run.version.value, run.notes.value];
       clearTimeout(timer);
       const wait = state.live.value ? last + LIVE_MS - performance.now() : 0;
       if (wait > 0) timer = setTimeout(make, wait);

@@ -8,7 +8,7 @@ import { shownText } from "../data/events";
 import { firstAtLeast, lastAtMost } from "../data/search";
 import { differences, type Stretches, valueAt } from "../data/stretches";
 import { chosenBelief, errorsOf } from "../plan/beliefs";
-import { bodyColor, colors, dark, mix } from "../theme";
+import { bodyColor, colors, dark, mix, PALETTE } from "../theme";
 import { type Series, readSeries } from "../data/metrics";
 import type { Group } from "./rows";
 
@@ -40,15 +40,13 @@ export type LanePaint =
   | { kind: "line"; series: Series; extent: readonly [number, number]; color: string }
   | { kind: "heat"; beliefs: BeliefSeries; rows: readonly number[]; truth: Stretches; color: string; endUs: number };
 
-/** Distinct colours with any kind of colour blindness (Paul Tol's muted scheme). */
-const WORD_COLORS = ["#88ccee", "#ddcc77", "#cc6677", "#44aa99", "#aa4499", "#999933", "#332288", "#117733", "#882255"];
 /** Every word keeps its colour, in all lanes of all runs. */
 const colorOfWord = new Map<string, string>();
 
 function wordColor(word: string): string {
   let color = colorOfWord.get(word);
   if (!color) {
-    color = WORD_COLORS[colorOfWord.size % WORD_COLORS.length]!;
+    color = PALETTE[colorOfWord.size % PALETTE.length]!;
     colorOfWord.set(word, color);
   }
   return color;
@@ -109,6 +107,15 @@ export function answerLane(answer: Answer): Lane {
   const words = (value: number): string => spans[value]?.words ?? "";
   const color = (): string => colors.value.cursor;
   return stretchLane({ id: "answer", label: answer.question, subject: "", group: "Answers", height: 16 }, () => stretches, color, words, () => 1);
+}
+
+/** The notes and bookmarks of a run. */
+export function noteLane(run: Run): Lane[] {
+  const notes = run.notes.value;
+  if (notes.length === 0) return [];
+  const us = notes.map((note) => note.step * run.clock.stepUs);
+  const words = (at: number): string => notes[lastAtMost(us, at)]?.text ?? "";
+  return [tickLane({ id: "notes", label: "notes", subject: "", group: "Answers", height: 14 }, () => us, colors.value.cursor, words)];
 }
 
 /** What a lane is called and where it stands; the lanes of a body are in its group. */

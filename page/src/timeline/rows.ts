@@ -7,7 +7,7 @@ export const GROUPS = ["Answers", "Beliefs", "Users", "Robots", "Doors and senso
 export type Group = (typeof GROUPS)[number];
 
 /** With more bodies, or more lanes in another group, they are folded at first. */
-const MOST_OPEN = 6;
+const MOST_OPEN = 4;
 const MOST_LANES = 12;
 const HEADER_HEIGHT = 18;
 

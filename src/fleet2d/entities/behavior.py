@@ -425,6 +425,12 @@ class Actor(Body):
             self._bodies.ask_at[self.row] = NEVER if step is None else step
 
     @property
+    def asked_at(self) -> int | None:
+        """The step at which it decides next, if nothing interrupts it; None: never."""
+        at = NEVER if self._bodies is None else int(self._bodies.ask_at[self.row])
+        return None if at == NEVER else at
+
+    @property
     def attention(self) -> Attention | None:
         """Which actions of robots interrupt its plans: those of the first attentive behavior."""
         return self._attentive[1] if self._attentive else None

@@ -176,6 +176,13 @@ class RunFacts(TypedDict):
     walks_every_s: float
 
 
+class NoteFacts(TypedDict):
+    """A note at a step of a run; without a text it is a bookmark."""
+
+    step: int
+    text: str
+
+
 class Problem(TypedDict):
     """The reason why something can't be shown."""
 
@@ -210,7 +217,10 @@ class BranchOrder(TypedDict):
 
 
 class LiveBody(TypedDict):
-    """A body at a step of a running simulation [lattice], and its path ahead: time [us], x, y."""
+    """A body at a step of a running simulation [lattice], and its path ahead: time [us], x, y.
+
+    At the step `decides` its behaviors are asked next, if nothing interrupts it; -1: at none.
+    """
 
     name: str
     x: int
@@ -219,6 +229,7 @@ class LiveBody(TypedDict):
     away: bool
     ahead: list[tuple[int, int, int]]
     note: str
+    decides: int
 
 
 class LiveEvent(TypedDict):

@@ -1,6 +1,7 @@
 """The home on the page: its rooms and pieces, and its walls and doors as they change in a run."""
 
 import re
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -60,7 +61,7 @@ def home_facts(plan: FloorPlan, doors: Sequence[DoorFacts] = ()) -> HomeFacts:
             ]
             for part in plan.polygons
         ],
-        rooms=[_room_facts(room) for room in plan.rooms],
+        rooms=_rooms_facts(plan.rooms),
         room_cells=runs_of(plan.room_of_cell),
         place_cells=runs_of(plan.room_of_place),
         doorways=[(d.start, d.end) for d in plan.doorways],
@@ -103,12 +104,22 @@ def points(coordinates: NDArray[Any]) -> list[Point]:
     return [(x, y) for x, y in np.round(coordinates, DIGITS).tolist()]
 
 
-def _room_facts(room: Room) -> RoomFacts:
+def _rooms_facts(rooms: Sequence[Room]) -> list[RoomFacts]:
+    """Return the facts of rooms; those of one type have different shades."""
+    counts: Counter[str] = Counter()
+    facts = []
+    for room in rooms:
+        facts.append(_room_facts(room, counts[room.type]))
+        counts[room.type] += 1
+    return facts
+
+
+def _room_facts(room: Room, number: int) -> RoomFacts:
     return RoomFacts(
         name=room.name,
         type=room.type,
-        color=room_color(room.type),
-        deep_color=deep_color(room.type),
+        color=room_color(room.type, number),
+        deep_color=deep_color(room.type, number),
         anchor=room.anchor_xy,
         area_m2=room.area_m2,
     )

@@ -76,6 +76,7 @@ class LiveEngine:
                 away=bool(actor.state.away),
                 ahead=list(self._ahead(actor)),
                 note=_note(actor),
+                decides=-1 if actor.asked_at is None else actor.asked_at,
             )
             for name, actor in self.simulation.actors.items()
         ]

@@ -22,7 +22,7 @@ from fleet2d.viewer.home_facts import walls_facts
 from fleet2d.viewer.live import MAX_ORDER_BYTES, LiveRun, read_order
 from fleet2d.viewer.page_data import PageData, compact_json
 from fleet2d.viewer.run_facts import live_facts
-from fleet2d.viewer.served_runs import ServedRuns, json_answer, problem
+from fleet2d.viewer.served_runs import ServedRuns, json_answer, json_body, problem
 
 MAX_BRANCHES = 4
 
@@ -133,7 +133,7 @@ class LiveRuns:
             except (Fleet2DError, ValueError) as error:
                 return problem(str(error))
 
-        body = await _json_body(request)
+        body = await json_body(request)
         return body if isinstance(body, Response) else await run_in_threadpool(begin, body)
 
     async def _facts(self, request: Request) -> Response:
@@ -166,7 +166,7 @@ class LiveRuns:
         return StreamingResponse(lines(), media_type="text/event-stream")
 
     async def _order(self, request: Request) -> Response:
-        body = await _json_body(request)
+        body = await json_body(request)
         if isinstance(body, Response):
             return body
         try:
@@ -175,12 +175,6 @@ class LiveRuns:
             return problem(str(error))
         refusal = await run_in_threadpool(live.submit, order)
         return problem(refusal) if refusal else json_answer(b"{}")
-
-
-async def _json_body(request: Request) -> bytes | Response:
-    if request.headers.get("content-type", "").split(";")[0] != "application/json":
-        return problem("an order must be JSON", 415)
-    return await request.body()
 
 
 def read_branch(body: bytes) -> BranchOrder:

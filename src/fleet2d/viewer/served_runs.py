@@ -13,6 +13,7 @@ from fleet2d.errors import ArtifactError, Fleet2DError
 from fleet2d.runs.run import open_run
 from fleet2d.viewer.contract import Problem
 from fleet2d.viewer.page_data import PageData, compact_json
+from fleet2d.viewer.run_notes import read_notes, write_notes
 
 Endpoint = Callable[[Request], Awaitable[Response]]
 
@@ -74,15 +75,37 @@ class ServedRuns:
                 _ = data.tracks
                 _ = data.sightings
 
+    async def _store_notes(self, request: Request) -> Response:
+        body = await json_body(request)
+        if isinstance(body, Response):
+            return body
+        store = _endpoint(
+            self, lambda data, _: json_answer(compact_json(write_notes(data.run, body)))
+        )
+        return await store(request)
+
     def routes(self) -> list[Route]:
         """Return the routes of the data of all runs."""
         return [
             Route("/run/{number:int}/facts.json", _endpoint(self, _facts)),
             Route("/run/{number:int}/sightings.json", _endpoint(self, _sightings)),
             Route("/run/{number:int}/tracks.bin", _endpoint(self, _tracks)),
+            Route("/run/{number:int}/notes.json", _endpoint(self, _notes)),
+            Route("/run/{number:int}/notes", self._store_notes, methods=["POST"]),
             Route("/run/{number:int}/walls/{walls:int}.json", _endpoint(self, _walls)),
             Route("/run/{number:int}/tables/{table}.parquet", _endpoint(self, _table)),
         ]
+
+
+def _notes(data: PageData, _: Request) -> Response:
+    return json_answer(compact_json(read_notes(data.run)))
+
+
+async def json_body(request: Request) -> bytes | Response:
+    """Return the body of a request that must be JSON, or the refusal."""
+    if request.headers.get("content-type", "").split(";")[0] != "application/json":
+        return problem("a change must be requested as JSON", 415)
+    return await request.body()
 
 
 def _endpoint(runs: ServedRuns, respond: Callable[[PageData, Request], Response]) -> Endpoint:

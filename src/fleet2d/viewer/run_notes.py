@@ -1,0 +1,93 @@
+"""Notes and bookmarks of a run, in a file beside its directory: no part of the run or its seal."""
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from fleet2d.errors import InputError
+from fleet2d.runs.run import Run
+from fleet2d.storage.files import write_atomically
+from fleet2d.viewer.contract import NoteFacts
+
+MAX_NOTES = 1_000
+MAX_TEXT = 2_000
+MAX_BYTES = 4_000_000
+SUFFIX = ".notes.json"
+
+
+def notes_path(run: Run) -> Path:
+    """Return the file of the notes of a run: `month.notes.json` beside `month`.
+
+    Raises:
+        InputError: The run isn't stored.
+    """
+    if run.directory is None:
+        raise InputError("the run is in memory: notes are stored beside the directory of a run")
+    root = Path(run.directory).resolve()
+    return root.with_name(root.name + SUFFIX)
+
+
+def read_notes(run: Run) -> list[NoteFacts]:
+    """Return the notes of a run, in the order of their steps.
+
+    Raises:
+        InputError: Their file can't be read.
+    """
+    if run.directory is None or not notes_path(run).exists():
+        return []
+    path = notes_path(run)
+    try:
+        with path.open("rb") as file:
+            return checked_notes(file.read(MAX_BYTES + 1))
+    except (OSError, InputError) as error:
+        raise InputError(f"{path} can't be read: {error}") from None
+
+
+def write_notes(run: Run, body: bytes) -> list[NoteFacts]:
+    """Store all notes of a run in place of the present ones, and return them.
+
+    Raises:
+        InputError: The body isn't notes, the run isn't stored, or the file can't be written.
+    """
+    notes, path = checked_notes(body), notes_path(run)
+    content = json.dumps(notes, indent=1, ensure_ascii=False).encode()
+    try:
+        write_atomically(path, content)
+    except OSError as error:
+        raise InputError(f"{path} can't be written: {error.strerror}") from error
+    return notes
+
+
+def checked_notes(body: bytes) -> list[NoteFacts]:
+    """Return the notes in a file or a request.
+
+    Raises:
+        InputError: It is not a list of notes, or there are too many.
+
+    Example:
+        >>> checked_notes(b'[{"step": 5, "text": "why?"}, {"step": 2, "text": ""}]')
+        [{'step': 2, 'text': ''}, {'step': 5, 'text': 'why?'}]
+    """
+    try:
+        content: Any = json.loads(body) if len(body) <= MAX_BYTES else None
+        if not isinstance(content, list):
+            raise TypeError
+        notes = [NoteFacts(step=entry["step"], text=entry["text"]) for entry in content]
+    except (ValueError, KeyError, TypeError, RecursionError):
+        raise InputError("notes are a list of {step, text}") from None
+    if len(notes) > MAX_NOTES or any(not _is_note(note) for note in notes):
+        raise InputError(
+            f"notes are at most {MAX_NOTES} of a step and a text of up to {MAX_TEXT} characters"
+        )
+    return sorted(notes, key=lambda note: note["step"])
+
+
+def _is_note(note: Mapping[str, Any]) -> bool:
+    step, text = note["step"], note["text"]
+    return (
+        type(step) is int
+        and 0 <= step < 1 << 53
+        and isinstance(text, str)
+        and len(text) <= MAX_TEXT
+    )
