@@ -8,7 +8,7 @@
 namespace fleet2d {
 namespace {
 
-constexpr i64 TRIES = 64;  // points of a sector that are tried before nothing is taken to be in view
+constexpr i64 TRIES = 1024;  // points of a sector that are tried before nothing is taken to be in view
 
 // whole * part / 2**20, rounded down, for any whole below 2**62 and part below 2**20.
 constexpr i64 scaled(i64 whole, i64 part) { return (whole >> 20) * part + (((whole & ((1 << 20) - 1)) * part) >> 20); }

@@ -269,6 +269,23 @@ def test_false_positives_come_at_their_rate_where_and_as_whom_they_are_told(rows
     assert (real["user"] == "ana").all()
 
 
+def test_false_positives_of_a_camera_before_a_wall_come_at_their_rate(folder: Path) -> None:
+    """Nearly all of what it could see is hidden: with 64 draws of a point, two of five failed."""
+    robot = {
+        "start": [0.6, 5.0], "start_heading_deg": 180,
+        "camera": {"range": [0.2, 6.0], "angle_deg": 90},
+        "perception": {"false_positives": {"per_hour": 60}},
+    }  # fmt: skip
+    content = {
+        "simulation": {"start": "2026-01-05", "duration": "10 h", "seed": 4, "step": "2 s"},
+        "floorplan": {"type": "native", "path": str(folder / "hall.json")},
+        "users": {"ana": {"type": "guest"}},
+        "robots": {"astro": robot},
+    }
+    count = len(table(fleet2d.run(content), "observations")["x"])
+    assert abs(count - 600) < 4.5 * np.sqrt(600)
+
+
 def test_looks_come_at_their_period_and_rows_after_their_latency(rows: Rows) -> None:
     """6 s are 3 steps of 2 s; 5 s are rounded up to 3."""
     for user in USERS:

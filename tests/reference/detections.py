@@ -232,7 +232,7 @@ class Errors:
             there = (x + self._noise(key, 0, noise), y + self._noise(key, 1, noise))
             return there if visible(walls, here, np.array([there]))[0] else None
         half = min(eye.half_angle, 4096)
-        for attempt in range(64):
+        for attempt in range(1024):
             part = random_below(key, 2 * attempt, 2**20)
             reach = math.isqrt(eye.near**2 + (eye.far**2 - eye.near**2) * part // 2**20)
             turned = 2 * heading + random_below(key, 2 * attempt + 1, 2 * half) - half
