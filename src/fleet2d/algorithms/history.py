@@ -71,7 +71,7 @@ class Blocks:
         self._rows.append(rows)
 
     def touching(self, begin: int, end: int) -> tuple[int, NDArray[Any] | None]:
-        """Return all blocks that overlap a stretch of time, joined, and their begin."""
+        """Return all blocks that overlap a stretch of time, joined, and where they begin."""
         overlap = self._touching(begin, end)
         blocks = self._rows[overlap]
         if not blocks:

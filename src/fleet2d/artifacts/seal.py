@@ -209,7 +209,7 @@ class Verification:
 
     @property
     def same(self) -> bool:
-        """Whether all that could be compared is what was stored."""
+        """Whether everything that could be compared equals what was stored."""
         return not self.differing
 
 

@@ -131,7 +131,7 @@ def _check_names(entries: Any) -> Any:
 
 
 def once(info: ValidationInfo, key: object, validate: Callable[[], T]) -> T:
-    """Return what many entries of a scenario name, such as a file, validated for the first of them.
+    """Return the validated form of what many entries name, such as a file: it is validated once.
 
     Args:
         info: Of the entry's validation, in whose context, if there is any, the result is kept.

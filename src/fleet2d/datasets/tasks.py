@@ -164,7 +164,7 @@ def _score_rtp(data: Dataset, split: str, models: Mapping[str, Weights]) -> list
 
 
 def _padded(beliefs: Sequence[F64], width: int) -> F64:
-    """Return beliefs of homes with fewer places with zeros for those that they lack."""
+    """Pad the beliefs of homes that have fewer places than the largest with zeros."""
     return np.concatenate([np.pad(b, ((0, 0), (0, width - b.shape[1]))) for b in beliefs])
 
 

@@ -1,4 +1,4 @@
-"""Conversations: what robots want of people comes up, people are addressed, and they answer.
+"""Conversations: requests of robots come up, people are addressed, and they answer.
 
 All of it follows from the poses and plans alone, step by step, so it doesn't depend on spans. A
 span ends when a request comes up and with each question and answer; the robot decides after it.

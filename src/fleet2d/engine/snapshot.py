@@ -330,7 +330,7 @@ class _SnapshotParts:
             self._flush()
 
     def finish(self) -> None:
-        """Write the rest and the digest of all."""
+        """Write what remains, and the digest of everything."""
         self._hash.update(self._buffer)
         self._buffer += self._hash.hexdigest().encode()
         self._flush()

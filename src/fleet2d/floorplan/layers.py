@@ -243,7 +243,7 @@ class Layers(Mapping[str, Layer]):
             known = ", ".join(get_args(LayerType))
             raise ComponentError(f"layer {name!r}: there is no dtype {dtype!r}; there are: {known}")
         if not holds(np.dtype(dtype), fill):
-            raise ComponentError(f"layer {name!r}: no {dtype} can be {fill:g}, its fill")
+            raise ComponentError(f"layer {name!r}: its fill value, {fill:g}, doesn't fit {dtype}")
         if name.partition(".")[0] in (*SEEN_LAYERS, COSTMAP):
             raise ComponentError(
                 f"layer {name!r} is one that the run maintains itself: rename yours"

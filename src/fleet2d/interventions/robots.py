@@ -372,7 +372,7 @@ class RealDetection(Settings):
 
 @register("intervention", "perceive")
 class Perceive(RobotIntervention):
-    """Let a robot perceive people now, as a real robot did: one whose `perceives` is `live`.
+    """Let a robot with `perceives: live` perceive people now, as a real robot did.
 
     Attributes:
         detections: The people, as {user: ana, x: 1.5, y: 2}.

@@ -38,7 +38,7 @@ class Year:
         return {**self.__dict__, "_drawn": {}}
 
     def on(self, ordinal: int) -> dict[str, Days]:
-        """Return the first and last day of each event that a day is in, by the event's name."""
+        """Return the first and last day of each event that covers a day, by the event's name."""
         year = date.fromordinal(ordinal).year
         found: dict[str, Days] = {}
         for name in self.events:
