@@ -135,3 +135,19 @@ def test_page_on_security_says_of_every_command_whether_it_runs_code() -> None:
     missing = set(group.list_commands(typer.Context(group))) - stated
 
     assert not missing, f"add to the table in docs/security.md: {sorted(missing)}"
+
+
+def test_each_line_of_the_threat_model_names_its_tests() -> None:
+    text = (DOCS / "security.md").read_text(encoding="utf-8")
+    table = text.split("| defended | against | test |\n| --- | --- | --- |\n", 1)[1]
+    tests = DOCS.parent / "tests"
+
+    lines = [line.split("|")[3] for line in table.split("\n\n", 1)[0].splitlines()]
+
+    assert len(lines) >= 9
+    for line in lines:
+        named = re.findall(r"`([^`]+)`", line)
+        assert named, line
+        for name in named:
+            path = tests.parent / name if "/" in name else tests / "hostile" / name
+            assert path.is_file() or any(path.glob("test_*.py")), name

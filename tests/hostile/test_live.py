@@ -90,6 +90,8 @@ def act(verb: str, names: st.SearchStrategy[Any], **fields: Any) -> st.SearchStr
 users, robots, bodies, places = (any_of(*names) for names in (USERS, ROBOTS, BODIES, PLACES))
 durations = any_of("1 s", "7 s", "3 min")
 lasting = {"duration": durations}
+AREA = [[3.0, 1.0], [5.0, 1.0], [5.0, 3.5], [3.0, 3.5]]
+KEYS = any_of({"dwell": "3 s"}, {"stay": "30 s"}, {"speed": 1.0}, {})
 ACTS = st.one_of(
     st.builds(dict, put=bodies, to=places),
     act("send", bodies, **lasting).flatmap(lambda a: places.map(lambda to: {**a, "to": to})),
@@ -131,6 +133,17 @@ ACTS = st.one_of(
     act("lock", any_of("bath_door")),
     act("unlock", any_of("bath_door")),
     st.builds(dict, room=any_of("kitchen_0"), type=any_of("bathroom")),
+    st.builds(dict, hold=users, posture=any_of("lie", "sit"), duration=durations),
+    st.builds(dict, configure=robots, behavior=any_of("patrol", "come", "follow"), keys=KEYS),
+    st.builds(dict, lights=any_of("kitchen", "bedroom"), turn=any_of("on", "off")),
+    st.builds(dict, slow=any_of(AREA), speed=any_of(0.01, 0.4), duration=durations),
+    st.builds(dict, keep_out=robots, of=any_of("kitchen", "living_room"), duration=durations),
+    st.builds(dict, fault=robots, charger=st.just(True), duration=durations),
+    st.builds(dict, fault=robots, lost=st.just(True), duration=durations),
+    act("kidnap", robots, to=places, **lasting),
+    act("relocalize", robots),
+    act("dismiss", robots),
+    st.builds(dict, report=any_of("motion"), says=any_of("on", "off")),
 )
 WAITS = st.builds(
     lambda act, event, each, delay: {**act, "on": event, "each": each, "delay": delay},
