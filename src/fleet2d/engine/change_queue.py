@@ -34,7 +34,7 @@ from fleet2d.runtime.clock import midnight_of
 from fleet2d.runtime.events import HOME, Event, EventKind
 
 
-def crossings(track: Breakpoints, line: Segment) -> list[int]:
+def crossings(track: Breakpoints, line: Segment, *, jumps: bool = True) -> list[int]:
     """Return the times [us] at which a track crosses a segment.
 
     A leg that only touches the line counts once; one along the line doesn't.
@@ -42,11 +42,13 @@ def crossings(track: Breakpoints, line: Segment) -> list[int]:
     Args:
         track: The motion [lattice units].
         line: The segment from jamb to jamb [lattice units].
+        jumps: Whether legs that take no time count.
     """
     (ax, ay), (bx, by) = line
     x, y = track.x, track.y
     side = (bx - ax) * (y - ay) - (by - ay) * (x - ax)
-    legs = np.flatnonzero((side[:-1] > 0) != (side[1:] > 0))
+    crosses = (side[:-1] > 0) != (side[1:] > 0)
+    legs = np.flatnonzero(crosses if jumps else crosses & (np.diff(track.time) > 0))
     times: list[int] = []
     for i in legs.tolist():
         px, py, qx, qy = int(x[i]), int(y[i]), int(x[i + 1]), int(y[i + 1])
@@ -183,7 +185,8 @@ class ChangeQueue:
         if not self.names or not actor.entity.opens_doors or not isinstance(actor.motion, Track):
             return
         for door in range(len(self.names)):
-            for moment in crossings(actor.motion.breakpoints, self.home.door_line(door)):
+            line, jumps = self.home.door_line(door), not self.home.plan.portals
+            for moment in crossings(actor.motion.breakpoints, line, jumps=jumps):
                 step = max(actor.planned_at, (moment - OPENS_AHEAD_US) // self.clock.step_us)
                 plan = (row, actor.planned_at)
                 self._put(step, None, actor.name, door, plan, moment)

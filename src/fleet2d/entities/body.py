@@ -105,6 +105,8 @@ class BodySettings(Settings):
     start_heading_deg: AngleDeg | None = None
     color: str | None = Field(default=None, min_length=1)
     opens_doors: bool = False
+    # Whether it climbs stairs and takes lifts.
+    uses_portals: ClassVar[bool] = False
     # Whether its routes are the cheapest by the costmap, if there is one, and not the shortest.
     minds_costs: ClassVar[bool] = False
     # Whether wet floors, carpets and edges slow it down.
@@ -388,7 +390,10 @@ class Body:
         """Return where its body can be at present outside of some rooms, by their indices."""
         entity = self.entity
         space = self.home.space(
-            entity.radius, opens_doors=entity.opens_doors, without=self.kept_out | rooms
+            entity.radius,
+            opens_doors=entity.opens_doors,
+            uses_portals=entity.uses_portals,
+            without=self.kept_out | rooms,
         )
         return self.home.costed(space) if entity.minds_costs else space
 

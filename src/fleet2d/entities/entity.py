@@ -52,6 +52,7 @@ class User(Entity):
     lights: Hours = ()
     sight_events: ClassVar[tuple[str, str]] = ("robot_lost", "robot_seen")
     uses_furniture: ClassVar[bool] = True
+    uses_portals: ClassVar[bool] = True
 
     @model_validator(mode="after")
     def _sees_what_is_there(self) -> Self:

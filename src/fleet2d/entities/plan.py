@@ -132,6 +132,11 @@ class Plan:
             return self
         if off is not None:
             self._step_to(*off)
+        for passing in space.passings((self.x, self.y), (x, y)) if route is None else ():
+            self.go_to_point(*passing.begin)
+            self.stay_until(self.time_us + passing.takes_us // 2)
+            self.jump(self.time_us, x=passing.end[0], y=passing.end[1])
+            self.stay_until(self.time_us + passing.takes_us - passing.takes_us // 2)
         if route is None:
             route = space.route((self.x, self.y), (x, y))
         if route is None:
@@ -227,7 +232,8 @@ class Plan:
 
     def reaches(self, x: int, y: int) -> bool:
         """Return whether there is a way to a lattice point from where the plan ends so far."""
-        return self._body.space.route((self.x, self.y), (x, y)) is not None
+        space, at = self._body.space, (self.x, self.y)
+        return space.route(at, (x, y)) is not None or bool(space.passings(at, (x, y)))
 
     def follow(self, breakpoints: I64) -> Self:
         """Follow given breakpoints; between two of the same time, the body jumps.

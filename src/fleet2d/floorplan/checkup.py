@@ -150,6 +150,8 @@ def _guess(area: float) -> str:
 
 def _parts(plan: FloorPlan) -> Iterator[Finding]:
     parts = sorted(shapely.get_parts(plan.free_space).tolist(), key=lambda part: -part.area)[1:]
+    ends = shapely.MultiPoint([at for p in plan.portals for at in (p.start, p.end)])
+    parts = [part for part in parts if not part.intersects(ends)]
     for part in parts:
         if part.area >= PART_M2:
             at = part.representative_point()
@@ -292,7 +294,8 @@ def _routes(home: Home, radius: float) -> Iterator[Finding]:
     """Find the places that a robot can't get to, because of walls or of furniture."""
     plan, body = home.plan, f"a body of radius {radius:g} m"
     try:
-        space = home.space(radius)
+        # A robot that is put on another storey lives there.
+        space = home.space(radius, uses_portals=True)
     except FloorPlanError:
         yield Finding("space", "unlivable", f"{body} fits nowhere in {plan.name}")
         return

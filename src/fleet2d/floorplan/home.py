@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Collection, Hashable, Iterable, Mapping, Sequence
 from dataclasses import replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any, Self, TypeVar
 
 import numpy as np
@@ -19,7 +19,7 @@ from fleet2d.floorplan.plan import Cache, FloorPlan, Room
 from fleet2d.floorplan.rooms.doorways import Doorway, doorway_segments
 from fleet2d.floorplan.rooms.room import room_type
 from fleet2d.floorplan.slow_area import SlowRegion
-from fleet2d.floorplan.space import Space
+from fleet2d.floorplan.space import LinkedSpace, Space
 from fleet2d.kernels import I32, Mesh
 
 # Types of rooms through which people leave a home without an entrance, the likeliest first.
@@ -107,17 +107,24 @@ class Home:
         return self._walls[1]
 
     def space(
-        self, radius: float, *, opens_doors: bool = False, without: frozenset[int] = NO_DOORS
+        self,
+        radius: float,
+        *,
+        opens_doors: bool = False,
+        uses_portals: bool = False,
+        without: frozenset[int] = NO_DOORS,
     ) -> Space:
         """Return the present space of bodies of a radius, built at its first use.
 
         Args:
             radius: The radius of the body [m].
             opens_doors: Whether the body passes shut doors that aren't locked.
+            uses_portals: Whether the body climbs stairs and takes lifts.
             without: Indices of the rooms that the body keeps out of.
         """
         shut = self.shut & self.locked if opens_doors else self.shut
-        return self._shapes.space(radius, shut, self.objects, without)
+        space = self._shapes.space(radius, shut, self.objects, without)
+        return self._shapes.linked(space) if uses_portals and self.plan.portals else space
 
     @property
     def costs_version(self) -> int:
@@ -260,6 +267,7 @@ class _Shapes:
         self.walls = lru_cache(CACHED_ARRANGEMENTS)(self._make_walls)
         self._gates = lru_cache(CACHED_ARRANGEMENTS)(self._make_gates)
         self.space_of = lru_cache(CACHED_ARRANGEMENTS)(self._make_space)
+        self.linked = lru_cache(CACHED_ARRANGEMENTS)(partial(LinkedSpace, portals=plan.portals))
 
     def __deepcopy__(self, memo: dict[int, object]) -> Self:
         """Return itself, as branches of a run share it, too."""

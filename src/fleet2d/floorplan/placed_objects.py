@@ -94,6 +94,27 @@ Point = tuple[float, float]
 
 
 @dataclass(frozen=True)
+class Portal:
+    """Stairs or a lift, by which people get from one part of the free space to another.
+
+    The storeys of a home lie side by side in its plane, as parts that nothing else joins. Robots
+    don't use portals, and nobody sees through them.
+
+    Attributes:
+        type: `stairs` or `lift`.
+        start: Its one end (x, y) [m], such as the foot of stairs.
+        end: Its other end (x, y) [m].
+        takes_us: How long people take from one to the other [us]: for half of it they are at the
+            one end, then at the other.
+    """
+
+    type: str
+    start: Point
+    end: Point
+    takes_us: int
+
+
+@dataclass(frozen=True)
 class UsePlace:
     """A place where a person is while using an object.
 

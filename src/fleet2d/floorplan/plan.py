@@ -20,6 +20,7 @@ from fleet2d.floorplan.lattice import Lattice
 from fleet2d.floorplan.mesh import build_mesh, canonical_order, free_on_lattice, part_notes
 from fleet2d.floorplan.placed_objects import (
     PlacedObject,
+    Portal,
     describe_object,
     find_named,
     number_objects,
@@ -121,6 +122,7 @@ class FloorPlan:
         doorways: The passages between rooms by index, from the source or found in the walls.
         objects: Furniture and devices, in the order of the source.
         no_go: Areas that robots keep out of [m].
+        portals: Stairs and lifts between parts of the free space.
         notes: Sentences on anomalies in the file and how it was read; not part of the content.
         regions: The labels as the file gives them; not part of the content.
         lost_doorways: Doorways of the file that stand in no passage; not part of the content.
@@ -146,6 +148,7 @@ class FloorPlan:
     doorways: tuple[Doorway, ...] = ()
     objects: tuple[PlacedObject, ...] = ()
     no_go: tuple[Polygon, ...] = ()
+    portals: tuple[Portal, ...] = ()
     notes: tuple[str, ...] = ()
     regions: tuple[LabelledRegion, ...] = ()
     lost_doorways: tuple[DoorLine, ...] = ()
@@ -309,6 +312,8 @@ class FloorPlan:
             head["objects"] = [describe_object(thing) for thing in self.objects]
         if self.no_go:
             head["no_go"] = [shapely.get_coordinates(area).tolist() for area in self.no_go]
+        if self.portals:
+            head["portals"] = [[p.type, *p.start, *p.end, p.takes_us] for p in self.portals]
         content = hashlib.sha256(json.dumps(head).encode())
         content.update(shapely.get_coordinates(self.polygons).astype("<i8").tobytes())
         content.update(self.room_of_cell.astype("<i2").tobytes())
@@ -383,6 +388,39 @@ class FloorPlan:
         """Return the objects whose middle is in a room."""
         middles = [(thing, thing.footprint.centroid) for thing in self.objects]
         return tuple(thing for thing, at in middles if self.room_at(at.x, at.y) == room)
+
+    def with_portals(self, portals: Sequence[Portal], where: str = "portals") -> Self:
+        """Return the same plan with further portals.
+
+        Args:
+            portals: The portals.
+            where: Their place in a file, for errors.
+
+        Raises:
+            FloorPlanError: An end is in no room, or a way leads from one to the other already.
+        """
+        for number, portal in enumerate(portals):
+            ends = [shapely.Point(self.lattice.point_at(at)) for at in (portal.start, portal.end)]
+            for at, end in zip((portal.start, portal.end), ends, strict=True):
+                if not any(polygon.contains(end) for polygon in self.polygons):
+                    x, y = self.nearest_free(*at)
+                    raise FloorPlanError(
+                        f"{where}[{number}]: its end at ({at[0]:g}, {at[1]:g}) m is in no room of"
+                        f" {self.name}: the nearest free place is ({x:.2f}, {y:.2f}) m"
+                    )
+            if any(
+                polygon.contains(ends[0]) and polygon.contains(ends[1]) for polygon in self.polygons
+            ):
+                raise FloorPlanError(
+                    f"{where}[{number}]: a way leads from its one end to the other already: each"
+                    " should be on another storey, which is a part of the free space of its own"
+                )
+        if not portals:
+            return self
+        linked = f"storeys are linked by stairs and lifts, which robots don't use: {len(portals)}"
+        parts = part_notes(self.lattice, self.polygons)
+        notes = (*(note for note in self.notes if note not in parts), linked)
+        return replace(self, portals=(*self.portals, *portals), notes=notes)
 
     def named(self, name: str) -> Self:
         """Return the same plan under another name."""

@@ -4,8 +4,9 @@ import hashlib
 from abc import abstractmethod
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import replace
+from datetime import timedelta
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 import shapely
@@ -14,12 +15,18 @@ from shapely import MultiPolygon, Polygon
 
 from fleet2d.configuration.components import Component, Settings
 from fleet2d.configuration.problems import problem, problem_at, suggest
-from fleet2d.configuration.units import AngleDeg, InputPath, Length, PositiveLength
+from fleet2d.configuration.units import (
+    AngleDeg,
+    InputPath,
+    Length,
+    PositiveDuration,
+    PositiveLength,
+)
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.costmap import CostmapSettings
 from fleet2d.floorplan.furniture import FURNITURE, stand_furniture
 from fleet2d.floorplan.layers import LayerSettings, check_layers
-from fleet2d.floorplan.placed_objects import Blocks, PlacedObject, number_objects
+from fleet2d.floorplan.placed_objects import Blocks, PlacedObject, Portal, number_objects
 from fleet2d.floorplan.plan import Cache, FloorPlan
 from fleet2d.floorplan.rooms.doorways import DoorLine, doorway_segments, name_doorways
 from fleet2d.floorplan.rooms.room import (
@@ -179,6 +186,26 @@ def _door_lines(plan: FloorPlan) -> list[DoorLine]:
     return lines
 
 
+class PortalSettings(Settings):
+    """Stairs or a lift between two storeys.
+
+    Attributes:
+        ends: Its two ends [[x, y], [x, y]] [m], such as the foot and the head of stairs.
+        takes: How long people take from one to the other.
+        type: What it is.
+    """
+
+    ends: tuple[tuple[Length, Length], tuple[Length, Length]] = Field(
+        examples=[[[1.0, 1.0], [11.0, 1.0]]]
+    )
+    takes: PositiveDuration = timedelta(seconds=12)
+    type: Literal["stairs", "lift"] = "stairs"
+
+    def to_portal(self) -> Portal:
+        """Return it as a part of a plan."""
+        return Portal(self.type, *self.ends, self.takes // timedelta(microseconds=1))
+
+
 # How far a piece may reach into a wall [m]: tape measures and traced walls differ by as much.
 WALL_TOLERANCE_M = 0.02
 
@@ -299,6 +326,7 @@ class FloorPlanSource(Component):
         layers: Named arrays with a value for each cell; explored, first_seen, last_seen and
             time_since_seen are maintained by the run, for each robot with a camera.
         costmap: Costs that routes of robots pay; null: they take the shortest.
+        portals: Stairs and lifts between storeys, which lie side by side in the plan.
         slows: Areas that slow robots down: wet floors, carpets, edges at which they stop.
     """
 
@@ -322,6 +350,7 @@ class FloorPlanSource(Component):
         default={}, examples=[{"explored": {"every": "1 d"}, "dust": {"unit": "g"}}]
     )
     costmap: CostmapSettings | None = None
+    portals: tuple[PortalSettings, ...] = ()
     slows: tuple[SlowArea, ...] = Field(
         default=(),
         examples=[[{"area": [[1, 0.5], [2.5, 0.5], [2.5, 2]], "speed": "40 %", "stop": "2 s"}]],
@@ -360,6 +389,7 @@ class FloorPlanSource(Component):
     def _read(self) -> FloorPlan:
         rules = Furnishing() if self.furnish is True else self.furnish or None
         plan = correct_rooms(self.load(), self.rooms)
+        plan = plan.with_portals([p.to_portal() for p in self.portals], "floorplan.portals")
         return place_furniture(plan, self.furniture, rules)
 
     def files(self) -> list[Path]:

@@ -1,7 +1,9 @@
 """Where bodies can be: the space of a round body, its shortest routes, and places to stand."""
 
+import heapq
+import math
 from collections.abc import Iterable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import Any
 
@@ -14,7 +16,7 @@ from shapely.geometry.base import BaseGeometry
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.lattice import UNITS_PER_CELL, Lattice
 from fleet2d.floorplan.mesh import Segment, build_mesh, snap_polygon
-from fleet2d.floorplan.placed_objects import PlacedObject, UsePlace
+from fleet2d.floorplan.placed_objects import PlacedObject, Portal, UsePlace
 from fleet2d.floorplan.plan import FloorPlan, read_only
 from fleet2d.kernels import (
     F64,
@@ -37,8 +39,14 @@ from fleet2d.kernels import (
 ROUNDING = 3
 # Number of free cells that are tried for a way back into the space, nearest first.
 ESCAPE_ATTEMPTS = 200
+# How far from the end of a portal a body may have to stand [m].
+PORTAL_REACH_M = 1.0
+SECOND_US = 1_000_000
 # Number of results that a space caches of each of its searches.
 CACHED_ROUTES = 4096
+
+
+PointXY = tuple[int, int]  # [lattice]
 
 
 class Space:
@@ -136,6 +144,10 @@ class Space:
         if not strictly_inside(self.mesh, x, y):
             return -1
         return int(self._part_of_triangle[locate(self.mesh, x, y)])
+
+    def passings(self, start: tuple[int, int], goal: tuple[int, int]) -> Sequence[Any]:
+        """Return the portals on the way from one lattice point to another: here none are used."""
+        return ()
 
     def part_near(self, x: int, y: int) -> int:
         """Return the part nearest to a point outside the space."""
@@ -256,6 +268,114 @@ class Space:
             after=r[reflex][first],
             simple=walls_meeting[vertex] == 1,
         )
+
+
+@dataclass(frozen=True)
+class Passing:
+    """The use of a portal.
+
+    Attributes:
+        begin: Where the body walks to [lattice].
+        end: Where it walks on from [lattice].
+        takes_us: How long it takes from one to the other [us].
+    """
+
+    begin: PointXY
+    end: PointXY
+    takes_us: int
+
+
+class LinkedSpace(Space):
+    """The space of a body that uses portals: parts that these link are one part.
+
+    Routes are within one storey, as before; `passings` has the portals on the way to another.
+    """
+
+    def __init__(self, base: Space, portals: Sequence[Portal]) -> None:
+        """Link the parts of a space.
+
+        Args:
+            base: The space without portals.
+            portals: The portals of its plan.
+        """
+        self.__dict__.update(base.__dict__)
+        self.base, self.portals = base, tuple(portals)
+        self._cache_searches()
+        self._passings: list[Passing] = []
+        owner = np.arange(base.parts)
+        for portal in portals:
+            begin, end = self._end(portal.start), self._end(portal.end)
+            if begin is None or end is None:
+                continue  # furniture bars it
+            self._passings += [
+                Passing(begin, end, portal.takes_us),
+                Passing(end, begin, portal.takes_us),
+            ]
+            first, second = (owner[base.part_at(*place)] for place in (begin, end))
+            owner[owner == max(first, second)] = min(first, second)
+        # Part 0 stays the largest, unless parts that portals link are larger together.
+        sizes = np.bincount(base.part_of_cell[base.part_of_cell >= 0], minlength=base.parts)
+        total = np.bincount(owner, sizes, minlength=base.parts)
+        order = np.argsort(-total, kind="stable")
+        rank = np.empty(base.parts, np.int32)
+        rank[order] = np.arange(base.parts, dtype=np.int32)
+        self._rank = rank[owner]
+        self.part_of_cell = read_only(np.append(self._rank, np.int32(-1))[base.part_of_cell])
+        self.parts = len(set(owner.tolist()))
+
+    def __reduce__(self) -> tuple[object, ...]:
+        """Pickle it by the arguments that it was made from."""
+        return LinkedSpace, (self.base, self.portals)
+
+    def part_at(self, x: int, y: int) -> int:
+        """Return the part of a lattice point strictly inside the space, else -1."""
+        part = self.base.part_at(x, y)
+        return int(self._rank[part]) if 0 <= part < len(self._rank) else -1
+
+    def passings(self, start: PointXY, goal: PointXY) -> list[Passing]:
+        """Return the portals on the way from one lattice point to another, in order.
+
+        The way is the shortest, in straight lines and with the times of portals as metres.
+        """
+        base, metre = self.base, self.plan.lattice.units_per_m
+        goal_part = self._part(goal)
+        queue: list[tuple[float, int, PointXY, list[Passing]]] = [(0.0, 0, start, [])]
+        best: dict[PointXY, float] = {}
+        tries = 0
+        while queue:
+            length, _, place, used = heapq.heappop(queue)
+            if place == goal:
+                return used
+            if best.get(place, np.inf) <= length:
+                continue
+            best[place] = length
+            part = self._part(place)
+            ways = [(goal, used, 0.0)] if part == goal_part else []
+            ways += [
+                (p.end, [*used, p], math.dist(place, p.begin) / metre + p.takes_us / SECOND_US)
+                for p in self._passings
+                if base.part_at(*p.begin) == part
+            ]
+            for other, through, metres in ways:
+                tries += 1
+                far = metres or math.dist(place, goal) / metre
+                heapq.heappush(queue, (length + far, tries, other, through))
+        return []
+
+    def _part(self, place: PointXY) -> int:
+        """Return the part of a storey that holds a lattice point, or is nearest to it."""
+        part = self.base.part_at(*place)
+        return part if part >= 0 else self.base.part_near(*place)
+
+    def _end(self, at: tuple[float, float]) -> PointXY | None:
+        """Return where a body stands at the end of a portal [lattice], or None if nowhere."""
+        x, y = self.plan.lattice.point_at(at)
+        if 0 <= self.base.part_at(x, y) < self.base.parts:
+            return x, y
+        near = self.base.nearest(x, y)
+        if near is None or math.dist(near, (x, y)) > PORTAL_REACH_M * self.plan.lattice.units_per_m:
+            return None
+        return near
 
 
 def shrink(

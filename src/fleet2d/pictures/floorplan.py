@@ -105,6 +105,11 @@ def draw_objects(plan: FloorPlan, axes: Axes) -> None:
     axes.add_collection(LineCollection(lines, lw=0.4, color=EDGE_COLOR, zorder=1.65))
     _draw_no_go(plan, axes)
     _draw_doorways(plan, axes)
+    for number, portal in enumerate(plan.portals, 1):
+        sign = {"stairs": "\N{UPWARDS ARROW FROM BAR}", "lift": "\N{UP DOWN ARROW}"}[portal.type]
+        box = {"boxstyle": "square,pad=0.2", "fc": "white", "ec": DOOR_COLOR, "lw": 0.6}
+        for at in (portal.start, portal.end):
+            axes.text(*at, f"{sign}{number}", ha="center", va="center", size=5, bbox=box)
 
 
 def label_objects(plan: FloorPlan, axes: Axes) -> None:

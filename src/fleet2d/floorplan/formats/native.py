@@ -47,7 +47,7 @@ from fleet2d.floorplan.formats.files import (
     validate,
 )
 from fleet2d.floorplan.lattice import UNITS_PER_CELL
-from fleet2d.floorplan.placed_objects import Blocks, PlacedObject, Posture, UsePlace
+from fleet2d.floorplan.placed_objects import Blocks, PlacedObject, Portal, Posture, UsePlace
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.rooms.doorways import DoorLine
 from fleet2d.floorplan.rooms.room import MAX_GAP_M2, UNKNOWN, LabelledRegion, room_type
@@ -241,6 +241,26 @@ class ObjectEntry(ObjectUse):
         )
 
 
+class PortalEntry(FileModel):
+    """Stairs or a lift between two storeys.
+
+    Attributes:
+        start: Its one end, such as the foot of stairs.
+        end: Its other end.
+        takes: How long people take from one to the other [s].
+        type: What it is.
+    """
+
+    start: Point
+    end: Point
+    takes: Annotated[Coordinate, Field(gt=0)] = 12.0
+    type: Literal["stairs", "lift"] = "stairs"
+
+    def to_portal(self) -> Portal:
+        """Return it as a part of a plan."""
+        return Portal(self.type, self.start, self.end, round(self.takes * 1_000_000))
+
+
 class PlanFile(FileModel):
     """A home. Lengths are in metres, angles in radians counter-clockwise from +x.
 
@@ -253,6 +273,7 @@ class PlanFile(FileModel):
         objects: Furniture and devices, which are separate from the walls.
         no_go: Areas that robots keep out of.
         entrance: A place just inside the front door.
+        portals: Stairs and lifts between storeys, which lie side by side.
     """
 
     model_config = ConfigDict(title="Fleet2D floor plan")
@@ -266,6 +287,7 @@ class PlanFile(FileModel):
     objects: Listed[ObjectEntry] = Field(default_factory=list)
     no_go: Listed[Area] = Field(default_factory=list)
     entrance: Point | None = None
+    portals: Listed[PortalEntry] = Field(default_factory=list)
 
 
 PLAN_FILE = TypeAdapter(PlanFile)
@@ -279,6 +301,7 @@ _LISTS: dict[str, type[FileModel]] = {
     "objects": ObjectEntry,
     "uses": UseEntry,
     "no_go": AreaEntry,
+    "portals": PortalEntry,
 }
 _AREAS = ("polygon", "footprint")
 _POINTS = ("start", "end", "approach", "entrance")
@@ -375,7 +398,7 @@ def plan_of(file: PlanFile, path: Path, cell: float) -> FloorPlan:
         regions_are="none" if file.rooms is None else "exact",
         objects=[thing.to_object() for thing in file.objects],
         no_go=[area.polygon for area in file.no_go],
-    )
+    ).with_portals([portal.to_portal() for portal in file.portals])
 
 
 def _with_passages(
@@ -430,6 +453,11 @@ def native_document(plan: FloorPlan) -> dict[str, Any]:
         document["objects"] = [object_document(thing) for thing in plan.objects]
     if plan.no_go:
         document["no_go"] = [_area_document(area) for area in plan.no_go]
+    if plan.portals:
+        document["portals"] = [
+            {"type": p.type, "start": list(p.start), "end": list(p.end), "takes": p.takes_us / 1e6}
+            for p in plan.portals
+        ]
     if plan.entrance is not None:
         document["entrance"] = list(plan.entrance)
     return document

@@ -1,0 +1,136 @@
+"""A home of two storeys side by side, which stairs link for people."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import fleet2d
+from fleet2d.errors import FloorPlanError, ScenarioError
+from fleet2d.floorplan.home import Home
+from fleet2d.floorplan.load import load_floorplan, save_floorplan
+
+STAIRS = {"start": [4.5, 3.5], "end": [8.5, 3.5], "takes": 14}
+HOUSE: dict[str, Any] = {
+    "format": "fleet2d-floorplan",
+    "version": 1,
+    "free": [[[0, 0], [5, 0], [5, 4], [0, 4]], [[8, 0], [13, 0], [13, 4], [8, 4]]],
+    "rooms": [
+        {"type": "living_room", "polygon": [[0, 0], [3, 0], [3, 4], [0, 4]]},
+        {"type": "kitchen", "polygon": [[3, 0], [5, 0], [5, 4], [3, 4]]},
+        {"type": "bedroom", "polygon": [[8, 0], [11, 0], [11, 4], [8, 4]]},
+        {"type": "bathroom", "polygon": [[11, 0], [13, 0], [13, 4], [11, 4]]},
+    ],
+    "portals": [STAIRS],
+    "entrance": [0.5, 0.5],
+}
+
+
+def house(folder: Path, **changes: Any) -> Path:
+    path = folder / "house.json"
+    path.write_text(json.dumps(HOUSE | changes))
+    return path
+
+
+def test_storeys_are_one_part_for_people_and_two_for_robots(tmp_path: Path) -> None:
+    home = Home(load_floorplan(house(tmp_path)))
+
+    assert 2 == home.space(0.2).parts
+    people = home.space(0.2, uses_portals=True)
+    assert 1 == people.parts
+    assert frozenset(range(4)) == people.rooms_of(0)
+
+
+def test_furniture_on_the_stairs_bars_them(tmp_path: Path) -> None:
+    box = {"type": "box", "footprint": [[3, 2], [5, 2], [5, 4], [3, 4]]}
+    home = Home(load_floorplan(house(tmp_path, objects=[box])))
+
+    assert 2 == home.space(0.2, uses_portals=True).parts
+
+
+def test_way_leads_by_the_nearer_stairs(tmp_path: Path) -> None:
+    far = {"start": [0.5, 0.5], "end": [12.5, 0.5], "type": "lift"}
+    plan = load_floorplan(house(tmp_path, portals=[STAIRS, far]))
+    space, at = Home(plan).space(0.2, uses_portals=True), plan.lattice.point_at
+
+    by_stairs = space.passings(at((4, 3)), at((9, 3)))
+    by_lift = space.passings(at((1, 1)), at((12, 1)))
+
+    assert [at((8.5, 3.5))] == [p.end for p in by_stairs]
+    assert [at((12.5, 0.5))] == [p.end for p in by_lift]
+    assert [at((0.5, 0.5))] == [p.end for p in space.passings(at((12, 1)), at((1, 1)))]
+
+
+@pytest.mark.parametrize(
+    ("end", "problem"),
+    [([6.5, 1], "is in no room of house: the nearest free place is ("),
+     ([1, 1], "a way leads from its one end to the other already")],
+)  # fmt: skip
+def test_portal_that_links_no_storeys_is_refused(
+    tmp_path: Path, end: list[float], problem: str
+) -> None:
+    with pytest.raises(FloorPlanError) as caught:
+        load_floorplan(house(tmp_path, portals=[STAIRS | {"end": end}]))
+
+    assert problem in str(caught.value)
+
+
+def test_plan_with_portals_is_written_and_read_back(tmp_path: Path) -> None:
+    plan = load_floorplan(house(tmp_path))
+
+    save_floorplan(plan, tmp_path / "copy.json")
+
+    copy = load_floorplan(tmp_path / "copy.json").named("house")
+    assert plan == copy
+    assert plan.portals == copy.portals
+    assert plan != load_floorplan(house(tmp_path, portals=[]))
+
+
+def scenario(folder: Path, **changes: Any) -> dict[str, Any]:
+    floorplan = {"type": "native", "path": str(house(folder))}
+    return {
+        "simulation": {"start": "2026-01-05T06:00", "duration": {"hours": 2}, "seed": 4, **changes},
+        "floorplan": floorplan,
+        "users": {"ana": {"type": "routine", "persona": "works_outside"}},
+        "robots": {
+            "astro": {"start": [4, 3], "camera": {"range": [0, 9], "angle_deg": 360}},
+            "bella": {"start": [9, 1], "camera": {"range": [0, 9], "angle_deg": 360}},
+        },
+        "artifacts": {"trajectories": "every step"},
+    }
+
+
+def test_people_climb_in_the_time_it_takes_and_are_seen_on_their_storey_only(
+    tmp_path: Path,
+) -> None:
+    run = fleet2d.run(scenario(tmp_path))
+
+    rows = run.tables["trajectories"].to_pandas()
+    rooms = {name: set(rows[rows.entity == name].room.dropna()) for name in ("astro", "bella")}
+    assert {"kitchen_0"} == rooms["astro"]
+    assert rooms["bella"] <= {"bedroom_0", "bathroom_0"}
+    ana = rows[(rows.entity == "ana") & ~rows.away]
+    x = ana.x.to_numpy()
+    assert not ((x > 5) & (x < 8)).any()
+    (jump, *_) = np.flatnonzero((x[1:] < 5) & (x[:-1] > 8)).tolist()
+    assert [x[jump]] * 6 == x[jump - 5 : jump + 1].tolist()  # half of 14 s at either end
+    assert [x[jump + 1]] * 6 == x[jump + 1 : jump + 7].tolist()
+    seen = run.tables["observations"].to_pandas()
+    assert set(seen.room[seen.robot == "astro"]) <= {"living_room_0", "kitchen_0"}
+    assert {"bedroom_0"} <= set(seen.room[seen.robot == "bella"])
+
+
+def test_steps_and_spans_of_a_house_with_stairs_are_the_same(tmp_path: Path) -> None:
+    assert (
+        fleet2d.run(scenario(tmp_path)).digest == fleet2d.run(scenario(tmp_path, max_span=1)).digest
+    )
+
+
+def test_portals_in_a_scenario_are_checked_where_they_stand(tmp_path: Path) -> None:
+    settings = scenario(tmp_path)
+    settings["floorplan"]["portals"] = [{"ends": [[1, 1], [2, 2]]}]
+
+    with pytest.raises((FloorPlanError, ScenarioError), match=r"floorplan.portals\[0\]"):
+        fleet2d.run(settings)
