@@ -244,6 +244,7 @@ def test_after_another_behavior_had_its_turn_it_goes_on_with_its_day() -> None:
         ({"persona": {"extends": "retired", "activities": {"read": {"rooms": ["sauna"]}}}}, ["sauna", "The rooms are"]),
         ({"persona": {"extends": "retired", "days": {"every_day": {"do": {"nap": {"at": "25:00"}}}}}}, ["25:00"]),
         ({"persona": "retired", "household": FAMILY}, ["household", "persona"]),
+        ({"household": FAMILY, "own_places": True}, ["own", "leave out own_places"]),
         ({"household": {**FAMILY, "members": {"ben": "retired"}, "couples": []}}, ["no member", "ben"]),
         ({"household": {**FAMILY, "couples": [["ana", "zoe"]]}}, ["zoe", "no member"]),
         ({"household": {**FAMILY, "together": {"dinner": {"at": "18:00"}}}}, ["dinner", "'on' or 'dates'"]),
@@ -364,9 +365,11 @@ def test_people_without_a_household_are_told_once_that_they_share_seats() -> Non
     assert notes == {
         "ben": "household: none, and ana has none either: they may use the same seat or spot at the"
         " same time. People who live together have, in place of a persona, household: {members:"
-        " {ana: works_outside, ben: works_outside}}"
+        " {ana: works_outside, ben: works_outside}}; who only shares a home has own_places: true"
     }
     assert told_of_households(family("1 h")) == {}
+    apart = {name: {**user, "own_places": True} for name, user in users.items()}
+    assert told_of_households(scenario("1 h", users=apart)) == {}
 
 
 def told_of_households(content: dict[str, Any]) -> dict[str, str]:

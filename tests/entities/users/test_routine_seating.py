@@ -45,6 +45,20 @@ def test_two_people_on_one_seat() -> None:
     assert 0 == seconds_on_one_place(result, "ana", "ben", "cleo")
 
 
+@pytest.mark.parametrize("kind", ["routine", "population"])
+def test_people_without_a_household_may_have_places_of_their_own(kind: str) -> None:
+    """Three who work at home sat on one chair at one desk for 15 hours a day, pair by pair."""
+    user = {"type": kind} | ({"persona": "works_from_home"} if kind == "routine" else {})
+    on_one_place = {}
+    for own in (False, True):
+        users = {name: {**user, "own_places": own} for name in ("ana", "ben", "cleo")}
+        home = {"type": "bundled", "furnish": True}
+        content = scenario("2 d", users=users, robots={}, floorplan=home)
+        on_one_place[own] = seconds_on_one_place(run(content), *users)
+    assert on_one_place[True] < 0.1 * on_one_place[False]
+    assert on_one_place[True] < 2 * 900  # at a washbasin or a toilet
+
+
 def test_more_people_than_places_leave_nobody_on_a_place_of_another() -> None:
     """Four retired people have one armchair; the others are on spots of the room."""
     chair = {"type": "armchair", "at": [11.3, 4.4], "name": "armchair"}

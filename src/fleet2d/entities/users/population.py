@@ -5,7 +5,7 @@ from datetime import datetime, timedelta
 from typing import TYPE_CHECKING, Literal
 
 from fleet2d.configuration.components import register
-from fleet2d.entities.users.resident import ResidentBehavior, Spots, rooms_at
+from fleet2d.entities.users.resident import ResidentBehavior, rooms_at
 from fleet2d.routines import survey
 from fleet2d.routines.activity import catalogue
 from fleet2d.routines.distributions import draw_weighted
@@ -60,7 +60,7 @@ class Population(ResidentBehavior):
         if self.bodily_needs:
             self.rules = interruption_rules(population_needs(), usual_errands(), known)
             names |= activities_of(population_needs(), usual_errands())
-        self.settle(actor, {name: known[name] for name in sorted(names)}, Spots(actor))
+        self.settle(actor, {name: known[name] for name in sorted(names)}, self.make_spots(actor))
 
     def begins_at(self, time: datetime) -> "RoomChoice | Point | None":
         """Return the rooms of a typical activity of such people at the beginning of the run."""

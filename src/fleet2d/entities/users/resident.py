@@ -67,6 +67,10 @@ class Seat(NamedTuple):
     place: int
 
 
+# Furniture that everybody uses, one after the other.
+FIXTURES = frozenset({"toilet", "washbasin", "shower", "bathtub"})
+
+
 class Spots:
     """The spots of one body.
 
@@ -78,11 +82,16 @@ class Spots:
     Attributes:
         rank: The number of the body among the members of its household.
         members: The number of members.
+        apart: Whether who gets no place at furniture of its own has none, but in a bathroom: then
+            a spot of the room serves. Members of a household take turns instead.
     """
 
-    def __init__(self, actor: "Actor", rank: int = 0, members: int = 1) -> None:
+    def __init__(
+        self, actor: "Actor", rank: int = 0, members: int = 1, *, apart: bool = False
+    ) -> None:
         self.rank = rank
         self.members = members
+        self.apart = apart
         self._actor = actor
         self._of_room: dict[int, list[Spot]] = {}
         self._at_furniture: dict[Hashable, list[Seat]] = {}
@@ -169,6 +178,8 @@ class Spots:
     ) -> list[Seat]:
         rank, members = share
         seats = seats_at(self._actor.home, kinds, indices, posture, members, self._can_reach)
+        if self.apart and len(seats) <= rank % members and not FIXTURES.intersection(kinds):
+            return []
         return list(part_of(seats, rank, members)) if seats else []
 
     def can_reach(self, seat: Seat) -> bool:
@@ -457,9 +468,12 @@ class ResidentBehavior(Behavior):
 
     Attributes:
         small_moves: Whether it turns, gets up and fetches things within an activity.
+        own_places: Whether it keeps to spots and seats of its own, apart from all other users of
+            whom this holds; members of a household have such anyway.
     """
 
     small_moves: bool = True
+    own_places: bool = False
 
     def day(self, ordinal: int) -> Sequence[Episode]:
         """Return what the resident does on a day, given by its ordinal, until the next begins."""
@@ -468,6 +482,13 @@ class ResidentBehavior(Behavior):
     def wait_for(self, room: int, clock: "Clock", begin_us: int, takes_us: int) -> int | None:
         """Return how long to wait before it may use a room [us]; None: not now."""
         return 0
+
+    def make_spots(self, actor: "Actor") -> Spots:
+        """Return the spots of a person without a household."""
+        if not self.own_places:
+            return Spots(actor)
+        names = list(actor.people)
+        return Spots(actor, names.index(actor.name), len(names), apart=True)
 
     def settle(
         self,

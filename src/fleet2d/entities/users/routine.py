@@ -337,13 +337,16 @@ class Routine(ResidentBehavior):
                 "the absences and visits of a member of a household belong in the household's"
                 " 'trips' and 'visits', as the other members depend on them"
             )
+        if self.household is not None and self.own_places:
+            raise problem("members of a household have places of their own: leave out own_places")
         return self
 
     def start(self, actor: "Actor") -> None:
         """Set up the days of the person, and find where the activities are done in the home."""
         self.name = actor.name
-        spots, sleeps_in, side = Spots(actor), None, (0, 1)
+        sleeps_in, side = None, (0, 1)
         if self.household is None:
+            spots = self.make_spots(actor)
             self.life = Life(self.resolved_persona, actor.seed, actor.path)
             self._note_strangers(actor)
         else:
@@ -370,12 +373,13 @@ class Routine(ResidentBehavior):
             if body is not actor and isinstance(behavior, Routine) and behavior.household is None
         )
         others = list(islice(strangers, 2))  # of a thousand, too
-        if len(others) == 1:
+        if len(others) == 1 and not self.own_places:
             members = f"{others[0]}: works_outside, {actor.name}: works_outside"
             actor.notes.append(
                 f"household: none, and {others[0]} has none either: they may use the same seat or"
                 " spot at the same time. People who live together have, in place of a persona,"
-                f" household: {{members: {{{members}}}}}"
+                f" household: {{members: {{{members}}}}}; who only shares a home has"
+                " own_places: true"
             )
 
     def _join_household(self, actor: "Actor") -> None:
