@@ -331,14 +331,6 @@ class SightMemory(NamedTuple):
     waiting: I64  # (cameras, 2): first row and length of the backlog
 
 
-class SightEvents(NamedTuple):
-    """Identities that come into view or are lost, in order of (step, identity)."""
-
-    step: I64
-    user: I32
-    kind: I32  # USER_SEEN | USER_LOST
-
-
 class DetectionRule(NamedTuple):
     """The settings that all cameras of a robot share."""
 
@@ -471,13 +463,6 @@ def empty_poses(count: int) -> Poses:
     """Return uninitialized poses, to be filled."""
     x, y, heading = (np.empty(count, np.int64) for _ in range(3))
     return Poses(x, y, heading, np.empty(count, np.uint8))
-
-
-def paste_poses(out: Poses, begin: int, part: Poses, rows: slice) -> None:
-    """Copy the rows of `part` to `out`, from `begin` on."""
-    count = len(part.x[rows])
-    for name in Poses._fields:
-        getattr(out, name)[begin : begin + count] = getattr(part, name)[rows]
 
 
 class Stretches(NamedTuple):

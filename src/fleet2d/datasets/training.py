@@ -1,6 +1,6 @@
 """Training of the network of `model: learned`: gradients by hand, with nothing but NumPy."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -268,9 +268,3 @@ def _unfolded(weights: Weights, mean: Any, scale: Any) -> Parameters:
         "score": weights.network.score,
     }
     return {name: value.astype(np.float32) for name, value in values.items()}
-
-
-def batches_of(windows: Iterable[Windows], size: int = 512) -> Iterator[tuple[Any, Any]]:
-    """Yield batches: features, (n, places, features), and the true places (n,)."""
-    for batch in _batches(windows, size):
-        yield batch.inputs, batch.truth

@@ -268,8 +268,8 @@ MOOD_COLOR, EXPIRED_COLOR = "#aa3377", "#9a9a9a"
 WEEKLY_FROM = 70  # days of a run from which on bars are weeks
 
 
-class Asked(NamedTuple):
-    """A time that a robot addressed a person.
+class AskedTime(NamedTuple):
+    """A time at which a robot addressed a person.
 
     Attributes:
         robot: The robot.
@@ -284,7 +284,7 @@ class Asked(NamedTuple):
     answer: str
 
 
-def asked_of(run: Run) -> tuple[list[Asked], list[Asked]]:
+def asked_of(run: Run) -> tuple[list[AskedTime], list[AskedTime]]:
     """Return the times that robots addressed people, and the requests that expired, by the events.
 
     Example:
@@ -293,19 +293,19 @@ def asked_of(run: Run) -> tuple[list[Asked], list[Asked]]:
         ([], [])
     """
     events, hours_of = run.tables["events"], _hours_of(run)
-    asked: list[Asked] = []
-    expired: list[Asked] = []
-    open_ones: dict[str, Asked] = {}  # by robot
+    asked: list[AskedTime] = []
+    expired: list[AskedTime] = []
+    open_ones: dict[str, AskedTime] = {}  # by robot
     columns = (events[name].to_pylist() for name in ("step", "entity", "event", "detail"))
     for step, robot, event, detail in sorted(zip(*columns, strict=True), key=lambda row: row[0]):
         user = detail.rpartition(" ")[2]
         if event == "asks":
             asked += [open_ones.pop(robot)] if robot in open_ones else []
-            open_ones[robot] = Asked(robot, user, hours_of(step), "no answer")
+            open_ones[robot] = AskedTime(robot, user, hours_of(step), "no answer")
         elif event in SHOWN_AS and robot in open_ones:
             asked.append(open_ones.pop(robot)._replace(answer=SHOWN_AS[event]))
         elif event == "expired":
-            expired.append(Asked(robot, user, hours_of(step), event))
+            expired.append(AskedTime(robot, user, hours_of(step), event))
     return [*asked, *open_ones.values()], expired
 
 

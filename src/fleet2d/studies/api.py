@@ -145,11 +145,11 @@ def make_executor(
     if executor == "serial":
         return SerialExecutor()
     if executor == "ray":
-        from fleet2d.studies.ray_executor import RayExecutor
+        from fleet2d.studies.cluster_executors import RayExecutor
 
         return RayExecutor(workers)
     if executor == "slurm":
-        from fleet2d.studies.slurm_executor import SlurmExecutor
+        from fleet2d.studies.cluster_executors import SlurmExecutor
 
         return SlurmExecutor(workers, slurm)
     raise InputError(f"there is no executor {executor!r}: give local, ray, slurm or serial")

@@ -10,10 +10,10 @@ import pytest
 from tests.studies.scenes import digests, optional, run, small
 
 from fleet2d.errors import InputError
-from fleet2d.studies import slurm_executor
+from fleet2d.studies import cluster_executors
+from fleet2d.studies.cluster_executors import SlurmExecutor
 from fleet2d.studies.command import slurm_parameters
 from fleet2d.studies.executors import FinishedTask, LostTask, TaskSchedule, WorkerTask
-from fleet2d.studies.slurm_executor import SlurmExecutor
 
 optional("submitit")
 pytestmark = [
@@ -27,7 +27,7 @@ pytestmark = [
 
 @pytest.fixture
 def executor(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> SlurmExecutor:
-    monkeypatch.setattr(slurm_executor, "LOOK_EVERY_S", 0.05)
+    monkeypatch.setattr(cluster_executors, "ASK_SLURM_EVERY_S", 0.05)
     return SlurmExecutor(2, folder=tmp_path / "jobs", cluster="local")
 
 
@@ -104,8 +104,8 @@ def test_a_job_that_left_the_queue_without_results_is_lost(
     executor: SlurmExecutor, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Without accounting, submitit would wait for it for ever."""
-    monkeypatch.setattr(slurm_executor, "_queued_jobs", lambda cluster: set[str]())
-    monkeypatch.setattr(slurm_executor, "GRACE_S", 0.0)
+    monkeypatch.setattr(cluster_executors, "_queued_jobs", lambda cluster: set[str]())
+    monkeypatch.setattr(cluster_executors, "GRACE_S", 0.0)
     (event,) = executor.run(Square(tmp_path), tasks(1))
     assert isinstance(event, LostTask)
     assert "left the queue without results" in event.reason
