@@ -3,7 +3,7 @@
 import re
 from typing import Any
 
-_VECTOR = "export the floor as DXF, or draw its walls in a picture"
+_VECTOR = "export the floor as DXF or SVG, or draw its walls in a picture"
 _PICTURE = "save it as PNG"
 _POINTS = "cut a slice of points between 0.3 m and 1.8 m above the floor, and save it as a picture"
 _MESH = "save a section 1 m above the floor as DXF"
@@ -47,7 +47,7 @@ _BEGINNINGS: tuple[tuple[bytes, str, str], ...] = (
 )
 # What a text begins with, after white space and an XML declaration; a regular expression.
 _TEXTS = (
-    (r"<svg|<!DOCTYPE svg", "an SVG drawing", "save it as DXF or PNG"),
+    (r"<svg|<!DOCTYPE svg", "an SVG drawing", "give it the ending .svg"),
     (r"<home\b", "a home of Sweet Home 3D", "give it the ending .xml"),
     (r"<kml", "KML", _MAP),
     (r"<osm", "OpenStreetMap data", _MAP),

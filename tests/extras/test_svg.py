@@ -1,0 +1,73 @@
+from pathlib import Path
+
+import pytest
+
+from fleet2d.errors import FloorPlanError
+from fleet2d.floorplan.formats.svg import Svg
+from fleet2d.floorplan.load import load_floorplan
+
+pytest.importorskip("svgelements")
+
+HEAD = (
+    '<svg xmlns="http://www.w3.org/2000/svg" width="1000" height="500"'
+    ' xmlns:inkscape="http://www.inkscape.org/namespaces/inkscape">'
+)
+# In the layout of CubiCasa5K: 100 units to a metre, doors of 0.85 m, rooms up to the walls.
+CUBICASA = f"""<?xml version="1.0"?>{HEAD}<g id="Model" class="Model v1-1">
+<g class="Space LivingRoom"><polygon points="20,20 500,20 500,400 20,400 20,20"/>
+ <g class="SpaceDimensionsLabel"><rect x="100" y="100" width="50" height="20"/></g></g>
+<g class="Space Bedroom" transform="translate(500,0)">
+ <polygon points="20,20 380,20 380,400 20,400"/></g>
+<g class="Wall" id="Wall"><polygon points="500,20 520,20 520,400 500,400"/>
+ <g class="Door Swing Beside" id="Door"><polygon points="500,100 520,100 520,185 500,185"/>
+  <g class="Panel"><path d="M500,100 A85,85 0 0 1 585,185"/></g></g></g>
+<g class="Wall External"><polygon points="0,0 900,0 900,20 0,20"/>
+ <g class="Window Regular"><polygon points="100,0 200,0 200,20 100,20"/></g></g>
+<g class="FixedFurniture Sink"><rect x="700" y="300" width="60" height="60"/></g>
+</g></svg>"""
+
+
+def write(folder: Path, text: str) -> Path:
+    path = folder / "plan.svg"
+    path.write_text(text)
+    return path
+
+
+def test_cubicasa_layout_has_its_rooms_and_doors(tmp_path: Path) -> None:
+    plan = load_floorplan(write(tmp_path, CUBICASA))
+
+    areas = {room.name: room.area_m2 for room in plan.rooms}
+    assert areas == pytest.approx({"living_room_0": 18.24, "bedroom_0": 13.68}, abs=0.3)
+    assert [("living_room", "bedroom")] == [
+        tuple(plan.rooms[k].type for k in sorted(door.rooms)) for door in plan.doorways
+    ]
+    assert plan.doorways[0].width_m == pytest.approx(0.85, abs=0.06)
+    assert "a unit is taken for 0.01 m, by the width of 1 doors" in plan.notes[0]
+
+
+def test_layers_of_inkscape_with_walls_as_lines(tmp_path: Path) -> None:
+    drawing = f"""{HEAD}<g inkscape:label="Outer walls" id="layer1">
+      <path id="path7" style="fill:none" d="M0,0 H800 V400 H0 Z"/><path fill="none" d="M400,0 V150 M400,240 V400"/></g>
+      <g inkscape:label="furniture"><circle cx="100" cy="100" r="40"/></g></svg>"""
+
+    plan = Svg(path=write(tmp_path, drawing), scale=0.01).load()
+
+    assert 2 == len(plan.rooms)
+    assert plan.area_m2 == pytest.approx(8 * 4, rel=0.06)
+    with pytest.raises(FloorPlanError, match="that would tell its scale"):
+        load_floorplan(tmp_path / "plan.svg")
+
+
+@pytest.mark.parametrize(
+    ("text", "problem"),
+    [
+        ("hello", "is damaged, or not SVG"),
+        (CUBICASA[:-40], "is damaged, or not SVG"),
+        (HEAD + "<rect width='9' height='9'/></svg>", "is named like walls or rooms"),
+        ("<!DOCTYPE svg [<!ENTITY a 'b'>]>" + HEAD + "</svg>", "defines entities"),
+        (HEAD + "<g class='Wall'><path d='M0,0 L nan,5'/></g></svg>", "named like walls|damaged"),
+    ],
+)
+def test_what_is_no_plan_is_refused(tmp_path: Path, text: str, problem: str) -> None:
+    with pytest.raises(FloorPlanError, match=problem):
+        load_floorplan(write(tmp_path, text))
