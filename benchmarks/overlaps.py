@@ -1,6 +1,6 @@
 """How often bodies of a household are in each other's place: on one seat, or walking.
 
-    python benchmarks/overlaps.py [SCENARIO] [--seeds N]
+    python benchmarks/overlaps.py [SCENARIO] [KEY.PATH=VALUE]... [--seeds N]
 
 A week of `examples/family.yaml` (or of another scenario), without and with `people_block: 3 s`. It
 compares all bodies at each second: two share a place if both rest, nearer than 5 cm; they overlap
@@ -27,12 +27,14 @@ def main() -> None:
     """Print a line for each seed and setting."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("scenario", nargs="?", default=str(FAMILY))
+    parser.add_argument("overrides", nargs="*", help="keys of it that are changed")
     parser.add_argument("--seeds", type=int, default=1, help="from 4 on")
     options = parser.parse_args()
     print("seed  people_block  on one place [s]  overlaps [s]  gives_way  processor [s]")
     for seed, block in itertools.product(range(4, 4 + options.seeds), ("null", "3 s")):
         begin = time.process_time()
-        run = fleet2d.run(options.scenario, f"simulation.people_block={block}", seed=seed)
+        changes = [*options.overrides, f"simulation.people_block={block}"]
+        run = fleet2d.run(options.scenario, *changes, seed=seed)
         seconds = time.process_time() - begin
         shared, overlaps = seconds_in_contact(run)
         gives_way = int((run.pandas("events")["event"] == "gives_way").sum())

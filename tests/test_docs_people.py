@@ -12,6 +12,8 @@ from pathlib import Path
 import pytest
 from tests.thorough import THOROUGH
 
+import fleet2d
+
 ROOT = Path(__file__).parents[1]
 pytestmark = pytest.mark.skipif(
     not THOROUGH, reason="FLEET2D_THOROUGH=1 computes all figures again"
@@ -77,6 +79,37 @@ def test_shares_of_rooms_are_as_near_as_the_page_says() -> None:
     lines = [line.split() for line in printed("people", "rooms")[1:]]
     errors = {int(day): f"{float(error):.3f}" for day, error, _ in lines}
     assert ["0.080", "0.037", "0.017", "0.008"] == [errors[day] for day in (1, 4, 16, 64)]
+
+
+def overlaps(*arguments: str) -> dict[str, list[str]]:
+    """Return the seconds on one place and of overlaps, and how often somebody gives way."""
+    lines = (line.split() for line in printed("overlaps", *arguments)[1:])
+    return {" ".join(words[1:-4]): words[-4:-1] for words in lines}
+
+
+def test_people_are_in_each_others_way_as_often_as_the_page_says() -> None:
+    found = overlaps()
+    assert "203" == found["null"][1]
+    assert ["49", "308"] == found["3 s"][1:]
+    flat = "../examples/flatmates.yaml"
+    own = [f"users.{name}.own_places=false" for name in ("ana", "ben", "cleo")]
+    assert ["1955", "380950"] == [overlaps(flat)["null"][0], overlaps(flat, *own)["null"][0]]
+
+
+def test_a_patrol_that_never_saw_the_beds_errs_as_the_page_says(shared_data: Path) -> None:
+    """The worst of the eight homes of `presence_views.yaml`, without and with stops that see."""
+    (home,) = (shared_data / "houseexpo").glob("6951eec7*.json")
+    errors = []
+    for stop_at in ("middle", "view"):
+        patrol = {"type": "patrol", "dwell": "5 min", "stop_at": stop_at}
+        stored = fleet2d.run(
+            str(ROOT / "examples/studies/base/presence_rounds.yaml"),
+            floorplan={"type": "houseexpo", "path": str(home), "furnish": True},
+            robots={"astro": {"behaviors": [patrol]}},
+            seed=1,
+        )
+        errors.append(f"{stored.metrics['likelihood_error']['ana']['tv']:.3f}")
+    assert ["0.450", "0.013"] == errors
 
 
 def test_fitted_personas_are_as_near_to_their_logs_as_the_page_says(
