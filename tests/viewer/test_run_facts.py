@@ -1,6 +1,7 @@
 """What the timeline marks covers the run, and says what the manifest and the table say."""
 
 import itertools
+from pathlib import Path
 
 import pytest
 from hypothesis import given
@@ -8,7 +9,13 @@ from hypothesis import strategies as st
 
 import fleet2d
 from fleet2d.runs.run import Tables
-from fleet2d.viewer.run_facts import expectation_marks, intervention_marks, marks_of
+from fleet2d.viewer import run_facts
+from fleet2d.viewer.run_facts import (
+    expectation_marks,
+    intervention_marks,
+    marks_of,
+    sightings_of,
+)
 
 STEPS = 1000
 
@@ -71,3 +78,15 @@ def test_interventions_of_a_script_say_so() -> None:
         mark["end"],
         mark["label"],
     )
+
+
+def test_sightings_are_the_same_however_they_are_read(
+    run_dir: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole = sightings_of(fleet2d.open_run(run_dir))
+    monkeypatch.setattr(run_facts, "BATCH_ROWS", 7)
+    assert whole == sightings_of(fleet2d.open_run(run_dir))
+    run = fleet2d.open_run(run_dir)
+    run.directory = None  # as a run in memory
+    assert whole == sightings_of(run)
+    assert sum(len(lane["first"]) for lane in whole) > 5

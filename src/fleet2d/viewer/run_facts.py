@@ -1,9 +1,9 @@
 """The facts of a run that the page receives: everything except its tables."""
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple, Self
 
 import numpy as np
 
@@ -132,41 +132,107 @@ def _violations(run: Run) -> dict[str, list[tuple[int, int]]]:
 JOIN_S = 6.0  # shorter gaps between sightings are no gaps in a lane
 
 
+BATCH_ROWS = 1 << 18
+
+
 def sightings_of(run: Run) -> list[SightingFacts]:
-    """Return the stretches in which each robot noticed each user, in order."""
+    """Return the stretches in which each robot noticed each user, in order.
+
+    A year has ten million observations: they are read in batches, in the order of their steps.
+
+    Raises:
+        ArtifactError: The table of observations is damaged.
+    """
     if "observations" not in run.tables:
         return []
-    table = run.tables["observations"]
-    step = table["step"].to_numpy()
-    robot, robots = categories(table["robot"])
-    user, users = categories(table["user"])
-    false = np.zeros(len(step), np.bool_)
-    if "true_user" in table.column_names:
-        true_user, true_names = categories(table["true_user"])
-        names = np.array([*users, ""], dtype=object)
-        true = np.array([*true_names, ""], dtype=object)
-        is_mistaken = (names[user] != true[true_user]) & (user >= 0)
-        false = (true_user < 0) | is_mistaken
-        if "truth_known" in table.column_names:
-            false &= table["truth_known"].to_numpy()
     gap = max(1, round(JOIN_S * 1e6 / run.manifest["step_us"]))
-    names_of_users = [*users, ""]  # the last one, code -1, is somebody unknown
-    lane = robot.astype(np.int64) * len(names_of_users) + user % len(names_of_users)
-    order = np.argsort(lane, kind="stable")
-    codes, begins = np.unique(lane[order], return_index=True)
-    lanes = []
-    for code, rows in zip(codes.tolist(), np.split(order, begins[1:]), strict=True):
-        first, last, is_false = _stretches(step[rows], false[rows], gap)
-        lanes.append(
-            SightingFacts(
-                robot=robots[code // len(names_of_users)],
-                user=names_of_users[code % len(names_of_users)],
-                first=first.tolist(),
-                last=last.tolist(),
-                false=is_false.tolist(),
-            )
-        )
-    return lanes
+    lanes: dict[tuple[str, str], SightingFacts] = {}
+    robots: dict[str, None] = {}  # in the order in which they appear, as users
+    users: dict[str, None] = {}
+    for batch in _observations(run):
+        rows = _Sightings.of(batch)
+        robots |= dict.fromkeys(rows.robots)
+        users |= dict.fromkeys(rows.users)
+        for robot, user, part in rows.lanes():
+            found = _stretches(rows.step[part], rows.false[part], gap)
+            _extend(lanes.setdefault((robot, user), _no_sightings(robot, user)), found, gap)
+    order = [(robot, user) for robot in robots for user in (*users, "")]
+    return [lanes[key] for key in order if key in lanes]
+
+
+def _observations(run: Run) -> Iterator[Any]:
+    """Yield the table of observations in parts, with the columns that sightings need."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    columns = ("step", "robot", "user", "true_user", "truth_known")
+    path = None if run.directory is None else path_in(run.directory, "observations.parquet")
+    if path is None or not path.is_file():
+        yield run.tables["observations"]
+        return
+    try:
+        file = pq.ParquetFile(path)
+        names = [name for name in columns if name in file.schema_arrow.names]
+        for batch in file.iter_batches(BATCH_ROWS, columns=names):
+            yield pa.Table.from_batches([batch])
+    except (pa.ArrowException, OSError) as error:
+        raise ArtifactError(f"{path} can't be read: {error}") from None
+
+
+class _Sightings(NamedTuple):
+    """Some observations.
+
+    Attributes:
+        step: int64 (rows,).
+        robot, user: int64 (rows,), numbers in `robots` and `users`; -1: an unknown user.
+        false: bool (rows,), whether the robot took something else for that user.
+    """
+
+    step: I64
+    robot: I64
+    user: I64
+    false: Bool
+    robots: list[str]
+    users: list[str]
+
+    @classmethod
+    def of(cls, table: Any) -> Self:
+        robot, robots = categories(table["robot"])
+        user, users = categories(table["user"])
+        false = np.zeros(len(robot), np.bool_)
+        if "true_user" in table.column_names:
+            true_user, true_names = categories(table["true_user"])
+            names = np.array([*users, ""], dtype=object)
+            true = np.array([*true_names, ""], dtype=object)
+            is_mistaken = (names[user] != true[true_user]) & (user >= 0)
+            false = (true_user < 0) | is_mistaken
+            if "truth_known" in table.column_names:
+                false &= table["truth_known"].to_numpy()
+        return cls(table["step"].to_numpy(), robot, user, false, robots, users)
+
+    def lanes(self) -> Iterator[tuple[str, str, I64]]:
+        """Yield a robot, a user, empty for an unknown one, and the rows of both."""
+        names = [*self.users, ""]
+        lane = self.robot * len(names) + self.user % len(names)
+        order = np.argsort(lane, kind="stable")
+        codes, begins = np.unique(lane[order], return_index=True)
+        for code, rows in zip(codes.tolist(), np.split(order, begins[1:]), strict=True):
+            yield self.robots[code // len(names)], names[code % len(names)], rows
+
+
+def _no_sightings(robot: str, user: str) -> SightingFacts:
+    return SightingFacts(robot=robot, user=user, first=[], last=[], false=[])
+
+
+def _extend(lane: SightingFacts, found: tuple[I64, I64, Any], gap: int) -> None:
+    """Add later stretches to a lane; the first one may continue its last one."""
+    first, last, false = (values.tolist() for values in found)
+    if lane["last"] and first[0] - lane["last"][-1] <= gap and false[0] == lane["false"][-1]:
+        lane["last"][-1] = last[0]
+        first, last, false = first[1:], last[1:], false[1:]
+    lane["first"] += first
+    lane["last"] += last
+    lane["false"] += false
 
 
 def _stretches(step: I64, false: Bool, gap: int) -> tuple[I64, I64, Any]:
