@@ -12,12 +12,13 @@ from typing import Any
 
 from fleet2d.configuration.problems import did_you_mean, suggest
 from fleet2d.configuration.units import format_duration, micros
-from fleet2d.engine.expectations import possible_details, possible_events
 from fleet2d.engine.intervention_queue import (
     OUTSIDE,
     SCRIPT,
     DueIntervention,
     PendingIntervention,
+    possible_details,
+    possible_events,
     read_record,
 )
 from fleet2d.engine.state import State
