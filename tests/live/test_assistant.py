@@ -85,6 +85,49 @@ def test_files_outside_and_code_are_refused(place: Workspace, text: str) -> None
         place.check("bad.yaml")
 
 
+@pytest.mark.parametrize("persona", ["{outside}", "../secret.yaml", "inside.yaml"])
+def test_nothing_outside_is_quoted_in_a_message(place: Workspace, persona: str) -> None:
+    """The message about a persona that was none began with the file's first line."""
+    secret = place.folder.parent / "secret.yaml"
+    secret.write_text("password 1234\n")
+    place.write("inside.yaml", "extends: ../secret.yaml\n")
+    persona = persona.format(outside=secret)
+    place.write("bad.yaml", f"{HOME}users: {{ana: {{type: routine, persona: {persona}}}}}\n")
+    override = f"users.ana={{type: routine, persona: {secret}}}"
+
+    for use in (lambda: place.check("bad.yaml"), lambda: place.begin("home.yaml", [override])):
+        with pytest.raises(InputError, match="is a file outside of the folder") as caught:
+            use()
+        assert "1234" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("a: !!python/object/apply:os.system [x]\n", "could not determine a constructor"),
+        ("a: &a [*a]\n", "nested more than 100 deep, or in themselves"),
+        ("a: [\n", "bad.yaml: "),
+        ("extends: bundled:base\nsimulation: {duration: 100000 d}\n", "would take minutes or more"),
+    ],
+)
+def test_a_wrong_file_is_told(place: Workspace, text: str, message: str) -> None:
+    place.write("bad.yaml", text)
+
+    with pytest.raises(InputError, match=message):
+        place.check("bad.yaml")
+
+
+def test_a_wrong_time_and_name_are_told(place: Workspace) -> None:
+    name = place.begin("home.yaml")
+
+    with pytest.raises(InputError, match="is a file outside of the folder"):
+        place.intervene(name, {"reset": "ltp", "learned": str(place.folder.parent / "secret.yaml")})
+    with pytest.raises(InputError, match="nonsense"):
+        place.advance(name, "nonsense")
+    with pytest.raises(InputError, match="is no name of a file"):
+        place.read("\0")
+
+
 @pytest.mark.parametrize(
     ("question", "message"),
     [

@@ -1,5 +1,6 @@
 """Detections of real robots: tables, topics of bags, labels, times, and what is wrong in them."""
 
+from datetime import date
 from pathlib import Path
 
 import numpy as np
@@ -118,6 +119,53 @@ def test_sorted_rows_are_counted(tmp_path: Path) -> None:
 
     assert log.time_us.tolist() == [0, 2_000_000] or log.time_us.tolist() == [3_000_000, 5_000_000]
     assert log.notes == ("1 lines ran backwards in time and were sorted in",)
+
+
+MOMENT = [  # 2026-03-29 00:59:59.5 UTC, an instant before summer time begins in Berlin
+    "1774745999.5",
+    "1774745999500",
+    "1774745999500000",
+    "1774745999500000000",
+    "2026-03-29T00:59:59.5Z",
+    "2026-03-28T20:59:59.5-04:00",
+]
+
+
+@pytest.mark.parametrize("text", MOMENT)
+def test_seconds_milli_micro_nanoseconds_and_zones_are_one_moment(
+    tmp_path: Path, text: str
+) -> None:
+    path = write(tmp_path, f"time,x,y\n{text},1,1\n")
+
+    log = read_detections(path, time_zone="Europe/Berlin")
+
+    assert (log.first_day, log.time_us.tolist()) == (date(2026, 3, 29), [7_199_500_000])
+    with pytest.raises(LogError, match="say which local time the home has by time_zone"):
+        read_detections(path)
+
+
+def test_a_jump_of_the_clock_is_told_with_its_line_and_size(tmp_path: Path) -> None:
+    rows = "2025-01-01 00:00:00,1,1\n2026-01-01 00:00:00,1,1\n2026-01-01 00:00:01,1,1\n"
+
+    log = read_detections(write(tmp_path, "time,x,y\n" + rows))
+
+    assert log.notes == ("line 3: the time jumps forward by 365.0 days there",)
+
+
+def test_a_clock_that_was_set_after_it_began_at_1970_is_refused(tmp_path: Path) -> None:
+    path = write(tmp_path, "time,x,y\n3,1,1\n1774745999,1,1\n1774746001,1,1\n")
+
+    with pytest.raises(
+        LogError, match=r"line 3: the time jumps forward by 20541\.0 days there: lea"
+    ):
+        read_detections(path, time_zone="UTC")
+
+
+def test_times_with_and_without_a_zone_are_refused(tmp_path: Path) -> None:
+    path = write(tmp_path, "time,x,y\n2026-01-01 00:00:00,1,1\n2026-01-01T05:00:01Z,1,1\n")
+
+    with pytest.raises(LogError, match="some of its times have a time zone and some have none"):
+        read_detections(path, time_zone="UTC")
 
 
 # Bags

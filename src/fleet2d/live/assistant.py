@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import yaml
+from pydantic_core import PydanticCustomError
 
 from fleet2d.configuration.trust import Trust, restrict
 from fleet2d.engine.simulation import Simulation
@@ -23,7 +24,9 @@ MAX_TEXT = 1 << 20
 """Size of a file that an assistant writes."""
 MAX_ROWS = 200
 """The number of rows of a table that one question returns."""
-MAX_EXTENDED = 100
+MAX_DEPTH = 100
+MAX_BODY_STEPS = 1_000_000_000
+"""Steps of a run times its bodies: a few minutes."""
 MAX_RUNNING = 8
 """The number of simulations that wait for interventions at the same time."""
 
@@ -58,6 +61,8 @@ class Workspace:
         Raises:
             InputError: It leads out of the folder.
         """
+        if "\0" in name:
+            raise InputError(f"{name!r} is no name of a file")
         path = (self.folder / name).resolve()
         if not path.is_relative_to(self.folder) or path == self.folder:
             raise InputError(f"{name!r} leads out of the folder: give a name like 'home.yaml'")
@@ -96,7 +101,9 @@ class Workspace:
         """
         path = self.path(name)
         if path.suffix not in (".yaml", ".yml", ".csv", ".json") or path.parent != self.folder:
-            raise InputError(f"{name!r}: give the name of a .yaml, .csv or .json file")
+            raise InputError(
+                f"{name!r}: give the name of a .yaml, .csv or .json file in the folder itself"
+            )
         if len(text.encode()) > MAX_TEXT:
             raise InputError(f"{name} would be larger than {MAX_TEXT} bytes")
         path.write_text(text, encoding="utf-8")
@@ -142,36 +149,47 @@ class Workspace:
         source: str | Path = scenario
         if not scenario.startswith("bundled:"):
             source = self.path(scenario)
-            self._check_extends(source, 0)
+            self._check_file(source, set())
+        for override in overrides:
+            self._check_values(_yaml(override.partition("=")[2], override), Path.cwd(), set())
         with restrict(Trust()):
             checked = load_scenario(source, *overrides)
-            self._check_paths(checked.resolved(), "")
+            self._check_values(checked.resolved(), self.folder, set())
+            bodies = len(checked.users) + len(checked.robots)
+            if bodies * checked.simulation.steps > MAX_BODY_STEPS:
+                raise InputError(
+                    f"{bodies} bodies in {checked.simulation.steps:,} steps would take minutes or"
+                    f" more: at most {MAX_BODY_STEPS:,} steps of bodies are run: shorten"
+                    " simulation.duration"
+                )
             return Simulation(checked, out=None if out is None else self.path(out))
 
-    def _check_extends(self, path: Path, depth: int) -> None:
-        """Refuse a scenario that extends one outside of the folder."""
-        content = yaml.safe_load(self.read(str(path.relative_to(self.folder))))
-        names = content.get("extends") if isinstance(content, dict) else None
-        for name in [names] if isinstance(names, str) else names or ():
-            if str(name).startswith("bundled:") or depth > MAX_EXTENDED:
-                continue
-            other = (path.parent / str(name)).resolve()
-            if not other.is_relative_to(self.folder):
-                raise InputError(f"{path.name} extends {name!r}, which is outside of the folder")
-            self._check_extends(other, depth + 1)
+    def _check_file(self, path: Path, known: set[Path]) -> None:
+        """Refuse a file that refers to one outside of the folder, before anything reads that."""
+        known.add(path)
+        name = str(path.relative_to(self.folder))
+        self._check_values(_yaml(self.read(name), name), path.parent, known)
 
-    def _check_paths(self, value: Any, key: str) -> None:
-        """Refuse files outside of the folder in a scenario."""
+    def _check_values(self, value: Any, base: Path, known: set[Path], depth: int = 0) -> None:
+        """Refuse values that are paths of files outside of the folder, seen from a folder."""
+        if depth > MAX_DEPTH:
+            raise InputError(f"values are nested more than {MAX_DEPTH} deep, or in themselves")
         if isinstance(value, dict):
-            for name, entry in value.items():
-                self._check_paths(entry, f"{key}.{name}" if key else str(name))
-        elif isinstance(value, list | tuple):
-            for number, entry in enumerate(value):
-                self._check_paths(entry, f"{key}.{number}")
-        elif isinstance(value, str) and value.startswith("/"):
-            path = Path(value).resolve()
-            if path.exists() and not path.is_relative_to(self.folder):
-                raise InputError(f"{key} is a file outside of the folder: copy it into the folder")
+            value = [*value, *value.values()]
+        if isinstance(value, list | tuple):
+            for entry in value:
+                self._check_values(entry, base, known, depth + 1)
+        if not isinstance(value, str):
+            return
+        try:
+            path = (base / Path(value).expanduser()).resolve()
+            is_there = path.exists() and path != self.folder
+        except (OSError, ValueError, RuntimeError):  # no path
+            return
+        if is_there and not path.is_relative_to(self.folder):
+            raise InputError(f"{value!r} is a file outside of the folder: copy it into the folder")
+        if is_there and path.suffix in (".yaml", ".yml") and path not in known:
+            self._check_file(path, known)
 
     def _open(self, run: str) -> Run:
         with restrict(Trust()):
@@ -270,7 +288,11 @@ class Workspace:
             if ":" in until:
                 run.run_until(until)
             else:
-                run.advance(round(parse_duration(until).total_seconds() * 1e6 / run.clock.step_us))
+                try:
+                    passed = parse_duration(until)
+                except PydanticCustomError as error:
+                    raise InputError(error.message()) from None
+                run.advance(round(passed.total_seconds() * 1e6 / run.clock.step_us))
         return {
             "time": run.time.isoformat(),
             "done": run.done,
@@ -284,8 +306,10 @@ class Workspace:
         Raises:
             InputError: There is no such simulation, or the intervention is wrong.
         """
+        run = self._get(simulation)
+        self._check_values(act, Path.cwd(), set())
         with restrict(Trust()):
-            self._get(simulation).intervene(act)
+            run.intervene(act)
         return "done"
 
     def finish(self, simulation: str) -> dict[str, Any]:
@@ -314,6 +338,14 @@ _OPERATORS = {
     ">": "greater",
     ">=": "greater_equal",
 }
+
+
+def _yaml(text: str, name: str) -> Any:
+    """Return the content of a YAML text."""
+    try:
+        return yaml.safe_load(text)
+    except (yaml.YAMLError, ValueError, RecursionError) as error:
+        raise InputError(f"{name}: {str(error)[:500]}") from None
 
 
 def _plain(value: Any) -> Any:

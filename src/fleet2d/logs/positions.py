@@ -37,6 +37,8 @@ NAMES = {
 }
 """The names that a column may have, if the user gives none."""
 
+# A longer step forward is one of the clock, or a log of two stays [us].
+JUMP_US = 7 * DAY_US
 EARLIEST_US, LATEST_US = -2_208_988_800_000_000, 7_258_118_400_000_000
 """The years 1900 and 2200 [us since 1970]."""
 
@@ -239,6 +241,7 @@ def local_times(
         order = np.argsort(time_us, kind="stable")
         time_us, row = time_us[order], row[order]
         notes.append(f"{len(back)} lines ran backwards in time and were sorted in")
+    notes += _jumps(time_us, line[row])
     first_day = date(1970, 1, 1) + timedelta(days=int(time_us[0] // DAY_US)) if has_date else None
     if first_day:
         time_us = time_us - time_us[0] // DAY_US * DAY_US
@@ -388,7 +391,19 @@ def _check_times(time_us: I64, path: Path, line: I64, *, has_date: bool) -> None
             f" expected {expected}"
         )
     days = int(time_us.max() - time_us.min()) // DAY_US + 1
+    if (jumps := _jumps(time_us, line)) and days > LOG_DAYS.limit:
+        raise LogError(f"{path}, {jumps[0]}: leave out the lines of the clock that wasn't set")
     LOG_DAYS.check(days, path, LogError)
+
+
+def _jumps(time_us: I64, line: I64) -> list[str]:
+    """Return a text about the largest step forward in time, if it is one of a clock."""
+    steps = np.diff(time_us)
+    if not len(steps) or (largest := int(steps.max())) < JUMP_US:
+        return []
+    at, count = line[int(steps.argmax()) + 1], np.count_nonzero(steps >= JUMP_US)
+    such = f" ({count} such lines)" if count > 1 else ""
+    return [f"line {at}: the time jumps forward by {largest / DAY_US:.1f} days there{such}"]
 
 
 def _parse_texts(texts: list[str], path: Path, line: I64) -> tuple[I64, bool]:

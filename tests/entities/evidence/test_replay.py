@@ -157,6 +157,40 @@ def test_few_detections_outside_are_left_out_and_counted(tmp_path: Path) -> None
     assert "1 of 10 detections are outside the home and left out, by up to 4" in notes
 
 
+@pytest.mark.parametrize("turn", [90.0, 180.0])
+def test_a_frame_that_is_turned_is_refused_with_its_distance(tmp_path: Path, turn: float) -> None:
+    x, y = place("kitchen_0")
+    path = detections(tmp_path / "seen.csv", [(float(t), "ana", x, y) for t in range(9)])
+
+    with pytest.raises(
+        InputError, match=r"9 of 9 detections are more than 1 m outside, by \d+\.\d m"
+    ):
+        fleet2d.Simulation(scenario(path, frame={"rotation_deg": turn}))
+
+
+def test_a_frame_off_by_a_metre_is_told_where_it_leads_through_walls(tmp_path: Path) -> None:
+    """Within the reach of a metre nothing is left out, but what is in walls is counted."""
+    x, y = place("kitchen_0")
+    rows = [(t, "ana", x + t / 10 - 4, y) for t in range(80)]  # through the walls beside
+    inside = [row for row in rows if fleet2d.load_floorplan().room_at(*row[2:]) is not None]
+    path = detections(tmp_path / "seen.csv", inside)
+
+    notes = " ".join(fleet2d.Simulation(scenario(path, frame={"origin": [0.6, 0.6]})).notes)
+
+    assert "detections are in or behind walls, by up to 0." in notes
+
+
+def test_what_is_from_before_the_run_is_left_out_and_counted(kitchen: Path) -> None:
+    content = scenario(kitchen)
+    content["simulation"]["start"] = "2026-01-05T00:10:30"
+
+    run = fleet2d.run(content)
+
+    note = "robots.astro: 30 detections before the run and 0 after its end were left out"
+    assert note in run.manifest["notes"]
+    assert run.tables["observations"].num_rows == 31
+
+
 @pytest.mark.parametrize(
     ("rows", "options", "message"),
     [
