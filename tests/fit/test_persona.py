@@ -12,16 +12,7 @@ from tests.thorough import THOROUGH, some
 from fleet2d import cli
 from fleet2d.configuration.documents import read_document
 from fleet2d.fit.command import fit_routine
-from fleet2d.fit.persona import (
-    Validation,
-    fit_persona,
-    gaps,
-    sample_markov,
-    sample_persona,
-    simulated_repeats,
-    to_yaml,
-    validate,
-)
+from fleet2d.fit.persona import fit_persona, gaps, to_yaml
 from fleet2d.fit.privacy import private_days, repeats
 from fleet2d.fit.timeline import (
     ActivityPlace,
@@ -35,6 +26,13 @@ from fleet2d.fit.timeline import (
     read_timeline,
     shares,
     wasserstein,
+)
+from fleet2d.fit.validation import (
+    Validation,
+    sample_markov,
+    sample_persona,
+    simulated_repeats,
+    validate,
 )
 from fleet2d.logs.layouts import read_log
 from fleet2d.logs.log import ActivityLog, LogError

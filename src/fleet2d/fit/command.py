@@ -7,7 +7,8 @@ import typer
 
 if TYPE_CHECKING:
     from fleet2d.fit.perception import Calibration, FittedProbability
-    from fleet2d.fit.persona import FittedPersona, Validation
+    from fleet2d.fit.persona import FittedPersona
+    from fleet2d.fit.validation import Validation
 
 
 fitting = typer.Typer(help="Learn from a real log.", no_args_is_help=True)
@@ -70,8 +71,9 @@ def fit_routine(
     Raises:
         LogError: The log can't be read, is of positions, or has too few days.
     """
-    from fleet2d.fit.persona import fit_persona, gaps, to_yaml, validate
+    from fleet2d.fit.persona import fit_persona, gaps, to_yaml
     from fleet2d.fit.timeline import find_days, read_timeline
+    from fleet2d.fit.validation import validate
     from fleet2d.logs.layouts import layout_names, read_log
     from fleet2d.logs.log import ActivityLog, LogError
 
@@ -110,7 +112,7 @@ def fit_routine(
 
 def table(validation: "Validation") -> list[str]:
     """Return the distances of a validation as lines of text."""
-    from fleet2d.fit.persona import MODELS
+    from fleet2d.fit.validation import MODELS
 
     lines = [
         f"{validation.days} days in {validation.folds} parts, each held back in turn: distances of"
@@ -137,8 +139,8 @@ def table(validation: "Validation") -> list[str]:
 
 def privacy(fitted: "FittedPersona", private: bool) -> list[str]:
     """Return how much of its log a persona repeats, as lines of text."""
-    from fleet2d.fit.persona import simulated_repeats
     from fleet2d.fit.privacy import repeats
+    from fleet2d.fit.validation import simulated_repeats
 
     lines = [
         "successive changes of activity, to the minute, that a day shares with one of the log:",

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fleet2d.errors import extra
-from fleet2d.fit.persona import FittedPersona, sample_markov, sample_persona
+from fleet2d.fit.persona import FittedPersona
 from fleet2d.fit.timeline import LivedDay, Timeline, by_hour, dwell_times, shares
+from fleet2d.fit.validation import sample_markov, sample_persona
 from fleet2d.kernels import F64, Bool
 from fleet2d.logs.log import AWAY
 from fleet2d.palette import OTHER_COLOR, ROOM_COLORS
