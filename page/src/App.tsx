@@ -124,7 +124,7 @@ function Controls() {
   const run = state.run.value!;
   const playing = state.playing.value;
   return (
-    <div class="controls" role="toolbar" aria-label="Time">
+    <section class="controls" aria-label="Time">
       {state.live.value ? (
         <LiveControls />
       ) : (
@@ -191,7 +191,7 @@ function Controls() {
       </span>
       {run.path && <CopyLink />}
       <Help />
-    </div>
+    </section>
   );
 }
 

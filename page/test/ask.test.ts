@@ -111,3 +111,15 @@ describe("‹ and ›", () => {
     state.search.value = "";
   });
 });
+
+describe("a question about two runs", async () => {
+  const [run, other] = [await wholeRun(), await wholeRun()];
+  const lane = other.roomsOf("ana");
+  other.rooms.set("ana", { ...lane, value: [...lane.value].map((room, i) => (i === 3 ? room + 1 : room)) });
+
+  it("finds where they differ", () => {
+    const { spans } = ask(run, "first ana differs", 0, other);
+    expect(spans.map((span) => [span.from, span.to])).toEqual([[lane.from[3], lane.to[3]]]);
+    expect(ask(run, "astro differs", 0, other).words).toBe("never");
+  });
+});

@@ -12,7 +12,7 @@ import type { EventRow } from "./events";
 import { AWAY } from "./rooms";
 import type { Run } from "./run";
 import { durationText } from "./clock";
-import { valueAt } from "./stretches";
+import { differences, valueAt } from "./stretches";
 
 export interface Span {
   from: number;
@@ -58,8 +58,18 @@ export function hasWords(text: string, words: string): boolean {
     .every((word) => text.includes(word));
 }
 
+/** When somebody is in different rooms in two runs. */
+function differing(run: Run, other: Run, names: readonly string[]): Span[] {
+  const bodies = run.bodies.filter((body) => names.length === 0 || names.includes(body.name.toLowerCase()));
+  const spans = bodies.flatMap(({ name }) => {
+    const { from, to } = differences(run.roomsOf(name), other.roomsOf(name));
+    return Array.from(from, (us, i) => ({ from: us, to: to[i]!, words: `${name} is in another room` }));
+  });
+  return spans.sort((a, b) => a.from - b.from);
+}
+
 /** Answer a question; times without a date are on the day of `nearUs`. */
-export function ask(run: Run, question: string, nearUs: number): Answer {
+export function ask(run: Run, question: string, nearUs: number, other: Run | null = null): Answer {
   const answer = (spans: Span[], words: string): Answer => ({ question, spans, words });
   let rest = ` ${question.trim().toLowerCase().replace(/\s+/g, " ")} `;
   const moment = / at (.+) $/.exec(rest);
@@ -82,7 +92,8 @@ export function ask(run: Run, question: string, nearUs: number): Answer {
   const which = / (last|first) /.exec(rest)?.[1];
   const part = Object.keys(PARTS).find((name) => rest.includes(` ${name} `));
   const words = rest.split(" ").filter((word) => word && word !== which && word !== part);
-  let found = stretchesOf(run, words);
+  const asksDifference = other && words.includes("differs");
+  let found = asksDifference ? differing(run, other, words.filter((word) => word !== "differs")) : stretchesOf(run, words);
   if (typeof found === "string") return answer([], found);
   if (part) found = partsOfDays(run, part, found);
   const longest = length ? Number(length[2]) * UNITS[length[3]!]! : 0;
@@ -97,7 +108,7 @@ export function ask(run: Run, question: string, nearUs: number): Answer {
 }
 
 /** What can follow the words so far: names, rooms and kinds of events. */
-export function completions(run: Run, question: string): string[] {
+export function completions(run: Run, question: string, hasOther = false): string[] {
   const before = question.replace(/\S*$/, "");
   const begun = question.slice(before.length).toLowerCase();
   const { rooms } = run.facts.home;
@@ -107,6 +118,7 @@ export function completions(run: Run, question: string): string[] {
     ...rooms.map((room) => room.name),
     ...rooms.map((room) => room.type),
     "away", "home", "seen",
+    ...(hasOther ? ["differs"] : []),
     ...run.events.kinds.map((kind) => kind.replaceAll("_", " ")),
     ...run.events.ofKind("activity").map((row) => row.detail.replaceAll("_", " ")),
   ];

@@ -27,7 +27,7 @@ function BeliefsOf({ run, title }: { run: Run; title: string }) {
     .filter((row) => row.believed > 0.002 || row.truth > 0.002 || row.i === comparison.now);
   return (
     <div>
-      {title && <h3>{title}</h3>}
+      {title && <h2>{title}</h2>}
       <label>
         Of{" "}
         <select

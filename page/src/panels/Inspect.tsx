@@ -63,7 +63,7 @@ function BodyView({ run, name }: { run: Run; name: string }) {
   ];
   return (
     <div data-inspected={name}>
-      <h3>{name}</h3>
+      <h2>{name}</h2>
       <button
         type="button"
         aria-pressed={state.followed.value === name}
@@ -77,7 +77,7 @@ function BodyView({ run, name }: { run: Run; name: string }) {
       {body.robot && why === undefined && run.path !== "" && (
         <p class="hint">Which behavior is active, why, and when it decides next: press Continue from here.</p>
       )}
-      <h4>History</h4>
+      <h3>History</h3>
       <History run={run} rows={run.events.about(name)} us={us} />
     </div>
   );
@@ -131,9 +131,9 @@ function DoorView({ run, name }: { run: Run; name: string }) {
   const us = slowMoment.value;
   return (
     <div data-inspected={name}>
-      <h3>{name}</h3>
+      <h2>{name}</h2>
       <Facts rows={[["kind", "door"], ["now", run.doorOpen(name, us) ? "open" : "shut"]]} />
-      <h4>History</h4>
+      <h3>History</h3>
       <History run={run} rows={run.events.ofEntity(name)} us={us} />
     </div>
   );
@@ -145,7 +145,7 @@ function FurnitureView({ run, name }: { run: Run; name: string }) {
   const thing = run.facts.home.objects.find((entry) => entry.name === name)!;
   return (
     <div data-inspected={name}>
-      <h3>{name.replaceAll("_", " ")}</h3>
+      <h2>{name.replaceAll("_", " ")}</h2>
       <Facts rows={[["kind", thing.type.replaceAll("_", " ")], ["blocks", BLOCKS[thing.blocks] ?? thing.blocks]]} />
     </div>
   );
@@ -159,7 +159,7 @@ function RoomView({ run, name }: { run: Run; name: string }) {
   const occupants = run.bodies.filter((body) => valueAt(run.roomsOf(body.name), us) === index);
   return (
     <div data-inspected={name}>
-      <h3>{name.replaceAll("_", " ")}</h3>
+      <h2>{name.replaceAll("_", " ")}</h2>
       <Facts
         rows={[
           ["kind", room.type.replaceAll("_", " ")],

@@ -10,7 +10,7 @@ export function Ask() {
   void run.version.value;
   const answer = state.answer.value;
   const put = (question: string): void => {
-    const found = question.trim() ? ask(run, question, state.moment.value) : null;
+    const found = question.trim() ? ask(run, question, state.moment.value, state.runs.value[1] ?? null) : null;
     state.answer.value = found;
     const first = found?.spans[0];
     if (first) state.goTo(first.from);
@@ -35,7 +35,7 @@ export function Ask() {
         }}
       />
       <datalist id="ask-words">
-        {completions(run, text.value).map((words) => (
+        {completions(run, text.value, state.runs.value.length > 1).map((words) => (
           <option key={words} value={words} />
         ))}
       </datalist>
