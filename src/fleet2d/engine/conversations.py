@@ -325,7 +325,24 @@ class Conversations(Watcher):
             queue.settle(request, reply.outcome, time, time + reply.later)
         self._tell(row, str(reply.outcome), text)
         user = next(a.row for a in self.actors if a.name == text.rpartition(" ")[2])
-        return [self._obey(row, user, reply.outcome, text, step, bodies)]
+        event = self._obey(row, user, reply.outcome, text, step, bodies)
+        asked = queue.interactions.get(text.rpartition(" ")[0])
+        if reply.outcome != Outcome.ACCEPTED or asked is None or asked.do != "ask":
+            return [event]
+        about = next((a.row for a in self.actors[: self.users] if a.name == asked.about), None)
+        if about is None:
+            return [event]
+        where = f"{asked.about} {self._whereabouts(about, user, bodies.block(step, step + 1))}"
+        return [event, Event(step, event.entity, EventKind.TOLD, where)]
+
+    def _whereabouts(self, about: int, user: int, block: PoseBlock) -> str:
+        """Return what a person knows of where another is: away, the room if the same, or home."""
+        if block.away[about, 0]:
+            return "away"
+        room = self._room(about, block)
+        if room is None or room != self._room(user, block):
+            return "home"
+        return self.actors[about].home.rooms[room].name
 
     def _obey(
         self, row: int, user: int, outcome: Outcome, text: str, step: int, bodies: Bodies

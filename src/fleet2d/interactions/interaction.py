@@ -39,7 +39,7 @@ class Outcome(StrEnum):
     SWITCHED_OFF = "switched_off"
 
 
-REQUEST_EVENTS = frozenset({"due", "expired", "question", "allowed", *map(str, Outcome)})
+REQUEST_EVENTS = frozenset({"due", "expired", "question", "allowed", "told", *map(str, Outcome)})
 """What a robot hears: requests come up and expire, people answer, ask it, and let it in again."""
 
 

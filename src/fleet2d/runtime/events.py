@@ -70,6 +70,7 @@ class EventKind(StrEnum):
     RETRACES = "retraces"
     SENT_AWAY = "sent_away"
     SWITCHED_OFF = "switched_off"
+    TOLD = "told"
     VISITS = "visits"
     WAY_BLOCKED = "way_blocked"
     WITHDRAWS = "withdraws"
