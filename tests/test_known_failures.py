@@ -302,6 +302,7 @@ CHANGES: dict[tuple[type, str], dict[str, Any]] = {
     (Patrol, PATROL): {
         "rooms": ["kitchen"], "waypoints": [[1, 3], [7, 1]], "dwell": "25 s", "order": "random",
         "look_around": False, "when": "23:00-23:30", "cooldown": "2 min", "avoid": ["kitchen"],
+        "stop_at": "view",
     },
     (Meander, "users.ben.behaviors.0"): {
         "turn_std_deg": 25, "at_walls": "stay", "when": "23:00-23:30",
@@ -322,6 +323,7 @@ CHANGES: dict[tuple[type, str], dict[str, Any]] = {
 # What is not told by tables, and which test sees it.
 ELSEWHERE = {
     (User, "color"): "tests/pictures: pictures",
+    (User, "lights"): "tests/engine/test_lights: it is day here",
     (User, "answers"): "tests/interactions: no robot wants anything here",
     (Robot, "localization"): "tests/entities/test_localization",
     (Robot, "color"): "tests/pictures: pictures",
