@@ -4,6 +4,7 @@ from collections.abc import Generator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from tests.scenes import OWN
 from tests.studies.scenes import SPEED, base, run, small
@@ -19,7 +20,14 @@ from fleet2d.studies.executors import (
     TaskSchedule,
     WorkerJob,
 )
-from fleet2d.studies.plan import StudyPlan, check_setups, forecast, make_plan, setups_to_check
+from fleet2d.studies.plan import (
+    PlanSchedule,
+    StudyPlan,
+    check_setups,
+    forecast,
+    make_plan,
+    setups_to_check,
+)
 from fleet2d.studies.simulator import RunSpeed
 from fleet2d.studies.specification import read_specification
 
@@ -234,3 +242,32 @@ def test_variants_that_fail_are_no_part_of_a_forecast() -> None:
     plan = make_plan(build_design(read_specification(small(base=broken))))
     with pytest.raises(ComponentError, match="all measured variants fail"):
         forecast(plan, SerialExecutor())
+
+
+def test_a_plan_takes_at_most_48_bytes_a_variant() -> None:
+    variants = plan(replicates=5000).variants
+    columns = (value for value in vars(variants).values() if isinstance(value, np.ndarray))
+    assert sum(column.nbytes for column in columns) <= 48 * len(variants)
+
+
+def test_equal_seeds_are_refused() -> None:
+    with pytest.raises(ScenarioError, match=r"variant 0 .* and variant 2 .* are the same scenario"):
+        plan(replicates=[7, 8, 7])
+
+
+def test_tasks_are_made_from_both_ends_and_put_back_in_their_place() -> None:
+    variants = plan(replicates=4).variants
+    schedule = PlanSchedule(variants, np.arange(1, len(variants)))
+    assert len(variants) - 1 == len(schedule)
+    first, second = schedule.take("a"), schedule.take("a")
+    last = schedule.take("b")
+    assert first is not None
+    assert second is not None
+    assert last is not None
+    assert (1, 2, len(variants) - 1) == (first.index, second.index, last.index)
+    assert variants[1].identity == first.identity
+    schedule.put_back(second)
+    assert schedule.take("a") == second
+    rest = [task.index for task in iter(lambda: schedule.take("a"), None)]
+    assert list(range(3, len(variants) - 1)) == rest
+    assert not schedule

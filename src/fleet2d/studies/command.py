@@ -1,6 +1,7 @@
 """The commands `fleet2d study run`, `status`, `rerun`, `report`, and `fleet2d tune`."""
 
 import gc
+import itertools
 import json
 import signal
 import sys
@@ -292,13 +293,13 @@ def _print_plan(checked: "CheckedStudy", workers: int | None) -> None:
         more = f", … {len(labels)} in all" if len(labels) > MAX_LINES else ""
         _print(f"{column}: {values}{more}")
     _print("")
-    for variant in plan.variants[:MAX_LINES]:
+    for variant in itertools.islice(plan.variants, MAX_LINES):
         _print(f"  {plan.design.describe(variant.index)}")
     if len(plan.variants) > MAX_LINES:
         _print(f"  … {len(plan.variants) - MAX_LINES} more")
     expected = forecast(plan, LocalExecutor(1))
     _print(
-        f"\n{len(plan.variants)} variants, {len({v.home_key for v in plan.variants})} homes,"
+        f"\n{len(plan.variants)} variants, {len(plan.variants.home_keys)} homes,"
         f" {in_words(expected.simulated)} of simulated time: about"
         f" {in_words(expected.by(count))} by {count} workers here"
     )

@@ -11,10 +11,13 @@ from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from fleet2d import __version__
 from fleet2d.configuration.documents import Document
 from fleet2d.configuration.problems import suggest
 from fleet2d.errors import InputError, ScenarioError
+from fleet2d.kernels import I32
 from fleet2d.scenario.compose import apply_changes, assignment, merge
 from fleet2d.scenario.model import Scenario, scenario_of
 from fleet2d.studies.axes import Choice, Label, key_path
@@ -184,9 +187,12 @@ class Design:
     seeds: tuple[int, ...]
 
     @cached_property
-    def combinations(self) -> list[tuple[int, ...]]:
-        """The index of the choice on each axis, by combination; -1 where an axis doesn't apply."""
-        return list(self._extend((), {}))
+    def combinations(self) -> I32:
+        """The index of the choice on each axis, -1 where it doesn't apply: (combinations, axes)."""
+        rows = self._extend((), {})
+        if not self.axes:
+            return np.zeros((sum(1 for _ in rows), 0), np.int32)
+        return np.fromiter(rows, np.dtype((np.int32, (len(self.axes),))))
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -202,12 +208,6 @@ class Design:
             for column in axis.columns
         }
         return {**labels, SEED: list(self.seeds)}
-
-    @property
-    def combination_labels(self) -> dict[str, list[Label]]:
-        """The label of each combination, by column of the axes."""
-        rows = [self._labels(combination) for combination in self.combinations]
-        return {column: [row[column] for row in rows] for column in self.columns[:-1]}
 
     def __len__(self) -> int:
         """Return the number of variants."""
@@ -247,9 +247,9 @@ class Design:
         )
         return f"variant {index} ({labels})"
 
-    def _at(self, index: int) -> tuple[tuple[int, ...], int]:
+    def _at(self, index: int) -> tuple[list[int], int]:
         combination, seed = divmod(index, len(self.seeds))
-        return self.combinations[combination], self.seeds[seed]
+        return self.combinations[combination].tolist(), self.seeds[seed]
 
     def _labels(self, combination: Sequence[int]) -> dict[str, Label]:
         labels: dict[str, Label] = {}
@@ -318,7 +318,7 @@ def build_design(specification: Specification) -> Design:
     design = Design(base, specification.folder, axes, rules, file.exclude, seeds)
     _check_size(specification.name, design)
     _check_conditions(specification, design)
-    if not design.combinations:
+    if not len(design.combinations):
         raise ScenarioError(f"{specification.name} has no variants: all are excluded")
     return design
 

@@ -7,23 +7,23 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import TypeAdapter
 
 from fleet2d.errors import ArtifactError, RunDirectoryError
+from fleet2d.kernels import I32, U8, Bool
 from fleet2d.storage.files import PARTIAL, FolderLock, path_in
 from fleet2d.studies.parts import (
     VARIANT,
     Part,
+    ResultRows,
     next_number,
     part_name,
     read_parts,
     read_results,
     record_names,
-    results_table,
     write_part,
 )
 from fleet2d.studies.records import Journal, read_journal
@@ -35,6 +35,7 @@ if TYPE_CHECKING:
 
 FORMAT = 1
 MISSING = "missing"
+COMPLETE, FAILED = 1, 2  # statuses of variants with results
 LOCK = "lock"
 META, PLAN, SCENARIOS, VARIANTS = (
     "study.json", "plan.parquet", "scenarios.parquet", "variants.parquet",
@@ -233,27 +234,49 @@ class StudyDirectory:
         """
         import pyarrow as pa
 
-        table = self.storage.read_table(PLAN, columns)
-        with self.storage.reading(PLAN):
-            if table.schema.field(VARIANT).type != pa.int32() or table[VARIANT].null_count:
-                raise ValueError("it has no numbers of variants")
-        return table
+        return pa.concat_tables(self.plan_batches(columns))
 
-    def statuses(self, parts: Sequence[Part]) -> dict[int, str]:
-        """Return the status of each variant with results, by number; the newest result counts."""
-        status_of: dict[int, str] = {}
-        for table in read_results(self.storage, parts):
-            numbers, statuses = (table.column(name).to_pylist() for name in (VARIANT, "status"))
-            status_of |= zip(numbers, statuses, strict=True)
+    def plan_batches(self, columns: Sequence[str] | None = None) -> "Iterator[pa.Table]":
+        """Yield the plan, or some of its columns, `variant` among them, some rows at a time.
+
+        Raises:
+            RunDirectoryError: It is missing or damaged.
+        """
+        import pyarrow as pa
+
+        for table in self.storage.read_batches(PLAN, columns):
+            with self.storage.reading(PLAN):
+                if table.schema.field(VARIANT).type != pa.int32() or table[VARIANT].null_count:
+                    raise ValueError("it has no numbers of variants")
+            yield table
+
+    def statuses(self, parts: Sequence[Part]) -> U8:
+        """Return the status of each variant with results, by number: uint8 (n,).
+
+        It is 0 without results, else COMPLETE or FAILED; the newest result counts.
+        """
+        status = np.zeros(0, np.uint8)
+
+        def note(numbers: I32, is_complete: Bool) -> None:
+            nonlocal status
+            missing = int(numbers.max(initial=-1)) + 1 - len(status)
+            if missing > 0:
+                status = np.append(status, np.zeros(max(missing, len(status)), np.uint8))
+            status[numbers] = np.where(is_complete, COMPLETE, FAILED)
+
+        for table in read_results(self.storage, parts, (VARIANT, "status")):
+            names = table.column("status").to_numpy()
+            note(table.column(VARIANT).to_numpy(), names == "complete")
         for record in read_journal(self.journal_path(parts)):
-            status_of[record.number] = record.header["status"]
-        return status_of
+            note(np.array([record.number], np.int32), np.array([record.is_complete]))
+        return status
 
     def counts(self) -> Counts:
         """Return how far the study is."""
-        numbers = self.plan([VARIANT]).column(VARIANT).to_pylist()
-        status_of = self.statuses(self.parts())
-        return Counts.of([status_of.get(number) for number in numbers])
+        numbers = self.plan([VARIANT]).column(VARIANT).to_numpy()
+        status = self.statuses(self.parts())
+        status = np.append(status, np.zeros(int(numbers.max(initial=0)) + 1, np.uint8))[numbers]
+        return Counts(len(numbers), *(int((status == c).sum()) for c in (COMPLETE, FAILED)))
 
     def variants(self) -> "pa.Table":
         """Return parameters, status, times, digest and metrics of all variants.
@@ -271,26 +294,42 @@ class StudyDirectory:
             table = self.storage.read_table(VARIANTS)
             if (table.schema.metadata or {}).get(_STATE) == _state(parts, has_journal=False):
                 return table
-        results = list(read_results(self.storage, parts))
-        if headers or not results:
-            results.append(results_table(headers))
-        table, plan = pa.concat_tables(results, promote_options="default"), self.plan()
-        rows = _newest_rows(table.column(VARIANT).to_numpy(), plan.column(VARIANT).to_numpy())
-        newest = table.take(pa.array(rows, pa.int64(), mask=rows < 0))
-        columns = {name: plan.column(name) for name in plan.column_names if name not in _PLAN_ONLY}
-        columns |= {name: newest.column(name) for name in newest.column_names if name != VARIANT}
-        columns["status"] = columns["status"].fill_null(MISSING)
-        return pa.table(columns).replace_schema_metadata({_STATE: _state(parts, bool(headers))})
+        return pa.concat_tables(self._variant_tables(parts, headers))
 
-    def write_variants(self) -> "pa.Table":
-        """Write `variants.parquet`; return its content.
+    def _variant_tables(
+        self, parts: Sequence[Part], headers: Sequence[Mapping[str, Any]]
+    ) -> "Iterator[pa.Table]":
+        """Yield the variants, some rows of the plan after the other."""
+        import pyarrow as pa
+
+        results = ResultRows(self.storage, parts, headers)
+        state = {_STATE: _state(parts, bool(headers))}
+        for plan in self.plan_batches():
+            newest = results.of(plan.column(VARIANT).to_numpy())
+            names = (name for name in plan.column_names if name not in _PLAN_ONLY)
+            columns = {name: plan.column(name) for name in names}
+            columns |= {
+                name: newest.column(name) for name in newest.column_names if name != VARIANT
+            }
+            columns["status"] = columns["status"].fill_null(MISSING)
+            yield pa.table(columns).replace_schema_metadata(state)
+
+    def write_variants(self, observe: "Callable[[pa.Table], None]") -> None:
+        """Write `variants.parquet`, which may be larger than the memory.
+
+        Args:
+            observe: Receives some rows after the other.
 
         Raises:
             ArtifactError: It can't be written.
         """
-        table = self.variants()
-        self.storage.write_table(VARIANTS, table)
-        return table
+
+        def tables() -> "Iterator[pa.Table]":
+            for table in self._variant_tables(self.parts(), ()):
+                observe(table)
+                yield table
+
+        self.storage.write_batches(VARIANTS, tables(), self.scratch)
 
     def journal_path(self, parts: Iterable[Part]) -> Path:
         """Return the path of the journal of the next part."""
@@ -349,19 +388,6 @@ def _scratch_of(location: str) -> Path:
     base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
     name = hashlib.sha256(location.encode()).hexdigest()[:16]
     return Path(base) / "fleet2d" / "studies" / name
-
-
-def _newest_rows(numbers: NDArray[np.int32], variants: NDArray[np.int32]) -> NDArray[np.int64]:
-    """Return the last row of each variant in a table of results, -1 where there is none.
-
-    Args:
-        numbers: The variant of each row of the results: int32 (rows,).
-        variants: The variants to look up: int32 (variants,).
-    """
-    order = np.argsort(numbers, kind="stable")
-    places = np.searchsorted(numbers[order], variants, side="right") - 1
-    rows = np.append(order, -1)[places]  # place -1: no row
-    return np.where(np.append(numbers, -1)[rows] == variants, rows, -1)
 
 
 def _state(parts: Iterable[Part], has_journal: bool) -> bytes:

@@ -2,13 +2,14 @@
 
 import time
 from collections import deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fleet2d.configuration.problems import did_you_mean
 from fleet2d.configuration.trust import Trust, current_trust, restrict
@@ -25,7 +26,7 @@ from fleet2d.studies.design import (
     scenario_content,
 )
 from fleet2d.studies.directory import (
-    PLAN,
+    COMPLETE,
     VARIANTS,
     Counts,
     Meta,
@@ -38,15 +39,16 @@ from fleet2d.studies.parts import RESULT_COLUMNS, Part, results_table
 from fleet2d.studies.plan import (
     Changed,
     KnownNames,
-    PlannedVariant,
+    PlanSchedule,
     ReconciledPlan,
     ScenarioFile,
     StudyPlan,
     check_setups,
     make_plan,
-    plan_table,
     reconcile,
+    task_of,
     write_catalogue,
+    write_plan,
 )
 from fleet2d.studies.reader import Study
 from fleet2d.studies.records import Journal, VariantRecord, record_of
@@ -68,7 +70,7 @@ class AdaptiveSchedule(TaskSchedule):
         self,
         settings: AdaptSettings,
         plan: StudyPlan,
-        missing: Sequence[WorkerTask],
+        missing: NDArray[np.integer[Any]],
         directory: StudyDirectory,
         on_note: Callable[[str], None],
     ) -> None:
@@ -77,29 +79,31 @@ class AdaptiveSchedule(TaskSchedule):
         Args:
             settings: The section `adapt` of the study file.
             plan: All variants.
-            missing: The tasks of variants without results.
+            missing: The places of variants without results.
             directory: The study, for results so far.
             on_note: Receives a remark for each decision.
         """
         super().__init__(())
         self._settings, self._design = settings, plan.design
         self._directory, self._on_note = directory, on_note
-        self._missing = {task.number: task for task in missing}
+        self._planned = plan.variants
+        self._is_missing = np.zeros(len(plan.variants), np.bool_)
+        self._is_missing[missing] = True
         self._dropped = set[object]()
         seeds = len(plan.design.seeds)
-        self._rounds = deque(
-            [v for v in plan.variants if first <= v.index % seeds < first + settings.seeds]
-            for first in range(0, seeds, settings.seeds)
-        )
+        round_of = plan.variants.index % seeds // settings.seeds
+        rounds = range(-(-seeds // settings.seeds))
+        self._rounds = deque(np.flatnonzero(round_of == number) for number in rounds)
         self._looks = len(self._rounds) - 1
         self._unfinished = 0
-        self._variants = list[PlannedVariant]()
+        self._places = list[int]()
         self._start_round()
 
     @property
     def plan(self) -> StudyPlan:
         """The variants of all rounds so far."""
-        return StudyPlan(self._design, tuple(sorted(self._variants, key=lambda v: v.index)))
+        places = np.array(sorted(self._places), np.int64)
+        return StudyPlan(self._design, self._planned.take(places))
 
     def on_end(self) -> None:
         """Count a task that has ended; after the last of a round, the next one starts."""
@@ -109,16 +113,17 @@ class AdaptiveSchedule(TaskSchedule):
 
     def _start_round(self) -> None:
         while self._rounds and not self._unfinished:
-            if self._variants:
+            if self._places:
                 self._decide()
             ((axis, _),) = self._settings.against.items()
             labels = self._design.parameters
-            part = self._rounds.popleft() if self._rounds else []
-            variants = [v for v in part if labels(v.index)[axis] not in self._dropped]
-            self._variants += variants
-            for variant in variants:
-                if task := self._missing.get(variant.number):
-                    self.add(task)
+            part = self._rounds.popleft().tolist() if self._rounds else []
+            index = self._planned.index
+            places = [i for i in part if labels(int(index[i]))[axis] not in self._dropped]
+            self._places += places
+            for place in places:
+                if self._is_missing[place]:
+                    self.add(task_of(self._planned[place]))
                     self._unfinished += 1
 
     def _decide(self) -> None:
@@ -285,27 +290,24 @@ def run_study(
         check_setups(checked.plan, executor, options.observer.on_check)
     with directory.locked():
         parts = directory.intact_parts(options.observer.on_note)
-        status_of = directory.statuses(parts)
-        reconciled = reconcile(checked.plan, directory, status_of, options.changed)
+        status = directory.statuses(parts)
+        reconciled = reconcile(checked.plan, directory, status > 0, options.changed)
         variants = reconciled.plan.variants
         _write_plan(directory, checked, reconciled.plan)
-        tasks = [
-            WorkerTask(v.number, v.index, v.identity, v.home_key)
-            for v in variants
-            if status_of.get(v.number) != "complete"
-        ]
+        status = np.append(status, np.zeros(int(variants.number.max()) + 1, np.uint8))
+        missing = np.flatnonzero(status[variants.number] != COMPLETE)
         _describe(reconciled, directory, options.observer)
         journal = directory.open_journal(parts)
         keeper = _ResultKeeper(directory, parts, journal)
-        counts = Counts(len(variants), len(variants) - len(tasks), 0)
+        counts = Counts(len(variants), len(variants) - len(missing), 0)
         options.observer.on_start(counts, executor.workers)
         failed, is_checked = 0, False
         adapt = checked.specification.file.adapt
-        schedule = TaskSchedule(() if adapt else tasks)
+        schedule = TaskSchedule() if adapt else PlanSchedule(variants, missing)
         try:
             if adapt is not None:
                 schedule = AdaptiveSchedule(
-                    adapt, reconciled.plan, tasks, directory, options.observer.on_note
+                    adapt, reconciled.plan, missing, directory, options.observer.on_note
                 )
             with closing(executor.run(checked.job, schedule)) as events:
                 for event in events:
@@ -315,7 +317,9 @@ def run_study(
                     options.observer.on_result(record)
                     failed += not record.is_complete
                     if record.is_complete and not is_checked:
-                        _note_missing(checked, results_table([record.header]), options.observer)
+                        summary = VariantSummary(checked)
+                        summary.add(results_table([record.header]))
+                        summary.note_missing(options.observer)
                         is_checked = True
                     if failed and options.fail_fast:
                         break
@@ -323,30 +327,50 @@ def run_study(
             keeper.pause()
         keeper.finish()
         if isinstance(schedule, AdaptiveSchedule) and not schedule:
-            directory.storage.write_table(PLAN, plan_table(schedule.plan))
-        table = directory.write_variants()
-    _note_missing(checked, table, options.observer)
-    return Counts.of(table.column("status").to_pylist())
+            write_plan(directory, schedule.plan)
+        summary = VariantSummary(checked)
+        directory.write_variants(summary.add)
+    summary.note_missing(options.observer)
+    return summary.counts
 
 
-def _note_missing(checked: CheckedStudy, variants: "pa.Table", observer: Observer) -> None:
-    """Note which of the metrics that the study names are missing in complete variants."""
-    import pyarrow.compute as pc
+class VariantSummary:
+    """What is to be said of the variants of a study, of which some rows come after the other."""
 
-    file = checked.specification.file
-    complete = variants.filter(pc.field("status") == "complete")
-    others = {*RESULT_COLUMNS, *checked.plan.design.columns, "simulated_s"}
-    metrics = [name for name in complete.column_names if name not in others]
-    for pattern in dict.fromkeys([*(c.metric for c in file.compare), *file.keep.metrics]):
-        lacks = np.ones(len(complete), bool)
-        for name in metrics:
-            if is_kept(name, [pattern]):
-                lacks &= complete[name].is_null().to_numpy()
-        if pattern != "*" and lacks.any():
-            hint = did_you_mean(pattern, metrics) if lacks.all() else ""
-            observer.on_note(
-                f"{lacks.sum()} of {len(lacks)} complete variants have no metric {pattern}{hint}"
-            )
+    def __init__(self, checked: CheckedStudy) -> None:
+        """Start without variants."""
+        file = checked.specification.file
+        self.counts = Counts(0, 0, 0)
+        self._others = {*RESULT_COLUMNS, *checked.plan.design.columns, "simulated_s"}
+        patterns = dict.fromkeys([*(c.metric for c in file.compare), *file.keep.metrics])
+        self._lacking = {pattern: 0 for pattern in patterns if pattern != "*"}
+        self._metrics: list[str] = []
+
+    def add(self, variants: "pa.Table") -> None:
+        """Add some variants."""
+        statuses = variants.column("status").to_numpy()
+        new, old = Counts.of(statuses.tolist()), self.counts
+        self.counts = Counts(
+            old.total + new.total, old.complete + new.complete, old.failed + new.failed
+        )
+        complete = variants.filter(statuses == "complete")
+        self._metrics = [name for name in complete.column_names if name not in self._others]
+        for pattern in self._lacking:
+            lacks = np.ones(len(complete), bool)
+            for name in self._metrics:
+                if is_kept(name, [pattern]):
+                    lacks &= complete[name].is_null().to_numpy()
+            self._lacking[pattern] += int(np.count_nonzero(lacks))
+
+    def note_missing(self, observer: Observer) -> None:
+        """Note which of the metrics that the study names are missing in complete variants."""
+        complete = self.counts.complete
+        for pattern, lacking in self._lacking.items():
+            if lacking:
+                hint = did_you_mean(pattern, self._metrics) if lacking == complete else ""
+                observer.on_note(
+                    f"{lacking} of {complete} complete variants have no metric {pattern}{hint}"
+                )
 
 
 def _record(event: Event) -> VariantRecord:

@@ -10,11 +10,14 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
+import numpy as np
 from pydantic import TypeAdapter
 
+from fleet2d.kernels import I32
 from fleet2d.studies.records import VariantRecord
 from fleet2d.studies.storage import Storage, write_error
 
@@ -27,6 +30,7 @@ if TYPE_CHECKING:
 RECORDS, RESULTS, TABLES = "parts", "results", "tables"
 VARIANT = "variant"
 ROWS_PER_GROUP = 250_000
+GROUPS_IN_MEMORY = 8  # of rows of results, ROWS_AT_A_TIME each
 ROWS_AT_A_TIME = 5_000  # of results, which take 3 kB each until they are in a table
 
 
@@ -154,12 +158,15 @@ def write_part(storage: Storage, scratch: Path, number: int, journal: "Journal")
 
 def _write_files(scratch: Path, name: str, journal: "Journal") -> dict[str, Path]:
     """Write results and tables; return the local files by their names in the storage."""
+    import pyarrow as pa
     import pyarrow.parquet as pq
 
     numbers = sorted(journal.offsets)
-    schemas = _table_schemas(journal.read(number) for number in numbers)
-    results = scratch / f"{name}-results"
-    metrics = list(dict.fromkeys(m for n in numbers for m in journal.read(n).header["metrics"]))
+    names, schemas = dict[str, None](), dict[str, pa.Schema]()
+    for record in map(journal.read, numbers):
+        names |= dict.fromkeys(record.header["metrics"])
+        _add_schemas(record, schemas)
+    results, metrics = scratch / f"{name}-results", list(names)
     with pq.ParquetWriter(results, results_table((), metrics).schema, compression="zstd") as file:
         for start in range(0, len(numbers), ROWS_AT_A_TIME):
             batch = numbers[start : start + ROWS_AT_A_TIME]
@@ -171,7 +178,7 @@ def _write_files(scratch: Path, name: str, journal: "Journal") -> dict[str, Path
             local = scratch / f"{name}-table-{i}"
             files[f"{TABLES}/{table}/{name}.parquet"] = local
             writers[table] = stack.enter_context(_PartFileWriter(local, schema))
-        for number in numbers:
+        for number in numbers if writers else ():
             for table, rows in journal.read(number).tables().items():
                 writers[table].write(number, rows.read_all())
     return files
@@ -238,18 +245,15 @@ def plain_schema(schema: "pa.Schema") -> "pa.Schema":
     return pa.schema(fields)
 
 
-def _table_schemas(records: Iterable[VariantRecord]) -> "dict[str, pa.Schema]":
-    """Return for each table the schema that fits the rows of all variants."""
+def _add_schemas(record: VariantRecord, schemas: "dict[str, pa.Schema]") -> None:
+    """Widen the schema of each table so that the rows of a variant fit."""
     import pyarrow as pa
 
-    schemas: dict[str, pa.Schema] = {}
-    for record in records:
-        for name, rows in record.tables().items():
-            schema = plain_schema(rows.schema)
-            common = schemas.setdefault(name, schema)
-            if common != schema:
-                schemas[name] = pa.unify_schemas([common, schema], promote_options="permissive")
-    return schemas
+    for name, rows in record.tables().items():
+        schema = plain_schema(rows.schema)
+        common = schemas.setdefault(name, schema)
+        if common != schema:
+            schemas[name] = pa.unify_schemas([common, schema], promote_options="permissive")
 
 
 _HEADER_FIELDS = ("identity", "status", "digest", "error", "trace")
@@ -288,19 +292,91 @@ def results_table(
     return pa.table(columns)
 
 
-def read_results(storage: Storage, parts: Iterable[Part]) -> "Iterator[pa.Table]":
-    """Yield the results of each part.
+def read_results(
+    storage: Storage, parts: Iterable[Part], columns: Sequence[str] | None = None
+) -> "Iterator[pa.Table]":
+    """Yield the results of each part, or some of their columns.
 
     Raises:
         RunDirectoryError: They are missing or damaged.
     """
+    for part in parts:
+        schema = _results_schema(storage, part)
+        if columns is not None:
+            schema = schema.empty_table().select(columns).schema
+        table = storage.read_table(part.results, schema.names)
+        with storage.reading(part.results):
+            yield table.select(schema.names).cast(schema)
+
+
+def _results_schema(storage: Storage, part: Part) -> "pa.Schema":
+    """Return the columns of the results of a part, with the types that readers rely on."""
     import pyarrow as pa
 
     types = {field.name: field.type for field in results_table(()).schema}
-    for part in parts:
-        table = storage.read_table(part.results)
-        with storage.reading(part.results):
-            if not types.keys() <= set(table.column_names):
-                raise ValueError("it has no results of variants")
-            fields = [(name, types.get(name, pa.float64())) for name in table.column_names]
-            yield table.cast(pa.schema(fields))
+    names = storage.schema(part.results).names
+    with storage.reading(part.results):
+        if not types.keys() <= set(names):
+            raise ValueError("it has no results of variants")
+    return pa.schema([(name, types.get(name, pa.float64())) for name in names])
+
+
+class ResultRows:
+    """The newest result of each variant, looked up without having all in memory."""
+
+    def __init__(
+        self, storage: Storage, parts: Sequence[Part], headers: Iterable[Mapping[str, Any]]
+    ) -> None:
+        """Note where the result of each variant is.
+
+        Args:
+            storage: The storage of the study.
+            parts: The parts with results.
+            headers: The headers of the records of a journal, which are newer.
+
+        Raises:
+            RunDirectoryError: Results are missing or damaged.
+        """
+        import pyarrow as pa
+
+        self._storage, self._parts = storage, parts
+        self._newest = results_table(headers)
+        schemas = [_results_schema(storage, part) for part in parts]
+        if self._newest.num_rows or not parts:
+            schemas.append(self._newest.schema)
+        self._schema = pa.unify_schemas(schemas)
+        numbers = [t[VARIANT].to_numpy() for t in read_results(storage, parts, (VARIANT,))]
+        numbers.append(self._newest[VARIANT].to_numpy())
+        # Rows are read by groups of a file; the last group is the journal.
+        sizes = [storage.row_groups(part.results) for part in parts]
+        self._groups = [(p, i) for p, of_part in enumerate(sizes) for i in range(len(of_part))]
+        self._first = np.cumsum([0, *(size for of_part in sizes for size in of_part)])
+        self._read = lru_cache(GROUPS_IN_MEMORY)(self._read_group)
+        count = 1 + max((int(part.max(initial=-1)) for part in numbers), default=-1)
+        self._row = np.full(count + 1, -1, np.int32)  # by number, over all parts; last: none
+        rows = np.concatenate(numbers)
+        self._row[rows] = np.arange(len(rows))
+
+    def of(self, numbers: I32) -> "pa.Table":
+        """Return the results of variants, a row each; without values where there are none."""
+        import pyarrow as pa
+
+        rows = self._row[np.where(numbers < len(self._row), numbers, -1)]
+        groups = np.searchsorted(self._first, rows, side="right") - 1
+        places, tables, before = np.full(len(numbers), -1), [self._schema.empty_table()], 0
+        for group in np.unique(groups[rows >= 0]).tolist():
+            here = np.flatnonzero(groups == group)
+            tables.append(self._read(group).take(pa.array(rows[here] - self._first[group])))
+            places[here] = before + np.arange(len(here))
+            before += len(here)
+        table = pa.concat_tables(tables, promote_options="default")
+        return table.take(pa.array(places, pa.int64(), mask=places < 0))
+
+    def _read_group(self, group: int) -> "pa.Table":
+        if group == len(self._groups):
+            return self._newest
+        part, number = self._groups[group]
+        name, schema = self._parts[part].results, _results_schema(self._storage, self._parts[part])
+        table = self._storage.read_row_group(name, number)
+        with self._storage.reading(name):
+            return table.select(schema.names).cast(schema)

@@ -3,11 +3,15 @@
 import json
 import re
 import time
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field, replace
 from datetime import timedelta
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Self
+
+import numpy as np
+from numpy.typing import NDArray
 
 from fleet2d.configuration.problems import did_you_mean, suggest
 from fleet2d.configuration.trust import Trust, current_trust, restrict
@@ -19,6 +23,7 @@ from fleet2d.errors import (
     RunDirectoryError,
     ScenarioError,
 )
+from fleet2d.kernels import F64, I32, Bool
 from fleet2d.runtime.determinism import sum_in_order
 from fleet2d.scenario.model import Scenario
 from fleet2d.studies.axes import Label
@@ -78,6 +83,89 @@ class PlannedVariant:
     simulated_s: float
 
 
+HASH = np.dtype("S16")
+"""A hash of 32 hexadecimal digits, packed."""
+Hashes = NDArray[np.bytes_]
+
+
+def packed(hashes: Iterable[str]) -> Hashes:
+    """Return hashes of 32 hexadecimal digits as HASH, (n,).
+
+    >>> unpacked(packed(["00" * 15 + "ab"])[0])
+    '000000000000000000000000000000ab'
+    """
+    return np.array([bytes.fromhex(text) for text in hashes], HASH)
+
+
+def unpacked(value: bytes) -> str:
+    """Return the hexadecimal digits of a packed hash; numpy cuts zeros off its end."""
+    return value.ljust(HASH.itemsize, b"\0").hex()
+
+
+@dataclass(frozen=True)
+class PlannedVariants:
+    """The variants of a plan as columns, 40 bytes each: as objects, ten million would take 5 GB.
+
+    Attributes:
+        seeds: How many variants of the design a combination has.
+        index: Their indices in the design, ascending: int32 (n,).
+        number: Their numbers in results: int32 (n,).
+        identity: Their identities: HASH (n,).
+        scenario: The hashes of their scenarios: HASH (n,).
+        template: The hashes of the scenarios of combinations without seeds: HASH (m,).
+        simulated_s: The simulated times of combinations [s]: float64 (m,).
+        home: For each combination, its home, an index of `home_keys`: int32 (m,).
+        home_keys: The keys of homes.
+    """
+
+    seeds: int
+    index: I32
+    number: I32
+    identity: Hashes
+    scenario: Hashes
+    template: Hashes
+    simulated_s: F64
+    home: I32
+    home_keys: tuple[str, ...]
+
+    def __len__(self) -> int:
+        """Return the number of variants."""
+        return len(self.index)
+
+    def __iter__(self) -> Iterator[PlannedVariant]:
+        """Yield them in their order."""
+        return map(self.__getitem__, range(len(self)))
+
+    def __getitem__(self, place: int) -> PlannedVariant:
+        """Return the variant at a place."""
+        combination = int(self.index[place]) // self.seeds
+        return PlannedVariant(
+            int(self.number[place]),
+            int(self.index[place]),
+            unpacked(self.identity[place]),
+            unpacked(self.scenario[place]),
+            unpacked(self.template[combination]),
+            self.home_keys[self.home[combination]],
+            float(self.simulated_s[combination]),
+        )
+
+    @property
+    def homes(self) -> I32:
+        """The home of each variant, an index of `home_keys`: int32 (n,)."""
+        return self.home[self.index // self.seeds]
+
+    @property
+    def total_simulated_s(self) -> float:
+        """The simulated time of all variants [s]."""
+        per_combination = np.bincount(self.index // self.seeds, minlength=len(self.simulated_s))
+        return float((per_combination * self.simulated_s).sum())
+
+    def take(self, places: NDArray[np.integer[Any]]) -> "PlannedVariants":
+        """Return some of them, by their places."""
+        columns = ("index", "number", "identity", "scenario")
+        return replace(self, **{name: getattr(self, name)[places] for name in columns})
+
+
 @dataclass(frozen=True)
 class StudyPlan:
     """A design and its variants, all checked.
@@ -88,7 +176,7 @@ class StudyPlan:
     """
 
     design: Design
-    variants: tuple[PlannedVariant, ...]
+    variants: PlannedVariants
 
     def parameters(self, variant: PlannedVariant) -> dict[str, Label]:
         """Return the labels of a variant by column."""
@@ -186,24 +274,107 @@ def make_plan(
     Raises:
         ScenarioError: Variants are wrong; a line per problem, with axis and value.
     """
-    variants: list[PlannedVariant] = []
+    count, seeds = len(design.combinations), len(design.seeds)
+    identities, scenarios = np.zeros((2, count, seeds), HASH)
+    templates, simulated_s = np.zeros(count, HASH), np.zeros(count)
+    homes, home_keys = np.zeros(count, np.int32), dict[str, int]()
     problems: list[str] = []
-    files = FileHashes()
-    for number in range(len(design.combinations)):
-        first = number * len(design.seeds)
+    files, first_of = FileHashes(), dict[tuple[str, str], int]()
+    repeated = _repeated(design.seeds)  # two variants with the same scenario
+    for number in range(count):
+        first = number * seeds
         try:
             scenario = design.scenario(first)
             content = scenario_content(scenario)
-            variants += _planned(design, first, content, input_hash(scenario, files))
+            inputs = input_hash(scenario, files)
         except InputError as error:
             problems.append(str(error))
             if len(problems) == MAX_PROBLEMS:
                 break
             continue
-        on_scenario(variants[-1].template, scenario)
+        simulation = content["simulation"]
+        template = content_hash({**content, "simulation": {**simulation, "seed": None}})
+        repeated = repeated or (first_of.setdefault((template, inputs), first), first)
+        repeated = None if repeated[0] == repeated[1] else repeated
+        hashes = list(scenario_hashes(content, design.seeds))
+        scenarios[number] = packed(hashes)
+        identities[number] = packed(identity(each, inputs) for each in hashes)
+        templates[number] = bytes.fromhex(template)
+        homes[number] = home_keys.setdefault(home_key(content), len(home_keys))
+        step, duration = (parse_duration(simulation[key]) for key in ("step", "duration"))
+        simulated_s[number] = (duration // step * step).total_seconds()
+        on_scenario(template, scenario)
     _raise_problems(problems)
-    _check_identities(design, variants)
-    return StudyPlan(design, tuple(variants))
+    if repeated is not None:
+        one, other = map(design.describe, repeated)
+        raise ScenarioError(
+            f"{one} and {other} are the same scenario: an axis sets what another axis or a rule"
+            " overrides, or has a value twice"
+        )
+    places = np.arange(count * seeds, dtype=np.int32)
+    columns = identities.reshape(-1), scenarios.reshape(-1), templates, simulated_s, homes
+    return StudyPlan(design, PlannedVariants(seeds, places, places, *columns, tuple(home_keys)))
+
+
+def _repeated(seeds: Sequence[int]) -> tuple[int, int] | None:
+    """Return the places of two equal seeds; None if all differ."""
+    first_of: dict[int, int] = {}
+    pairs = ((first_of.setdefault(seed, i), i) for i, seed in enumerate(seeds))
+    return next((pair for pair in pairs if pair[0] != pair[1]), None)
+
+
+class PlannedTasks:
+    """The tasks of variants that share a home, each made when it is taken."""
+
+    def __init__(self, variants: PlannedVariants, places: NDArray[np.integer[Any]]) -> None:
+        """Take the places of variants, in their order."""
+        self._variants, self._places = variants, places
+        self._begin, self._end = 0, len(places)
+        self._first, self._last = deque[WorkerTask](), deque[WorkerTask]()
+
+    def __len__(self) -> int:
+        """Return how many there are."""
+        return len(self._first) + self._end - self._begin + len(self._last)
+
+    def append(self, task: WorkerTask, /) -> None:
+        """Add a task as the last."""
+        self._last.append(task)
+
+    def appendleft(self, task: WorkerTask, /) -> None:
+        """Add a task as the first."""
+        self._first.appendleft(task)
+
+    def popleft(self) -> WorkerTask:
+        """Remove the first task and return it."""
+        if self._first or self._begin == self._end:
+            return (self._first or self._last).popleft()
+        self._begin += 1
+        return task_of(self._variants[self._places[self._begin - 1]])
+
+    def pop(self) -> WorkerTask:
+        """Remove the last task and return it."""
+        if self._last or self._begin == self._end:
+            return (self._last or self._first).pop()
+        self._end -= 1
+        return task_of(self._variants[self._places[self._end]])
+
+
+class PlanSchedule(TaskSchedule):
+    """The tasks of some variants of a plan, grouped by home."""
+
+    def __init__(self, variants: PlannedVariants, places: NDArray[np.integer[Any]]) -> None:
+        """Group variants, by their places, by home."""
+        super().__init__()
+        homes = variants.homes[places]
+        _, first = np.unique(homes, return_index=True)
+        for home in homes[np.sort(first)].tolist():
+            tasks = PlannedTasks(variants, places[homes == home].astype(np.int32))
+            self._groups[variants.home_keys[home]] = tasks
+
+
+def task_of(variant: PlannedVariant) -> WorkerTask:
+    """Return the task to run a variant."""
+    return WorkerTask(variant.number, variant.index, variant.identity, variant.home_key)
 
 
 def setups_to_check(plan: StudyPlan) -> list[PlannedVariant]:
@@ -212,30 +383,27 @@ def setups_to_check(plan: StudyPlan) -> list[PlannedVariant]:
     Their set-up shows people and robots that have no room where they start, without setting up
     every variant.
     """
-    design = plan.design
-    by_home: dict[str, list[tuple[PlannedVariant, tuple[int, ...]]]] = {}
-    for number, combination in enumerate(design.combinations):
-        variant = plan.variants[number * len(design.seeds)]
-        by_home.setdefault(variant.home_key, []).append((variant, combination))
-    return [variant for variants in by_home.values() for variant in _covering(variants)]
+    by_home = np.argsort(plan.variants.home, kind="stable")
+    homes = np.split(by_home, np.flatnonzero(np.diff(plan.variants.home[by_home])) + 1)
+    chosen = [number for home in homes for number in _covering(plan.design, home)]
+    seeds = len(plan.design.seeds)
+    return [plan.variants[number * seeds] for number in chosen]
 
 
-def _covering(
-    variants: Sequence[tuple[PlannedVariant, tuple[int, ...]]],
-) -> Iterator[PlannedVariant]:
-    """Yield variants of one home in which each choice of each axis comes at least once."""
-    first = variants[0][1]
-    varying = [i for i in range(len(first)) if any(c[i] != first[i] for _, c in variants)]
+def _covering(design: Design, numbers: NDArray[np.integer[Any]]) -> Iterator[int]:
+    """Yield combinations of one home, by number, in which each choice of each axis comes once."""
+    rows = design.combinations[numbers]
+    varying = np.flatnonzero((rows != rows[0]).any(axis=0)).tolist()
     covered: set[tuple[int, int]] = set()
     for all_new in (True, False):  # variants of new choices only come first: fewer are needed
-        for variant, combination in variants:
-            choices = {(axis, combination[axis]) for axis in varying}
+        for number, row in zip(numbers.tolist(), rows[:, varying].tolist(), strict=True):
+            choices = set(zip(varying, row, strict=True))
             uncovered = choices - covered
             if uncovered and (uncovered == choices or not all_new):
                 covered |= choices
-                yield variant
+                yield number
     if not varying:
-        yield variants[0][0]
+        yield int(numbers[0])
 
 
 @dataclass
@@ -269,7 +437,7 @@ def check_setups(
         ScenarioError: Variants are wrong; a line per problem, with axis and value.
     """
     problems: dict[int, str] = {}
-    tasks = [WorkerTask(v.number, v.index, v.identity, v.home_key) for v in setups_to_check(plan)]
+    tasks = [task_of(variant) for variant in setups_to_check(plan)]
     runner = executor if len(tasks) > FEW_SETUPS else SerialExecutor()
     events = runner.run(SetupJob(plan.design), TaskSchedule(tasks))
     try:
@@ -293,33 +461,6 @@ def _raise_problems(problems: list[str]) -> None:
         raise ScenarioError("\n".join(_without_repetition(problems)))
 
 
-def _planned(
-    design: Design, first: int, content: dict[str, Any], inputs: str
-) -> Iterator[PlannedVariant]:
-    """Yield the variants of one combination; they differ by their seeds only."""
-    home, simulation = home_key(content), content["simulation"]
-    step, duration = parse_duration(simulation["step"]), parse_duration(simulation["duration"])
-    template = content_hash({**content, "simulation": {**simulation, "seed": None}})
-    simulated_s = (duration // step * step).total_seconds()
-    for i, scenario in enumerate(scenario_hashes(content, design.seeds), first):
-        yield PlannedVariant(
-            i, i, identity(scenario, inputs), scenario, template, home, simulated_s
-        )
-
-
-def _check_identities(design: Design, variants: Sequence[PlannedVariant]) -> None:
-    """Refuse two variants with the same scenario: some axis has no effect."""
-    by_identity: dict[str, PlannedVariant] = {}
-    for variant in variants:
-        equal = by_identity.setdefault(variant.identity, variant)
-        if equal is not variant:
-            raise ScenarioError(
-                f"{design.describe(equal.index)} and {design.describe(variant.index)} are the same"
-                " scenario: an axis sets what another axis or a rule overrides, or has a value"
-                " twice"
-            )
-
-
 def _without_repetition(problems: list[str]) -> list[str]:
     """Return the first of all problems that differ by their variant only."""
     first: dict[str, str] = {}
@@ -329,6 +470,7 @@ def _without_repetition(problems: list[str]) -> list[str]:
 
 
 Changed = Literal["redo", "keep"]
+PLAN_BATCH = 10_000  # rows of the plan that are in memory as text
 PLAN_COLUMNS = (VARIANT, "identity", "scenario", "template", "home_key", "simulated_s")
 BATCH = 1000
 
@@ -382,55 +524,77 @@ class ReconciledPlan:
 
 
 def reconcile(
-    plan: StudyPlan, directory: StudyDirectory, finished: Iterable[int], changed: Changed | None
+    plan: StudyPlan, directory: StudyDirectory, finished: Bool, changed: Changed | None
 ) -> ReconciledPlan:
     """Number the variants of a plan as in the stored study; new variants get new numbers.
 
     Args:
         plan: The current plan.
         directory: The study.
-        finished: Numbers of the variants with results.
+        finished: Whether there are results, by the number of the variant: bool (n,).
         changed: What to do with results of other code, inputs or scenarios.
 
     Raises:
         RunDirectoryError: There are such results, and `changed` is None.
     """
-    with_results = set(finished)
     if not directory.storage.exists(PLAN):
-        if with_results:
+        if finished.any():
             raise RunDirectoryError(
                 f"{directory.location}/{PLAN} is missing, and with it the variants of the results:"
                 " choose another --out"
             )
         return ReconciledPlan(plan, len(plan.variants), 0)
-    stored_rows = directory.plan(PLAN_COLUMNS[:3]).to_pylist()
-    numbers = {row["identity"]: row[VARIANT] for row in stored_rows}
-    present = {variant.identity for variant in plan.variants}
-    stale = {
-        row["scenario"]: row
-        for row in stored_rows
-        if row["identity"] not in present and row[VARIANT] in with_results
-    }
-    recomputed = [v for v in plan.variants if v.identity not in numbers and v.scenario in stale]
-    if stale and changed is None:
-        raise RunDirectoryError(_refusal(directory.location, len(recomputed), len(stale)))
-    next_number = max(numbers.values(), default=-1) + 1
-    variants: list[PlannedVariant] = []
-    reused = 0
-    for variant in plan.variants:
-        if variant.identity in numbers:
-            variants.append(replace(variant, number=numbers[variant.identity]))
-        elif changed == "keep" and variant.scenario in stale:
-            row = stale[variant.scenario]
-            variants.append(replace(variant, number=row[VARIANT], identity=row["identity"]))
-            reused += 1
-        else:
-            variants.append(replace(variant, number=next_number))
-            next_number += 1
-    new_variants = sum(variant.identity not in numbers for variant in variants)
+    variants, stored = plan.variants, _StoredPlan.read(directory)
+    place = _find(stored.identity, variants.identity)
+    is_stored = place >= 0
+    number = np.where(is_stored, stored.number[place], -1).astype(np.int32)
+    has_result = np.append(finished, np.zeros(int(stored.number.max(initial=-1)) + 1, np.bool_))
+    is_gone = _find(variants.identity, stored.identity) < 0
+    stale = np.flatnonzero(is_gone & has_result[stored.number])
+    same = np.where(is_stored, -1, _find(stored.scenario[stale], variants.scenario))
+    if len(stale) and changed is None:
+        recomputed = np.count_nonzero(same >= 0)
+        raise RunDirectoryError(_refusal(directory.location, int(recomputed), len(stale)))
+    reused, identity = np.zeros(len(variants), np.bool_), variants.identity
+    if changed == "keep":
+        reused, identity = same >= 0, identity.copy()
+        number[reused] = stored.number[stale[same[reused]]]
+        identity[reused] = stored.identity[stale[same[reused]]]
+    is_new = ~is_stored & ~reused
+    first = int(stored.number.max(initial=-1)) + 1
+    number[is_new] = np.arange(first, first + np.count_nonzero(is_new))
+    numbered = replace(variants, number=number, identity=identity)
     return ReconciledPlan(
-        StudyPlan(plan.design, tuple(variants)), new_variants, len(stale) - reused
+        StudyPlan(plan.design, numbered),
+        int(np.count_nonzero(is_new)),
+        len(stale) - int(np.count_nonzero(reused)),
     )
+
+
+class _StoredPlan(NamedTuple):
+    """Columns of a stored plan: a row per variant."""
+
+    number: I32
+    identity: Hashes
+    scenario: Hashes
+
+    @classmethod
+    def read(cls, directory: StudyDirectory) -> Self:
+        """Read them, some rows at a time."""
+        parts = [
+            (batch[VARIANT].to_numpy(), *(packed(batch[n].to_pylist()) for n in PLAN_COLUMNS[1:3]))
+            for batch in directory.storage.read_batches(PLAN, PLAN_COLUMNS[:3])
+        ]
+        empty = (np.zeros(0, np.int32), np.zeros(0, HASH), np.zeros(0, HASH))
+        return cls(*map(np.concatenate, zip(*(parts or [empty]), strict=True)))
+
+
+def _find(among: Hashes, wanted: Hashes) -> NDArray[np.intp]:
+    """Return the last place of each wanted hash among others, -1 where there is none: (n,)."""
+    order = np.argsort(among, kind="stable")
+    at = np.searchsorted(among, wanted, side="right", sorter=order) - 1
+    places = np.append(order, -1)[at]  # place -1: none is that small
+    return np.where(np.append(among, among[:1])[places] == wanted, places, -1) if len(among) else at
 
 
 def _refusal(location: str, recomputed: int, stale: int) -> str:
@@ -447,21 +611,34 @@ def _refusal(location: str, recomputed: int, stale: int) -> str:
     )
 
 
-def plan_table(plan: StudyPlan) -> "pa.Table":
-    """Return a plan as a table: a row per variant, in the order of the design."""
+def plan_batches(plan: StudyPlan) -> "Iterator[pa.Table]":
+    """Yield a plan as tables: a row per variant, in the order of the design."""
     import pyarrow as pa
 
-    columns: dict[str, pa.Array] = {
-        VARIANT: pa.array([v.number for v in plan.variants], pa.int32())
-    }
-    for name in PLAN_COLUMNS[1:]:
-        columns[name] = pa.array([getattr(v, name) for v in plan.variants])
-    seeds = len(plan.design.seeds)
-    places = pa.array([v.index // seeds for v in plan.variants], pa.int32())
-    for column, labels in plan.design.combination_labels.items():
-        columns[column] = label_array(labels).take(places)
-    columns[SEED] = pa.array([plan.design.seeds[v.index % seeds] for v in plan.variants])
-    return pa.table(columns)
+    design, variants = plan.design, plan.variants
+    labels = {}  # by column: the number of its axis, and the label of each choice, of none last
+    for number, axis in enumerate(design.axes):
+        used = set(np.unique(design.combinations[:, number]).tolist())
+        for column in axis.columns:
+            texts = (c.labels[column] if i in used else None for i, c in enumerate(axis.choices))
+            labels[column] = number, label_array([*texts, None])
+    for begin in range(0, max(len(variants), 1), PLAN_BATCH):
+        index = variants.index[begin : begin + PLAN_BATCH]
+        combination, seed = np.divmod(index, len(design.seeds))
+        columns = {VARIANT: pa.array(variants.number[begin : begin + PLAN_BATCH])}
+        for name in ("identity", "scenario"):
+            values = getattr(variants, name)[begin : begin + PLAN_BATCH]
+            columns[name] = pa.array(map(unpacked, values.tolist()), pa.string())
+        templates = map(unpacked, variants.template[combination].tolist())
+        columns["template"] = pa.array(templates, pa.string())
+        homes = pa.array(variants.home_keys, pa.string())
+        columns["home_key"] = homes.take(pa.array(variants.home[combination]))
+        columns["simulated_s"] = pa.array(variants.simulated_s[combination])
+        for column, (number, texts) in labels.items():
+            codes = design.combinations[combination, number]
+            columns[column] = texts.take(pa.array(codes % len(texts)))  # -1 is the last
+        columns[SEED] = pa.array(np.array(design.seeds)[seed])
+        yield pa.table(columns)
 
 
 def label_array(labels: list[Label]) -> "pa.Array":
@@ -485,7 +662,12 @@ def write_catalogue(
 ) -> None:
     """Write the plan and the scenarios of a study."""
     directory.storage.write(SCENARIOS, scenarios())
-    directory.storage.write_table(PLAN, plan_table(plan))
+    write_plan(directory, plan)
+
+
+def write_plan(directory: StudyDirectory, plan: StudyPlan) -> None:
+    """Write the plan of a study."""
+    directory.storage.write_batches(PLAN, plan_batches(plan), directory.scratch)
 
 
 def stored_scenario(directory: StudyDirectory, number: int) -> dict[str, Any]:
@@ -565,8 +747,8 @@ def forecast(plan: StudyPlan, executor: Executor, samples: int = SAMPLES) -> For
     if not measured:
         raise ComponentError("all measured variants fail: run one of them with `fleet2d run`")
     worker_s = time.perf_counter() - begin_s - sum_in_order(seconds for _, seconds in measured)
-    simulated_s = sum(variant.simulated_s for variant in plan.variants)
-    homes = len({variant.home_key for variant in plan.variants})
+    simulated_s = plan.variants.total_simulated_s
+    homes = len(plan.variants.home_keys)
     start_s = worker_s * (1 + (len(setups_to_check(plan)) > FEW_SETUPS))
     # The first variant finds its home built by the warm-up.
     home_s = max(speed.home_s for speed, _ in measured)

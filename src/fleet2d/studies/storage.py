@@ -1,5 +1,6 @@
 """The files of a study: in a local folder, or in any store that pyarrow can reach."""
 
+import itertools
 import os
 import re
 from collections.abc import Iterator, Sequence
@@ -9,12 +10,13 @@ from typing import TYPE_CHECKING, Any
 
 from fleet2d.bounds import one_line
 from fleet2d.errors import ArtifactError, Fleet2DError, RunDirectoryError
-from fleet2d.storage.files import is_disk_full, path_in, plain_name, write_atomically
+from fleet2d.storage.files import PARTIAL, is_disk_full, path_in, plain_name, write_atomically
 
 if TYPE_CHECKING:
     import pyarrow as pa
 
 COPY_BYTES = 1 << 22
+BATCH_ROWS = 10_000  # of a table that is read in parts
 # What libraries raise on damaged files; pyarrow's errors are subclasses of these.
 DAMAGE = (
     ArithmeticError, AttributeError, LookupError, MemoryError, NotImplementedError, OSError,
@@ -166,9 +168,13 @@ class Storage:
 
         with self.reading(name):
             names = None if columns is None else list(columns)
-            table = pq.read_table(
-                self.path(name), columns=names, filters=filters, filesystem=self.filesystem
-            )
+            if filters is None:  # without the modules of data sets, which take 60 MB
+                with self.filesystem.open_input_file(self.path(name)) as source:
+                    table = pq.ParquetFile(source).read(names)
+            else:
+                table = pq.read_table(
+                    self.path(name), columns=names, filters=filters, filesystem=self.filesystem
+                )
             if names and set(names) != set(table.column_names):
                 raise ValueError(f"it has no columns {', '.join(names)}")
             return table
@@ -203,6 +209,85 @@ class Storage:
         sink = pa.BufferOutputStream()
         pq.write_table(table, sink, compression="zstd", row_group_size=50_000)
         self.write(name, bytes(sink.getvalue()))
+
+    def schema(self, name: str) -> "pa.Schema":
+        """Return the schema of a Parquet file.
+
+        Raises:
+            RunDirectoryError: There is none, or it is damaged.
+        """
+        import pyarrow.parquet as pq
+
+        with self.reading(name):
+            return pq.read_schema(self.path(name), filesystem=self.filesystem)
+
+    def row_groups(self, name: str) -> list[int]:
+        """Return how many rows each group of a Parquet file has.
+
+        Raises:
+            RunDirectoryError: There is none, or it is damaged.
+        """
+        import pyarrow.parquet as pq
+
+        with self.reading(name):
+            metadata = pq.read_metadata(self.path(name), filesystem=self.filesystem)
+            return [metadata.row_group(i).num_rows for i in range(metadata.num_row_groups)]
+
+    def read_row_group(self, name: str, number: int) -> "pa.Table":
+        """Return one group of rows of a Parquet file.
+
+        Raises:
+            RunDirectoryError: There is none, or it is damaged.
+        """
+        import pyarrow.parquet as pq
+
+        with self.reading(name), self.filesystem.open_input_file(self.path(name)) as source:
+            return pq.ParquetFile(source).read_row_group(number, use_threads=False)
+
+    def read_batches(self, name: str, columns: Sequence[str] | None = None) -> "Iterator[pa.Table]":
+        """Yield some rows of a Parquet file after the other, at least one table.
+
+        Raises:
+            RunDirectoryError: There is none, it is damaged, or it lacks a column.
+        """
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
+        with self.reading(name), self.filesystem.open_input_file(self.path(name)) as source:
+            file = pq.ParquetFile(source)
+            names = file.schema_arrow.names if columns is None else list(columns)
+            if missing := [name for name in names if name not in file.schema_arrow.names]:
+                raise ValueError(f"it has no columns {', '.join(missing)}")
+            batches = file.iter_batches(BATCH_ROWS, columns=names, use_threads=False)
+            first = next(batches, None)
+            if first is None:
+                yield file.read(names)
+                return
+            for batch in itertools.chain([first], batches):
+                yield pa.Table.from_batches([batch])
+
+    def write_batches(self, name: str, tables: "Iterator[pa.Table]", scratch: Path) -> None:
+        """Write tables of one schema as a Parquet file, without having all of them in memory.
+
+        Args:
+            name: The file; readers see all of it, or none.
+            tables: The tables, one at least.
+            scratch: A local folder for the unfinished file, on the same disk as a local storage.
+
+        Raises:
+            ArtifactError: It can't be written.
+        """
+        import pyarrow.parquet as pq
+
+        local, first = scratch / f"{PurePosixPath(name).name}{PARTIAL}", next(tables)
+        try:
+            scratch.mkdir(parents=True, exist_ok=True)
+            with pq.ParquetWriter(local, first.schema, compression="zstd") as file:
+                for table in itertools.chain([first], tables):
+                    file.write_table(table)
+        except OSError as error:
+            raise write_error(self.location, error) from error
+        self.publish(local, name)
 
     def publish(self, local: Path, name: str) -> None:
         """Move a finished local file into the storage: by renaming if it is local, else by a copy.
