@@ -216,7 +216,8 @@ class _Sightings(NamedTuple):
         lane = self.robot * len(names) + self.user % len(names)
         order = np.argsort(lane, kind="stable")
         codes, begins = np.unique(lane[order], return_index=True)
-        for code, rows in zip(codes.tolist(), np.split(order, begins[1:]), strict=True):
+        parts = np.split(order, begins[1:]) if len(order) else []  # it has a part of nothing, too
+        for code, rows in zip(codes.tolist(), parts, strict=True):
             yield self.robots[code // len(names)], names[code % len(names)], rows
 
 
