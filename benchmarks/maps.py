@@ -2,6 +2,7 @@
 
     python benchmarks/maps.py damaged --maps 1000   # clean plans with defects, the plan as truth
     python benchmarks/maps.py captured              # real maps with true rooms, of ../shared/data
+    python benchmarks/maps.py changed               # real maps turned, coarser, at other thresholds
 
 A map is damaged by some of noise, rays, shut doors, furniture, rotation, another resolution, grey
 for unknown, and threshold, all drawn from its number. Truth are the rooms of the clean
@@ -315,6 +316,56 @@ def captured_table() -> None:
     print("published: ROSE2 on its 11 cluttered maps IoU .69; morphological .52, Voronoi .52")
 
 
+# --- Captured maps that are changed --------------------------------------------------------------
+
+
+def changed_maps(
+    grey: Labels,
+) -> Iterator[tuple[str, Labels, float, float, Callable[[Labels], Labels]]]:
+    """Yield changed maps: name, pixels, pixel [m], free_thresh, and what changes labels back."""
+    from PIL import Image
+
+    def turned(labels: Any, degrees: float, fill: int, mode: str) -> Any:
+        picture = Image.fromarray(labels.astype(np.int32), mode)
+        return np.asarray(picture.rotate(degrees, Image.Resampling.NEAREST, True, fillcolor=fill))
+
+    rows, columns = grey.shape
+
+    def turn_back(labels: Labels) -> Labels:
+        back = turned(labels, -17, -1, "I")
+        top, left = (back.shape[0] - rows) // 2, (back.shape[1] - columns) // 2
+        return back[top : top + rows, left : left + columns].astype(np.int64)
+
+    edge = int(np.bincount(np.concatenate([grey[0], grey[-1]])).argmax())
+    yield "turned by 17 deg", turned(grey, 17, edge, "I"), PIXEL_M, 0.196, turn_back
+    half = grey[: rows // 2 * 2, : columns // 2 * 2].reshape(rows // 2, 2, columns // 2, 2)
+    coarse = half.min(axis=(1, 3))  # an obstacle anywhere in a pixel
+    yield "half the resolution", coarse, 2 * PIXEL_M, 0.196, lambda a: a.repeat(2, 0).repeat(2, 1)
+    for thresh in (0.096, 0.296):
+        yield f"free_thresh {thresh}", grey, PIXEL_M, thresh, lambda labels: labels
+
+
+def changed_table() -> None:
+    """Print how the rooms of changed maps agree with those of the maps as they are."""
+    from PIL import Image
+
+    def rooms(pixels: Labels, pixel: float, thresh: float) -> Labels:
+        with TemporaryDirectory() as folder:
+            path = write_map(Path(folder), pixels, pixel, thresh)
+            return room_pixels(Ros.model_construct(path=path).load(), pixel, *pixels.shape)
+
+    scores: dict[str, list[float]] = defaultdict(list)
+    for kind, path, _ in pictures():
+        grey = np.asarray(Image.open(path).convert("L")).astype(np.int64)
+        original = rooms(grey, PIXEL_M, 0.196)
+        for name, pixels, pixel, thresh, back in changed_maps(grey):
+            scores[f"{kind}: {name}"].append(
+                score(back(rooms(pixels, pixel, thresh)), original)["iou"]
+            )
+    for name, values in sorted(scores.items()):
+        print(f"{name:<45} IoU {np.mean(values):.2f}, least {min(values):.2f}")
+
+
 def _scores(rows: list[dict[str, Any]]) -> str:
     means = "".join(f"{np.mean([row[key] for row in rows]):>6.2f}" for key in SCORES)
     return means + "".join(f"{sum(row[key] for row in rows):>6.0f}" for key in ("rooms", "true"))
@@ -325,14 +376,16 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("what", choices=("damaged", "captured"))
+    parser.add_argument("what", choices=("damaged", "captured", "changed"))
     parser.add_argument("--maps", type=int, default=60, help="number of damaged maps")
     parser.add_argument("--workers", type=int, default=2)
     options = parser.parse_args()
     if options.what == "damaged":
         damaged_table(options.maps, options.workers)
-    else:
+    elif options.what == "captured":
         captured_table()
+    else:
+        changed_table()
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
 """Generate a home: link the rooms of many layouts by doors, judge each, and finish the best."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import shapely
@@ -28,6 +28,8 @@ from fleet2d.floorplan.synthetic.slicing import (
 )
 from fleet2d.runtime.determinism import sum_in_order
 
+# The largest cost that taste adds to a passage and to a layout, at a variety of 1.
+LINK_TASTE, LAYOUT_TASTE = 1, 12
 JAMB = 2  # minimum distance of a door from the corner of a room [units]
 
 
@@ -89,12 +91,14 @@ class Widths:
         bath: To bathrooms, toilets and small rooms.
         corridor: Clear width of hallways.
         open_plan: Whether living, dining and kitchen are open to each other.
+        prices: The cost of a passage by the types of its two rooms.
     """
 
     door: int
     bath: int
     corridor: int
     open_plan: bool
+    prices: Mapping[tuple[str, str], float] = field(default_factory=lambda: COSTS)
 
     def of(self, kinds: set[str]) -> int:
         """Return the width of a door between rooms of two kinds."""
@@ -158,7 +162,7 @@ def _best_links(
         a, b = _rooms(layout, wall)
         if a == b:
             continue
-        price = _price(briefs, a, b)
+        price = _price(briefs, a, b, widths)
         kinds = {briefs[a].kind, briefs[b].kind}
         needed = widths.of(kinds) + (0 if kinds <= _WITHOUT_JAMBS else 2 * JAMB)
         if price is None or wall.length < needed:
@@ -168,11 +172,11 @@ def _best_links(
     return best
 
 
-def _price(briefs: Sequence[Brief], a: int, b: int) -> float | None:
+def _price(briefs: Sequence[Brief], a: int, b: int, widths: Widths) -> float | None:
     owners = {briefs[a].partner, briefs[b].partner} - {None}
     if owners:
         return 0.0 if briefs[a].partner == b or briefs[b].partner == a else None
-    return COSTS.get((briefs[a].kind, briefs[b].kind))
+    return widths.prices.get((briefs[a].kind, briefs[b].kind))
 
 
 def add_loops(
@@ -399,12 +403,14 @@ class Style:
         open_plan: Whether living, dining and kitchen are open to each other.
         corridor: Clear width of corridors [units].
         door: Width of doors between rooms [units].
+        variety: How much rooms, links and layouts differ from the usual ones [percent].
     """
 
     outline: str | None = None
     open_plan: bool | None = None
     corridor: int | None = None
     door: int | None = None
+    variety: int = 0
 
 
 @dataclass(frozen=True)
@@ -447,8 +453,9 @@ def generate(seed: int, wishes: Wishes, style: Style) -> House:
     Raises:
         FloorPlanError: No home was found that meets the request.
     """
-    decided = settle_wishes(wishes, Choices(seed, "wishes"))
+    decided = settle_wishes(wishes, Choices(seed, "wishes"), style.variety)
     widths = _style(style, Choices(seed, "style"))
+    widths = replace(widths, prices=_tastes(Choices(seed, "taste"), style.variety))
     # A plain outline is only a first try; a requested outline is binding.
     plain = Choices(seed, "outline").chance(PLAIN_PERCENT)
     candidates: list[_Candidate] = []
@@ -458,15 +465,19 @@ def generate(seed: int, wishes: Wishes, style: Style) -> House:
             if number >= MAX_LAYOUTS // 4 and wishes.garage is None:
                 decided = replace(decided, garage=False)
             choices = Choices(seed, f"rooms {number // PATIENCE}")
-            briefs = choose_rooms(decided, choices, style.outline == "U")
+            if number >= MAX_LAYOUTS * 3 // 4:  # rare rooms fit into no layout
+                style, widths = replace(style, variety=0), replace(widths, prices=COSTS)
+            briefs = choose_rooms(decided, choices, style.outline == "U", style.variety)
         usual = "rectangle" if plain and number < 2 * PATIENCE else None
         request = LayoutRequest(
             briefs, decided.area_m2 or 0.0, widths.corridor, style.outline or usual
         )
         layout = draw_layout(request, Choices(seed, f"layout {number}"))
-        candidate = layout and _judge(layout, widths, request.outline, _ease(number))
+        limit = MAX_ACCESS_COST + LINK_TASTE * style.variety / 100
+        candidate = layout and _judge(layout, widths, request.outline, _ease(number), limit)
         if candidate:
-            candidates.append(candidate)
+            taste = Choices(seed, f"taste {number}").below(LAYOUT_TASTE * style.variety + 1)
+            candidates.append(replace(candidate, cost=candidate.cost + taste / 100))
         # Where good layouts are rare, fewer are enough.
         if len(candidates) >= max(ENOUGH_LAYOUTS - number // PATIENCE, 1):
             break
@@ -475,6 +486,16 @@ def generate(seed: int, wishes: Wishes, style: Style) -> House:
         if house is not None:
             return house
     raise FloorPlanError(_failure(decided, style))
+
+
+def _tastes(choices: Choices, variety: int) -> Mapping[tuple[str, str], float]:
+    """Return costs of passages to which those of one family's taste are added."""
+    if not variety:
+        return COSTS
+    prices = {
+        pair: cost + choices.below(LINK_TASTE * variety) / 100 for pair, cost in _PAIRS.items()
+    }
+    return prices | {(b, a): cost for (a, b), cost in prices.items()}
 
 
 def _style(style: Style, choices: Choices) -> Widths:
@@ -492,7 +513,7 @@ def _ease(number: int) -> float:
 
 
 def _judge(
-    layout: RoomLayout, widths: Widths, outline: str | None, ease: float
+    layout: RoomLayout, widths: Widths, outline: str | None, ease: float, limit: float
 ) -> _Candidate | None:
     """Return the layout with its links and its cost, or None if it is not a home."""
     shape = shape_cost(layout, ease)
@@ -500,7 +521,7 @@ def _judge(
         return None
     walls = inner_walls(layout.boxes)
     access = link_rooms(layout, walls, widths)
-    if access is None or access.cost > MAX_ACCESS_COST:
+    if access is None or access.cost > limit:
         return None
     outer = outer_walls(layout.boxes, walls)
     light = light_cost(layout, outer)

@@ -187,8 +187,13 @@ OPTIONAL = (
 )
 
 
-def settle_wishes(wishes: Wishes, choices: Choices) -> Wishes:
+def settle_wishes(wishes: Wishes, choices: Choices, variety: int = 0) -> Wishes:
     """Draw what the wishes leave open.
+
+    Args:
+        wishes: The wishes.
+        choices: The stream to draw from.
+        variety: By how many percent more the number of bedrooms for an area varies.
 
     Raises:
         FloorPlanError: The wishes contradict each other.
@@ -204,7 +209,18 @@ def settle_wishes(wishes: Wishes, choices: Choices) -> Wishes:
     _check(area, wishes)
     if wishes.bedrooms is None:
         least = beds
-        beds = min(max((round(area) + choices.between(-36, 36) + 38) // 66, least), 6)
+        beds = min(
+            max(
+                (
+                    round(area)
+                    + choices.between(-36 - 36 * variety // 100, 36 + 36 * variety // 100)
+                    + 38
+                )
+                // 66,
+                least,
+            ),
+            6,
+        )
         while beds > least and minimum_area(beds, baths, garage) > 0.8 * area:
             beds -= 1
         while beds < MAX_ROOMS_PER_TYPE and maximum_area(beds, baths) < area:
@@ -261,14 +277,24 @@ def _base(bedrooms: int, bathrooms: int) -> list[str]:
     return ["living_room", "kitchen", *["bedroom"] * bedrooms, *["bathroom"] * bathrooms]
 
 
-def choose_rooms(wishes: Wishes, choices: Choices, porch: bool = False) -> list[Brief]:
+def choose_rooms(
+    wishes: Wishes, choices: Choices, porch: bool = False, variety: int = 0
+) -> list[Brief]:
     """Return the rooms of a home, largest uses first, with areas that add up.
 
     Args:
         wishes: Settled wishes.
         choices: The stream to draw from.
         porch: Whether the home must have an entryway.
+        variety: How far further rooms may make others smaller than typical, from 0 to 100 percent
+            of what their least sizes allow.
     """
+
+    def needed(kinds: Sequence[str]) -> float:
+        sizes = [SIZES[kind] for kind in kinds]
+        spare = fsum(size.typical_area - size.min_area for size in sizes)
+        return fsum(size.typical_area for size in sizes) - spare * variety / 100
+
     area, beds, baths = wishes.area_m2 or 0.0, wishes.bedrooms or 1, wishes.bathrooms or 1
     kinds = _base(beds, baths) + ["garage"] * bool(wishes.garage)
     total = area / TYPICAL_AREA_FACTOR
@@ -278,8 +304,8 @@ def choose_rooms(wishes: Wishes, choices: Choices, porch: bool = False) -> list[
         if porch and kind == "entryway":
             kinds.append(kind)
             continue
-        is_likely = area >= from_area and choices.chance(percent)
-        if is_likely and fsum(SIZES[k].typical_area for k in [*kinds, kind]) <= fill * total:
+        is_likely = 100 * area >= (100 - variety) * from_area and choices.chance(percent)
+        if is_likely and needed([*kinds, kind]) <= fill * total:
             kinds.append(kind)
     for kind, _, _ in OPTIONAL:  # a very large home takes more rooms
         if 0.85 * fsum(SIZES[k].max_area for k in kinds) < total and kinds.count(kind) < 2:

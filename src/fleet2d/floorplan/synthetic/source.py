@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 
 from fleet2d.configuration.components import register
 from fleet2d.configuration.problems import problem
-from fleet2d.configuration.units import Length
+from fleet2d.configuration.units import Length, Share
 from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
 from fleet2d.floorplan.rooms.doorways import DoorLine
 from fleet2d.floorplan.source import FloorPlanSource
@@ -121,6 +121,7 @@ class Synthetic(FloorPlanSource):
         open_plan: Whether living, dining and kitchen are open to each other.
         corridor_width: Clear width of hallways, 0.9 m to 2 m, rounded to 5 cm.
         door_width: Width of doors between rooms, 0.7 m to 1.2 m, rounded to 5 cm.
+        variety: How much rooms and their links differ from the usual ones.
 
     Example:
         >>> plan = Synthetic(seed=7, area_m2=120, bedrooms=3).load()
@@ -137,6 +138,7 @@ class Synthetic(FloorPlanSource):
     open_plan: bool | None = None
     corridor_width: Length | None = None
     door_width: Length | None = None
+    variety: Share = 0.0
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -154,7 +156,11 @@ class Synthetic(FloorPlanSource):
         """
         wishes = Wishes(self.area_m2, self.bedrooms, self.bathrooms, self.garage)
         style = Style(
-            self.outline, self.open_plan, _units(self.corridor_width), _units(self.door_width)
+            self.outline,
+            self.open_plan,
+            _units(self.corridor_width),
+            _units(self.door_width),
+            round(self.variety * 100),
         )
         house = generate(self.seed, wishes, style)
         name = f"synthetic_{self.seed}"
