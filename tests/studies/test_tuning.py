@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 from tests.studies.scenes import SPEED, base, small
-from tests.thorough import THOROUGH
+from tests.thorough import THOROUGH, some
 
 from fleet2d.errors import InputError, RunDirectoryError, ScenarioError
 from fleet2d.studies.axes import Parameter
@@ -197,7 +197,7 @@ CHANGES: dict[str, tuple[dict[str, Any], dict[str, Any], str]] = {
 }
 
 
-@pytest.mark.parametrize("change", CHANGES)
+@pytest.mark.parametrize("change", some([*CHANGES], 3))
 def test_another_search_never_gets_the_trials_of_this_one(tmp_path: Path, change: str) -> None:
     """Trials on a home that was held out afterwards counted, and were reported for homes unseen.
 
