@@ -153,6 +153,21 @@ def test_of_a_flood_only_some_is_applied() -> None:
     assert len(peer.told) == 20
 
 
+def test_a_flood_does_not_fill_the_memory() -> None:
+    bridge = Bridge(fleet2d.Simulation(LIVE), [Now({})], speed=0, max_per_step=10)
+    post = bridge._post_of(0)
+    for k in range(1000):
+        post(pose(k))
+    assert bridge._inbox.qsize() == 100
+    bridge.run()
+
+    assert bridge.counts["received"] == 1000
+    assert bridge.counts["applied"] == 1
+    rest = [bridge.counts[why] for why in ("applied", "replaced", "too many")]
+    assert sum(rest) == 1000
+    assert rest[2] >= 900
+
+
 def test_only_the_last_pose_of_a_step_counts() -> None:
     _, peer, bridge = bridged({0: [pose(k) for k in range(50)]})
 

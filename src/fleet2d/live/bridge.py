@@ -9,6 +9,7 @@ import json
 import math
 import queue
 import sys
+import threading
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -49,6 +50,8 @@ MAX_AGE_S = 2.0
 REACH_M = 1.0
 # More messages than this in a step are left out.
 MAX_PER_STEP = 1000
+# More messages than this, times the bound of a step, aren't even kept until then.
+MAX_WAITING_STEPS = 10
 # The number of texts of one kind that are told in full.
 MAX_TOLD = 20
 
@@ -222,6 +225,7 @@ class Bridge:
                     " fleet2d.live.open_peers(scenario)"
                 )
             self._sources[kind, name] = numbers[address]
+        self._lock, self._dropped = threading.Lock(), 0
         self._goals: dict[str, tuple[Sender, Any]] = {}  # who sent each body where
         self._inbox: queue.SimpleQueue[tuple[float, Sender, Any]] = queue.SimpleQueue()
         self._events: list[Event] = []
@@ -270,6 +274,11 @@ class Bridge:
 
     def _post_of(self, number: int) -> Post:
         def post(content: Content, client: int = 0) -> None:
+            waiting = self._inbox.qsize()
+            if content is not None and waiting >= MAX_WAITING_STEPS * self.max_per_step:
+                with self._lock:
+                    self._dropped += 1
+                return
             self._inbox.put((time.monotonic(), (number, client), content))
 
         return post
@@ -299,6 +308,11 @@ class Bridge:
         messages: list[tuple[LiveMessage, Sender]] = []
         latest: dict[tuple[str, str], int] = {}
         gone: list[Sender] = []
+        with self._lock:
+            dropped, self._dropped = self._dropped, 0
+        if dropped:
+            self.counts["received"] += dropped
+            self.counts["too many"] += dropped
         for _ in range(self._inbox.qsize()):
             arrived, sender, content = self._inbox.get()
             if content is None:
