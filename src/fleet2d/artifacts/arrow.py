@@ -225,6 +225,8 @@ def _values_of(array: pa.Array) -> NDArray[Any]:
     if pa.types.is_dictionary(array.type):
         words = np.array(array.dictionary.to_pylist(), object)
         return cast(NDArray[Any], words[_values_of(array.indices)])
+    if pa.types.is_string(array.type):
+        return np.array(array.to_pylist(), object)
     if pa.types.is_boolean(array.type):
         flags = np.unpackbits(np.frombuffer(array.buffers()[1], np.uint8), bitorder="little")
         return flags[array.offset :][: len(array)].astype(bool)
