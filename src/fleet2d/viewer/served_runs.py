@@ -11,6 +11,7 @@ from starlette.routing import Route
 
 from fleet2d.errors import ArtifactError, Fleet2DError
 from fleet2d.runs.run import open_run
+from fleet2d.runtime.memory import release_memory
 from fleet2d.viewer.contract import Problem
 from fleet2d.viewer.page_data import PageData, compact_json
 from fleet2d.viewer.run_notes import read_notes, write_notes
@@ -74,6 +75,7 @@ class ServedRuns:
                 data.walls(0)
                 _ = data.tracks
                 _ = data.sightings
+        release_memory()  # the tables that were read
 
     async def _store_notes(self, request: Request) -> Response:
         body = await json_body(request)
