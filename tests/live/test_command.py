@@ -5,10 +5,12 @@ from pathlib import Path
 
 import pytest
 import typer
+from tests.live.scenes import LIVE, place
 from typer.testing import CliRunner
 
 import fleet2d
 from fleet2d.errors import InputError
+from fleet2d.live import Bridge, from_iterator
 from fleet2d.live.command import live
 
 APP = typer.Typer()
@@ -27,6 +29,18 @@ def test_a_run_among_datagrams_is_stored_and_reproduced(tmp_path: Path) -> None:
     digest = fleet2d.open_run(tmp_path / "run").digest
     assert f"complete, digest {str(digest)[:8]}, stored in " in result.output
     assert fleet2d.reproduce(tmp_path / "run").digest == digest
+
+
+def test_a_run_that_heard_messages_is_reproduced(tmp_path: Path) -> None:
+    """The note about what had arrived was missing when it was repeated."""
+    x, y = place()
+    messages = [{"type": "pose", "entity": "ana", "x": x, "y": y}, {"type": "?"}]
+    content = LIVE | {"simulation": {"duration": "3 s", "seed": 4}}
+    simulation = fleet2d.Simulation(content, out=tmp_path / "run")
+    run = Bridge(simulation, [from_iterator(messages)], speed=20).run()
+
+    assert any(note.startswith("live: 2 messages") for note in run.manifest["notes"])
+    assert fleet2d.reproduce(tmp_path / "run").same
 
 
 def test_sources_of_the_scenario_are_opened(tmp_path: Path) -> None:

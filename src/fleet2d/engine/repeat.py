@@ -34,6 +34,8 @@ from fleet2d.runs.run import Run, open_run
 from fleet2d.scenario.model import load_scenario
 from fleet2d.storage.files import path_in, refuse_links
 
+# What begins the note about the messages of a live run, which its repetition doesn't get.
+LIVE = "live: "
 # Fields that are compared in another way, or are the same for all runs.
 _COMPARED_APART = frozenset({"digest", "format", "scenario", "seal", "status", "tables", "notes"})
 
@@ -237,8 +239,8 @@ def _fields(old: Mapping[str, Any], new: Mapping[str, Any], stored: Iterable[str
 
 
 def _repeatable(notes: list[str]) -> list[str]:
-    """Return the notes that don't depend on the speed of a machine."""
-    return [note for note in notes if not note.startswith(SLOW)]
+    """Return the notes that depend neither on the speed of a machine nor on what arrived live."""
+    return [note for note in notes if not note.startswith((SLOW, LIVE))]
 
 
 def _files(old: Path, new: Path) -> list[str]:
