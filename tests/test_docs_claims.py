@@ -259,7 +259,7 @@ def test_messages_of_the_page_of_interventions_are_those_of_the_program(fleet2d:
 
 def test_interventions_of_the_page_exist() -> None:
     text = page("interventions")
-    part = text[text.index("## Kinds of interventions") : text.index("Lights are a curve")]
+    part = text[text.index("## Kinds of interventions") : text.index("## Errors before the run")]
     cells = [line.split("|")[1] for line in part.splitlines() if line.startswith("| `")]
     listed = {name for cell in cells for name in re.findall(r"`([a-z_]+)(?::|`)", cell)}
     arguments = {"find", "dock", "behavior", "rooms", "values"}

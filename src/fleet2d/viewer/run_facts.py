@@ -150,7 +150,7 @@ def sightings_of(run: Run) -> list[SightingFacts]:
     robots: dict[str, None] = {}  # in the order in which they appear, as users
     users: dict[str, None] = {}
     for batch in _observations(run):
-        rows = _Sightings.of(batch)
+        rows = _SightingColumns.of(batch)
         robots |= dict.fromkeys(rows.robots)
         users |= dict.fromkeys(rows.users)
         for robot, user, part in rows.lanes():
@@ -179,7 +179,7 @@ def _observations(run: Run) -> Iterator[Any]:
         raise ArtifactError(f"{path} can't be read: {error}") from None
 
 
-class _Sightings(NamedTuple):
+class _SightingColumns(NamedTuple):
     """Some observations.
 
     Attributes:
