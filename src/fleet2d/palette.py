@@ -57,7 +57,7 @@ def room_color(kind: str, number: int = 0) -> str:
     """Return the colour of a room on a floor plan by its type, and its number among those.
 
     >>> room_color("bedroom"), room_color("bedroom", 1)
-    ('#c9dcf2', '#afcceb')
+    ('#c9dcf2', '#aecbeb')
     """
     return _deeper(ROOM_COLORS.get(kind, OTHER_COLOR), SHADES[number % len(SHADES)])
 

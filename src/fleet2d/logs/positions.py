@@ -392,7 +392,10 @@ def _check_times(time_us: I64, path: Path, line: I64, *, has_date: bool) -> None
         )
     days = int(time_us.max() - time_us.min()) // DAY_US + 1
     if (jumps := _jumps(time_us, line)) and days > LOG_DAYS.limit:
-        raise LogError(f"{path}, {jumps[0]}: leave out the lines of the clock that wasn't set")
+        advice = f"set {LOG_DAYS.variable}={days} in the environment"
+        raise LogError(
+            f"{path}, {jumps[0]}: leave out the lines of the clock that wasn't set, or {advice}"
+        )
     LOG_DAYS.check(days, path, LogError)
 
 

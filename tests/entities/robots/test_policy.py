@@ -230,7 +230,8 @@ def test_memory_counts_looks_by_room_hour_and_person() -> None:
     memory.take(rows)
     memory.take(rows[:0])
 
-    assert [70, NEVER, 30] == memory.last[:, room].tolist()
+    assert [70, NEVER, 30, 70] == memory.last[:, room].tolist()  # of anyone in the last row
     assert [2, 1] == memory.looks[0, room, 7:9].tolist()
     assert 1 == memory.looks[2, room, 7]
-    assert [3, 0, 1] == memory.total[:, room].tolist()
+    assert [3, 1] == memory.looks[3, room, 7:9].tolist()
+    assert [3, 0, 1, 4] == memory.total[:, room].tolist()
