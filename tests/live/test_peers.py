@@ -31,15 +31,14 @@ def in_background(bridge: Bridge) -> tuple[threading.Thread, list[Any]]:
 
 def test_datagrams_move_a_body() -> None:
     peer: Any = open_peer("udp://127.0.0.1:0")
-    simulation = fleet2d.Simulation(LIVE)
+    port, simulation = peer.port, fleet2d.Simulation(LIVE)  # it is closed when the run ends
     thread, runs = in_background(Bridge(simulation, [peer], speed=30))
     x, y = place()
-    sender = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-    while thread.is_alive():
-        message = {"type": "pose", "entity": "ana", "x": x, "y": y}
-        sender.sendto(json.dumps(message).encode(), ("127.0.0.1", peer.port))
-        time.sleep(0.05)
-    sender.close()
+    message = json.dumps({"type": "pose", "entity": "ana", "x": x, "y": y}).encode()
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+        while thread.is_alive():
+            sender.sendto(message, ("127.0.0.1", port))
+            time.sleep(0.05)
     thread.join()
 
     assert runs[0].status == "complete"
