@@ -1,5 +1,6 @@
 """Live scenes that tests share."""
 
+from functools import cache
 from typing import Any
 
 import fleet2d
@@ -15,6 +16,7 @@ LIVE: dict[str, Any] = {
 }
 
 
+@cache
 def place(room: str = "kitchen_0") -> tuple[float, float]:
     """Return a place in the middle of a room of the bundled home."""
     return next(r.anchor_xy for r in fleet2d.load_floorplan().rooms if r.name == room)

@@ -71,6 +71,8 @@ class Client:
     def close(self) -> None:
         self.mqtt.disconnect()
         self.mqtt.loop_stop()
+        self.mqtt.on_message = self.mqtt.on_subscribe = None
+        del self.mqtt  # closes its sockets
 
 
 def test_a_broker_passes_on_what_happens_and_what_arrives(broker: int) -> None:

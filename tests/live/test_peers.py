@@ -125,12 +125,12 @@ def test_a_page_in_chromium_shows_a_run_and_sends_a_robot() -> None:
         threading.Thread(target=server.serve_forever, daemon=True).start()
         peer: Any = open_peer("ws://127.0.0.1:0")
         page = browser.new_page()
-        simulation = fleet2d.Simulation(LIVE)
+        simulation = fleet2d.Simulation(LIVE, "simulation.duration=80 s")  # a page takes long
         thread, runs = in_background(Bridge(simulation, [peer], speed=10))
         run = f"?run=ws://127.0.0.1:{peer.port}"
         page.goto(f"http://127.0.0.1:{server.server_port}/page.html{run}")
         page.get_by_role("button", name="kitchen_0").click()
-        page.get_by_text("the run is over: ").wait_for(timeout=20_000)
+        page.get_by_text("the run is over: ").wait_for(timeout=40_000)
         bodies, log = page.locator("#bodies").inner_text(), page.locator("#log").inner_text()
         server.shutdown()
     thread.join()
