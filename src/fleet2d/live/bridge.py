@@ -284,15 +284,7 @@ class Bridge:
         return post
 
     def _simulate(self) -> None:
-        step_s = self.simulation.clock.step_us / 1e6
-        gc.freeze()  # what is there already lives on: each collection below is short
-        try:
-            self._simulate_steps(step_s)
-        finally:
-            gc.unfreeze()
-
-    def _simulate_steps(self, step_s: float) -> None:
-        simulation = self.simulation
+        simulation, step_s = self.simulation, self.simulation.clock.step_us / 1e6
         began, first = time.monotonic(), simulation.step
         while not simulation.done:
             if self.speed:
