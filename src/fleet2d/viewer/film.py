@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from fractions import Fraction
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -27,9 +28,17 @@ EDGE = 2  # pixels around a text for its antialiased rim
 
 
 class Stamp(NamedTuple):
-    """The picture of a text, RGBA in 0 to 1, float32 (rows, columns, 4); its corner [pixels]."""
+    """The picture of a text, and its corner [pixels].
 
-    picture: NDArray[np.float32]
+    Attributes:
+        color: float32 (rows, columns, 3), what it adds to a picture, 0 to 255.
+        rest: float32 (rows, columns, 1), the share of the picture that remains, 0 to 1.
+        left: Its left edge.
+        top: Its upper edge.
+    """
+
+    color: NDArray[np.float32]
+    rest: NDArray[np.float32]
     left: int
     top: int
 
@@ -71,16 +80,15 @@ class TextStamps:
         stamp = self._stamps[key]
         if stamp is None:
             return
-        rows, columns = stamp.picture.shape[:2]
+        rows, columns = stamp.rest.shape[:2]
         top, left = round(self._height - y) + stamp.top, round(x) + stamp.left
         low, high = max(0, top), min(pixels.shape[0], top + rows)
         begin, end = max(0, left), min(pixels.shape[1], left + columns)
         if low >= high or begin >= end:
             return
-        part = stamp.picture[low - top : high - top, begin - left : end - left]
+        part = np.s_[low - top : high - top, begin - left : end - left]
         target = pixels[low:high, begin:end, :3]
-        opacity = part[..., 3:]
-        target[...] = target * (1 - opacity) + 255 * part[..., :3] * opacity + 0.5
+        target[...] = target * stamp.rest[part] + stamp.color[part]
 
     @staticmethod
     def _place(text: Text) -> tuple[float, float]:
@@ -112,13 +120,22 @@ class TextStamps:
         if not pixels.any():
             return None
         picture = (pixels / 255).astype(np.float32)
-        return Stamp(picture, left - round(x), top - round(self._height - y))
+        opacity = picture[..., 3:]
+        color = 255 * picture[..., :3] * opacity + np.float32(0.5)
+        return Stamp(color, 1 - opacity, left - round(x), top - round(self._height - y))
 
 
 SUFFIXES = (".mp4", ".gif", ".webp")
 MAX_FRAMES_PER_S = 25
 HEIGHT_PX = 720
 HEIGHT_IN = 7.2
+X264 = {
+    "preset": "superfast",
+    "crf": "20",
+    "tune": "animation",
+    "x264-params": "bframes=0:rc-lookahead=0",
+}
+ROWS_BETWEEN = 16  # equal rows between two parts of a picture that have changed
 # A GIF or WebP is written from pictures that are all in memory.
 MAX_PICTURES = 3_000
 
@@ -242,24 +259,92 @@ def _frames(
 def _write_mp4(path: Path, frames: Iterator[tuple[int, U8]], total: int, rate: Fraction) -> None:
     with extra("film", "an MP4 film needs PyAV"):
         import av
-    with av.open(str(path), "w", format="mp4", options={"movflags": "faststart"}) as container:
-        stream: Any = None
-        frame: Any = None
+    number, first = next(frames)
+    last = np.zeros_like(first)
+    rows, columns = first.shape[:2]
+    frame = av.VideoFrame(columns, rows, "yuv420p")
+    planes = [_array_of(plane) for plane in frame.planes]
+    with (
+        av.open(str(path), "w", format="mp4", options={"movflags": "faststart"}) as container,
+        ThreadPoolExecutor(1) as thread,
+    ):
+        stream: Any = container.add_stream("libx264", rate=rate)
+        stream.width, stream.height, stream.pix_fmt = columns, rows, "yuv420p"
+        stream.time_base = stream.codec_context.time_base = frame.time_base = 1 / rate
+        stream.thread_type = "FRAME"  # slices of one picture would wait for each other
+        stream.options = X264
+
+        def encode(number: int, parts: list[Part]) -> None:
+            for part in parts:
+                converted = av.VideoFrame.from_numpy_buffer(part.pixels, format="rgba")
+                small = converted.reformat(format="yuv420p")
+                part.paste([_array_of(plane) for plane in small.planes], planes)
+            frame.pts = number
+            container.mux(stream.encode(frame))
+
+        # A picture is encoded, in a thread that needs no interpreter, while the next is drawn.
+        begun = thread.submit(encode, number, changed_parts(last, first))
         for number, pixels in frames:
-            frame = av.VideoFrame.from_ndarray(pixels, format="rgba")
-            if stream is None:
-                stream = container.add_stream("libx264", rate=rate)
-                stream.width, stream.height, stream.pix_fmt = frame.width, frame.height, "yuv420p"
-                stream.time_base = 1 / rate
-                stream.codec_context.time_base = 1 / rate
-                stream.options = {"preset": "veryfast", "crf": "20", "tune": "animation"}
-            frame.pts, frame.time_base = number, 1 / rate
-            container.mux(stream.encode(frame))
-        if frame is not None and frame.pts < total - 1:  # the last picture stays to the end
-            frame.pts = total - 1
-            container.mux(stream.encode(frame))
-        if stream is not None:
-            container.mux(stream.encode(None))
+            parts = changed_parts(last, pixels)
+            begun.result()
+            begun = thread.submit(encode, number, parts)
+        begun.result()
+        if number < total - 1:  # the last picture stays to the end
+            encode(total - 1, [])
+        container.mux(stream.encode(None))
+
+
+def _array_of(plane: Any) -> U8:
+    """Return the pixels of a plane of a frame, which share its memory."""
+    pixels: U8 = np.frombuffer(plane, np.uint8).reshape(-1, plane.line_size)
+    return pixels[: plane.height, : plane.width]
+
+
+class Part(NamedTuple):
+    """A rectangle of a picture: its corner, and its pixels, uint8 (rows, columns, 4)."""
+
+    top: int
+    left: int
+    pixels: U8
+
+    def paste(self, parts: Sequence[U8], planes: Sequence[U8]) -> None:
+        """Paste the rectangle, as planes of brightness and of colours of half the size."""
+        for part, plane in zip(parts, planes, strict=True):
+            half = 1 if part is parts[0] else 2
+            top, left = self.top // half, self.left // half
+            plane[top : top + part.shape[0], left : left + part.shape[1]] = part
+
+
+def changed_parts(last: U8, pixels: U8) -> list[Part]:
+    """Return the rectangles in which a picture differs from the last one, which it becomes.
+
+    Converting the colours of whole pictures would take as long as drawing them. Corners and sizes
+    are even, as are those of the picture: colours are stored for two by two pixels.
+
+    Args:
+        last: uint8 (rows, columns, 4), changed in place.
+        pixels: The same of the present picture.
+
+    Example:
+        >>> last, pixels = np.zeros((2, 40, 20, 4), np.uint8)
+        >>> pixels[3, 5] = pixels[30:33, 8] = 255
+        >>> [(part.top, part.left, part.pixels.shape) for part in changed_parts(last, pixels)]
+        [(2, 4, (2, 2, 4)), (30, 8, (4, 2, 4))]
+        >>> changed_parts(last, pixels)
+        []
+    """
+    changed = last.view(np.uint32)[..., 0] != pixels.view(np.uint32)[..., 0]
+    rows = np.flatnonzero(changed.any(axis=1))
+    parts = []
+    bands = np.split(rows, np.flatnonzero(np.diff(rows) > ROWS_BETWEEN) + 1)
+    for band in bands if len(rows) else ():
+        columns = np.flatnonzero(changed[band[0] : band[-1] + 1].any(axis=0))
+        top, left = (int(index[0]) // 2 * 2 for index in (band, columns))
+        bottom, right = (int(index[-1]) // 2 * 2 + 2 for index in (band, columns))
+        part = pixels[top:bottom, left:right].copy()
+        last[top:bottom, left:right] = part
+        parts.append(Part(top, left, part))
+    return parts
 
 
 def _write_pictures(

@@ -10,10 +10,9 @@ import numpy as np
 import shapely
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.collections import Collection, LineCollection, PolyCollection
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
-from matplotlib.patches import Circle
 from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
@@ -150,6 +149,8 @@ def _label(axes: Axes, rows: Sequence[StripRow]) -> None:
 
 TAIL = timedelta(minutes=1)  # length of the paths behind bodies
 MIN_RADIUS_M = 0.2
+TURNS = np.linspace(0, 2 * np.pi, 48, endpoint=False)
+CIRCLE = np.stack([np.cos(TURNS), np.sin(TURNS)], axis=1)  # of radius 1
 NOSE = 1.6  # length of the line of the heading [radii]
 STRIP_ROWS = 6
 ABOVE_M = 0.6  # space above the plan
@@ -157,14 +158,16 @@ ABOVE_M = 0.6  # space above the plan
 
 @dataclass
 class BodyArtists:
-    """A body on the stage: its facts, its path, and its artists."""
+    """A body on the stage: its facts, its path, its name, and the outlines of what it sees [m].
+
+    All bodies are drawn by the same few artists: each artist costs more than what it draws.
+    """
 
     facts: BodyFacts
     path: Trajectory
-    disc: Circle
-    nose: Any
+    radius: float
     name: Any
-    views: list[PolyCollection]
+    views: list[F64]
     view_key: object = None
 
 
@@ -216,23 +219,32 @@ class Stage:
         self._axes.set_ylim(top=top + ABOVE_M)
         facts_of_bodies = bodies_of(run.manifest["scenario"], run.manifest["entities"])
         self.bodies = [self._artists(facts) for facts in facts_of_bodies]
+        self._views = PolyCollection([], facecolors=VIEW_COLOR, alpha=0.4, zorder=2.2)
+        self._edges = PolyCollection(
+            [], facecolors="none", edgecolors=VIEW_EDGE, lw=0.8, zorder=3.2
+        )
         self._paths = LineCollection([], lw=1.6, alpha=0.7, zorder=3.4)
         self._sightings = LineCollection([], lw=1.0, ls=(0, (2, 1.5)), color=VIEW_EDGE, zorder=3.6)
-        for lines in (self._paths, self._sightings):
-            self._axes.add_collection(lines, autolim=False)
+        self._noses = LineCollection([], lw=2.2, zorder=4.2, capstyle="round")
+        self._discs = PolyCollection([], edgecolors="white", lw=0.9, zorder=4.3)
+        for artist in self._collections:
+            self._axes.add_collection(artist, autolim=False)
         self._clock, self._away = self._write_head(axes)
         self._cursor = None if self._strip is None else self._fill_strip(self._strip)
         self._observations = _ObservationsByStep(self._part)
         self._scene: object = None
 
     @property
+    def _collections(self) -> list[Collection]:
+        """What all bodies are drawn by, except their names, in the order of drawing."""
+        below = [self._views, self._edges, self._paths, self._sightings]
+        return [*below, self._noses, self._discs]
+
+    @property
     def body_artists(self) -> list[tuple[Axes, Artist]]:
         """The artists of bodies, of their paths and of their views, in the order of drawing."""
-        artists: list[Artist] = [view for body in self.bodies for view in body.views]
-        artists += [self._paths, self._sightings]
-        for body in self.bodies:
-            artists += [body.disc, body.nose, body.name]
-        return [(self._axes, artist) for artist in artists]
+        names = (body.name for body in self.bodies)
+        return [(self._axes, artist) for artist in (*self._collections, *names)]
 
     @property
     def clock_artists(self) -> list[tuple[Axes | None, Artist]]:
@@ -245,6 +257,7 @@ class Stage:
         index = (step - self._first) // self.stride
         last_scene = self._scene
         poses = [self._place(body, index, step) for body in self.bodies]
+        self._draw_bodies(poses)
         views = [body.view_key for body in self.bodies]
         lines = [line.tobytes() for line in self._draw_paths(index)]
         self._scene = (poses, views, lines, self._draw_sightings(step, index))
@@ -301,41 +314,42 @@ class Stage:
     def _artists(self, facts: BodyFacts) -> BodyArtists:
         interval = timedelta(microseconds=self._step_us * self.stride)
         path = self._part.path(facts["name"], interval)
-        color = facts["color"]
-        radius = max(facts["radius"], MIN_RADIUS_M)
-        disc = Circle((0, 0), radius, facecolor=color, edgecolor="white", lw=0.9, zorder=4.3)
-        self._axes.add_patch(disc)
-        (nose,) = self._axes.plot([], [], color=color, lw=2.2, zorder=4.2, solid_capstyle="round")
-        name = self._axes.text(0, 0, facts["name"], fontsize=8.5, weight="bold", color=color)
-        name.set(ha="center", va="bottom", zorder=5, clip_on=True)
+        name = self._axes.text(0, 0, facts["name"], fontsize=8.5, weight="bold")
+        name.set(color=facts["color"], ha="center", va="bottom", zorder=5, clip_on=True)
         name.set_path_effects([withStroke(linewidth=2.0, foreground=RIM_COLOR)])
-        views = [PolyCollection([], facecolors=VIEW_COLOR, alpha=0.4, zorder=2.2) for _ in range(2)]
-        views[1].set(facecolor="none", edgecolor=VIEW_EDGE, lw=0.8, alpha=1.0, zorder=3.2)
-        for view in views if facts["cameras"] else ():
-            self._axes.add_collection(view, autolim=False)
-        return BodyArtists(facts, path, disc, nose, name, views if facts["cameras"] else [])
+        return BodyArtists(facts, path, max(facts["radius"], MIN_RADIUS_M), name, [])
 
     def _place(self, body: BodyArtists, index: int, step: int) -> tuple[float, float, float] | None:
-        """Move a body to its pose, which is returned; hide it and return None while it is away."""
+        """Move the name of a body; return its pose, None while it is away."""
         path = body.path
         x, y, heading = float(path.x[index]), float(path.y[index]), float(path.heading[index])
         is_home = not bool(path.away[index])
-        for artist in (body.disc, body.nose, body.name, *body.views):
-            artist.set_visible(is_home)
+        body.name.set_visible(is_home)
         if not is_home:
+            body.views, body.view_key = [], None
             return None
-        radius = body.disc.get_radius()
-        body.disc.center = (x, y)
-        body.nose.set_data(
-            [x, x + NOSE * radius * np.cos(heading)], [y, y + NOSE * radius * np.sin(heading)]
-        )
-        body.name.set_position((x, y + 1.5 * radius))
-        if body.views:
-            self._draw_view(body, (x, y, heading), step)
+        body.name.set_position((x, y + 1.5 * body.radius))
+        if body.facts["cameras"]:
+            self._look(body, (x, y, heading), step)
         return x, y, heading
 
-    def _draw_view(self, body: BodyArtists, pose: tuple[float, float, float], step: int) -> None:
-        """Draw the regions that the cameras of a body see, if they changed."""
+    def _draw_bodies(self, poses: Sequence[tuple[float, float, float] | None]) -> None:
+        """Draw bodies at their poses, and what they see; None for those who are away."""
+        here = [(body, pose) for body, pose in zip(self.bodies, poses, strict=True) if pose]
+        colors = [body.facts["color"] for body, _ in here] or "none"
+        radius = np.array([body.radius for body, _ in here]).reshape(-1, 1, 1)
+        place = np.array([pose for _, pose in here]).reshape(-1, 1, 3)
+        facing = np.stack([np.cos(place[..., 2]), np.sin(place[..., 2])], axis=2)
+        centre = place[..., :2]
+        self._noses.set(segments=np.append(centre, centre + NOSE * radius * facing, axis=1))
+        self._noses.set_color(colors)
+        self._discs.set(verts=centre + radius * CIRCLE, facecolor=colors)
+        outlines = [outline for body in self.bodies for outline in body.views]
+        for artist in (self._views, self._edges):
+            artist.set_verts(outlines)
+
+    def _look(self, body: BodyArtists, pose: tuple[float, float, float], step: int) -> None:
+        """Set the regions that the cameras of a body see, if they changed."""
         number = int(np.searchsorted(self._change_steps, step, side="right")) - 1
         walls = self._walls.changes[max(0, number)]["walls"]
         key = (pose, walls, self._pans(body.facts, step))
@@ -343,9 +357,7 @@ class Stage:
             return
         body.view_key = key
         sight = SightWalls(self._walls.mesh(walls), self._plan.lattice)
-        outlines = list(self._outlines(body.facts, pose, sight, step))
-        for view in body.views:
-            view.set_verts(outlines)
+        body.views = list(self._outlines(body.facts, pose, sight, step))
 
     def _pans(self, facts: BodyFacts, step: int) -> tuple[float, ...]:
         return tuple(
@@ -386,7 +398,7 @@ class Stage:
             xy = np.stack([path.x[span], path.y[span]], axis=1)[~path.away[span]]
             if len(xy) > 1 and (xy != xy[0]).any():
                 lines.append(xy)
-                colors.append(body.disc.get_facecolor())
+                colors.append(body.facts["color"])
         self._paths.set_segments(lines)
         self._paths.set_color(colors or "none")
         return lines
