@@ -13,13 +13,14 @@ algorithm, metric) is declared by the base class of all components of that kind:
 A component in a module below its kind's package needs no import anywhere else.
 """
 
-import importlib
+import importlib.util
 import inspect
 import pkgutil
 import re
 from collections.abc import Callable, Iterable, Mapping, Sized
 from dataclasses import dataclass
 from functools import cache, lru_cache
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
 
 from pydantic import (
@@ -481,16 +482,20 @@ def _registered(kind: str, name: str) -> type[Component] | None:
 
 
 def _import_builtins(kind: str, name: str | None = None) -> None:
-    """Import a kind's modules, or, if one has the first part of ``name``, only that one."""
+    """Import a kind's modules, or, if one registers ``name``, only that one."""
     if kind in _COMPLETE or kind not in PACKAGES:
         return
     package = importlib.import_module(PACKAGES[kind])
     folders = getattr(package, "__path__", [])  # a module has all components of its kind
     modules = sorted(m.name for m in pkgutil.walk_packages(folders, f"{package.__name__}."))
-    for module in [m for m in modules if name and name.startswith(m.rpartition(".")[2])]:
-        importlib.import_module(module)
-        if name and _registered(kind, name):
-            return
+    if name:
+        # Most types stand in the file of their name, which is read first.
+        for module in sorted(modules, key=lambda m: not name.startswith(m.rpartition(".")[2])):
+            spec = importlib.util.find_spec(module)
+            if spec and spec.origin and f'"{name}"' in Path(spec.origin).read_text("utf-8"):
+                importlib.import_module(module)
+                if _registered(kind, name):
+                    return
     for module in modules:
         importlib.import_module(module)
     _COMPLETE.add(kind)
