@@ -11,7 +11,7 @@ from pydantic import Field
 from fleet2d.algorithms.algorithm import Present
 from fleet2d.algorithms.history import History
 from fleet2d.algorithms.observations import NOWHERE
-from fleet2d.algorithms.presence.belief import ANYONE, HOURS, Presence
+from fleet2d.algorithms.presence.belief import ANYONE, HOURS, Presence, presence_of
 from fleet2d.algorithms.presence.estimator import LN_2, natural_log
 from fleet2d.configuration.components import register
 from fleet2d.configuration.units import PositiveDuration, Share, micros
@@ -20,7 +20,6 @@ from fleet2d.floorplan.plan import read_only
 from fleet2d.floorplan.space import Space
 from fleet2d.kernels import F64, I64, SUB, Bool
 from fleet2d.kernels import earth_mover as minimal_cost
-from fleet2d.metrics.belief_reader import presence_of
 from fleet2d.metrics.metric import Metric
 from fleet2d.runtime.clock import DAY_S, HOUR_US, midnight_of
 

@@ -11,12 +11,12 @@ from fleet2d.algorithms.algorithm import Present
 from fleet2d.algorithms.evidence import steps_of_bin
 from fleet2d.algorithms.history import History
 from fleet2d.algorithms.observations import NOWHERE
+from fleet2d.algorithms.presence.belief import BeliefReader
 from fleet2d.algorithms.presence.estimator import natural_log
 from fleet2d.configuration.components import register
 from fleet2d.configuration.units import PositiveDuration
 from fleet2d.floorplan.home import Home
 from fleet2d.kernels import F64, I64, UNKNOWN_TRUTH, Bool
-from fleet2d.metrics.belief_reader import BeliefReader
 from fleet2d.metrics.metric import Metric, UnknownPlaces
 from fleet2d.runtime.determinism import sum_in_order
 

@@ -1,5 +1,6 @@
-"""How much of the time robots perceive the users."""
+"""Metrics of sightings: what of the home robots observe, and whom they see or confuse."""
 
+from collections.abc import Mapping
 from typing import Any, ClassVar
 
 import numpy as np
@@ -8,7 +9,13 @@ from fleet2d.algorithms.algorithm import Present
 from fleet2d.algorithms.history import History
 from fleet2d.configuration.components import register
 from fleet2d.floorplan.home import Home
+from fleet2d.kernels import I64, UNKNOWN_TRUTH
 from fleet2d.metrics.metric import Metric
+from fleet2d.runtime.clock import HOUR_S
+
+UNKNOWN = "unknown"  # name in the confusion of a person not recognized
+NO_ONE = "nobody"  # name in the confusion of false positives
+SHARES = {"half": 0.5, "most": 0.9}
 
 
 @register("metric", "sightings")
@@ -48,3 +55,164 @@ class Sightings(Metric):
             for user, seen in self.seen.items()
             if self.at_home[user]
         }
+
+
+@register("metric", "detections")
+class Detections(Metric):
+    """Precision, recall and identity confusion of each robot, over all its cameras.
+
+    A look is one image of one camera, at one step; a user is in view if the camera's geometry shows
+    the user, regardless of its perception.
+
+    - `recall`: looks in which a user in view was noticed / looks with that user in view, summed
+      over users: TP / (TP + FN).
+    - `precision`: observations of somebody who is there, recognized correctly or not / all
+      observations: TP / (TP + FP).
+    - `recognized`: observations with the correct user / observations of users; an observation of
+      nobody known counts as not recognized.
+    - `confusion`: for each user, and for nobody (false positives), the shares of observations
+      recognized as each user, or as nobody (`unknown`); each sums to one.
+
+    A ratio whose denominator is 0 is left out. Observations of a real robot, whose truth nobody
+    knows, count in none of them: `unknown_truth` is their number. Stored per period: looks,
+    detections, false positives and identities, by robot and user.
+    """
+
+    unit: ClassVar[str] = "share"
+
+    def start(self, home: Home) -> None:
+        """Begin counting."""
+        self.looks: I64 | None = None  # (robots, users, 2): in view, noticed
+        self.confusion: I64  # (robots, users + 1, users + 1): true, perceived
+        self.names: tuple[tuple[str, ...], tuple[str, ...]] = ((), ())
+        self.unknown: I64  # (robots,): observations whose truth nobody knows
+
+    def update(self, history: History, state: Present) -> Any:
+        """Count looks and observations; return a row for each robot and user."""
+        robots, users = len(state.robots), len(state.users)
+        if self.looks is None:
+            self.looks = np.zeros((robots, users, 2), np.int64)
+            self.confusion = np.zeros((robots, users + 1, users + 1), np.int64)
+            self.unknown = np.zeros(robots, np.int64)
+            self.names = state.robots, state.users
+        counts, observations = history.looks, history.observations
+        looks = np.zeros((robots, users, 2), np.int64)
+        np.add.at(looks, counts.robot, np.stack([counts.in_view, counts.detected], axis=-1))
+        confusion = np.zeros((robots, users + 1, users + 1), np.int64)
+        # A false positive, or a person not recognized, is -1: the last entry.
+        true = history.truth.user
+        known = true != UNKNOWN_TRUTH
+        np.add.at(confusion, (observations.robot[known], true[known], observations.user[known]), 1)
+        self.unknown += np.bincount(observations.robot[~known], minlength=robots)
+        self.looks += looks
+        self.confusion += confusion
+        return self._rows(looks, confusion)
+
+    def _rows(self, looks: I64, confusion: I64) -> Any:
+        """Return a row for each robot and user, and last for nobody: the false positives."""
+        robots, users = self.names
+        if not (robots and users):
+            return None
+        names = np.array([*users, NO_ONE], dtype=object)
+        count = len(names)
+        padded = np.concatenate([looks, np.zeros((len(robots), 1, 2), np.int64)], axis=1)
+        correct = np.diagonal(confusion, axis1=1, axis2=2).copy()
+        correct[:, -1] = 0
+        return {
+            "robot": np.repeat(np.array(robots, dtype=object), count),
+            "user": np.tile(names, len(robots)),
+            "in_view": padded[..., 0].ravel(),
+            "detected": padded[..., 1].ravel(),
+            "observed": confusion.sum(axis=2).ravel(),
+            "recognized": correct.ravel(),
+            "unknown": confusion[:, :, -1].ravel(),
+        }
+
+    def result(self) -> dict[str, Any]:
+        """Return {robot: {precision, recall, recognized, confusion}}, without undefined ratios."""
+        if self.looks is None:
+            return {}
+        robots, users = self.names
+        return {
+            robot: self._summary(self.looks[r], self.confusion[r], users)
+            | ({"unknown_truth": int(self.unknown[r])} if self.unknown[r] else {})
+            for r, robot in enumerate(robots)
+        }
+
+    def _summary(self, looks: I64, counts: I64, users: tuple[str, ...]) -> dict[str, Any]:
+        numbers: dict[str, Any] = {}
+        real, total = int(counts[:-1].sum()), int(counts.sum())
+        if total:
+            numbers["precision"] = real / total
+        if looks[:, 0].sum():
+            numbers["recall"] = int(looks[:, 1].sum()) / int(looks[:, 0].sum())
+        if real:
+            numbers["recognized"] = int(np.trace(counts[:-1, :-1])) / real
+        confusion = {
+            true: {
+                perceived: int(counts[t, p]) / int(counts[t].sum())
+                for p, perceived in enumerate((*users, UNKNOWN))
+                if counts[t, p]
+            }
+            for t, true in enumerate((*users, NO_ONE))
+            if counts[t].sum()
+        }
+        if confusion:
+            numbers["confusion"] = confusion
+        return numbers
+
+    @classmethod
+    def summary(cls, result: Mapping[str, Any]) -> Mapping[str, Any]:
+        """Return all numbers but the confusion of identities."""
+        return {
+            robot: {key: value for key, value in numbers.items() if key != "confusion"}
+            for robot, numbers in result.items()
+        }
+
+
+@register("metric", "coverage")
+class Coverage(Metric):
+    """Share of the floor of all rooms that was in view of a robot, and times to half and 90 %.
+
+    `share`: the cells of rooms that were in view at some step, as in the layer `first_seen`,
+    divided by all cells of rooms, with furniture or without. `half_h`, `most_h`: hours from the
+    start of the run to the step at which half, and 90 %, of these cells had been in view; left out
+    if that never happened.
+    """
+
+    needs: ClassVar[frozenset[str]] = frozenset({"first_seen"})
+    units: ClassVar[Mapping[str, str]] = {
+        "share": "share of the floor",
+        "half_h": "h",
+        "most_h": "h",
+    }
+
+    def start(self, home: Home) -> None:
+        """Begin without any cells seen."""
+        self.first: dict[str, Any] = {}  # sorted first steps of the cells seen, by robot
+        self.cells = int(np.count_nonzero(home.plan.room_of_cell >= 0))
+        self.step_s = 0.0
+
+    def update(self, history: History, state: Present) -> Any:
+        """Read the layers of first steps; return a row for each robot."""
+        self.step_s, inside = history.step_s, state.home.plan.room_of_cell >= 0
+        for robot in state.robots:
+            layer = f"first_seen.{robot}"
+            if layer in state.home.layers:
+                first = state.home.layers[layer].values[inside]
+                self.first[robot] = np.sort(first[(first >= 0) & (first < history.end)])
+        if not self.first:
+            return None
+        shares = [len(first) / self.cells for first in self.first.values()]
+        return {"robot": np.array(list(self.first), dtype=object), "share": np.array(shares)}
+
+    def result(self) -> dict[str, Any]:
+        """Return {robot: {share, half_h, most_h}}, hours only where the share was reached."""
+        numbers: dict[str, Any] = {}
+        for robot, first in self.first.items():
+            numbers[robot] = {"share": len(first) / self.cells}
+            for name, share in SHARES.items():
+                needed = int(np.ceil(share * self.cells))
+                if 0 < needed <= len(first):
+                    numbers[robot][f"{name}_h"] = int(first[needed - 1]) * self.step_s / HOUR_S
+        return numbers

@@ -1,0 +1,170 @@
+"""Metrics of movement: how far robots drive, how often, and what charge they use."""
+
+from collections.abc import Mapping
+from datetime import timedelta
+from math import dist
+from typing import Any, ClassVar
+
+import numpy as np
+from pydantic import Field
+
+from fleet2d.algorithms.algorithm import Present
+from fleet2d.algorithms.history import History
+from fleet2d.configuration.components import register
+from fleet2d.configuration.units import Length, PositiveDuration
+from fleet2d.floorplan.home import Home
+from fleet2d.metrics.metric import Metric
+from fleet2d.runtime.clock import DAY_S
+
+RestPlace = tuple[float, float]
+
+
+@register("metric", "distance")
+class Distance(Metric):
+    """Metres that each body covers per day, as the sum of its moves from step to step."""
+
+    unit: ClassVar[str] = "m a day"
+
+    def start(self, home: Home) -> None:
+        """Begin counting."""
+        self.metres: dict[str, float] = {}
+        self.last: dict[str, tuple[float, float]] = {}
+        self.days = 0.0
+
+    def update(self, history: History, state: Present) -> Any:
+        """Add up the moves."""
+        for name in (*state.users, *state.robots):
+            poses = history.poses(name)
+            between = dist(self.last[name], poses.at(0)) if name in self.last else 0.0
+            self.metres[name] = self.metres.get(name, 0.0) + between + poses.distance
+            self.last[name] = poses.at(-1)
+        self.days += len(history) * history.step_s / DAY_S
+
+    def result(self) -> dict[str, Any]:
+        """Return {name: metres per day}."""
+        return {name: metres / self.days for name, metres in self.metres.items() if self.days}
+
+
+@register("metric", "travel")
+class Travel(Metric):
+    """Relocations and metres a day, of each robot.
+
+    A robot rests where its position doesn't change for `rest` or longer, turning or not. A
+    relocation is a rest more than `apart` away from the previous rest. Metres are the sum of the
+    moves from step to step.
+
+    Attributes:
+        rest: Shortest time at one place that is a rest.
+        apart: Distance between two places of rest [m].
+    """
+
+    units: ClassVar[Mapping[str, str]] = {"relocations": "a day", "metres": "m a day"}
+
+    rest: PositiveDuration = timedelta(minutes=1)
+    apart: Length = Field(default=0.5, ge=0)
+
+    def start(self, home: Home) -> None:
+        """Begin counting."""
+        self.metres: dict[str, float] = {}
+        self.relocations: dict[str, int] = {}
+        self.last_rest: dict[str, RestPlace] = {}  # place of the last rest
+        self.standing: dict[str, tuple[RestPlace, int]] = {}  # place, and for how many steps
+        self.days = 0.0
+
+    def update(self, history: History, state: Present) -> Any:
+        """Add up moves and rests."""
+        rest_steps = self.rest.total_seconds() / history.step_s
+        for robot in state.robots:
+            poses = history.poses(robot)
+            standing = self.standing.get(robot)
+            between = 0.0 if standing is None else dist(standing[0], poses.at(0))
+            self.metres[robot] = self.metres.get(robot, 0.0) + between + poses.distance
+            self.relocations.setdefault(robot, 0)
+            changes = np.flatnonzero((np.diff(poses.xy, axis=0) != 0).any(axis=1)) + 1
+            begins = [0, *changes.tolist()]
+            for begin, end in zip(begins, [*begins[1:], len(history)], strict=True):
+                place, steps = poses.at(begin), end - begin
+                if standing is not None and standing[0] == place:
+                    steps += standing[1]
+                standing = place, steps
+                if steps >= rest_steps:
+                    self._rest(robot, place)
+            assert standing is not None
+            self.standing[robot] = standing
+        self.days += len(history) * history.step_s / DAY_S
+
+    def _rest(self, robot: str, place: RestPlace) -> None:
+        if robot in self.last_rest and dist(self.last_rest[robot], place) > self.apart:
+            self.relocations[robot] += 1
+            self.last_rest[robot] = place
+        self.last_rest.setdefault(robot, place)
+
+    def result(self) -> dict[str, Any]:
+        """Return {robot: {relocations, metres}}, both per day."""
+        return {
+            robot: {
+                "relocations": self.relocations[robot] / self.days,
+                "metres": metres / self.days,
+            }
+            for robot, metres in self.metres.items()
+        }
+
+
+@register("metric", "battery")
+class BatteryUse(Metric):
+    """Lowest charge, dockings a day, and shares of time charging and empty, of each robot.
+
+    From the events `battery`, `docks` and `charged`. `lowest` is the lowest charge in these events:
+    they happen at decisions, after a change of 5 %, when the robot docks, and when it is empty.
+    `dockings` counts `docks`. `charging` is the share of the run's steps from a `docks` to the
+    `charged` after it, or to the end of the run; a robot at its charger charges at other times,
+    too. `empty` is the share of steps with an empty battery, from which on the robot stands still.
+    """
+
+    units: ClassVar[Mapping[str, str]] = {
+        "lowest": "share of a full charge",
+        "dockings": "a day",
+        "charging": "share of time",
+        "empty": "share of time",
+    }
+
+    def start(self, home: Home) -> None:
+        """Begin counting."""
+        self.lowest: dict[str, float] = {}
+        self.dockings: dict[str, int] = {}
+        self.docked_at: dict[str, int] = {}
+        self.charging: dict[str, int] = {}  # steps
+        self.empty_at: dict[str, int] = {}
+        self.steps = 0
+        self.step_s = 1.0
+
+    def update(self, history: History, state: Present) -> Any:
+        """Read the events."""
+        for event in history.events:
+            name = event.entity
+            if event.event in ("battery", "docks", "charged"):
+                level = float(event.detail.removesuffix(" %")) / 100
+                self.lowest[name] = min(self.lowest.get(name, 1.0), level)
+                if event.event == "battery" and level == 0:
+                    self.empty_at.setdefault(name, event.step)
+            if event.event == "docks":
+                self.dockings[name] = self.dockings.get(name, 0) + 1
+                self.docked_at[name] = event.step
+            elif event.event == "charged" and name in self.docked_at:
+                steps = event.step - self.docked_at.pop(name)
+                self.charging[name] = self.charging.get(name, 0) + steps
+        self.steps, self.step_s = history.end, history.step_s
+
+    def result(self) -> dict[str, Any]:
+        """Return {robot: {lowest, dockings, charging}}, and empty of those that ran empty."""
+        numbers = {}
+        for name, lowest in self.lowest.items():
+            present = self.steps - self.docked_at[name] if name in self.docked_at else 0
+            numbers[name] = {
+                "lowest": lowest,
+                "dockings": self.dockings.get(name, 0) / (self.steps * self.step_s / DAY_S),
+                "charging": (self.charging.get(name, 0) + present) / self.steps,
+            }
+            if name in self.empty_at:
+                numbers[name]["empty"] = (self.steps - self.empty_at[name]) / self.steps
+        return numbers
