@@ -306,25 +306,32 @@ def with_imports(files: Iterable[Path], folder: Path, within: Path | None = None
 
 def _imports_of(file: Path, folder: Path) -> Iterator[Path]:
     """Yield the existing files of the modules that a module may import."""
-    for node in _nodes_of(file):
-        if isinstance(node, ast.Import):
-            for alias in node.names:
-                yield from _files_of(folder, alias.name.split("."))
-        elif isinstance(node, ast.ImportFrom):
-            start = file.parents[node.level - 1] if 0 < node.level <= len(file.parents) else folder
-            module = node.module.split(".") if node.module else []
-            for alias in node.names:
-                yield from _files_of(start, [*module, alias.name])
+    try:
+        imports = _imports_in(read_bytes(file, FILE_BYTES))
+    except (OSError, InputError):
+        return  # it can't be imported either
+    for level, parts in imports:
+        start = file.parents[level - 1] if 0 < level <= len(file.parents) else folder
+        yield from _files_of(start, parts)
 
 
-def _nodes_of(file: Path) -> Iterator[ast.AST]:
+@lru_cache(maxsize=64)  # a study's runs read the same files
+def _imports_in(text: bytes) -> list[tuple[int, list[str]]]:
+    """Return the level and the dotted name of each import in a module's text."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # they are about the user's text
-            tree = ast.parse(read_bytes(file, FILE_BYTES))
-    except (SyntaxError, ValueError, RecursionError, MemoryError, OSError, InputError):
-        return  # it can't be imported either
-    yield from ast.walk(tree)
+            tree = ast.parse(text)
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
+        return []
+    imports = list[tuple[int, list[str]]]()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            imports += [(0, alias.name.split(".")) for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            module = node.module.split(".") if node.module else []
+            imports += [(node.level, [*module, alias.name]) for alias in node.names]
+    return imports
 
 
 def _files_of(folder: Path, parts: Sequence[str]) -> Iterator[Path]:

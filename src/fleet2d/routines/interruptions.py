@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from datetime import timedelta
-from functools import cache
+from functools import cache, lru_cache
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple, Self
 
@@ -20,6 +20,7 @@ from fleet2d.routines.activity import (
     SchemaForms,
     seconds,
 )
+from fleet2d.routines.distributions import Distribution
 from fleet2d.routines.planner import (
     FINISHES,
     INTERRUPTS,
@@ -253,7 +254,12 @@ def _chance(share: float) -> int:
 
 def _quantiles(distribution: DurationDistribution) -> Quantiles:
     """Return quantiles of a distribution between its bounds [s]."""
-    return tuple(max(1, value) for value in distribution.table().quantiles(1 << QUANTILE_BITS))
+    return _quantiles_of(distribution.table())
+
+
+@lru_cache(maxsize=256)  # people of one persona share them
+def _quantiles_of(table: Distribution) -> Quantiles:
+    return tuple(max(1, value) for value in table.quantiles(1 << QUANTILE_BITS))
 
 
 def interrupt(
