@@ -24,6 +24,7 @@ def test_every_houseexpo_plan_is_lived_in_for_a_day(shared_data: Path) -> None:
         assert run.metrics["distance"]["ana"] > 1, plan.name
 
 
+@pytest.mark.slow
 def test_every_map_of_a_robot_is_lived_in_for_a_day(shared_data: Path) -> None:
     maps = [
         *(("ros", path) for path in sorted((shared_data / "ros_maps").glob("*/map.yaml"))),

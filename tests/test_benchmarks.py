@@ -25,6 +25,7 @@ def test_ci_starts_every_benchmark() -> None:
     assert [] == [name for name in NAMES if name not in parts and f"start {name}" not in script]
 
 
+@pytest.mark.slow
 def test_studies_are_measured() -> None:
     command = [sys.executable, str(BENCHMARKS / "studies.py"), "overhead", "--small"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)

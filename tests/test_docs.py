@@ -96,6 +96,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("page", pages_with("python"))
 def test_python_of_a_page_runs_in_an_empty_folder(
     page: Path, folder: Path, monkeypatch: pytest.MonkeyPatch
@@ -110,6 +111,7 @@ def test_python_of_a_page_runs_in_an_empty_folder(
         sys.modules.pop(Path(block.title or "").stem, None)  # another page may have one, too
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("block", scenarios())
 def test_scenario_of_a_page_can_be_simulated(block: Block, folder: Path) -> None:
     write_titled_blocks(block.page, folder)
@@ -172,6 +174,7 @@ def test_concepts_deny_nothing_that_there_is() -> None:
 NOT_RUN = {"view", "reproduce-paper", "fit", "calibrate", "convert"}
 
 
+@pytest.mark.slow
 def test_commands_of_the_command_line_page_run_in_its_folder(folder: Path) -> None:
     """All that need nothing but the page's own file, in order, at a day instead of sixty."""
     page = ROOT / "docs" / "cli.md"

@@ -203,6 +203,7 @@ def test_json_has_the_keys_of_the_page(fleet2d: Cli) -> None:
     assert set(said["wall_s"]) == set(printed["wall_s"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("plan", ["synthetic:7", "family_home"])
 def test_commands_that_take_a_floor_plan_take_bundled_and_synthetic_ones(
     fleet2d: Cli, plan: str
@@ -212,6 +213,7 @@ def test_commands_that_take_a_floor_plan_take_bundled_and_synthetic_ones(
     assert 0 == fleet2d("show", plan, "--out", "plan.svg")[0]
 
 
+@pytest.mark.slow
 def test_the_bundled_month_is_as_the_pages_say() -> None:
     """Its error of presence after the month, and the rounds that the robot makes."""
     month = run({"extends": "bundled:base"})

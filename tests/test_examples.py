@@ -44,6 +44,7 @@ def test_there_are_examples_of_an_own_behavior_and_an_own_algorithm() -> None:
     assert SCENARIOS
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", RUNNABLE, ids=lambda path: path.name)
 def test_a_script_runs(
     examples: Path,
@@ -66,6 +67,7 @@ def test_a_script_runs(
     assert "" == err
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", SCENARIOS, ids=lambda path: str(path.relative_to(EXAMPLES)))
 def test_a_scenario_runs_from_anywhere(fleet2d: Cli, examples: Path, path: Path) -> None:
     content = yaml.safe_load(path.read_text())
@@ -81,6 +83,7 @@ def test_a_scenario_runs_from_anywhere(fleet2d: Cli, examples: Path, path: Path)
         assert name in stored.tables
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", STUDIES, ids=lambda path: path.name)
 def test_a_study_is_as_it_should_be(
     examples: Path, path: Path, request: pytest.FixtureRequest

@@ -153,6 +153,7 @@ def test_known_failure_02_ten_days_run_to_their_end() -> None:
     assert ("complete", 10 * 86400) == (stored.status, stored.manifest["steps"])
 
 
+@pytest.mark.slow
 def test_known_failure_02_years_run_to_their_end() -> None:
     """A minute at a time, and a robot that moves a dozen times a day."""
     days, last = (3652, "2036-01-04T23") if THOROUGH else (731, "2028-01-05T23")
@@ -367,6 +368,7 @@ def usual() -> Any:
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("cls", "where", "key", "value"),
     CASES,
@@ -476,6 +478,7 @@ def test_known_failure_06_two_labels_on_one_box_are_one_room(tmp_path: Path) -> 
 # --- 7 -----------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("cell", some([0.02, 0.01, 0.05, 0.1, 0.2, 0.5, 1.0], 2))
 def test_known_failure_07_the_area_stays_within_a_tolerance_or_it_is_an_error(
     plan_paths: list[Path], cell: float

@@ -83,6 +83,7 @@ def process(folder: Path, *arguments: str) -> "subprocess.CompletedProcess[str]"
 EVERY = sorted(set(" ".join(LEAVES).split()))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("folders", [*LEAVES, " ".join(EVERY)] if THOROUGH else [" ".join(EVERY)])
 def test_rest_works_without_leaves(folders: str, copy: Path) -> None:
     with without(copy, *folders.split()):
@@ -95,6 +96,7 @@ def test_rest_works_without_leaves(folders: str, copy: Path) -> None:
     assert not gone & commands
 
 
+@pytest.mark.slow
 def test_command_of_a_missing_leaf_is_unknown(copy: Path) -> None:
     with without(copy, "paper"):
         done = process(copy, "-m", "fleet2d.cli", "reproduce-paper")

@@ -52,6 +52,7 @@ def test_the_table_has_all_parts_in_all_columns() -> None:
     assert [sum(bool(cell) for cell in row) for row in ROWS] == [2, 3, 3, 3, 3, 3]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("cell", some(CELLS, 2))
 def test_a_cell_runs(folder: Path, cell: str) -> None:
     run = fleet2d.run("parts.yaml", cell)
@@ -60,6 +61,7 @@ def test_a_cell_runs(folder: Path, cell: str) -> None:
     assert run.tables["trajectories"].num_rows
 
 
+@pytest.mark.slow
 def test_what_was_replayed_is_as_it_was(folder: Path) -> None:
     logged = [row[1][0] for row in ROWS[1:]]
     first = fleet2d.open_run("first")
@@ -78,6 +80,7 @@ def test_what_was_replayed_is_as_it_was(folder: Path) -> None:
     )
 
 
+@pytest.mark.slow
 def test_live_cells_hear_a_log_that_is_played_to_them(folder: Path) -> None:
     """A program without Fleet2D plays the log, twenty times as fast as it was."""
     cells = [row[2][0].replace(":9000", ":0") for row in ROWS[1:5]]
@@ -109,6 +112,7 @@ def test_live_cells_hear_a_log_that_is_played_to_them(folder: Path) -> None:
     ]
 
 
+@pytest.mark.slow
 def test_parts_are_combined(folder: Path) -> None:
     choices = [[cell[0] for cell in row if cell] for row in ROWS[1:]]
     combinations = list(itertools.product(*choices))
@@ -116,6 +120,7 @@ def test_parts_are_combined(folder: Path) -> None:
         assert fleet2d.run("parts.yaml", *cells).status == "complete"
 
 
+@pytest.mark.slow
 def test_a_learner_is_as_good_on_a_real_log_as_the_page_says(
     shared_data: Path, tmp_path: Path
 ) -> None:

@@ -3,6 +3,7 @@
 import ast
 import re
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 from tools import package_map
@@ -47,7 +48,7 @@ def reachable(graph: dict[str, set[str]], name: str) -> set[str]:
 
 def imports(name: str, path: Path) -> Iterator[str]:
     """Yield the modules that a module imports: at once, later, or for types only."""
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in definitions(path):
         if isinstance(node, ast.Import):
             targets = [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
@@ -57,6 +58,14 @@ def imports(name: str, path: Path) -> Iterator[str]:
         else:
             continue
         yield from (target for target in targets if target in MODULES and target != name)
+
+
+@cache
+def definitions(path: Path) -> list[ast.Import | ast.ImportFrom | ast.ClassDef]:
+    """Return all imports and classes of a module, at its top and within."""
+    kinds = (ast.Import, ast.ImportFrom, ast.ClassDef)
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    return [node for node in ast.walk(tree) if isinstance(node, kinds)]
 
 
 def base_of(node: ast.ImportFrom, name: str, path: Path) -> str:
@@ -96,7 +105,7 @@ def test_files_that_contributing_names_are_there() -> None:
 def test_no_two_classes_have_the_same_name() -> None:
     places: dict[str, list[str]] = {}
     for module, path in MODULES.items():
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        for node in definitions(path):
             if isinstance(node, ast.ClassDef):
                 places.setdefault(node.name.lstrip("_"), []).append(module)
 

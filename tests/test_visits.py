@@ -61,6 +61,7 @@ def real_homes(shared_data: Path) -> list[Visits]:
     return [count_visits(*traces_of_log(shared_data / "activity" / log)[0]) for log in logs]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", bundled_names())
 def test_a_persona_moves_about_as_people_of_real_homes_do(
     name: str, real_homes: list[Visits]

@@ -419,6 +419,7 @@ def places(content: Any, where: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
     return paths
 
 
+@pytest.mark.slow
 def test_no_edited_manifest_gives_a_traceback(run: Path) -> None:
     """Opened, verified, read and drawn from: every failure is an error of Fleet2D."""
     path, rng = run / "manifest.json", random.Random(11)

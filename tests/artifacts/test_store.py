@@ -393,6 +393,7 @@ sys.stdin.read()
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(os.name != "posix", reason="kill -9 is a matter of POSIX")
 def test_crash_never_leaves_a_file_that_looks_whole(tmp_path: Path) -> None:
     """Killed in the middle of storing, of closing, and just after.

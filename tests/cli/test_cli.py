@@ -198,6 +198,7 @@ def schema() -> dict[str, Any]:
     return scenario_schema()
 
 
+@pytest.mark.slow
 def test_the_schema_is_valid_and_says_which_it_is(fleet2d: Cli, schema: dict[str, Any]) -> None:
     code, out, err = fleet2d("schema")
     assert (0, "", schema) == (code, err, json.loads(out))
@@ -393,6 +394,7 @@ def interrupted(
     return subprocess.CompletedProcess(arguments, process.returncode, out, err)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(os.name != "posix", reason="signals are posix")
 def test_ctrl_c_leaves_a_readable_run(tmp_path: Path) -> None:
     (tmp_path / "home.yaml").write_text(yaml.safe_dump(every_step("300 d")))

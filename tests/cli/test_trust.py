@@ -56,6 +56,7 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("command", "run"), [("reproduce", "run"), ("resume", "half")])
 def test_code_runs_only_when_it_is_named(
     fleet2d: Cli, monkeypatch: pytest.MonkeyPatch, home: Path, command: str, run: str

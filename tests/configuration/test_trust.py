@@ -160,6 +160,7 @@ def test_a_study_whose_code_is_named_runs(fleet2d: Cli) -> None:
     assert Path("ran").exists()
 
 
+@pytest.mark.slow
 def test_a_study_of_a_bundled_scenario_has_no_code(fleet2d: Cli) -> None:
     """Its name has the form of a component's, `bundled.py` and the class `base`."""
     study = {"base": "bundled:base", "axes": {"robots.astro.speed": [0.3]}, "replicates": 1}
@@ -190,6 +191,7 @@ def test_a_variant_of_a_stored_study_asks_for_trust(fleet2d: Cli, tmp_path: Path
     assert 0 == fleet2d("study", "rerun", "studies/study", "0")[0]  # loaded already: its own code
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("command", "made"),
     [

@@ -24,6 +24,7 @@ def records(data: Dataset) -> dict[str, str]:
     return {name: file["sha256"] for name, file in data.manifest["files"].items()}
 
 
+@pytest.mark.slow
 def test_tables_are_there_for_every_split(data: Dataset) -> None:
     assert ("train", "test") == data.splits
     runs = data.arrow("runs", "train").to_pydict()
@@ -48,10 +49,12 @@ def test_labels_are_the_truth_of_their_step(data: Dataset) -> None:
     assert following[-1] is None
 
 
+@pytest.mark.slow
 def test_the_content_is_the_same_for_any_number_of_workers(data: Dataset, tmp_path: Path) -> None:
     assert records(data) == records(make(tmp_path / "two", workers=2))
 
 
+@pytest.mark.slow
 def test_an_interrupted_data_set_goes_on(data: Dataset, tmp_path: Path) -> None:
     out = tmp_path / "killed"
     source = tmp_path / "small.json"
@@ -77,6 +80,7 @@ def test_an_interrupted_data_set_goes_on(data: Dataset, tmp_path: Path) -> None:
     assert not (out / "unfinished").exists()
 
 
+@pytest.mark.slow
 def test_damaged_parts_and_records_of_an_unfinished_one_are_made_again(
     data: Dataset, tmp_path: Path
 ) -> None:

@@ -94,6 +94,7 @@ def looks() -> dict[str, Any]:
     return content
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["line_of_sight", "flashlight"])
 def test_a_span_ends_at_the_earliest_event_and_all_cameras_have_looked_up_to_it(
     method: str,

@@ -140,6 +140,7 @@ def check_by(values: F64, edges: npt.ArrayLike, happened: Bool, share: F64) -> N
         assert agree(happened[inside], share[inside]), (g, result, expected)
 
 
+@pytest.mark.slow
 def test_who_was_in_view_is_within_range_and_angle(rows: Rows) -> None:
     looks = of(rows, "sharp")
     distance, bearing = from_eye(looks["x"], looks["y"])

@@ -133,6 +133,7 @@ def test_robots_wait_for_each_other_and_for_people() -> None:
     assert gap(stored, "astro", "ana").min() >= 0.35
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("span", some([1, 61], 2))
 def test_spans_do_not_show_where_bodies_block_each_other(span: int) -> None:
     content = everything("40 min")

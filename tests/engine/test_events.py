@@ -136,6 +136,7 @@ def test_metrics_hear_of_users_and_get_the_rest_at_the_end(whole: Any) -> None:
     assert [*expected, 1799] == whole.metrics["diary"]["steps"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("span", some([1, 7, 600], 2))
 def test_events_are_the_same_for_every_max_span(whole: Any, span: int) -> None:
     other = whole_run(max_span=span)

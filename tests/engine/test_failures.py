@@ -180,6 +180,7 @@ CASES = [
 ]  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("changes", "path", "words"), CASES)
 def test_an_error_names_who_failed_and_when_and_the_run_so_far_is_whole(
     changes: dict[str, Any], path: str, words: list[str], tmp_path: Path

@@ -115,6 +115,7 @@ def digest_of(seed: int) -> str:
     return str(stored.digest)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("workers", some([1, 2, 3], 3))
 def test_runs_in_any_number_of_processes_are_those_of_one(workers: int) -> None:
     expected = [base().digest, digest_of(5)]
@@ -129,6 +130,7 @@ print(fleet2d.run("bundled:base", *json.loads(sys.argv[1])).digest)
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "environment",
     some(

@@ -148,6 +148,7 @@ def run_prints(folder: Path, how: str, duration: str = "3 h") -> subprocess.Comp
     return fleet2d_process(*arguments, cwd=folder)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("how", some(["gone", "gone in a thread", "gone as a thread"], 3))
 def test_a_component_that_ends_the_process_leaves_the_run(tmp_path: Path, how: str) -> None:
     """What was committed can be read, and the run can be resumed."""
@@ -214,6 +215,7 @@ class Odd(fleet2d.Algorithm):
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("how", "words"),
     some(

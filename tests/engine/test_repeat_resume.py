@@ -291,6 +291,7 @@ def test_killed_at_random_moments_and_resumed_it_is_the_same(tmp_path: Path, for
     assert len(resumed) > 1 or KILLS < 10
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", some([signal.SIGTERM, signal.SIGINT], 2))
 def test_a_signal_is_heard_and_the_run_goes_on_later(tmp_path: Path, number: int) -> None:
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
@@ -439,6 +440,7 @@ def operations(tmp_path_factory: pytest.TempPathFactory) -> int:
     return run_with_fault(tmp_path_factory.mktemp("count") / "run", 10**9, dies=False)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("first", "dies", "drop"),
     [(1, False, False), (3, True, False), (5, True, True)],
@@ -492,6 +494,7 @@ def test_a_fault_while_resuming_loses_nothing(tmp_path: Path) -> None:
     assert fails_at > 20
 
 
+@pytest.mark.slow
 def test_resume_on_the_command_line(tmp_path: Path) -> None:
     changes = ("simulation.duration=2 d", "artifacts.checkpoint=6 h")
     simulation = fleet2d.Simulation(None, *changes, seed=4, out=tmp_path / "run")

@@ -96,6 +96,7 @@ def household(plan: str) -> dict[str, Any]:
     )
 
 
+@pytest.mark.slow
 def test_readings_are_the_same_for_every_span(plan: str) -> None:
     whole = run(household(plan))
     assert {"hall", "contact", "plug"} <= set(table(whole, "sensors")["sensor"])

@@ -116,6 +116,7 @@ WAYS: dict[str, Callable[[Simulation], Simulation]] = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("scene", "way"),
     [
@@ -243,6 +244,7 @@ def saved(path: Path, content: dict[str, Any] | None = None, steps: int = 500) -
     return path
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scene", some(["doors, sensors, layers", "cameras that err"], 2))
 def test_another_process_goes_on_from_a_file(scene: str, tmp_path: Path) -> None:
     path = saved(tmp_path / "run.fleet2d", SCENES[scene](), 555)

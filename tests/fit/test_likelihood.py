@@ -50,6 +50,7 @@ def test_the_fit_of_a_constant_is_the_share() -> None:
     assert (top.low, top.high) == pytest.approx((inside[0], inside[-1]), abs=1e-4)
 
 
+@pytest.mark.slow
 def test_large_logs_give_the_true_parameters() -> None:
     log = simulated(3, 80_000, bearing=True, turned=True)
     assert log.bearing is not None
@@ -109,6 +110,7 @@ class Known:
         return value
 
 
+@pytest.mark.slow
 def test_intervals_of_bearing_and_orientation_cover_the_truth_as_often_as_they_claim() -> None:
     """Of 30 logs, 95 % intervals miss in 1.5 +- 1.2; none of 4 parameters may miss in more than 5."""
     names = ("bearing midpoint", "bearing width", "side", "back")

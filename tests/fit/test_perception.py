@@ -101,6 +101,7 @@ def test_a_table_of_identities_follows_the_fit_and_never_adds_up_to_more_than_1(
     assert any("ana, ben" in note for note in calibration.notes)
 
 
+@pytest.mark.slow
 def test_the_log_of_a_run_calibrates_to_the_settings_of_the_run() -> None:
     """The whole circle: a simulated camera, its log, and the parameters again."""
     rng = np.random.default_rng(12)

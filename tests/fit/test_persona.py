@@ -144,6 +144,7 @@ def test_a_markov_chain_keeps_the_shares_of_time(life: Timeline) -> None:
     assert np.abs(hours - hours.mean(axis=0)).max() < 0.12  # it knows no clock
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", some(LOGS, 3))
 def test_days_of_real_logs_held_back_are_matched_as_well_as_by_copies(
     shared_data: Path, name: str
@@ -282,6 +283,7 @@ def test_equal_days_have_no_distance_and_shares_add_up(life: Timeline) -> None:
 # The command
 
 
+@pytest.mark.slow
 def test_the_command_writes_a_persona_and_a_picture_and_says_how_good_it_is(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

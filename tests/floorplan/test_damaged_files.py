@@ -393,6 +393,7 @@ def read_or_refused(read: Read, path: Path) -> None:
     assert len(message) < 3000
 
 
+@pytest.mark.slow
 @every_format
 @settings(
     max_examples=examples(250),

@@ -65,6 +65,7 @@ def test_plan_with_everything_comes_back_equal(tmp_path: Path, suffix: str) -> N
     assert native_document(plan) == native_document(again)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("suffix", ["json", "yaml", "geojson"])
 @pytest.mark.parametrize(
     "file",

@@ -17,6 +17,7 @@ FINDS = sorted((Path(__file__).parent / "finds").glob("*-*"))
 """Contents that a reader has failed at, as NAME OF THE READER-NUMBER."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", READERS)
 def test_what_is_nearly_right_is_read_or_refused(name: str) -> None:
     reader = READERS[name]

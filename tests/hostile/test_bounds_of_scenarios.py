@@ -72,6 +72,7 @@ def bombs(n: int) -> dict[str, tuple[str, str]]:
 QUICK = ["extends", "users", "wrong users"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", list(bombs(1)) if THOROUGH else QUICK)
 def test_scenario_is_refused_within_seconds(tmp_path: Path, name: str) -> None:
     """`extends` of 20,000 names, 30,000 users or 200,000 anchors took 7 to 25 s and more."""

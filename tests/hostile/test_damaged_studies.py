@@ -130,6 +130,7 @@ def study(whole: Path, tmp_path: Path) -> Path:
 COMMANDS = (("status",), ("rerun", "1"), ("report",))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "number", some(range(len(CASES)), 7), ids=lambda n: f"{CASES[n][0]} {CASES[n][1]}"
 )
@@ -215,6 +216,7 @@ def test_names_with_escapes_are_printed_without(study: Path, fleet2d: Cli) -> No
 # --- Searches -------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("file", ["search.json", "trials.log"])
 @pytest.mark.parametrize("damage", ["empty", "cut", "noise", "folder", "link"])
 def test_a_damaged_search_is_refused_in_one_line(

@@ -235,6 +235,7 @@ def test_a_run_that_leads_elsewhere_harms_nothing(
     record_property("tried", len(attacks))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", PAINTERS)
 def test_a_figure_of_a_run_that_leads_elsewhere_harms_nothing(
     tmp_path: Path,

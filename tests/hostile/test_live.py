@@ -171,6 +171,7 @@ def request(run: fleet2d.Simulation, order: Any) -> None:
         pass
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("doors", [False, True])
 @settings(max_examples=examples(50))
 @given(orders=st.lists(ORDERS, max_size=12))
@@ -235,6 +236,7 @@ WAIT = {"on": ["activity", "ana", "wash"], "hold": "astro", "duration": "2 min"}
 LATER = {"at": "07:05", "send": "ana", "to": "kitchen"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seconds", [1, 300])
 @pytest.mark.parametrize("act", [WAIT, LATER, {**WAIT, "each": True, "delay": "9 s"}])
 def test_what_waits_for_its_time_survives_a_kill(
@@ -320,6 +322,7 @@ class Page:
                 self.frames += 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", some([signal.SIGINT, signal.SIGTERM], 2))
 def test_a_signal_with_an_open_page_is_one_line_and_loses_nothing(
     number: signal.Signals, tmp_path: Path

@@ -36,6 +36,7 @@ def shell(
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("redirect", "options", "code", "message"),
     some(
@@ -101,6 +102,7 @@ def test_every_command_says_that_its_output_cannot_be_written(
     assert 1 == result.stderr.count("\n")
 
 
+@pytest.mark.slow
 def test_a_reader_that_has_seen_enough_is_no_error(tmp_path: Path) -> None:
     result = shell(tmp_path, "| head -c 1", "components")
     assert "" == result.stderr

@@ -254,6 +254,7 @@ def test_checkpoint_names_only_classes_of_listed_files(folder: Path) -> None:
             sys.modules.pop(name, None)
 
 
+@pytest.mark.slow
 def test_command_line_runs_the_listed_source(tmp_path: Path) -> None:
     """The whole way: a run with planted files beside its code, resumed in another process."""
     (tmp_path / "mine.py").write_text(OWN)

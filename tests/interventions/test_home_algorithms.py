@@ -74,6 +74,7 @@ def readings(run: fleet2d.Run) -> list[tuple[int, str]]:
     return list(zip(rows["step"].tolist(), rows["state"].tolist(), strict=True))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("max_span", [None, 1])
 def test_a_sensor_says_what_it_is_told_to_say(max_span: int | None) -> None:
     plain = readings(fleet2d.run(home(), max_span=max_span))

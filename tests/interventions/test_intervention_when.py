@@ -55,6 +55,7 @@ def test_a_time_is_written_as_it_is_read(text: str) -> None:
     assert text == WHEN.dump_python(WHEN.validate_python(text), mode="json")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("text", ["11:00", "12:00", "monday 11:59:59", "weekend 00:00"])
 def test_moments_of_a_clock_time_are_those_of_every_second_of_the_run(text: str) -> None:
     when = parse_when(text)

@@ -106,6 +106,7 @@ def imported(path: Path) -> set[str]:
     return names
 
 
+@pytest.mark.slow
 def test_the_core_is_imported_by_kernels_only_and_numba_by_nobody() -> None:
     for path in SOURCES:
         names = imported(path)
@@ -114,6 +115,7 @@ def test_the_core_is_imported_by_kernels_only_and_numba_by_nobody() -> None:
             assert "fleet2d._core" not in names, path
 
 
+@pytest.mark.slow
 def test_kernels_pass_on_only_what_others_import() -> None:
     passed_on, imported = set(), set()
     for path in PACKAGE.rglob("*.py"):

@@ -146,6 +146,7 @@ def test_a_wrong_question_is_answered_with_what_there_is(
         place.ask("first", **question)
 
 
+@pytest.mark.slow
 def test_a_client_uses_the_tools(place: Workspace) -> None:
     mcp = pytest.importorskip("mcp", reason="the extra mcp is not installed")
 

@@ -69,6 +69,7 @@ def test_poses_are_where_the_body_is() -> None:
     assert run.status == peer.ended == "complete"
 
 
+@pytest.mark.slow
 def test_a_recorded_live_run_gives_the_same_digest(tmp_path: Path) -> None:
     x, y = place()
     seen = {
@@ -110,6 +111,7 @@ def test_frames_have_every_event_and_row_of_the_run() -> None:
     assert kinds == {"poses", "event", "row"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("message", "told"),
     [
@@ -168,6 +170,7 @@ def test_a_flood_does_not_fill_the_memory() -> None:
     assert rest[2] >= 900
 
 
+@pytest.mark.slow
 def test_only_the_last_pose_of_a_step_counts() -> None:
     _, peer, bridge = bridged({0: [pose(k) for k in range(50)]})
 
@@ -358,6 +361,7 @@ def test_a_pose_in_a_wall_is_moved_to_where_the_body_fits_and_told() -> None:
     assert re.fullmatch(r"ana: a pose in or at a wall is moved by 0\.1\d m", peer.told[0])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("off", [(-30.0, 0.0), (0.0, 1e4)])
 def test_a_pose_of_another_frame_is_told_with_its_distance(off: tuple[float, float]) -> None:
     x, y = place()

@@ -118,6 +118,7 @@ def test_pages_of_other_sites_are_refused() -> None:
     thread.join()
 
 
+@pytest.mark.slow
 def test_a_page_in_chromium_shows_a_run_and_sends_a_robot() -> None:
     pytest.importorskip("websockets", reason="the extra live is not installed")
     pages = partial(SimpleHTTPRequestHandler, directory=str(EXAMPLES / "live"))

@@ -58,6 +58,7 @@ os._exit(0)
 """
 
 
+@pytest.mark.slow
 def test_a_robot_program_hears_standard_messages_and_sends_goals() -> None:
     done = subprocess.run(
         [sys.executable, "-c", SCENE],

@@ -218,6 +218,7 @@ def test_columns_are_not_for_bags(ros: Ros, tmp_path: Path) -> None:
         read_log(path, columns={"x": "east"})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["bag", "run.mcap"])
 def test_exported_run_is_driven_again(name: str, tmp_path: Path) -> None:
     """There and back: a robot that follows the bag of a run is where it was in that run."""

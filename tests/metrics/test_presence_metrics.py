@@ -71,6 +71,7 @@ def estimate(stored: Any, algorithm: str, user: str, step: int) -> dict[str, flo
     return dict(zip(rows["room"][at], rows["share"][at], strict=True))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("user", ["ana", "ben"])
 def test_ltp_error_is_the_distance_to_the_truth(stored: Any, user: str) -> None:
     rows = table(stored, "error", user=user)
@@ -116,6 +117,7 @@ def test_users_who_were_never_at_home_are_skipped(stored: Any) -> None:
     assert {"ana", "ben"} == set(stored.metrics["at_home"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("user", ["ana", "ben", "gone"])
 def test_rtp_score_is_of_each_minute_and_by_the_gap(stored: Any, user: str) -> None:
     lived, observed = places(stored, user), table(stored, "observations")

@@ -301,6 +301,7 @@ class Diary(Metric):
         return {"events": self.events}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("period", ["1 s", "7 min", "1 d"])
 def test_history_has_the_events_of_the_table(period: str) -> None:
     scenario_content = content()

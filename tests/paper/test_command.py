@@ -45,6 +45,7 @@ def test_a_result_is_printed_kept_and_drawn(reproduce: Callable[..., Result]) ->
     assert 2 == json.loads(Path("paper/ltp-gap.json").read_text(encoding="utf-8"))["days"]
 
 
+@pytest.mark.slow
 def test_units_in_brackets_are_printed(reproduce: Callable[..., Result]) -> None:
     code, out, _ = reproduce("rtp-gap", *TINY, "--out", "here/there")
     assert 0 == code

@@ -112,6 +112,7 @@ def numbers_of(result: Result) -> dict[str, Any]:
     return {name: value for name, value in result.numbers.items() if name != "seconds"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["ltp-gap", "rtp-gap", "feedback"])
 def test_a_result_is_kept_and_drawn(measured: dict[str, Result], name: str, tmp_path: Path) -> None:
     content = json.loads(measured[name].save(tmp_path).read_text(encoding="utf-8"))
@@ -206,6 +207,7 @@ def test_a_map_that_cannot_be_read_says_so() -> None:
         speed.rows(PaperOptions(map=Path("nowhere.yaml")), 30)
 
 
+@pytest.mark.slow
 def test_rows_are_measured_in_processes_of_their_own(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:

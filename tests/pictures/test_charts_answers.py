@@ -57,6 +57,7 @@ def test_a_run_without_interactions_has_no_such_figure() -> None:
         answers_figure(fleet2d.run(scenario("10 min")))
 
 
+@pytest.mark.slow
 def test_reports_show_answers_if_robots_want_something() -> None:
     without = fleet2d.run(home("10 min", interactions={}, robots={"astro": {}}))
 

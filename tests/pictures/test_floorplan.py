@@ -36,6 +36,7 @@ def pixels(plan: FloorPlan, *places: tuple[float, float], **options: bool) -> li
     return [image[y, x].tolist() for x, y in at]
 
 
+@pytest.mark.slow
 def test_png_and_svg_are_written_the_same_twice(home: FloorPlan, tmp_path: Path) -> None:
     for ending, start in ((".png", b"\x89PNG"), (".svg", b"<?xml"), (".PNG", b"\x89PNG")):
         first, second = tmp_path / f"a{ending}", tmp_path / f"b{ending}"
@@ -105,6 +106,7 @@ def test_rooms_too_small_for_their_name_show_their_number() -> None:
     assert not any("storage" in text for text in texts)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("start", ["13f8", "1bb5", "2953", "69c2", "f1ac"])
 def test_empty_tiny_long_slanted_and_large_plans_are_drawn(
     shared_data: Path, tmp_path: Path, start: str

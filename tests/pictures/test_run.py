@@ -98,6 +98,7 @@ def test_picture_says_what_was_run(tmp_path: Path) -> None:
     assert "interrupted" not in words
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("users", "robots"), [({}, None), (None, {}), ({}, {}), ({"bo": MEANDER}, {"eye": MEANDER})]
 )
@@ -124,6 +125,7 @@ def test_run_that_stored_less_says_so(override: str, note: str) -> None:
     assert note in words_of(base(override))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "overrides",
     some(

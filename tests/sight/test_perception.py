@@ -125,6 +125,7 @@ def test_detection_follows_the_light_of_the_day() -> None:
     check_by(hour, [2, 6, 7, 8, 14, 20, 21, 22], noticed(watch), expected)
 
 
+@pytest.mark.slow
 def test_detection_falls_with_the_part_of_a_body_that_a_pillar_hides() -> None:
     count = 12
     users = around(RNG.uniform(3, 5, N // 4), RNG.uniform(0, 35, N // 4))

@@ -122,6 +122,7 @@ def test_the_ratio_of_variances_is_that_of_unpaired_to_paired() -> None:
     )  # 2 × 1.25 / (2 × 0.25)
 
 
+@pytest.mark.slow
 def test_hanging_out_or_not_has_the_variance_in_pairs_that_is_promised(tmp_path: Path) -> None:
     """The same lives in the same homes; compared with runs whose home and seed are another's."""
     patrol = {"type": "patrol", "cooldown": "1 h"}

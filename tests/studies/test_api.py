@@ -66,6 +66,7 @@ def test_what_a_function_raises_is_raised_with_its_scenario(executor: str) -> No
     assert ["in scenario 2"] == caught.value.__notes__
 
 
+@pytest.mark.slow
 def test_a_function_that_ends_its_process_is_given_up() -> None:
     with pytest.raises(ComponentError, match=r"exit code 3.*in each of 3 attempts"):
         map_runs(end_the_process, SEEDED[:1], workers=1)

@@ -58,6 +58,7 @@ def test_a_variant_is_run_again_and_compared(fleet2d: Cli) -> None:
     assert "give a number from 0 to 3" in err
 
 
+@pytest.mark.slow
 def test_a_report_is_written_beside_the_study(fleet2d: Cli) -> None:
     fleet2d("study", "run", "speeds.yaml", *SERIAL)
     expected = (0, "studies/speeds/report/report.html\n", "")

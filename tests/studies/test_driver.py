@@ -324,6 +324,7 @@ def test_a_file_that_changes_during_a_study_fails_its_variants(
     assert {driver.CHANGED_MESSAGE} == set(study.failures["error"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("workers", some([2, 1, 4], 3))
 def test_results_are_the_same_with_any_number_of_workers(
     undisturbed_dir: Path, tmp_path: Path, workers: int

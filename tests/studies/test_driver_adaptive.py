@@ -68,6 +68,7 @@ def test_it_continues_with_the_same_decisions(tmp_path: Path) -> None:
     assert set(digests(first)) < set(digests(more))
 
 
+@pytest.mark.slow
 def test_workers_in_processes_decide_the_same(tmp_path: Path) -> None:
     content = study(width=1e9)
     _, serial = run(content, tmp_path / "serial")

@@ -61,6 +61,7 @@ def run_in_a_child_and_kill(folder: Path, after_s: float, variants: int) -> None
     os.waitpid(child, 0)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork on this system")
 @pytest.mark.filterwarnings("ignore:.*fork.*")
 def test_a_study_killed_many_times_ends_as_an_undisturbed_one(tmp_path: Path) -> None:
@@ -116,6 +117,7 @@ def wait_for_results(folder: Path, process: "subprocess.Popen[bytes]") -> None:
         time.sleep(0.02)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc").exists(), reason="looks into /proc")
 @pytest.mark.parametrize("sign", some([signal.SIGINT, signal.SIGTERM, signal.SIGKILL], 2))
 def test_ended_by_a_signal_it_leaves_nothing_running_and_loses_nothing(
@@ -142,6 +144,7 @@ def test_ended_by_a_signal_it_leaves_nothing_running_and_loses_nothing(
     assert 0 < study.counts.complete < 80
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc").exists(), reason="looks into /proc")
 def test_a_worker_that_dies_loses_only_what_it_ran_and_that_is_run_again(tmp_path: Path) -> None:
     process = start(tmp_path, "--workers", "2")

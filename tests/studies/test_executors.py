@@ -77,6 +77,7 @@ class CannotBeLoaded:
         return int, ("no job",)
 
 
+@pytest.mark.slow
 def test_a_worker_killed_while_it_sends_its_results_is_replaced(tmp_path: Path) -> None:
     """A `concurrent.futures.ProcessPoolExecutor` waits for ever for such a worker."""
     job = DiesWhileSending(tmp_path / "mark")
@@ -91,6 +92,7 @@ def test_a_job_that_no_worker_can_load_is_an_error_with_its_traceback() -> None:
         list(LocalExecutor(1).run(job, schedule("a")))
 
 
+@pytest.mark.slow
 def test_a_worker_with_much_memory_is_replaced_between_two_tasks() -> None:
     events = list(LocalExecutor(1, memory_mb=1.0).run(pid_of, schedule("aaa")))
     pids = [event.payload for event in events if isinstance(event, FinishedTask)]

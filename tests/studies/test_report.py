@@ -46,6 +46,7 @@ def page(study: Study, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_report(study, tmp_path_factory.mktemp("report"))
 
 
+@pytest.mark.slow
 def test_a_report_is_one_page_with_its_figures(study: Study, page: Path, tmp_path: Path) -> None:
     text = page.read_text()
     assert "Does a fast robot see more?" in text

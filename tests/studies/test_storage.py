@@ -100,6 +100,7 @@ def test_secrets_in_a_location_are_not_printed() -> None:
     assert "s3://bucket/study?region=us-east-1" == storage.location
 
 
+@pytest.mark.slow
 def test_a_server_that_does_not_answer_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("AWS_MAX_ATTEMPTS", "1")
     gone = "s3://key:secret@bucket/study?endpoint_override=127.0.0.1:9&scheme=http&region=a"

@@ -159,6 +159,7 @@ def test_several_objectives_end_in_several_settings(tmp_path: Path) -> None:
     assert all(len(values) == 2 for values in result.values.values())
 
 
+@pytest.mark.slow
 def test_it_runs_in_worker_processes(tmp_path: Path) -> None:
     assert 3 == tuned(tmp_path, LocalExecutor(1), trials=3).trials["complete"]
 
@@ -174,6 +175,7 @@ def parameters(tmp_path: Path) -> list[tuple[Any, ...]]:
     return [(trial.state.name, trial.params, trial.values) for trial in trials]
 
 
+@pytest.mark.slow
 def test_trials_are_the_same_with_any_number_of_workers(tmp_path: Path) -> None:
     """Each worker that became free asked for a trial, so that their number decided on it."""
     keys = {"trials": 6, "batch": 3, "prune_at": ["1 min", "2 min"]}
@@ -197,6 +199,7 @@ CHANGES: dict[str, tuple[dict[str, Any], dict[str, Any], str]] = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("change", some([*CHANGES], 3))
 def test_another_search_never_gets_the_trials_of_this_one(tmp_path: Path, change: str) -> None:
     """Trials on a home that was held out afterwards counted, and were reported for homes unseen.
@@ -248,6 +251,7 @@ def test_an_axis_that_applies_to_some_variants_only_is_not_held_out(tmp_path: Pa
         tune(study, tmp_path / "tune", SerialExecutor())
 
 
+@pytest.mark.slow
 def test_trials_can_be_stored_in_a_database(tmp_path: Path) -> None:
     url = f"sqlite:///{tmp_path / 'trials.db'}"
     first = tuned(tmp_path, trials=3, storage=url)

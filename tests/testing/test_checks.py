@@ -93,6 +93,7 @@ class Meddler(Algorithm):
         state.outputs["x"] = 1
 
 
+@pytest.mark.slow
 def test_sound_algorithms_pass() -> None:
     check_algorithm(Sound, period="30 min")
     check_algorithm(OnSight)

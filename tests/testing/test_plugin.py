@@ -89,6 +89,7 @@ def test_seeds():
     ]
 
 
+@pytest.mark.slow
 def test_a_rate_is_decided_before_all_seeds_are_used(suite: Suite) -> None:
     result = suite("""
 @trial("flat.yaml", seeds=200, holds=0.5)
@@ -106,6 +107,7 @@ def test_mostly(trial):
     assert "after 200" not in text
 
 
+@pytest.mark.slow
 def test_a_failure_leaves_a_run_that_reproduces_a_picture_and_the_command(
     suite: Suite, tmp_path: Path
 ) -> None:
@@ -139,6 +141,7 @@ def test_ana_stays(trial):
     assert f"film it: fleet2d film {place / 'smaller'} --from 'step 0' --to 'step 4'" in report
 
 
+@pytest.mark.slow
 def test_fixtures_parameters_and_choices_of_tests_work(suite: Suite) -> None:
     code = """
 @pytest.fixture
@@ -256,6 +259,7 @@ def test_body(trial):
     assert 3 == len(lines), lines
 
 
+@pytest.mark.slow
 def test_trials_run_in_several_processes(suite: Suite, tmp_path: Path) -> None:
     code = """
 @pytest.mark.parametrize("number", range(4))

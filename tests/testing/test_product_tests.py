@@ -41,6 +41,7 @@ def test_each_of_the_twelve_tests_has_a_worse_robot(week: ModuleType) -> None:
     assert {name.removeprefix("test_") for name in tests} == WORSE.keys()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", WORSE)
 def test_tests_pass_for_the_product_and_fail_for_a_worse_robot(week: ModuleType, name: str) -> None:
     function = getattr(week, f"test_{name}")
@@ -84,6 +85,7 @@ def test_there_are_ten_scenarios_of_at_most_twenty_lines_and_twenty_mutants() ->
     assert len({name for names in MUTANTS.values() for name in names}) >= 20
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("home", HOMES if THOROUGH else [0, 4])
 @pytest.mark.parametrize("scenario", MUTANTS)
 def test_each_scenario_holds_in_ten_homes(scenario: str, home: int) -> None:
@@ -92,6 +94,7 @@ def test_each_scenario_holds_in_ten_homes(scenario: str, home: int) -> None:
     ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("scenario", "mutant"),
     some([(name, mutant) for name, mutants in MUTANTS.items() for mutant in mutants], 2),

@@ -56,6 +56,7 @@ def falsify(*arguments: str) -> Any:
     return CliRunner().invoke(app, [*arguments, "--workers", "1"])
 
 
+@pytest.mark.slow
 def test_the_resulting_scenario_fails(folder: Path) -> None:
     done = falsify("flat.yaml", "--over", OVER, "--budget", "30", "--out", "found.yaml")
     assert 1 == done.exit_code, done.output
@@ -71,6 +72,7 @@ def test_the_resulting_scenario_fails(folder: Path) -> None:
     assert [] == smaller.manifest["entities"]["users"]
 
 
+@pytest.mark.slow
 def test_a_test_of_a_trial_can_be_searched(folder: Path) -> None:
     done = falsify("test_flat.py::test_comes", "--over", OVER, "--budget", "30", "--quiet")
     assert (1, "") == (done.exit_code, done.output)
@@ -78,6 +80,7 @@ def test_a_test_of_a_trial_can_be_searched(folder: Path) -> None:
     assert failing.robots["astro"].speed < 0.3
 
 
+@pytest.mark.slow
 def test_without_a_failure_the_smallest_margin_is_reported(folder: Path) -> None:
     slow = "robots.astro.speed={low: 0.5, high: 0.6}"
     done = falsify("flat.yaml", "--over", slow, "--budget", "5")
@@ -86,6 +89,7 @@ def test_without_a_failure_the_smallest_margin_is_reported(folder: Path) -> None
     assert "narrowest: margin" in done.output
 
 
+@pytest.mark.slow
 def test_it_goes_on_after_its_first_find_and_says_what_fails_apart(folder: Path) -> None:
     axes = ["--over", OVER, "--over", "where={key: robots.astro.dwell, values: [1 min, 2 min]}"]
     done = falsify("flat.yaml", *axes, "--budget", "40", "--finds", "3", "--out", "found.yaml")
@@ -125,6 +129,7 @@ def test_wrong_input_is_refused_in_words(folder: Path, arguments: list[str], wor
     assert words in str(done.exception)
 
 
+@pytest.mark.slow
 def test_a_planted_fault_is_detected_that_random_search_misses(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -15,6 +15,7 @@ from fleet2d.viewer.stage import Stage
 MAGIC = {".png": b"\x89PNG", ".svg": b"<?xml", ".pdf": b"%PDF", ".gif": b"GIF8", ".webp": b"RIFF"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ending", [".png", ".svg", ".pdf"])
 def test_moment_is_drawn_in_each_format(run_dir: Path, tmp_path: Path, ending: str) -> None:
     target = tmp_path / f"moment{ending}"
@@ -104,6 +105,7 @@ def report(run_dir: Path, tmp_path_factory: pytest.TempPathFactory) -> str:
     return target.read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_report_says_what_ran_and_how_to_run_it_again(run_dir: Path, report: str) -> None:
     run, text = fleet2d.open_run(run_dir), report
     for words in (str(run.digest), "fleet2d reproduce", "bath_door", "sightings · ana", "<img"):

@@ -54,6 +54,7 @@ def test_missing_library_is_named(run_dir: Path, monkeypatch: pytest.MonkeyPatch
         run.draw()
 
 
+@pytest.mark.slow
 def test_dark_figure_has_a_dark_ground_and_bright_words(run_dir: Path) -> None:
     run = fleet2d.open_run(run_dir)
     for figure in (

@@ -56,6 +56,7 @@ def test_forecasts_begin_with_the_present_belief() -> None:
     assert np.abs(late.with_away("u0") - now.with_away("u0")).max() > 0.01
 
 
+@pytest.mark.slow
 def test_it_is_better_than_what_it_corrects_in_an_unseen_home() -> None:
     routine = {"type": "rtp", "model": "routine"}
     run = fleet2d.run(

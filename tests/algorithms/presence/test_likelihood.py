@@ -71,6 +71,7 @@ def test_stays_and_shares_are_those_the_person_was_drawn_from() -> None:
         assert np.mean(where == 4) == pytest.approx(presence.away("u0"), abs=0.03)
 
 
+@pytest.mark.slow
 def test_sighting_share_fails_under_hangout_but_likelihood_does_not() -> None:
     """Robots that hang out where they saw somebody most: the rich get richer (6 runs of 30 days).
 
@@ -118,6 +119,7 @@ def audits(t: int, at: int, sees_person: bool, sightings, random: np.random.Gene
     )
 
 
+@pytest.mark.slow
 def test_audits_by_the_clock_find_the_truth_whatever_the_robot_does_in_between() -> None:
     """60 days have 720 looks at each room, timed by the clock: shares have errors of 0.02 at most.
 

@@ -168,6 +168,7 @@ def test_a_frame_that_is_turned_is_refused_with_its_distance(tmp_path: Path, tur
         fleet2d.Simulation(scenario(path, frame={"rotation_deg": turn}))
 
 
+@pytest.mark.slow
 def test_a_frame_off_by_a_metre_is_told_where_it_leads_through_walls(tmp_path: Path) -> None:
     """Within the reach of a metre nothing is left out, but what is in walls is counted."""
     x, y = place("kitchen_0")

@@ -59,6 +59,7 @@ def home_file(folder: Path, which: str) -> Path:
     return files[0] if which == "first" else files[len(files) // 2]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "which"),
     [
@@ -128,6 +129,7 @@ def product() -> dict[str, Any]:
     return content
 
 
+@pytest.mark.slow
 def test_all_at_once_is_the_same_for_every_max_span_and_for_copies() -> None:
     stored = assert_same_for_every_max_span(product(), *((61, 7) if THOROUGH else (7,)))
     expected = {

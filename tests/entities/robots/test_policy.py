@@ -61,6 +61,7 @@ def lives(content: dict[str, Any], choose: Any) -> tuple[Simulation, list[F32]]:
     return simulation, observations
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("task", ["hangout", "find", "patrol"])
 def test_a_run_with_a_policy_is_the_same_for_every_max_span(task: str) -> None:
     stored = assert_same_for_every_max_span(home_with([policy(task, every="20 min")], "90 min"))

@@ -31,6 +31,7 @@ def apart(counts: Counter[str], target: dict[str, float]) -> float:
     return sum(abs(counts[c] / total - share) for c, share in target.items()) / 2
 
 
+@pytest.mark.slow
 def test_shares_of_many_people_follow_the_survey_hour_by_hour() -> None:
     simulation = Simulation(
         scenario("5 min", users=users(1000 if THOROUGH else 300, group="workers"))

@@ -33,6 +33,7 @@ def shares(stored: Run) -> dict[str, float]:
     return {**shares_of_time, "away": float((rooms < 0).mean())}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("dwell", "duration", "error"),
     some([("5 min", "20 d", 0.02), ("30 min", "60 d", 0.03), ("1 min", "5 d", 0.02)], 2),

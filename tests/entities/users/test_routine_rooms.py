@@ -64,6 +64,7 @@ def odd(minutes: Counter[tuple[str, str]]) -> dict[tuple[str, str], int]:
     }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", some(range(29), 29))
 def test_nothing_is_done_in_an_odd_room_of_a_real_home(shared_data: Path, name: int) -> None:
     """Children played in bathrooms of 11 of 20 homes, up to an hour a day, while others showered."""
