@@ -274,7 +274,7 @@ def _write_mp4(path: Path, frames: Iterator[tuple[int, U8]], total: int, rate: F
         stream.thread_type = "FRAME"  # slices of one picture would wait for each other
         stream.options = X264
 
-        def encode(number: int, parts: list[Patch]) -> None:
+        def encode(number: int, parts: list[ChangedPart]) -> None:
             for part in parts:
                 converted = av.VideoFrame.from_numpy_buffer(part.pixels, format="rgba")
                 small = converted.reformat(format="yuv420p")
@@ -300,7 +300,7 @@ def _array_of(plane: Any) -> U8:
     return pixels[: plane.height, : plane.width]
 
 
-class Patch(NamedTuple):
+class ChangedPart(NamedTuple):
     """A rectangle of a picture: its corner, and its pixels, uint8 (rows, columns, 4)."""
 
     top: int
@@ -315,7 +315,7 @@ class Patch(NamedTuple):
             plane[top : top + part.shape[0], left : left + part.shape[1]] = part
 
 
-def changed_parts(last: U8, pixels: U8) -> list[Patch]:
+def changed_parts(last: U8, pixels: U8) -> list[ChangedPart]:
     """Return the rectangles in which a picture differs from the last one, which it becomes.
 
     Converting the colours of whole pictures would take as long as drawing them. Corners and sizes
@@ -343,7 +343,7 @@ def changed_parts(last: U8, pixels: U8) -> list[Patch]:
         bottom, right = (int(index[-1]) // 2 * 2 + 2 for index in (band, columns))
         part = pixels[top:bottom, left:right].copy()
         last[top:bottom, left:right] = part
-        parts.append(Patch(top, left, part))
+        parts.append(ChangedPart(top, left, part))
     return parts
 
 
