@@ -328,7 +328,7 @@ ELSEWHERE = {
     (User, "answers"): "tests/interactions: no robot wants anything here",
     (Robot, "localization"): "tests/entities/test_localization",
     (Robot, "color"): "tests/pictures: pictures",
-    (Robot, "perceives"): "tests/entities/evidence/test_replay: it needs a table",
+    (Robot, "perceives"): "tests/entities/test_replayed_detections: it needs a table",
     (User, "opens_doors"): "tests/engine/test_change_queue: there is no door in this home",
     (Robot, "gives_way"): "tests/engine/test_collisions_clearance: it meets nobody on its way here",
     (Robot, "opens_doors"): "tests/engine/test_change_queue: there is no door in this home",

@@ -10,8 +10,8 @@ from fleet2d.configuration.units import Share as Share
 from fleet2d.datasets.generate import dataset as dataset
 from fleet2d.datasets.reader import Dataset as Dataset
 from fleet2d.datasets.reader import open_dataset as open_dataset
-from fleet2d.engine.interrupts.interrupt import Interrupt as Interrupt
-from fleet2d.engine.interrupts.interrupt import SpanView as SpanView
+from fleet2d.engine.interrupt import Interrupt as Interrupt
+from fleet2d.engine.interrupt import SpanView as SpanView
 from fleet2d.engine.repeat import branch as branch
 from fleet2d.engine.repeat import reproduce as reproduce
 from fleet2d.engine.repeat import resume as resume
@@ -20,10 +20,10 @@ from fleet2d.engine.simulation import run as run
 from fleet2d.entities.behavior import Actor as Actor
 from fleet2d.entities.behavior import Behavior as Behavior
 from fleet2d.entities.behavior import Situation as Situation
-from fleet2d.entities.drives.drive import Drive as Drive
-from fleet2d.entities.drives.drive import Leg as Leg
-from fleet2d.entities.drives.drive import Moment as Moment
-from fleet2d.entities.drives.drive import Route as Route
+from fleet2d.entities.drive import Drive as Drive
+from fleet2d.entities.drive import Leg as Leg
+from fleet2d.entities.drive import Moment as Moment
+from fleet2d.entities.drive import Route as Route
 from fleet2d.entities.plan import Plan as Plan
 from fleet2d.errors import ComponentError as ComponentError
 from fleet2d.errors import Fleet2DError as Fleet2DError

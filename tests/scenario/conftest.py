@@ -9,7 +9,7 @@ from fleet2d.configuration import components
 from fleet2d.configuration.components import Component, OneOf, register
 from fleet2d.configuration.units import Duration, InputPath, Length, Share
 from fleet2d.entities.behavior import Behavior
-from fleet2d.entities.drives.differential import Differential
+from fleet2d.entities.drive import Differential
 from fleet2d.sight.fov import LineOfSight
 
 

@@ -229,14 +229,14 @@ class ShortForm:
 PACKAGES = {
     "floorplan": "fleet2d.floorplan",
     "behavior": "fleet2d.entities",
-    "drive": "fleet2d.entities.drives",
-    "evidence_source": "fleet2d.entities.evidence",
-    "object": "fleet2d.entities.objects",
+    "drive": "fleet2d.entities.drive",
+    "evidence_source": "fleet2d.entities",
+    "object": "fleet2d.entities",
     "algorithm": "fleet2d.algorithms",
     "presence_estimator": "fleet2d.algorithms.presence",
     "presence_model": "fleet2d.algorithms.presence",
     "metric": "fleet2d.metrics",
-    "interrupt": "fleet2d.engine.interrupts",
+    "interrupt": "fleet2d.engine.interrupt",
     "sight": "fleet2d.sight",
     "perception_error": "fleet2d.sight",
     "intervention": "fleet2d.interventions",
@@ -492,7 +492,8 @@ def _import_builtins(kind: str, name: str | None = None) -> None:
         # Most types stand in the file of their name, which is read first.
         for module in sorted(modules, key=lambda m: not name.startswith(m.rpartition(".")[2])):
             spec = importlib.util.find_spec(module)
-            if spec and spec.origin and f'"{name}"' in Path(spec.origin).read_text("utf-8"):
+            source = Path(spec.origin).read_text("utf-8") if spec and spec.origin else ""
+            if re.search(rf'^@register\("{kind}", .*"{re.escape(name)}"', source, re.MULTILINE):
                 importlib.import_module(module)
                 if _registered(kind, name):
                     return

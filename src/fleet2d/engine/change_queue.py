@@ -20,7 +20,7 @@ from fleet2d.engine.basis import Basis
 from fleet2d.engine.lights import PeopleSwitches, switch
 from fleet2d.entities.behavior import Actor
 from fleet2d.entities.body import Track
-from fleet2d.entities.objects.door import Door, door_hint
+from fleet2d.entities.home_object import Door, door_hint
 from fleet2d.errors import ComponentError, PlacementError, ScenarioError
 from fleet2d.floorplan.home import lattice_footprint
 from fleet2d.floorplan.home_change import ALL_ROOMS, HomeChange

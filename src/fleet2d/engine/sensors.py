@@ -13,7 +13,7 @@ from fleet2d.algorithms.history import SensorRow
 from fleet2d.configuration.problems import suggest
 from fleet2d.engine.basis import Basis, Watcher
 from fleet2d.entities.body import Bodies, PoseBlock
-from fleet2d.entities.objects.home_object import (
+from fleet2d.entities.home_object import (
     Sensor,
     SensorFault,
     SensorReading,

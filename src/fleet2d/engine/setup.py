@@ -14,7 +14,7 @@ from fleet2d.engine.change_queue import ChangeQueue
 from fleet2d.engine.collisions import BlockedWays, Clearance
 from fleet2d.engine.conversations import Conversations
 from fleet2d.engine.encounters import Encounters
-from fleet2d.engine.interrupts.interrupt import WATCHED_EVENTS, Interruptions
+from fleet2d.engine.interrupt import WATCHED_EVENTS, Interruptions
 from fleet2d.engine.intervention_queue import InterventionQueue
 from fleet2d.engine.layers import LayerBook, add_layers
 from fleet2d.engine.learners import Learners
@@ -24,7 +24,7 @@ from fleet2d.engine.state import EventStream, InView, Recall, State
 from fleet2d.engine.world import schedule_script
 from fleet2d.entities.body import Bodies
 from fleet2d.entities.decisions import DecidingActor
-from fleet2d.entities.objects.door import Door
+from fleet2d.entities.home_object import Door
 from fleet2d.errors import ComponentError, PlacementError, ScenarioError, blame
 from fleet2d.floorplan.home import Home
 from fleet2d.interventions.intervention import causes_errors

@@ -19,7 +19,7 @@ from fleet2d.engine.change_queue import ChangeQueue
 from fleet2d.engine.collisions import BlockedWays, Clearance
 from fleet2d.engine.conversations import Conversations
 from fleet2d.engine.encounters import Encounters
-from fleet2d.engine.interrupts.interrupt import Interruptions
+from fleet2d.engine.interrupt import Interruptions
 from fleet2d.engine.intervention_queue import InterventionQueue
 from fleet2d.engine.layers import LayerBook
 from fleet2d.engine.learners import Learners

@@ -12,8 +12,7 @@ from pydantic import Field
 from fleet2d.configuration.components import Settings, components, lookup
 from fleet2d.configuration.problems import suggest
 from fleet2d.configuration.units import AngleDeg, Length, Speed, TurnRateDeg
-from fleet2d.entities.drives.differential import Differential
-from fleet2d.entities.drives.drive import Drive, breakpoints, estimate
+from fleet2d.entities.drive import Differential, Drive, breakpoints, estimate
 from fleet2d.entities.place import (
     ANY,
     Place,

@@ -10,10 +10,9 @@ from fleet2d.configuration.problems import problem_at
 from fleet2d.configuration.units import Length, Speed, TurnRateDeg
 from fleet2d.entities.behavior import Behavior, Hours
 from fleet2d.entities.body import BodySettings
-from fleet2d.entities.drives.differential import Differential
-from fleet2d.entities.drives.drive import Drive
+from fleet2d.entities.drive import Differential, Drive
 from fleet2d.entities.equipment import Battery, Localization
-from fleet2d.entities.evidence.evidence_source import EvidenceSource
+from fleet2d.entities.evidence_source import EvidenceSource
 from fleet2d.entities.giving_way import GivesWay
 from fleet2d.interactions.answers import AnswersField
 from fleet2d.interactions.interaction import REQUEST_EVENTS

@@ -368,7 +368,7 @@ class Plan:
         """Ask the behavior again as soon as one of these events happens.
 
         A robot with a camera has the events user_seen and user_lost, a user with a camera
-        robot_seen and robot_lost. All bodies have the interrupts of `fleet2d.engine.interrupts`;
+        robot_seen and robot_lost. All bodies have the interrupts of `fleet2d.engine.interrupt`;
         one of your own is its class.
 
         Raises:

@@ -6,7 +6,7 @@ from pydantic import Field
 
 from fleet2d.configuration.components import register
 from fleet2d.configuration.problems import suggest
-from fleet2d.entities.objects.home_object import SensorFault
+from fleet2d.entities.home_object import SensorFault
 from fleet2d.entities.place import Point
 from fleet2d.errors import ScenarioError
 from fleet2d.floorplan.home_change import HomeChange

@@ -11,7 +11,7 @@ import threading
 from typing import Any
 
 from fleet2d.engine.simulation import Simulation
-from fleet2d.entities.objects.home_object import Sensor
+from fleet2d.entities.home_object import Sensor
 from fleet2d.errors import InputError, extra
 from fleet2d.live.bridge import LiveStep, Post
 from fleet2d.runs.run import Run

@@ -42,7 +42,7 @@ from fleet2d.configuration.problems import (
 from fleet2d.configuration.trust import check_code
 from fleet2d.configuration.units import Duration, PositiveDuration, format_duration, micros
 from fleet2d.entities.entity import Robot, User
-from fleet2d.entities.objects.home_object import HomeObject
+from fleet2d.entities.home_object import HomeObject
 from fleet2d.errors import ScenarioError
 from fleet2d.floorplan.home_change import HomeChange
 from fleet2d.floorplan.load import advise_type

@@ -13,7 +13,7 @@ from pydantic import ValidationError
 
 from fleet2d.artifacts.manifest import FILE_NAME
 from fleet2d.configuration.problems import refusal
-from fleet2d.entities.objects.door import Door
+from fleet2d.entities.home_object import Door
 from fleet2d.errors import ArtifactError, Fleet2DError
 from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.lattice import UNITS_PER_CELL

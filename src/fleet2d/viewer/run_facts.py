@@ -12,7 +12,7 @@ from fleet2d.artifacts.manifest import plain
 from fleet2d.artifacts.table import categories
 from fleet2d.configuration.units import parse_duration
 from fleet2d.engine.simulation import Simulation
-from fleet2d.entities.objects.door import Door
+from fleet2d.entities.home_object import Door
 from fleet2d.errors import ArtifactError
 from fleet2d.kernels import I64, Bool
 from fleet2d.palette import body_color

@@ -3,14 +3,19 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import timedelta
-from typing import ClassVar, Literal, NamedTuple
+from typing import ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, model_validator
 
-from fleet2d.configuration.components import Component
-from fleet2d.configuration.units import Duration, micros
+from fleet2d.configuration.components import Component, Settings, register
+from fleet2d.configuration.problems import did_you_mean, problem
+from fleet2d.configuration.units import Duration, PositiveDuration, TimeOfDay, micros
+from fleet2d.entities.place import Point
+from fleet2d.errors import PlacementError
 from fleet2d.floorplan.home import Home
+from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.floorplan.rooms.doorways import Doorway
 from fleet2d.kernels import I64, Bool
 
 
@@ -187,3 +192,112 @@ class FurnitureSensor(Sensor):
     def hold_us(self) -> int:
         """Return how long it stays on [us]."""
         return micros(self.hold)
+
+
+class Turn(Settings):
+    """A change of a door at a time of day, every day.
+
+    Attributes:
+        at: When, every day.
+        open: Open it, or shut it.
+        locked: Lock it, or unlock it.
+    """
+
+    at: TimeOfDay
+    open: bool | None = None
+    locked: bool | None = None
+
+    @model_validator(mode="after")
+    def _does_something(self) -> Self:
+        if self.open is None and self.locked is None:
+            raise problem("nothing happens then: give 'open' or 'locked', true or false")
+        return self
+
+
+@register("object", "door")
+class Door(HomeObject):
+    """A door: while it is shut, it blocks sight and ways exactly like a wall.
+
+    People open it as they come to it, unless it is locked; for bodies with `opens_doors: false`,
+    such as robots, it is a wall. It never shuts on a body: it waits until the doorway is free.
+
+    Attributes:
+        doorway: Its doorway: by name, by a room that has one only, by 'room-room', or the one
+            nearest to a point [x, y] in metres.
+        open: Whether it stands open at first.
+        locked: Whether it is locked at first, so that nobody can open it by hand.
+        closes_after: It shuts this long after somebody opened it or went through; left out: it
+            stays as it was left.
+        schedule: When it is opened, shut or locked, every day.
+    """
+
+    doorway: str | Point = Field(examples=["bathroom_0", "kitchen_0-hallway_0", [4.0, 2.5]])
+    open: bool = True
+    locked: bool = False
+    closes_after: PositiveDuration | None = Field(default=None, examples=["10 s"])
+    schedule: tuple[Turn, ...] = ()
+
+    @model_validator(mode="after")
+    def _opens_by_day(self) -> Self:
+        late = [turn.at for turn in self.schedule if turn.at >= timedelta(days=1)]
+        if late:
+            raise problem("a door's schedule ends at 23:59:59: write 00:00 for midnight")
+        return self
+
+    def find(self, plan: FloorPlan) -> Doorway:
+        """Return its doorway in a floor plan.
+
+        Raises:
+            PlacementError: There is no such doorway, or several; the message lists the doorways.
+        """
+        if not plan.doorways:
+            raise PlacementError(f"{plan.name} has no doorways: give it some, or no doors")
+        if not isinstance(self.doorway, str):
+            x, y = self.doorway
+            return min(plan.doorways, key=lambda d: (_squared(d, x, y), d.index))
+        matches = doorways_named(plan, self.doorway)
+        names = [doorway.name for doorway in plan.doorways]
+        if not matches:
+            known = [*names, *(room.name for room in plan.rooms)]
+            raise PlacementError(
+                f"there is no doorway {self.doorway!r}{did_you_mean(self.doorway, known)}"
+                f" The doorways are: {', '.join(names)}"
+            )
+        if len(matches) > 1:
+            raise PlacementError(
+                f"{self.doorway!r} has {len(matches)} doorways: choose one of"
+                f" {', '.join(doorway.name for doorway in matches)}"
+            )
+        return matches[0]
+
+
+def doorways_named(plan: FloorPlan, name: str) -> list[Doorway]:
+    """Return the doorway of a name, those between 'room-room', or all of a room."""
+    exact = [doorway for doorway in plan.doorways if doorway.name == name]
+    if exact:
+        return exact
+    rooms = {room.name: room.index for room in plan.rooms}
+    pairs = {
+        tuple(sorted((rooms[a], rooms[b]))) for a in rooms for b in rooms if f"{a}-{b}" == name
+    }
+    if name in rooms:
+        return [d for d in plan.doorways if rooms[name] in d.rooms]
+    return [d for d in plan.doorways if tuple(sorted(d.rooms)) in pairs]
+
+
+def door_hint(plan: FloorPlan, name: str) -> str:
+    """Return how to add a door to a doorway of a plan in a scenario, for messages."""
+    names = [doorway.name for doorway in plan.doorways]
+    if not names:
+        return ""
+    matches = doorways_named(plan, name)
+    doorway = matches[0].name if matches else names[0]
+    return (
+        ". A doorway that the picture shows is open until a door hangs in it: objects:"
+        f" {{{name}: {{type: door, doorway: {doorway}}}}}; the doorways are: {', '.join(names)}"
+    )
+
+
+def _squared(doorway: Doorway, x: float, y: float) -> float:
+    (x0, y0), (x1, y1) = doorway.start, doorway.end
+    return float(((x0 + x1) / 2 - x) ** 2 + ((y0 + y1) / 2 - y) ** 2)

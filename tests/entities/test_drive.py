@@ -1,4 +1,4 @@
-"""Drives in whole runs: every kind, whatever robots do; a user's own; and what is refused."""
+"""What the tests of drives share."""
 
 import copy
 from collections.abc import Iterable
@@ -7,7 +7,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 import pytest
-from tests.entities.drives.drives import CORNER, driven
+from hypothesis import given
+from hypothesis import strategies as st
 from tests.entities.robots.robots import assert_same_for_every_max_span, events, home_with
 from tests.scenes import digests, path, run, table
 from tests.thorough import some
@@ -15,10 +16,27 @@ from tests.thorough import some
 import fleet2d
 from fleet2d import Behavior, Drive, Moment, Plan, Route, Situation
 from fleet2d.configuration.components import components
-from fleet2d.entities.drives.drive import estimate
+from fleet2d.entities.drive import Differential, Holonomic, Trapezoidal, breakpoints, estimate
 from fleet2d.entities.robots.approach import way_seconds
 from fleet2d.errors import ComponentError, ScenarioError
+from fleet2d.kernels import TURN, time_route
 from fleet2d.scenario.compose import compose
+
+CORNER = [(0, 0), (3, 0), (3, 2)]
+"""A route that turns left after three metres [m]."""
+
+
+def driven(
+    drive: Drive, points: list[tuple[float, float]] = CORNER, heading_deg: float = 0.0
+) -> list[tuple[float, ...]]:
+    """The breakpoints of a robot of 0.5 m/s and 90 degrees/s: s, x and y [m], heading [degrees]."""
+    route = np.round(np.array(points) * 1000).astype(np.int64)  # a unit is a millimetre
+    heading = round(heading_deg / 360 * TURN)
+    rows: Any = breakpoints(drive, route, heading, (500.0, TURN / 4), 1000.0)
+    assert not rows[:, 4].any()
+    numbers = rows[:, :4] / [1e6, 1000, 1000, TURN / 360]
+    return [tuple(row) for row in np.round(numbers, 3).tolist()]
+
 
 OTHERS = sorted(set(components("drive")) - {"differential"})
 BATTERY = {"driving": "4 min", "standing": "20 min", "charging": "2 min", "charger": [1.0, 3.0]}
@@ -176,7 +194,7 @@ def test_estimates_that_are_no_times_are_refused(seconds: Any) -> None:
 @pytest.mark.parametrize(
     ("moments", "words"),
     [
-        ([], "the drive tests.entities.drives.test_drives:Returned ended after"),
+        ([], "the drive tests.entities.test_drive:Returned ended after"),
         (KeyError("wheel"), "KeyError: 'wheel'"),
     ],
 )
@@ -227,3 +245,100 @@ def test_people_have_no_drive() -> None:
     with pytest.raises(ScenarioError) as caught:
         fleet2d.load_scenario(None, "users.ana.drive=holonomic")
     assert "drive" in str(caught.value)
+
+
+POINTS = st.lists(st.tuples(*[st.integers(-5000, 5000)] * 2), min_size=1, max_size=6)
+
+
+def test_it_turns_on_the_spot_and_then_drives() -> None:
+    assert [
+        (6.0, 3.0, 0.0, 0.0),
+        (7.0, 3.0, 0.0, 90.0),
+        (11.0, 3.0, 2.0, 90.0),
+    ] == driven(Differential())
+
+
+@given(POINTS, st.integers(0, TURN - 1), st.floats(1, 5000), st.floats(1, TURN))
+def test_it_is_the_same_as_in_the_core(
+    points: list[tuple[int, int]], heading: int, speed: float, turn_rate: float
+) -> None:
+    route = np.array(points, np.int64)
+    core = time_route(route, 0, heading, speed, turn_rate)[1:]
+    rows = breakpoints(Differential(), route, heading, (speed, turn_rate), 1280.0)
+
+    assert core[:, 1:].tolist() == rows[:, 1:4].tolist()
+    late = core[:, 0] - rows[:, 0]  # the core rounds the time of each turn and leg up
+    assert ((late >= -1) & (late <= 1 + np.arange(len(late)))).all()
+
+
+def test_it_turns_while_it_drives() -> None:
+    assert [
+        (6.0, 3.0, 0.0, 0.0),
+        (7.0, 3.0, 0.5, 90.0),  # a quarter turn takes a second, half a metre
+        (10.0, 3.0, 2.0, 90.0),
+    ] == driven(Holonomic())
+
+
+def test_it_turns_the_shorter_way_as_far_as_the_way_lasts() -> None:
+    assert [(0.5, 0.25, 0.0, 315.0)] == driven(Holonomic(), [(0, 0), (0.25, 0)], heading_deg=270)
+    assert [(0.5, 0.0, 0.25, 45.0), (1.0, 0.0, 0.5, 90.0)] == driven(
+        Holonomic(), [(0, 0), (0, 0.25), (0, 0.5)]
+    )
+
+
+def test_it_keeps_its_heading_if_it_never_turns() -> None:
+    assert [(6.0, 3.0, 0.0, 45.0), (10.0, 3.0, 2.0, 45.0)] == driven(
+        Holonomic(turns=False), heading_deg=45
+    )
+
+
+def along(acceleration: float, metres: float, pieces: int = 64) -> np.ndarray:
+    """Time [s] and position [m] on a straight way."""
+    drive = Trapezoidal(acceleration=acceleration, pieces=pieces)
+    return np.array([(0, 0), *((s, x) for s, x, _, _ in driven(drive, [(0, 0), (metres, 0)]))])
+
+
+def test_it_takes_speed_by_acceleration_longer_for_each_leg() -> None:
+    rows = driven(Trapezoidal(acceleration=0.25, pieces=2))
+
+    assert (
+        [
+            (1.0, 0.125, 0.0, 0.0),  # 0.5 m/s after two seconds and half a metre
+            (2.0, 0.5, 0.0, 0.0),
+            (6.0, 2.5, 0.0, 0.0),
+            (7.0, 2.875, 0.0, 0.0),
+            (8.0, 3.0, 0.0, 0.0),
+            (9.0, 3.0, 0.0, 90.0),
+        ]
+        == rows[:6]
+    )
+    assert (15.0, 3.0, 2.0, 90.0) == rows[-1]  # 2 m / 0.5 m/s + 2 s
+
+
+def test_on_a_short_leg_it_brakes_before_it_is_at_full_speed() -> None:
+    rows = along(0.25, 0.36, pieces=2)
+
+    assert [[0, 0], [0.6, 0.045], [1.2, 0.18], [1.8, 0.315], [2.4, 0.36]] == rows.tolist()
+
+
+@pytest.mark.parametrize("metres", [0.01, 0.05, 1.0, 7.5])
+def test_positions_and_speeds_are_those_of_the_profile(metres: float) -> None:
+    time, x = along(0.5, metres, pieces=8).T
+
+    ramp, left = min(0.5, metres) / 2, time[-1] - time
+    rising = np.sqrt(2 * ramp / 0.5)
+    steady = ramp + 0.5 * rising * (time - rising)
+    exact = np.select(
+        [time < rising, left < rising], [0.25 * time**2, metres - 0.25 * left**2], steady
+    )
+    assert exact == pytest.approx(x, abs=0.002)
+    assert (np.diff(x) > 0).all()
+    assert (np.diff(x) <= 0.5 * np.diff(time) + 0.002).all()
+
+
+def test_it_thinks_that_ways_take_what_they_take() -> None:
+    drive = Trapezoidal(acceleration=0.3)
+    metres = np.array([0.0, 0.2, 0.8, 0.9, 5.0, np.inf])
+    taken = [0.0, *(driven(drive, [(0, 0), (way, 0)])[-1][0] for way in metres[1:-1]), np.inf]
+
+    assert taken == pytest.approx(drive.seconds(metres, 0.5).tolist(), abs=2e-3)

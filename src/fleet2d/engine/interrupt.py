@@ -11,7 +11,7 @@ from typing import ClassVar, cast
 
 import numpy as np
 
-from fleet2d.configuration.components import Component, lookup
+from fleet2d.configuration.components import Component, lookup, register
 from fleet2d.configuration.trust import source_files
 from fleet2d.engine.basis import Basis, Watcher
 from fleet2d.entities.behavior import Actor, SightEvent
@@ -20,6 +20,9 @@ from fleet2d.entities.entity import Robot, User
 from fleet2d.errors import ComponentError, blame
 from fleet2d.kernels import Bool
 from fleet2d.runtime.events import Event
+
+Wait = tuple[int, str]
+"""The row of a body, and the name of the interrupt for which its plan waits."""
 
 
 @dataclass(frozen=True)
@@ -59,9 +62,6 @@ class Interrupt(Component):
 
 # The events of cameras and conversations, which are watchers of their own.
 WATCHED_EVENTS = frozenset({*User.sight_events, *Robot.sight_events, *Robot.request_events})
-
-Wait = tuple[int, str]
-"""The row of a body, and the name of the interrupt for which its plan waits."""
 
 
 class Interruptions(Watcher):
@@ -158,3 +158,23 @@ def _checked(name: str, holds: Bool, steps: int) -> Bool:
             " one for each step of the span"
         )
     return holds
+
+
+@register("interrupt", "home_empty")
+class HomeEmpty(Interrupt):
+    """The last person has left the home, as a robot may learn from everyone's phones."""
+
+    def holds(self, span: SpanView) -> Bool:
+        """Return at which steps all people are away."""
+        away: Bool = (span.poses.away[: span.users] != 0).all(axis=0)
+        return away
+
+
+@register("interrupt", "home_occupied")
+class HomeOccupied(Interrupt):
+    """Somebody has come home to an empty home, as a robot may learn from everyone's phones."""
+
+    def holds(self, span: SpanView) -> Bool:
+        """Return at which steps somebody is at home."""
+        home: Bool = (span.poses.away[: span.users] == 0).any(axis=0)
+        return home

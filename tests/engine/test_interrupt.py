@@ -13,7 +13,7 @@ import pytest
 from tests.scenes import run, scenario, table
 
 from fleet2d import Behavior, Plan, Run, Simulation, Situation
-from fleet2d.engine.interrupts.interrupt import Interrupt, Interruptions, SpanView
+from fleet2d.engine.interrupt import Interrupt, Interruptions, SpanView
 from fleet2d.errors import ComponentError, ScenarioError
 
 PERIOD = 7
@@ -195,3 +195,27 @@ def test_interrupt_of_a_users_own_file_is_given_by_its_class(tmp_path: Path) -> 
 
     assert [31, 91, 151] == reactions(stored)
     assert Simulation.load(file).run().digest == stored.digest
+
+
+OUT = [
+    {"at": "07:02", "away": True},
+    {"at": "07:06", "place": "kitchen"},
+]
+
+
+@pytest.mark.parametrize(("event", "kind"), [("home_empty", "left_home"), ("home_occupied", "came_home")])  # fmt: skip
+def test_robot_decides_once_after_the_last_person_left_or_the_first_came(
+    event: str, kind: str
+) -> None:
+    waits = {
+        "type": "tests.engine.test_interrupt:Waits",
+        "event": event,
+    }
+    people = {n: {"type": "schedule", "days": [{"items": OUT}]} for n in ("ana", "ben")}
+    stored = run(scenario("10 min", users=people, robots={"astro": {"behaviors": [waits]}}))
+
+    steps = table(stored, "events", event=kind)["step"].tolist()
+    (reaction,) = table(stored, "events", event="reacts")["step"].tolist()
+    assert 2 == len(steps)
+    expected = max(steps) if event == "home_empty" else min(steps)
+    assert expected <= reaction <= expected + 2

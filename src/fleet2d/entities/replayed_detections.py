@@ -11,7 +11,7 @@ from pydantic import Field
 from fleet2d.configuration.components import register
 from fleet2d.configuration.problems import suggest
 from fleet2d.configuration.units import InputFileOrFolder, Length
-from fleet2d.entities.evidence.evidence_source import SIGHTING, EvidenceSource
+from fleet2d.entities.evidence_source import SIGHTING, EvidenceSource
 from fleet2d.kernels import F64, I64, NOBODY, TURN, UNKNOWN_TRUTH, Bool
 from fleet2d.kernels import SightingColumn as Column
 from fleet2d.logs.log import Day, LogError, begin_of_run, files_of
@@ -20,6 +20,7 @@ from fleet2d.logs.placement import LogFrame
 if TYPE_CHECKING:
     from fleet2d.entities.behavior import Actor
     from fleet2d.logs.detections import RobotDetections
+
 
 # If more detections than this are outside of the home, the frame of the log is wrong.
 MAX_OUTSIDE = 0.5

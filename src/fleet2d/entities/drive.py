@@ -4,13 +4,22 @@ import math
 from abc import abstractmethod
 from collections.abc import Iterable, Iterator
 from itertools import pairwise
+from math import isqrt, sqrt
 from typing import ClassVar, NamedTuple
 
 import numpy as np
+from pydantic import Field
 
-from fleet2d.configuration.components import Component
+from fleet2d.configuration.components import Component, register
 from fleet2d.errors import ComponentError
 from fleet2d.kernels import F64, I64, TURN, heading_of, turn_between
+
+# The longest time for a route [s]: ten days, so that poses on it can be interpolated in 64 bits.
+MAX_DURATION_S = 864_000
+# A moment this near to a corner of the route is at the corner [m].
+NEAR_M = 1e-6
+SHORTEST_MM = 2
+"""The shortest piece of a change of speed: some lattice units, so that the robot moves in it."""
 
 
 class Leg(NamedTuple):
@@ -92,12 +101,6 @@ class Drive(Component):
             float64, of the same shape.
         """
         return metres / speed
-
-
-# The longest time for a route [s]: ten days, so that poses on it can be interpolated in 64 bits.
-MAX_DURATION_S = 864_000
-# A moment this near to a corner of the route is at the corner [m].
-NEAR_M = 1e-6
 
 
 def breakpoints(
@@ -199,3 +202,89 @@ def _between(last: Moment, moment: Moment, metres: float) -> Moment:
     turn = turn_between(last.heading % TURN, moment.heading % TURN)
     seconds = last.seconds + (moment.seconds - last.seconds) * share
     return Moment(seconds, metres, last.heading + round(turn * share))
+
+
+@register("drive", "differential")
+class Differential(Drive):
+    """Turns on the spot towards each leg of its route, then drives straight, at constant rates."""
+
+    def moments(self, route: Route) -> Iterator[Moment]:
+        """Yield the ends of turns and legs; the core computes the same, see `time_route` there."""
+        seconds, metres, heading = 0.0, 0.0, route.heading
+        for leg in route.legs:
+            turn = abs(turn_between(heading, leg.direction))
+            heading = leg.direction
+            if turn:
+                seconds += turn / route.turn_rate
+                yield Moment(seconds, metres, heading)
+            lasts = 0.0
+            for lasts, driven in self.straight(leg.length, route.speed):
+                yield Moment(seconds + lasts, metres + driven, heading)
+            seconds, metres = seconds + lasts, metres + leg.length
+
+    def straight(self, length: float, speed: float) -> Iterable[tuple[float, float]]:
+        """Return times [s] and distances [m] at which the speed changes on a leg, and its end."""
+        return [(length / speed, length)]
+
+
+@register("drive", "holonomic")
+class Holonomic(Drive):
+    """Drives in any direction at constant speed, without stopping to turn.
+
+    Attributes:
+        turns: Whether it turns towards its way while it drives; else it keeps its heading.
+    """
+
+    turns: bool = True
+
+    def moments(self, route: Route) -> Iterator[Moment]:
+        """Yield the ends of legs, and of the turns on them."""
+        seconds, metres, heading = 0.0, 0.0, route.heading
+        for leg in route.legs:
+            lasts = leg.length / route.speed
+            turn = turn_between(heading, leg.direction) if self.turns else 0
+            turning = abs(turn) / route.turn_rate
+            if 0 < turning < lasts:
+                heading = leg.direction
+                yield Moment(seconds + turning, metres + turning * route.speed, heading)
+            elif turning:  # the leg is too short to turn all the way
+                heading += round(turn * (lasts / turning))
+            seconds, metres = seconds + lasts, metres + leg.length
+            yield Moment(seconds, metres, heading)
+
+
+@register("drive", "trapezoidal")
+class Trapezoidal(Differential):
+    """Turns on the spot towards each leg; on it, accelerates, drives at constant speed, brakes.
+
+    Gathering speed and braking take `pieces` equal times each, of constant speed: the position is
+    at most speed² / (8 acceleration pieces²) off, 6 mm at 0.6 m/s. Turns are at constant rate,
+    and a plan begins at rest, also where another one was interrupted.
+
+    Attributes:
+        acceleration: How fast it gathers speed and brakes [m/s²].
+        pieces: Number of constant speeds that approximate acceleration, and braking.
+    """
+
+    acceleration: float = Field(default=0.5, ge=0.01, le=100)
+    pieces: int = Field(default=4, ge=1, le=64)
+
+    def straight(self, length: float, speed: float) -> Iterator[tuple[float, float]]:
+        """Yield times [s] and distances [m] at which the speed changes on a leg, and its end."""
+        ramp = min(speed * speed / self.acceleration, length) / 2  # until it is at full speed [m]
+        rising = sqrt(2 * ramp / self.acceleration)
+        full = self.acceleration * rising
+        pieces = max(1, min(self.pieces, isqrt(int(ramp * 1000 / SHORTEST_MM))))
+        for k in range(1, pieces + 1):
+            yield rising * k / pieces, ramp * k * k / pieces**2
+        braking = rising + (length - 2 * ramp) / full
+        if braking > rising:
+            yield braking, length - ramp
+        for k in range(pieces - 1, -1, -1):
+            yield braking + rising * (pieces - k) / pieces, length - ramp * k * k / pieces**2
+
+    def seconds(self, metres: F64, speed: float) -> F64:
+        """Return the robot's estimates of the time to many places, each way as one leg [s]."""
+        changing = speed * speed / self.acceleration  # gathering speed and braking [m]
+        at_speed = np.maximum(metres - changing, 0.0) / speed
+        return 2 * np.sqrt(np.minimum(metres, changing) / self.acceleration) + at_speed

@@ -1,1 +1,0 @@
-"""Interrupts: conditions that end plans when they become true; one condition a module."""

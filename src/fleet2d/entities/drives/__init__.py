@@ -1,1 +1,0 @@
-"""Drives of robots: how they move along a route, one per module."""

@@ -1,1 +1,0 @@
-"""Objects of a home that have a state: doors and sensors."""

@@ -1,0 +1,296 @@
+"""Sensors of a home: of doors, seats, appliances and motion, real ones, and those of a log."""
+
+from datetime import timedelta
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+import shapely
+from pydantic import Field
+
+from fleet2d.configuration.components import register
+from fleet2d.configuration.problems import suggest
+from fleet2d.configuration.units import (
+    AngleDeg,
+    Duration,
+    InputPath,
+    Length,
+    PeerAddress,
+    PositiveLength,
+    micros,
+)
+from fleet2d.entities.home_object import FurnitureSensor, Sensor, SensorView, first_cause
+from fleet2d.entities.place import Point
+from fleet2d.errors import PlacementError
+from fleet2d.floorplan.home import Home
+from fleet2d.kernels import I64, TURN, Bool, half_sine, region_contains_points, visible_region
+from fleet2d.logs.log import Day, LogError, PositionLog, begin_of_run
+from fleet2d.runtime.clock import Clock
+
+NAMES = {
+    "time": ("time", "timestamp", "t", "datetime", "time_s"),
+    "sensor": ("sensor", "id", "name", "entity"),
+    "state": ("state", "value", "message", "on"),
+}
+"""The names that a column may have, if the user gives none."""
+ON = frozenset({"on", "open", "true", "1", "1.0", "present", "opened", "motion"})
+OFF = frozenset({"off", "close", "closed", "false", "0", "0.0", "absent", "clear", "none"})
+
+
+@register("object", "contact_sensor")
+class ContactSensor(Sensor):
+    """A sensor that reports OPEN when a door opens, and CLOSE when it shuts.
+
+    Attributes:
+        of: The name of the door, one of the scenario's objects.
+    """
+
+    of: str
+
+    words: ClassVar[tuple[str, str]] = ("OPEN", "CLOSE")
+
+    def watch(self, door: int) -> None:
+        """Set the door that it watches, by its number in the home."""
+        self.door = door
+
+    def place(self, home: Home) -> str:
+        """Return the first room of the doorway."""
+        return home.rooms[home.doors[self.door].rooms[0]].name
+
+    def sense(self, view: SensorView, home: Home) -> tuple[I64, I64]:
+        """Return all steps of the span if the door is open: doors move between spans only."""
+        shut = self.door in home.shut
+        steps = np.arange(0 if shut else view.steps, dtype=np.int64) + view.first
+        return steps, np.full(len(steps), -1, np.int64)
+
+
+@register("object", "occupancy_sensor")
+class OccupancySensor(FurnitureSensor):
+    """A sensor that is on while somebody is on a bed, a sofa or a chair."""
+
+    def sense(self, view: SensorView, home: Home) -> tuple[I64, I64]:
+        """Return the steps in which the middle of a person is over the object."""
+        lattice = home.plan.lattice
+        footprint = home.object(self.of).footprint
+        x0, y0, x1, y1 = lattice.to_lattice(np.reshape(footprint.bounds, (2, 2))).ravel().tolist()
+        x, y = view.x[: view.users, 1:], view.y[: view.users, 1:]
+        on_object = view.present[: view.users, 1:] & (x >= x0) & (x <= x1) & (y >= y0) & (y <= y1)
+        bodies, columns = np.nonzero(on_object)
+        if len(columns):
+            points = lattice.to_metres(np.stack([x[bodies, columns], y[bodies, columns]], axis=1))
+            on_object[bodies, columns] = shapely.intersects_xy(footprint, points)
+        return first_cause(on_object, view.first)
+
+
+@register("object", "smart_plug")
+class SmartPlug(FurnitureSensor):
+    """A plug that is on while a person stays where its device is used: a stove, a desk, a TV.
+
+    Passing by doesn't switch it on: the person has to stay on the spot for two steps.
+
+    Attributes:
+        of: The object of the floor plan that it feeds, by name.
+        reach: How near to such a place counts as using the device.
+        hold: It turns off when nobody has used it for this long.
+    """
+
+    of: str
+    reach: Length = Field(default=0.3, ge=0)
+    hold: Duration = timedelta(minutes=1)
+
+    def start(self, home: Home, step_us: int) -> None:
+        """Check that the object exists, and can be used."""
+        if not home.object(self.of).uses:
+            raise PlacementError(
+                f"{self.of} has no place to use it from: a plug can't tell its use"
+            )
+
+    def sense(self, view: SensorView, home: Home) -> tuple[I64, I64]:
+        """Return the steps in which a person stays at one of the object's places."""
+        lattice = home.plan.lattice
+        x, y = view.x[: view.users], view.y[: view.users]
+        still = (np.diff(x) == 0) & (np.diff(y) == 0)
+        at_device = np.zeros(still.shape, np.bool_)
+        reach = round(self.reach * lattice.units_per_m)
+        for use in home.object(self.of).uses:
+            at_x, at_y = lattice.point_at((use.x, use.y))
+            at_device |= (x[:, 1:] - at_x) ** 2 + (y[:, 1:] - at_y) ** 2 <= reach * reach
+        return first_cause(at_device & still & view.present[: view.users, 1:], view.first)
+
+
+@register("object", "motion_sensor")
+class MotionSensor(Sensor):
+    """A sensor that is on while a person moves in view, with no wall between, and a while longer.
+
+    It doesn't notice people who stand, sit or lie still.
+
+    Attributes:
+        at: Where it hangs, [x, y] in metres.
+        heading_deg: Where it looks, counter-clockwise from +x.
+        angle_deg: Width of its field of view.
+        range: How far it sees.
+        hold: It turns off when nobody has moved for this long.
+        robots: Whether robots trigger it, too.
+    """
+
+    at: Point = Field(examples=[[1.0, 2.5]])
+    heading_deg: AngleDeg = 0.0
+    angle_deg: AngleDeg = Field(default=360.0, gt=0, le=360)
+    range: PositiveLength = 6.0
+    hold: Duration = timedelta(seconds=5)
+    robots: bool = False
+
+    def start(self, home: Home, step_us: int) -> None:
+        """Compute its position on the lattice."""
+        x, y = home.plan.lattice.point_at(self.at)
+        if home.plan.room_at(*self.at) is None:
+            raise PlacementError(
+                f"({self.at[0]:g}, {self.at[1]:g}) m is outside the home: hang the sensor in a room"
+            )
+        self.eye = (int(x), int(y))
+        self.reach = round(self.range * home.plan.lattice.units_per_m)
+        self.version = -1
+
+    def place(self, home: Home) -> str:
+        """Return the room that it hangs in."""
+        room = home.plan.room_at(*self.at)
+        return room.name if room else ""
+
+    def hold_us(self) -> int:
+        """Return how long it stays on [us]."""
+        return micros(self.hold)
+
+    def sense(self, view: SensorView, home: Home) -> tuple[I64, I64]:
+        """Return the steps in which somebody moved in view."""
+        rows = slice(None) if self.robots else slice(view.users)
+        x, y, present = view.x[rows], view.y[rows], view.present[rows]
+        moved = (np.diff(x) != 0) | (np.diff(y) != 0)
+        near = moved & present[:, 1:] & present[:, :-1]
+        dx, dy = x[:, 1:] - self.eye[0], y[:, 1:] - self.eye[1]
+        near &= dx * dx + dy * dy <= self.reach * self.reach
+        bodies, columns = np.nonzero(near)
+        if len(columns):
+            points = np.stack([x[bodies, columns + 1], y[bodies, columns + 1]], axis=1)
+            near[bodies, columns] = self._in_view(points, home)
+        return first_cause(near, view.first)
+
+    def _in_view(self, points: I64, home: Home) -> Bool:
+        x, y = self.eye
+        if self.version != home.version:
+            self.version, self.walls = home.version, home.walls
+            self.region = visible_region(self.walls, x, y)
+        is_visible: Bool = region_contains_points(self.walls, x, y, *self.region, points)
+        return is_visible & self._in_wedge(points[:, 0] - x, points[:, 1] - y)
+
+    def _in_wedge(self, dx: I64, dy: I64) -> Bool:
+        half = round(self.angle_deg / 360 * TURN)
+        if half >= TURN:
+            return np.ones(len(dx), np.bool_)
+        middle = 2 * round(self.heading_deg / 360 * TURN)
+        quarter = TURN // 2  # of a turn, in halves of a heading
+        right, left = middle - half, middle + half
+        from_right = half_sine(right + quarter) * dy - half_sine(right) * dx >= 0
+        to_left = half_sine(left) * dx - half_sine(left + quarter) * dy >= 0
+        return from_right & to_left if half <= quarter else from_right | to_left
+
+
+@register("object", "live_sensor")
+class LiveSensor(Sensor):
+    """A real sensor: it is on or off as an intervention `report` says; see `fleet2d live`.
+
+    Attributes:
+        room: The room that its readings name.
+        source: The other program whose messages it takes, such as ws://127.0.0.1:8765, which
+            `fleet2d live` opens; left out: any of `--with`.
+    """
+
+    room: str = Field(min_length=1)
+    source: PeerAddress | None = None
+
+    def sense(self, view: SensorView, home: Home) -> tuple[I64, I64]:
+        """Return no steps: only reports switch it."""
+        none = np.zeros(0, np.int64)
+        return none, none
+
+
+@register("object", "replay_sensor")
+class ReplaySensor(Sensor):
+    """A real sensor, whose readings are replayed from a table.
+
+    Attributes:
+        path: The table (.csv, .parquet, .jsonl) with a row for each change of its state.
+        room: The room that its readings name.
+        columns: Names of the columns time, state and sensor, as {state: value}.
+        sensor: The sensor, if the table has several.
+        time_zone: The time zone of the home, if the times have one or count from 1970.
+        sort: Sort rows whose time runs backwards; else they are refused.
+        day: The day of the table that is the first of the run: a number from 0, its date, or the
+            first of the same weekday.
+    """
+
+    path: InputPath
+    room: str = Field(min_length=1)
+    columns: dict[str, str] = Field(default={})
+    sensor: str | None = None
+    time_zone: str | None = None
+    sort: bool = False
+    day: Day = 0
+
+    def files(self) -> tuple[Path, ...]:
+        """Return the file that it reads."""
+        return (self.path,)
+
+    def read(self, clock: Clock) -> None:
+        """Read the table.
+
+        Raises:
+            LogError: It can't be read, lacks a column, has no such sensor, or a state is unknown.
+        """
+        import pyarrow as pa
+        import pyarrow.compute as pc
+
+        from fleet2d.logs.positions import Stamps, columns_of, local_times, read_table, times_of
+
+        table = read_table(self.path)
+        named = columns_of(table, self.columns, self.path, NAMES, ("time", "state"))
+        if "sensor" in named:
+            names = pc.cast(table[named["sensor"]], pa.string())
+            known = sorted(str(name) for name in pc.unique(names).to_pylist())
+            name = known[0] if self.sensor is None and len(known) == 1 else self.sensor
+            if name not in known:
+                which = f"no sensor {name!r}{suggest(name, known)}" if name else "several sensors"
+                raise LogError(f"{self.path} has {which}; select one by 'sensor'")
+            table = table.filter(pc.equal(names, name))
+        line = np.arange(table.num_rows) + (2 if self.path.suffix.lower() == ".csv" else 1)
+        states = [_is_on(value, self.path) for value in table[named["state"]].to_pylist()]
+        time_us, has_date, has_zone = times_of(table[named["time"]], self.path, line)
+        stamps = Stamps(time_us, line, has_date=has_date, has_zone=has_zone)
+        usable = np.ones(len(line), bool)
+        local = local_times(
+            self.path, "readings", stamps, usable, [], time_zone=self.time_zone, sort=self.sort
+        )
+        nothing = np.zeros((len(local.row), 2))
+        log = PositionLog(
+            self.path, "readings", local.first_day, local.time_us, nothing, nothing[:, 0]
+        )
+        self._steps = (local.time_us - begin_of_run(log, self.day, clock)) // clock.step_us
+        self._on = np.array(states, bool)[local.row]
+
+    def sense(self, view: SensorView, home: Home) -> tuple[I64, I64]:
+        """Return the steps at which it is on, caused by nobody known."""
+        steps = np.arange(view.first, view.first + view.steps, dtype=np.int64)
+        row = np.searchsorted(self._steps, steps, side="right") - 1
+        on = steps[(row >= 0) & self._on[row]]
+        return on, np.full(len(on), -1, np.int64)
+
+
+def _is_on(value: Any, path: Path) -> bool:
+    """Return whether a state means on.
+
+    Raises:
+        LogError: It is no known word.
+    """
+    word = str(value).strip().lower()
+    if word not in ON | OFF:
+        raise LogError(f"{path}: the state {value!r} is unknown: expected ON or OFF, OPEN or CLOSE")
+    return word in ON
