@@ -25,7 +25,7 @@ from fleet2d.algorithms.observations import (
 from fleet2d.errors import ComponentError
 from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.plan import read_only
-from fleet2d.interactions.answers import AnswerRecord, Wanted
+from fleet2d.interactions.answers import AnswerRecord, Answers, Wanted
 from fleet2d.kernels import (
     F64,
     I16,
@@ -233,6 +233,7 @@ class Log:
         self.activities = activities
         self.answers: Sequence[AnswerRecord] = ()  # how people answered: truth
         self.wanted: Sequence[Wanted] = ()  # the requests that came up
+        self.answer_models: Mapping[str, Answers] = {}  # of each user: truth
         self._motions = motions
         self._observations = Blocks()  # (n, OBSERVATION), by step
         self._events: list[Event] = []
@@ -510,6 +511,16 @@ class History:
         """
         self._check_metric("answers")
         return [record for record in self.log.answers if self.first <= record.step < self.end]
+
+    @cached_property
+    def answer_models(self) -> Mapping[str, Answers]:
+        """How each user answers, if any robot wants something of people; for metrics only.
+
+        Raises:
+            ComponentError: The component is an algorithm.
+        """
+        self._check_metric("answer_models")
+        return self.log.answer_models
 
     @cached_property
     def wanted(self) -> list[Wanted]:

@@ -176,7 +176,7 @@ class Conversations(Watcher):
                 text = f"{change.request.name} {interaction.to}"
                 events.append(Event(step, robot.name, change.event, text))
                 if change.event == "due":
-                    self.wanted.append(Wanted(step, robot.name, text, interaction.worth))
+                    self.wanted.append(Wanted(step, robot.name, text, interaction))
                 self._tell(row, change.event, text)
             asked = [q for q in _questions(row, robot) if q.step == step]
             asked += [q for q in self._questions if q.step == step and q.robot == row]

@@ -65,6 +65,9 @@ def set_up(scenario: Scenario, clock: Clock, seed: int, store: RunStore) -> Stat
     log = _log(basis, cameras, recorder) if learners.all else None
     if log is not None:
         log.answers, log.wanted = conversations.log, conversations.wanted
+        log.answer_models = {
+            basis.users[row].name: answers for row, answers in conversations.answers.items()
+        }
     clearance, blocking = Clearance(basis.users, basis.robots), BlockedWays(basis)
     encounters, interruptions = Encounters(basis.users, basis.robots), Interruptions(basis)
     state = State(

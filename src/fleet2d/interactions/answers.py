@@ -333,12 +333,12 @@ class Reply(NamedTuple):
 
 
 class Wanted(NamedTuple):
-    """A request that came up: when, whose, the interaction and the person, and its value then."""
+    """A request that came up: when, whose, and the interaction and the person."""
 
     step: int
     robot: str
     text: str
-    worth: float
+    interaction: Interaction
 
 
 class AnswerRecord(NamedTuple):

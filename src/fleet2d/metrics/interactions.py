@@ -51,7 +51,7 @@ class Interactions(Metric):
         for wanted in history.wanted:
             key = wanted.robot, _person(wanted.text)
             self.wanted[key] += 1
-            self.worth[key] += wanted.worth  # type: ignore[assignment]
+            self.worth[key] += wanted.interaction.worth  # type: ignore[assignment]
         for event in history.events:
             if event.event in TOLD:
                 people = (word for word in reversed(event.detail.split()) if word in state.users)
