@@ -432,48 +432,25 @@ def test_ctrl_c_during_set_up_exits_130(
     assert ["home.yaml"] == [path.name for path in Path().iterdir()]
 
 
-@pytest.mark.parametrize(
-    "command", ["run", "validate", "schema", "components", "show", "convert", "reproduce"]
-)
-def test_every_command_has_help(fleet2d: Cli, command: str) -> None:
-    code, out, err = fleet2d(command, "--help")
-    assert (0, "") == (code, err)
-    assert "Usage" in out
-    assert len(out.splitlines()) > 5
-
-
-def test_help_lists_the_commands(fleet2d: Cli) -> None:
-    code, out, _ = fleet2d("--help")
-    assert 0 == code
-    for command in ("run", "validate", "schema", "components", "show", "convert", "reproduce"):
-        assert command in out
-
-
 # What the bundled scenario doesn't use, and other scenarios or commands do.
 UNUSED = (
     "fleet2d.algorithms.presence.fremen",
     "fleet2d.algorithms.presence.real_time",
-    "fleet2d.calibrate",
     "fleet2d.engine.expectations",
-    "fleet2d.expectations.vocabulary",
     "fleet2d.engine.repeat",
+    "fleet2d.entities.robots.search",
     "fleet2d.entities.users.guest",
     "fleet2d.expectations",
     "fleet2d.fit",
-    "fleet2d.interventions.home",
     "fleet2d.interventions.bodies",
     "fleet2d.interventions.home",
-    "fleet2d.interventions.bodies",
     "fleet2d.interventions.robots",
-    "fleet2d.interventions.robots",
-    "fleet2d.interventions.home",
     "fleet2d.logs",
     "fleet2d.paper",
+    "fleet2d.pictures",
     "fleet2d.published",
-    "fleet2d.entities.robots.search",
     "fleet2d.studies",
     "fleet2d.testing",
-    "fleet2d.pictures",
     "fleet2d.viewer",
 )
 # The packages of others that a run needs, and what these need in turn.

@@ -1,13 +1,11 @@
 """The program `fleet2d`, also as `python -m fleet2d.cli`, and how its commands are found.
 
-A command is a module of this package, with a function of the module's name or a Typer app of
-several commands: `scenario_diff` in `scenario_diff.py` is `fleet2d scenario-diff`. It needs no
-mention elsewhere. Installed packages add others by entry points of the group `fleet2d.command`, and
-some of Fleet2D's own commands do so, too. All are imported when they are called, and should import
-what they need then, too.
+A command is a function of its name, or a Typer app of several commands, in a module of this package
+that `COMMANDS` names. Installed packages add others by entry points of the group `fleet2d.command`,
+and some of Fleet2D's own commands do so, too. All are imported when they are called, and should
+import what they need then, too.
 """
 
-import pkgutil
 from collections.abc import Iterator
 from difflib import get_close_matches
 from importlib import import_module
@@ -21,6 +19,20 @@ from fleet2d import __version__, cli
 from fleet2d.runtime.memory import rare_collections
 
 GROUP = "fleet2d.command"
+COMMANDS = {
+    "components": "scenarios",
+    "convert": "scenarios",
+    "export": "export",
+    "reproduce": "stored",
+    "resume": "run",
+    "run": "run",
+    "schema": "scenarios",
+    "show": "show",
+    "test": "test",
+    "validate": "scenarios",
+    "verify": "stored",
+}
+"""The module of each command of this package."""
 
 
 class Commands(TyperGroup):
@@ -28,16 +40,16 @@ class Commands(TyperGroup):
 
     def list_commands(self, ctx: Any) -> list[str]:
         """Return the names of all commands that can be loaded, sorted."""
-        own = set(_modules())
+        own = set(COMMANDS)
         others = {entry.name for entry in entries()} - own
         return sorted(own | {name for name in others if self.get_command(ctx, name) is not None})
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
         """Return a command, None if there is none of that name."""
-        module = _modules().get(cmd_name)
+        module = COMMANDS.get(cmd_name)
         if module is not None:
             with rare_collections():
-                function = getattr(import_module(f"{cli.__name__}.{module}"), module)
+                function = getattr(import_module(f"{cli.__name__}.{module}"), cmd_name)
             return _command(cmd_name, function, ctx)
         entry = next((entry for entry in entries() if entry.name == cmd_name), None)
         return None if entry is None else _load(entry, ctx)
@@ -60,12 +72,6 @@ def entries(group: str = GROUP) -> Iterator[Any]:
     from importlib.metadata import entry_points  # slow to import, and rarely needed
 
     return iter(entry_points(group=group))
-
-
-def _modules() -> dict[str, str]:
-    """Return the name of the module of each command, by the command's name."""
-    names = (module.name for module in pkgutil.iter_modules(cli.__path__))
-    return {name.replace("_", "-"): name for name in names if name != "__main__"}
 
 
 def _load(entry: Any, ctx: Any) -> Any:

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 import typer
 
 from fleet2d.errors import ArtifactError, RunDirectoryError, blame
-from fleet2d.options import file_name, split
+from fleet2d.options import TrustFiles, TrustFolders, file_name, split, trust_of
 from fleet2d.runtime.memory import rare_collections
 
 if TYPE_CHECKING:
@@ -306,3 +306,21 @@ def _fresh_directory(name: str) -> Path:
             ) from error
         else:
             return directory
+
+
+def resume(
+    directory: Annotated[Path, typer.Argument(metavar="RUN_DIR", help="An unfinished run.")],
+    trust: TrustFiles = None,
+    trust_dir: TrustFolders = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")] = False,
+) -> None:
+    """Continue an interrupted or killed run; the result equals that of an undisturbed run."""
+    from fleet2d.engine.repeat import reopen
+
+    with redirect_stdout(sys.stderr) if as_json else nullcontext():  # output of components
+        simulation, note = reopen(directory, trust_of(trust, trust_dir))
+        if not quiet:
+            typer.echo(note, err=True)
+        run = run_with_progress(simulation, show=sys.stderr.isatty() and not quiet)
+    print_results(run, as_json=as_json, quiet=quiet)

@@ -1,11 +1,15 @@
-"""`fleet2d validate`: check a scenario or a floor plan, without running it."""
+"""Commands on scenarios and plans: `fleet2d validate`, `convert`, `components` and `schema`."""
 
-from collections.abc import Collection
+import json
+from collections.abc import Callable, Collection
+from contextlib import suppress
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
+from fleet2d.cli.__main__ import entries
 from fleet2d.errors import InputError
 from fleet2d.options import Resolution, file_name, split
 
@@ -94,3 +98,84 @@ def _check_floorplan(
 
 def _count(items: Collection[Any], noun: str) -> str:
     return f"{len(items)} {noun}{'' if len(items) == 1 else 's'}"
+
+
+def convert(
+    source: Annotated[
+        Path,
+        typer.Argument(
+            help="A floor plan of any format, or a configuration of the published Fleet2D."
+        ),
+    ],
+    target: Annotated[
+        Path,
+        typer.Argument(help="The floor plan (.json, .yaml, .geojson) or the scenario to write."),
+    ],
+    resolution: Resolution = None,
+) -> None:
+    """Turn a floor plan into Fleet2D's own format, or a published configuration into a scenario."""
+    from fleet2d.floorplan.load import is_floorplan, load_floorplan
+
+    if is_floorplan(source):
+        from fleet2d.floorplan.load import save_floorplan
+
+        plan = load_floorplan(source, resolution=resolution)
+        save_floorplan(plan, target)
+        notes = list(plan.notes)
+    else:
+        notes = _converter()(source, target)
+    for note in notes:
+        typer.echo(f"note: {note}")
+    typer.echo(target)
+
+
+def _converter() -> Callable[[Path, Path], list[str]]:
+    """Return the function that converts a configuration of another program into a scenario.
+
+    Raises:
+        InputError: There is none.
+    """
+    for entry in entries("fleet2d.converter"):
+        with suppress(ModuleNotFoundError):
+            return entry.load()
+    raise InputError(
+        "this is neither a floor plan (docs/floorplans.md lists the formats) nor a file that an"
+        " installed converter takes"
+    )
+
+
+def components(
+    as_json: Annotated[bool, typer.Option("--json", help="Print a JSON list.")] = False,
+) -> None:
+    """List every registered type, with its fields, units and defaults."""
+    from fleet2d.scenario.schema import describe_components
+
+    descriptions = describe_components()
+    if as_json:
+        typer.echo(json.dumps([asdict(component) for component in descriptions], indent=2))
+        return
+    for component in descriptions:
+        names = " or ".join((component.type, *component.aliases))
+        typer.echo(f"{component.kind}: {names}\n    {component.summary}")
+        for field in component.fields:
+            default = "required" if field.default is None else f"= {field.default or repr('')}"
+            typer.echo(f"    {field.name}: {field.type} {default}")
+            if field.description:
+                typer.echo(f"        {field.description}")
+        typer.echo("")
+
+
+def schema(
+    floorplan: Annotated[
+        bool, typer.Option("--floorplan", help="The schema of Fleet2D's own floor plan format.")
+    ] = False,
+) -> None:
+    """Print the JSON Schema of a scenario, for completion in an editor."""
+    if floorplan:
+        from fleet2d.floorplan.formats.native import native_schema
+
+        typer.echo(json.dumps(native_schema(), indent=2))
+        return
+    from fleet2d.scenario.schema import schema as scenario_schema
+
+    typer.echo(json.dumps(scenario_schema(), indent=2))
