@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <bit>
 
-#include "occlusion.hpp"
-
 namespace fleet2d {
 namespace {
 
@@ -21,6 +19,7 @@ struct Interval {
     i64 posture;
     i64 shown;             // points of the body in view, above 0
     i64 steady = UNKNOWN;  // steady_chance of all this, once that is known
+    i64 eye_level = 0;     // height of the camera [mm], where heights matter
 
     bool comes_before(const Interval& other) const {
         return camera != other.camera ? camera < other.camera : user < other.user;
@@ -41,7 +40,7 @@ void write(View<i64> row, const Sighting& sighting) {
 class IntervalFinder {
 public:
     IntervalFinder(const Mesh& walls, const Lenses& lenses, const DetectionRule& rule, const Window& window,
-                   Onlooker onlooker, View<const u64, 3> shown, View<const i64> radii)
+                   Onlooker onlooker, View<const u64, 3> shown, View<const i64> radii, const Heights* heights)
         : walls_(walls),
           lenses_(lenses),
           rule_(rule),
@@ -49,7 +48,8 @@ public:
           onlooker_(onlooker),
           shown_(shown),
           hides_(radii.size() > 0),
-          obstacles_(window, radii) {}
+          heights_(heights),
+          obstacles_(window, radii, heights) {}
 
     // All intervals, in order of their first steps.
     std::vector<Interval> intervals() {
@@ -99,6 +99,10 @@ private:
             }
             const i64 dx = other.x - eye.x, dy = other.y - eye.y;
             Interval interval{step, until, camera, user, eye, dx, dy, other.heading, posture, 0};
+            if (heights_ != nullptr) {
+                const i64 own = window_.posture[run];
+                interval.eye_level = heights_->eyes(camera, own) + heights_->base(own, body.x, body.y);
+            }
             if (shown_.size() > 0) {
                 split_by_method(interval);
             } else {
@@ -121,19 +125,24 @@ private:
         }
     }
 
-    // Add an interval in which some points are in view, as far as no body hides them.
+    // Add an interval in which some points are in view, as far as no low furniture and no body hides them.
     void add(Interval interval, u64 points) {
         if (points == 0) return;
+        const i64 count = lenses_.points[interval.camera] + 1, other = onlooker_.first_other + interval.user;
+        View<const i64, 2> outline = lenses_.bodies[interval.camera][interval.user];
+        outline.shape[0] = count;
+        const Levels levels = heights_ == nullptr ? Levels{} : levels_of(interval);
+        if (heights_ != nullptr) {
+            points = obstacles_.over_furniture(points, interval.eye, interval.dx, interval.dy, outline, levels);
+            if (points == 0) return;
+        }
         if (!hides_) {
             interval.shown = std::popcount(points);
             found_.push_back(interval);
             return;
         }
-        const i64 count = lenses_.points[interval.camera] + 1, other = onlooker_.first_other + interval.user;
-        View<const i64, 2> outline = lenses_.bodies[interval.camera][interval.user];
-        outline.shape[0] = count;
         for (const Glimpse& glimpse : obstacles_.split({interval.begin, interval.end, points}, onlooker_.body, other,
-                                                       interval.eye, interval.dx, interval.dy, outline)) {
+                                                       interval.eye, interval.dx, interval.dy, outline, levels)) {
             if (glimpse.points == 0) continue;
             interval.begin = glimpse.begin;
             interval.end = glimpse.end;
@@ -142,7 +151,13 @@ private:
         }
     }
 
-    // Which points of a user's body are in view, bodies between apart.
+    Levels levels_of(const Interval& interval) const {
+        const i64 x = interval.eye.x + interval.dx, y = interval.eye.y + interval.dy;
+        return {interval.eye_level, heights_->base(interval.posture, x, y),
+                heights_->points[interval.camera][interval.user][interval.posture]};
+    }
+
+    // Which points of a user's body are in view, bodies and low furniture between apart.
     u64 points_shown(i64 camera, i64 user, const Pose& eye, i64 dx, i64 dy) {
         if (dx * dx + dy * dy > lenses_.widest(camera, user)) return 0;
         const i64 half_angle = lenses_.half_angle[camera];
@@ -160,7 +175,8 @@ private:
     const Window& window_;
     const Onlooker onlooker_;
     const View<const u64, 3> shown_;
-    const bool hides_;  // whether bodies hide each other
+    const bool hides_;              // whether bodies hide each other
+    const Heights* const heights_;  // null where height doesn't matter
     Obstacles obstacles_;
     std::vector<Interval> found_;
     Pose located_{};          // the camera that was located last
@@ -438,8 +454,8 @@ private:
 
 DetectionResult detect(const Mesh& walls, const Lenses& lenses, const ErrorTables& errors, const DetectionRule& rule,
                        const Window& window, Onlooker onlooker, const SightMemory& memory, View<const u64, 3> shown,
-                       View<const i64> radii) {
-    auto intervals = IntervalFinder(walls, lenses, rule, window, onlooker, shown, radii).intervals();
+                       View<const i64> radii, const Heights* heights) {
+    auto intervals = IntervalFinder(walls, lenses, rule, window, onlooker, shown, radii, heights).intervals();
     return Detector(walls, lenses, errors, rule, window, onlooker, memory, std::move(intervals)).run();
 }
 

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "lens.hpp"
+#include "occlusion.hpp"
 #include "perception.hpp"
 #include "timelines.hpp"
 
@@ -94,8 +95,9 @@ struct DetectionResult {
 //
 // `shown` holds (cameras, users, steps) the points in view, bit i for number i, where another method decides that;
 // else it is empty. `radii` are those of all bodies of the window, where they hide each other; else it is empty.
+// `heights` is null where height doesn't matter.
 DetectionResult detect(const Mesh& walls, const Lenses& lenses, const ErrorTables& errors, const DetectionRule& rule,
                        const Window& window, Onlooker onlooker, const SightMemory& memory, View<const u64, 3> shown,
-                       View<const i64> radii);
+                       View<const i64> radii, const Heights* heights);
 
 }  // namespace fleet2d

@@ -975,7 +975,7 @@ USER_LOST: int = 0
 
 USER_SEEN: int = 1
 
-def detect(walls: Mesh, lenses: tuple[Any, ...], errors: tuple[Any, ...], rule: tuple[Any, ...], window: Window, body: int, first_other: int, memory: tuple[Any, ...], shown: numpy.typing.NDArray[numpy.uint64] | None = None, radii: numpy.typing.NDArray[numpy.int64] | None = None) -> tuple[int, numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64]]:
+def detect(walls: Mesh, lenses: tuple[Any, ...], errors: tuple[Any, ...], rule: tuple[Any, ...], window: Window, body: int, first_other: int, memory: tuple[Any, ...], shown: numpy.typing.NDArray[numpy.uint64] | None = None, radii: numpy.typing.NDArray[numpy.int64] | None = None, heights: tuple[Any, ...] | None = None) -> tuple[int, numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64]]:
     """
     Look at all others in the steps of a window, up to the first with an event that stops it.
 
@@ -991,6 +991,7 @@ def detect(walls: Mesh, lenses: tuple[Any, ...], errors: tuple[Any, ...], rule: 
         shown: uint64 (cameras, users, steps), which points of each are in view, bit i for number i,
             where another method decides that; None: lines of sight do.
         radii: int64 (bodies,), of all bodies of the window, which hide each other; None: they don't.
+        heights: The heights of cameras, bodies and furniture, a `fleet2d.kernels.Heights`; None: they don't matter.
 
     Returns:
         The steps done (the stopping one included); the sightings, int64 (SIGHTING, n), with the columns of

@@ -260,6 +260,18 @@ class Lenses(NamedTuple):
     widest: I64  # (cameras, users): farthest distance of a centre in view, squared
 
 
+class Heights(NamedTuple):
+    """The heights of cameras, bodies and low furniture [mm], int64 below 2**13."""
+
+    eyes: I64  # (cameras, postures): of each camera, by the posture of its owner
+    points: I64  # (cameras, users, postures, points + 1): of the points of a body, as Lenses.bodies
+    tops: I64  # (bodies, postures): of all bodies
+    corners: I64  # (corners, 2): the outlines of furniture, piece after piece [lattice units]
+    start: I64  # (pieces + 1,): where each piece begins in `corners`
+    boxes: I64  # (pieces, 4): smallest x and y, and largest, of each piece
+    top: I64  # (pieces,)
+
+
 def camera_poses(
     lenses: Lenses, camera: int, body: tuple[I64, I64, I64], moments_us: I64
 ) -> tuple[I64, I64, I64]:

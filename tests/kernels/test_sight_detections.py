@@ -26,6 +26,7 @@ from fleet2d.kernels import (
     About,
     DetectionRule,
     ErrorTables,
+    Heights,
     Lenses,
     SightMemory,
     UserDraw,
@@ -62,6 +63,7 @@ class Scene:
         shown: uint64 (cameras, users, steps), what another method says; None: lines of sight do.
         thickness: Of the bodies, which hide each other, the first one's radius, that of each more is
             7 units larger [lattice units]; 0: nobody hides anybody.
+        heights: Seed of the heights and the furniture; 0: height doesn't matter.
     """
 
     robot: I64
@@ -72,6 +74,7 @@ class Scene:
     perceptions: Sequence[Perception | None] = ()
     shown: U64 | None = None
     thickness: int = 0
+    heights: int = 0
 
     def part(self, begin: int, end: int) -> "Scene":
         """Return some steps of it."""
@@ -112,12 +115,56 @@ class Scene:
             user = number - first_user
             if 0 <= user < len(self.users):
                 poses = [
-                    slow.Body(x, y, bool(away)) for x, y, away, *_ in self.users[user].tolist()
+                    slow.Body(x, y, bool(away), heading, posture)
+                    for x, y, away, heading, posture in self.users[user].tolist()
                 ]
                 result[user] = slow.Obstacle(poses, radius)
             elif number != robot:
                 result[-1 - number] = slow.Obstacle(here, radius)
         return result
+
+    def heights_for(self, eyes: Sequence[slow.Eye]) -> tuple[Heights, slow.Heights] | None:
+        """Return the heights of cameras, bodies and furniture, for the kernel and for the twin."""
+        if not self.heights:
+            return None
+        rng, users = np.random.default_rng(self.heights), len(self.users)
+        count, points = users + 1 + 3 * self.strangers, max(eye.points for eye in eyes) + 1
+        low = np.array([0, 300, 500, 800, 1700])  # several are equal, so that lines graze
+        levels = Heights(
+            eyes=rng.choice(low, (len(eyes), 3)),
+            points=rng.choice(low, (len(eyes), users, 3, points)),
+            tops=rng.choice(low, (count, 3)),
+            corners=np.zeros((0, 2), np.int64),
+            start=np.zeros(1, np.int64),
+            boxes=np.zeros((0, 4), np.int64),
+            top=np.zeros(0, np.int64),
+        )
+        pieces = [_piece(rng) for _ in range(rng.integers(0, 6))]
+        if pieces:
+            corners = [np.array(piece.corners) for piece in pieces]
+            levels = levels._replace(
+                corners=np.concatenate(corners),
+                start=np.cumsum([0, *map(len, corners)]),
+                boxes=np.array([[*c.min(axis=0), *c.max(axis=0)] for c in corners]),
+                top=np.array([piece.top for piece in pieces]),
+            )
+        *_, first_user = self.window(0)
+        tops = {
+            n - first_user if 0 <= n - first_user < users else -1 - n: levels.tops[n].tolist()
+            for n in range(count)
+        }
+        return levels, slow.Heights(levels.eyes.tolist(), levels.points.tolist(), tops, pieces)
+
+
+def _piece(rng: np.random.Generator) -> slow.Piece:
+    """Return a piece of furniture: a box on cells' borders, an L, or a triangle."""
+    x, y, w, h = (64 * rng.integers(0, 12, 4) + [0, 0, 32, 32]).tolist()
+    shapes = [
+        [(x, y), (x + w, y), (x + w, y + h), (x, y + h)],
+        [(x, y), (x + w, y), (x + w, y + h // 2), (x + 8, y + h // 2), (x + 8, y + h), (x, y + h)],
+        [(x, y), (x + w, y + 7), (x + 3, y + h)],
+    ]
+    return slow.Piece(shapes[rng.integers(0, 3)], int(rng.choice([300, 500, 800])))
 
 
 @dataclass
@@ -220,8 +267,17 @@ def looked(
     lenses, errors, rule = kernel_args(eyes, scene)
     rule = rule._replace(stop_lost=stops[0], stop_seen=stops[1])
     before = memory.about.copy()
+    heights = scene.heights_for(eyes)
     done, columns, *events = detect(
-        home.mesh, lenses, errors, rule, *scene.window(first), memory, scene.shown, scene.radii()
+        home.mesh,
+        lenses,
+        errors,
+        rule,
+        *scene.window(first),
+        memory,
+        scene.shown,
+        scene.radii(),
+        heights and heights[0],
     )
     counts = (memory.about - before)[..., [About.IN_VIEW, About.NOTICED]]
     return Seen(
@@ -244,7 +300,7 @@ def looked_slowly(
 ) -> Seen:
     """Return what the twin sees."""
     eyes, carried = listed(eye), carried or nothing_known(eye, scene)
-    shown = scene.shown
+    shown, heights = scene.shown, scene.heights_for(eyes)
     result = slow.detect(
         home.walls,
         eyes,
@@ -262,6 +318,7 @@ def looked_slowly(
         carried.errors,
         None if shown is None else lambda c, u, j: int(shown[c, u, j]),
         scene.obstacles(),
+        heights and heights[1],
     )
     known = carried.known
     return Seen(*result, [k.noticed for k in known], [int(k.seen) for k in known])
@@ -478,6 +535,36 @@ def test_look_past_bodies_in_one_room_equals_the_reference(moves: float) -> None
     assert (
         100 < len(expected.sightings) < len(looked(ROOM, eyes_, replace(scene, thickness=0), 0)[1])
     )
+
+
+@quick
+@given(homes(), st.lists(odd_eyes(), min_size=1, max_size=3), seeds(), MOVES, THICKNESSES)
+def test_look_over_furniture_and_bodies_equals_the_reference(
+    polygons: list[Polygon],
+    cameras: list[slow.Eye],
+    seed: int,
+    moves: float,
+    thickness: int,
+) -> None:
+    home = home_of(polygons)
+    scene = scene_in(home, np.random.default_rng(seed), 3, LONG, moves)
+    scene = replace(scene, thickness=thickness, heights=seed + 1)
+
+    assert looked_slowly(home, cameras, scene, FIRST) == looked(home, cameras, scene, FIRST)
+
+
+@pytest.mark.parametrize("thickness", [0, 60])
+def test_look_over_furniture_in_one_room_equals_the_reference(thickness: int) -> None:
+    """Where furniture hides people often, and parts of them."""
+    eyes_ = [slow.Eye(0, 900, 4096, SURE, 2, points=7), slow.Eye(0, 900, 300, SURE, 2, forward=40)]
+    scene = scene_in(ROOM, np.random.default_rng(8), 5, 60, 0.3)
+    scene = replace(scene, thickness=thickness, heights=7)
+    expected = looked_slowly(ROOM, eyes_, scene, FIRST)
+
+    assert expected == looked(ROOM, eyes_, scene, FIRST)
+    flat = looked(ROOM, eyes_, replace(scene, heights=0), FIRST)
+    assert 100 < len(expected.sightings)
+    assert expected.places != flat.places
 
 
 @quick

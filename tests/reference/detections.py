@@ -8,6 +8,7 @@ from fractions import Fraction
 from typing import NamedTuple
 
 import numpy as np
+import shapely
 from tests.reference.headings import DIGITS, alignment, cosine, sine
 from tests.reference.line_of_sight import visible
 from tests.reference.motion import half_up
@@ -64,6 +65,70 @@ class Obstacle(NamedTuple):
 
     poses: list[Body]
     radius: int
+
+
+class Piece(NamedTuple):
+    """A piece of furniture: its corners [lattice units], and its height [mm]."""
+
+    corners: list[Point]
+    top: int
+
+
+@dataclass
+class Heights:
+    """How high cameras, bodies and furniture are [mm].
+
+    Attributes:
+        eyes: Of each camera, by the posture of its owner.
+        points: Of the points of each user, by camera and posture.
+        tops: Of each obstacle by number, as they are given to `detect`, by posture.
+        furniture: All pieces.
+    """
+
+    eyes: list[list[int]]
+    points: list[list[list[list[int]]]]
+    tops: dict[int, list[int]]
+    furniture: list[Piece]
+
+    def base(self, body: Body) -> int:
+        """Return how high a body lies, as who lies on furniture is on top of it."""
+        here = shapely.Point(body.x, body.y)
+        on = [p.top for p in self.furniture if shapely.Polygon(p.corners).covers(here)]
+        return max(on, default=0) if body.posture == 2 else 0
+
+    def line(self, camera: int, user: int, point: int, owner: Body, body: Body) -> tuple[int, int]:
+        """Return the heights of a camera and of a point of a user."""
+        to = self.base(body) + self.points[camera][user][body.posture][point]
+        return self.base(owner) + self.eyes[camera][owner.posture], to
+
+
+def line_is_low(eye: Fraction, to: Fraction, part: Fraction, top: int) -> bool:
+    """Return whether a line from a height to another is at a part of its way at a top or below."""
+    return eye + part * (to - eye) <= top
+
+
+def _furniture_hides(heights: Heights, at: Body, point: Point, eye: int, to: int) -> bool:
+    """Return whether the line meets an edge of a piece, and is not above it there."""
+    px, py = point[0] - at.x, point[1] - at.y
+    for piece in heights.furniture:
+        corners = [(x - at.x, y - at.y) for x, y in piece.corners]
+        for (ax, ay), (bx, by) in zip(corners, corners[1:] + corners[:1], strict=True):
+            across = px * (by - ay) - py * (bx - ax)
+            ends: list[Point] = [(ax, ay), (bx, by)]
+            parts = []
+            if across != 0:
+                part = Fraction(ax * (by - ay) - ay * (bx - ax), across)
+                where = Fraction(ax * py - ay * px, across)
+                if 0 <= where <= 1:
+                    parts = [part]
+            elif px * ay == py * ax and (px, py) != (0, 0):  # along the line
+                parts = [Fraction(px * x + py * y, px * px + py * py) for x, y in ends]
+            if any(
+                0 <= p <= 1 and line_is_low(Fraction(eye), Fraction(to), p, piece.top)
+                for p in parts
+            ):
+                return True
+    return False
 
 
 class Ghost(NamedTuple):
@@ -275,6 +340,7 @@ def detect(
     errors: Sequence[Errors | None] = (),
     method: Method | None = None,
     obstacles: Mapping[int, Obstacle] | None = None,
+    heights: Heights | None = None,
 ) -> Look:
     """Look at all users in each step, and tell what becomes known.
 
@@ -292,6 +358,7 @@ def detect(
         errors: How each camera errs; None for one that doesn't.
         method: Which points of a user a camera has in view at a step, instead of lines of sight.
         obstacles: The users by number, and others by negative ones, that hide each other.
+        heights: How high all are; None if that doesn't matter.
     """
     sightings: list[tuple[int, ...]] = []
     events: list[tuple[int, int, int]] = []
@@ -308,18 +375,18 @@ def detect(
             for u, user in enumerate(users):
                 if user[j].away:
                     continue
-                points = body_points(eye, radii[u])
+                points, identity = body_points(eye, radii[u]), u
                 in_view = {i for i in range(len(points)) if method and method(c, u, j) >> i & 1}
                 if method is None:
                     in_view = _points_in_view(walls, eye, at, towards, user[j], points)
-                between = [body for number, body in (obstacles or {}).items() if number != u]
-                shown = _count_shown(at, user[j], [points[i] for i in in_view], between, j)
+                between = {n: body for n, body in (obstacles or {}).items() if n != u}
+                lines = _lines(heights, c, u, in_view, body, user[j])
+                shown = _count_shown(at, user[j], points, lines, between, j, heights)
                 if shown == 0:
                     continue
                 counts[c][u][0] += 1
                 away = user[j].x - at.x, user[j].y - at.y
-                truth = (user[j].x, user[j].y, user[j].heading, user[j].posture)
-                identity, seems = u, truth
+                seems = truth = (user[j].x, user[j].y, user[j].heading, user[j].posture)
                 if errs is None:
                     noticed = random_bits(keys[c][u], step) // 2**11 < eye.chance
                 else:
@@ -368,18 +435,49 @@ def hides(point: Point, centre: Point, radius: int) -> bool:
     return 0 < part < 1 and away <= radius**2
 
 
+def _lines(
+    heights: Heights | None, c: int, u: int, in_view: set[int], owner: Body, user: Body
+) -> dict[int, tuple[int, int]]:
+    """Return the heights of both ends of the lines to the points of a user in view."""
+    if heights is None:
+        return dict.fromkeys(in_view, (0, 0))
+    return {i: heights.line(c, u, i, owner, user) for i in in_view}
+
+
 def _count_shown(
-    at: Body, user: Body, points: Sequence[Point], between: Sequence[Obstacle], j: int
+    at: Body,
+    user: Body,
+    points: Sequence[Point],
+    lines: Mapping[int, tuple[int, int]],
+    between: Mapping[int, Obstacle],
+    j: int,
+    heights: Heights | None,
 ) -> int:
-    """Return how many points of a user no body that is at home hides from a camera."""
-    bodies = [(body.poses[j], body.radius) for body in between if not body.poses[j].away]
-    return sum(
-        not any(
-            hides((user.x + x - at.x, user.y + y - at.y), (body.x - at.x, body.y - at.y), radius)
-            for body, radius in bodies
-        )
-        for x, y in points
-    )
+    """Return how many points of a user no body that is at home hides from a camera, and no piece.
+
+    `lines` has the heights of both ends of the line to each point in view.
+    """
+    bodies = {n: body for n, body in between.items() if not body.poses[j].away}
+
+    def is_hidden(number: int, eye: int, to: int) -> bool:
+        x, y = user.x + points[number][0], user.y + points[number][1]
+        if heights is not None and _furniture_hides(heights, at, (x, y), eye, to):
+            return True
+        px, py = x - at.x, y - at.y
+        for n, obstacle in bodies.items():
+            body = obstacle.poses[j]
+            bx, by = body.x - at.x, body.y - at.y
+            if not hides((px, py), (bx, by), obstacle.radius):
+                continue
+            if heights is None:
+                return True
+            part = Fraction(px * bx + py * by, px * px + py * py)
+            top = heights.tops[n][body.posture] + heights.base(body)
+            if line_is_low(Fraction(eye), Fraction(to), part, top):
+                return True
+        return False
+
+    return sum(not is_hidden(number, *line) for number, line in lines.items())
 
 
 def _points_in_view(

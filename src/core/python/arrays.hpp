@@ -169,6 +169,15 @@ inline constexpr auto members_of = nullptr;
 template <class S>
 concept ComesAsNamedTuple = !std::is_null_pointer_v<std::remove_const_t<decltype(members_of<S>)>>;
 
+template <class T>
+inline constexpr bool is_view = false;
+template <class T, std::size_t N>
+inline constexpr bool is_view<View<T, N>> = true;
+
+// What refers to memory of Python, or to a copy that its caster owns.
+template <class T>
+concept Borrows = is_view<T> || ComesAsNamedTuple<T>;
+
 template <class M>
 struct Member;
 template <class S, class T>
@@ -204,10 +213,11 @@ struct type_caster<fleet2d::View<T, N>> {
 };
 
 // nanobind's own caster of optional values would free the copy before the call.
-template <class T, std::size_t N>
-struct type_caster<std::optional<fleet2d::View<T, N>>> {
-    using V = std::optional<fleet2d::View<T, N>>;
-    using Caster = make_caster<fleet2d::View<T, N>>;
+template <class T>
+    requires fleet2d::border::Borrows<T>
+struct type_caster<std::optional<T>> {
+    using V = std::optional<T>;
+    using Caster = make_caster<T>;
     NB_TYPE_CASTER(V, optional_name(Caster::Name))
     Caster caster;
 

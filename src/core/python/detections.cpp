@@ -20,6 +20,10 @@ template <>
 inline constexpr auto border::members_of<DetectionRule> =
     std::tuple(&DetectionRule::patience, &DetectionRule::step_us, &DetectionRule::start_us, &DetectionRule::burst,
                &DetectionRule::stop_lost, &DetectionRule::stop_seen);
+template <>
+inline constexpr auto border::members_of<Heights> =
+    std::tuple(&Heights::eyes, &Heights::points, &Heights::tops, &Heights::corners, &Heights::start, &Heights::boxes,
+               &Heights::top);
 
 namespace {
 
@@ -68,6 +72,25 @@ Array<i64, 2> columns_of(const std::vector<Sighting>& sightings) {
         std::ranges::transform(sightings, columns[column++].begin(), member);
     }
     return columns;
+}
+
+void check_heights(const Heights& heights, const Lenses& lenses, i64 bodies) {
+    const i64 cameras = lenses.bodies.size(), pieces = heights.pieces();
+    require(heights.eyes.shape == std::array{cameras, POSTURES} && heights.tops.shape == std::array{bodies, POSTURES},
+            "eyes must be (cameras, POSTURES), tops (bodies, POSTURES)");
+    require(heights.points.shape == std::array{cameras, lenses.bodies.shape[1], POSTURES, lenses.bodies.shape[2]},
+            "points must be (cameras, users, POSTURES, points + 1)");
+    require(all_in_range(heights.eyes, 0, HIGHEST) && all_in_range(heights.points, 0, HIGHEST) &&
+                all_in_range(heights.tops, 0, HIGHEST) && all_in_range(heights.top, 0, HIGHEST),
+            "heights must be in 0 to 2**13 - 1");
+    require(heights.corners.shape[1] == 2 && all_in_range(heights.corners, -FARTHEST, FARTHEST),
+            "corners must be (corners, 2), within 2**29 lattice units");
+    require(heights.boxes.shape == std::array{pieces, i64{4}} && heights.start.size() == pieces + 1,
+            "start must have one more than there are pieces, boxes must be (pieces, 4)");
+    require(heights.start[0] == 0 && heights.start[pieces] == heights.corners.size(), "start must cover all corners");
+    for (i64 i = 0; i < pieces; ++i) {
+        require(heights.start[i] < heights.start[i + 1], "each piece must have corners");
+    }
 }
 
 void check_memory(const SightMemory& memory, const Lenses& lenses, const ErrorTables& errors, i64 cameras, i64 users) {
@@ -119,7 +142,8 @@ for standing, 1 sitting, 2 lying.)");
         "detect",
         [](const Mesh& walls, const Lenses& lenses, const ErrorTables& errors, const DetectionRule& rule,
            const Window& window, i64 body, i64 first_other, const SightMemory& memory,
-           std::optional<View<const u64, 3>> shown, std::optional<View<const i64>> radii) {
+           std::optional<View<const u64, 3>> shown, std::optional<View<const i64>> radii,
+           const std::optional<Heights>& heights) {
             check_lenses(lenses);
             const i64 cameras = lenses.reach.shape[0], users = lenses.reach.shape[1];
             require(lenses.bodies.shape[2] < MAX_SHOWN, "bodies must have fewer than MAX_SHOWN points");
@@ -135,10 +159,12 @@ for standing, 1 sitting, 2 lying.)");
                 require(widths.size() == window.bodies(), "radii must have one for each body");
                 require(all_in_range(widths, 1, FATTEST), "radii must be in 1 to 2**17 - 1");
             }
+            if (heights) check_heights(*heights, lenses, window.bodies());
             DetectionResult result;
             {
                 const nb::gil_scoped_release unlocked;
-                result = detect(walls, lenses, errors, rule, window, {body, first_other}, memory, points, widths);
+                result = detect(walls, lenses, errors, rule, window, {body, first_other}, memory, points, widths,
+                                heights ? &*heights : nullptr);
             }
             const i64 count = static_cast<i64>(result.events.size());
             auto step = Array<i64>::empty({count}), identity = Array<i64>::empty({count});
@@ -151,7 +177,7 @@ for standing, 1 sitting, 2 lying.)");
                               std::move(kind));
         },
         "walls"_a, "lenses"_a, "errors"_a, "rule"_a, "window"_a, "body"_a, "first_other"_a, "memory"_a,
-        "shown"_a = nb::none(), "radii"_a = nb::none(),
+        "shown"_a = nb::none(), "radii"_a = nb::none(), "heights"_a = nb::none(),
         R"(Look at all others in the steps of a window, up to the first with an event that stops it.
 
 Args:
@@ -166,6 +192,7 @@ Args:
     shown: uint64 (cameras, users, steps), which points of each are in view, bit i for number i,
         where another method decides that; None: lines of sight do.
     radii: int64 (bodies,), of all bodies of the window, which hide each other; None: they don't.
+    heights: The heights of cameras, bodies and furniture, a `fleet2d.kernels.Heights`; None: they don't matter.
 
 Returns:
     The steps done (the stopping one included); the sightings, int64 (SIGHTING, n), with the columns of

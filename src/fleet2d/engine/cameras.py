@@ -32,6 +32,7 @@ from fleet2d.kernels import (
     About,
     DetectionRule,
     GhostDraw,
+    Heights,
     Lenses,
     Poses,
     Reach,
@@ -61,6 +62,7 @@ from fleet2d.sight.fov import FieldOfView, LineOfSight
 from fleet2d.sight.perception import Perception
 
 if TYPE_CHECKING:
+    from fleet2d.engine.heights import BodyHeights
     from fleet2d.entities.robots.policy import SightingMemory
 
 # Squared distance beyond which a dark camera sees nobody.
@@ -102,6 +104,7 @@ class Cameras(Watcher):
         activity_senses: How each camera perceives activities.
         method: The method of sight; None: lines of sight.
         radii: Radii of all bodies, if they hide each other [lattice units]; None: they don't.
+        heights: Heights of bodies and furniture, if they matter; None: they don't.
         memory: The memory from span to span.
         drift: The error of the owner's belief about its own pose; None: it has none.
         sighting_errors: What changes sightings after the look; None: nothing does.
@@ -124,6 +127,7 @@ class Cameras(Watcher):
         users: int,
         method: FieldOfView | None = None,
         radii: I64 | None = None,
+        heights: "BodyHeights | None" = None,
     ) -> None:
         """Set up the cameras of one body.
 
@@ -133,6 +137,7 @@ class Cameras(Watcher):
             users: Number of users among them.
             method: The method of sight; None: lines of sight.
             radii: Radii of all bodies, if they hide each other [lattice units].
+            heights: Heights of bodies and furniture, if they matter.
 
         Raises:
             ScenarioError: A period is not a multiple of the step, or an unknown body is named.
@@ -140,7 +145,7 @@ class Cameras(Watcher):
         self.owner, self.row = actors[row], row
         # Lines of sight are compiled into the look.
         self.method = None if isinstance(method, LineOfSight) else method
-        self.radii = radii
+        self.radii, self.heights = radii, heights
         is_robot = row >= users
         self.index = row - users if is_robot else row
         self._first = 0 if is_robot else users
@@ -193,6 +198,11 @@ class Cameras(Watcher):
             owner.path,
         )
         self.lenses = stack_lenses(lenses, has_errors, context)
+        self._levels = None
+        if self.heights is not None:
+            others = slice(self._first, self._first + len(self.others))
+            points = self.lenses.bodies.shape[2]
+            self._levels = self.heights.levels(self.row, cameras.values(), others, points)
         self._perceptions = perceptions
         self._patience = max(lens.patience for lens in lenses)
         errors = [p if errs else None for p, errs in zip(perceptions, has_errors, strict=True)]
@@ -378,6 +388,7 @@ class Cameras(Watcher):
             self.memory,
             points,
             self.radii,
+            self._heights_in(home),
         )
         events = list(zip(step.tolist(), identity.tolist(), kind.tolist(), strict=True))
         sightings, looked = sightings.T, self.next_step + count
@@ -392,6 +403,12 @@ class Cameras(Watcher):
                 events = sight_events(sightings, self.memory, patience, self.next_step, looked)
                 end = next((step + 1 for step, _, kind in events if stops[kind]), looked)
         return Look(looked, end, sightings, events, old_memory)
+
+    def _heights_in(self, home: Home) -> Heights | None:
+        """Return the heights that matter at present; None if none does."""
+        if self.heights is None or self._levels is None:
+            return None
+        return self.heights.with_furniture(self._levels, home)
 
 
 def _drift_of(owner: Actor) -> Drift | None:

@@ -304,7 +304,12 @@ class ExpectedCameras:
         """Return cameras that notice all bodies in view at each step, from the present one on."""
         cameras, run = self.cameras, self.run
         perfect = PerfectCameras(
-            cameras.row, run.actors, run.bodies.users, cameras.method, cameras.radii
+            cameras.row,
+            run.actors,
+            run.bodies.users,
+            cameras.method,
+            cameras.radii,
+            cameras.heights,
         )
         perfect.bodies, perfect.next_step = run.bodies, run.first
         return perfect

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -33,6 +34,9 @@ from fleet2d.runtime.clock import Clock
 from fleet2d.runtime.events import EventKind
 from fleet2d.scenario.model import Scenario
 from fleet2d.sight.fov import FieldOfView
+
+if TYPE_CHECKING:
+    from fleet2d.engine.heights import BodyHeights
 
 
 def set_up(scenario: Scenario, clock: Clock, seed: int, store: RunStore) -> State:
@@ -132,29 +136,39 @@ def _open_cameras(basis: Basis) -> tuple[list[Cameras], list[Cameras]]:
     if not 0 < users < len(actors):
         return [], []
     home, sight = basis.home, basis.scenario.sight
-    method, radii = sight.method.model_copy(), None
+    method, radii, heights = sight.method.model_copy(), None, None
     with blame("sight.method", None):
         method.start(home)
     if sight.people_occlude:
         units = home.plan.lattice.units_per_m
         radii = np.array([max(round(actor.entity.radius * units), 1) for actor in actors], np.int64)
+    if sight.heights:
+        from fleet2d.engine.heights import BodyHeights  # few runs need it
+
+        heights = BodyHeights(actors)
     cameras = [
-        _cameras_of(row, basis, method, radii)
+        _cameras_of(row, basis, method, radii, heights)
         for row, actor in enumerate(actors)
         if actor.entity.eyes
     ]
     return [c for c in cameras if c.row < users], [c for c in cameras if c.row >= users]
 
 
-def _cameras_of(row: int, basis: Basis, method: FieldOfView, radii: I64 | None) -> Cameras:
+def _cameras_of(
+    row: int,
+    basis: Basis,
+    method: FieldOfView,
+    radii: I64 | None,
+    heights: "BodyHeights | None",
+) -> Cameras:
     """Return the cameras of one body, or what it perceives in place of their view."""
     actors, users = basis.actors, basis.bodies.users
     source = getattr(actors[row].entity, "perceives", None)
     if source is None:
-        return Cameras(row, actors, users, method, radii)
+        return Cameras(row, actors, users, method, radii, heights)
     from fleet2d.engine.real_sight import RealSight  # few runs need it
 
-    sight = RealSight(row, actors, users, method, radii)
+    sight = RealSight(row, actors, users, method, radii, heights)
     sight.prepare(source)
     return sight
 

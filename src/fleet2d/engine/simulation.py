@@ -9,7 +9,7 @@ import json
 import operator
 import secrets
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import nullcontext, suppress
 from datetime import datetime, timedelta
 from pathlib import Path
@@ -213,7 +213,17 @@ class Simulation(InterventionMethods):
     def notes(self) -> list[str]:
         """What is odd in the floor plan or won't work in it, and about what robots perceive."""
         sources = (f"{c.owner.path}: {note}" for c in self._state.cameras for note in c.notes)
-        return [*self.home.plan.notes, *self._home_errors, *sources]
+        return [*self.home.plan.notes, *self._home_errors, *sources, *self._unused_heights]
+
+    @property
+    def _unused_heights(self) -> Iterator[str]:
+        """What says how high something is, while heights don't matter."""
+        for actor in () if self.scenario.sight.heights else self._state.actors:
+            eyes = actor.entity.eyes
+            only = ["camera"] if "camera" in eyes else [f"cameras.{name}" for name in eyes]
+            for path, camera in zip(only, eyes.values(), strict=True):
+                if camera.height is not None:
+                    yield f"{actor.path}.{path}.height has no effect without sight.heights: true"
 
     @property
     def _home_errors(self) -> Sequence[str]:

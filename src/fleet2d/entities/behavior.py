@@ -298,6 +298,8 @@ class Behavior(Component):
     remembers: ClassVar[bool] = False
     # Kinds of commands that it carries out: find, come, dock, or a name of its own.
     answers: ClassVar[frozenset[str]] = frozenset()
+    # Height of a user with it, unless the scenario says it [m].
+    usual_height: ClassVar[float] = 1.7
 
     when: Hours = ()
     cooldown: Duration = timedelta(0)

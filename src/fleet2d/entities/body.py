@@ -89,6 +89,8 @@ class BodySettings(Settings):
 
     Attributes:
         radius: Radius of the body [m].
+        height: Its height, standing [m], for `sight.heights`; left out: 1.7 m for a person, 0.3 m
+            for a pet, 0.4 m for a robot.
         speed: Walking speed [m/s].
         turn_rate_deg: How fast it turns on the spot [deg/s].
         start: Where it is at first; left out: where its behavior would be, else drawn.
@@ -98,6 +100,7 @@ class BodySettings(Settings):
     """
 
     radius: Length = Field(default=0.2, gt=0, le=2)
+    height: Length | None = Field(default=None, gt=0, le=4)
     speed: Speed = Field(default=1.0, ge=0.01, le=20)
     turn_rate_deg: TurnRateDeg = Field(default=180.0, ge=0.01, le=36000)
     start: Place | None = None
@@ -112,6 +115,8 @@ class BodySettings(Settings):
     minds_floor: ClassVar[bool] = False
     # Whether it sits or lies on furniture that a place names, instead of stopping before it.
     uses_furniture: ClassVar[bool] = False
+    # Its height, if the scenario doesn't say [m].
+    usual_height: ClassVar[float] = 1.7
     # What happens when its cameras lose somebody, and when they see somebody.
     sight_events: ClassVar[tuple[str, str]]
     # What it hears about what it wants of people.
@@ -121,6 +126,11 @@ class BodySettings(Settings):
     def eyes(self) -> dict[str, Camera]:
         """Its cameras by name; none, unless a subclass has some."""
         return {}
+
+    @property
+    def tall(self) -> float:
+        """Its height, standing [m]."""
+        return self.usual_height if self.height is None else self.height
 
     def check_interrupt(self, name: str) -> None:
         """Check that an event may end its plans: one of its cameras, or a registered interrupt.

@@ -60,6 +60,12 @@ class User(Entity):
         return self
 
     @property
+    def tall(self) -> float:
+        """Its height, standing [m]: unless the scenario says it, by what it does."""
+        usual = (behavior.usual_height for behavior in self.behaviors)
+        return min(usual, default=self.usual_height) if self.height is None else self.height
+
+    @property
     def eyes(self) -> dict[str, Camera]:
         """The user's field of view, if there is one."""
         return {} if self.camera is None else {"camera": self.camera}
@@ -92,6 +98,7 @@ class Robot(Entity):
     perception: Perception | None = None
     perceives: Annotated[EvidenceSource, OneOf("evidence_source")] | None = None
 
+    usual_height: ClassVar[float] = 0.4
     minds_costs: ClassVar[bool] = True
     minds_floor: ClassVar[bool] = True
     battery: Battery | None = None

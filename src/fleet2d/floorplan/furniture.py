@@ -48,6 +48,7 @@ class Furniture:
         width: Least and largest extent from left to right [m].
         depth: Least and largest extent from back to front [m].
         blocks: What it blocks: nothing, bodies (`path`), or bodies and sight (`sight`).
+        height: How high it is [m]; 0 if it stands on legs, or lies flat, and hides nobody.
         wall: Whether its back stands against a wall.
         front_m: Depth of the floor before it that stays empty [m].
         uses: The places to use it from.
@@ -57,6 +58,7 @@ class Furniture:
     width: Range
     depth: Range
     blocks: Blocks
+    height: float
     wall: bool
     front_m: float
     uses: tuple[Use, ...] = ()
@@ -85,36 +87,36 @@ _IN_TUB = (Use("lie", facing=LEFT),)
 
 # fmt: off
 _CATALOGUE = (
-    #         type              width         depth         blocks     wall  front uses
-    Furniture("bed",            (1.40, 1.80), (2.00, 2.10), "path",    True,  0.0, _DOUBLE_BED),
-    Furniture("single_bed",     (0.80, 1.00), (1.90, 2.05), "path",    True,  0.0, _SINGLE_BED),
-    Furniture("nightstand",     (0.40, 0.50), (0.35, 0.45), "path",    True,  0.0, _STAND),
-    Furniture("wardrobe",       (1.00, 2.00), (0.60, 0.65), "sight",   True,  0.6, _STAND),
-    Furniture("dresser",        (0.80, 1.40), (0.45, 0.50), "path",    True,  0.6, _STAND),
-    Furniture("bookshelf",      (0.80, 1.20), (0.30, 0.40), "sight",   True,  0.6, _STAND),
-    Furniture("shelf",          (0.80, 1.60), (0.40, 0.50), "sight",   True,  0.6, _STAND),
-    Furniture("desk",           (1.20, 1.60), (0.60, 0.80), "path",    True,  0.0, _AT_DESK),
-    Furniture("chair",          (0.45, 0.50), (0.45, 0.50), "path",    False, 0.0, _SIT),
-    Furniture("table",          (1.20, 2.00), (0.80, 1.00), "path",    False, 0.0, _AT_TABLE),
-    Furniture("sofa",           (1.60, 2.40), (0.85, 0.95), "path",    True,  0.4, _SEATS_3),
-    Furniture("armchair",       (0.80, 0.90), (0.80, 0.90), "path",    False, 0.3, _SIT),
-    Furniture("coffee_table",   (0.80, 1.20), (0.50, 0.60), "path",    False, 0.0),
-    Furniture("tv",             (1.20, 1.60), (0.35, 0.45), "path",    True,  0.6, _WATCH),
-    Furniture("stove",          (0.60, 0.60), (0.60, 0.60), "path",    True,  0.9, _STAND),
-    Furniture("fridge",         (0.60, 0.70), (0.60, 0.65), "sight",   True,  0.9, _STAND),
-    Furniture("sink",           (0.60, 0.80), (0.60, 0.60), "path",    True,  0.9, _STAND),
-    Furniture("kitchen_counter",(0.40, 1.20), (0.60, 0.60), "path",    True,  0.9, _STAND),
-    Furniture("toilet",         (0.40, 0.50), (0.60, 0.70), "path",    True,  0.5, _SIT),
-    Furniture("washbasin",      (0.45, 0.60), (0.40, 0.50), "path",    True,  0.5, _STAND),
-    Furniture("shower",         (0.80, 0.90), (0.80, 0.90), "nothing", True,  0.4, _INSIDE),
-    Furniture("bathtub",        (1.60, 1.70), (0.70, 0.75), "path",    True,  0.5, _IN_TUB),
-    Furniture("washing_machine",(0.60, 0.60), (0.60, 0.60), "path",    True,  0.6, _STAND),
-    Furniture("shoe_rack",      (0.60, 0.90), (0.25, 0.35), "path",    True,  0.5, _STAND),
-    Furniture("bench",          (1.00, 1.40), (0.40, 0.50), "path",    True,  0.5, _SIT),
-    Furniture("workbench",      (1.40, 2.00), (0.60, 0.70), "path",    True,  0.8, _STAND),
-    Furniture("treadmill",      (0.80, 0.90), (1.70, 1.90), "path",    False, 0.4, _STAND),
-    Furniture("rug",            (1.20, 2.00), (1.20, 1.60), "nothing", False, 0.0),
-    Furniture("charger",        (0.25, 0.35), (0.20, 0.25), "nothing", True,  0.6, _STAND),
+    #         type              width         depth         blocks   height wall front uses
+    Furniture("bed",            (1.40, 1.80), (2.00, 2.10), "path",  0.55, True,  0.0, _DOUBLE_BED),
+    Furniture("single_bed",     (0.80, 1.00), (1.90, 2.05), "path",  0.55, True,  0.0, _SINGLE_BED),
+    Furniture("nightstand",     (0.40, 0.50), (0.35, 0.45), "path",  0.55, True,  0.0, _STAND),
+    Furniture("wardrobe",       (1.00, 2.00), (0.60, 0.65), "sight", 2.00, True,  0.6, _STAND),
+    Furniture("dresser",        (0.80, 1.40), (0.45, 0.50), "path",  0.85, True,  0.6, _STAND),
+    Furniture("bookshelf",      (0.80, 1.20), (0.30, 0.40), "sight", 1.80, True,  0.6, _STAND),
+    Furniture("shelf",          (0.80, 1.60), (0.40, 0.50), "sight", 1.80, True,  0.6, _STAND),
+    Furniture("desk",           (1.20, 1.60), (0.60, 0.80), "path",  0.0,  True,  0.0, _AT_DESK),
+    Furniture("chair",          (0.45, 0.50), (0.45, 0.50), "path",  0.0,  False, 0.0, _SIT),
+    Furniture("table",          (1.20, 2.00), (0.80, 1.00), "path",  0.0,  False, 0.0, _AT_TABLE),
+    Furniture("sofa",           (1.60, 2.40), (0.85, 0.95), "path",  0.85, True,  0.4, _SEATS_3),
+    Furniture("armchair",       (0.80, 0.90), (0.80, 0.90), "path",  0.90, False, 0.3, _SIT),
+    Furniture("coffee_table",   (0.80, 1.20), (0.50, 0.60), "path",  0.0,  False, 0.0),
+    Furniture("tv",             (1.20, 1.60), (0.35, 0.45), "path",  1.10, True,  0.6, _WATCH),
+    Furniture("stove",          (0.60, 0.60), (0.60, 0.60), "path",  0.90, True,  0.9, _STAND),
+    Furniture("fridge",         (0.60, 0.70), (0.60, 0.65), "sight", 1.80, True,  0.9, _STAND),
+    Furniture("sink",           (0.60, 0.80), (0.60, 0.60), "path",  0.90, True,  0.9, _STAND),
+    Furniture("kitchen_counter",(0.40, 1.20), (0.60, 0.60), "path",  0.90, True,  0.9, _STAND),
+    Furniture("toilet",         (0.40, 0.50), (0.60, 0.70), "path",  0.75, True,  0.5, _SIT),
+    Furniture("washbasin",      (0.45, 0.60), (0.40, 0.50), "path",  0.85, True,  0.5, _STAND),
+    Furniture("shower",         (0.80, 0.90), (0.80, 0.90), "nothing", 0.0, True,  0.4, _INSIDE),
+    Furniture("bathtub",        (1.60, 1.70), (0.70, 0.75), "path",  0.55, True,  0.5, _IN_TUB),
+    Furniture("washing_machine",(0.60, 0.60), (0.60, 0.60), "path",  0.85, True,  0.6, _STAND),
+    Furniture("shoe_rack",      (0.60, 0.90), (0.25, 0.35), "path",  0.60, True,  0.5, _STAND),
+    Furniture("bench",          (1.00, 1.40), (0.40, 0.50), "path",  0.45, True,  0.5, _SIT),
+    Furniture("workbench",      (1.40, 2.00), (0.60, 0.70), "path",  0.0,  True,  0.8, _STAND),
+    Furniture("treadmill",      (0.80, 0.90), (1.70, 1.90), "path",  0.20, False, 0.4, _STAND),
+    Furniture("rug",            (1.20, 2.00), (1.20, 1.60), "nothing", 0.0, False, 0.0),
+    Furniture("charger",        (0.25, 0.35), (0.20, 0.25), "nothing", 0.0, True,  0.6, _STAND),
 )
 # fmt: on
 
@@ -147,6 +149,7 @@ def stand_furniture(
     *,
     name: str = "",
     blocks: Blocks | None = None,
+    height: float | None = None,
 ) -> PlacedObject:
     """Return a piece of furniture at a place, with the places to use it from.
 
@@ -157,6 +160,7 @@ def stand_furniture(
         size: Its width and depth [m]; None for the middle of its type's ranges.
         name: Its name; empty to be numbered by type.
         blocks: As `Furniture.blocks`; None for what is usual for its type.
+        height: As `Furniture.height`; None for what is usual for its type.
 
     Raises:
         FloorPlanError: There is no such type.
@@ -191,4 +195,5 @@ def stand_furniture(
         blocks=model.blocks if blocks is None else blocks,
         uses=tuple(uses),
         heading=float(in_radians(heading % TURN)),
+        height=height,
     )

@@ -147,6 +147,7 @@ class PlacedObject:
         uses: Places to use it from.
         heading: Direction of its front [rad], counter-clockwise from +x: of a sofa into the room,
             of a bed from the pillows to the feet.
+        height: How high it is [m], 0 if it hides nobody; None for what is usual for its type.
     """
 
     name: str
@@ -155,6 +156,7 @@ class PlacedObject:
     blocks: Blocks = "path"
     uses: tuple[UsePlace, ...] = ()
     heading: float = 0.0
+    height: float | None = None
 
 
 def number_objects(objects: Sequence[PlacedObject]) -> tuple[PlacedObject, ...]:
@@ -171,7 +173,8 @@ def describe_object(thing: PlacedObject) -> list[Any]:
     """Return all that defines an object as plain JSON data, for the digest of a plan."""
     corners = shapely.get_coordinates(thing.footprint).tolist()
     uses = [[use.x, use.y, use.heading, use.posture, use.approach] for use in thing.uses]
-    return [thing.name, thing.type, corners, thing.blocks, thing.heading, uses]
+    height = [] if thing.height is None else [thing.height]
+    return [thing.name, thing.type, corners, thing.blocks, thing.heading, uses, *height]
 
 
 def move_object(

@@ -233,6 +233,8 @@ class FurniturePiece(Settings):
         name: Its name; left out: its type and a number.
         blocks: What it blocks: nothing, bodies (`path`), or bodies and sight (`sight`); left out:
             what is usual for its type.
+        height: How high it is [m], for `sight.heights`; 0: it hides nobody; left out: what is usual
+            for its type.
     """
 
     type: str = Field(examples=["sofa"])
@@ -241,6 +243,7 @@ class FurniturePiece(Settings):
     size: tuple[PositiveLength, PositiveLength] | None = Field(default=None, examples=[[1.6, 2.0]])
     name: str | None = Field(default=None, min_length=1)
     blocks: Blocks | None = None
+    height: Length | None = Field(default=None, ge=0, le=8)
 
     @model_validator(mode="after")
     def _check_type(self) -> Self:
@@ -251,14 +254,23 @@ class FurniturePiece(Settings):
                 f"{suggest(self.type, sorted(FURNITURE))}",
                 self.type,
             )
+        if self.height is not None and (self.blocks or FURNITURE[self.type].blocks) == "sight":
+            raise problem_at(
+                ("height",), "what blocks sight reaches the ceiling: give blocks: path, too"
+            )
         return self
 
     def stand(self) -> PlacedObject:
         """Return the piece as an object, with unchecked places to use it from."""
         heading = round(self.heading_deg / 360 * TURN) % TURN
-        size, blocks = self.size, self.blocks
         return stand_furniture(
-            self.type, self.at, heading, size, name=self.name or "", blocks=blocks
+            self.type,
+            self.at,
+            heading,
+            self.size,
+            name=self.name or "",
+            blocks=self.blocks,
+            height=self.height,
         )
 
 

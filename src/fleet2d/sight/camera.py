@@ -126,6 +126,8 @@ class Camera(Settings):
             the step; left out: 5 s, or the next multiple above; with several cameras, the longest
             counts.
         offset: Where it is mounted: forward and left of the body's centre [m].
+        height: How high it is mounted [m], for `sight.heights`; left out: 15/16 of the body's
+            height. The camera of a user who sits or lies is lower in proportion.
         heading_deg: The direction in which it looks, counter-clockwise from the body's heading.
         pan: The directions between which it turns; null: its direction is fixed.
         period: Time from look to look; null: one in every step.
@@ -140,6 +142,7 @@ class Camera(Settings):
     detection: Share = 1.0
     lost_after: Duration | None = Field(default=None, examples=["5 s"])
     offset: tuple[Length, Length] = Field(default=(0.0, 0.0), examples=[[0.1, 0]])
+    height: Length | None = Field(default=None, ge=0, le=4)
     heading_deg: AngleDeg = 0.0
     pan: Pan | None = None
     period: PositiveDuration | None = None
@@ -490,10 +493,14 @@ class SightSettings(Settings):
             flashlight, or your own.
         people_occlude: Whether bodies hide people from cameras: a line of sight ends at any body
             that it passes nearer than that body's radius.
+        heights: Whether the heights of cameras, bodies and furniture matter: low furniture hides
+            what is lower from where the camera is, and bodies, if they hide people, those behind
+            them as far as they are high.
         seen_every: How often the area in view is computed, for the layers of what robots have seen
             and the exposure of rooms; null: in every step.
     """
 
     method: Annotated[FieldOfView, OneOf("sight")] = LineOfSight()
     people_occlude: bool = False
+    heights: bool = False
     seen_every: PositiveDuration | None = None

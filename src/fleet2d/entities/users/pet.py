@@ -1,7 +1,7 @@
 """Pet: a cat or a dog that sleeps most of the day, and roams through the home in between."""
 
 from datetime import timedelta
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, ClassVar, Self
 
 from pydantic import Field, model_validator
 
@@ -35,6 +35,8 @@ class Pet(Behavior):
         spots: Smallest and largest number of stops between two naps.
         stays_in_room: Probability that its next spot is in the same room.
     """
+
+    usual_height: ClassVar[float] = 0.3
 
     rooms: tuple[str, ...] = ()
     nap: AnyDurationDistribution = DurationDistribution(

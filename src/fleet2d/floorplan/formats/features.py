@@ -301,6 +301,7 @@ def _to_objects(feature: Feature, move: Move) -> Iterable[PlacedObject]:
             use_of.blocks,
             () if number else tuple(uses),
             use_of.heading,
+            use_of.height,
         )
 
 

@@ -206,10 +206,12 @@ class ObjectUse(FileModel):
         blocks: What it blocks: nothing, bodies, or bodies and sight.
         heading: Direction of its front.
         uses: Places to use it from.
+        height: How high it is [m]; 0: it hides nobody; left out: what is usual for its type.
     """
 
     blocks: Blocks = "path"
     heading: Coordinate = 0.0
+    height: Annotated[float, Field(ge=0, le=8)] | None = None
     uses: Listed[UseEntry] = Field(default_factory=list)
 
     def use_places(self) -> tuple[UsePlace, ...]:
@@ -238,6 +240,7 @@ class ObjectEntry(ObjectUse):
             blocks=self.blocks,
             uses=self.use_places(),
             heading=self.heading,
+            height=self.height,
         )
 
 
@@ -473,6 +476,8 @@ def object_document(thing: PlacedObject) -> dict[str, Any]:
     }
     if thing.heading:
         document["heading"] = thing.heading
+    if thing.height is not None:
+        document["height"] = thing.height
     if thing.uses:
         document["uses"] = [_use_document(use) for use in thing.uses]
     return document

@@ -1,0 +1,120 @@
+"""Heights of cameras, bodies and furniture: who stands behind a sofa is seen by the head."""
+
+from collections.abc import Iterable, Iterator, Sequence
+
+import numpy as np
+import shapely
+
+from fleet2d.entities.behavior import Actor
+from fleet2d.floorplan.furniture import FURNITURE
+from fleet2d.floorplan.home import Home, lattice_footprint
+from fleet2d.floorplan.placed_objects import PlacedObject
+from fleet2d.kernels import I64, TURN, UNIT, Heights, cosine, in_radians, sine
+from fleet2d.sight.camera import Camera
+
+# Where the head, the eyes and a robot's camera are, as a share of the height of a body; and where
+# the other points of a body are, in turn.
+HEAD = 15 / 16
+AROUND = (3 / 4, 1 / 2, 1 / 4)
+# How high a seat is [m], and how far those who sit rise above it, as a share of their height.
+SEAT_M = 0.45
+SITTING = 0.52
+# How far those who lie rise above what they lie on [m].
+LYING_M = 0.25
+# Furniture whose back is as high as it is, with a seat before it, and the depth of the back [m].
+WITH_BACK = {"sofa", "armchair"}
+BACK_M = 0.25
+
+
+class BodyHeights:
+    """The heights of all bodies of a run, and of the furniture of its home.
+
+    Attributes:
+        tops: Heights of the bodies, each standing, sitting and lying: int64 (bodies, 3) [mm].
+    """
+
+    def __init__(self, actors: Sequence[Actor]) -> None:
+        """Take the heights of the bodies of a run."""
+        tall = np.array([actor.entity.tall for actor in actors])
+        postures = [tall, SEAT_M + SITTING * tall, np.minimum(LYING_M, tall)]
+        self.tops = _millimetres(np.stack(postures, axis=1))
+        self._furniture: tuple[object, tuple[I64, ...]] = (None, ())
+
+    def levels(self, row: int, cameras: Iterable[Camera], others: slice, points: int) -> Heights:
+        """Return the heights of the cameras of a body, and of the points that they look at.
+
+        Args:
+            row: The row of the body.
+            cameras: Its cameras.
+            others: The rows of the bodies that it looks at.
+            points: Points of each body that are looked at, at most.
+        """
+        own = self.tops[row]
+        mounted = [HEAD * own[0] if c.height is None else 1000 * c.height for c in cameras]
+        shares = np.array([HEAD, *(AROUND[i % len(AROUND)] for i in range(points - 1))])
+        looked_at = np.rint(self.tops[others, :, None] * shares).astype(np.int64)
+        return Heights(
+            eyes=np.rint(np.outer(mounted, own / own[0])).astype(np.int64),
+            points=np.repeat(looked_at[None], len(mounted), axis=0),
+            tops=self.tops,
+            corners=np.zeros((0, 2), np.int64),
+            start=np.zeros(1, np.int64),
+            boxes=np.zeros((0, 4), np.int64),
+            top=np.zeros(0, np.int64),
+        )
+
+    def with_furniture(self, levels: Heights, home: Home) -> Heights:
+        """Return levels with the furniture that is in the home at present."""
+        if self._furniture[0] is not home.objects:
+            self._furniture = home.objects, _stacked(home)
+        corners, start, boxes, top = self._furniture[1]
+        return levels._replace(corners=corners, start=start, boxes=boxes, top=top)
+
+
+def _stacked(home: Home) -> tuple[I64, I64, I64, I64]:
+    """Return corners, start, boxes and top of all furniture; see `fleet2d.kernels.Heights`."""
+    prisms = [prism for thing in home.objects for prism in prisms_of(home, thing)]
+    outlines = [outline for outline, _ in prisms]
+    boxes = [np.concatenate([outline.min(axis=0), outline.max(axis=0)]) for outline in outlines]
+    return (
+        np.concatenate([np.zeros((0, 2), np.int64), *outlines]),
+        np.cumsum([0, *map(len, outlines)], dtype=np.int64),
+        np.array(boxes, np.int64).reshape(-1, 4),
+        _millimetres(np.array([height for _, height in prisms])),
+    )
+
+
+def prisms_of(home: Home, thing: PlacedObject) -> Iterator[tuple[I64, float]]:
+    """Yield the parts of a piece of furniture that hide what is low: outline and height [m].
+
+    Outlines are int64 (corners, 2) [lattice units]. What stands on legs hides nobody, and what
+    blocks sight is a wall already.
+    """
+    model = FURNITURE.get(thing.type)
+    height = thing.height if thing.height is not None else model.height if model else 0.0
+    if thing.blocks == "sight" or height == 0:
+        return
+    footprint = lattice_footprint(home.plan, thing)
+    corners = _corners(footprint)
+    if thing.type not in WITH_BACK or height <= SEAT_M:
+        yield corners, height
+        return
+    yield corners, SEAT_M
+    turn = round(thing.heading / float(in_radians(TURN)) * TURN) % TURN
+    ahead, left = np.array([cosine(turn), sine(turn)]), np.array([-sine(turn), cosine(turn)])
+    forward, across = corners @ ahead // UNIT, corners @ left // UNIT
+    depths = forward.min() - 1, forward.min() + round(BACK_M * home.plan.lattice.units_per_m)
+    sides = across.min() - 1, across.max() + 1
+    box = [(depth * ahead + side * left) // UNIT for depth in depths for side in sides]
+    behind = shapely.MultiPoint(box).convex_hull
+    for part in shapely.get_parts(shapely.intersection(footprint, behind)):
+        if isinstance(part, shapely.Polygon) and part.area > 0:
+            yield _corners(part), height
+
+
+def _corners(polygon: shapely.Polygon) -> I64:
+    return np.rint(np.asarray(polygon.exterior.coords)[:-1]).astype(np.int64)
+
+
+def _millimetres(metres: np.ndarray) -> I64:
+    return np.rint(1000 * metres).astype(np.int64)

@@ -1,0 +1,186 @@
+"""Heights of cameras, bodies and furniture: in runs, for every span and by every exact method."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+import shapely
+from tests.engine.test_cameras_hiding import WALK, seen
+from tests.scenes import digests, run, scenario
+
+import fleet2d
+from fleet2d.engine.heights import prisms_of
+from fleet2d.floorplan.furniture import stand_furniture
+from fleet2d.floorplan.home import Home
+from fleet2d.kernels import QUARTER
+
+LIES = {"hold": "ana", "posture": "lie", "duration": "1 h", "at": "0 s"}
+ALL = [*range(10)]
+
+
+def behind(
+    piece: dict[str, Any] | None, camera_m: float = 0.4, *, x: float = 4.0, **ana: Any
+) -> dict[str, Any]:
+    """A robot at the west end of the living room, ana at x, and furniture at 2.6 m between them."""
+    users = {"ana": {"start": [x, 3.2], **ana}}
+    camera = {"height": camera_m, "range": [0, 6]}
+    robot = {"start": [0.6, 3.2], "start_heading_deg": 0, "camera": camera}
+    content = scenario("10 s", users=users, robots={"astro": robot}) | {"sight": {"heights": True}}
+    if piece is not None:
+        content["floorplan"]["furniture"] = [{"at": [2.6, 3.3], "heading_deg": 0, **piece}]
+    return content
+
+
+SOFA = {"type": "sofa", "size": [1.2, 0.9]}
+
+
+def test_who_stands_behind_a_sofa_is_seen_and_who_lies_there_is_not() -> None:
+    content = behind(SOFA)
+
+    assert {"ana": ALL} == seen(content)
+    assert {} == seen({**content, "script": [LIES]})
+    assert {"ana": ALL} == seen({**content, "script": [LIES], "sight": {}})
+    assert {"ana": ALL} == seen({**behind(None), "script": [LIES]})
+
+
+# The line rises from the camera over the back of the sofa, 0.85 m high, which begins at 2.15 m: 1.55 m from the camera,
+# where ana is at 3.4 m. Her head is at 15/16 of her height.
+HIDDEN_BELOW_M = 0.4 + (0.85 - 0.4) * 3.4 / 1.55
+
+
+@pytest.mark.parametrize(("above_m", "expected"), [(0.005, {"ana": ALL}), (-0.005, {})])
+def test_a_head_is_seen_from_the_height_on_at_which_the_line_clears_the_sofa(
+    above_m: float, expected: dict[str, list[int]]
+) -> None:
+    assert expected == seen(behind(SOFA, height=(HIDDEN_BELOW_M + above_m) * 16 / 15))
+
+
+@pytest.mark.parametrize(("camera_m", "expected"), [(2.5, {"ana": ALL}), (1.0, {})])
+def test_a_high_camera_looks_over_furniture_that_hides_from_a_low_one(
+    camera_m: float, expected: dict[str, list[int]]
+) -> None:
+    assert expected == seen(behind(SOFA, camera_m, x=4.7, height=0.3))
+
+
+@pytest.mark.parametrize(
+    ("piece", "expected"),
+    [
+        ({"type": "table", "size": [1.2, 0.9]}, {"ana": ALL}),
+        ({**SOFA, "height": 0}, {"ana": ALL}),
+        ({**SOFA, "height": 2.0}, {}),
+        ({"type": "wardrobe", "size": [1.2, 0.6]}, {}),
+    ],
+    ids=["on legs", "flat", "high", "up to the ceiling"],
+)
+def test_furniture_hides_as_high_as_it_is(
+    piece: dict[str, Any], expected: dict[str, list[int]]
+) -> None:
+    assert expected == seen(behind(piece))
+
+
+def test_the_share_in_view_counts_parts_of_the_body_behind_furniture() -> None:
+    content = behind(SOFA)
+    robot = content["robots"]["astro"]
+    robot["camera"]["body_points"] = 6
+    robot["perception"] = {"detection": {"visible_share": [[0.5, 0], [0.51, 1]]}}
+
+    assert {} == seen(content)
+    assert {"ana": ALL} == seen({**content, "sight": {}})
+
+
+@pytest.mark.parametrize(("height_m", "expected"), [(1.1, [*ALL]), (1.9, [])])
+def test_a_child_does_not_hide_an_adult(height_m: float, expected: list[int]) -> None:
+    content = behind(None, 1.6)
+    content["users"]["ben"] = {"start": [2.5, 3.2], "height": height_m}
+    content["sight"]["people_occlude"] = True
+
+    assert expected == seen(content).get("ana", [])
+
+
+def test_moved_furniture_no_longer_hides() -> None:
+    move = {"at": "5 s", "move": "sofa_0", "to": [2.6, 1.0]}
+    content = {**behind({**SOFA, "height": 2.0, "size": [0.6, 0.9]}), "changes": [move]}
+
+    assert [5, 6, 7, 8, 9] == seen(content)["ana"]
+
+
+def test_a_pet_is_low_and_a_height_of_its_own_counts() -> None:
+    pet = {"type": "pet", "nap": "1 h", "start": [4.0, 3.2]}
+
+    for of_body, is_seen in (({}, False), ({"height": 1.7}, True)):
+        content = behind(SOFA)
+        content["users"] = {"ana": {**pet, **of_body}}
+        simulation = fleet2d.Simulation(content)
+        assert (1.7 if is_seen else 0.3) == simulation.actors["ana"].entity.tall
+        assert ("ana" in seen(content)) == is_seen
+
+
+def walkers() -> dict[str, Any]:
+    """People who walk, sit and lie among furniture, and a robot with two cameras."""
+    content = behind(SOFA)
+    content["simulation"]["duration"] = "10 min"
+    content["users"] = {
+        "ana": {**WALK, "start": [4, 3.2], "script": [[1.2, 3.6], 20.0, [4.6, 0.6], 60.0]},
+        "ben": {"type": "meander", "speed": 0.4, "camera": {"angle_deg": 200}},
+        "cleo": {"type": "pet", "stop": "5 s", "nap": "20 s"},
+    }
+    content["robots"]["astro"] |= {"type": "patrol", "dwell": "0 s"}
+    del content["robots"]["astro"]["camera"]
+    content["robots"]["astro"]["cameras"] = {
+        "low": {"height": 0.2, "body_points": 5, "range": [0, 6]},
+        "high": {"height": 1.3, "heading_deg": 180},
+    }
+    content["sight"]["people_occlude"] = True
+    return content
+
+
+@pytest.mark.parametrize("span", [1, 37])
+def test_spans_do_not_show_where_heights_matter(span: int) -> None:
+    content = walkers()
+
+    assert digests(run(content)) == digests(run(content, max_span=span))
+
+
+def test_heights_are_the_same_by_every_exact_method_and_change_what_is_seen() -> None:
+    content = walkers()
+    expected = digests(run(content))
+    by_polygon = {**content["sight"], "method": {"type": "visibility_polygon"}}
+
+    result = digests(run({**content, "sight": by_polygon}))
+
+    assert expected["observations"] == result["observations"]
+    assert expected["observations"] != digests(run({**content, "sight": {}}))["observations"]
+
+
+def test_the_back_of_a_sofa_is_high_and_its_seat_low() -> None:
+    plan = fleet2d.load_floorplan()
+    home = Home(plan)
+    units = plan.lattice.units_per_m
+    for heading in range(0, 4 * QUARTER, 300):
+        sofa = stand_furniture("sofa", (13.0, 3.0), heading, (2.0, 0.9))
+        (seat, seat_m), (back, back_m) = prisms_of(home, sofa)
+        whole, rear = shapely.Polygon(seat), shapely.Polygon(back)
+
+        assert (0.45, 0.85) == (seat_m, back_m)
+        assert abs(rear.area / units**2 - 2.0 * 0.25) < 0.02
+        assert shapely.area(shapely.difference(rear, whole.buffer(2))) == 0
+        ahead = np.array([np.cos(sofa.heading), np.sin(sofa.heading)])
+        middle = shapely.get_coordinates(rear.centroid)[0] / units - np.array([13.0, 3.0])
+        origin = plan.lattice.to_lattice((13.0, 3.0)) / units - np.array([13.0, 3.0])
+        assert abs((middle - origin) @ ahead + 0.325) < 0.02
+
+
+def test_a_height_of_what_blocks_sight_is_refused() -> None:
+    wardrobe = {"type": "wardrobe", "height": 0.9, "size": [1.2, 0.6]}
+
+    with pytest.raises(fleet2d.InputError, match="blocks: path"):
+        run(behind(wardrobe))
+    assert {"ana": ALL} == seen(behind({**wardrobe, "blocks": "path"}))
+
+
+def test_a_height_without_effect_is_a_note() -> None:
+    content = behind(SOFA)
+    notes = fleet2d.Simulation({**content, "sight": {}}).notes
+
+    assert any("sight.heights" in note and "robots.astro.camera.height" in note for note in notes)
+    assert not any("sight.heights" in note for note in fleet2d.Simulation(content).notes)
