@@ -150,7 +150,7 @@ def live(_: Path) -> None:
         took = timed(bridge.run)
         for other in others:
             other.terminate()
-        percentiles(f"live: five bodies, steps of {step}, late (must 5)", bridge.lateness_s)
+        percentiles(f"live: five bodies, steps of {step}, late (must 5)", list(bridge.lateness_s))
         print(f"live: {took / seconds:.2%} of a core (must 3); {bridge.notes()[0]}")
 
 

@@ -58,9 +58,20 @@ def test_an_address_in_use_is_refused(scheme: str) -> None:
             open_peer(f"{scheme}://127.0.0.1:{taken.getsockname()[1]}")
 
 
-@pytest.mark.parametrize("address", ["tcp://localhost:1", "localhost:99", "ws://h:port", ""])
-def test_a_wrong_address_is_refused(address: str) -> None:
-    with pytest.raises(InputError, match="is no address of a peer"):
+@pytest.mark.parametrize(
+    ("address", "why"),
+    [
+        ("tcp://localhost:1", ""),
+        ("localhost:99", ""),
+        ("ws://h:port", ": Port could not be cast to integer value as 'port'"),
+        ("ws://h:99999", ": Port out of range 0-65535"),
+        ("udp://", ": it has no host"),
+        ("ws://[::1", ": Invalid IPv6 URL"),
+        ("", ""),
+    ],
+)
+def test_a_wrong_address_is_refused(address: str, why: str) -> None:
+    with pytest.raises(InputError, match=f"is no address of a peer{why}"):
         open_peer(address)
 
 

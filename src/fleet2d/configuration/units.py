@@ -93,18 +93,20 @@ def parse_peer_address(text: str) -> SplitResult:
         >>> parse_peer_address("mqtt://nas:1883/lab").port
         1883
     """
-    parts = urlsplit(text)
     try:
-        has_place = bool(parts.netloc) and (parts.port is None or parts.port >= 0)
-    except ValueError:  # a port that is no number
-        has_place = False
-    if parts.scheme not in PEER_SCHEMES or not has_place:
-        hint = did_you_mean(parts.scheme, PEER_SCHEMES) or "."
-        raise problem(
-            f"{text!r} is no address of a peer{hint} Write udp://HOST:PORT, ws://HOST:PORT,"
-            " rosbridge://HOST:PORT or mqtt://HOST:PORT/PREFIX"
-        )
-    return parts
+        parts = urlsplit(text)
+        _ = parts.port
+    except ValueError as error:
+        wrong = f": {error}."
+    else:
+        is_known = parts.scheme in PEER_SCHEMES
+        if is_known and parts.netloc:
+            return parts
+        wrong = ": it has no host." if is_known else did_you_mean(parts.scheme, PEER_SCHEMES)
+    raise problem(
+        f"{text!r} is no address of a peer{wrong or '.'} Write udp://HOST:PORT, ws://HOST:PORT,"
+        " rosbridge://HOST:PORT or mqtt://HOST:PORT/PREFIX"
+    )
 
 
 def _checked_peer_address(text: str) -> str:

@@ -11,7 +11,7 @@ import queue
 import sys
 import threading
 import time
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -52,6 +52,8 @@ REACH_M = 1.0
 MAX_PER_STEP = 1000
 # More messages than this, times the bound of a step, aren't even kept until then.
 MAX_WAITING_STEPS = 10
+# Of so many steps it is kept how late they began: a run may last for months.
+MAX_LATENESS = 100_000
 # The number of texts of one kind that are told in full.
 MAX_TOLD = 20
 
@@ -185,7 +187,7 @@ class Bridge:
         rows: Whether rows of tables are passed on, besides poses and events.
         tell: Called with notes about what arrived.
         counts: How many messages were received, applied, late, lost, wrong, replaced, too many.
-        lateness_s: How late each step began.
+        lateness_s: How late each of the last steps began, at most MAX_LATENESS of them.
 
     Example:
         >>> from fleet2d.live import to_function
@@ -206,7 +208,7 @@ class Bridge:
     rows: bool = True
     tell: Callable[[str], object] = str
     counts: Counter[str] = field(default_factory=Counter)
-    lateness_s: list[float] = field(default_factory=list)
+    lateness_s: deque[float] = field(default_factory=lambda: deque(maxlen=MAX_LATENESS))
 
     def __post_init__(self) -> None:
         """Begin with nothing heard.
