@@ -168,3 +168,58 @@ def test_unknown_rooms_and_turns_are_refused(change: dict[str, str], message: st
         watched({"at": "22:05", **change})
     with pytest.raises(InputError, match=message):
         watched(changes=[{"at": "5 min", **change}])
+
+
+DARK_AT = "19:00"
+"""Dark in December and light in June; the default of `unlit` says dark."""
+
+
+@pytest.mark.parametrize(("start", "least", "most"), [("06-21", 1200, 1200), ("12-21", 150, 330)])
+def test_with_daylight_the_season_decides_how_dark_an_unlit_room_is(
+    start: str, least: int, most: int
+) -> None:
+    off = {"at": "0 s", "lights": "all", "turn": "off"}
+    place = {"start": f"2026-{start}T{DARK_AT}", "daylight": {"latitude": 52.5}}
+    stored = watched(off, simulation=place)
+
+    assert least <= seen(stored, "22:00", "22:20") <= most
+
+
+def test_a_curve_of_ones_own_goes_before_daylight() -> None:
+    off = {"at": "0 s", "lights": "all", "turn": "off"}
+    place = {"start": f"2026-12-21T{DARK_AT}", "daylight": {"latitude": 52.5}}
+    blind = {"perception": {"detection": {"unlit": 0.0}}}
+
+    assert seen(watched(off, simulation=place, astro=blind), "22:00", "22:20") == 0
+
+
+@pytest.mark.parametrize(("day", "expected"), [("06-21", []), ("12-21", [1])])
+def test_lights_in_the_dark_are_on_from_sunset_to_sunrise(day: str, expected: list[int]) -> None:
+    place = {"start": f"2026-{day}T{DARK_AT}", "daylight": {"latitude": 52.5}}
+
+    assert expected == switched(watched(ana={"lights": "dark"}, simulation=place), "light_on")[0]
+
+
+def test_a_light_goes_on_at_sunset() -> None:
+    """In Berlin's winter, at 15:54 and some seconds."""
+    place = {"start": "2026-12-21T15:50", "daylight": {"latitude": 52.52, "noon": "12:06:23"}}
+    steps, rooms = switched(watched(ana={"lights": "dark"}, simulation=place), "light_on")
+
+    assert (["kitchen_0"], True) == (rooms, 180 < steps[0] < 300)
+
+
+def test_lights_in_the_dark_need_a_place() -> None:
+    with pytest.raises(InputError, match=r"lights.*simulation\.daylight"):
+        watched(ana={"lights": "dark"})
+
+
+def test_runs_by_daylight_are_the_same_for_every_span_and_from_their_manifest() -> None:
+    content = people(daylight={"latitude": 52.5})
+    content["users"]["ana"]["lights"] = "dark"
+    expected = digests(run(content))
+
+    assert expected == digests(run(content, max_span=7))
+    assert (
+        fleet2d.load_scenario(fleet2d.load_scenario(content).resolved()).users["ana"].lights
+        == fleet2d.load_scenario(content).users["ana"].lights
+    )

@@ -53,6 +53,36 @@ def test_a_vacation_begins_within_its_part_of_each_year() -> None:
     assert len({day(first)[5:] for first, _ in found}) > 10
 
 
+HEAT = {"every": "20 d", "season": ["06-01", "08-31"], "lasts": "4 d", "days": "hot"}
+
+
+def test_heat_comes_by_chance_and_begins_in_its_season_only() -> None:
+    found = spans(HEAT, years=30)
+    anytime = spans({name: value for name, value in HEAT.items() if name != "season"}, years=30)
+
+    assert all("06-01" <= day(first)[5:] <= "08-31" for first, _ in found)
+    assert set(found) == {s for s in anytime if "06-01" <= day(s[0])[5:] <= "08-31"}
+    assert 30 * 92 / 24 == pytest.approx(len(found), rel=0.15)
+
+
+def test_a_season_of_chance_may_last_past_new_year() -> None:
+    found = spans({**HEAT, "season": ["12-01", "01-31"]}, years=10)
+
+    assert {"12", "01"} == {day(first)[5:7] for first, _ in found}
+
+
+def test_days_of_heat_have_a_siesta_and_an_evening_outside() -> None:
+    days = {"season": ["06-01", "08-31"], "days": "hot"}
+    june = date(2026, 6, 1).toordinal()
+    lives = life(), life(heat=days)
+    cool, hot = ([e.activity for d in range(june, june + 30) for e in own.day(d)] for own in lives)
+
+    assert cool.count("sit_outside") == 0
+    assert hot.count("nap") > 15
+    assert hot.count("sit_outside") > 15
+    assert hot.count("work") == 0
+
+
 def test_a_season_may_last_past_new_year_and_end_on_a_leap_day() -> None:
     found = spans({"season": ["11-15", "02-29"], "days": "day_off"}, years=3)
     assert [(day(first), day(last)) for first, last in found] == [

@@ -1,17 +1,21 @@
 """The lights that people switch: on where they are awake in the dark, off when they leave."""
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from fleet2d.engine.basis import Basis
-from fleet2d.entities.behavior import Actor, holds
+from fleet2d.entities.behavior import DARK, Actor, HoursSpan, holds
 from fleet2d.entities.body import Track
 from fleet2d.entities.decisions import DecidingActor, StandStill
 from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.placed_objects import POSTURES
 from fleet2d.kernels import rooms_at
 from fleet2d.runtime.events import HOME, Event, EventKind
+
+if TYPE_CHECKING:
+    from fleet2d.runtime.sun import Sun
 
 LYING = POSTURES.index("lie")
 NOWHERE = -1
@@ -36,7 +40,12 @@ class PeopleSwitches:
     def __init__(self, basis: Basis) -> None:
         self._home, self._clock, self._bodies = basis.home, basis.clock, basis.bodies
         users = basis.scenario.users.values()
-        self._hours = {row: user.lights for row, user in enumerate(users) if user.lights}
+        sun = basis.clock.sun
+        self._hours: dict[int, tuple[HoursSpan | Sun, ...]] = {
+            row: tuple(sun if span == DARK and sun else span for span in user.lights)
+            for row, user in enumerate(users)
+            if user.lights
+        }
         self._awake_in = dict.fromkeys(self._hours, NOWHERE)
         if self._hours:
             basis.home.set_lights(range(len(basis.home.rooms)), is_on=False)

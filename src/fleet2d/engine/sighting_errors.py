@@ -23,7 +23,8 @@ from fleet2d.kernels import (
     in_radians,
 )
 from fleet2d.kernels import SightingColumn as Column
-from fleet2d.sight.perception import Curve, Detection, Perception
+from fleet2d.runtime.sun import Sun
+from fleet2d.sight.perception import DARK_NIGHT, DARKEST, Curve, Detection, Perception
 from fleet2d.sight.perception_error import CameraSightings, ErrorStream, PerceptionError
 
 if TYPE_CHECKING:
@@ -75,15 +76,22 @@ class Darkness(PerceptionError):
 
     Attributes:
         unlit: Share that are noticed nevertheless, by the time of day [hours].
+        sun: The sun, if it decides on that share instead.
     """
 
     unlit: Curve
+    sun: Sun | None = None
 
     def distort(self, sightings: CameraSightings) -> CameraSightings:
         """Return the sightings without those that the darkness hides."""
         is_dark = np.isin(sightings.true_room, sorted(sightings.home.unlit))
         is_dark &= sightings.true_user != NOBODY
-        shares = self.unlit.around_the_clock().chances(sightings.hour.tolist()) / ONE
+        if self.sun is None:
+            shares = self.unlit.around_the_clock().chances(sightings.hour.tolist()) / ONE
+        else:
+            since = (sightings.step * round(1e6 * sightings.step_s)).astype("m8[us]")
+            by_day = self.sun.shares(np.datetime64(sightings.start, "us") + since)
+            shares = DARKEST + (1 - DARKEST) * by_day
         is_hidden = is_dark & (sightings.uniform("noticed") >= shares)
         return sightings.replace(noticed=sightings.noticed & ~is_hidden)
 
@@ -122,7 +130,8 @@ class SightingErrors:
             path = f"{owner.path}{part}.perception.errors"
             errors = dict(sorted(perception.errors.items())) if perception else {}
             detection = perception.detection if perception else Detection()
-            darkness = Darkness(unlit=detection.unlit)
+            sun = owner.clock.sun if detection.unlit == DARK_NIGHT else None
+            darkness = Darkness(unlit=detection.unlit, sun=sun)
             self._cameras.append(CameraErrors(name, path, errors, darkness))
 
     def change(

@@ -48,7 +48,7 @@ from fleet2d.interventions.intervention import ClockTime, Intervention, parse_wh
 from fleet2d.interventions.methods import InterventionMethods
 from fleet2d.kernels import in_radians
 from fleet2d.runs.run import Run, open_store
-from fleet2d.runtime.clock import Clock, midnight_of
+from fleet2d.runtime.clock import midnight_of
 from fleet2d.runtime.events import Event, EventKind
 from fleet2d.runtime.memory import free_bodies, rare_collections
 from fleet2d.scenario.model import Scenario, load_scenario
@@ -113,7 +113,7 @@ class Simulation(InterventionMethods):
         """Set up all but the directory."""
         self.scenario, simulation = scenario, scenario.simulation
         self.seed = secrets.randbelow(2**53) if simulation.seed is None else simulation.seed
-        self.clock = Clock(simulation.start, simulation.step_us, simulation.steps)
+        self.clock = simulation.clock
         self._store = store
         self._state = set_up(self.scenario, self.clock, self.seed, self._store)
         # The scenario's own script repeats its interventions itself.

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from fleet2d.floorplan.home import Home
     from fleet2d.floorplan.plan import Room
     from fleet2d.interactions.interaction import RequestQueue
+    from fleet2d.runtime.sun import Sun
 
 
 DAY = timedelta(days=1)
@@ -111,7 +112,32 @@ Hours = Annotated[
 """Hours of the week, in one or several spans; what an empty list means is up to the field."""
 
 
-def holds(hours: Sequence[HoursSpan], time: datetime) -> datetime | None:
+DARK = HoursSpan((), timedelta(0), timedelta(0), "dark")
+"""The hours from sunset to sunrise, which `fleet2d.runtime.sun.Sun` has for each day."""
+
+
+def _parse_light_hours(value: object) -> tuple[HoursSpan, ...]:
+    return (DARK,) if value in ("dark", ["dark"], (DARK,)) else _parse_hours(value)
+
+
+LightHours = Annotated[
+    tuple[HoursSpan, ...],
+    BeforeValidator(_parse_light_hours),
+    PlainSerializer(lambda spans: [span.text for span in spans]),
+    WithJsonSchema(
+        {
+            "description": "hours of the week, like '17:00-08:00', a list of them, or 'dark', from"
+            " sunset to sunrise",
+            "x-quantity": "hours",
+            "anyOf": [{"type": "string"}, {"type": "array", "items": {"type": "string"}}],
+            "examples": ["17:00-08:00", "dark"],
+        }
+    ),
+]
+"""Hours of the week, or those in which it is dark."""
+
+
+def holds(hours: "Sequence[HoursSpan | Sun]", time: datetime) -> datetime | None:
     """Return the end of the hours that a moment lies in; None if it lies outside."""
     ends = [end for span in hours if (end := span.end_at(time))]
     return max(ends, default=None)

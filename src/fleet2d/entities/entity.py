@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 from fleet2d.configuration.components import OneOf
 from fleet2d.configuration.problems import problem_at
 from fleet2d.configuration.units import Length, Speed, TurnRateDeg
-from fleet2d.entities.behavior import Behavior, Hours
+from fleet2d.entities.behavior import Behavior, LightHours
 from fleet2d.entities.body import BodySettings
 from fleet2d.entities.drive import Differential, Drive
 from fleet2d.entities.equipment import Battery, Localization
@@ -42,13 +42,13 @@ class User(Entity):
         camera: The user's field of view; with it, robots that come into view are events.
         answers: How the person answers robots that want something; null: as most people do.
         lights: Hours in which the person has the light on where it is awake, and switches it off on
-            leaving; left out: it leaves lights alone.
+            leaving; `dark`: from sunset to sunrise; left out: it leaves lights alone.
     """
 
     opens_doors: bool = True
     camera: Camera | None = None
     answers: AnswersField | None = None
-    lights: Hours = ()
+    lights: LightHours = ()
     sight_events: ClassVar[tuple[str, str]] = ("robot_lost", "robot_seen")
     uses_furniture: ClassVar[bool] = True
     uses_portals: ClassVar[bool] = True

@@ -297,18 +297,19 @@ FIRST_YEAR, LAST_YEAR = 2000, 2050  # whose public holidays are looked up
 class YearEvent(Settings):
     """Something that changes the days of a person in the course of a year.
 
-    When: one of `every`, `yearly`, `once`, `season` and `holidays`. What then: one of `days`,
-    `away` and `becomes`.
+    When: one of `every`, `yearly`, `once`, `season` and `holidays`; `every` may have a `season`.
+    What then: one of `days`, `away` and `becomes`.
 
     Attributes:
         every: It comes by chance, with this mean time between its end and its next beginning.
         yearly: It begins on a random day of this part of each year: ("07-10", "08-20").
         once: It begins on this date, or on a random day of this range.
-        season: It is this part of each year: ("11-01", "02-28").
+        season: It is this part of each year: ("11-01", "02-28"); with `every`, it comes by chance,
+            and begins in this part only.
         holidays: It is on the public holidays of a country or a part of it: "DE", "DE-BY".
         dates: The dates of those holidays; looked up if left out.
         lasts: How long it lasts, rounded to days, at least one; left out: for good (`once`).
-        days: The template of the days, of the persona or a bundled one: ill, bad_day, day_off.
+        days: The template of the days, of the persona or a bundled one: ill, bad_day, day_off, hot.
         away: Whether nobody is at home: from 10:00 on its first day to 18:00 on its last.
         becomes: The persona whose days are lived from then on.
     """
@@ -334,13 +335,14 @@ class YearEvent(Settings):
     @model_validator(mode="after")
     def _is_one_thing_at_one_time(self) -> Self:
         times = ("every", "yearly", "once", "season", "holidays")
-        if sum(getattr(self, name) is not None for name in times) != 1:
+        times_given = [name for name in times if getattr(self, name) is not None]
+        if len(times_given) != 1 and times_given != ["every", "season"]:
             raise problem(f"say when it is by exactly one of {', '.join(times)}")
         if (self.days is not None) + self.away + (self.becomes is not None) != 1:
             raise problem("say what it changes by exactly one of days, away and becomes")
         if self.lasts is None and (self.every or self.yearly):
             raise problem("say how long it lasts, like 'lasts: 5 d'")
-        if self.lasts is not None and (self.season or self.holidays):
+        if self.lasts is not None and (self.season or self.holidays) and not self.every:
             raise problem("a season and a holiday have their own length: leave out 'lasts'")
         if isinstance(self.once, tuple) and self.once[0] > self.once[1]:
             raise problem_at(("once",), f"{self.once[0]} is after {self.once[1]}: swap them")

@@ -97,7 +97,11 @@ def _draw(event: YearEvent, key: np.uint64, year: int) -> list[Days]:
     """Return when an event is that begins in a year; one that is once, for any year."""
     draws = Draws(key, 0 if event.once is not None else year)
     if event.every is not None:
-        return _by_chance(event.every, event, draws, year)
+        found = _by_chance(event.every, event, draws, year)
+        if event.season is None:
+            return found
+        parts = [_part_of_year(event.season, each) for each in (year - 1, year)]
+        return [span for span in found if any(a <= span[0] <= b for a, b in parts)]
     if event.holidays is not None:
         return [(day.toordinal(), day.toordinal()) for day in event.dates if day.year == year]
     if event.season is not None:

@@ -2,11 +2,15 @@
 
 from dataclasses import dataclass
 from datetime import datetime, time, timedelta
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fleet2d.kernels import I64
+
+if TYPE_CHECKING:
+    from fleet2d.runtime.sun import Sun
 
 MICROSECOND = timedelta(microseconds=1)
 HOUR_S = 60 * 60
@@ -24,6 +28,7 @@ class Clock:
         start: Local time of step 0, without time zone: a simulated day always has 24 hours.
         step_us: Length of a step [us].
         steps: Number of steps; the last is steps - 1.
+        sun: The sun over the home; None: it doesn't matter.
 
     Example:
         >>> clock = Clock(datetime(2026, 1, 5), step_us=1_000_000, steps=3600)
@@ -36,6 +41,7 @@ class Clock:
     start: datetime
     step_us: int
     steps: int
+    sun: "Sun | None" = None
 
     def time(self, step: int) -> datetime:
         """Return the local time of a step."""

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Mapping
+from dataclasses import replace
 from datetime import date, datetime, timedelta
 from pathlib import Path
 from typing import Annotated, Any, Self
@@ -40,7 +41,14 @@ from fleet2d.configuration.problems import (
     suggest,
 )
 from fleet2d.configuration.trust import check_code
-from fleet2d.configuration.units import Duration, PositiveDuration, format_duration, micros
+from fleet2d.configuration.units import (
+    Duration,
+    PositiveDuration,
+    TimeOfDay,
+    format_duration,
+    micros,
+)
+from fleet2d.entities.behavior import DARK
 from fleet2d.entities.entity import Robot, User
 from fleet2d.entities.home_object import HomeObject
 from fleet2d.errors import ScenarioError
@@ -50,6 +58,7 @@ from fleet2d.floorplan.source import FloorPlanSource
 from fleet2d.interactions.interaction import Interaction
 from fleet2d.interventions.intervention import Entry
 from fleet2d.metrics.metric import Metric
+from fleet2d.runtime.clock import Clock
 from fleet2d.scenario.compose import compose, slot_kind
 from fleet2d.sight.camera import SightSettings
 
@@ -104,6 +113,19 @@ def _refuse_file_as_type(value: Any) -> Any:
     return value
 
 
+class Daylight(Settings):
+    """Where the home is, for the times of sunrise and sunset.
+
+    Attributes:
+        latitude: Its latitude, north is positive [deg].
+        noon: When the sun is highest by the clock, in the mean of the year; 12:10 with summer time
+            is 13:10.
+    """
+
+    latitude: float = Field(ge=-65, le=65, examples=[52.5])
+    noon: TimeOfDay = timedelta(hours=12)
+
+
 class SimulationSettings(Settings):
     """When a run starts, how long it lasts, and how fast it goes.
 
@@ -116,6 +138,8 @@ class SimulationSettings(Settings):
         people_block: How long a person or robot waits for another body in its way before going
             round it; null: bodies don't block each other.
         speedup: Run at this many times real time; null: as fast as possible.
+        daylight: Where the home is, if nights are to be longer in winter; null: lights and
+            detection go by the time of day alone.
     """
 
     start: Annotated[datetime, BeforeValidator(_parse_local_time)] = datetime(2026, 1, 5)
@@ -125,6 +149,7 @@ class SimulationSettings(Settings):
     max_span: int | None = Field(default=None, ge=1)
     people_block: PositiveDuration | None = Field(default=None, examples=["3 s"])
     speedup: float | None = Field(default=None, ge=0.001)
+    daylight: Daylight | None = None
 
     @model_validator(mode="after")
     def _fits_the_calendar(self) -> Self:
@@ -152,6 +177,16 @@ class SimulationSettings(Settings):
     def step_us(self) -> int:
         """The length of a step [µs]."""
         return micros(self.step)
+
+    @property
+    def clock(self) -> Clock:
+        """The steps of the run, and the sun over the home."""
+        clock = Clock(self.start, self.step_us, self.steps)
+        if self.daylight is None:
+            return clock
+        from fleet2d.runtime.sun import Sun  # few scenarios need it
+
+        return replace(clock, sun=Sun(self.daylight.latitude, self.daylight.noon))
 
 
 class Scenario(Settings):
@@ -206,6 +241,17 @@ class Scenario(Settings):
                         (section, name), f"there is {nouns[name]} named {name!r} already"
                     )
                 nouns[name] = noun
+        return self
+
+    @model_validator(mode="after")
+    def _nights_have_a_place(self) -> Self:
+        for name, user in self.users.items():
+            if user.lights == (DARK,) and self.simulation.daylight is None:
+                raise problem_at(
+                    ("users", name, "lights"),
+                    "when it is dark depends on where the home is: add"
+                    " simulation.daylight: {latitude: 52.5}",
+                )
         return self
 
     @model_validator(mode="after")

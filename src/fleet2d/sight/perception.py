@@ -190,7 +190,8 @@ SUM_ERROR = 1e-6
 
 # How well people are noticed without a light: by daylight as ever, at night a fifth as often. Not
 # measured: cameras differ widely here.
-DARK_NIGHT = Curve(points=((6.0, 0.2), (8.0, 1.0), (17.0, 1.0), (19.0, 0.2)))
+DARKEST = 0.2
+DARK_NIGHT = Curve(points=((6.0, DARKEST), (8.0, 1.0), (17.0, 1.0), (19.0, DARKEST)))
 
 
 def _check_sum(location: tuple[str, ...], total: float) -> None:
@@ -212,7 +213,8 @@ class Detection(Settings):
         visible_share: Factor by the share of the body's points in view; needs the camera's
             `body_points`.
         light: Factor by the time of day [hours], the same every day.
-        unlit: Further factor, by the time of day, where the light of the user's room is off.
+        unlit: Further factor, by the time of day, where the light of the user's room is off; left
+            out: by the sun, if the scenario has `simulation.daylight`.
         memory: Time constant of misses: after it, the last random draw still holds with probability
             1/e; 0: each look has a new draw.
     """
