@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 
 import fleet2d
 from fleet2d.algorithms.evidence import Evidence
-from fleet2d.algorithms.presence.sighting_share import SightingShare
+from fleet2d.algorithms.presence.estimator import SightingShare
 from fleet2d.cli.__main__ import app
 from fleet2d.engine.simulation import Simulation
 from fleet2d.entities.giving_way import WaitForPeople

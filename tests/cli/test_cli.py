@@ -435,7 +435,7 @@ def test_ctrl_c_during_set_up_exits_130(
 # What the bundled scenario doesn't use, and other scenarios or commands do.
 UNUSED = (
     "fleet2d.algorithms.presence.fremen",
-    "fleet2d.algorithms.presence.real_time",
+    "fleet2d.algorithms.presence.model",
     "fleet2d.engine.expectations",
     "fleet2d.engine.repeat",
     "fleet2d.entities.robots.search",

@@ -14,9 +14,7 @@ from fleet2d.errors import ComponentError, Fleet2DError, InputError
 from fleet2d.floorplan.home import Home
 from fleet2d.kernels import U64, Bool, Lenses, Poses, Reach, UserPoses
 from fleet2d.sight.camera import Camera, TableContext, stack_lenses
-from fleet2d.sight.flashlight import Flashlight
-from fleet2d.sight.fov import FieldOfView, LineOfSight
-from fleet2d.sight.visibility_polygon import VisibilityPolygon
+from fleet2d.sight.fov import FieldOfView, Flashlight, LineOfSight, VisibilityPolygon
 
 HERE = f"{TESTS.as_posix()}/engine/test_cameras_points"
 SECOND = 1_000_000

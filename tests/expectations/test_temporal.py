@@ -25,8 +25,7 @@ from fleet2d.expectations import (
     since,
     until,
 )
-from fleet2d.expectations.expectation import Expectation, RunSignals
-from fleet2d.expectations.traces import Trace
+from fleet2d.expectations.expectation import Expectation, RunSignals, Trace
 from fleet2d.expectations.verdict import verdict_of
 from fleet2d.runtime.clock import Clock
 

@@ -13,7 +13,7 @@ from fleet2d.errors import InputError, PlacementError
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.kernels import Reach
 from fleet2d.pictures.layers import CameraPose, cells_panel, draw_fov, parse_pose, region_panel
-from fleet2d.sight.flashlight import Flashlight
+from fleet2d.sight.fov import Flashlight
 
 
 @pytest.fixture(scope="module")

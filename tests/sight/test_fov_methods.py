@@ -17,9 +17,7 @@ from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.rooms.doorways import DoorLine
 from fleet2d.kernels import SUB, Bool, Reach
-from fleet2d.sight.flashlight import Flashlight
-from fleet2d.sight.fov import FieldOfView, LineOfSight
-from fleet2d.sight.visibility_polygon import VisibilityPolygon
+from fleet2d.sight.fov import FieldOfView, Flashlight, LineOfSight, VisibilityPolygon
 
 POINTS = 300
 

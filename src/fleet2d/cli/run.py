@@ -1,4 +1,4 @@
-"""`fleet2d run`: simulate a scenario; its progress, its messages and its summary."""
+"""`fleet2d run` and `resume`: simulate a scenario; its progress, its messages and its summary."""
 
 import gc
 import json

@@ -23,9 +23,9 @@ from fleet2d.artifacts.unfinished import (
     remove_leftovers,
 )
 from fleet2d.configuration.trust import Trust, refuse_untrusted, restrict, restrict_stored
+from fleet2d.engine.basis import changed_inputs
 from fleet2d.engine.checkpoint import Checkpoint, UnusableCheckpointError
 from fleet2d.engine.expectations import TABLE
-from fleet2d.engine.inputs import changed_inputs
 from fleet2d.engine.simulation import Simulation
 from fleet2d.errors import ArtifactError, InputError, RunDirectoryError
 from fleet2d.expectations.expectation import Expectation

@@ -23,8 +23,8 @@ from fleet2d.artifacts.store import RunStore, cannot_write
 from fleet2d.artifacts.unfinished import UnfinishedRun
 from fleet2d.configuration.problems import suggest
 from fleet2d.configuration.units import micros, parse_duration
+from fleet2d.engine.basis import input_files
 from fleet2d.engine.checkpoint import Checkpoint, CheckpointWriter
-from fleet2d.engine.inputs import input_files
 from fleet2d.engine.intervention_queue import is_from_outside
 from fleet2d.engine.loop import Loop
 from fleet2d.engine.setup import set_up

@@ -37,7 +37,7 @@ from fleet2d.configuration.trust import (
     is_scenario_module,
     public_name,
 )
-from fleet2d.engine.inputs import components_of
+from fleet2d.engine.basis import components_of
 from fleet2d.engine.state import State
 from fleet2d.entities.body import RandomWalk, Track
 from fleet2d.entities.plan import Note

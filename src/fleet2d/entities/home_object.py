@@ -1,4 +1,4 @@
-"""Objects of a home that have a state during a run, and the base of those that sense people."""
+"""Objects of a home that have a state during a run: doors, and the base of sensors."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

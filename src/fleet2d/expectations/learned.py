@@ -9,7 +9,7 @@ import numpy as np
 from fleet2d.algorithms.algorithm import to_columns
 from fleet2d.configuration.problems import suggest
 from fleet2d.errors import ScenarioError
-from fleet2d.expectations.expectation import WORDS
+from fleet2d.expectations.expectation import WORDS, Trace, constant
 from fleet2d.expectations.signals import (
     Gauge,
     MeasuredRun,
@@ -18,7 +18,6 @@ from fleet2d.expectations.signals import (
     SignalBlock,
     WordSignal,
 )
-from fleet2d.expectations.traces import Trace, constant
 from fleet2d.floorplan.home import Home
 
 

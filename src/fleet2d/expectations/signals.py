@@ -22,17 +22,23 @@ from fleet2d.entities.behavior import Actor, Behavior
 from fleet2d.entities.body import Pose
 from fleet2d.errors import InputError, ScenarioError
 from fleet2d.expectations.expectation import (
+    INFINITE,
     MIXED,
+    TINY,
     Expectation,
     RunSignals,
     Term,
+    Trace,
     Window,
     Word,
     argument_text,
+    combine,
+    constant,
+    joined,
     number_text,
+    shortest,
     truth,
 )
-from fleet2d.expectations.traces import INFINITE, TINY, Trace, combine, constant, joined, shortest
 from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.rooms.room import PRIORITY, usual_type
 from fleet2d.kernels import F64, I64

@@ -10,17 +10,21 @@ import numpy as np
 
 from fleet2d.configuration.problems import did_you_mean
 from fleet2d.errors import InputError
-from fleet2d.expectations.expectation import And, Expectation, Not, RunSignals, Word
-from fleet2d.expectations.signals import Scene, Signal
-from fleet2d.expectations.traces import (
+from fleet2d.expectations.expectation import (
     INFINITE,
+    And,
+    Expectation,
+    Not,
+    RunSignals,
     Trace,
+    Word,
     combine,
     constant,
     joined,
     pulses,
     shortest,
 )
+from fleet2d.expectations.signals import Scene, Signal
 from fleet2d.expectations.vocabulary import during
 from fleet2d.kernels import I64
 

@@ -8,7 +8,16 @@ from typing import Any, NamedTuple, Protocol
 
 from fleet2d.configuration.units import format_duration
 from fleet2d.errors import InputError
-from fleet2d.expectations.expectation import And, Expectation, Not, Or, RunSignals, number_text
+from fleet2d.expectations.expectation import (
+    TINY,
+    And,
+    Expectation,
+    Not,
+    Or,
+    RunSignals,
+    Trace,
+    number_text,
+)
 from fleet2d.expectations.signals import ANY_KIND, Signal, SignalComparison, WordComparison
 from fleet2d.expectations.temporal import (
     Temporal,
@@ -18,7 +27,6 @@ from fleet2d.expectations.temporal import (
     at_end,
     may_be_untested,
 )
-from fleet2d.expectations.traces import TINY, Trace
 from fleet2d.expectations.vocabulary import distance, during
 from fleet2d.runtime.clock import DAY_S, HOUR_S, Clock
 

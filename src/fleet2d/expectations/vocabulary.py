@@ -18,7 +18,7 @@ from fleet2d.configuration.problems import did_you_mean
 from fleet2d.configuration.units import parse_time_of_day, weekdays_of
 from fleet2d.entities.behavior import Actor
 from fleet2d.errors import InputError, ScenarioError
-from fleet2d.expectations.expectation import RunSignals
+from fleet2d.expectations.expectation import RunSignals, Trace, combine, constant, pulses, shortest
 from fleet2d.expectations.signals import (
     ANY_KIND,
     Condition,
@@ -30,7 +30,6 @@ from fleet2d.expectations.signals import (
     SignalBlock,
     WordSignal,
 )
-from fleet2d.expectations.traces import Trace, combine, constant, pulses, shortest
 from fleet2d.floorplan.home import Home, lattice_footprint
 from fleet2d.floorplan.lattice import UNITS_PER_CELL
 from fleet2d.floorplan.placed_objects import PlacedObject

@@ -23,8 +23,7 @@ from fleet2d.pictures.theme import SCALE
 from fleet2d.runs.layers import PREFIX, layer_steps, read_layer
 from fleet2d.runs.run import Run
 from fleet2d.sight.camera import DEFAULT_ANGLE_DEG, DEFAULT_RANGE_M
-from fleet2d.sight.flashlight import Flashlight
-from fleet2d.sight.fov import FieldOfView, VisibleRegion
+from fleet2d.sight.fov import FieldOfView, Flashlight, VisibleRegion
 
 # The brighter part of viridis: names of rooms are written over it.
 COLORS = ListedColormap(mpl.colormaps["viridis"](np.linspace(0.35, 1.0, 256)))

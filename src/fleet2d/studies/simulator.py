@@ -10,7 +10,7 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from fleet2d.engine.inputs import input_files
+from fleet2d.engine.basis import input_files
 from fleet2d.engine.simulation import Simulation
 from fleet2d.errors import ComponentError
 from fleet2d.runtime.clock import HOUR_S

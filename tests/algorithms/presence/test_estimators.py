@@ -16,11 +16,10 @@ from tests.algorithms.presence.worlds import (
 from tests.reference import presence as slow
 
 from fleet2d.algorithms.evidence import Evidence
-from fleet2d.algorithms.presence.estimator import Estimator
+from fleet2d.algorithms.presence.estimator import Estimator, SightingShare
 from fleet2d.algorithms.presence.exposure_ratio import AuditOnly, ExposureRatio
 from fleet2d.algorithms.presence.fremen import Fremen
 from fleet2d.algorithms.presence.likelihood import Likelihood
-from fleet2d.algorithms.presence.sighting_share import SightingShare
 from fleet2d.configuration.components import components
 from fleet2d.errors import ComponentError
 from fleet2d.kernels import F64

@@ -22,10 +22,10 @@ from tests.algorithms.presence.worlds import (
 
 from fleet2d.algorithms.evidence import Evidence, SightingCounts
 from fleet2d.algorithms.presence.belief import with_anyone
+from fleet2d.algorithms.presence.estimator import SightingShare
 from fleet2d.algorithms.presence.exposure_ratio import AuditOnly, ExposureRatio
 from fleet2d.algorithms.presence.likelihood import Likelihood
 from fleet2d.algorithms.presence.people import DayEvidence
-from fleet2d.algorithms.presence.sighting_share import SightingShare
 from fleet2d.kernels import F64, I64
 from fleet2d.metrics.ltp_error import total_variation
 

@@ -145,9 +145,9 @@ def any_evidence(
 
 def main() -> None:
     """Print the mean total variation of each estimator under each robot, over six runs of 30 days."""
+    from fleet2d.algorithms.presence.estimator import SightingShare
     from fleet2d.algorithms.presence.exposure_ratio import ExposureRatio
     from fleet2d.algorithms.presence.likelihood import Likelihood
-    from fleet2d.algorithms.presence.sighting_share import SightingShare
     from fleet2d.metrics.ltp_error import total_variation
 
     for policy in (patrol, hangout, follow):

@@ -9,7 +9,7 @@ import pytest
 from tests.scenes import flat_path, process, scenario
 
 import fleet2d
-from fleet2d.engine.inputs import input_files
+from fleet2d.engine.basis import input_files
 
 NET = """
 import numpy as np
