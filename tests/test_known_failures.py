@@ -324,7 +324,7 @@ CHANGES: dict[tuple[type, str], dict[str, Any]] = {
 # What is not told by tables, and which test sees it.
 ELSEWHERE = {
     (User, "color"): "tests/pictures: pictures",
-    (User, "lights"): "tests/engine/test_change_queue_lights: it is day here",
+    (User, "lights"): "tests/engine/test_lights: it is day here",
     (User, "answers"): "tests/interactions: no robot wants anything here",
     (Robot, "localization"): "tests/entities/test_localization",
     (Robot, "color"): "tests/pictures: pictures",
