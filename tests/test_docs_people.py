@@ -7,8 +7,10 @@ import re
 import subprocess
 import sys
 from collections.abc import Iterator
+from datetime import timedelta
 from pathlib import Path
 
+import numpy as np
 import pytest
 from tests.thorough import THOROUGH
 
@@ -110,6 +112,36 @@ def test_a_patrol_that_never_saw_the_beds_errs_as_the_page_says(shared_data: Pat
         )
         errors.append(f"{stored.metrics['likelihood_error']['ana']['tv']:.3f}")
     assert ["0.450", "0.013"] == errors
+
+
+def test_the_robot_of_the_readme_sees_her_as_often_as_it_says_and_enters_no_bedroom(
+    tmp_path: Path,
+) -> None:
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    scenario = text.split("```yaml title=home.yaml\n")[1].split("```")[0]
+    (tmp_path / "home.yaml").write_text(scenario, encoding="utf-8")
+    run = fleet2d.run(tmp_path / "home.yaml")
+    said = re.search(r"sees Ana during (\d+) % of her time", text)
+    assert said is not None
+    assert said[1] == f"{100 * run.metrics['sightings']['ana']:.0f}"
+
+    private = [r.index for r in fleet2d.load_floorplan().rooms if r.type in {"bedroom", "bathroom"}]
+    path = run.path("astro", every=timedelta(seconds=1))
+    assert not np.isin(path.room, private).any()
+
+
+def test_after_events_of_a_year_estimators_err_as_the_page_says(tmp_path: Path) -> None:
+    found = fleet2d.study(ROOT / "examples/studies/presence_year.yaml", tmp_path / "year").complete
+    columns = ("exposure_ratio", "exposure_ratio_14", "likelihood", "likelihood_14", "likelihood_5")
+    for event, cells in rows("presence", "| event | `exposure_ratio`"):
+        for column, cell in zip(columns, cells, strict=True):
+            values = [
+                row[f"{column}_error.ana.tv"]
+                for row in found.iter_rows(named=True)
+                if row["event"] == event
+            ]
+            assert 5 == len(values)
+            assert agrees(cell.split()[0], sum(values) / 5), (event, column)
 
 
 def test_fitted_personas_are_as_near_to_their_logs_as_the_page_says(
