@@ -22,7 +22,7 @@ from unittest.mock import patch
 import numpy as np
 
 import fleet2d
-from fleet2d.algorithms.process import Process
+from fleet2d.algorithms.external import Process
 from fleet2d.live import Bridge, open_peer
 from fleet2d.runs.exporters import export
 

@@ -29,8 +29,8 @@ from fleet2d.errors import ComponentError as ComponentError
 from fleet2d.errors import Fleet2DError as Fleet2DError
 from fleet2d.errors import InputError as InputError
 from fleet2d.floorplan.home import Home as Home
-from fleet2d.floorplan.home_change import HomeChange as HomeChange
-from fleet2d.floorplan.home_change import HomeChanges as HomeChanges
+from fleet2d.floorplan.home import HomeChange as HomeChange
+from fleet2d.floorplan.home import HomeChanges as HomeChanges
 from fleet2d.floorplan.load import load_floorplan as load_floorplan
 from fleet2d.floorplan.plan import FloorPlan as FloorPlan
 from fleet2d.floorplan.plan import LabelledRegion as LabelledRegion

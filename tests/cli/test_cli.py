@@ -439,7 +439,7 @@ UNUSED = (
     "fleet2d.engine.expectations",
     "fleet2d.engine.repeat",
     "fleet2d.entities.robots.search",
-    "fleet2d.entities.users.guest",
+    "fleet2d.entities.users.scripted",
     "fleet2d.expectations",
     "fleet2d.fit",
     "fleet2d.interventions.bodies",

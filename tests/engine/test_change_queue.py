@@ -13,7 +13,7 @@ from tests.thorough import some
 import fleet2d
 from fleet2d import Algorithm, ComponentError, InputError
 from fleet2d.engine.change_queue import crossings
-from fleet2d.floorplan.home_change import HomeChange, HomeChanges
+from fleet2d.floorplan.home import HomeChange, HomeChanges
 from fleet2d.kernels import Breakpoints
 
 

@@ -5,7 +5,7 @@ from datetime import datetime, timedelta
 import pytest
 from pydantic import ValidationError
 
-from fleet2d.floorplan.home_change import HomeChange, HomeChanges
+from fleet2d.floorplan.home import HomeChange, HomeChanges
 
 
 @pytest.mark.parametrize(

@@ -7,13 +7,10 @@ from pydantic import model_validator
 
 from fleet2d.entities.behavior import Actor, Situation
 from fleet2d.entities.plan import Plan
-from fleet2d.entities.robots.come import Come
 from fleet2d.entities.robots.dock import Dock
 from fleet2d.entities.robots.find import Find
-from fleet2d.entities.robots.follow import Follow
-from fleet2d.entities.robots.opportunistic import Opportunistic
-from fleet2d.entities.robots.patrol import Patrol
-from fleet2d.entities.robots.scheduled import Scheduled
+from fleet2d.entities.robots.follow import Come, Follow
+from fleet2d.entities.robots.patrol import Opportunistic, Patrol, Scheduled
 
 LATE = timedelta(seconds=30)
 

@@ -16,8 +16,7 @@ from fleet2d.configuration.components import Component
 from fleet2d.configuration.problems import suggest
 from fleet2d.configuration.units import InputPath, PositiveDuration
 from fleet2d.errors import ComponentError, InputError
-from fleet2d.floorplan.home import Home
-from fleet2d.floorplan.home_change import HomeChanges
+from fleet2d.floorplan.home import Home, HomeChanges
 from fleet2d.kernels import F64
 from fleet2d.runtime.determinism import Draws, stream_key
 

@@ -22,8 +22,7 @@ from fleet2d.entities.behavior import Actor
 from fleet2d.entities.body import Track
 from fleet2d.entities.home_object import Door, door_hint
 from fleet2d.errors import ComponentError, PlacementError, ScenarioError
-from fleet2d.floorplan.home import lattice_footprint
-from fleet2d.floorplan.home_change import ALL_ROOMS, HomeChange
+from fleet2d.floorplan.home import ALL_ROOMS, HomeChange, lattice_footprint
 from fleet2d.floorplan.mesh import Segment
 from fleet2d.floorplan.placed_objects import move_object
 from fleet2d.floorplan.rooms.room import PRIORITY, usual_type

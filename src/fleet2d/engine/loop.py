@@ -23,7 +23,7 @@ from fleet2d.engine.state import State
 from fleet2d.engine.world import EngineWorld
 from fleet2d.entities.behavior import Situation
 from fleet2d.errors import InputError, blame
-from fleet2d.floorplan.home_change import HomeChanges
+from fleet2d.floorplan.home import HomeChanges
 from fleet2d.runtime.clock import Clock
 from fleet2d.runtime.memory import rare_collections
 

@@ -26,8 +26,7 @@ from fleet2d.entities.body import Pose
 from fleet2d.entities.decisions import Arbiter, DecidingActor
 from fleet2d.entities.home_object import SensorFault
 from fleet2d.errors import ScenarioError
-from fleet2d.floorplan.home import Home
-from fleet2d.floorplan.home_change import HomeChange
+from fleet2d.floorplan.home import Home, HomeChange
 from fleet2d.floorplan.slow_area import SlowArea
 from fleet2d.interventions.intervention import (
     ENTRY_KEYS,

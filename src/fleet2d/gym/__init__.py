@@ -13,8 +13,8 @@ with extra("gym", "fleet2d.gym needs gymnasium and pettingzoo"):
 from fleet2d.gym.env import DiscountByTime as DiscountByTime
 from fleet2d.gym.env import RobotEnv as RobotEnv
 from fleet2d.gym.env import RobotLife as RobotLife
+from fleet2d.gym.env import RobotsEnv as RobotsEnv
 from fleet2d.gym.env import VectorRobotEnv as VectorRobotEnv
-from fleet2d.gym.parallel import RobotsEnv as RobotsEnv
 from fleet2d.gym.task import REWARDS as REWARDS
 from fleet2d.gym.task import LearningTask as LearningTask
 from fleet2d.gym.task import load_task as load_task

@@ -13,7 +13,7 @@ from fleet2d.entities.body import Pose
 from fleet2d.entities.decisions import DoActivity, GoOut, GoTo, StandStill
 from fleet2d.entities.place import Place, Point, RoomChoice, furniture_of, is_point, matching_rooms
 from fleet2d.entities.plan import check_data, plan_of
-from fleet2d.entities.users.guest import Guest
+from fleet2d.entities.users.scripted import Guest
 from fleet2d.errors import PlacementError, ScenarioError
 from fleet2d.floorplan.placed_objects import Posture
 from fleet2d.interventions.intervention import Intervention, World, body, user

@@ -9,7 +9,7 @@ from fleet2d.configuration.problems import suggest
 from fleet2d.entities.home_object import SensorFault
 from fleet2d.entities.place import Point
 from fleet2d.errors import ScenarioError
-from fleet2d.floorplan.home_change import HomeChange
+from fleet2d.floorplan.home import HomeChange
 from fleet2d.floorplan.slow_area import SlowArea
 from fleet2d.interventions.intervention import Intervention, Lasting, World
 

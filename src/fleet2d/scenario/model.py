@@ -52,7 +52,7 @@ from fleet2d.entities.behavior import DARK
 from fleet2d.entities.entity import Robot, User
 from fleet2d.entities.home_object import HomeObject
 from fleet2d.errors import ScenarioError
-from fleet2d.floorplan.home_change import HomeChange
+from fleet2d.floorplan.home import HomeChange
 from fleet2d.floorplan.load import advise_type
 from fleet2d.floorplan.source import FloorPlanSource
 from fleet2d.interactions.interaction import Interaction

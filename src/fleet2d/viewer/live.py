@@ -19,7 +19,7 @@ from fleet2d.configuration.documents import parse_yaml
 from fleet2d.engine.simulation import Simulation
 from fleet2d.entities.body import Track
 from fleet2d.errors import Fleet2DError, InputError, PlacementError
-from fleet2d.floorplan.home_change import HomeChange
+from fleet2d.floorplan.home import HomeChange
 from fleet2d.kernels import TURN, Mesh
 from fleet2d.runs.run import Run
 from fleet2d.runtime.clock import DAY_S

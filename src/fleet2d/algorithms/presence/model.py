@@ -18,8 +18,7 @@ from fleet2d.algorithms.presence.belief import (
     WeeklyPresence,
     are_distributions,
 )
-from fleet2d.algorithms.presence.estimator import Estimator
-from fleet2d.algorithms.presence.long_term import SECOND_US, PresenceAlgorithm
+from fleet2d.algorithms.presence.estimator import SECOND_US, Estimator, PresenceAlgorithm
 from fleet2d.configuration.components import Component, OneOf, register
 from fleet2d.configuration.units import PositiveDuration
 from fleet2d.errors import ComponentError

@@ -1,15 +1,15 @@
-"""Patrol: a robot's rounds through rooms or along waypoints."""
+"""Rounds of a robot: through rooms or along waypoints, at set times, or as people come by."""
 
-from collections.abc import Sequence
-from datetime import timedelta
-from typing import ClassVar, Literal, Self
+from collections.abc import Iterator, Sequence
+from datetime import datetime, timedelta
+from typing import Annotated, ClassVar, Literal, Self
 
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
-from fleet2d.configuration.components import register
+from fleet2d.configuration.components import Settings, register
 from fleet2d.configuration.problems import problem
-from fleet2d.configuration.units import Duration
-from fleet2d.entities.behavior import Actor, Behavior, Situation
+from fleet2d.configuration.units import Days, Duration, Length, Share, TimeOfDay, weekdays_of
+from fleet2d.entities.behavior import DAY, DOOR_WAIT, Actor, Behavior, Situation
 from fleet2d.entities.place import (
     Place,
     Point,
@@ -18,11 +18,20 @@ from fleet2d.entities.place import (
     furniture_of,
     is_point,
     lies_in,
+    stop_at,
     stops_at,
 )
 from fleet2d.entities.plan import Plan
-from fleet2d.entities.robots.approach import stops_with_view, unwatched
+from fleet2d.entities.robots.approach import (
+    approach,
+    check_has_camera,
+    is_in_rooms,
+    stops_with_view,
+    unwatched,
+)
 from fleet2d.floorplan.plan import Room
+from fleet2d.interactions.interaction import Request
+from fleet2d.runtime.clock import midnight_of
 
 MAX_NAMED = 6  # how many rooms a note names
 
@@ -118,3 +127,191 @@ class Patrol(Behavior):
             plan.stay(self.dwell)
             has_stop = True
         return plan if has_stop else plan.stay(self.dwell)
+
+
+class ScheduledVisit(Settings):
+    """One visit: when, where, and for how long.
+
+    Attributes:
+        at: Time of day at which the robot sets out.
+        place: The destination: a room, a kind of room, or a point.
+        dwell: How long it stays there.
+        on: The days on which it is made.
+        look_around: Turn once on the spot on arriving.
+        task: The task that is done there, for the events table.
+    """
+
+    at: TimeOfDay
+    place: Place
+    dwell: Duration = timedelta(minutes=10)
+    on: Days | Annotated[tuple[Days, ...], Field(min_length=1)] = "daily"
+    look_around: bool = True
+    task: str = ""
+
+
+@register("behavior", "scheduled")
+class Scheduled(Behavior):
+    """Visit rooms at fixed times of the day; between visits, later behaviors decide.
+
+    It interrupts them when a visit is due. If `preempts` is false, a visit is made once they have
+    no plan, no later than `late` after its time; a visit behind a shut door, once the door is open.
+    In a room the robot stops at the point farthest from its walls. Events: `visits`, with the task,
+    else the room, and `way_blocked`, with the room.
+
+    Attributes:
+        visits: The visits.
+        late: A visit that can't begin within this time is left out.
+        avoid: Rooms, or kinds of rooms if the home has them, that it doesn't visit: visits there
+            are left out, with a note.
+    """
+
+    records: ClassVar[frozenset[str]] = frozenset({"visits", "way_blocked"})
+
+    visits: tuple[ScheduledVisit, ...] = Field(min_length=1)
+    late: Duration = timedelta(minutes=30)
+    avoid: tuple[str, ...] = ()
+
+    def start(self, actor: Actor) -> None:
+        """Find the stops."""
+        self.stops = [stop_at(actor, visit.place) for visit in self.visits]
+        avoided = avoided_rooms(actor, "scheduled.avoid", self.avoid)
+        self.left_out = {i for i, xy in enumerate(self.stops) if lies_in(actor, xy, avoided)}
+        if self.left_out:
+            rooms = ", ".join(sorted({self._room_name(actor, i) for i in self.left_out}))
+            actor.notes.append(f"scheduled.visits: left out, because of `avoid`: those of {rooms}")
+        self.last_decision = actor.clock.start - timedelta(microseconds=1)
+        self.pending: list[tuple[datetime, int]] = []  # due time and number of visits to make
+
+    def wakes_at(self, now: Situation, plan: Plan) -> datetime | None:
+        """Return when the next visit is due, or a shut door is tried again."""
+        due = next((due for due, _ in self._due(max(self.last_decision, now.time))), None)
+        retry = now.time + DOOR_WAIT if self.pending else None
+        return min((time for time in (due, retry) if time is not None), default=None)
+
+    def decide(self, now: Situation) -> Plan | None:
+        """Make a visit that is due, or leave the decision to later behaviors."""
+        fresh = [visit for visit in self._due(self.last_decision) if visit[0] <= now.time]
+        self.last_decision = now.time
+        self.pending = [v for v in self.pending + fresh if now.time - v[0] <= self.late]
+        for due, number in self.pending:
+            if not now.actor.may_block_routes or now.plan().reaches(*self.stops[number]):
+                self.pending.remove((due, number))
+                return self._visit(now, number)
+        blocked = [number for due, number in self.pending if (due, number) in fresh]
+        if blocked:
+            return (
+                now.plan()
+                .note("way_blocked", self._room_name(now.actor, blocked[0]))
+                .stay(DOOR_WAIT)
+            )
+        return None
+
+    def _visit(self, now: Situation, number: int) -> Plan:
+        visit, (x, y) = self.visits[number], self.stops[number]
+        name = visit.task or self._room_name(now.actor, number)
+        plan = now.plan().go_to_point(x, y).note("visits", name)
+        if visit.look_around:
+            plan.turn_by(1.0)
+        return plan.stay(visit.dwell)
+
+    def _room_name(self, actor: Actor, number: int) -> str:
+        """Return the name of the room of a visit; empty for a point between two rooms."""
+        plan = actor.home.plan
+        room = plan.room_at(*plan.lattice.to_metres(self.stops[number]).tolist())
+        return room.name if room else ""
+
+    def _due(self, since: datetime) -> Iterator[tuple[datetime, int]]:
+        """Yield time and number of the visits due within eight days after a moment, in order."""
+        midnight = midnight_of(since)
+        for ahead in range(9):
+            day = midnight + ahead * DAY
+            today = [
+                (day + visit.at, number)
+                for number, visit in enumerate(self.visits)
+                if number not in self.left_out and day.weekday() in weekdays_of(visit.on)
+            ]
+            yield from (entry for entry in sorted(today) if entry[0] > since)
+
+
+@register("behavior", "opportunistic")
+class Opportunistic(Behavior):
+    """Approach a person who comes into view, and interact for a while.
+
+    The behavior that it interrupts goes on afterwards. It goes to where the person was perceived; a
+    person who walks on in the meantime isn't followed. Events: `approaches`, `interacts`, with the
+    name of the person as perceived, and `interaction_over`. If the robot wants something of the
+    person (`interactions:`), it asks for it (`asks`), and carries out what is accepted
+    (`delivered`).
+
+    Attributes:
+        users: Users that it approaches; left out: everybody, recognized or not.
+        distance: How near it comes [m]; personal space ends at 1.2 m.
+        interaction: How long it interacts.
+        chance: Probability that it takes an opportunity.
+        again: Minimum time between two approaches to the same person.
+        avoid: Rooms, or kinds of rooms if the home has them, in which it leaves people alone.
+    """
+
+    records: ClassVar[frozenset[str]] = frozenset(
+        {"approaches", "asks", "collects", "delivered", "interaction_over", "interacts"}
+    )
+    listens: ClassVar[frozenset[str]] = frozenset({"user_seen"})
+
+    users: tuple[str, ...] = ()
+    distance: Length = Field(default=1.2, ge=0.3, le=10)
+    interaction: Duration = timedelta(minutes=1)
+    chance: Share = 1.0
+    again: Duration = timedelta(minutes=15)
+    avoid: tuple[str, ...] = ()
+
+    def about(self) -> tuple[str, ...]:
+        """Return the users that it approaches, if only some."""
+        return self.users
+
+    def start(self, actor: Actor) -> None:
+        """Check that it has a camera."""
+        check_has_camera(actor, "opportunistic")
+        self.avoided = avoided_rooms(actor, "opportunistic.avoid", self.avoid)
+        self.asked: tuple[Request, str] | None = None  # the request, as events named it
+        self.last_opportunity: dict[str, datetime] = {}  # by person
+
+    def decide(self, now: Situation) -> Plan | None:
+        """Approach somebody in view, or leave the decision to later behaviors."""
+        if (accepted := self._accepted(now)) is not None:
+            request, text = accepted
+            person = text.rpartition(" ")[2]
+            done = "delivered" if person == request.interaction.to else "collects"
+            plan = now.plan().stay(request.interaction.takes).note(done, text)
+            return plan.note("interaction_over", person)
+        avoided = self.avoided | now.actor.banned(now.step)
+        for name, (x, y) in sorted(now.in_view.items()):
+            if not self._is_opportunity(name, now) or is_in_rooms(now, x, y, avoided):
+                continue
+            self.last_opportunity[name] = now.time
+            if now.random(f"chance {name}").uniform() < self.chance:
+                return self._approach(now, name, x, y)
+        return None
+
+    def _is_opportunity(self, name: str, now: Situation) -> bool:
+        """Return whether it may approach a person: one of its users, left alone for long enough."""
+        if self.users and name not in self.users:
+            return False
+        last = self.last_opportunity.get(name)
+        return last is None or now.time - last >= self.again
+
+    def _approach(self, now: Situation, name: str, x: float, y: float) -> Plan:
+        plan = now.plan().note("approaches", name)
+        approach(now, plan, x, y, self.distance)
+        plan.face(*now.home.plan.lattice.point_at((x, y)))
+        plan.note("interacts", name)
+        ready = [] if now.requests is None else now.requests.ready(now.time, (name,))
+        self.asked = (ready[0], ready[0].text) if ready else None
+        if self.asked is not None:
+            plan.note("asks", self.asked[1]).interrupt_on("accepted")
+        return plan.stay(self.interaction).note("interaction_over", name)
+
+    def _accepted(self, now: Situation) -> tuple[Request, str] | None:
+        """Return the request that the person it is with has just accepted, and its text."""
+        asked, self.asked = self.asked, None
+        texts = [event.user for event in now.events if event.event == "accepted"]
+        return asked if asked is not None and asked[1] in texts else None
