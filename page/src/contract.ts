@@ -111,6 +111,14 @@ export interface MarkFacts {
   label: string;
 }
 
+/** A floor that slows robots down from `step` to before `end`: its outline [m], its effect. */
+export interface SlowFacts {
+  outline: [number, number][];
+  words: string;
+  step: number;
+  end: number;
+}
+
 /** Stretches in which a robot noticed a user: steps `first` to `last`, both included. `false` marks stretches in which the robot took something else for that user. */
 export interface SightingFacts {
   robot: string;
@@ -120,7 +128,7 @@ export interface SightingFacts {
   false: boolean[];
 }
 
-/** Everything about a run but its tables; steps `first_step` to `end_step` - 1 are shown. */
+/** Everything about a run but its tables; steps `first_step` to `end_step` - 1 are shown. With `starts_unlit` all lights are off at first; its events switch them. */
 export interface RunFacts {
   title: string;
   status: string;
@@ -138,6 +146,8 @@ export interface RunFacts {
   tables: TableFacts[];
   walls: WallsChange[];
   marks: MarkFacts[];
+  slows: SlowFacts[];
+  starts_unlit: boolean;
   metrics: Record<string, unknown>;
   scenario: Record<string, unknown>;
   walks_every_s: number;
@@ -175,7 +185,7 @@ export interface BranchOrder {
   step: number;
 }
 
-/** A body at a step of a running simulation [lattice], and its path ahead: time [us], x, y. At the step `decides` its behaviors are asked next, if nothing interrupts it; -1: at none. */
+/** A body at a step of a running simulation [lattice], and its path ahead: time [us], x, y. It follows a plan of its `behavior`, whose last note is the `reason`. At the step `decides` its behaviors are asked next, if nothing interrupts it; -1: at none. */
 export interface LiveBody {
   name: string;
   x: number;
@@ -183,7 +193,8 @@ export interface LiveBody {
   heading: number;
   away: boolean;
   ahead: [number, number, number][];
-  note: string;
+  behavior: string;
+  reason: string;
   decides: number;
 }
 
@@ -209,6 +220,7 @@ export interface LiveFrame {
   beliefs: Record<string, number[]>;
   events: LiveEvent[];
   marks: MarkFacts[];
+  slows: SlowFacts[];
   walls: number;
   message: string;
   served_as: number;

@@ -7,7 +7,7 @@ import type { Run } from "./data/run";
 import { firstAtLeast, lastAtMost } from "./data/search";
 
 export const SPEEDS = [1, 10, 60, 600, 3600, 14_400, 86_400];
-export const SWITCHES = ["names", "furniture", "ways", "sight", "observations", "beliefs"] as const;
+export const SWITCHES = ["names", "furniture", "ways", "sight", "observations", "beliefs", "lights", "slows"] as const;
 export type Switch = (typeof SWITCHES)[number];
 export const PANELS = ["now", "inspect", "beliefs", "events", "metrics", "layers", "notes"] as const;
 export type Panel = (typeof PANELS)[number];
@@ -31,7 +31,7 @@ export const eventKind = signal("");
 export const search = signal("");
 /** What was asked of the timeline, and what answers it. */
 export const answer = signal<Answer | null>(null);
-export const shown = signal<ReadonlySet<Switch>>(new Set(["names", "furniture", "ways", "sight", "observations"]));
+export const shown = signal<ReadonlySet<Switch>>(new Set(SWITCHES.filter((name) => name !== "beliefs")));
 export const layer = signal("");
 export const panel = signal<Panel>("now");
 export const belief = signal("");

@@ -19,6 +19,7 @@ export interface Colors {
   cursor: string;
   halo: string;
   hatch: string;
+  slow: string;
 }
 
 const LIGHT: Colors = {
@@ -37,6 +38,7 @@ const LIGHT: Colors = {
   cursor: "#c8452f",
   halo: "rgba(255,255,255,0.8)",
   hatch: "#cfd2d6",
+  slow: "#0077bb",
 };
 
 const DARK: Colors = {
@@ -55,6 +57,7 @@ const DARK: Colors = {
   cursor: "#ff7a63",
   halo: "rgba(22,24,28,0.8)",
   hatch: "#4a5059",
+  slow: "#66bbee",
 };
 
 const query = typeof matchMedia === "function" ? matchMedia("(prefers-color-scheme: dark)") : null;

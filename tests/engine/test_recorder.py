@@ -9,6 +9,8 @@ from tests.thorough import some
 
 from fleet2d.engine import recorder
 
+DECISIONS = {"trajectories": "1 min", "decisions": True}
+
 
 def small(**artifacts: Any) -> dict[str, Any]:
     return scenario(
@@ -24,10 +26,11 @@ def small(**artifacts: Any) -> dict[str, Any]:
 def test_tables_do_not_depend_on_when_rows_are_handed_over(
     monkeypatch: pytest.MonkeyPatch, span: int | None
 ) -> None:
-    expected = digests(run(everything("30 min")))
+    content = everything("30 min", artifacts=DECISIONS)
+    expected = digests(run(content))
     monkeypatch.setattr(recorder, "MAX_ROWS", 0)
     monkeypatch.setattr(recorder, "ROWS_PER_BODY", 0)
-    assert expected == digests(run(everything("30 min"), max_span=span))
+    assert expected == digests(run(content, max_span=span))
 
 
 def test_every_step_of_the_end_is_the_same_when_rows_are_handed_over_late_or_early(
@@ -42,9 +45,11 @@ def test_every_step_of_the_end_is_the_same_when_rows_are_handed_over_late_or_ear
             assert expected == digests(run(content, max_span=1)), seconds
 
 
-@pytest.mark.parametrize("name", ["trajectories", "key_frames", "observations", "events"])
+@pytest.mark.parametrize(
+    "name", ["trajectories", "key_frames", "observations", "events", "decisions"]
+)
 def test_rows_are_in_order_of_step_and_entity(name: str) -> None:
-    stored = run(everything("1 h"))
+    stored = run(everything("1 h", artifacts=DECISIONS))
     columns = table(stored, name)
     bodies = [*stored.manifest["entities"]["users"], *stored.manifest["entities"]["robots"]]
     who = columns["robot" if name == "observations" else "entity"]
@@ -65,6 +70,16 @@ def test_a_table_that_is_off_is_not_there_and_changes_no_other(name: str) -> Non
     assert {k: v for k, v in everything_on.items() if k not in ("run", name)} == {
         k: v for k, v in off.items() if k != "run"
     }
+
+
+def test_decisions_change_no_other_table_and_name_the_behavior_that_decided() -> None:
+    without, stored = run(small()), run(small(decisions=True))
+    assert without.digest != stored.digest
+    assert without.manifest["tables"].items() <= stored.manifest["tables"].items()
+    decisions = table(stored, "decisions", entity="astro")
+    assert {"patrol"} == set(decisions["behavior"])
+    begun, planned = decisions["step"][1:], decisions["next_step"][:-1]
+    assert begun.tolist() == planned.astype(int).tolist()
 
 
 def test_seen_and_lost_take_turns() -> None:

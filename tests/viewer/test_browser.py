@@ -324,6 +324,49 @@ def test_click_on_a_body_shows_its_state_and_history(page: Any) -> None:
     assert page.locator("[data-inspected=astro] ol.events li").count() > 1
 
 
+def test_decision_behind_what_a_robot_does_is_shown(page: Any, run_dir: Path) -> None:
+    page.click("tr[data-body=astro] button")
+    events = fleet2d.open_run(run_dir).tables["events"].to_pylist()
+    explores = next(row for row in events if row["event"] == "explores")
+    page.fill("#goto", f"step {explores['step'] + 60}")
+    page.press("#goto", "Enter")
+    inspected = page.locator("[data-inspected=astro]")
+    inspected.locator("div:has(dt:text-is('behavior')) >> text=hangout").wait_for()
+    room = explores["detail"].replace("_", " ")
+    inspected.locator(f"div:has(dt:text-is('why')) >> text=explores {room}").wait_for()
+    inspected.locator("div:has(dt:text-is('decides')) >> text=in 59 min").wait_for()
+    page.wait_for_selector(".label >> text=astro: behavior")
+
+
+def test_lights_and_slow_floors_are_shown(browser: Any) -> None:
+    area = [[11.0, 1.0], [14.0, 1.0], [14.0, 4.0], [11.0, 4.0]]
+    run = fleet2d.run(
+        "bundled:base",
+        "simulation.duration=1 h",
+        seed=4,
+        floorplan={"slows": [{"area": area, "speed": 0.5}]},
+        changes=[{"at": "30 min", "lights": "living_room", "turn": "off"}],
+    )
+    server = PageServer([PageData(run)])
+    stop = server.start()
+    with page_at(browser, f"{server.address}#select=living_room_0&panel=inspect") as page:
+        light = page.locator("div:has(> dt:text-is('light')) dd")
+        assert "on" == light.inner_text()
+        plan = page.locator(".plan canvas")
+        pictures = {plan.screenshot()}
+        page.keyboard.press("End")
+        until(page, lambda: light.inner_text() == "off")
+        page.wait_for_selector(".label >> text=living_room_0 light")
+        page.click("#tab-layers")
+        for name in ("slows", "lights"):
+            pictures.add(plan.screenshot())
+            page.uncheck(f"input[name={name}]")
+            page.wait_for_timeout(150)
+        pictures.add(plan.screenshot())
+        assert 4 == len(pictures)
+    stop()
+
+
 def test_two_runs_are_compared_in_step(browser: Any, run_dir: Path, other_dir: Path) -> None:
     server = PageServer([run_dir, other_dir])
     stop = server.start()

@@ -38,6 +38,18 @@ def test_file_holds_the_run_and_loads_nothing(run_dir: Path, tmp_path: Path) -> 
     assert "default-src 'none'" in outside
 
 
+def test_decisions_that_were_not_stored_are_those_of_the_run(run_dir: Path) -> None:
+    run = fleet2d.open_run(run_dir)
+    data = PageData(run)
+    table = pq.read_table(data.table_path("decisions")).to_pylist()
+    rows = [row for row in table if row["entity"] == "astro"]
+    assert {"patrol", "hangout"} == {row["behavior"] for row in rows}
+    explores = [row for row in run.tables["events"].to_pylist() if row["event"] == "explores"]
+    decided = {row["step"]: row["reason"] for row in rows}
+    assert explores
+    assert all(f"explores {row['detail']}" == decided[row["step"]] for row in explores)
+
+
 def test_part_of_a_run_keeps_poses_within_it_and_drops_the_rest(run_dir: Path) -> None:
     data = PageData(fleet2d.open_run(run_dir))
     complete, part = embedded_run(data, 0, 9 * 3600), embedded_run(data, 3600, 7200)

@@ -1,6 +1,7 @@
 """What the timeline marks covers the run, and says what the manifest and the table say."""
 
 import itertools
+from datetime import datetime
 from pathlib import Path
 
 import pytest
@@ -9,12 +10,14 @@ from hypothesis import strategies as st
 
 import fleet2d
 from fleet2d.runs.run import Tables
+from fleet2d.runtime.clock import Clock
 from fleet2d.viewer import run_facts
 from fleet2d.viewer.run_facts import (
     expectation_marks,
     intervention_marks,
     marks_of,
     sightings_of,
+    slow_floors,
 )
 
 STEPS = 1000
@@ -78,6 +81,22 @@ def test_interventions_of_a_script_say_so() -> None:
         mark["end"],
         mark["label"],
     )
+
+
+def test_slow_floors_last_as_long_as_they_were_put() -> None:
+    clock = Clock(datetime(2026, 1, 5), 1_000_000, 3600)
+    area = [[1.0, 1.0], [3.0, 1.0], [3.0, 3.0]]
+    scenario = {"floorplan": {"slows": [{"area": area, "stop": "2 s"}]}}
+    records = [
+        {"do": "put", "step": 5, "entity": "ana"},
+        {"do": "slow", "step": 60, "area": area, "speed": 0.5, "duration": "10 min"},
+        {"do": "slow", "step": 3500, "area": area, "speed": 0.25, "stop": "1 s", "duration": "1 h"},
+    ]
+    assert [
+        (0, 3600, "robots stop for 2 s"),
+        (60, 660, "robots drive at 50%"),
+        (3500, 3600, "robots drive at 25%, robots stop for 1 s"),
+    ] == [(f["step"], f["end"], f["words"]) for f in slow_floors(scenario, records, clock)]
 
 
 def test_sightings_are_the_same_however_they_are_read(

@@ -35,6 +35,10 @@ export class Events {
     return [...this.byKind.keys()].sort();
   }
 
+  has(kind: string): boolean {
+    return this.byKind.has(kind);
+  }
+
   ofKind(kind: string): EventRow[] {
     return this.rowsAt(this.byKind.get(kind));
   }

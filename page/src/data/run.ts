@@ -4,7 +4,8 @@ import { signal } from "@preact/signals";
 import type { BodyFacts, NoteFacts, RunFacts, SightingFacts, TableFacts, WallsFacts } from "../contract";
 import { type Beliefs, readBeliefs } from "./beliefs";
 import { Clock } from "./clock";
-import { Events, readEvents } from "./events";
+import { Decisions, readDecisions } from "./decisions";
+import { type EventRow, Events, readEvents } from "./events";
 import { Home } from "./home";
 import { LayerTable } from "./layers";
 import { Observations, type ObservationSource } from "./observations";
@@ -15,6 +16,17 @@ import { Walls } from "./sight";
 import type { RunSource } from "./source";
 import type { Stretches } from "./stretches";
 import { readTracks, Track, tracksOf } from "./tracks";
+
+/** When something was switched, and whether on. */
+export interface Switches {
+  us: number[];
+  on: boolean[];
+}
+
+/** Whether something is on at a moment; undefined before it was switched first. */
+function isOn({ us: moments, on }: Switches, us: number): boolean | undefined {
+  return on[lastAtMost(moments, us)];
+}
 
 const NO_STRETCHES: Stretches = { from: [], to: [], value: [] };
 
@@ -33,10 +45,9 @@ export class Run {
   readonly problems = signal<string[]>([]);
   /** Paths ahead of bodies in a live run [lattice]; those of a stored run follow from its tracks. */
   ahead = new Map<string, number[]>();
-  /** What behaviors of a live run say of themselves. */
-  behaviorNotes = new Map<string, string>();
-  /** When bodies of a live run decide next [us]. */
-  decisions = new Map<string, number>();
+  /** What bodies decided; null until it is read. */
+  decisions: Decisions | null = null;
+  private asksForDecisions = false;
 
   /** What is known of the run ends here: the step that its simulation has come to. */
   knownUs = Infinity;
@@ -138,6 +149,7 @@ export class Run {
     await this.attempt(async () => {
       this.notes.value = await this.source.notes();
     });
+    if (this.tableFacts("decisions")) await this.readDecisions();
     for (const facts of this.facts.tables.filter((entry) => entry.role === "algorithm")) {
       await this.attempt(async () => {
         const table = await this.open(facts.name);
@@ -148,6 +160,19 @@ export class Run {
     await this.attempt(async () => {
       const table = await this.open("observations");
       if (table) this.observations = new Observations(table);
+    });
+    this.changed();
+  }
+
+  /** Read why bodies did what they did; where the run didn't store that, the server repeats it. */
+  async readDecisions(): Promise<void> {
+    if (this.asksForDecisions || this.decisions) return;
+    const facts = this.tableFacts("decisions");
+    if (!facts && !this.path) return;
+    this.asksForDecisions = true;
+    await this.attempt(async () => {
+      const table = await Table.open(await this.source.table("decisions", facts?.bytes ?? 0));
+      this.decisions = await readDecisions(table, this.clock.stepUs);
     });
     this.changed();
   }
@@ -219,25 +244,40 @@ export class Run {
   /** Whether a door stands open at a moment. */
   doorOpen(name: string, us: number): boolean {
     const facts = this.facts.home.doors.find((door) => door.name === name);
-    const rows = this.doorEvents(name);
-    const i = lastAtMost(rows.us, us);
-    return i < 0 ? (facts?.open ?? true) : rows.open[i]!;
+    return isOn(this.doorEvents(name), us) ?? facts?.open ?? true;
   }
 
-  private doorRows = new Map<string, { us: number[]; open: boolean[]; seen: number }>();
+  /** Whether lights of rooms are ever switched. */
+  get hasLights(): boolean {
+    return this.facts.starts_unlit || this.events.has("light_off");
+  }
 
-  doorEvents(name: string): { us: number[]; open: boolean[] } {
-    let rows = this.doorRows.get(name);
-    if (!rows || rows.seen !== this.events.rows.length) {
-      const doorEvents = this.events.ofEntity(name).filter((row) => row.event === "opened" || row.event === "shut");
-      rows = {
-        us: doorEvents.map((row) => row.us),
-        open: doorEvents.map((row) => row.event === "opened"),
-        seen: this.events.rows.length,
-      };
-      this.doorRows.set(name, rows);
+  /** The rooms whose lights are off at a moment. */
+  unlitAt(us: number): number[] {
+    if (!this.hasLights) return [];
+    const { rooms } = this.facts.home;
+    return [...rooms.keys()].filter((i) => !(isOn(this.lightEvents(rooms[i]!.name), us) ?? !this.facts.starts_unlit));
+  }
+
+  lightEvents(room: string): Switches {
+    return this.switches(`light of ${room}`, "", (row) => row.detail === room, "light_on", "light_off");
+  }
+
+  doorEvents(name: string): Switches {
+    return this.switches(name, name, () => true, "opened", "shut");
+  }
+
+  private readonly switched = new Map<string, Switches & { seen: number }>();
+
+  /** When something was switched on and off, by the events of an entity. */
+  private switches(key: string, entity: string, isAbout: (row: EventRow) => boolean, on: string, off: string): Switches {
+    let found = this.switched.get(key);
+    if (!found || found.seen !== this.events.rows.length) {
+      const rows = this.events.ofEntity(entity).filter((row) => (row.event === on || row.event === off) && isAbout(row));
+      found = { us: rows.map((row) => row.us), on: rows.map((row) => row.event === on), seen: this.events.rows.length };
+      this.switched.set(key, found);
     }
-    return rows;
+    return found;
   }
 
   report(problem: string): void {

@@ -3,6 +3,7 @@
 import { batch, computed, signal } from "@preact/signals";
 import type { LiveFrame, LiveSession, RunFacts, SightingFacts, WallsFacts } from "../contract";
 import { Beliefs, type BeliefSeries } from "../data/beliefs";
+import { Decisions } from "../data/decisions";
 import type { Observation, ObservationSource } from "../data/observations";
 import { AWAY } from "../data/rooms";
 import { Run } from "../data/run";
@@ -93,6 +94,7 @@ class LiveObservations implements ObservationSource {
 export class Feed {
   readonly status = signal<LiveFrame | null>(null);
   private readonly observations: LiveObservations;
+  private readonly decisions: Decisions;
   private readonly shares = new Map<string, BeliefSeries>();
   private stream: EventSource | null = null;
   private lastStep: number;
@@ -107,6 +109,7 @@ export class Feed {
     run.observations = this.observations;
     const us = since * run.clock.stepUs;
     run.knownUs = us;
+    run.decisions = this.decisions = past?.decisions?.until(us) ?? new Decisions();
     for (const { name } of run.bodies) {
       run.tracks.set(name, past?.tracks.get(name)?.until(us) ?? Track.none());
       run.rooms.set(name, stretchesUntil(past?.roomsOf(name) ?? { from: [], to: [], value: [] }, us));
@@ -196,6 +199,7 @@ export class Feed {
       this.run.events.add(event.step, at, event.entity, event.event, event.user, event.detail);
     }
     this.run.facts.marks.push(...frame.marks);
+    this.run.facts.slows.push(...frame.slows);
     const { walls } = this.run.facts;
     if (walls[walls.length - 1]!.walls !== frame.walls) walls.push({ step: frame.step, walls: frame.walls });
     for (const body of frame.bodies) {
@@ -203,9 +207,8 @@ export class Feed {
       if (!track) continue;
       track.append(us, body);
       this.run.ahead.set(body.name, [body.x, body.y, ...body.ahead.flatMap(([, x, y]) => [x, y])]);
-      this.run.behaviorNotes.set(body.name, body.note);
-      if (body.decides >= 0) this.run.decisions.set(body.name, body.decides * this.run.clock.stepUs);
-      else this.run.decisions.delete(body.name);
+      const nextUs = body.decides < 0 ? NaN : body.decides * this.run.clock.stepUs;
+      this.decisions.add(body.name, { us, behavior: body.behavior, reason: body.reason, nextUs });
       this.addRoom(body.name, us, body.away ? AWAY : this.run.home.roomAt(body.x, body.y));
     }
     this.observations.step = frame.step;

@@ -1,5 +1,6 @@
 /** One body, door or room: its state, its plan, why it does so, its history. */
 
+import { useEffect } from "preact/hooks";
 import { durationText } from "../data/clock";
 import type { EventRow } from "../data/events";
 import type { Run } from "../data/run";
@@ -43,21 +44,22 @@ function BodyView({ run, name }: { run: Run; name: string }) {
   const us = slowMoment.value;
   const body = run.body(name)!;
   const now = bodyState(run, name, us);
-  const isNow = run.clock.stepAt(us) >= run.clock.stepAt(run.presentUs);
-  const why = isNow ? run.behaviorNotes.get(name) : undefined;
-  const decides = isNow ? run.decisions.get(name) : undefined;
+  useEffect(() => void run.readDecisions(), [run]);
+  const decision = run.decisions?.at(name, us);
   const rows: [string, string][] = [
     ["kind", body.robot ? "robot" : "user"],
     ["room", now?.room ?? "not stored"],
     ["since", now ? since(run, name, us) : ""],
+    ["activity", now?.activity ?? ""],
+    ["behavior", decision ? decision.behavior.replaceAll("_", " ") || "none" : ""],
+    ["why", decision?.reason.replaceAll("_", " ") ?? ""],
+    ["decided", decision ? `${run.clock.text(decision.us)}, ${durationText(us - decision.us)} ago` : ""],
+    ["decides", decision && decision.nextUs >= us ? `in ${durationText(decision.nextUs - us)}` : ""],
+    ["next", nextPlace(run, name, us)],
     ["place", now && !now.away ? `${now.x.toFixed(2)} m, ${now.y.toFixed(2)} m` : ""],
     ["heading", now && !now.away ? `${now.headingDeg.toFixed(0)}°` : ""],
-    ["activity", now?.activity ?? ""],
     ["sees", now?.sees.join(", ") ?? ""],
-    ["next", nextPlace(run, name, us)],
-    ["why", why ?? ""],
-    ["decides", decides === undefined ? "" : `in ${durationText(decides - us)}`],
-    ["last note", why ? "" : noteOf(run, name, us)],
+    ["last note", noteOf(run, name, us)],
     ["behaviors", body.behaviors.join(", ")],
     ["cameras", body.cameras.map((camera) => `${camera.name}: ${camera.near} to ${camera.far} m, ${((camera.angle * 180) / Math.PI).toFixed(0)}°`).join("; ")],
   ];
@@ -74,9 +76,7 @@ function BodyView({ run, name }: { run: Run; name: string }) {
         {state.followed.value === name ? "Follow no longer" : `Follow ${name}`}
       </button>
       <Facts rows={rows} />
-      {body.robot && why === undefined && run.path !== "" && (
-        <p class="hint">Which behavior is active, why, and when it decides next: press Continue from here.</p>
-      )}
+      {!run.decisions && run.path !== "" && <p class="hint">The run is repeated to find out which behavior decided, and why …</p>}
       <h3>History</h3>
       <History run={run} rows={run.events.about(name)} us={us} />
     </div>
@@ -164,6 +164,7 @@ function RoomView({ run, name }: { run: Run; name: string }) {
         rows={[
           ["kind", room.type.replaceAll("_", " ")],
           ["area", `${room.area_m2.toFixed(1)} m²`],
+          ["light", run.hasLights ? (run.unlitAt(us).includes(index) ? "off" : "on") : ""],
           ["here now", occupants.map((body) => body.name).join(", ") || "nobody"],
         ]}
       />

@@ -10,6 +10,8 @@ const WORDS: Record<state.Switch, string> = {
   sight: "what is in view",
   observations: "observations",
   beliefs: "beliefs",
+  lights: "lights that are off",
+  slows: "slow floors",
 };
 
 export function LayersPanel() {
@@ -58,6 +60,8 @@ const LEGEND: [string, string][] = [
   ["◯", "somebody whom a robot notices"],
   ["⊗", "a false observation, red"],
   ["◌", "where somebody is in the other run, red"],
+  ["▒", "a room whose light is off"],
+  ["≈", "a floor on which robots are slow, blue"],
   ["┅", "an area that robots keep out of"],
 ];
 

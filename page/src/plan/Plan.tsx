@@ -10,10 +10,10 @@ import * as state from "../state";
 import { colors, dark, scaleColor } from "../theme";
 import { drawBeliefs } from "./beliefs";
 import { bodyState } from "../panels/Now";
-import { bodyRadius, drawScene } from "./bodies";
+import { bodyRadius, drawScene, slowFloorsAt } from "./bodies";
 import { fitted, oncePerFrame } from "./canvas";
 import { FOOT, Frame } from "./frame";
-import { cellImage, drawCells, drawGround, tracePolygons } from "./ground";
+import { cellImage, drawCells, drawGround, drawNames, tracePolygons } from "./ground";
 
 const FOLLOW_ZOOM = 3;
 
@@ -32,6 +32,8 @@ class PlanPainter {
   private groundKey = "";
   private layerImage: HTMLCanvasElement | null = null;
   private layerKey = "";
+  private night: HTMLCanvasElement | null = null;
+  private nightKey = "";
   private frame: Frame | null = null;
 
   constructor(
@@ -49,7 +51,8 @@ class PlanPainter {
     this.paintGround(frame, width, height);
     context.clearRect(0, 0, width, height);
     context.drawImage(this.ground, 0, 0, width, height);
-    if (this.layerImage && state.layer.value) this.paintLayer(context, frame);
+    if (this.layerImage && state.layer.value) this.paintCells(context, frame, this.layerImage, 0.7);
+    if (state.shown.value.has("lights")) this.paintNight(context, frame);
     if (state.shown.value.has("beliefs")) drawBeliefs(context, this.run, frame, state.moment.value);
     drawScene(context, {
       run: this.run,
@@ -84,13 +87,27 @@ class PlanPainter {
     drawGround(context, this.run.home, frame, { colors: colors.value, dark: dark.value, names, furniture });
   }
 
-  private paintLayer(context: CanvasRenderingContext2D, frame: Frame): void {
+  private paintCells(context: CanvasRenderingContext2D, frame: Frame, image: HTMLCanvasElement, opacity: number): void {
     context.save();
     tracePolygons(context, frame, this.run.facts.home.free.flat());
     context.clip("evenodd");
-    context.globalAlpha = 0.7;
-    drawCells(context, this.run.home, frame, this.layerImage!);
+    context.globalAlpha = opacity;
+    drawCells(context, this.run.home, frame, image);
     context.restore();
+  }
+
+  /** Darken the rooms whose lights are off. */
+  private paintNight(context: CanvasRenderingContext2D, frame: Frame): void {
+    const rooms = this.run.unlitAt(state.moment.value);
+    if (rooms.length === 0) return;
+    const key = rooms.join();
+    if (key !== this.nightKey) {
+      const unlit = new Set(rooms);
+      this.night = cellImage(this.run.home, (cell) => (unlit.has(this.run.home.cells[cell]!) ? [0, 0, 0, 255] : null));
+      this.nightKey = key;
+    }
+    this.paintCells(context, frame, this.night!, dark.value ? 0.55 : 0.35);
+    if (state.shown.value.has("names")) drawNames(context, this.run.home, frame, colors.value);
   }
 
   async loadLayer(name: string, step: number): Promise<void> {
@@ -143,7 +160,11 @@ class PlanPainter {
     const now = bodyState(run, name, state.moment.value);
     if (now) return [name, now.room, now.activity, now.sees.length > 0 ? `sees ${now.sees.join(", ")}` : ""].filter(Boolean).join(" · ").replaceAll("_", " ");
     const room = run.facts.home.rooms[run.home.roomIndex(name)];
-    if (room) return `${name} · ${room.area_m2.toFixed(1)} m²`.replaceAll("_", " ");
+    if (room) {
+      const floor = slowFloorsAt(run, state.moment.value).find((entry) => isInside(entry.outline, ...this.frame!.place(px, py)));
+      const isUnlit = run.unlitAt(state.moment.value).includes(run.home.roomIndex(name));
+      return [`${name} · ${room.area_m2.toFixed(1)} m²`, isUnlit ? "light off" : "", floor?.words ?? ""].filter(Boolean).join(" · ").replaceAll("_", " ");
+    }
     const door = run.facts.home.doors.some((entry) => entry.name === name);
     return (door ? `${name} · ${run.doorOpen(name, state.moment.value) ? "open" : "shut"}` : name).replaceAll("_", " ");
   }

@@ -1,11 +1,12 @@
 /** What moves on the plan: people, robots, their ways, what is in view, what was noticed. */
 
-import type { BodyFacts, CameraFacts } from "../contract";
+import type { BodyFacts, CameraFacts, SlowFacts } from "../contract";
 import { isFalse } from "../data/observations";
 import type { Run } from "../data/run";
 import { type Pose, TURN } from "../data/tracks";
 import { bodyColor, cameraColors, type Colors } from "../theme";
 import type { Frame } from "./frame";
+import { tracePolygons } from "./ground";
 
 type Context = CanvasRenderingContext2D;
 
@@ -34,6 +35,7 @@ export function drawScene(context: Context, scene: Scene): void {
     const track = run.tracks.get(body.name);
     if (track && !track.empty) poses.set(body.name, track.poseAt(us));
   }
+  if (shows("slows")) drawSlowFloors(context, scene);
   drawDoors(context, scene);
   if (shows("sight")) {
     for (const body of run.bodies) {
@@ -48,6 +50,31 @@ export function drawScene(context: Context, scene: Scene): void {
     const pose = poses.get(body.name);
     if (pose && !pose.away) drawBody(context, scene, body, pose);
   }
+}
+
+/** The floors on which robots are slow at a moment. */
+export function slowFloorsAt(run: Run, us: number): SlowFacts[] {
+  const step = run.clock.stepAt(us);
+  return run.facts.slows.filter((floor) => floor.step <= step && step < floor.end);
+}
+
+function drawSlowFloors(context: Context, { run, us, frame, colors }: Scene): void {
+  const floors = slowFloorsAt(run, us);
+  if (floors.length === 0) return;
+  context.save();
+  tracePolygons(context, frame, run.facts.home.free.flat());
+  context.clip("evenodd");
+  for (const floor of floors) {
+    tracePolygons(context, frame, [floor.outline]);
+    context.fillStyle = `${colors.slow}33`;
+    context.fill();
+    context.strokeStyle = colors.slow;
+    context.lineWidth = 1.5;
+    context.setLineDash([2, 3]);
+    context.stroke();
+    context.setLineDash([]);
+  }
+  context.restore();
 }
 
 function drawDoors(context: Context, { run, us, frame, colors }: Scene): void {

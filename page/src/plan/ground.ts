@@ -142,7 +142,8 @@ function nameObject(context: Context, frame: Frame, thing: ObjectFacts, colors: 
   context.fillText(words, frame.x((left + right) / 2), frame.y((Math.min(...ys) + Math.max(...ys)) / 2));
 }
 
-function drawNames(context: Context, home: Home, frame: Frame, colors: Colors): void {
+/** Write the names of rooms. */
+export function drawNames(context: Context, home: Home, frame: Frame, colors: Colors): void {
   context.textAlign = "center";
   context.textBaseline = "middle";
   context.lineJoin = "round";

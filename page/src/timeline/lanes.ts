@@ -2,7 +2,7 @@
 
 import type { Answer } from "../data/ask";
 import type { BeliefSeries } from "../data/beliefs";
-import type { Run } from "../data/run";
+import type { Run, Switches } from "../data/run";
 import type { BodyFacts } from "../contract";
 import { shownText } from "../data/events";
 import { firstAtLeast, lastAtMost } from "../data/search";
@@ -154,11 +154,12 @@ function ownLanes(run: Run, prefix: string, other: Run | null): Lane[] {
     const group: Group = body.robot ? "Robots" : "Users";
     const lanes = [roomLane(run, body.name, prefix, group)];
     if (other) lanes.push(differenceLane(run, other, body.name, prefix, group));
+    if (body.robot && run.decisions?.of(body.name)) lanes.push(decisionLane(run, body.name, prefix, group));
     if (kinds.includes("activity")) lanes.push(activityLane(run, body.name, prefix, group));
     if (kinds.some((kind) => !ROUTINE_KINDS.has(kind))) lanes.push(eventLane(run, body, prefix, group));
     return lanes;
   });
-  return [...bodies, ...sightingLanes(run, prefix), ...outputLanes(run, prefix), ...markLanes(run, prefix), ...doorLanes(run, prefix)];
+  return [...bodies, ...sightingLanes(run, prefix), ...outputLanes(run, prefix), ...markLanes(run, prefix), ...switchLanes(run, prefix)];
 }
 
 function roomLane(run: Run, name: string, prefix: string, group: Group): Lane {
@@ -200,6 +201,15 @@ function activityLane(run: Run, name: string, prefix: string, group: Group): Lan
   };
   const place = { id: `${prefix}${name}/activity`, label: `${name} does`, subject: name, group, height: 16 };
   return stretchLane(place, stretches, (value) => wordColor(words[value] ?? ""), (value) => words[value] ?? "");
+}
+
+/** Which behavior of a body decided, and why. */
+function decisionLane(run: Run, name: string, prefix: string, group: Group): Lane {
+  const { us, behavior, reason } = run.decisions!.of(name)!;
+  const stretches = (): Stretches => ({ from: us, to: us.map((_, i) => us[i + 1] ?? run.presentUs), value: us.map((_, i) => i) });
+  const words = (i: number): string => [behavior[i], reason[i]].filter(Boolean).join(": ").replaceAll("_", " ");
+  const place = { id: `${prefix}${name}/decisions`, label: `${name}: behavior`, subject: name, group, height: 16 };
+  return stretchLane(place, stretches, (i) => (behavior[i] ? wordColor(behavior[i]!) : null), words);
 }
 
 function sightingLanes(run: Run, prefix: string): Lane[] {
@@ -274,17 +284,24 @@ function markLanes(run: Run, prefix: string): Lane[] {
   });
 }
 
-function doorLanes(run: Run, prefix: string): Lane[] {
-  return run.facts.home.doors.map((door) => {
+/** Doors while they are shut, and lights while they are on. */
+function switchLanes(run: Run, prefix: string): Lane[] {
+  const { doors, rooms } = run.facts.home;
+  const lane = (name: string, label: string, words: [string, string], marked: 0 | 1, color: string, isOn: boolean, switches: () => Switches): Lane => {
     const stretches = (): Stretches => {
-      const { us: moments, open: states } = run.doorEvents(door.name);
+      const { us: moments, on: states } = switches();
       const us = [0, ...moments];
-      return { from: us, to: us.map((_, i) => us[i + 1] ?? run.presentUs), value: [door.open, ...states].map(Number) };
+      return { from: us, to: us.map((_, i) => us[i + 1] ?? run.presentUs), value: [isOn, ...states].map(Number) };
     };
-    const color = (value: number): string | null => (value ? null : colors.value.door);
-    const place = { id: `${prefix}${door.name}/door`, label: `${door.name} shut`, subject: door.name, group: "Doors and sensors" as const, height: 10 };
-    return stretchLane(place, stretches, color, (value) => (value ? "open" : "shut"), (value) => 1 - value);
-  });
+    const place = { id: `${prefix}${name}/${words[marked]}`, label, subject: name, group: "Doors and sensors" as const, height: 10 };
+    return stretchLane(place, stretches, (value) => (value === marked ? color : null), (value) => words[value]!, (value) => Number(value === marked));
+  };
+  const lit = run.hasLights ? rooms.filter((room) => run.lightEvents(room.name).us.length > 0) : [];
+  const { door, viewEdge } = colors.value;
+  return [
+    ...doors.map(({ name, open }) => lane(name, `${name} shut`, ["shut", "open"], 0, door, open, () => run.doorEvents(name))),
+    ...lit.map(({ name }) => lane(name, `${name} light`, ["light off", "light on"], 1, viewEdge, !run.facts.starts_unlit, () => run.lightEvents(name))),
+  ];
 }
 
 /** Lanes of metrics and sensors, which are read from their tables. */

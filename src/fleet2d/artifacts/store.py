@@ -49,6 +49,7 @@ class ArtifactSettings(Settings):
         observations: Store every observation that a robot makes.
         events: Store events: a user seen or lost, an arrival, a change of activity.
         outputs: Store the outputs of algorithms and metrics, one table each.
+        decisions: Store every decision: who decided, which behavior for it, why, and until when.
         learned: Store what each algorithm has learned at the end, learned/NAME.npz: another run can
             start from it.
         checkpoint: Write the state of the run this often in simulated time, so that `fleet2d
@@ -67,6 +68,7 @@ class ArtifactSettings(Settings):
     observations: bool = True
     events: bool = True
     outputs: bool = True
+    decisions: bool = False
     learned: bool = False
     checkpoint: Annotated[
         PositiveDuration | Literal["auto", "off"], BeforeValidator(_off_as_text)

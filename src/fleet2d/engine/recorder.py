@@ -79,6 +79,8 @@ def table_specs(
                 "entity", "category", categories=names, nullable=True, description=text
             )
         specs.append(TableSpec("events", (STEP, TIME, entities, event, *user_columns, detail)))
+    if settings.decisions:
+        specs.append(TableSpec("decisions", (STEP, TIME, entity, *DECISION)))
     if sensors.names:
         specs.append(_sensor_table(sensors))
     return specs
@@ -132,6 +134,16 @@ def _sensor_table(sensors: Sensors) -> TableSpec:
     return TableSpec("sensors", (STEP, TIME, room, sensor, state, activity))
 
 
+DECISION = (
+    Column("behavior", "category", nullable=True, description="the one whose plan it follows"),
+    Column("reason", "string", description="the last note of the plan"),
+    Column(
+        "next_step",
+        "int64",
+        nullable=True,
+        description="when it decides next if nothing interrupts it",
+    ),
+)
 # Events whose detail is a user, who has a column of their own.
 USER_EVENTS = frozenset({EventKind.USER_LOST, EventKind.USER_SEEN})
 ACTIVITY = EventKind.ACTIVITY.value
@@ -181,6 +193,8 @@ class Recorder:
         self._rows = {name: row for row, name in enumerate(entities)} | {HOME: -1}
         self._stores_home = basis.may_change
         self._events: list[Event] = []
+        self._actors = basis.actors
+        self._decisions: list[tuple[int, int, str, str, int | None]] = []
         self._observations: list[I64] = []
         self._sensors, self._readings = sensors, list[SensorRow]()
         self._rooms = NearestRooms(basis.home.plan)
@@ -200,6 +214,9 @@ class Recorder:
         """Collect the beginning of a body's plan, which was made at `step`."""
         if "key_frames" in self._tables:
             self._keys.begin_plan(row, step)
+        if "decisions" in self._tables:
+            actor = self._actors[row]
+            self._decisions.append((step, row, *actor.reason(), actor.asked_at))
 
     def move_body(self, row: int, step: int) -> None:
         """Note that a body is put elsewhere, so that its next plan begins with a key frame."""
@@ -232,7 +249,8 @@ class Recorder:
         self._readings += readings
         self._count += len(observations) + len(readings)
         count = self._count + self._samples.count + self._keys.count
-        if count + len(self._events) > self._most or self.keeps_none:
+        count += len(self._events) + len(self._decisions)
+        if count > self._most or self.keeps_none:
             self.drain()
 
     def end(self, step: int, rows: int) -> None:
@@ -252,6 +270,7 @@ class Recorder:
             self._keys.store()
         self._store_observations()
         self._store_events()
+        self._store_decisions()
         self._store_readings()
         self._count = 0
         self.wall_s += time.perf_counter() - began
@@ -326,6 +345,25 @@ class Recorder:
             entity=rows[order],
             event=list(map(str, kinds)),
             detail=details,
+        )
+
+    def _store_decisions(self) -> None:
+        if not self._decisions:
+            return
+        # Who gives way at the step of its decision decides twice: the last one counts.
+        last = {entry[:2]: entry for entry in self._decisions}
+        self._decisions = []
+        step, row, behavior, reason, next_step = zip(
+            *(last[key] for key in sorted(last)), strict=True
+        )
+        missing = np.array([at is None for at in next_step])
+        self.store.append(
+            "decisions",
+            **self._times(np.array(step, np.int64)),
+            entity=np.array(row, np.int32),
+            behavior=[name or None for name in behavior],
+            reason=list(reason),
+            next_step=np.ma.array([at or 0 for at in next_step], np.int64, mask=missing),
         )
 
     def _store_readings(self) -> None:

@@ -39,6 +39,10 @@ LIVE = "live: "
 # Fields that are compared in another way, or are the same for all runs.
 _COMPARED_APART = frozenset({"digest", "format", "scenario", "seal", "status", "tables", "notes"})
 
+ONLY_DECISIONS = {  # beside the trajectories, by which the repetition is checked
+    **dict.fromkeys(("key_frames", "observations", "events", "outputs", "learned"), False),
+    "decisions": True,
+}
 # The name of an expectation while a run is judged by it; names in scenarios have no spaces.
 JUDGED_NAME = "what is judged"
 
@@ -166,8 +170,8 @@ def branch(run: Run, step: int, out: Path | None = None) -> Simulation:
     steps = int(run.manifest["steps"])
     if not 0 <= step < steps:
         raise InputError(f"the run can't be continued from step {step}: its last is {steps - 1}")
-    if run.directory is not None and (paths := changed_inputs(Manifest.read(run.directory))):
-        raise RunDirectoryError(f"{paths[0]} has changed since the run: put it back as it was")
+    if run.directory is not None:
+        _refuse_changed_inputs(run.directory)
     simulation = repeat_until(run.manifest, step, out)
     interval = timedelta(microseconds=step * run.manifest["step_us"])
     for name in simulation.actors if step and "key_frames" in run.tables else ():
@@ -190,12 +194,46 @@ def repeat_until(content: Mapping[str, Any], step: int, out: Path | None) -> Sim
     return simulation
 
 
-def _simulation(content: Mapping[str, Any], out: Path | None) -> Simulation:
+def decisions_of(run: Run) -> Any:
+    """Return the table of decisions of a run that didn't store them: the run is repeated for them.
+
+    Raises:
+        InputError: Its scenario or an input file is wrong by now.
+        RunDirectoryError: An input file has changed, or code isn't trusted.
+        ArtifactError: The run can't be repeated: its poses would differ.
+    """
+    if run.directory is not None:
+        _refuse_changed_inputs(run.directory)
+    with restrict_stored():
+        simulation = _simulation(run.manifest, None, ONLY_DECISIONS)
+    simulation.advance(int(run.manifest["steps"]))
+    new = simulation.finish()
+    old, poses = run.manifest["tables"], "trajectories"
+    if poses in old and old[poses] != new.manifest["tables"][poses]:
+        raise ArtifactError(
+            "the run can't be repeated: its poses would differ; `fleet2d reproduce` says what has"
+            " changed"
+        )
+    return new.tables["decisions"]
+
+
+def _refuse_changed_inputs(directory: Path) -> None:
+    if paths := changed_inputs(Manifest.read(directory)):
+        raise RunDirectoryError(f"{paths[0]} has changed since the run: put it back as it was")
+
+
+def _simulation(
+    content: Mapping[str, Any], out: Path | None, artifacts: Mapping[str, Any] | None = None
+) -> Simulation:
     # Without its speedup and checkpoints, which would only cost time.
     scenario = content["scenario"]
     if not isinstance(scenario.get("simulation"), dict):
         raise RunDirectoryError(f"{FILE_NAME}: scenario.simulation is missing: it can't be run")
-    fast = {**scenario, "simulation": {**scenario["simulation"], "speedup": None}}
+    fast = {
+        **scenario,
+        "simulation": {**scenario["simulation"], "speedup": None},
+        "artifacts": {**scenario.get("artifacts", {}), **(artifacts or {})},
+    }
     try:
         simulation = Simulation(
             load_scenario(fast, "artifacts.checkpoint=off"),

@@ -521,6 +521,14 @@ class DecidingActor(Actor):
         with blame(self.path, step):
             self._set_next_decision(now, fresh=True)
 
+    def reason(self) -> tuple[str, str]:
+        """Return what its plan comes from, a behavior or `order`, and the last note of the plan."""
+        active, notes = self.arbiter.active, self.plan.notes
+        note = f"{notes[-1].event} {notes[-1].detail}".strip() if notes else ""
+        if self.order is not None:
+            return "order", note
+        return "" if active is None else self.behaviors[active].type_name, note
+
     @property
     def _just_waited(self) -> int:
         """The steps after a wait within which another one counts as its continuation."""

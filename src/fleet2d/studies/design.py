@@ -133,7 +133,12 @@ def home_key(content: Mapping[str, Any]) -> str:
 
 NOT_APPLICABLE = -1
 MAX_VARIANTS = 10_000_000
-SWITCHES = ("key_frames", "observations", "events")  # of `artifacts`, named after their tables
+SWITCHES = (
+    "key_frames",
+    "observations",
+    "events",
+    "decisions",
+)  # of `artifacts`, named after their tables
 
 
 @dataclass(frozen=True)

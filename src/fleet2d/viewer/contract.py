@@ -139,6 +139,15 @@ class MarkFacts(TypedDict):
     label: str
 
 
+class SlowFacts(TypedDict):
+    """A floor that slows robots down from `step` to before `end`: its outline [m], its effect."""
+
+    outline: list[Point]
+    words: str
+    step: int
+    end: int
+
+
 class SightingFacts(TypedDict):
     """Stretches in which a robot noticed a user: steps `first` to `last`, both included.
 
@@ -153,7 +162,10 @@ class SightingFacts(TypedDict):
 
 
 class RunFacts(TypedDict):
-    """Everything about a run but its tables; steps `first_step` to `end_step` - 1 are shown."""
+    """Everything about a run but its tables; steps `first_step` to `end_step` - 1 are shown.
+
+    With `starts_unlit` all lights are off at first; its events switch them.
+    """
 
     title: str
     status: str
@@ -171,6 +183,8 @@ class RunFacts(TypedDict):
     tables: list[TableFacts]
     walls: list[WallsChange]
     marks: list[MarkFacts]
+    slows: list[SlowFacts]
+    starts_unlit: bool
     metrics: dict[str, Any]
     scenario: dict[str, Any]
     walks_every_s: float
@@ -219,7 +233,8 @@ class BranchOrder(TypedDict):
 class LiveBody(TypedDict):
     """A body at a step of a running simulation [lattice], and its path ahead: time [us], x, y.
 
-    At the step `decides` its behaviors are asked next, if nothing interrupts it; -1: at none.
+    It follows a plan of its `behavior`, whose last note is the `reason`. At the step `decides` its
+    behaviors are asked next, if nothing interrupts it; -1: at none.
     """
 
     name: str
@@ -228,7 +243,8 @@ class LiveBody(TypedDict):
     heading: int
     away: bool
     ahead: list[tuple[int, int, int]]
-    note: str
+    behavior: str
+    reason: str
     decides: int
 
 
@@ -259,6 +275,7 @@ class LiveFrame(TypedDict):
     beliefs: dict[str, list[float]]
     events: list[LiveEvent]
     marks: list[MarkFacts]
+    slows: list[SlowFacts]
     walls: int
     message: str
     served_as: int

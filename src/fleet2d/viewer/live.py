@@ -18,14 +18,15 @@ import numpy as np
 from fleet2d.configuration.documents import parse_yaml
 from fleet2d.engine.simulation import Simulation
 from fleet2d.entities.body import Track
+from fleet2d.entities.decisions import DecidingActor
 from fleet2d.errors import Fleet2DError, InputError, PlacementError
 from fleet2d.floorplan.home import HomeChange
 from fleet2d.kernels import TURN, Mesh
 from fleet2d.runs.run import Run
 from fleet2d.runtime.clock import DAY_S
 from fleet2d.runtime.events import EventKind
-from fleet2d.viewer.contract import LiveBody, LiveEvent, LiveFrame, LiveOrder, MarkFacts
-from fleet2d.viewer.run_facts import intervention_marks
+from fleet2d.viewer.contract import LiveBody, LiveEvent, LiveFrame, LiveOrder
+from fleet2d.viewer.run_facts import intervention_marks, slow_floors_of
 
 AHEAD_US = 120_000_000
 MAX_CORNERS = 60
@@ -45,7 +46,7 @@ class LiveEngine:
         self._meshes: dict[int, int] = {}
         self._walls: list[Mesh] = []
         self._called: set[str] = set()
-        self._marks = 0
+        self._recorded = len(simulation.interventions)
 
     @property
     def step(self) -> int:
@@ -67,19 +68,21 @@ class LiveEngine:
 
     def bodies(self) -> list[LiveBody]:
         """Return the poses of all users and robots, and their paths ahead."""
-        return [
-            LiveBody(
-                name=name,
-                x=int(actor.state.x),
-                y=int(actor.state.y),
-                heading=int(actor.state.heading) % TURN,
-                away=bool(actor.state.away),
-                ahead=list(self._ahead(actor)),
-                note=_note(actor),
-                decides=-1 if actor.asked_at is None else actor.asked_at,
-            )
-            for name, actor in self.simulation.actors.items()
-        ]
+        return [self._body(name, actor) for name, actor in self.simulation.actors.items()]
+
+    def _body(self, name: str, actor: DecidingActor) -> LiveBody:
+        behavior, reason = actor.reason()
+        return LiveBody(
+            name=name,
+            x=int(actor.state.x),
+            y=int(actor.state.y),
+            heading=int(actor.state.heading) % TURN,
+            away=bool(actor.state.away),
+            ahead=list(self._ahead(actor)),
+            behavior=behavior,
+            reason=reason,
+            decides=-1 if actor.asked_at is None else actor.asked_at,
+        )
 
     def _ahead(self, actor: Any) -> Iterator[tuple[int, int, int]]:
         """Yield the corners of the path ahead: time [us], x and y [lattice]."""
@@ -135,11 +138,11 @@ class LiveEngine:
             if event.step < self._events_until and event.event != EventKind.SENSOR
         ]
 
-    def marks(self) -> list[MarkFacts]:
-        """Return the marks of the interventions since the last call."""
-        records = self.simulation.interventions[self._marks :]
-        self._marks += len(records)
-        return intervention_marks(records)
+    def interventions(self) -> list[dict[str, Any]]:
+        """Return the records of the interventions since the last call."""
+        records = self.simulation.interventions[self._recorded :]
+        self._recorded += len(records)
+        return records
 
     def walls(self) -> int:
         """Return the id of the present set of walls, for `mesh`."""
@@ -210,16 +213,6 @@ class LiveEngine:
             )
         x, y = lattice.to_metres(near).tolist()
         return x, y
-
-
-def _note(actor: Any) -> str:
-    """Return the active behavior of a body, and the last note of its plan."""
-    active = actor.arbiter.active
-    behaviors = actor.behaviors
-    kind = behaviors[active].type_name if active is not None and active < len(behaviors) else ""
-    notes = getattr(actor.plan, "notes", ())
-    note = f"{notes[-1].event} {notes[-1].detail}".strip() if notes else ""
-    return ": ".join(filter(None, (str(kind), note)))
 
 
 FRAME_US = 60_000_000  # maximum simulated time between two frames
@@ -308,7 +301,13 @@ class LiveRun:
         finally:
             self.run = self.engine.finish()
             served_as = self._serve(self.run) if self._serve is not None else -1
-            self._frame = {**self._frame, "events": [], "marks": [], "served_as": served_as}
+            self._frame = {
+                **self._frame,
+                "events": [],
+                "marks": [],
+                "slows": [],
+                "served_as": served_as,
+            }
             self._send(self._frame)
 
     def _advance(self) -> None:
@@ -371,6 +370,7 @@ class LiveRun:
     def _state(self) -> LiveFrame:
         """Return the frame of the current step; events and marks since the last one."""
         engine = self.engine
+        records = engine.interventions()
         self._frame = LiveFrame(
             step=engine.step,
             paused=self._paused,
@@ -382,7 +382,8 @@ class LiveRun:
             doors=engine.doors(),
             beliefs=engine.beliefs(),
             events=engine.events(),
-            marks=engine.marks(),
+            marks=intervention_marks(records),
+            slows=slow_floors_of(records, self._clock),
             walls=engine.walls(),
             message="",
             served_as=-1,
@@ -400,7 +401,7 @@ class LiveRun:
         watcher: queue.Queue[LiveFrame] = queue.Queue()
         with self._lock:
             self._watchers.append(watcher)
-            watcher.put({**self._frame, "events": [], "marks": []})
+            watcher.put({**self._frame, "events": [], "marks": [], "slows": []})
         try:
             while not (self._is_ending or self._streams_end):
                 frames = []

@@ -6,7 +6,9 @@ import json
 import math
 import shutil
 import tempfile
+import threading
 import weakref
+from collections.abc import Callable
 from datetime import timedelta
 from functools import cached_property
 from pathlib import Path
@@ -15,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from fleet2d.artifacts.table import categories
+from fleet2d.engine.repeat import decisions_of
 from fleet2d.errors import ArtifactError, InputError
 from fleet2d.kernels import TURN
 from fleet2d.runs.run import Run
@@ -39,6 +42,7 @@ def write_file(path: Path, content: bytes) -> None:
 
 POSES = "poses"
 """A table that replaces `key_frames` for the page in runs with random walks."""
+DECISIONS = "decisions"
 MAX_POSES = 200_000
 MAX_ROWS = 1 << 17
 
@@ -56,6 +60,7 @@ class PageData:
         self.run = run
         self.title = run_title(run)
         self._folder: Path | None = None
+        self._lock = threading.Lock()
 
     @cached_property
     def _walls(self) -> WallsHistory:
@@ -102,11 +107,16 @@ class PageData:
     def table_path(self, name: str) -> Path:
         """Return the Parquet file of a table.
 
+        Decisions that the run didn't store are those of its repetition.
+
         Raises:
-            ArtifactError: The run has no such table.
+            ArtifactError: The run has no such table, or can't be repeated for it.
+            Fleet2DError: See `decisions_of`.
         """
         if name == POSES and self._walks_every_us:
             return self._temporary_file(POSES, self._poses)
+        if name == DECISIONS and name not in self.run.tables:
+            return self._temporary_file(name, lambda: decisions_of(self.run))
         if name not in self.run.tables:
             raise ArtifactError(f"the run has no table {name!r}")
         if self.run.directory is not None:
@@ -116,8 +126,12 @@ class PageData:
         # A run in memory, or an unfinished one, whose rows are in its journal.
         return self._temporary_file(name, lambda: self.run.tables[name])
 
-    def _temporary_file(self, name: str, table: Any) -> Path:
+    def _temporary_file(self, name: str, table: Callable[[], Any]) -> Path:
         """Return a temporary file of a table that is not a file of a run directory."""
+        with self._lock:
+            return self._stored(name, table)
+
+    def _stored(self, name: str, table: Callable[[], Any]) -> Path:
         if self._folder is None:
             self._folder = Path(tempfile.mkdtemp(prefix="fleet2d-view-"))
             weakref.finalize(self, shutil.rmtree, self._folder, ignore_errors=True)

@@ -10,14 +10,16 @@ import numpy as np
 from fleet2d import __version__
 from fleet2d.artifacts.manifest import plain
 from fleet2d.artifacts.table import categories
-from fleet2d.configuration.units import parse_duration
+from fleet2d.configuration.units import micros, parse_duration
 from fleet2d.engine.simulation import Simulation
 from fleet2d.entities.home_object import Door
 from fleet2d.errors import ArtifactError
+from fleet2d.floorplan.slow_area import SlowArea
 from fleet2d.kernels import I64, Bool
 from fleet2d.palette import body_color
 from fleet2d.runs.layers import PREFIX
 from fleet2d.runs.run import Run
+from fleet2d.runtime.clock import Clock
 from fleet2d.sight.camera import DEFAULT_ANGLE_DEG, DEFAULT_RANGE_M
 from fleet2d.storage.files import path_in
 from fleet2d.viewer.contract import (
@@ -28,10 +30,12 @@ from fleet2d.viewer.contract import (
     MarkFacts,
     RunFacts,
     SightingFacts,
+    SlowFacts,
     TableFacts,
     WallsChange,
 )
 from fleet2d.viewer.home_facts import HomeDoors, WallsHistory, door_facts, home_facts
+from fleet2d.viewer.moments import clock_of
 
 INTERVENTIONS = "interventions"
 VIOLATIONS = "violations"  # name of the table
@@ -81,6 +85,38 @@ def intervention_label(record: Mapping[str, Any]) -> str:
         parts = next(([key, value] for key, value in change.items() if value), ["change"])
     by = f" ({record['by']})" if record.get("by") else ""
     return " ".join(str(part) for part in parts[:3]) + by
+
+
+def slow_floors(
+    scenario: Mapping[str, Any], records: Iterable[Mapping[str, Any]], clock: Clock
+) -> list[SlowFacts]:
+    """Return the floors that slow robots down, of a scenario and of records of interventions."""
+    floors = [_slow_floor(area, 0, clock.steps) for area in scenario["floorplan"].get("slows", ())]
+    return [*floors, *slow_floors_of(records, clock)]
+
+
+def slow_floors_of(records: Iterable[Mapping[str, Any]], clock: Clock) -> list[SlowFacts]:
+    """Return the floors that slow robots down since interventions."""
+    floors = []
+    for record in records:
+        if record["do"] == "slow":
+            step, end, duration = int(record["step"]), clock.steps, record.get("duration")
+            if duration is not None:
+                end = min(end, step + clock.step_at_or_after(micros(parse_duration(duration))))
+            floors.append(_slow_floor(record, step, end))
+    return floors
+
+
+def _slow_floor(settings: Mapping[str, Any], step: int, end: int) -> SlowFacts:
+    area = SlowArea(**{key: settings[key] for key in SlowArea.model_fields if key in settings})
+    parts = [f"robots drive at {area.speed:.0%}"] if area.speed < 1 else []
+    parts += [f"robots stop for {area.stop.total_seconds():g} s"] if area.stop else []
+    return SlowFacts(outline=list(area.area), words=", ".join(parts), step=step, end=end)
+
+
+def _starts_unlit(scenario: Mapping[str, Any]) -> bool:
+    """Return whether people switch lights, which are off at first then."""
+    return any(user.get("lights") for user in scenario.get("users", {}).values())
 
 
 def expectation_marks(
@@ -274,6 +310,8 @@ def run_facts(run: Run, doors: HomeDoors, walls: WallsHistory) -> RunFacts:
         tables=[_table_facts(run, name) for name in run.tables],
         walls=walls.changes,
         marks=marks_of(run),
+        slows=slow_floors(scenario, manifest.get("interventions") or (), clock_of(run)),
+        starts_unlit=_starts_unlit(scenario),
         metrics=run.metrics,
         scenario=scenario,
         walks_every_s=0.0,
@@ -414,6 +452,8 @@ def live_facts(simulation: Simulation) -> RunFacts:
         tables=[],
         walls=[WallsChange(step=0, walls=0)],
         marks=[],
+        slows=slow_floors(scenario, simulation.interventions, clock),
+        starts_unlit=_starts_unlit(scenario),
         metrics={},
         scenario=scenario,
         walks_every_s=0.0,
