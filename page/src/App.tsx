@@ -15,6 +15,8 @@ import { MetricsPanel } from "./panels/MetricsPanel";
 import { NotesPanel } from "./panels/NotesPanel";
 import { Now } from "./panels/Now";
 import { slowMoment } from "./panels/slow";
+import { Terms } from "./panels/Terms";
+import { downloadFilm, filming } from "./film";
 import { Plan } from "./plan/Plan";
 import * as state from "./state";
 import { Ask } from "./timeline/Ask";
@@ -189,6 +191,11 @@ function Controls() {
           Day
         </button>
       </span>
+      {run.path && !state.live.value && (
+        <button type="button" disabled={filming.value} title="A film of the minute around this moment (m)" onClick={() => void downloadFilm(run)}>
+          {filming.value ? "Filming …" : "Film"}
+        </button>
+      )}
       {run.path && <CopyLink />}
       <Help />
     </section>
@@ -267,16 +274,7 @@ function Help() {
   return (
     <details class="help">
       <summary>Keys</summary>
-      <dl>
-        {KEYS.map(([keys, words]) => (
-          <div key={keys}>
-            <dt>
-              <kbd>{keys}</kbd>
-            </dt>
-            <dd>{words}</dd>
-          </div>
-        ))}
-      </dl>
+      <Terms rows={KEYS.map(([keys, words]) => [<kbd>{keys}</kbd>, words])} />
     </details>
   );
 }

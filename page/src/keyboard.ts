@@ -1,5 +1,6 @@
 /** The whole page by keyboard alone. */
 
+import { downloadFilm, goToFailure } from "./film";
 import { status } from "./live/feed";
 import { orderAll } from "./live/orders";
 import * as state from "./state";
@@ -21,6 +22,8 @@ export const KEYS: [string, string][] = [
   ["g", "go to a time"],
   ["a", "ask the timeline"],
   ["b", "bookmark or note at the moment"],
+  ["v", "the next failure"],
+  ["m", "a film of the minute around the moment"],
   ["c", "keep who is selected in the middle of the plan"],
   ["f", "search events"],
   ["t", "light, dark"],
@@ -69,6 +72,10 @@ const ACTIONS: Record<string, (event: KeyboardEvent) => void> = {
   },
   c: () => {
     state.followed.value = state.followed.value ? "" : state.selected.value;
+  },
+  v: () => goToFailure(),
+  m: () => {
+    if (state.run.value && !state.live.value) void downloadFilm(state.run.value);
   },
   a: () => document.getElementById("ask")?.focus(),
   g: () => document.getElementById("goto")?.focus(),

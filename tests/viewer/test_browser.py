@@ -5,6 +5,7 @@ import math
 import re
 import shutil
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from datetime import timedelta
 from pathlib import Path
 from typing import Any
@@ -31,16 +32,23 @@ def browser() -> Iterator[Any]:
 
 @pytest.fixture(scope="module")
 def address(run_dir: Path) -> Iterator[str]:
-    server = PageServer([run_dir])
-    stop = server.start()
-    yield server.address
-    stop()
+    with served(run_dir) as started:
+        yield started
 
 
 @pytest.fixture
 def page(browser: Any, address: str) -> Iterator[Any]:
     with page_at(browser, address) as opened:
         yield opened
+
+
+@contextmanager
+def served(*sources: Path | PageData) -> Iterator[str]:
+    """Serve runs; yield the address of their page."""
+    server = PageServer(sources)
+    stop = server.start()
+    yield server.address
+    stop()
 
 
 def moment(page: Any) -> int:
@@ -196,24 +204,22 @@ def test_note_at_a_moment_is_kept_and_found_again(
     browser: Any, run_dir: Path, tmp_path: Path
 ) -> None:
     root = shutil.copytree(run_dir, tmp_path / "day")
-    server = PageServer([root])
-    stop = server.start()
-    with page_at(browser, server.address) as page:
-        page.fill("#goto", "step 7200")
-        page.press("#goto", "Enter")
-        page.keyboard.press("b")
-        page.wait_for_selector("#note:focus")
-        page.keyboard.type("waits here")
-        page.keyboard.press("Enter")
-        page.wait_for_selector("ol[data-count='1'] >> text=waits here")
-        page.keyboard.press("Home")
-    with page_at(browser, f"{server.address}#panel=notes") as page:
-        page.wait_for_selector(".label >> text=notes")
-        page.click("text=waits here")
-        assert 7200 == moment(page)
-        page.click("[aria-label='Remove waits here']")
-        page.wait_for_selector("ol[data-count='0']", state="attached")
-    stop()
+    with served(root) as address:
+        with page_at(browser, address) as page:
+            page.fill("#goto", "step 7200")
+            page.press("#goto", "Enter")
+            page.keyboard.press("b")
+            page.wait_for_selector("#note:focus")
+            page.keyboard.type("waits here")
+            page.keyboard.press("Enter")
+            page.wait_for_selector("ol[data-count='1'] >> text=waits here")
+            page.keyboard.press("Home")
+        with page_at(browser, f"{address}#panel=notes") as page:
+            page.wait_for_selector(".label >> text=notes")
+            page.click("text=waits here")
+            assert 7200 == moment(page)
+            page.click("[aria-label='Remove waits here']")
+            page.wait_for_selector("ol[data-count='0']", state="attached")
 
 
 def test_link_to_a_moment_is_copied(browser: Any, address: str) -> None:
@@ -347,40 +353,55 @@ def test_lights_and_slow_floors_are_shown(browser: Any) -> None:
         floorplan={"slows": [{"area": area, "speed": 0.5}]},
         changes=[{"at": "30 min", "lights": "living_room", "turn": "off"}],
     )
-    server = PageServer([PageData(run)])
-    stop = server.start()
-    with page_at(browser, f"{server.address}#select=living_room_0&panel=inspect") as page:
-        light = page.locator("div:has(> dt:text-is('light')) dd")
-        assert "on" == light.inner_text()
-        plan = page.locator(".plan canvas")
-        pictures = {plan.screenshot()}
-        page.keyboard.press("End")
-        until(page, lambda: light.inner_text() == "off")
-        page.wait_for_selector(".label >> text=living_room_0 light")
-        page.click("#tab-layers")
-        for name in ("slows", "lights"):
+    with served(PageData(run)) as address:
+        with page_at(browser, f"{address}#select=living_room_0&panel=inspect") as page:
+            light = page.locator("div:has(> dt:text-is('light')) dd")
+            assert "on" == light.inner_text()
+            plan = page.locator(".plan canvas")
+            pictures = {plan.screenshot()}
+            page.keyboard.press("End")
+            until(page, lambda: light.inner_text() == "off")
+            page.wait_for_selector(".label >> text=living_room_0 light")
+            page.click("#tab-layers")
+            for name in ("slows", "lights"):
+                pictures.add(plan.screenshot())
+                page.uncheck(f"input[name={name}]")
+                page.wait_for_timeout(150)
             pictures.add(plan.screenshot())
-            page.uncheck(f"input[name={name}]")
-            page.wait_for_timeout(150)
-        pictures.add(plan.screenshot())
-        assert 4 == len(pictures)
-    stop()
+            assert 4 == len(pictures)
+
+
+def test_one_key_stores_a_film_of_the_minute_around_a_failure(browser: Any, tmp_path: Path) -> None:
+    av = pytest.importorskip("av", reason="PyAV is not installed")
+    run = fleet2d.run(
+        "bundled:base",
+        "simulation.duration=10 min",
+        "expect.unseen=never(seen(ana, by=astro))",
+        seed=4,
+    )
+    (mark,) = [m for m in PageData(run).facts["marks"] if m["kind"] == "violated"][:1]
+    with served(PageData(run)) as address, page_at(browser, address) as page:
+        page.keyboard.press("v")
+        assert mark["step"] == moment(page)
+        with page.expect_download() as download:
+            page.keyboard.press("m")
+        download.value.save_as(tmp_path / "film.mp4")
+    with av.open(str(tmp_path / "film.mp4")) as film:
+        assert 15.0 == pytest.approx(film.duration / 1e6, abs=1.0)
 
 
 def test_two_runs_are_compared_in_step(browser: Any, run_dir: Path, other_dir: Path) -> None:
-    server = PageServer([run_dir, other_dir])
-    stop = server.start()
-    with page_at(browser, server.address) as page:
-        assert 2 == page.locator(".plan canvas").count()
-        page.wait_for_selector(".labels button >> text=rooms differ")
-        page.fill("#goto", "day 1 08:00")
-        page.press("#goto", "Enter")
-        page.wait_for_timeout(300)
-        steps = [table.get_attribute("data-step") for table in page.locator("table.now").all()]
-        assert [str(8 * 3600)] * 2 == steps
-        page.click("#tab-metrics")
-        assert page.locator("table.results tr.differs").count() > 0
-    stop()
+    with served(run_dir, other_dir) as address:
+        with page_at(browser, address) as page:
+            assert 2 == page.locator(".plan canvas").count()
+            page.wait_for_selector(".labels button >> text=rooms differ")
+            page.fill("#goto", "day 1 08:00")
+            page.press("#goto", "Enter")
+            page.wait_for_timeout(300)
+            steps = [table.get_attribute("data-step") for table in page.locator("table.now").all()]
+            assert [str(8 * 3600)] * 2 == steps
+            page.click("#tab-metrics")
+            assert page.locator("table.results tr.differs").count() > 0
 
 
 def test_exported_file_plays_without_a_server(browser: Any, run_dir: Path, tmp_path: Path) -> None:
@@ -400,14 +421,12 @@ def test_exported_file_plays_without_a_server(browser: Any, run_dir: Path, tmp_p
 def test_fifty_users_are_shown(browser: Any, tmp_path: Path) -> None:
     people = {f"u{i:02d}": {"type": "routine", "persona": "works_outside"} for i in range(50)}
     run = fleet2d.run("bundled:base", "simulation.duration=1 h", seed=4, users=people)
-    server = PageServer([PageData(run)])
-    stop = server.start()
-    with page_at(browser, server.address) as page:
-        page.keyboard.press("End")
-        assert 52 == page.locator("table.now tr[data-body]").count()
-        page.click("tr[data-body=u49] button")
-        page.wait_for_selector("[data-inspected=u49]")
-    stop()
+    with served(PageData(run)) as address:
+        with page_at(browser, address) as page:
+            page.keyboard.press("End")
+            assert 52 == page.locator("table.now tr[data-body]").count()
+            page.click("tr[data-body=u49] button")
+            page.wait_for_selector("[data-inspected=u49]")
 
 
 def test_plan_of_4000_vertices_is_shown(browser: Any, tmp_path: Path) -> None:
@@ -424,27 +443,23 @@ def test_plan_of_4000_vertices_is_shown(browser: Any, tmp_path: Path) -> None:
             "robots": {"astro": {"camera": {}, "behaviors": [{"type": "patrol"}]}},
         }
     )
-    server = PageServer([PageData(run)])
-    stop = server.start()
-    with page_at(browser, server.address) as page:
-        page.keyboard.press("End")
-        shows_step(page, 599)
-        pictures = {page.locator(".plan canvas").screenshot()}
-        page.click("#tab-layers")
-        page.click("input[name=sight]")
-        page.wait_for_timeout(300)
-        pictures.add(page.locator(".plan canvas").screenshot())
-        assert 2 == len(pictures)
-    stop()
+    with served(PageData(run)) as address:
+        with page_at(browser, address) as page:
+            page.keyboard.press("End")
+            shows_step(page, 599)
+            pictures = {page.locator(".plan canvas").screenshot()}
+            page.click("#tab-layers")
+            page.click("input[name=sight]")
+            page.wait_for_timeout(300)
+            pictures.add(page.locator(".plan canvas").screenshot())
+            assert 2 == len(pictures)
 
 
 def test_damaged_run_is_explained_on_the_page(browser: Any, tmp_path: Path) -> None:
     (tmp_path / "manifest.json").write_text('{"format": 99}')
-    server = PageServer([tmp_path])
-    stop = server.start()
-    with page_at(browser, server.address) as page:
-        assert "later Fleet2D" in page.inner_text(".failure")
-    stop()
+    with served(tmp_path) as address:
+        with page_at(browser, address) as page:
+            assert "later Fleet2D" in page.inner_text(".failure")
 
 
 def test_live_run_is_stepped_paused_and_steered(browser: Any) -> None:
@@ -492,37 +507,35 @@ def test_moment_of_a_stored_run_is_continued_otherwise_beside_it(
     browser: Any, run_dir: Path, tmp_path: Path
 ) -> None:
     parent = shutil.copytree(run_dir, tmp_path / "day")
-    server = PageServer([parent])
-    stop = server.start()
-    at = 4 * 3600
-    with page_at(browser, server.address) as page:
-        page.fill("#goto", f"step {at}")
-        page.press("#goto", "Enter")
-        page.click("text=Continue from here")
-        page.wait_for_selector(f".live[data-paused=true][data-step='{at}']")
-        tables = [page.locator(f"table.now[data-step='{at}']").nth(i) for i in range(2)]
-        places = [t.locator("tr[data-body=astro]").get_attribute("data-x") for t in tables]
-        assert places[0] == places[1]
-        page.locator("tr[data-body=astro] button").first.click()
-        page.select_option("select[aria-label='Key of a behavior of astro']", "hangout.tau")
-        page.fill("input[aria-label='Value of hangout.tau']", "10 min")
-        page.get_by_role("button", name="Change", exact=True).click()
-        page.click("text=Call astro")
-        box = page.locator(".plan canvas").nth(1).bounding_box()
-        page.mouse.click(box["x"] + box["width"] * 0.6, box["y"] + box["height"] * 0.75)
-        page.click("button.play")
-        page.wait_for_selector("html[data-ended='1']", timeout=60_000)
-        page.click("#tab-now")
-        shows_step(page, 9 * 3600 - 1)
-        rooms = [
-            page.locator("table.now")
-            .nth(i)
-            .locator("tr[data-body=astro]")
-            .get_attribute("data-room")
-            for i in range(2)
-        ]
-        assert "living_room_0" == rooms[1] != rooms[0]
-    stop()
+    with served(parent) as address:
+        at = 4 * 3600
+        with page_at(browser, address) as page:
+            page.fill("#goto", f"step {at}")
+            page.press("#goto", "Enter")
+            page.click("text=Continue from here")
+            page.wait_for_selector(f".live[data-paused=true][data-step='{at}']")
+            tables = [page.locator(f"table.now[data-step='{at}']").nth(i) for i in range(2)]
+            places = [t.locator("tr[data-body=astro]").get_attribute("data-x") for t in tables]
+            assert places[0] == places[1]
+            page.locator("tr[data-body=astro] button").first.click()
+            page.select_option("select[aria-label='Key of a behavior of astro']", "hangout.tau")
+            page.fill("input[aria-label='Value of hangout.tau']", "10 min")
+            page.get_by_role("button", name="Change", exact=True).click()
+            page.click("text=Call astro")
+            box = page.locator(".plan canvas").nth(1).bounding_box()
+            page.mouse.click(box["x"] + box["width"] * 0.6, box["y"] + box["height"] * 0.75)
+            page.click("button.play")
+            page.wait_for_selector("html[data-ended='1']", timeout=60_000)
+            page.click("#tab-now")
+            shows_step(page, 9 * 3600 - 1)
+            rooms = [
+                page.locator("table.now")
+                .nth(i)
+                .locator("tr[data-body=astro]")
+                .get_attribute("data-room")
+                for i in range(2)
+            ]
+            assert "living_room_0" == rooms[1] != rooms[0]
     branch = tmp_path / "day-branch-1"
     done = fleet2d.open_run(branch).manifest["interventions"]
     assert [("configure", at), ("send", at)] == [(act["do"], act["step"]) for act in done]

@@ -33,7 +33,7 @@ export interface Session {
   sources: RunSource[];
 }
 
-async function fetched(url: string, init?: RequestInit): Promise<Response> {
+export async function fetched(url: string, init?: RequestInit): Promise<Response> {
   const response = await fetch(url, init);
   if (!response.ok) {
     const problem = (await response.json().catch(() => null)) as Problem | null;
@@ -42,7 +42,7 @@ async function fetched(url: string, init?: RequestInit): Promise<Response> {
   return response;
 }
 
-async function json<T>(url: string): Promise<T> {
+export async function json<T>(url: string): Promise<T> {
   return (await (await fetched(url)).json()) as T;
 }
 
@@ -117,10 +117,30 @@ export function rangedBuffer(url: string, byteLength: number): AsyncBuffer {
   };
 }
 
-class HeldRun implements RunSource {
-  readonly path = "";
+/** A source of a run that has its poses in tables only, and nowhere to store notes. */
+export abstract class TablesOnly {
+  protected abstract readonly whyNoNotes: string;
 
-  constructor(private readonly held: EmbeddedRun) {}
+  notes(): Promise<NoteFacts[]> {
+    return Promise.resolve([]);
+  }
+
+  storeNotes(): Promise<never> {
+    return Promise.reject(new Error(this.whyNoNotes));
+  }
+
+  tracks(): Promise<null> {
+    return Promise.resolve(null);
+  }
+}
+
+class HeldRun extends TablesOnly implements RunSource {
+  readonly path = "";
+  protected readonly whyNoNotes = "a file holds no notes: open the run with fleet2d view";
+
+  constructor(private readonly held: EmbeddedRun) {
+    super();
+  }
 
   facts(): Promise<RunFacts> {
     return Promise.resolve(this.held.facts);
@@ -128,18 +148,6 @@ class HeldRun implements RunSource {
 
   sightings(): Promise<SightingFacts[]> {
     return Promise.resolve(this.held.sightings);
-  }
-
-  notes(): Promise<NoteFacts[]> {
-    return Promise.resolve([]);
-  }
-
-  storeNotes(): Promise<never> {
-    return Promise.reject(new Error("a file holds no notes: open the run with fleet2d view"));
-  }
-
-  tracks(): Promise<null> {
-    return Promise.resolve(null);
   }
 
   walls(number: number): Promise<WallsFacts> {

@@ -7,7 +7,7 @@ import { Decisions } from "../data/decisions";
 import type { Observation, ObservationSource } from "../data/observations";
 import { AWAY } from "../data/rooms";
 import { Run } from "../data/run";
-import { type RunSource, ServedRun } from "../data/source";
+import { json, type RunSource, ServedRun, TablesOnly } from "../data/source";
 import { stretchesUntil } from "../data/stretches";
 import { Track } from "../data/tracks";
 import * as state from "../state";
@@ -18,21 +18,19 @@ export const feeds = signal<readonly Feed[]>([]);
 export const status = computed<LiveFrame | null>(() => feeds.value[feeds.value.length - 1]?.status.value ?? null);
 export const connected = signal(true);
 
-async function json<T>(url: string): Promise<T> {
-  const response = await fetch(url);
-  if (!response.ok) throw new Error(`${url}: ${response.status}`);
-  return (await response.json()) as T;
-}
-
 const NOTHING = "a run that is under way has no tables yet";
 /** Numbers of the walls that a branch shares with its past begin here. */
 const PAST_WALLS = 1_000_000;
 
-class LiveSource implements RunSource {
+class LiveSource extends TablesOnly implements RunSource {
+  protected readonly whyNoNotes = "notes are stored beside a run that is over";
+
   constructor(
     readonly path: string,
     private readonly past: Run | null,
-  ) {}
+  ) {
+    super();
+  }
 
   facts(): Promise<RunFacts> {
     return json(`${this.path}/facts.json`);
@@ -40,18 +38,6 @@ class LiveSource implements RunSource {
 
   sightings(): Promise<SightingFacts[]> {
     return Promise.resolve([]);
-  }
-
-  notes(): Promise<never[]> {
-    return Promise.resolve([]);
-  }
-
-  storeNotes(): Promise<never> {
-    return Promise.reject(new Error("notes are stored beside a run that is over"));
-  }
-
-  tracks(): Promise<null> {
-    return Promise.resolve(null);
   }
 
   walls(number: number): Promise<WallsFacts> {

@@ -9,6 +9,7 @@ import { valueAt } from "../data/stretches";
 import * as state from "../state";
 import { bodyState } from "./Now";
 import { slowMoment } from "./slow";
+import { Terms } from "./Terms";
 
 const SHOWN_EVENTS = 12;
 
@@ -24,19 +25,9 @@ export function Inspect() {
   return <p class="hint">There is no {name} in this run.</p>;
 }
 
+/** The facts that are known. */
 function Facts({ rows }: { rows: [string, string][] }) {
-  return (
-    <dl>
-      {rows
-        .filter(([, value]) => value)
-        .map(([name, value]) => (
-          <div key={name}>
-            <dt>{name}</dt>
-            <dd>{value}</dd>
-          </div>
-        ))}
-    </dl>
-  );
+  return <Terms rows={rows.filter(([, value]) => value)} />;
 }
 
 function BodyView({ run, name }: { run: Run; name: string }) {

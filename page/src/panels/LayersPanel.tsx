@@ -2,6 +2,7 @@
 
 import * as state from "../state";
 import { roomColor, scaleColor } from "../theme";
+import { Terms } from "./Terms";
 
 const WORDS: Record<state.Switch, string> = {
   names: "names",
@@ -68,25 +69,12 @@ const LEGEND: [string, string][] = [
 function Legend() {
   const run = state.run.value!;
   const kinds = new Map(run.facts.home.rooms.map((room) => [room.type, roomColor(room.color, room.deep_color)]).reverse() as [string, string][]);
+  const signs = LEGEND.map(([sign, words]) => [<span aria-hidden="true">{sign}</span>, words] as const);
+  const chips = [...kinds].reverse().map(([kind, color]) => [<span class="chip robot" style={{ background: color }} />, kind.replaceAll("_", " ")] as const);
   return (
     <fieldset class="legend">
       <legend>Legend</legend>
-      <dl>
-        {LEGEND.map(([sign, words]) => (
-          <div key={sign}>
-            <dt aria-hidden="true">{sign}</dt>
-            <dd>{words}</dd>
-          </div>
-        ))}
-        {[...kinds].reverse().map(([kind, color]) => (
-          <div key={kind}>
-            <dt>
-              <span class="chip robot" style={{ background: color }} />
-            </dt>
-            <dd>{kind.replaceAll("_", " ")}</dd>
-          </div>
-        ))}
-      </dl>
+      <Terms rows={[...signs, ...chips]} />
       <p class="hint">Rooms of one type differ in shade.</p>
     </fieldset>
   );

@@ -82,7 +82,7 @@ function paintLane(context: Context, paint: LanePaint, scale: Scale, top: number
 /** A row a room, the darker the more is believed of it; where the user really is as a line. */
 function paintHeat(
   context: Context,
-  { beliefs, rows, truth, color, endUs }: Extract<LanePaint, { kind: "heat" }>,
+  { beliefs, rows, names, truth, color, endUs }: Extract<LanePaint, { kind: "heat" }>,
   scale: Scale,
   top: number,
   height: number,
@@ -110,6 +110,10 @@ function paintHeat(
     const [left, right] = [Math.max(0, xOf(scale, truth.from[k]!)), Math.min(scale.width, xOf(scale, truth.to[k]!))];
     context.fillRect(left, top + (row + 0.5) * tall - 1.5, Math.max(1, right - left), 2);
   }
+  context.font = "9px system-ui, sans-serif";
+  context.textBaseline = "middle";
+  context.textAlign = "left";
+  names.forEach((name, row) => writeInside(context, name, 0, top + (row + 0.5) * tall - 0.5, scale.width, colors));
 }
 
 function paintStretches(
@@ -192,7 +196,7 @@ function paintLine(
 }
 
 const SECOND = 1e6;
-const STEPS = [1, 5, 15, 30, 60, 300, 900, 1800, 3600, 7200, 10_800, 21_600, 43_200, 86_400, 172_800, 604_800, 2_592_000];
+const STEPS = [1, 5, 15, 30, 60, 300, 900, 1800, 3600, 7200, 10_800, 21_600, 43_200, 86_400, 172_800, 604_800, 1_209_600, 2_592_000];
 
 /** Distance between two ticks of the axis [us], so that about so many fit. */
 export function tickStep(scale: Scale, pixels = 84): number {
@@ -226,6 +230,7 @@ function drawAxis(context: Context, scale: Scale, clock: Clock, colors: Colors):
     const words = step >= 86_400 * SECOND || atMidnight ? clock.dateText(us) : clock.timeText(us, step < 60 * SECOND);
     context.fillText(words, x + 4, 25);
   }
+  if (step >= 86_400 * SECOND) return; // the ticks are dates
   context.fillStyle = colors.text;
   context.font = "600 11px system-ui, sans-serif";
   context.fillText(`${clock.dateText(Math.max(0, scale.from))} · day ${clock.day(Math.max(0, scale.from))}`, 4, 8);

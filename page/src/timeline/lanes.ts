@@ -38,7 +38,7 @@ export type LanePaint =
     }
   | { kind: "ticks"; us: readonly number[]; color: string }
   | { kind: "line"; series: Series; extent: readonly [number, number]; color: string }
-  | { kind: "heat"; beliefs: BeliefSeries; rows: readonly number[]; truth: Stretches; color: string; endUs: number };
+  | { kind: "heat"; beliefs: BeliefSeries; rows: readonly number[]; names: readonly string[]; truth: Stretches; color: string; endUs: number };
 
 /** Every word keeps its colour, in all lanes of all runs. */
 const colorOfWord = new Map<string, string>();
@@ -61,7 +61,7 @@ export function lanesOf(run: Run, prefix: string, other: Run | null, title = "")
   return lanes;
 }
 
-const HEAT_ROW_HEIGHT = 9;
+const HEAT_ROW_HEIGHT = 12;
 const MIN_HEAT = 0.02;
 
 /** What is believed of each room over time, the true room drawn over it, and the error below. */
@@ -88,7 +88,7 @@ export function beliefLanes(run: Run): Lane[] {
     const room = valueAt(truth, us);
     return `${believed.join(", ")}${room === null ? "" : `; true: ${name(room)}`}`;
   };
-  const paint: LanePaint = { kind: "heat", beliefs, rows, truth, color, endUs: run.endUs };
+  const paint: LanePaint = { kind: "heat", beliefs, rows, names: rows.map(name), truth, color, endUs: run.endUs };
   const height = rows.length * HEAT_ROW_HEIGHT;
   const heat: Lane = { id: "belief", label, height, group: "Beliefs", isMain: true, words, paint: () => paint, subject: chosen.user };
   const error = errorsOf(run, chosen);

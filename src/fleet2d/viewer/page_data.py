@@ -18,7 +18,7 @@ import numpy as np
 
 from fleet2d.artifacts.table import categories
 from fleet2d.engine.repeat import decisions_of
-from fleet2d.errors import ArtifactError, InputError
+from fleet2d.errors import ArtifactError, InputError, extra
 from fleet2d.kernels import TURN
 from fleet2d.runs.run import Run
 from fleet2d.storage.files import path_in, write_atomically
@@ -43,6 +43,8 @@ def write_file(path: Path, content: bytes) -> None:
 POSES = "poses"
 """A table that replaces `key_frames` for the page in runs with random walks."""
 DECISIONS = "decisions"
+FILM_AROUND_US = 30_000_000
+FILM_SPEED = 4.0
 MAX_POSES = 200_000
 MAX_ROWS = 1 << 17
 
@@ -59,7 +61,6 @@ class PageData:
         """Take a run; nothing is computed."""
         self.run = run
         self.title = run_title(run)
-        self._folder: Path | None = None
         self._lock = threading.Lock()
 
     @cached_property
@@ -129,15 +130,35 @@ class PageData:
     def _temporary_file(self, name: str, table: Callable[[], Any]) -> Path:
         """Return a temporary file of a table that is not a file of a run directory."""
         with self._lock:
-            return self._stored(name, table)
+            path = self._temporary_folder / f"{name}.parquet"
+            if not path.exists():
+                write_table(table(), path)
+        return path
 
-    def _stored(self, name: str, table: Callable[[], Any]) -> Path:
-        if self._folder is None:
-            self._folder = Path(tempfile.mkdtemp(prefix="fleet2d-view-"))
-            weakref.finalize(self, shutil.rmtree, self._folder, ignore_errors=True)
-        path = self._folder / f"{name}.parquet"
-        if not path.exists():
-            write_table(table(), path)
+    @cached_property
+    def _temporary_folder(self) -> Path:
+        folder = Path(tempfile.mkdtemp(prefix="fleet2d-view-"))
+        weakref.finalize(self, shutil.rmtree, folder, ignore_errors=True)
+        return folder
+
+    def film_path(self, step: int) -> Path:
+        """Return a film of the minute around a step, at four times real time.
+
+        Raises:
+            InputError: The run has no such step, or PyAV or matplotlib isn't installed.
+            ArtifactError: The run stored no key frames.
+        """
+        with extra("viz", "a film needs matplotlib"):
+            from fleet2d.viewer.film import write_film
+        steps, step_us = self.run.manifest["steps"], self.run.manifest["step_us"]
+        if not 0 <= step < steps:
+            raise InputError(f"there is no step {step} to film: the last is {steps - 1}")
+        around = max(1, FILM_AROUND_US // step_us)
+        with self._lock:
+            path = self._temporary_folder / f"{step}.mp4"
+            if not path.exists():
+                first, end = max(0, step - around), min(steps, step + around)
+                write_film(self.run, path, first, end, speed=FILM_SPEED)
         return path
 
     @cached_property

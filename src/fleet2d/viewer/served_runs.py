@@ -95,6 +95,7 @@ class ServedRuns:
             Route("/run/{number:int}/notes.json", _endpoint(self, _notes)),
             Route("/run/{number:int}/notes", self._store_notes, methods=["POST"]),
             Route("/run/{number:int}/walls/{walls:int}.json", _endpoint(self, _walls)),
+            Route("/run/{number:int}/film/{step:int}.mp4", _endpoint(self, _film)),
             Route("/run/{number:int}/tables/{table}.parquet", _endpoint(self, _table)),
         ]
 
@@ -137,6 +138,10 @@ def _tracks(data: PageData, _: Request) -> Response:
 
 def _sightings(data: PageData, _: Request) -> Response:
     return json_answer(compact_json(data.sightings))
+
+
+def _film(data: PageData, request: Request) -> Response:
+    return FileResponse(data.film_path(request.path_params["step"]), media_type="video/mp4")
 
 
 def _walls(data: PageData, request: Request) -> Response:
