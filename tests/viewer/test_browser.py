@@ -353,22 +353,22 @@ def test_lights_and_slow_floors_are_shown(browser: Any) -> None:
         floorplan={"slows": [{"area": area, "speed": 0.5}]},
         changes=[{"at": "30 min", "lights": "living_room", "turn": "off"}],
     )
-    with served(PageData(run)) as address:
-        with page_at(browser, f"{address}#select=living_room_0&panel=inspect") as page:
-            light = page.locator("div:has(> dt:text-is('light')) dd")
-            assert "on" == light.inner_text()
-            plan = page.locator(".plan canvas")
-            pictures = {plan.screenshot()}
-            page.keyboard.press("End")
-            until(page, lambda: light.inner_text() == "off")
-            page.wait_for_selector(".label >> text=living_room_0 light")
-            page.click("#tab-layers")
-            for name in ("slows", "lights"):
-                pictures.add(plan.screenshot())
-                page.uncheck(f"input[name={name}]")
-                page.wait_for_timeout(150)
+    view = "#select=living_room_0&panel=inspect"
+    with served(PageData(run)) as address, page_at(browser, address + view) as page:
+        light = page.locator("div:has(> dt:text-is('light')) dd")
+        assert "on" == light.inner_text()
+        plan = page.locator(".plan canvas")
+        pictures = {plan.screenshot()}
+        page.keyboard.press("End")
+        until(page, lambda: light.inner_text() == "off")
+        page.wait_for_selector(".label >> text=living_room_0 light")
+        page.click("#tab-layers")
+        for name in ("slows", "lights"):
             pictures.add(plan.screenshot())
-            assert 4 == len(pictures)
+            page.uncheck(f"input[name={name}]")
+            page.wait_for_timeout(150)
+        pictures.add(plan.screenshot())
+        assert 4 == len(pictures)
 
 
 def test_one_key_stores_a_film_of_the_minute_around_a_failure(browser: Any, tmp_path: Path) -> None:
@@ -391,17 +391,16 @@ def test_one_key_stores_a_film_of_the_minute_around_a_failure(browser: Any, tmp_
 
 
 def test_two_runs_are_compared_in_step(browser: Any, run_dir: Path, other_dir: Path) -> None:
-    with served(run_dir, other_dir) as address:
-        with page_at(browser, address) as page:
-            assert 2 == page.locator(".plan canvas").count()
-            page.wait_for_selector(".labels button >> text=rooms differ")
-            page.fill("#goto", "day 1 08:00")
-            page.press("#goto", "Enter")
-            page.wait_for_timeout(300)
-            steps = [table.get_attribute("data-step") for table in page.locator("table.now").all()]
-            assert [str(8 * 3600)] * 2 == steps
-            page.click("#tab-metrics")
-            assert page.locator("table.results tr.differs").count() > 0
+    with served(run_dir, other_dir) as address, page_at(browser, address) as page:
+        assert 2 == page.locator(".plan canvas").count()
+        page.wait_for_selector(".labels button >> text=rooms differ")
+        page.fill("#goto", "day 1 08:00")
+        page.press("#goto", "Enter")
+        page.wait_for_timeout(300)
+        steps = [table.get_attribute("data-step") for table in page.locator("table.now").all()]
+        assert [str(8 * 3600)] * 2 == steps
+        page.click("#tab-metrics")
+        assert page.locator("table.results tr.differs").count() > 0
 
 
 def test_exported_file_plays_without_a_server(browser: Any, run_dir: Path, tmp_path: Path) -> None:
@@ -421,12 +420,11 @@ def test_exported_file_plays_without_a_server(browser: Any, run_dir: Path, tmp_p
 def test_fifty_users_are_shown(browser: Any, tmp_path: Path) -> None:
     people = {f"u{i:02d}": {"type": "routine", "persona": "works_outside"} for i in range(50)}
     run = fleet2d.run("bundled:base", "simulation.duration=1 h", seed=4, users=people)
-    with served(PageData(run)) as address:
-        with page_at(browser, address) as page:
-            page.keyboard.press("End")
-            assert 52 == page.locator("table.now tr[data-body]").count()
-            page.click("tr[data-body=u49] button")
-            page.wait_for_selector("[data-inspected=u49]")
+    with served(PageData(run)) as address, page_at(browser, address) as page:
+        page.keyboard.press("End")
+        assert 52 == page.locator("table.now tr[data-body]").count()
+        page.click("tr[data-body=u49] button")
+        page.wait_for_selector("[data-inspected=u49]")
 
 
 def test_plan_of_4000_vertices_is_shown(browser: Any, tmp_path: Path) -> None:
@@ -443,23 +441,21 @@ def test_plan_of_4000_vertices_is_shown(browser: Any, tmp_path: Path) -> None:
             "robots": {"astro": {"camera": {}, "behaviors": [{"type": "patrol"}]}},
         }
     )
-    with served(PageData(run)) as address:
-        with page_at(browser, address) as page:
-            page.keyboard.press("End")
-            shows_step(page, 599)
-            pictures = {page.locator(".plan canvas").screenshot()}
-            page.click("#tab-layers")
-            page.click("input[name=sight]")
-            page.wait_for_timeout(300)
-            pictures.add(page.locator(".plan canvas").screenshot())
-            assert 2 == len(pictures)
+    with served(PageData(run)) as address, page_at(browser, address) as page:
+        page.keyboard.press("End")
+        shows_step(page, 599)
+        pictures = {page.locator(".plan canvas").screenshot()}
+        page.click("#tab-layers")
+        page.click("input[name=sight]")
+        page.wait_for_timeout(300)
+        pictures.add(page.locator(".plan canvas").screenshot())
+        assert 2 == len(pictures)
 
 
 def test_damaged_run_is_explained_on_the_page(browser: Any, tmp_path: Path) -> None:
     (tmp_path / "manifest.json").write_text('{"format": 99}')
-    with served(tmp_path) as address:
-        with page_at(browser, address) as page:
-            assert "later Fleet2D" in page.inner_text(".failure")
+    with served(tmp_path) as address, page_at(browser, address) as page:
+        assert "later Fleet2D" in page.inner_text(".failure")
 
 
 def test_live_run_is_stepped_paused_and_steered(browser: Any) -> None:
