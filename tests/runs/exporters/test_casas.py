@@ -10,13 +10,13 @@ from tests.scenes import run, scenario
 from fleet2d.errors import RunDirectoryError
 from fleet2d.logs.layouts import casas
 from fleet2d.runs.exporters import Selection
-from fleet2d.runs.exporters.casas import export
+from fleet2d.runs.exporters.texts import export_casas
 
 
 def test_file_has_a_line_per_reading_in_the_columns_of_casas(plan: str, tmp_path: Path) -> None:  # noqa: F811
     stored = run(household(plan))
     path = tmp_path / "log.txt"
-    text = export(stored, path, Selection.of(stored))
+    text = export_casas(stored, path, Selection.of(stored))
     lines = path.read_text().splitlines()
     assert stored.tables["sensors"].num_rows == len(lines)
     assert f"{len(lines)} readings in {path}" == text
@@ -31,17 +31,17 @@ def test_file_has_a_line_per_reading_in_the_columns_of_casas(plan: str, tmp_path
 def test_reader_of_casas_logs_reads_it(plan: str, tmp_path: Path) -> None:  # noqa: F811
     path = tmp_path / "log.txt"
     stored = run(household(plan))
-    export(stored, path, Selection.of(stored))
+    export_casas(stored, path, Selection.of(stored))
     assert casas.read(path)
 
 
 def test_run_without_sensors_is_refused_with_what_to_do(tmp_path: Path) -> None:
     stored = run(scenario("1 min"))
     with pytest.raises(RunDirectoryError, match="add objects that sense to its scenario"):
-        export(stored, tmp_path / "log.txt", Selection.of(stored))
+        export_casas(stored, tmp_path / "log.txt", Selection.of(stored))
 
 
 def test_file_that_can_not_be_written_is_named(plan: str, tmp_path: Any) -> None:  # noqa: F811
     stored = run(household(plan))
     with pytest.raises(RunDirectoryError, match=r"no/log\.txt can't be written"):
-        export(stored, tmp_path / "no" / "log.txt", Selection.of(stored))
+        export_casas(stored, tmp_path / "no" / "log.txt", Selection.of(stored))

@@ -13,7 +13,7 @@ from fleet2d.runs.exporters import exporter, format_of, formats, new_file
 
 
 def test_module_of_a_format_exports() -> None:
-    assert "fleet2d.runs.exporters.casas" == exporter("casas").__module__
+    assert "fleet2d.runs.exporters.texts" == exporter("casas").__module__
 
 
 def test_unknown_format_is_refused_with_the_known_ones() -> None:

@@ -11,10 +11,10 @@ rr = pytest.importorskip("rerun", reason="the extra rerun is not installed")
 
 @pytest.fixture(scope="module")
 def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    from fleet2d.runs.exporters import rerun
+    from fleet2d.runs.exporters.rerun import export_rerun
 
     path = tmp_path_factory.mktemp("rerun") / "day.rrd"
-    rerun.export(day(), path, part())
+    export_rerun(day(), path, part())
     return path
 
 

@@ -11,7 +11,7 @@ import pytest
 from tests.runs.exporters.worlds import END, FIRST, day, part, poses, rows
 
 from fleet2d.errors import RunDirectoryError
-from fleet2d.runs.exporters import mcap, rosbag2
+from fleet2d.runs.exporters.bags import export_mcap, export_rosbag2
 
 pytest.importorskip("rosbags", reason="the extra ros is not installed")
 BEGIN_NS = 1_767_571_200 * 1_000_000_000  # 2026-01-05T00:00, taken as UTC
@@ -24,7 +24,7 @@ def from_mcap(tmp_path_factory: pytest.TempPathFactory) -> Messages:
     from mcap_ros2.decoder import DecoderFactory
 
     path = tmp_path_factory.mktemp("mcap") / "day.mcap"
-    mcap.export(day(), path, part())
+    export_mcap(day(), path, part())
     messages: Messages = defaultdict(list)
     with path.open("rb") as file:
         reader = make_reader(file, decoder_factories=[DecoderFactory()])
@@ -38,7 +38,7 @@ def from_bag(tmp_path_factory: pytest.TempPathFactory) -> Messages:
     from rosbags.highlevel import AnyReader
 
     path = tmp_path_factory.mktemp("bag") / "day"
-    rosbag2.export(day(), path, part())
+    export_rosbag2(day(), path, part())
     messages: Messages = defaultdict(list)
     with AnyReader([path]) as reader:
         for connection, time, data in reader.messages():
@@ -192,7 +192,7 @@ def test_chunks_of_mcap_files_are_whole_and_indexed(tmp_path: Path) -> None:
     from mcap.reader import make_reader
 
     path = tmp_path / "day.mcap"
-    said = mcap.export(day(), path, part())
+    said = export_mcap(day(), path, part())
 
     with path.open("rb") as file:
         reader = make_reader(file, validate_crcs=True)
@@ -218,7 +218,7 @@ def test_chunks_of_mcap_files_are_whole_and_indexed(tmp_path: Path) -> None:
 
 
 def test_layout_for_foxglove_names_the_topics_of_the_file(tmp_path: Path) -> None:
-    line = mcap.export(day(), tmp_path / "day.mcap", part())
+    line = export_mcap(day(), tmp_path / "day.mcap", part())
 
     layout = json.loads((tmp_path / "day.layout.json").read_text())
     assert "day.layout.json" in line
@@ -226,7 +226,7 @@ def test_layout_for_foxglove_names_the_topics_of_the_file(tmp_path: Path) -> Non
     assert {"/map", "/astro/odom", "/astro/detections"} == set(topics)
 
 
-@pytest.mark.parametrize(("export", "name"), [(mcap.export, "d.mcap"), (rosbag2.export, "d")])
+@pytest.mark.parametrize(("export", "name"), [(export_mcap, "d.mcap"), (export_rosbag2, "d")])
 def test_place_that_can_not_be_written_is_named(
     export: Callable[..., str], name: str, tmp_path: Path
 ) -> None:

@@ -7,11 +7,11 @@ import pandas as pd
 from shapely.geometry import LineString, Point
 from tests.runs.exporters.worlds import NAMES, day, part, poses, rows
 
-from fleet2d.runs.exporters import csv, geojson, jsonl
+from fleet2d.runs.exporters.texts import export_csv, export_geojson, export_jsonl
 
 
 def test_csv_has_the_pose_of_each_body_at_each_time(tmp_path: Path) -> None:
-    csv.export(day(), tmp_path / "day.csv", part())
+    export_csv(day(), tmp_path / "day.csv", part())
 
     table = pd.read_csv(tmp_path / "day.csv", parse_dates=["time"])
     assert table["step"].is_monotonic_increasing
@@ -26,7 +26,7 @@ def test_csv_has_the_pose_of_each_body_at_each_time(tmp_path: Path) -> None:
 
 
 def test_json_lines_have_all_records_in_order_of_time(tmp_path: Path) -> None:
-    jsonl.export(day(), tmp_path / "day.jsonl", part())
+    export_jsonl(day(), tmp_path / "day.jsonl", part())
 
     lines = [json.loads(line) for line in (tmp_path / "day.jsonl").read_text().splitlines()]
     assert sorted(line["step"] for line in lines) == [line["step"] for line in lines]
@@ -44,7 +44,7 @@ def test_json_lines_have_all_records_in_order_of_time(tmp_path: Path) -> None:
 
 def test_geojson_has_the_home_the_ways_and_the_events(tmp_path: Path) -> None:
     path = tmp_path / "day.geojson"
-    geojson.export(day(), path, part())
+    export_geojson(day(), path, part())
 
     features = json.loads(path.read_text())["features"]
     ways = [f for f in features if f["properties"]["kind"] == "way"]

@@ -1,13 +1,12 @@
-"""Exporters, one format a module, and what they export: a part of a run, in bounded memory.
+"""Exporters by their formats, and what they export: a part of a run, in bounded memory.
 
-`export` in a module writes a stored run to a file for other programs. A format of an installed
-package is an entry point of the group `fleet2d.exporter`: a function with the same arguments.
+`export_NAME` in the module of a format writes a stored run to a file for other programs. A format
+of an installed package is an entry point of the group `fleet2d.exporter`: a function with the same
+arguments.
 """
 
-import ast
 import importlib
 import os
-import pkgutil
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -204,6 +203,37 @@ def _batches(run: "Run", name: str) -> "Iterator[pa.RecordBatch]":
 Exporter = Callable[["Run", Path, "Selection"], str]
 """Writes a part of a run to a file, and returns a line about it."""
 
+_FORMATS = {
+    "casas": (
+        "texts",
+        "The readings of a run's sensors as a text file in the layout of the CASAS smart homes.",
+    ),
+    "csv": ("texts", "Poses of all users and robots as CSV: a row for each body and time."),
+    "geojson": (
+        "texts",
+        "GeoJSON in metres: rooms, doorways and furniture, a line for each way, a point for each"
+        " event.",
+    ),
+    "jsonl": (
+        "texts",
+        "JSON Lines: an object for each pose, event, observation and row of a table, in order of"
+        " time.",
+    ),
+    "mcap": (
+        "bags",
+        "ROS 2 messages in an MCAP file, for Foxglove, PlotJuggler and ROS: needs the extra `ros`.",
+    ),
+    "rerun": (
+        "rerun",
+        "A recording for the viewer of Rerun: needs the extra `rerun`.",
+    ),
+    "rosbag2": (
+        "bags",
+        "ROS 2 messages as a bag in SQLite, which any ROS 2 can play: needs the extra `ros`.",
+    ),
+}
+"""The module of each format, and what it is."""
+
 # Formats whose files have another suffix than the name of the format.
 _SUFFIXES = {".txt": "casas", ".rrd": "rerun", "": "rosbag2"}
 
@@ -240,11 +270,8 @@ def export(
 
 
 def formats() -> dict[str, str]:
-    """Return what each format is, by its name, without importing any.
-
-    That is the first line of the module; empty for formats of installed packages.
-    """
-    own = {name: _first_line(Path(__path__[0], f"{name}.py")) for name in _modules()}
+    """Return what each format is, by its name; empty for formats of installed packages."""
+    own = {name: text for name, (_, text) in _FORMATS.items()}
     return dict(sorted({**dict.fromkeys(_plugins().names, ""), **own}.items()))
 
 
@@ -290,10 +317,11 @@ def exporter(name: str) -> Exporter:
 
     Example:
         >>> exporter("casas").__module__
-        'fleet2d.runs.exporters.casas'
+        'fleet2d.runs.exporters.texts'
     """
-    if name in _modules():
-        return cast("Exporter", importlib.import_module(f"{__name__}.{name}").export)
+    if name in _FORMATS:
+        module = importlib.import_module(f"{__name__}.{_FORMATS[name][0]}")
+        return cast("Exporter", getattr(module, f"export_{name}"))
     if name not in _plugins().names:
         from fleet2d.configuration.problems import (
             suggest,  # with pydantic, which the help needn't import
@@ -301,15 +329,6 @@ def exporter(name: str) -> Exporter:
 
         raise InputError(f"there is no exporter {name!r}{suggest(name, formats())}")
     return cast("Exporter", _plugins()[name].load())
-
-
-def _first_line(module: Path) -> str:
-    docstring = ast.get_docstring(ast.parse(module.read_text(encoding="utf-8")))
-    return (docstring or "").partition("\n")[0]
-
-
-def _modules() -> list[str]:
-    return [module.name for module in pkgutil.iter_modules(__path__)]
 
 
 def _plugins() -> Any:

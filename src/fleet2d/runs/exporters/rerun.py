@@ -17,7 +17,7 @@ _ARROW, _BODY, _SIGHTING = 0.4, 0.15, 0.06
 _GREY = (136, 136, 136)
 
 
-def export(run: Run, path: Path, part: Selection) -> str:
+def export_rerun(run: Run, path: Path, part: Selection) -> str:
     """Write walls, rooms, poses where they change, sightings, events and presence.
 
     The timeline `time` is the local time of the run, `step` its step. What is shown of a body that
