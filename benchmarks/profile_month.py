@@ -65,7 +65,7 @@ def learns(_: Learners, learner: Any, *__: Any) -> str:
 PARTS: tuple[tuple[Any, str, str | Callable[..., str]], ...] = (
     (Simulation, "__init__", "set up: plan, walls, routes, places"),
     (Simulation, "finish", "write and close"),
-    (Simulation, "_spans", "loop"),
+    (loop.Loop, "run", "loop"),
     *((Bodies, name, "everybody follows a plan") for name in ("follow", "window", "runs", "block")),
     *((Cameras, name, "robots look for users") for name in ("limit", "take")),
     *((SeenArea, name, "what of the home was in view") for name in ("take", "take_bins")),

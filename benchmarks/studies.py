@@ -26,9 +26,10 @@ from fleet2d.studies.executors import (
     SerialExecutor,
     TaskSchedule,
     WorkerJob,
+    WorkerTask,
 )
 from fleet2d.studies.reader import open_study
-from fleet2d.studies.records import record_of
+from fleet2d.studies.records import VariantRecord, record_of
 from fleet2d.studies.simulator import VariantOutcome
 
 EXAMPLES = Path(__file__).parents[1] / "examples" / "studies"
@@ -41,14 +42,14 @@ class InstantExecutor:
     workers = 1
 
     def run(self, job: WorkerJob, tasks: TaskSchedule) -> Generator[Event]:
-        """Yield a record of usual size for each task."""
+        """Yield a record of usual size for each task; making it is the work of a worker."""
         numbers = {f"metric_{i}.ana.value": 0.1 * i for i in range(30)}
+        outcome = VariantOutcome("complete", "0" * 64, numbers, {}, {"total": 0.03})
+        header = record_of(WorkerTask(0, 0, ""), outcome).header
         while (task := tasks.take(self)) is not None:
             if isinstance(job, StudyJob):
-                outcome = VariantOutcome(
-                    "complete", f"{task.number:064x}", numbers, {}, {"total": 0.03}
-                )
-                yield FinishedTask(task, record_of(task, outcome), 1)
+                own = {"number": task.number, "identity": task.identity}
+                yield FinishedTask(task, VariantRecord({**header, **own}), 1)
             else:  # set-ups
                 yield FinishedTask(task, "", 1)
 

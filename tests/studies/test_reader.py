@@ -1,5 +1,7 @@
 """Reading studies with polars, pandas, DuckDB and Arrow, and answers from them."""
 
+import subprocess
+import sys
 from pathlib import Path
 
 import polars as pl
@@ -31,6 +33,17 @@ def test_variants_have_parameters_status_time_digest_and_metrics(study: Study) -
     assert SIGHTINGS in study.metrics
     assert (pl.Float64, pl.Int64) == (frame.schema[SPEED], frame.schema["seed"])
     assert frame[SIGHTINGS].is_between(0, 1).all()
+
+
+def test_opening_loads_neither_the_simulator_nor_pandas(study: Study) -> None:
+    code = (
+        "import sys, fleet2d\n"
+        f"assert len(fleet2d.open_study({study.location!r}).arrow_variants) == 6\n"
+        "heavy = ('fleet2d.engine', 'fleet2d.scenario', 'pandas', 'polars', 'shapely')\n"
+        "print([name for name in heavy if name in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert "[]\n" == done.stdout
 
 
 def test_a_table_of_all_variants_comes_with_their_parameters(study: Study) -> None:

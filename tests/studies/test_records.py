@@ -9,14 +9,19 @@ import pyarrow as pa
 import pytest
 
 from fleet2d.errors import ArtifactError
+from fleet2d.studies import records
 from fleet2d.studies.executors import WorkerTask
 from fleet2d.studies.records import Journal, VariantRecord, read_journal, record_of
 from fleet2d.studies.simulator import VariantOutcome
 
 
-def record(number: int, status: Any = "complete") -> VariantRecord:
+def record(
+    number: int, status: Any = "complete", metrics: dict[str, float] | None = None
+) -> VariantRecord:
     rows = pa.table({"step": [1, 2, 3], "value": [0.5, None, number]})
-    outcome = VariantOutcome(status, "d" * 8, {"a.b": 0.25}, {"rows": rows}, {"total": 1.0})
+    outcome = VariantOutcome(
+        status, "d" * 8, metrics or {"a.b": 0.25}, {"rows": rows}, {"total": 1.0}
+    )
     return record_of(WorkerTask(number, number, f"id{number}"), outcome)
 
 
@@ -43,6 +48,24 @@ def test_the_newest_record_of_a_variant_counts(path: Path) -> None:
     journal.append(record(1, "failed"))
     journal.append(record(1))
     assert (1, "complete") == (len(journal), journal.read(1).header["status"])
+
+
+def test_results_are_the_newest_in_the_order_of_variants(
+    path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(records, "MAX_HEADERS", 2)
+    monkeypatch.setattr(records, "GROUP_ROWS", 2)
+    journal = Journal(path)
+    for entry in (record(2), record(1, "failed"), record(0, metrics={"z": 1.0}), record(1)):
+        journal.append(entry)
+    groups = list(journal.results())
+    rows = pa.concat_tables(groups)
+    assert [2, 1] == [len(group) for group in groups]
+    assert ([0, 1, 2], ["complete"] * 3) == tuple(
+        rows[c].to_pylist() for c in ("variant", "status")
+    )
+    assert ["z", "a.b"] == rows.column_names[-2:]
+    assert [1.0, None, None] == rows["z"].to_pylist()
 
 
 def test_a_journal_goes_on_where_it_was_closed(path: Path) -> None:

@@ -101,7 +101,7 @@ def table_of(
     columns = []
     for column in spec.columns:
         names = words[column.name].in_order() if column.is_growing else column.categories
-        dictionary = _strings(names) if column.kind == "category" else None
+        dictionary = string_array(names) if column.kind == "category" else None
         parts = [_array_of(chunk[column.name], column, dictionary) for chunk, _ in chunks]
         columns.append(pa.chunked_array(parts, _TYPES[column.kind]))
     return pa.Table.from_arrays(columns, schema=schema or schema_of(spec))
@@ -122,13 +122,13 @@ def _array_of(chunk: ColumnChunk, column: Column, dictionary: pa.Array | None) -
         bitmap = None if missing is None else _bits(~missing)
         return pa.StringArray.from_buffers(len(chunk.lengths), *text, bitmap)
     if dictionary is not None:
-        codes = _wrapped(chunk.values, pa.int32(), missing)
+        codes = number_array(chunk.values, pa.int32(), missing)
         return pa.DictionaryArray.from_arrays(codes, dictionary)
-    return _wrapped(chunk.values, _TYPES[column.kind], missing)
+    return number_array(chunk.values, _TYPES[column.kind], missing)
 
 
-def _wrapped(values: NDArray[Any], kind: pa.DataType, missing: Bool | None) -> pa.Array:
-    """Wrap values as they lie in memory.
+def number_array(values: NDArray[Any], kind: pa.DataType, missing: Bool | None = None) -> pa.Array:
+    """Wrap numbers or booleans as they lie in memory.
 
     `pa.array` would do, but it imports pandas where that is installed: a quarter of a second.
     """
@@ -137,8 +137,9 @@ def _wrapped(values: NDArray[Any], kind: pa.DataType, missing: Bool | None) -> p
     return pa.Array.from_buffers(kind, len(values), [bitmap, data])
 
 
-def _strings(words: Sequence[str]) -> pa.Array:
-    return _array_of(encode_strings(words, nullable=False), Column("words", "string"), None)
+def string_array(words: Sequence[str | None]) -> pa.Array:
+    """Return texts, or None where there is none, as an array; see `number_array`."""
+    return _array_of(encode_strings(words, nullable=None in words), Column("words", "string"), None)
 
 
 def _bits(flags: Bool) -> pa.Buffer:
@@ -386,8 +387,8 @@ def with_categories(table: pa.Table) -> pa.Table:
         if column.kind != "category":
             continue
         # The dictionary of the first chunk comes first in the unified one.
-        no_codes = _wrapped(np.empty(0, np.int32), pa.int32(), None)
-        first = pa.DictionaryArray.from_arrays(no_codes, _strings(column.categories))
+        no_codes = number_array(np.empty(0, np.int32), pa.int32(), None)
+        first = pa.DictionaryArray.from_arrays(no_codes, string_array(column.categories))
         chunks = pa.chunked_array([first, *table.column(i).chunks]).unify_dictionaries().chunks
         if not column.is_growing and len(chunks[0].dictionary) > len(column.categories):
             name = chunks[0].dictionary[len(column.categories)]

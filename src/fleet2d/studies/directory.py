@@ -10,13 +10,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
-from pydantic import TypeAdapter
+from pydantic import Field, TypeAdapter
 
+from fleet2d.configuration.components import Settings
 from fleet2d.errors import ArtifactError, RunDirectoryError
 from fleet2d.kernels import I32, U8, Bool
 from fleet2d.storage.files import PARTIAL, FolderLock, path_in
 from fleet2d.studies.parts import (
-    VARIANT,
     Part,
     ResultRows,
     next_number,
@@ -26,8 +26,7 @@ from fleet2d.studies.parts import (
     record_names,
     write_part,
 )
-from fleet2d.studies.records import Journal, read_journal
-from fleet2d.studies.specification import PairedComparison
+from fleet2d.studies.records import VARIANT, Journal, array_of, numbers_of, read_journal
 from fleet2d.studies.storage import Storage, write_error
 
 if TYPE_CHECKING:
@@ -82,6 +81,22 @@ class MetricFacts:
     description: str = ""
     unit: str = ""
     units: Mapping[str, str] = field(default_factory=dict)
+
+
+class PairedComparison(Settings):
+    """A paired comparison that the report shows.
+
+    Attributes:
+        metric: A number, such as ltp_error.ana.tv.
+        against: The axis and its reference value.
+        by: The columns whose values are the units of intervals; left out: homes, people, seeds.
+        within: Axes with a separate comparison for each of their values.
+    """
+
+    metric: str
+    against: dict[str, Any] = Field(min_length=1, max_length=1)
+    by: tuple[str, ...] | None = None
+    within: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -265,18 +280,35 @@ class StudyDirectory:
             status[numbers] = np.where(is_complete, COMPLETE, FAILED)
 
         for table in read_results(self.storage, parts, (VARIANT, "status")):
-            names = table.column("status").to_numpy()
-            note(table.column(VARIANT).to_numpy(), names == "complete")
+            is_complete = [status == "complete" for status in table.column("status").to_pylist()]
+            note(numbers_of(table), np.array(is_complete, np.bool_))
         for record in read_journal(self.journal_path(parts)):
             note(np.array([record.number], np.int32), np.array([record.is_complete]))
         return status
 
     def counts(self) -> Counts:
         """Return how far the study is."""
-        numbers = self.plan([VARIANT]).column(VARIANT).to_numpy()
+        numbers = numbers_of(self.plan([VARIANT]))
         status = self.statuses(self.parts())
         status = np.append(status, np.zeros(int(numbers.max(initial=0)) + 1, np.uint8))[numbers]
         return Counts(len(numbers), *(int((status == c).sum()) for c in (COMPLETE, FAILED)))
+
+    def scenario(self, number: int) -> dict[str, Any]:
+        """Return the scenario of a variant, with its seed.
+
+        Raises:
+            RunDirectoryError: The study has no such variant.
+        """
+        row_filter = [(VARIANT, "=", number)]
+        rows = self.storage.read_table(PLAN, ["template", "seed"], row_filter).to_pylist()
+        if not rows:
+            raise RunDirectoryError(f"{self.location} has no variant {number}")
+        template_filter = [("template", "=", rows[0]["template"])]
+        with self.storage.reading(SCENARIOS):
+            texts = self.storage.read_table(SCENARIOS, filters=template_filter).to_pylist()
+            content: dict[str, Any] = json.loads(texts[0]["scenario"])
+            content["simulation"]["seed"] = rows[0]["seed"]
+        return content
 
     def variants(self) -> "pa.Table":
         """Return parameters, status, times, digest and metrics of all variants.
@@ -305,13 +337,14 @@ class StudyDirectory:
         results = ResultRows(self.storage, parts, headers)
         state = {_STATE: _state(parts, bool(headers))}
         for plan in self.plan_batches():
-            newest = results.of(plan.column(VARIANT).to_numpy())
+            newest = results.of(numbers_of(plan))
             names = (name for name in plan.column_names if name not in _PLAN_ONLY)
             columns = {name: plan.column(name) for name in names}
             columns |= {
                 name: newest.column(name) for name in newest.column_names if name != VARIANT
             }
-            columns["status"] = columns["status"].fill_null(MISSING)
+            statuses = (status or MISSING for status in columns["status"].to_pylist())
+            columns["status"] = array_of(statuses, pa.string())
             yield pa.table(columns).replace_schema_metadata(state)
 
     def write_variants(self, observe: "Callable[[pa.Table], None]") -> None:

@@ -35,7 +35,7 @@ from fleet2d.studies.directory import (
 )
 from fleet2d.studies.executors import Event, Executor, LostTask, TaskSchedule, WorkerTask
 from fleet2d.studies.intervals import LEVEL
-from fleet2d.studies.parts import RESULT_COLUMNS, Part, results_table
+from fleet2d.studies.parts import Part
 from fleet2d.studies.plan import (
     Changed,
     KnownNames,
@@ -51,7 +51,13 @@ from fleet2d.studies.plan import (
     write_plan,
 )
 from fleet2d.studies.reader import Study
-from fleet2d.studies.records import Journal, VariantRecord, record_of
+from fleet2d.studies.records import (
+    RESULT_COLUMNS,
+    VariantRecord,
+    array_of,
+    record_of,
+    results_table,
+)
 from fleet2d.studies.simulator import VariantOutcome, describe_error, execute, is_kept
 from fleet2d.studies.specification import AdaptSettings, Specification, read_specification
 
@@ -148,7 +154,7 @@ class AdaptiveSchedule(TaskSchedule):
             )
 
 
-PART_BYTES = 64_000_000  # size at which a journal becomes a part
+PART_BYTES = 32_000_000  # size at which a journal becomes a part
 PART_S_REMOTE = 60.0  # the longest time that results for a store are on this machine only
 CHANGED_MESSAGE = (
     "a file that the variant reads, or Fleet2D itself, changed after the study began: run the study"
@@ -297,8 +303,7 @@ def run_study(
         status = np.append(status, np.zeros(int(variants.number.max()) + 1, np.uint8))
         missing = np.flatnonzero(status[variants.number] != COMPLETE)
         _describe(reconciled, directory, options.observer)
-        journal = directory.open_journal(parts)
-        keeper = _ResultKeeper(directory, parts, journal)
+        keeper = _ResultKeeper(directory, parts)
         counts = Counts(len(variants), len(variants) - len(missing), 0)
         options.observer.on_start(counts, executor.workers)
         failed, is_checked = 0, False
@@ -323,8 +328,9 @@ def run_study(
                         is_checked = True
                     if failed and options.fail_fast:
                         break
-        finally:
+        except BaseException:
             keeper.pause()
+            raise
         keeper.finish()
         if isinstance(schedule, AdaptiveSchedule) and not schedule:
             write_plan(directory, schedule.plan)
@@ -348,18 +354,22 @@ class VariantSummary:
 
     def add(self, variants: "pa.Table") -> None:
         """Add some variants."""
-        statuses = variants.column("status").to_numpy()
-        new, old = Counts.of(statuses.tolist()), self.counts
+        import pyarrow as pa
+
+        from fleet2d.artifacts.arrow import values_of
+
+        statuses = variants.column("status").to_pylist()
+        new, old = Counts.of(statuses), self.counts
         self.counts = Counts(
             old.total + new.total, old.complete + new.complete, old.failed + new.failed
         )
-        complete = variants.filter(statuses == "complete")
+        complete = variants.filter(array_of((s == "complete" for s in statuses), pa.bool_()))
         self._metrics = [name for name in complete.column_names if name not in self._others]
         for pattern in self._lacking:
             lacks = np.ones(len(complete), bool)
             for name in self._metrics:
                 if is_kept(name, [pattern]):
-                    lacks &= complete[name].is_null().to_numpy()
+                    lacks &= values_of(complete[name].is_null())
             self._lacking[pattern] += int(np.count_nonzero(lacks))
 
     def note_missing(self, observer: Observer) -> None:
@@ -383,8 +393,9 @@ def _record(event: Event) -> VariantRecord:
 class _ResultKeeper:
     """Stores results: each in the journal at once, and many together in parts."""
 
-    def __init__(self, directory: StudyDirectory, parts: list[Part], journal: Journal) -> None:
-        self._directory, self._parts, self._journal = directory, parts, journal
+    def __init__(self, directory: StudyDirectory, parts: list[Part]) -> None:
+        self._directory, self._parts = directory, parts
+        self._journal = directory.open_journal(parts)
         self._commit_time = time.monotonic()
         self._is_open = True
 
@@ -400,13 +411,11 @@ class _ResultKeeper:
 
     def finish(self) -> None:
         """Move all results into parts."""
-        journal = self._directory.open_journal(self._parts)
-        self._journal, self._is_open = journal, True
-        if len(journal):
+        if len(self._journal):
             self._commit()
             return
         self.pause()
-        journal.path.unlink()
+        self._journal.path.unlink()
 
     def pause(self) -> None:
         """Close the journal; its results stay there until the study is continued."""

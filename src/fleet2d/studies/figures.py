@@ -8,7 +8,7 @@ import numpy as np
 from fleet2d.errors import extra
 from fleet2d.runtime.clock import DAY_US
 from fleet2d.studies.intervals import estimate
-from fleet2d.studies.parts import VARIANT
+from fleet2d.studies.records import VARIANT
 
 if TYPE_CHECKING:
     import polars as pl

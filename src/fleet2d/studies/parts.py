@@ -5,6 +5,7 @@ commit record is written: the names of its files with their sizes and checksums.
 """
 
 import hashlib
+import itertools
 import json
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -18,7 +19,7 @@ import numpy as np
 from pydantic import TypeAdapter
 
 from fleet2d.kernels import I32
-from fleet2d.studies.records import VariantRecord
+from fleet2d.studies.records import VARIANT, VariantRecord, numbers_of, results_table
 from fleet2d.studies.storage import Storage, write_error
 
 if TYPE_CHECKING:
@@ -28,10 +29,8 @@ if TYPE_CHECKING:
 
 
 RECORDS, RESULTS, TABLES = "parts", "results", "tables"
-VARIANT = "variant"
 ROWS_PER_GROUP = 250_000
-GROUPS_IN_MEMORY = 8  # of rows of results, ROWS_AT_A_TIME each
-ROWS_AT_A_TIME = 5_000  # of results, which take 3 kB each until they are in a table
+GROUPS_IN_MEMORY = 2  # of rows of results
 
 
 @dataclass(frozen=True)
@@ -161,24 +160,23 @@ def _write_files(scratch: Path, name: str, journal: "Journal") -> dict[str, Path
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    numbers = sorted(journal.offsets)
-    names, schemas = dict[str, None](), dict[str, pa.Schema]()
-    for record in map(journal.read, numbers):
-        names |= dict.fromkeys(record.header["metrics"])
-        _add_schemas(record, schemas)
-    results, metrics = scratch / f"{name}-results", list(names)
-    with pq.ParquetWriter(results, results_table((), metrics).schema, compression="zstd") as file:
-        for start in range(0, len(numbers), ROWS_AT_A_TIME):
-            batch = numbers[start : start + ROWS_AT_A_TIME]
-            file.write_table(results_table((journal.read(n).header for n in batch), metrics))
+    results, schemas = scratch / f"{name}-results", dict[str, pa.Schema]()
+    rows = journal.results()
+    first = next(rows)
+    with pq.ParquetWriter(results, first.schema, compression="zstd") as file:
+        for table in itertools.chain([first], rows):
+            file.write_table(table)
     files = {f"{RESULTS}/{name}.parquet": results}
+    numbers = sorted(journal.with_tables)
+    for record in map(journal.read, numbers):
+        _add_schemas(record, schemas)
     with ExitStack() as stack:
         writers: dict[str, _PartFileWriter] = {}
         for i, (table, schema) in enumerate(schemas.items()):
             local = scratch / f"{name}-table-{i}"
             files[f"{TABLES}/{table}/{name}.parquet"] = local
             writers[table] = stack.enter_context(_PartFileWriter(local, schema))
-        for number in numbers if writers else ():
+        for number in numbers:
             for table, rows in journal.read(number).tables().items():
                 writers[table].write(number, rows.read_all())
     return files
@@ -256,42 +254,6 @@ def _add_schemas(record: VariantRecord, schemas: "dict[str, pa.Schema]") -> None
             schemas[name] = pa.unify_schemas([common, schema], promote_options="permissive")
 
 
-_HEADER_FIELDS = ("identity", "status", "digest", "error", "trace")
-_SECONDS = ("setup", "simulate", "total")
-RESULT_COLUMNS = (
-    VARIANT, *_HEADER_FIELDS, "attempts", "setup_s", "simulate_s", "wall_s", "peak_rss_mb",
-)  # fmt: skip
-"""The columns of the results beside the metrics."""
-
-
-def results_table(
-    headers: Iterable[Mapping[str, Any]], metrics: Sequence[str] | None = None
-) -> "pa.Table":
-    """Return one row for each variant: status, times, memory, and a column for each metric.
-
-    Args:
-        headers: The headers of their records.
-        metrics: The names of the metrics; None: all that a header has.
-    """
-    import pyarrow as pa
-
-    rows = list(headers)
-    columns: dict[str, pa.Array] = {VARIANT: pa.array([row["number"] for row in rows], pa.int32())}
-    for name in _HEADER_FIELDS:
-        columns[name] = pa.array([row.get(name) for row in rows], pa.string())
-    columns["attempts"] = pa.array([row["attempts"] for row in rows], pa.int32())
-    for phase in _SECONDS:
-        seconds = [row.get("wall_s", {}).get(phase) for row in rows]
-        columns["wall_s" if phase == "total" else f"{phase}_s"] = pa.array(seconds, pa.float64())
-    columns["peak_rss_mb"] = pa.array([row.get("peak_rss_mb") for row in rows], pa.float64())
-    if metrics is None:
-        metrics = list(dict.fromkeys(name for row in rows for name in row.get("metrics", ())))
-    for name in metrics:
-        values = [row.get("metrics", {}).get(name) for row in rows]
-        columns[name] = pa.array(values, pa.float64())
-    return pa.table(columns)
-
-
 def read_results(
     storage: Storage, parts: Iterable[Part], columns: Sequence[str] | None = None
 ) -> "Iterator[pa.Table]":
@@ -300,10 +262,12 @@ def read_results(
     Raises:
         RunDirectoryError: They are missing or damaged.
     """
+    import pyarrow as pa
+
     for part in parts:
         schema = _results_schema(storage, part)
         if columns is not None:
-            schema = schema.empty_table().select(columns).schema
+            schema = pa.schema([schema.field(name) for name in columns])
         table = storage.read_table(part.results, schema.names)
         with storage.reading(part.results):
             yield table.select(schema.names).cast(schema)
@@ -345,8 +309,8 @@ class ResultRows:
         if self._newest.num_rows or not parts:
             schemas.append(self._newest.schema)
         self._schema = pa.unify_schemas(schemas)
-        numbers = [t[VARIANT].to_numpy() for t in read_results(storage, parts, (VARIANT,))]
-        numbers.append(self._newest[VARIANT].to_numpy())
+        numbers = [numbers_of(t) for t in read_results(storage, parts, (VARIANT,))]
+        numbers.append(numbers_of(self._newest))
         # Rows are read by groups of a file; the last group is the journal.
         sizes = [storage.row_groups(part.results) for part in parts]
         self._groups = [(p, i) for p, of_part in enumerate(sizes) for i in range(len(of_part))]
@@ -361,16 +325,24 @@ class ResultRows:
         """Return the results of variants, a row each; without values where there are none."""
         import pyarrow as pa
 
+        from fleet2d.artifacts.arrow import number_array
+
         rows = self._row[np.where(numbers < len(self._row), numbers, -1)]
         groups = np.searchsorted(self._first, rows, side="right") - 1
-        places, tables, before = np.full(len(numbers), -1), [self._schema.empty_table()], 0
+        places, tables, before = (
+            np.full(len(numbers), -1),
+            [pa.Table.from_batches([], self._schema)],
+            0,
+        )
         for group in np.unique(groups[rows >= 0]).tolist():
             here = np.flatnonzero(groups == group)
-            tables.append(self._read(group).take(pa.array(rows[here] - self._first[group])))
+            tables.append(
+                self._read(group).take(number_array(rows[here] - self._first[group], pa.int64()))
+            )
             places[here] = before + np.arange(len(here))
             before += len(here)
         table = pa.concat_tables(tables, promote_options="default")
-        return table.take(pa.array(places, pa.int64(), mask=places < 0))
+        return table.take(number_array(places, pa.int64(), places < 0))
 
     def _read_group(self, group: int) -> "pa.Table":
         if group == len(self._groups):

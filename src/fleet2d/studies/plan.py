@@ -47,7 +47,7 @@ from fleet2d.studies.executors import (
     TaskSchedule,
     WorkerTask,
 )
-from fleet2d.studies.parts import VARIANT
+from fleet2d.studies.records import VARIANT, array_of, numbers_of
 from fleet2d.studies.simulator import check_setup, is_kept, measure
 from fleet2d.studies.specification import SEED, StudyFile
 
@@ -470,7 +470,7 @@ def _without_repetition(problems: list[str]) -> list[str]:
 
 
 Changed = Literal["redo", "keep"]
-PLAN_BATCH = 10_000  # rows of the plan that are in memory as text
+PLAN_BATCH = 5_000  # rows of the plan that are in memory as text
 PLAN_COLUMNS = (VARIANT, "identity", "scenario", "template", "home_key", "simulated_s")
 BATCH = 1000
 
@@ -486,12 +486,12 @@ class ScenarioFile:
         self._schema = pa.schema([("template", pa.string()), ("scenario", pa.string())])
         self._sink = pa.BufferOutputStream()
         self._writer = pq.ParquetWriter(self._sink, self._schema, compression="zstd")
-        self._rows: list[dict[str, str]] = []
+        self._rows: list[tuple[str, str]] = []
 
     def add(self, template: str, scenario: Scenario) -> None:
         """Add the scenario of a combination, with any of its seeds."""
         content = json.dumps(scenario.resolved())
-        self._rows.append({"template": template, "scenario": content})
+        self._rows.append((template, content))
         if len(self._rows) == BATCH:
             self._flush()
 
@@ -504,7 +504,9 @@ class ScenarioFile:
     def _flush(self) -> None:
         import pyarrow as pa
 
-        self._writer.write_table(pa.Table.from_pylist(self._rows, self._schema))
+        if self._rows:
+            columns = [array_of(each, pa.string()) for each in zip(*self._rows, strict=True)]
+            self._writer.write_table(pa.table(columns, schema=self._schema))
         self._rows = []
 
 
@@ -582,7 +584,7 @@ class _StoredPlan(NamedTuple):
     def read(cls, directory: StudyDirectory) -> Self:
         """Read them, some rows at a time."""
         parts = [
-            (batch[VARIANT].to_numpy(), *(packed(batch[n].to_pylist()) for n in PLAN_COLUMNS[1:3]))
+            (numbers_of(batch), *(packed(batch[n].to_pylist()) for n in PLAN_COLUMNS[1:3]))
             for batch in directory.storage.read_batches(PLAN, PLAN_COLUMNS[:3])
         ]
         empty = (np.zeros(0, np.int32), np.zeros(0, HASH), np.zeros(0, HASH))
@@ -615,6 +617,8 @@ def plan_batches(plan: StudyPlan) -> "Iterator[pa.Table]":
     """Yield a plan as tables: a row per variant, in the order of the design."""
     import pyarrow as pa
 
+    from fleet2d.artifacts.arrow import number_array
+
     design, variants = plan.design, plan.variants
     labels = {}  # by column: the number of its axis, and the label of each choice, of none last
     for number, axis in enumerate(design.axes):
@@ -622,22 +626,23 @@ def plan_batches(plan: StudyPlan) -> "Iterator[pa.Table]":
         for column in axis.columns:
             texts = (c.labels[column] if i in used else None for i, c in enumerate(axis.choices))
             labels[column] = number, label_array([*texts, None])
+    homes, seeds = array_of(variants.home_keys, pa.string()), np.array(design.seeds, np.int64)
     for begin in range(0, max(len(variants), 1), PLAN_BATCH):
         index = variants.index[begin : begin + PLAN_BATCH]
         combination, seed = np.divmod(index, len(design.seeds))
-        columns = {VARIANT: pa.array(variants.number[begin : begin + PLAN_BATCH])}
+        numbers = variants.number[begin : begin + PLAN_BATCH]
+        columns = {VARIANT: number_array(numbers, pa.int32())}
         for name in ("identity", "scenario"):
             values = getattr(variants, name)[begin : begin + PLAN_BATCH]
-            columns[name] = pa.array(map(unpacked, values.tolist()), pa.string())
+            columns[name] = array_of(map(unpacked, values.tolist()), pa.string())
         templates = map(unpacked, variants.template[combination].tolist())
-        columns["template"] = pa.array(templates, pa.string())
-        homes = pa.array(variants.home_keys, pa.string())
-        columns["home_key"] = homes.take(pa.array(variants.home[combination]))
-        columns["simulated_s"] = pa.array(variants.simulated_s[combination])
+        columns["template"] = array_of(templates, pa.string())
+        columns["home_key"] = homes.take(number_array(variants.home[combination], pa.int32()))
+        columns["simulated_s"] = number_array(variants.simulated_s[combination], pa.float64())
         for column, (number, texts) in labels.items():
-            codes = design.combinations[combination, number]
-            columns[column] = texts.take(pa.array(codes % len(texts)))  # -1 is the last
-        columns[SEED] = pa.array(np.array(design.seeds)[seed])
+            codes = design.combinations[combination, number] % len(texts)  # -1 is the last
+            columns[column] = texts.take(number_array(codes, pa.int32()))
+        columns[SEED] = number_array(seeds[seed], pa.int64())
         yield pa.table(columns)
 
 
@@ -651,10 +656,11 @@ def label_array(labels: list[Label]) -> "pa.Array":
 
     kinds = {type(label) for label in labels if label is not None}
     if kinds <= {bool} or kinds <= {int}:
-        return pa.array(labels, pa.bool_() if kinds == {bool} else pa.int64())
+        return array_of(labels, pa.bool_() if kinds == {bool} else pa.int64())
     if kinds <= {int, float}:
-        return pa.array(labels, pa.float64())
-    return pa.array([None if label is None else str(label) for label in labels], pa.string())
+        return array_of(labels, pa.float64())
+    texts = (None if label is None else str(label) for label in labels)
+    return array_of(texts, pa.string())
 
 
 def write_catalogue(
@@ -668,24 +674,6 @@ def write_catalogue(
 def write_plan(directory: StudyDirectory, plan: StudyPlan) -> None:
     """Write the plan of a study."""
     directory.storage.write_batches(PLAN, plan_batches(plan), directory.scratch)
-
-
-def stored_scenario(directory: StudyDirectory, number: int) -> dict[str, Any]:
-    """Return the scenario of a variant, with its seed.
-
-    Raises:
-        RunDirectoryError: The study has no such variant.
-    """
-    row_filter = [(VARIANT, "=", number)]
-    rows = directory.storage.read_table(PLAN, ["template", "seed"], row_filter).to_pylist()
-    if not rows:
-        raise RunDirectoryError(f"{directory.location} has no variant {number}")
-    template_filter = [("template", "=", rows[0]["template"])]
-    with directory.storage.reading(SCENARIOS):
-        texts = directory.storage.read_table(SCENARIOS, filters=template_filter).to_pylist()
-        content: dict[str, Any] = json.loads(texts[0]["scenario"])
-        content["simulation"]["seed"] = rows[0]["seed"]
-    return content
 
 
 SAMPLES = 3

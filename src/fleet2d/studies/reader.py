@@ -6,22 +6,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 from fleet2d.configuration.problems import did_you_mean, suggest
-from fleet2d.configuration.trust import Trust, restrict_stored
 from fleet2d.errors import ArtifactError, InputError, extra
 from fleet2d.studies import answers
 from fleet2d.studies.directory import Counts, StudyDirectory
 from fleet2d.studies.intervals import POWER
-from fleet2d.studies.parts import (
-    RESULT_COLUMNS,
-    TABLES,
-    VARIANT,
-    Part,
-    plain_schema,
-    with_variant,
-)
-from fleet2d.studies.plan import stored_scenario
-from fleet2d.studies.records import VariantRecord, read_journal
-from fleet2d.studies.simulator import run_scenario
+from fleet2d.studies.parts import TABLES, Part, plain_schema, with_variant
+from fleet2d.studies.records import RESULT_COLUMNS, VARIANT, VariantRecord, read_journal
 from fleet2d.studies.storage import damaged
 
 if TYPE_CHECKING:
@@ -213,7 +203,7 @@ class Study:
         Raises:
             RunDirectoryError: There is no such variant.
         """
-        return stored_scenario(self._directory, variant)
+        return self._directory.scenario(variant)
 
     def rerun(
         self,
@@ -236,6 +226,9 @@ class Study:
             RunDirectoryError: There is no such variant, or the directory can't be used.
             ScenarioError: Its code isn't trusted.
         """
+        from fleet2d.configuration.trust import Trust, restrict_stored
+        from fleet2d.studies.simulator import run_scenario
+
         with restrict_stored(Trust.of(trust)):
             return run_scenario(self.scenario(variant), out, **settings)
 

@@ -1,23 +1,30 @@
 """The results of single variants, and the journal that stores each as soon as it is finished."""
 
 import json
+import math
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fleet2d.artifacts.manifest import plain
+import numpy as np
+
+from fleet2d.kernels import I32
 from fleet2d.storage.files import Frame, FrameWriter, JournalFormat, read_frames
-from fleet2d.studies.executors import WorkerTask
-from fleet2d.studies.simulator import VariantOutcome
 from fleet2d.studies.storage import DAMAGE, damaged, write_error
 
 if TYPE_CHECKING:
     import pyarrow as pa
 
+    from fleet2d.studies.executors import WorkerTask
+    from fleet2d.studies.simulator import VariantOutcome
+
 FORMAT = JournalFormat(b"fleet2d study journal 2\n", ("variant",))
 SYNC_EVERY_S = 2.0  # maximum loss after a power cut; a killed process loses nothing
+VARIANT = "variant"
+GROUP_ROWS = 5_000  # of results, that are written together
+MAX_HEADERS = 1_000  # that a journal has in memory, 3 kB each; as rows of a table they take 0.4
 
 
 @dataclass(frozen=True)
@@ -54,8 +61,8 @@ class VariantRecord:
         return readers
 
 
-def record_of(task: WorkerTask, outcome: VariantOutcome, attempts: int = 1) -> VariantRecord:
-    """Return the outcome of a task as a record."""
+def record_of(task: "WorkerTask", outcome: "VariantOutcome", attempts: int = 1) -> VariantRecord:
+    """Return the outcome of a task as a record; JSON has no NaN and no infinity: they are null."""
     streams = {name: _stream(table) for name, table in outcome.tables.items()}
     fields = vars(outcome).items()
     header = {key: value for key, value in fields if key != "tables" and value != {}}
@@ -63,10 +70,12 @@ def record_of(task: WorkerTask, outcome: VariantOutcome, attempts: int = 1) -> V
         "number": task.number,
         "identity": task.identity,
         "attempts": attempts,
-        "metrics": outcome.metrics,
+        "metrics": {
+            name: value if math.isfinite(value) else None for name, value in outcome.metrics.items()
+        },
         "tables": [(name, len(data)) for name, data in streams.items()],
     }
-    return VariantRecord(plain(header), b"".join(streams.values()))
+    return VariantRecord(header, b"".join(streams.values()))
 
 
 def _stream(table: "pa.Table") -> bytes:
@@ -80,12 +89,73 @@ def _stream(table: "pa.Table") -> bytes:
     return bytes(sink.getvalue())
 
 
+_HEADER_FIELDS = ("identity", "status", "digest", "error", "trace")
+_SECONDS = ("setup", "simulate", "total")
+RESULT_COLUMNS = (
+    VARIANT, *_HEADER_FIELDS, "attempts", "setup_s", "simulate_s", "wall_s", "peak_rss_mb",
+)  # fmt: skip
+"""The columns of the results beside the metrics."""
+
+
+def array_of(values: Iterable[Any], kind: "pa.DataType") -> "pa.Array":
+    """Return values, None among them, as an array of Arrow.
+
+    `pyarrow.array` would do, but it imports pandas where that is installed, which takes 40 MB.
+    """
+    import pyarrow as pa
+
+    from fleet2d.artifacts.arrow import number_array, string_array
+
+    items = list(values)
+    if kind == pa.string():
+        return string_array(items)
+    missing = np.array([item is None for item in items], np.bool_)
+    numbers = [0 if item is None else item for item in items] if missing.any() else items
+    return number_array(np.array(numbers, kind.to_pandas_dtype()), kind, missing)
+
+
+def numbers_of(table: "pa.Table") -> I32:
+    """Return the numbers of the variants in the rows of a table: int32 (n,)."""
+    from fleet2d.artifacts.arrow import values_of
+
+    return values_of(table.column(VARIANT)).astype(np.int32, copy=False)
+
+
+def results_table(
+    headers: Iterable[Mapping[str, Any]], metrics: Sequence[str] | None = None
+) -> "pa.Table":
+    """Return one row for each variant: status, times, memory, and a column for each metric.
+
+    Args:
+        headers: The headers of their records.
+        metrics: The names of the metrics; None: all that a header has.
+    """
+    import pyarrow as pa
+
+    rows = list(headers)
+    values = [row.get("metrics", {}) for row in rows]
+    columns: dict[str, pa.Array] = {VARIANT: array_of([row["number"] for row in rows], pa.int32())}
+    for name in _HEADER_FIELDS:
+        columns[name] = array_of([row.get(name) for row in rows], pa.string())
+    columns["attempts"] = array_of([row["attempts"] for row in rows], pa.int32())
+    for phase in _SECONDS:
+        seconds = [row.get("wall_s", {}).get(phase) for row in rows]
+        columns["wall_s" if phase == "total" else f"{phase}_s"] = array_of(seconds, pa.float64())
+    columns["peak_rss_mb"] = array_of([row.get("peak_rss_mb") for row in rows], pa.float64())
+    if metrics is None:
+        metrics = list(dict.fromkeys(name for row in values for name in row))
+    for name in metrics:
+        columns[name] = array_of([row.get(name) for row in values], pa.float64())
+    return pa.table(columns)
+
+
 class Journal:
     """The records of variants that are not yet in a part of the data set; it only grows.
 
     Attributes:
         path: The file.
         offsets: The offset of the newest frame of each variant, by its number [bytes].
+        with_tables: The numbers of variants that have tables.
     """
 
     def __init__(self, path: Path) -> None:
@@ -97,9 +167,14 @@ class Journal:
         """
         self.path = path
         self.offsets: dict[int, int] = {}
+        self.with_tables = set[int]()
+        self._headers: list[Mapping[str, Any]] = []
+        self._results: list[pa.Table] = []
+        self._first_with: dict[tuple[str, ...], int] = {}  # variant, by the names of its metrics
         end = 0
         for frame in read_frames(path, FORMAT):
-            self.offsets[_record(frame, path).number], end = frame.start, frame.end
+            self._add(_record(frame, path), frame.start)
+            end = frame.end
         try:
             self._writer = FrameWriter(path, FORMAT, end)
         except OSError as error:
@@ -132,7 +207,39 @@ class Journal:
         except OSError as error:
             self._writer.undo()
             raise write_error(self.path.parent, error) from error
-        self.offsets[record.number] = start
+        self._add(record, start)
+
+    def results(self) -> "Iterator[pa.Table]":
+        """Yield the newest results of each variant as rows, in the order of their numbers."""
+        import pyarrow as pa
+
+        from fleet2d.artifacts.arrow import number_array
+
+        self._pack()
+        layouts = sorted(self._first_with, key=self._first_with.__getitem__)
+        metrics = dict.fromkeys(name for layout in layouts for name in layout)
+        rows = pa.concat_tables(self._results, promote_options="default")
+        rows = rows.select([*RESULT_COLUMNS, *metrics])
+        numbers = numbers_of(rows)
+        newest = len(numbers) - 1 - np.unique(numbers[::-1], return_index=True)[1]
+        for begin in range(0, max(len(newest), 1), GROUP_ROWS):
+            yield rows.take(number_array(newest[begin : begin + GROUP_ROWS], pa.int64()))
+
+    def _add(self, record: VariantRecord, start: int) -> None:
+        number, layout = record.number, tuple(record.header["metrics"])
+        self.offsets[number] = start
+        if record.header["tables"]:
+            self.with_tables.add(number)
+        else:
+            self.with_tables.discard(number)
+        self._first_with[layout] = min(number, self._first_with.get(layout, number))
+        self._headers.append(record.header)
+        if len(self._headers) == MAX_HEADERS:
+            self._pack()
+
+    def _pack(self) -> None:
+        self._results.append(results_table(self._headers))
+        self._headers = []
 
     def read(self, number: int) -> VariantRecord:
         """Return the newest record of a variant."""

@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, Any
 
 from fleet2d.errors import ArtifactError, InputError
 from fleet2d.studies.answers import FEW_UNITS, RESIDUAL, holm
+from fleet2d.studies.directory import PairedComparison
 from fleet2d.studies.figures import over_time
 from fleet2d.studies.intervals import LEVEL
-from fleet2d.studies.specification import PairedComparison
 
 if TYPE_CHECKING:
     import polars as pl

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 COPY_BYTES = 1 << 22
-BATCH_ROWS = 10_000  # of a table that is read in parts
+BATCH_ROWS = 5_000  # of a table that is read in parts
 # What libraries raise on damaged files; pyarrow's errors are subclasses of these.
 DAMAGE = (
     ArithmeticError, AttributeError, LookupError, MemoryError, NotImplementedError, OSError,
