@@ -91,11 +91,15 @@ YAML_VALUES = Bound("VALUES", 200_000, "values")
 """Values in a YAML text, or in a scenario and all that it extends; those of an anchor count again
 for each alias."""
 EXTENDED_FILES = Bound("EXTENDED_FILES", 100, "files")
-"""Files of a scenario: its own and those that they extend."""
+"""Files of a scenario, or of a persona: its own and those that they extend."""
 ENTRIES = Bound("ENTRIES", 2_500, "entries")
 """Entries of a section of a scenario, such as its users."""
 MEMBERS = Bound("MEMBERS", 100, "members")
 """Members of a household, each of whom depends on all others."""
+PERSONA_VALUES = Bound("PERSONA_VALUES", 1_000_000, "values in the personas of its users")
+"""Values of personas that are read from files or extend others. They count for each user: for a
+member of a household, with its file and those of all its members. A long text counts for each 64
+characters."""
 ITEMS = Bound("ITEMS", 20_000, "entries")
 """Entries of a list of mappings or texts, such as a script."""
 JSON_VALUES = Bound("JSON_VALUES", 3_000_000, "values")

@@ -129,6 +129,78 @@ def test_a_household_has_a_bound(tmp_path: Path) -> None:
         load_scenario(tmp_path / "home.yaml")
 
 
+def persona_files(folder: Path, n: int) -> None:
+    """Personas that each extend the next one twice: read in turn they are 2 ** n files."""
+    for i in range(n):
+        (folder / f"own{i}.yaml").write_text(f"extends: [own{i + 1}.yaml, own{i + 1}.yaml]")
+    (folder / f"own{n}.yaml").write_text("extends: retired")
+
+
+@pytest.mark.parametrize("persona", ["own0.yaml", f"{{extends: [{'retired, ' * 5000}retired]}}"])
+def test_a_persona_extends_a_bounded_number_of_files(tmp_path: Path, persona: str) -> None:
+    """Files that extend the next one twice were read for hours, 2,000 names for 9 s."""
+    from fleet2d.errors import ScenarioError
+    from fleet2d.scenario.model import load_scenario
+
+    persona_files(tmp_path, 40)
+    text = f"{BASE}users: {{ana: {{type: routine, persona: {persona}}}}}\n"
+    (tmp_path / "home.yaml").write_text(text)
+
+    with pytest.raises(ScenarioError, match=r"ana\.persona: the persona has at least 101 files"):
+        load_scenario(tmp_path / "home.yaml")
+
+
+def house(folder: Path, members: int) -> Path:
+    """Write a scenario with a household whose members have one persona of their own."""
+    names = [f"u{i}" for i in range(members)]
+    (folder / "own.yaml").write_text("extends: retired\npace: 0.9\n")
+    lines = "".join(f"  {name}: own.yaml\n" for name in names)
+    (folder / "house.yaml").write_text(f"members:\n{lines}")
+    text = "".join(f"  {name}: {{type: routine, household: house.yaml}}\n" for name in names)
+    (folder / "home.yaml").write_text(f"{BASE}users:\n{text}")
+    return folder / "home.yaml"
+
+
+def test_personas_of_a_household_count_for_each_member(tmp_path: Path) -> None:
+    """A household of 100 had a manifest of 284 MB, which nothing could read; 24 of them, 20 GB."""
+    from fleet2d.errors import ScenarioError
+    from fleet2d.scenario.model import load_scenario
+
+    assert 20 == len(load_scenario(house(tmp_path, 20)).users) - 1  # and ana
+    with pytest.raises(ScenarioError, match=r"FLEET2D_MAX_PERSONA_VALUES=\d+ in the") as caught:
+        load_scenario(house(tmp_path, 100))
+    assert 2 >= len(str(caught.value).splitlines())
+
+
+def test_long_texts_of_personas_count_for_each_user(tmp_path: Path) -> None:
+    """A text is stored for each user: 60 MB for 2,499 of them were 150 GB of a manifest."""
+    from fleet2d.errors import ScenarioError
+    from fleet2d.scenario.model import load_scenario
+
+    (tmp_path / "own.yaml").write_text(f"extends: retired\nabout: {'x' * 10_000_000}\n")
+    users = "".join(f"  u{i}: {{type: routine, persona: own.yaml}}\n" for i in range(20))
+    (tmp_path / "home.yaml").write_text(f"{BASE}users:\n{users}")
+
+    with pytest.raises(ScenarioError, match="FLEET2D_MAX_PERSONA_VALUES"):
+        load_scenario(tmp_path / "home.yaml")
+
+
+def test_no_run_begins_that_could_not_be_opened(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It was simulated and stored whole, and then its manifest was too large to be read."""
+    import fleet2d
+    from fleet2d.artifacts import store
+    from fleet2d.bounds import Bound
+    from fleet2d.errors import RunDirectoryError
+
+    monkeypatch.setattr(store, "FILE_BYTES", Bound("FILE_BYTES", 1000, "bytes"))
+
+    with pytest.raises(RunDirectoryError, match=r"month/manifest\.json has \d+ bytes, and at most"):
+        fleet2d.run("simulation.duration=1h", seed=1, out=tmp_path / "month")
+    assert not (tmp_path / "month").exists()
+
+
 def test_places_of_replaced_values_are_forgotten(tmp_path: Path) -> None:
     """Messages name where a value is written now, not where one that it replaced was."""
     from fleet2d.scenario.compose import compose

@@ -501,13 +501,15 @@ class Manifest(BaseModel):
         """Return the text of the file: sorted keys, no NaN."""
         return canonical(self.content())
 
-    def write(self, directory: Path) -> None:
-        """Replace the manifest of a run directory atomically.
+    def write(self, directory: Path) -> int:
+        """Replace the manifest of a run directory atomically; return its size [bytes].
 
         Raises:
             OSError: The directory can't be written.
         """
-        write_atomically(directory / FILE_NAME, self.to_json().encode())
+        text = self.to_json().encode()
+        write_atomically(directory / FILE_NAME, text)
+        return len(text)
 
     @classmethod
     def read(cls, directory: Path) -> Manifest:

@@ -22,6 +22,7 @@ from fleet2d.artifacts.unfinished import (
     columns_of,
     remove_leftovers,
 )
+from fleet2d.bounds import FILE_BYTES
 from fleet2d.configuration.components import Settings
 from fleet2d.configuration.units import PositiveDuration
 from fleet2d.errors import ArtifactError, Fleet2DError, RunDirectoryError
@@ -273,10 +274,14 @@ class RunStore:
             self._is_open = True
             self._unfinished_run().begin()
             self.manifest.status = "running"
-            self.manifest.write(self.root)
+            size = self.manifest.write(self.root)
+            FILE_BYTES.check(size, self.directory / FILE_NAME, RunDirectoryError)
         except OSError as error:
             self.discard()
             raise cannot_write(self.directory, error) from error
+        except RunDirectoryError:  # a run that nobody could open
+            self.discard()
+            raise
 
     def _lock_directory(self, root: Path) -> None:
         """Lock the directory, and check that no other run has begun there in the meantime."""

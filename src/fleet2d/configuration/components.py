@@ -17,6 +17,7 @@ import importlib.util
 import inspect
 import pkgutil
 import re
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sized
 from dataclasses import dataclass
 from functools import cache, lru_cache
@@ -140,19 +141,41 @@ def once(info: ValidationInfo, key: object, validate: Callable[[], T]) -> T:
         validate: Reads and validates it.
 
     Raises:
-        ValueError: It is invalid, which the first entry found.
+        ValueError: It is invalid, which the first entry found; or all that was counted, which
+            counts again for each entry, is beyond a bound.
     """
     if info.context is None:
         return validate()
     if key not in info.context:
+        before = Counter(info.context.get(Counter))
         try:
-            info.context[key] = validate()
+            result: T | ValueError = validate()
         except ValueError as error:  # the errors of pydantic are
-            info.context[key] = error
-    result = info.context[key]
+            result = error
+        info.context[key] = result, Counter(info.context.get(Counter)) - before
+    else:
+        for bound, amount in info.context[key][1].items():
+            count(info, bound, amount)
+    result = info.context[key][0]
     if isinstance(result, ValueError):
         raise result
     return result
+
+
+def count(info: ValidationInfo, bound: Bound, amount: int) -> None:
+    """Count what a scenario has of something, in the context of its validation, if there is any.
+
+    Raises:
+        PydanticCustomError: It has more than the bound; only the first such error is shown.
+    """
+    if info.context is None:
+        return
+    amounts = info.context.setdefault(Counter, Counter())  # by bound
+    amounts[bound] += amount
+    try:
+        bound.check(amounts[bound], "the scenario", prefix="at least ")
+    except InputError as error:
+        raise problem(str(error), bound.name) from None
 
 
 def _name_as_type(entries: Any) -> Any:

@@ -14,8 +14,8 @@ from pydantic import (
     model_validator,
 )
 
-from fleet2d.bounds import MEMBERS
-from fleet2d.configuration.components import Settings, once
+from fleet2d.bounds import MEMBERS, PERSONA_VALUES
+from fleet2d.configuration.components import Settings, count, once
 from fleet2d.configuration.documents import read_document
 from fleet2d.configuration.problems import (
     Location,
@@ -33,7 +33,7 @@ from fleet2d.routines.activity import (
     SchemaForms,
     find_activity,
 )
-from fleet2d.routines.persona import AnyPersona, Dates, Timing, YearEvent
+from fleet2d.routines.persona import AnyPersona, Dates, Timing, YearEvent, values_in
 from fleet2d.routines.planner import (
     Episode,
 )
@@ -275,9 +275,11 @@ def _read_household(
 
     def read() -> Household:
         try:
-            return validate(read_document(path).data)
+            data = read_document(path).data
         except ScenarioError as error:
             raise problem(str(error)) from None
+        count(info, PERSONA_VALUES, values_in(data))
+        return validate(data)
 
     return once(info, (Household, path), read)
 

@@ -1,9 +1,11 @@
 """Lives: the days of one person, and those of all members of a household."""
 
+from bisect import bisect_left
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from datetime import date, datetime
 from itertools import pairwise
+from typing import NamedTuple
 
 from fleet2d.configuration.units import weekdays_of
 from fleet2d.kernels import ANY_ROOM, NO_GAP_S, RoomUse
@@ -42,6 +44,18 @@ WELCOME = "welcome"
 WELCOME_S = 90
 
 MemberRooms = Mapping[str, Mapping[str, Sequence[int]]]
+
+
+class PrivateUses(NamedTuple):
+    """The uses of private rooms on a day.
+
+    Attributes:
+        by_begin: Their begin and end [s since midnight], member and room, in order of time.
+        longest: The duration of the longest [s].
+    """
+
+    by_begin: list[tuple[int, int, str, int]]
+    longest: int
 
 
 class Life:
@@ -173,7 +187,7 @@ class Lives:
             for name in household.members
         }
         self._cache: dict[int, Mapping[str, Sequence[Episode]]] = {}
-        self._uses: dict[int, list[tuple[str, int, int, int]]] = {}  # of private rooms
+        self._uses: dict[int, PrivateUses] = {}
         self.first = self._next = first
 
     def day(self, ordinal: int) -> Mapping[str, Sequence[Episode]]:
@@ -208,26 +222,36 @@ class Lives:
             if indices
         }
 
-    def in_use(self, ordinal: int, member: str, room: int) -> list[tuple[int, int]]:
-        """Return when others use a private room [s since the midnight of a date]."""
-        return [
-            (begin + shift, end + shift)
-            for day, shift in ((ordinal - 1, -DAY_S), (ordinal, 0), (ordinal + 1, DAY_S))
-            if day >= self.first
-            for name, of, begin, end in self._private_uses(day)
-            if name != member and of in (ANY_ROOM, room)
-        ]
+    def in_use(self, ordinal: int, member: str, room: int, first: int, last: int) -> bool:
+        """Return whether others use a private room between two times [s since a midnight].
 
-    def _private_uses(self, ordinal: int) -> list[tuple[str, int, int, int]]:
-        """Return the member, room, begin and end of all uses of private rooms on a day."""
+        Args:
+            ordinal: The ordinal of the date that the midnight begins.
+            member: The member who would use it.
+            room: The room.
+            first: The first time.
+            last: The last time.
+        """
+        for day, shift in ((ordinal - 1, -DAY_S), (ordinal, 0), (ordinal + 1, DAY_S)):
+            uses = self._private_uses(day) if day >= self.first else PrivateUses([], 0)
+            begin = bisect_left(uses.by_begin, (first - shift - uses.longest,))
+            end = bisect_left(uses.by_begin, (last - shift,))
+            for _, use_end, name, of in uses.by_begin[begin:end]:
+                if use_end + shift > first and name != member and of in (ANY_ROOM, room):
+                    return True
+        return False
+
+    def _private_uses(self, ordinal: int) -> PrivateUses:
         days = self.day(ordinal)
         if ordinal not in self._uses:
-            self._uses[ordinal] = [
-                (name, episode.room, episode.begin, episode.end)
+            uses = sorted(
+                (episode.begin, episode.end, name, episode.room)
                 for name, episodes in days.items()
                 for episode in episodes
                 if self._is_exclusive(name, episode)
-            ]
+            )
+            longest = max((end - begin for begin, end, *_ in uses), default=0)
+            self._uses[ordinal] = PrivateUses(uses, longest)
         return self._uses[ordinal]
 
     def _is_exclusive(self, name: str, episode: Episode) -> bool:

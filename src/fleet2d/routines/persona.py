@@ -18,7 +18,8 @@ from pydantic import (
     model_validator,
 )
 
-from fleet2d.configuration.components import Settings, once
+from fleet2d.bounds import EXTENDED_FILES, PERSONA_VALUES
+from fleet2d.configuration.components import Settings, count, once
 from fleet2d.configuration.documents import read_document
 from fleet2d.configuration.problems import did_you_mean, problem, problem_at, shown, suggest
 from fleet2d.configuration.units import (
@@ -33,7 +34,7 @@ from fleet2d.configuration.units import (
     format_time_of_day,
     weekdays_of,
 )
-from fleet2d.errors import ScenarioError, extra
+from fleet2d.errors import InputError, extra
 from fleet2d.routines.activity import (
     Activity,
     AnyDurationDistribution,
@@ -522,7 +523,7 @@ def _without_nulls(data: Any, keys: tuple[str, ...]) -> Any:
     return result
 
 
-def read_persona(value: object, chain: tuple[str, ...] = ()) -> Any:
+def read_persona(value: object) -> Any:
     """Read a persona: a bundled name, the path of a YAML file, or a mapping that may `extend` some.
 
     Of a list, each changes those before it; a part, such as short_stays, changes any persona.
@@ -530,12 +531,23 @@ def read_persona(value: object, chain: tuple[str, ...] = ()) -> Any:
     Raises:
         PydanticCustomError: There is no such persona, or its file can't be read.
     """
+    if isinstance(value, str) and value in bundled_names():
+        return bundled_persona(value)
+    return _data_of(value, (), [])
+
+
+def _data_of(value: object, chain: tuple[str, ...], files: list[Path]) -> Any:
+    """Return a persona as plain data, with all that it extends.
+
+    Args:
+        value: As of `read_persona`.
+        chain: The files that extend it.
+        files: All files that were read for the persona; those read now are added.
+    """
     if isinstance(value, Persona) or (isinstance(value, Mapping) and "extends" not in value):
         return value
-    if isinstance(value, str) and value in bundled_names() and not chain:
-        return bundled_persona(str(value))
     if isinstance(value, Mapping):
-        below = _extended(value["extends"], chain)
+        below = _extended(value["extends"], chain, files)
         return merge(below, {key: v for key, v in value.items() if key != "extends"})
     if not isinstance(value, str | Path) or not str(value):
         raise problem(
@@ -545,18 +557,25 @@ def read_persona(value: object, chain: tuple[str, ...] = ()) -> Any:
     path = _persona_file(value, is_extended=bool(chain))
     if str(path.resolve()) in chain:
         raise problem(f"the persona {path.name} extends itself")
+    files.append(path)
     try:
-        data = read_document(path).data
-    except ScenarioError as error:
+        EXTENDED_FILES.check(len(files), "the persona", prefix="at least ")
+        data = _bundled_data(path) if path.parent in (BUNDLED, PARTS) else read_document(path).data
+    except InputError as error:
         raise problem(str(error)) from None
-    return read_persona(data, (*chain, str(path.resolve())))
+    return _data_of(data, (*chain, str(path.resolve())), files)
 
 
-def _extended(names: Any, chain: tuple[str, ...]) -> Any:
+@cache
+def _bundled_data(path: Path) -> Any:
+    return read_document(path).data
+
+
+def _extended(names: Any, chain: tuple[str, ...], files: list[Path]) -> Any:
     """Return what personas and parts, or a single one, are together, each changed by the next."""
     below: Any = {}
     for name in names if isinstance(names, list | tuple) else [names]:
-        above = read_persona(name, (*chain, ""))
+        above = _data_of(name, (*chain, ""), files)
         if below and "needs" in above and "needs" not in below:
             below = {**below, "needs": usual_needs()}  # a part adds to them
         below = merge(below, above)
@@ -593,10 +612,25 @@ def _validate_persona(
     value: object, validate: ValidatorFunctionWrapHandler, info: ValidationInfo
 ) -> Persona:
     """Read and validate a persona; a file is read once for all users that name it."""
+
+    def read() -> Persona:
+        data = read_persona(value)
+        if data is not value and not isinstance(data, Persona):  # more than the scenario's file has
+            count(info, PERSONA_VALUES, values_in(data))
+        return validate(data)
+
     if isinstance(value, str | Path) and str(value) not in bundled_names():
-        path = folder_of(value) / Path(value).expanduser()
-        return once(info, (Persona, path), lambda: validate(read_persona(value)))
-    return validate(read_persona(value))
+        return once(info, (Persona, folder_of(value) / Path(value).expanduser()), read)
+    return read()
+
+
+def values_in(data: Any) -> int:
+    """Return the number of values in plain data; a long text counts for each 64 characters."""
+    if isinstance(data, Mapping):
+        return 1 + sum(map(values_in, data.values()))
+    if isinstance(data, list | tuple):
+        return 1 + sum(map(values_in, data))
+    return 1 + (len(data) // 64 if isinstance(data, str) else 0)
 
 
 @cache
@@ -633,7 +667,7 @@ _LOADED: dict[str, Persona] = {}  # bundled personas, by name
 def bundled_persona(name: str) -> Persona:
     """Return a persona that comes with Fleet2D: the same each time."""
     if name not in _LOADED:
-        _LOADED[name] = Persona.model_validate(read_persona(name, ("",)))
+        _LOADED[name] = Persona.model_validate(_data_of(name, ("",), []))
     return _LOADED[name]
 
 

@@ -152,6 +152,7 @@ class Seating:
         self._taken: dict[Seat, list[tuple[int, int]]] = {}  # by the first place of a spot
         self._wanted: dict[tuple[int, str], tuple[Sequence[Seat], int]] = {}
         self._spot = _spots(self._home.objects)
+        self._reachable = usual_rooms(self._home)
 
     def places(self, ordinal: int, number: int, rank: int) -> Sequence[Seat] | None:
         """Return the place that a member has for an episode of a day.
@@ -254,7 +255,7 @@ class Seating:
             name, rooms = matching_rooms(
                 activity.rooms,
                 self._home.rooms,
-                usual_rooms(self._home),
+                self._reachable,
                 never_in=activity.never_in,
             )
         except PlacementError:  # then rest replaces the activity
@@ -446,11 +447,10 @@ class Routine(ResidentBehavior):
             return None
         date = clock.start + timedelta(microseconds=begins_us)
         midnight_us = clock.elapsed(datetime.fromordinal(date.toordinal()))
-        for begin, end in self.lives.in_use(date.toordinal(), self.name, room):
-            if begins_us - WAY_US < midnight_us + end * SECOND_US and (
-                midnight_us + begin * SECOND_US < ends_us
-            ):
-                return None
+        first = (begins_us - WAY_US - midnight_us) // SECOND_US
+        last = -((midnight_us - ends_us) // SECOND_US)  # rounded up
+        if self.lives.in_use(date.toordinal(), self.name, room, first, last):
+            return None
         return begins_us - begin_us
 
     def seated(self, venue: Venue, which: tuple[int, int]) -> Venue:
