@@ -285,6 +285,9 @@ def test_killed_at_random_moments_and_resumed_it_is_the_same(tmp_path: Path, for
         stored = fleet2d.open_run(out)
         assert expected == digests(stored), number
         assert verify_run(out).same, number
+        if verify_run(out).foreign:  # killed when it was complete, but not yet cleaned up
+            with pytest.raises(RunDirectoryError, match="a complete run: there is nothing to res"):
+                fleet2d.resume(out, own)
         assert [] == verify_run(out).foreign
         resumed.add(tuple(stored.manifest["resumed"]))
         shutil.rmtree(out)
