@@ -434,7 +434,7 @@ def test_ctrl_c_during_set_up_exits_130(
 
 # What the bundled scenario doesn't use, and other scenarios or commands do.
 UNUSED = (
-    "fleet2d.algorithms.presence.fremen",
+    "fleet2d.algorithms.presence.exposure_ratio",
     "fleet2d.algorithms.presence.model",
     "fleet2d.engine.expectations",
     "fleet2d.engine.repeat",

@@ -7,7 +7,7 @@ import numpy as np
 from fleet2d.engine.cameras import Cameras, Look
 from fleet2d.engine.sighting_errors import sight_events
 from fleet2d.entities.body import Bodies
-from fleet2d.entities.evidence_source import SIGHTING, EvidenceSource, LiveDetections
+from fleet2d.entities.entity import SIGHTING, EvidenceSource, LiveDetections
 from fleet2d.errors import blame
 from fleet2d.kernels import (
     I64,

@@ -11,7 +11,7 @@ from pydantic import Field
 from fleet2d.configuration.components import register
 from fleet2d.configuration.problems import suggest
 from fleet2d.configuration.units import InputFileOrFolder, Length
-from fleet2d.entities.evidence_source import SIGHTING, EvidenceSource
+from fleet2d.entities.entity import SIGHTING, EvidenceSource
 from fleet2d.kernels import F64, I64, NOBODY, TURN, UNKNOWN_TRUTH, Bool
 from fleet2d.kernels import SightingColumn as Column
 from fleet2d.logs.log import Day, LogError, begin_of_run, files_of

@@ -17,8 +17,7 @@ from tests.reference import presence as slow
 
 from fleet2d.algorithms.evidence import Evidence
 from fleet2d.algorithms.presence.estimator import Estimator, SightingShare
-from fleet2d.algorithms.presence.exposure_ratio import AuditOnly, ExposureRatio
-from fleet2d.algorithms.presence.fremen import Fremen
+from fleet2d.algorithms.presence.exposure_ratio import AuditOnly, ExposureRatio, Fremen
 from fleet2d.algorithms.presence.likelihood import Likelihood
 from fleet2d.configuration.components import components
 from fleet2d.errors import ComponentError

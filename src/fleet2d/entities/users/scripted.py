@@ -1,12 +1,24 @@
-"""People whom something else moves: guests of a script, people nobody located, and live bodies."""
+"""People moved by something else: guests of a script, people nobody located, programs."""
 
-from datetime import datetime
-from typing import ClassVar
+from collections.abc import Mapping
+from datetime import datetime, timedelta
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from pydantic import Field
 
 from fleet2d.configuration.components import register
-from fleet2d.configuration.units import PeerAddress
+from fleet2d.configuration.trust import check_trust
+from fleet2d.configuration.units import InputPath, PeerAddress, PositiveDuration
 from fleet2d.entities.behavior import Behavior, Situation
 from fleet2d.entities.plan import Plan
+from fleet2d.errors import ComponentError, Fleet2DError
+from fleet2d.runtime.program import ExternalProgram
+
+if TYPE_CHECKING:
+    from fleet2d.entities.behavior import Actor
+
+MAX_ITEMS = 1000
+"""The number of items of a plan."""
 
 
 @register("behavior", "guest")
@@ -57,3 +69,91 @@ class Live(Behavior):
     def decide(self, now: Situation) -> Plan:
         """Stand."""
         return now.plan().stay()
+
+
+@register("behavior", "process")
+class ProcessBehavior(Behavior):
+    """A behavior in another process, of any language.
+
+    Whenever the body has to decide, the program is told where it is, and answers with a plan, a
+    list of `{go_to: PLACE}`, `{turn_deg: 90}` and `{stay_s: 60}`; or with the type `none`: then
+    the next behavior decides. See `fleet2d.runtime.program` for the messages.
+
+    Attributes:
+        command: The program; a file .py is run by Python.
+        arguments: Its arguments.
+        settings: Its own settings, which it gets in the first message.
+        timeout: The longest time to wait for an answer; then the run fails.
+    """
+
+    command: InputPath
+    arguments: tuple[str, ...] = ()
+    settings: dict[str, Any] = Field(default={})
+    timeout: PositiveDuration = timedelta(seconds=10)
+
+    def start(self, actor: "Actor") -> None:
+        """Check that the program may run; it starts at the first decision."""
+        check_trust("process", [self.command])
+        about = {
+            "name": actor.name,
+            "start": actor.clock.start.isoformat(),
+            "step_s": actor.clock.step_us / 1e6,
+            "rooms": [{"name": room.name, "type": room.type} for room in actor.home.rooms],
+            "settings": self.settings,
+        }
+        self.program = ExternalProgram(
+            self.command, self.arguments, self.timeout.total_seconds(), about
+        )
+
+    def decide(self, now: Situation) -> Plan | None:
+        """Ask the program."""
+        x, y = now.home.plan.lattice.to_metres([now.actor.state.x, now.actor.state.y]).tolist()
+        room = now.home.plan.room_at(x, y)
+        shares = {
+            name: output.share.tolist()
+            for name, output in now.outputs.items()
+            if hasattr(getattr(output, "share", None), "tolist")
+        }
+        message = {
+            "type": "decide",
+            "step": now.step,
+            "time": now.time.isoformat(),
+            "x": x,
+            "y": y,
+            "room": room.name if room else None,
+            "away": bool(now.actor.state.away),
+            "outputs": shares,
+        }
+        content = self.program.ask(message).content
+        if content.get("type") == "none":
+            return None
+        items = content.get("plan")
+        if not isinstance(items, list) or not 0 < len(items) <= MAX_ITEMS:
+            raise ComponentError(
+                f"{self.command} answered {content!r:.200}: expected 'plan', a list of 1 to"
+                f" {MAX_ITEMS} items, or the type 'none'"
+            )
+        plan = now.plan()
+        for item in items:
+            self._add(plan, item)
+        return plan
+
+    def _add(self, plan: Plan, item: Mapping[str, Any]) -> None:
+        """Add an item of an answer to a plan."""
+        try:
+            ((verb, value),) = item.items()
+            if verb == "go_to":
+                plan.go_to(value)
+            elif verb == "turn_deg":
+                plan.turn_by(float(value) / 360)
+            elif verb == "stay_s":
+                plan.stay(timedelta(seconds=float(value)))
+            else:
+                raise ValueError(f"there is no {verb!r}")
+        except Fleet2DError:
+            raise
+        except (ValueError, TypeError, AttributeError, OverflowError) as error:
+            raise ComponentError(
+                f"{self.command} answered the item {item!r:.100}: expected {{go_to: PLACE}},"
+                f" {{turn_deg: 90}} or {{stay_s: 60}} ({error})"
+            ) from None

@@ -6,7 +6,7 @@ from tests.algorithms.presence.worlds import DAY, MONDAY, evidence_of, pieces
 from tests.reference import presence as slow
 
 from fleet2d.algorithms.evidence import Evidence
-from fleet2d.algorithms.presence.fremen import Fremen
+from fleet2d.algorithms.presence.exposure_ratio import Fremen
 
 
 def rhythmic(days: int, seed: int) -> Evidence:
