@@ -17,7 +17,7 @@ from fleet2d.fit.picture import SAMPLED, draw_persona
 from fleet2d.fit.privacy import repeats
 from fleet2d.fit.timeline import find_days, read_timeline, shares
 from fleet2d.fit.validation import sample_persona, simulated_repeats, validate
-from fleet2d.logs.layouts import read_log
+from fleet2d.logs.layout import read_log
 from fleet2d.logs.log import ActivityLog
 
 LOGS = {

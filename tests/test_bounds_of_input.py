@@ -23,8 +23,8 @@ from fleet2d.bounds import BOUNDS, FILE_BYTES, Bound, one_line, read_bytes
 from fleet2d.configuration.documents import parse, read_document
 from fleet2d.errors import Fleet2DError, InputError
 from fleet2d.floorplan.load import load_floorplan
-from fleet2d.logs.layouts import read_log
-from fleet2d.logs.layouts import read_log as read_detections
+from fleet2d.logs.layout import read_log
+from fleet2d.logs.layout import read_log as read_detections
 from fleet2d.scenario.model import load_scenario
 
 SMALL = {

@@ -34,7 +34,7 @@ from fleet2d.fit.validation import (
     simulated_repeats,
     validate,
 )
-from fleet2d.logs.layouts import read_log
+from fleet2d.logs.layout import read_log
 from fleet2d.logs.log import ActivityLog, LogError
 from fleet2d.routines.persona import Persona, read_persona
 from fleet2d.routines.planner import parse_day

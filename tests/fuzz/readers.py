@@ -17,7 +17,7 @@ import yaml
 from hypothesis import strategies as st
 from tests.floorplan.test_damaged_files import FORMATS, PGM
 from tests.fuzz.changes import lines, pieces, structures
-from tests.logs.layouts.test_reading import ADLS, CASAS, HOMER, SENSORS
+from tests.logs.test_layout_reading import ADLS, CASAS, HOMER, SENSORS
 from tests.scenes import flat_document, scenario
 
 import fleet2d
@@ -27,7 +27,7 @@ from fleet2d.configuration.trust import Trust, restrict
 from fleet2d.fit.perception import read_detections
 from fleet2d.floorplan.load import load_floorplan
 from fleet2d.live.messages import parse_message
-from fleet2d.logs.layouts import read_log
+from fleet2d.logs.layout import read_log
 from fleet2d.routines.persona import BUNDLED as PERSONAS
 from fleet2d.scenario.model import load_scenario
 from fleet2d.studies.specification import read_specification

@@ -74,10 +74,10 @@ def fit_routine(
     from fleet2d.fit.persona import fit_persona, gaps, to_yaml
     from fleet2d.fit.timeline import find_days, read_timeline
     from fleet2d.fit.validation import validate
-    from fleet2d.logs.layouts import layout_names, read_log
+    from fleet2d.logs.layout import LAYOUTS, read_log
     from fleet2d.logs.log import ActivityLog, LogError
 
-    layouts = ["auto", *layout_names()]
+    layouts = ["auto", *LAYOUTS]
     if layout not in layouts:
         raise LogError(f"--format: expected one of {', '.join(layouts)}, got {layout!r}")
     if model not in ("recorded", "laws"):

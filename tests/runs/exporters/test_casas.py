@@ -8,7 +8,7 @@ from tests.engine.test_sensors import household, plan  # noqa: F401  (a fixture)
 from tests.scenes import run, scenario
 
 from fleet2d.errors import RunDirectoryError
-from fleet2d.logs.layouts import casas
+from fleet2d.logs.layout import read_casas
 from fleet2d.runs.exporters import Selection
 from fleet2d.runs.exporters.texts import export_casas
 
@@ -32,7 +32,7 @@ def test_reader_of_casas_logs_reads_it(plan: str, tmp_path: Path) -> None:  # no
     path = tmp_path / "log.txt"
     stored = run(household(plan))
     export_casas(stored, path, Selection.of(stored))
-    assert casas.read(path)
+    assert read_casas(path)
 
 
 def test_run_without_sensors_is_refused_with_what_to_do(tmp_path: Path) -> None:

@@ -23,7 +23,7 @@ from fleet2d.entities.place import Nearest
 from fleet2d.entities.plan import Note, Plan
 from fleet2d.floorplan.space import straight_way
 from fleet2d.kernels import F64, I64, TURN, heading_of, line_of_sight, locate, time_route
-from fleet2d.logs.layouts import Layout, read_log
+from fleet2d.logs.layout import Layout, read_log
 from fleet2d.logs.log import AWAY, ActivityLog, Day, LogError, PositionLog, begin_of_run, files_of
 from fleet2d.logs.placement import (
     DOOR,

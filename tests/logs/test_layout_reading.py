@@ -10,7 +10,7 @@ import pyarrow.csv as pacsv
 import pyarrow.parquet as pq
 import pytest
 
-from fleet2d.logs.layouts import read_log
+from fleet2d.logs.layout import read_log
 from fleet2d.logs.log import ActivityLog, LogError, PositionLog, Reading
 
 S = 1_000_000

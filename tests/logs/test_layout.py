@@ -1,36 +1,29 @@
-"""Layouts are found by the names of their modules, and tell their lines from those of others."""
+"""Layouts tell their lines from those of others."""
 
 from pathlib import Path
 
 import pytest
-from tests.logs.layouts.test_reading import ADLS, CASAS, HOMER, SENSORS
+from tests.logs.test_layout_reading import ADLS, CASAS, HOMER, SENSORS
 
-from fleet2d.logs.layouts import layout_names, layout_of, read_log
+from fleet2d.logs.layout import LAYOUTS, read_log
 from fleet2d.logs.log import LogError
 
 SAMPLES = {"casas": [CASAS], "homer": [HOMER], "uci_adl": [ADLS, SENSORS]}
 
 
-@pytest.mark.parametrize("name", layout_names())
-def test_a_layout_has_all_that_reading_needs(name: str) -> None:
-    layout = layout_of(name)
-
-    assert isinstance(layout.FOLDERS, bool)
-    assert not layout.matches("hello world")
-
-
 @pytest.mark.parametrize(("name", "text"), [(n, t) for n, ts in SAMPLES.items() for t in ts])
 def test_no_line_shows_two_layouts(name: str, text: str) -> None:
     lines = text.splitlines()
-    shown = {other for other in layout_names() for line in lines if layout_of(other).matches(line)}
+    shown = {other for other, layout in LAYOUTS.items() for line in lines if layout.matches(line)}
 
     assert {name} == shown
 
 
 def test_readings_of_a_thermometer_are_casas_and_other_words_are_not() -> None:
-    casas = layout_of("casas")
+    casas = LAYOUTS["casas"]
 
     assert casas.matches("2020-03-02 07:00:00.5 Kitchen T101 21.5")
+    assert not casas.matches("hello world")
     assert not casas.matches("2020-03-02 07:00 > 08:00 kitchen breakfast")
 
 

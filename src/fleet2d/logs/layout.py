@@ -1,0 +1,445 @@
+"""Layouts of logs of rooms and activities, and reading a log of any layout."""
+
+import re
+from bisect import bisect_right
+from collections import Counter
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from datetime import date, datetime
+from itertools import islice
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal, NamedTuple, Protocol
+
+from fleet2d.bounds import one_line
+from fleet2d.logs.log import (
+    AWAY,
+    ActivityLog,
+    LogError,
+    PositionLog,
+    Reading,
+    in_order,
+    log_lines,
+    parse_time,
+    since,
+)
+from fleet2d.runtime.clock import DAY_MINUTES, DAY_US
+from fleet2d.storage.bags import is_bag
+
+CASAS_LINE = re.compile(r"(\d{4}-\d\d?-\d\d?)\s+(\d+:\S+)\s+(\S+)\s+(\S+)\s+(\S+)(?:\s+(.*))?")
+ON = frozenset({"ON", "OPEN", "PRESENT"})
+OFF = frozenset({"OFF", "CLOSE", "CLOSED", "ABSENT"})
+NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?")
+
+AGENDA = re.compile(r"(\w+) \((\d{1,9}):(\d\d) - (?:(\d{1,9})\s?days? - )?(\d{1,9}):(\d\d)\)")
+SCRIPT = re.compile(r"### (\w+?)-\w+\.txt")
+ACTION = re.compile(r"\[(\w+)\]((?: <\w+> \(\d+\))*) \[\d+\]")
+THING = re.compile(r"<(\w+)> \((\d{1,9})\d*\)")
+MINUTE = re.compile(r"\d+(?:\.\d+)?")
+ROOM = re.compile(r"bathroom|bedroom|dining_room|home_office|kitchen|living_?room|hallway")
+ADDED = 1000  # objects from this number on were added later, in any room
+MINUTE_US = 60_000_000
+MAX_MINUTES = 1e6  # later times are cut to the end of their activity in any case
+_TIME = r"(\d{4}-\d\d?-\d\d?\s+\d+:\S+)"
+UCI_ADL_LINE = re.compile(rf"{_TIME}\s+{_TIME}\s+(.*)")
+HEAD = re.compile(r"(Start time\s+End time.*|[-\s]+)")
+LEAVING = frozenset({"leaving", "leave_home", "away", "out"})
+FIRST_LINES = 20
+
+
+def _shows_casas(line: str) -> bool:
+    """Return whether a line is an event of a sensor that switches or measures."""
+    match = CASAS_LINE.fullmatch(line)
+    if match is None:
+        return False
+    return match[5].upper() in ON | OFF or NUMBER.fullmatch(match[5]) is not None
+
+
+def read_casas(path: Path, *, sort: bool = False) -> ActivityLog:
+    """Read the events of a home; those that switch on become readings of an instant.
+
+    ::
+
+        2011-06-15 01:41:40.205759 Bathroom Bathroom ON Bed_Toilet_Transition
+
+    Only sensors that switch on show that somebody is there: a motion sensor switches off by itself,
+    seconds after the last motion, when the person may be gone.
+
+    Raises:
+        LogError: A line is damaged, or times run backwards.
+    """
+    readings: list[Reading] = []
+    others: Counter[str] = Counter()
+    first_day = None
+    for number, text in log_lines(path):
+        match = CASAS_LINE.fullmatch(text)
+        if match is None:
+            raise LogError(
+                f"{path}, line {number}: expected date, time, room, sensor, ON or OFF, and"
+                f" activity, got {one_line(text)!r}"
+            )
+        day, time, room, _, value, activity = match.groups()
+        moment = parse_time(f"{day} {time}", path, number)
+        first_day = first_day or moment.date()
+        if value.upper() in ON:
+            at = since(first_day, moment)
+            readings.append(Reading(at, at, room, (activity or "").strip(), number))
+        elif value.upper() not in OFF:
+            others[value] += 1
+    readings, notes = in_order(readings, path, sort=sort)
+    if others:
+        values = one_line(", ".join(sorted(others)[:5]), 200)
+        notes.append(f"{others.total()} lines are neither ON nor OFF and left out: {values}")
+    return ActivityLog(path, "casas", first_day, tuple(readings), tuple(notes))
+
+
+@dataclass
+class _ScriptedActivity:
+    """An activity of a day.
+
+    Attributes:
+        activity: Its name.
+        begin_us: Its beginning on the agenda [us since midnight].
+        end_us: Its end on the agenda [us since midnight].
+        line: The line of the agenda.
+        steps: Its script: time [us], objects by name and number, and line.
+    """
+
+    activity: str
+    begin_us: int
+    end_us: int
+    line: int
+    steps: list[tuple[int, list[tuple[str, int]], int]] = field(default_factory=list)
+
+
+def _shows_homer(line: str) -> bool:
+    """Return whether a line is of an agenda."""
+    return AGENDA.fullmatch(line) is not None
+
+
+def read_homer(path: Path, *, sort: bool = False) -> ActivityLog:
+    """Read the days of a household: one file, or a folder whose files follow each other by name.
+
+    ::
+
+        brushing_teeth (06:10 - 06:13)
+
+        ### brushing_teeth-07.txt
+
+        [WALK] <bathroom> (1) [1]
+        370.25
+
+    The number after one or several actions is the minute of the day at which they are done. Walking
+    to a room names it. Objects with a number below 1000 are numbered room by room, as in
+    VirtualHome, which the scripts come from: number 16, a shower, belongs to the bathroom, number
+    1, if the next room is number 41. Actions without such a number happen in the room of the action
+    before.
+
+    Raises:
+        LogError: A line is damaged, times run backwards, or a day's end is beyond the next.
+    """
+    files = sorted(path.glob("*.txt")) if path.is_dir() else [path]
+    if not files:
+        raise LogError(f"{path} holds no .txt file")
+    days = [_day(file) for file in files]
+    rooms = sorted(
+        {(n, name) for day in days for b in day for _, things, _ in b.steps for name, n in things
+         if ROOM.fullmatch(name) and n < ADDED}
+    )  # fmt: skip
+    readings: list[Reading] = []
+    notes: list[str] = []
+    for number, (file, blocks) in enumerate(zip(files, days, strict=True)):
+        of_day = [reading for block in blocks for reading in _readings(block, rooms)]
+        of_day, order_notes = in_order(of_day, file, sort=sort)
+        notes += [f"{file.name}: {note}" for note in order_notes]
+        without_room = {block.activity for block in blocks} - {r.activity for r in of_day}
+        if without_room:
+            names = ", ".join(sorted(without_room))
+            notes.append(f"{file.name}: in no room, or in no time: {names}")
+        readings += [
+            r._replace(begin_us=r.begin_us + number * DAY_US, end_us=r.end_us + number * DAY_US)
+            for r in of_day
+        ]
+    return ActivityLog(path, "homer", None, tuple(readings), tuple(notes))
+
+
+def _day(path: Path) -> list[_ScriptedActivity]:
+    blocks: list[_ScriptedActivity] = []
+    block = -1
+    objects: list[tuple[str, int]] = []  # of the actions since the last time
+    for number, line in log_lines(path):
+        if match := AGENDA.fullmatch(line):
+            blocks.append(_agenda(match, path, number))
+        elif match := SCRIPT.fullmatch(line):
+            block += 1
+            if block >= len(blocks) or blocks[block].activity != match[1]:
+                raise LogError(
+                    f"{path}, line {number}: the script of {one_line(match[1])} isn't next on the"
+                    " agenda"
+                )
+            objects = []
+        elif match := ACTION.fullmatch(line):
+            objects += [(name, int(n)) for name, n in THING.findall(match[2])]
+        elif MINUTE.fullmatch(line):
+            if block < 0:
+                raise LogError(f"{path}, line {number}: an action before any '### activity'")
+            # Rounded to the microsecond, as sums of thirds of minutes end in …33332.
+            at = round(min(float(line), MAX_MINUTES) * MINUTE_US)
+            blocks[block].steps.append((at, objects, number))
+            objects = []
+    if not blocks:
+        raise LogError(f"{path}: no line like 'breakfast (08:35 - 09:02)'; is it a day of HOMER+?")
+    return blocks
+
+
+def _agenda(match: re.Match[str], path: Path, line: int) -> _ScriptedActivity:
+    begin = int(match[2]) * 60 + int(match[3])
+    end = (int(match[4] or 0) * 24 + int(match[5])) * 60 + int(match[6])
+    if begin >= DAY_MINUTES or int(match[5]) > 24:
+        raise LogError(
+            f"{path}, line {line}: expected a time within 24 hours, got {one_line(match[0])!r}"
+        )
+    if end < begin:
+        raise LogError(f"{path}, line {line}: it ends before it begins, {one_line(match[0])!r}")
+    return _ScriptedActivity(match[1], begin * MINUTE_US, end * MINUTE_US, line)
+
+
+def _readings(block: _ScriptedActivity, rooms: list[tuple[int, str]]) -> list[Reading]:
+    """Return the readings of an activity, one for each stay in a room."""
+    numbers = [number for number, _ in rooms]
+    pieces: list[tuple[int, int, str, int]] = []  # begin, end, room or "", line
+    begin = block.begin_us
+    for at, things, line in block.steps:
+        end = min(max(at, begin), block.end_us)
+        named_room = ""
+        for _name, number in things:
+            if number < ADDED and (count := bisect_right(numbers, number)):
+                named_room = rooms[count - 1][1]
+        pieces.append((begin, end, named_room, line))
+        begin = end
+    pieces.append((begin, block.end_us, "", block.line))
+    room = next((named_room for _, _, named_room, _ in pieces if named_room), "")
+    readings: list[Reading] = []
+    for first, last, named_room, line in pieces:
+        room = named_room or room
+        if last == first:
+            continue  # without a duration, it is not a reading
+        if readings and readings[-1].room == room:
+            readings[-1] = readings[-1]._replace(end_us=last)
+        elif room:
+            readings.append(Reading(first, last, room, block.activity, line))
+    return readings
+
+
+class _Row(NamedTuple):
+    """A line of a file; `words` are an activity, or a sensor with its type and place."""
+
+    begin: datetime
+    end: datetime
+    words: str
+    line: int
+
+
+def _shows_uci_adl(line: str) -> bool:
+    """Return whether a line is an interval, or of the head of a table."""
+    return (UCI_ADL_LINE.fullmatch(line) or HEAD.fullmatch(line)) is not None
+
+
+def read_uci_adl(path: Path, *, sort: bool = False) -> ActivityLog:
+    """Read a home's sensors and activities.
+
+    ::
+
+        2011-11-28 10:21:44    2011-11-28 10:23:31    Basin    PIR    Bathroom      (…_Sensors.txt)
+        2011-11-28 10:21:24    2011-11-28 10:23:36    Toileting                     (…_ADLs.txt)
+
+    The two files of a home are read together, whichever is named: the sensors show in which room a
+    person is, the activities what is done there and when the home is left. In a file of activities
+    alone, each activity stands for the room that it is done in.
+
+    Raises:
+        LogError: A line is damaged, or times run backwards.
+    """
+    files = {kind: (file, _rows(file)) for kind, file in _pair(path).items()}
+    first_day = min(row.begin.date() for _, rows in files.values() for row in rows)
+    notes: list[str] = []
+    parts: dict[str, list[Reading]] = {"sensors": [], "activities": []}
+    for kind, (file, rows) in files.items():
+        readings = [_reading(row, first_day) for row in rows]
+        parts[kind], order_notes = in_order(readings, file, sort=sort)
+        notes += [f"{file.name}: {note}" for note in order_notes]
+    readings = parts["activities"]
+    if parts["sensors"]:
+        readings = _with_activities(parts["sensors"], readings)
+    return ActivityLog(path, "uci_adl", first_day, tuple(readings), tuple(notes))
+
+
+def _pair(path: Path) -> dict[str, Path]:
+    """Return the files of a home: of sensors, of activities, or both."""
+    if path.is_dir():
+        by_kind = {
+            "sensors": sorted(path.glob("*_Sensors.txt")),
+            "activities": sorted(path.glob("*_ADLs.txt")),
+        }
+        for kind, files in by_kind.items():
+            if len(files) > 1:
+                raise LogError(f"{path} holds {len(files)} files of {kind}: name the one to read")
+        return {kind: files[0] for kind, files in by_kind.items() if files}
+    is_sensors = len(_rows(path)[0].words.split()) >= 3
+    parts = ("_Sensors", "_ADLs") if is_sensors else ("_ADLs", "_Sensors")
+    twin = path.with_name(path.name.replace(*parts))
+    pair = {"sensors" if is_sensors else "activities": path}
+    if twin != path and twin.is_file():
+        pair["activities" if is_sensors else "sensors"] = twin
+    return pair
+
+
+def _rows(path: Path) -> list[_Row]:
+    rows = []
+    for number, text in log_lines(path):
+        if HEAD.fullmatch(text):
+            continue
+        match = UCI_ADL_LINE.fullmatch(text)
+        if match is None or not match[3].strip():
+            raise LogError(
+                f"{path}, line {number}: expected a start time, an end time, and an activity or a"
+                f" sensor with its type and place, got {one_line(text)!r}"
+            )
+        begin, end = (parse_time(" ".join(match[i].split()), path, number) for i in (1, 2))
+        rows.append(_Row(begin, end, match[3].strip(), number))
+    if not rows:
+        raise LogError(f"{path} holds no reading: is it the right file?")
+    return rows
+
+
+def _reading(row: _Row, first_day: date) -> Reading:
+    begin, end, text, number = row
+    words = text.split()
+    label = words[-1]
+    activity = label if len(words) == 1 else ""
+    room = AWAY if activity.lower() in LEAVING else label
+    return Reading(since(first_day, begin), since(first_day, end), room, activity, number)
+
+
+def _with_activities(sensors: list[Reading], activities: list[Reading]) -> list[Reading]:
+    """Label sensor readings with the concurrent activity, and add readings for absences."""
+    begins = [activity.begin_us for activity in activities]
+    readings = [reading for reading in activities if reading.room == AWAY]
+    for sensor in sensors:
+        number = bisect_right(begins, sensor.begin_us) - 1
+        is_part = number >= 0 and sensor.begin_us <= activities[number].end_us
+        readings.append(sensor._replace(activity=activities[number].activity if is_part else ""))
+    # Of readings with the same begin, being out comes last, so that it holds.
+    return sorted(readings, key=lambda reading: (reading.begin_us, reading.room == AWAY))
+
+
+class LogLayout(NamedTuple):
+    """A layout.
+
+    Attributes:
+        matches: Returns whether a stripped line shows this layout, and no other.
+        read: Reads a file, or a folder of files of one home; `sort` sorts its lines by time.
+        reads_folders: Whether it reads folders, too.
+    """
+
+    matches: Callable[[str], bool]
+    read: "LogReader"
+    reads_folders: bool
+
+
+class LogReader(Protocol):
+    """What reads the files of a layout."""
+
+    def __call__(self, path: Path, *, sort: bool = False) -> ActivityLog:
+        """Return the log."""
+
+
+LAYOUTS = {
+    "casas": LogLayout(_shows_casas, read_casas, reads_folders=False),
+    "homer": LogLayout(_shows_homer, read_homer, reads_folders=True),
+    "uci_adl": LogLayout(_shows_uci_adl, read_uci_adl, reads_folders=True),
+}
+"""The layouts of rooms and activities, by name."""
+
+if TYPE_CHECKING:
+    Layout = str
+else:
+    Layout = Literal[("auto", *LAYOUTS, "bag", "positions")]
+
+
+def read_log(
+    path: str | Path,
+    layout: Layout = "auto",
+    *,
+    id: str | None = None,  # noqa: A002 - the name of the column
+    columns: Mapping[str, str] | None = None,
+    time_zone: str | None = None,
+    sort: bool = False,
+) -> ActivityLog | PositionLog:
+    """Read a log: a smart home's events, an activity script, or position fixes.
+
+    Args:
+        path: The file; or the folder, for a home that has several.
+        layout: The layout; "auto" recognizes it by its content.
+        id: The tag to read, of positions; the topic or frame, of a bag; see `read_bag`.
+        columns: The names of the columns of positions; see `read_positions`.
+        time_zone: The time zone of the home, for positions and bags; see `read_positions`.
+        sort: Sort lines whose time runs backwards instead of refusing them.
+
+    Raises:
+        LogError: It is of no known layout, damaged, or contradicts itself.
+    """
+    path = Path(path)
+    if not path.exists():
+        raise LogError(f"no such file: {path}")
+    layout = _recognize(path) if layout == "auto" else layout
+    if layout == "positions":
+        # Imported here, as no other layout needs pyarrow.
+        from fleet2d.logs.positions import read_positions
+
+        return read_positions(path, id=id, columns=columns, time_zone=time_zone, sort=sort)
+    if layout == "bag":
+        if columns:
+            raise LogError(f"{path} is a bag: columns are for tables of positions")
+        from fleet2d.logs.bags import read_bag
+
+        return read_bag(path, id=id, time_zone=time_zone, sort=sort)
+    if id is not None or columns or time_zone is not None:
+        raise LogError(
+            f"{path} is of the layout {layout}: id, columns and time_zone are for positions"
+            " and bags"
+        )
+    return LAYOUTS[layout].read(path, sort=sort)
+
+
+def _recognize(path: Path) -> str:
+    """Return the layout of a file or folder.
+
+    Raises:
+        LogError: It is of no known layout.
+    """
+    if is_bag(path):
+        return "bag"
+    if path.is_dir():
+        layouts = map(_recognize_lines, sorted(path.glob("*.txt")))
+        layout = next((name for name in layouts if name and LAYOUTS[name].reads_folders), None)
+        if layout is None:
+            several = [name for name, layout in LAYOUTS.items() if layout.reads_folders]
+            raise LogError(
+                f"{path}: no .txt file in this folder is of a layout with several files"
+                f" ({', '.join(several)}): for other layouts name the file"
+            )
+        return layout
+    if path.suffix.lower() in (".parquet", ".pq"):
+        return "positions"
+    layout = _recognize_lines(path) or ("positions" if path.suffix.lower() == ".csv" else None)
+    if layout is None:
+        names = ", ".join(LAYOUTS)
+        raise LogError(f"{path} has no known layout: give 'format' ({names} or positions)")
+    return layout
+
+
+def _recognize_lines(file: Path) -> str | None:
+    """Return the layout that one of the first lines of a file shows, if one does."""
+    lines = (line for _, line in islice(log_lines(file), FIRST_LINES))
+    shown = (name for line in lines for name, layout in LAYOUTS.items() if layout.matches(line))
+    return next(shown, None)
