@@ -4,7 +4,7 @@ import type { Answer } from "../data/ask";
 import type { BeliefSeries } from "../data/beliefs";
 import type { Run, Switches } from "../data/run";
 import type { BodyFacts } from "../contract";
-import { shownText } from "../data/events";
+import { type EventRow, shownText } from "../data/events";
 import { firstAtLeast, lastAtMost } from "../data/search";
 import { differences, type Stretches, valueAt } from "../data/stretches";
 import { chosenBelief, errorsOf } from "../plan/beliefs";
@@ -159,7 +159,7 @@ function ownLanes(run: Run, prefix: string, other: Run | null): Lane[] {
     if (kinds.some((kind) => !ROUTINE_KINDS.has(kind))) lanes.push(eventLane(run, body, prefix, group));
     return lanes;
   });
-  return [...bodies, ...sightingLanes(run, prefix), ...outputLanes(run, prefix), ...markLanes(run, prefix), ...switchLanes(run, prefix)];
+  return [...bodies, ...requestLanes(run, prefix), ...sightingLanes(run, prefix), ...outputLanes(run, prefix), ...markLanes(run, prefix), ...switchLanes(run, prefix)];
 }
 
 function roomLane(run: Run, name: string, prefix: string, group: Group): Lane {
@@ -242,6 +242,76 @@ function eventLane(run: Run, body: BodyFacts, prefix: string, group: Group): Lan
   };
   const place = { id: `${prefix}${body.name}/events`, label: `${body.name} events`, subject: body.name, group, height: 12 };
   return tickLane(place, us, bodyColor(body.color), words);
+}
+
+const OUTCOMES = ["accepted", "declined", "sent away", "no answer", "expired", "open"];
+const OUTCOME_COLORS = ["#009988", "#ee7733", "#cc3311", "#bbbbbb", "#9a9a9a", "#77aadd"];
+const NO_ANSWER = OUTCOMES.indexOf("no answer");
+const OPEN = OUTCOMES.indexOf("open");
+/** Events that end a request, and what came of it; after others the robot may try again. */
+const ENDS = new Map([
+  ["accepted", 0],
+  ["declined", 1],
+  ["sent_away", 2],
+  ["banned", 2],
+  ["switched_off", 2],
+  ["expired", OUTCOMES.indexOf("expired")],
+]);
+
+/** A request of a robot, from when it came up to what came of it. */
+interface Request {
+  from: number;
+  to: number;
+  lastUs: number;
+  outcome: number;
+  asks: number;
+}
+
+/** A lane for each interaction of a robot and a person: from when a request came up to what came of it. */
+function requestLanes(run: Run, prefix: string): Lane[] {
+  const robots = run.bodies.filter((body) => body.robot && run.events.kindsOf(body.name).includes("due"));
+  return robots.flatMap(({ name }) => {
+    const rows = run.events.ofEntity(name);
+    const texts = [...new Set(run.events.of(name, "due").map((row) => row.detail))].sort();
+    return texts.map((text) => {
+      const requests = once(() => requestsOf(rows, text, run.presentUs));
+      const stretches = once((): Stretches => ({
+        from: requests().map((request) => request.from),
+        to: requests().map((request) => request.to),
+        value: requests().map((request) => request.outcome),
+      }));
+      const place = { id: `${prefix}${name}/request/${text}`, label: `${name}: ${text}`, subject: name, group: "Robots" as const, height: 12 };
+      const lane = stretchLane(place, stretches, (value) => OUTCOME_COLORS[value]!, (value) => OUTCOMES[value]!, (value) => OPEN - value);
+      const words = (us: number): string => {
+        const request = requests()[lastAtMost(stretches().from, us)];
+        if (!request || us >= request.to) return "";
+        const minutes = Math.round((request.to - request.from) / 60e6);
+        const lasts = request.outcome === OPEN ? "for" : "after";
+        return `${OUTCOMES[request.outcome]!} ${lasts} ${minutes} min, asked ${request.asks === 1 ? "once" : `${request.asks} times`}`;
+      };
+      return { ...lane, words };
+    });
+  });
+}
+
+function requestsOf(rows: readonly EventRow[], text: string, endUs: number): Request[] {
+  const requests: Request[] = [];
+  for (const { us, event, detail } of rows) {
+    // An event by which the robot is sent away names the room, too.
+    if (detail !== text && !detail.startsWith(`${text} `)) continue;
+    const last = requests.at(-1);
+    const isOpen = last?.outcome === OPEN;
+    if (event === "due") {
+      if (isOpen) [last.to, last.outcome] = [last.lastUs, NO_ANSWER]; // the robot has given up
+      requests.push({ from: us, to: endUs, lastUs: us, outcome: OPEN, asks: 0 });
+    }
+    if (!isOpen || event === "due") continue;
+    last.lastUs = us;
+    if (event === "asks") last.asks += 1;
+    const outcome = ENDS.get(event);
+    if (outcome !== undefined) [last.to, last.outcome] = [us, outcome];
+  }
+  return requests;
 }
 
 function outputLanes(run: Run, prefix: string): Lane[] {
