@@ -14,6 +14,7 @@ from fleet2d.algorithms.timing import (
     LogisticTiming,
     ThompsonTiming,
     TimingPolicy,
+    TwoStageTiming,
 )
 
 ROOMS, KITCHEN, BEDROOM = 3, 0, 1
@@ -60,6 +61,49 @@ def test_thompson_learns_who_has_time_from_other_interactions() -> None:
 
     assert chances[8, KITCHEN] > 0.9
     assert chances[14, KITCHEN] < 0.1
+
+
+def experienced(worth: float, yeses: int, noes: int, **settings: float) -> float:
+    """The chance at 8 in the kitchen of a policy that had some yeses there, and noes with time."""
+    policy = TwoStageTiming(**settings)
+    policy.start(ROOMS)
+    policy.worth = worth
+    for number in range(yeses + noes):
+        answer = "accepted" if number < yeses else "declined"
+        policy.learn(Asked("ana", "tea", 8, KITCHEN, answer))
+    return float(policy.chances()[8, KITCHEN])
+
+
+def test_what_is_worth_little_is_asked_only_where_a_yes_is_nearly_sure() -> None:
+    assert experienced(5, 10, 10) > 0.9
+    assert experienced(1.5, 10, 10) < 0.1
+    assert experienced(1.5, 20, 0) > 0.9
+    assert 0.02 == experienced(0, 20, 0)
+
+
+def test_who_never_agrees_is_asked_at_no_hour_and_who_has_no_time_at_that_hour() -> None:
+    policy = TwoStageTiming()
+    policy.start(ROOMS)
+    policy.worth = 5
+    for _ in range(20):
+        policy.learn_from_other(Asked("ana", "pill", 8, KITCHEN, "ignored"))
+        policy.learn_from_other(Asked("ana", "pill", 18, KITCHEN, "declined"))
+    assert policy.chances()[8, KITCHEN] < 0.1 < 0.9 < policy.chances()[18, KITCHEN]
+
+    for _ in range(20):
+        policy.learn(Asked("ana", "tea", 18, KITCHEN, "declined"))
+    assert policy.chances()[:, KITCHEN].max() < 0.1
+
+
+def test_a_policy_knows_what_the_interaction_is_worth() -> None:
+    class Greedy(FixedTimes):
+        """Asks only for what is worth more than 3."""
+
+        def chances(self) -> Any:
+            return np.full((24, self.rooms), float(self.worth > 3))
+
+    run = fleet2d.run(timed(Greedy(), "5 h", users={"ana": ana(outcomes=("declined",))}))
+    assert {1.0} == set(table(run, "when")["chance"])  # the pill is worth 4
 
 
 def test_thompson_explores_less_the_more_it_knows() -> None:

@@ -54,7 +54,8 @@ class Asked(NamedTuple):
 class TimingPolicy(Component):
     """Base of policies: with which probability to address a person at an hour in a room.
 
-    Each has its own copy for each person and interaction.
+    Each has its own copy for each person and interaction, and knows in `self.worth` the value of
+    the interaction.
 
     Example:
         >>> class Never(TimingPolicy):
@@ -67,7 +68,7 @@ class TimingPolicy(Component):
 
     def start(self, rooms: int) -> None:
         """Begin without experience in a home with a number of rooms."""
-        self.rooms = rooms
+        self.rooms, self.worth = rooms, 1.0
 
     def learn(self, asked: Asked) -> None:
         """Learn from an answer."""
@@ -129,6 +130,7 @@ class TimingAlgorithm(Algorithm):
         """Begin without experience."""
         self.policies: dict[tuple[str, str], TimingPolicy] = {}
         self.open: dict[str, Asked] = {}  # by robot: the last question without an answer
+        self.worth: dict[str, float] = {}  # of each interaction
 
     def remember(self) -> Mapping[str, Any]:
         """Refuse: what it has learned belongs to a home and its people."""
@@ -146,6 +148,7 @@ class TimingAlgorithm(Algorithm):
         """Learn from the questions and answers; return the chances."""
         before = sum(1 for _ in self.policies)
         learned = 0
+        self.worth |= {w.text.rpartition(" ")[0]: w.interaction.worth for w in history.wanted}
         for event in history.events:
             if event.event == "asks":
                 self._close(event.entity, "")
@@ -168,6 +171,7 @@ class TimingAlgorithm(Algorithm):
         if (user, name) not in self.policies:
             policy = self.policies[user, name] = self.policy.model_copy(deep=True)
             policy.start(rooms)
+            policy.worth = self.worth.get(name, 1.0)
         return self.policies[user, name]
 
     def _close(self, robot: str, outcome: str) -> bool:
@@ -180,6 +184,15 @@ class TimingAlgorithm(Algorithm):
             if user == asked.user:
                 (policy.learn if name == asked.name else policy.learn_from_other)(asked)
         return True
+
+
+def _count(asked: Asked, counts: F64, weight: float = 1.0) -> None:
+    """Count an answer in its cell of (24, rooms), and less of it near by."""
+    for hour, near in ((-2, 0.25), (-1, 0.5), (0, 1.0), (1, 0.5), (2, 0.25)):
+        row = counts[(asked.hour + hour) % HOURS]
+        row += 0.3 * near * weight
+        if asked.room >= 0:
+            row[asked.room] += 0.7 * near * weight
 
 
 @register("timing_policy", "fixed_times")
@@ -277,19 +290,11 @@ class ThompsonTiming(TimingPolicy):
         """Count an answer, and less of it near by."""
         self.answers[0] += asked.was_accepted
         self.answers[1] += 1
-        self._count(asked, self.yes if asked.was_accepted else self.no, 1.0)
+        _count(asked, self.yes if asked.was_accepted else self.no)
 
     def learn_from_other(self, asked: Asked) -> None:
         """Count whether the person had time, by a part."""
-        self._count(asked, self.yes if asked.was_available else self.no, self.others)
-
-    def _count(self, asked: Asked, counts: F64, weight: float) -> None:
-        """Count an answer in its cell, and less of it near by."""
-        for hour, near in ((-2, 0.25), (-1, 0.5), (0, 1.0), (1, 0.5), (2, 0.25)):
-            row = counts[(asked.hour + hour) % HOURS]
-            row += 0.3 * near * weight
-            if asked.room >= 0:
-                row[asked.room] += 0.7 * near * weight
+        _count(asked, self.yes if asked.was_available else self.no, self.others)
 
     def chances(self) -> F64:
         """Return the probability that the rate of yes is above `ask_at`."""
@@ -303,3 +308,55 @@ class ThompsonTiming(TimingPolicy):
                 above = logistic(1.7 * (yes / total - ask_at) / spread)
                 chances[hour, room] = max(self.min_chance, min(above, 1.0))
         return chances
+
+
+@register("timing_policy", "two_stage")
+class TwoStageTiming(TimingPolicy):
+    """Ask with the probability that a question is worth more than it costs, by Thompson's rule.
+
+    As people answer in stages, the rate of yes is a product of two: of having time, by hour and
+    room, learned from the answers to all interactions with the person; and of saying yes with time,
+    at any hour, learned from those to this one. Both are beta variables; the distribution of the
+    product is approximated by a logistic one with its mean and variance. A question costs `price`:
+    by annoying, it takes as much from the value of others. So what is worth little is asked only
+    where a yes is nearly sure.
+
+    Attributes:
+        price: What a question costs, in the unit of `worth`.
+        min_chance: Minimum probability of asking anywhere: off-policy estimates need one above 0.
+        prior: Number of imagined answers in each rate, three in five of them favorable.
+    """
+
+    price: float = Field(default=1.0, ge=0)
+    min_chance: Share = 0.02
+    prior: float = Field(default=2.0, gt=0)
+
+    def start(self, rooms: int) -> None:
+        """Begin with imagined answers only."""
+        super().start(rooms)
+        yes, no = 0.6 * self.prior, 0.4 * self.prior
+        self.has_time, self.has_none = np.full((HOURS, rooms), yes), np.full((HOURS, rooms), no)
+        self.agrees, self.declines = yes, no
+
+    def learn(self, asked: Asked) -> None:
+        """Count whether the person had time, and whether she agreed."""
+        self.learn_from_other(asked)
+        self.agrees += asked.was_accepted
+        self.declines += asked.was_available and not asked.was_accepted
+
+    def learn_from_other(self, asked: Asked) -> None:
+        """Count whether the person had time."""
+        _count(asked, self.has_time if asked.was_available else self.has_none)
+
+    def chances(self) -> F64:
+        """Return the probability that a question is worth more than its price."""
+        if not self.worth:
+            return np.full((HOURS, self.rooms), self.min_chance)
+        total, answers = self.has_time + self.has_none, self.agrees + self.declines
+        time, yes = self.has_time / total, self.agrees / answers
+        time_variance = time * (1 - time) / (total + 1)
+        yes_variance = yes * (1 - yes) / (answers + 1)
+        variance = time**2 * yes_variance + (yes**2 + yes_variance) * time_variance
+        gain = (self.worth * time * yes - self.price) / (self.worth * np.sqrt(variance))
+        above = [logistic(1.7 * each) for each in gain.ravel().tolist()]
+        return np.array(above).reshape(gain.shape).clip(self.min_chance, 1.0)

@@ -161,7 +161,7 @@ def _weights(log: LoggedOpportunities, target: ArrayLike) -> F64:
     if (drawn <= 0).any():
         raise InputError(
             "an action was drawn whose probability is 0 in the log: let the policy that is logged"
-            " explore (least, explores)"
+            " explore (min_chance, explore)"
         )
     return np.where(log.asked, probability, 1 - probability) / drawn
 
