@@ -2,7 +2,9 @@
 
 from typing import Any
 
+import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from tests.entities.robots.test_interact import PILL, ana, home
 from tests.scenes import scenario
 
@@ -10,6 +12,7 @@ import fleet2d
 from fleet2d.errors import InputError
 from fleet2d.pictures.charts import answers_figure, asked_of
 from fleet2d.viewer.report import report_html
+from fleet2d.viewer.stage import Stage
 
 
 def run_with(outcomes: tuple[str, ...], **changes: Any) -> fleet2d.Run:
@@ -32,7 +35,7 @@ def test_a_question_is_drawn_by_its_answer(outcome: str, answer: str) -> None:
     (asked, *_), _ = asked_of(run_with((outcome,)))
 
     assert ("astro", "ana", answer) == (asked.robot, asked.user, asked.answer)
-    assert 7 + 1 / 6 <= asked.hours < 7.5  # the run begins at 7:00
+    assert 600 <= asked.step < 1800
 
 
 def test_expired_requests_are_drawn_at_their_deadline() -> None:
@@ -40,7 +43,41 @@ def test_expired_requests_are_drawn_at_their_deadline() -> None:
     asked, (expired,) = asked_of(run_with(("accepted",), robots=robots))
 
     assert [] == asked
-    assert 8 + 1 / 6 == pytest.approx(expired.hours, abs=1e-3)
+    assert 70 * 60 == expired.step
+
+
+def test_a_question_lasts_until_it_is_carried_out_or_the_robot_withdraws() -> None:
+    for outcome, takes in (("accepted", 30), ("", 0)):
+        run = run_with((outcome,))
+        (talk, *_), _ = asked_of(run)
+        assert talk.end is not None
+        if outcome:
+            assert talk.step + 5 == talk.answered
+            assert takes <= talk.end - talk.step - 5 <= takes + 2
+        else:
+            assert talk.answered is None
+            assert talk.end - talk.step == pytest.approx(20, abs=2)  # its patience
+
+
+def test_a_film_says_what_is_asked_and_answered_beside_the_robot() -> None:
+    run = run_with(("accepted",))
+    (talk, *_), _ = asked_of(run)
+    stage = Stage(run, talk.step - 60, talk.step + 120, figure=Figure())
+    robot = next(body for body in stage.bodies if body.facts["name"] == "astro")
+
+    def shown(step: int) -> str:
+        stage.show(step)
+        return str(robot.name.get_text())
+
+    assert talk.answered is not None
+    assert talk.end is not None
+    assert "astro" == shown(talk.step - 1)
+    assert "astro: pill ana?" == shown(talk.step) == shown(talk.answered - 1)
+    assert "astro: pill ana, accepted" == shown(talk.answered) == shown(talk.end)
+    assert "astro" == shown(talk.end + 1)
+    # The film draws a new frame at each of these moments.
+    moments = np.array([talk.step, talk.answered, talk.end + 1]) - (talk.step - 60)
+    assert stage.changes()[moments].all()
 
 
 def test_annoyance_is_drawn_for_each_person() -> None:

@@ -264,6 +264,8 @@ SHOWN_AS = {
     "banned": "sent away",
     "switched_off": "sent away",
 }
+# Events by which a robot is no longer with the person whom it addressed.
+ENDS_TALK = frozenset({"delivered", "collects", "withdraws", "interaction_over"})
 MOOD_COLOR, EXPIRED_COLOR = "#aa3377", "#9a9a9a"
 WEEKLY_FROM = 70  # days of a run from which on bars are weeks
 
@@ -274,14 +276,24 @@ class AskedTime(NamedTuple):
     Attributes:
         robot: The robot.
         user: The person meant.
-        hours: When, since the begin of the day on which the run began [h].
+        text: The interaction and the person meant.
+        step: When.
         answer: What came of it: a key of ANSWER_COLORS.
+        answered: The step of the answer; None without one.
+        end: The step at which the robot had carried it out or withdrew; None if it did neither.
     """
 
     robot: str
-    user: str
-    hours: float
+    text: str
+    step: int
     answer: str
+    answered: int | None = None
+    end: int | None = None
+
+    @property
+    def user(self) -> str:
+        """The person meant."""
+        return self.text.rpartition(" ")[2]
 
 
 def asked_of(run: Run) -> tuple[list[AskedTime], list[AskedTime]]:
@@ -292,20 +304,22 @@ def asked_of(run: Run) -> tuple[list[AskedTime], list[AskedTime]]:
         >>> asked_of(fleet2d.run("simulation.duration=1 h"))
         ([], [])
     """
-    events, hours_of = run.tables["events"], _hours_of(run)
+    events = run.tables["events"]
     asked: list[AskedTime] = []
     expired: list[AskedTime] = []
     open_ones: dict[str, AskedTime] = {}  # by robot
     columns = (events[name].to_pylist() for name in ("step", "entity", "event", "detail"))
     for step, robot, event, detail in sorted(zip(*columns, strict=True), key=lambda row: row[0]):
-        user = detail.rpartition(" ")[2]
-        if event == "asks":
+        if event in ENDS_TALK and robot in open_ones:
+            asked.append(open_ones.pop(robot)._replace(end=step))
+        elif event == "asks":
             asked += [open_ones.pop(robot)] if robot in open_ones else []
-            open_ones[robot] = AskedTime(robot, user, hours_of(step), "no answer")
-        elif event in SHOWN_AS and robot in open_ones:
-            asked.append(open_ones.pop(robot)._replace(answer=SHOWN_AS[event]))
+            open_ones[robot] = AskedTime(robot, detail, step, "no answer")
+        elif event in SHOWN_AS and robot in open_ones and open_ones[robot].answered is None:
+            answer = open_ones[robot]._replace(answer=SHOWN_AS[event], answered=step)
+            open_ones[robot] = answer
         elif event == "expired":
-            expired.append(AskedTime(robot, user, hours_of(step), event))
+            expired.append(AskedTime(robot, detail, step, event))
     return [*asked, *open_ones.values()], expired
 
 
@@ -331,13 +345,17 @@ def answers_figure(run: Run) -> Figure:
         raise InputError("robots addressed nobody in this run: there are no answers to draw")
     figure = Figure(figsize=(10.67, 0.6 + 2.3 * len(pairs)), dpi=100, facecolor="white")
     panels = figure.subplots(len(pairs), 2, width_ratios=(3, 1), squeeze=False)
-    days = 1 + int(_hours_of(run)(run.manifest["steps"] - 1) // 24)
+    hours_of = _hours_of(run)
+    days = 1 + int(hours_of(run.manifest["steps"] - 1) // 24)
     width = 7 if days >= WEEKLY_FROM else 1
     for (robot, user), (by_day, by_hour) in zip(pairs, panels, strict=True):
         own = [each for each in asked if (each.robot, each.user) == (robot, user)]
-        late = [each.hours / 24 for each in expired if (each.robot, each.user) == (robot, user)]
-        _stack(by_day, [(each.hours / 24, each.answer) for each in own], width, days)
-        _stack(by_hour, [(each.hours % 24, each.answer) for each in own], 1, 24)
+        late = [
+            hours_of(each.step) / 24 for each in expired if (each.robot, each.user) == (robot, user)
+        ]
+        times = [(hours_of(each.step), each.answer) for each in own]
+        _stack(by_day, [(hours / 24, answer) for hours, answer in times], width, days)
+        _stack(by_hour, [(hours % 24, answer) for hours, answer in times], 1, 24)
         by_day.plot(late, np.zeros(len(late)), "|", color=EXPIRED_COLOR, clip_on=False)
         accepted = sum(each.answer == "accepted" for each in own)
         title = f"{robot} asked {user} {len(own)} times: {accepted} accepted, {len(late)} expired"

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.kernels import F64, I16, Bool
 from fleet2d.palette import ACCENT_COLOR, TEXT_COLOR, VIEW_COLOR, VIEW_EDGE, deep_color
+from fleet2d.pictures.charts import AskedTime, asked_of
 from fleet2d.pictures.floorplan import floorplan_axes
 from fleet2d.pictures.life import HATCH_COLOR, QUIET_COLOR, RIM_COLOR, SightWalls, field_of_view
 from fleet2d.runs.run import Run
@@ -232,6 +233,8 @@ class Stage:
         self._clock, self._away = self._write_head(axes)
         self._cursor = None if self._strip is None else self._fill_strip(self._strip)
         self._observations = _ObservationsByStep(self._part)
+        has_talks = bool(run.manifest["scenario"].get("interactions"))
+        self._talks = [each for each in asked_of(run)[0] if each.step < end] if has_talks else []
         self._scene: object = None
 
     @property
@@ -256,11 +259,12 @@ class Stage:
         """Show a step of the run; return whether any body, path or view differs from before."""
         index = (step - self._first) // self.stride
         last_scene = self._scene
+        names = [self._name(body, step) for body in self.bodies]
         poses = [self._place(body, index, step) for body in self.bodies]
         self._draw_bodies(poses)
         views = [body.view_key for body in self.bodies]
         lines = [line.tobytes() for line in self._draw_paths(index)]
-        self._scene = (poses, views, lines, self._draw_sightings(step, index))
+        self._scene = (names, poses, views, lines, self._draw_sightings(step, index))
         path = self.bodies[0].path if self.bodies else None
         if path is not None:
             time = path.time[index]
@@ -283,6 +287,11 @@ class Stage:
                 changed[1:] |= values[1:] != values[:-1]
         minute = self.bodies[0].path.time.astype("M8[m]")
         changed[1:] |= minute[1:] != minute[:-1]
+        for talk in self._talks:
+            for step in (talk.step, talk.answered, self._end_of(talk) + 1):
+                # The first moment that is not before the step.
+                if step is not None and 0 <= (number := -((self._first - step) // self.stride)):
+                    changed[number : number + 1] = True
         changed[0] = True
         return changed
 
@@ -318,6 +327,21 @@ class Stage:
         name.set(color=facts["color"], ha="center", va="bottom", zorder=5, clip_on=True)
         name.set_path_effects([withStroke(linewidth=2.0, foreground=RIM_COLOR)])
         return BodyArtists(facts, path, max(facts["radius"], MIN_RADIUS_M), name, [])
+
+    def _name(self, body: BodyArtists, step: int) -> str:
+        """Write what a robot asks, and what is answered, beside its name; return the text."""
+        text = name = body.facts["name"]
+        for talk in self._talks:
+            if talk.robot == name and talk.step <= step <= self._end_of(talk):
+                is_answered = talk.answered is not None and talk.answered <= step
+                text = f"{name}: {talk.text}{f', {talk.answer}' if is_answered else '?'}"
+        body.name.set_text(text)
+        return text
+
+    def _end_of(self, talk: AskedTime) -> int:
+        """Return the last step at which a talk is shown, else a minute after its last word."""
+        last = talk.step if talk.answered is None else talk.answered
+        return last + 60_000_000 // self._step_us if talk.end is None else talk.end
 
     def _place(self, body: BodyArtists, index: int, step: int) -> tuple[float, float, float] | None:
         """Move the name of a body; return its pose, None while it is away."""
