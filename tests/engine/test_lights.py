@@ -211,6 +211,8 @@ def test_a_light_goes_on_at_sunset() -> None:
 def test_lights_in_the_dark_need_a_place() -> None:
     with pytest.raises(InputError, match=r"lights.*simulation\.daylight"):
         watched(ana={"lights": "dark"})
+    with pytest.raises(InputError, match=r"lights.*17:00-08:00', or dark"):
+        watched(ana={"lights": "darkness"})
 
 
 def test_runs_by_daylight_are_the_same_for_every_span_and_from_their_manifest() -> None:

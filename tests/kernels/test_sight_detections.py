@@ -567,6 +567,34 @@ def test_look_over_furniture_in_one_room_equals_the_reference(thickness: int) ->
     assert expected.places != flat.places
 
 
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"eyes": np.full((1, 3), 2**13)}, "heights must be in 0"),
+        ({"eyes": np.zeros((2, 3), np.int64)}, "eyes must be"),
+        ({"tops": np.zeros((1, 3), np.int64)}, "tops"),
+        ({"points": np.zeros((1, 1, 3, 1), np.int64)}, "points must be"),
+        ({"start": np.array([0, 1])}, "start must have one more"),
+        ({"corners": np.zeros((3, 2), np.int64)}, "start must cover"),
+        ({"start": np.zeros(2, np.int64), "top": np.ones(1, np.int64),
+          "boxes": np.zeros((1, 4), np.int64)}, "each piece must have corners"),
+    ],
+)  # fmt: skip
+def test_heights_that_do_not_fit_are_refused(change: dict[str, I64], message: str) -> None:
+    eye = slow.Eye(0, 900, 4096, SURE, 2, points=2)
+    scene = replace(scene_in(ROOM, np.random.default_rng(3), 2, 5), heights=1, strangers=0)
+    given_heights = scene.heights_for([eye])
+    assert given_heights is not None
+    empty = {"corners": np.zeros((0, 2), np.int64), "start": np.zeros(1, np.int64),
+             "boxes": np.zeros((0, 4), np.int64), "top": np.zeros(0, np.int64)}  # fmt: skip
+    heights = given_heights[0]._replace(**empty)._replace(**change)
+    lenses, errors, rule = kernel_args([eye], scene)
+    memory = nothing_known(eye, scene).memory
+
+    with pytest.raises(ValueError, match=message):
+        detect(ROOM.mesh, lenses, errors, rule, *scene.window(0), memory, heights=heights)
+
+
 @quick
 @given(st.data(), st.lists(odd_eyes(), min_size=1, max_size=2), seeds(), MOVES, stoppings)
 def test_look_of_cameras_that_err_equals_the_reference(

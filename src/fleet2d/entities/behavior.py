@@ -117,7 +117,11 @@ DARK = HoursSpan((), timedelta(0), timedelta(0), "dark")
 
 
 def _parse_light_hours(value: object) -> tuple[HoursSpan, ...]:
-    return (DARK,) if value in ("dark", ["dark"], (DARK,)) else _parse_hours(value)
+    if value in ("dark", ["dark"], (DARK,)):
+        return (DARK,)
+    if isinstance(value, str) and value.isalpha():
+        raise problem(f"expected hours like '17:00-08:00', or dark, got {shown(value)}")
+    return _parse_hours(value)
 
 
 LightHours = Annotated[
