@@ -26,7 +26,8 @@ RECORD, RESULTS, TABLE = (
     "parts/000001.json", "results/000001.parquet", "tables/room_share/000001.parquet",
 )  # fmt: skip
 JSON = ("study.json", RECORD)
-PARQUET = ("plan.parquet", "scenarios.parquet", "variants.parquet", RESULTS, TABLE)
+PLAN = "plan.parquet"
+PARQUET = (PLAN, "scenarios.parquet", "variants.parquet", RESULTS, TABLE)
 COMPARE = [{"metric": "sightings.ana", "against": {SPEED: 0.3}}]
 STUDY = small(replicates=2, keep={"tables": ["room_share"]}, compare=COMPARE)
 
@@ -152,7 +153,10 @@ def test_commands_say_in_one_line_what_is_damaged(
             assert lines[0].startswith(("error: ", "not reproduced")), err
 
 
-@pytest.mark.parametrize("number", some(range(1, len(CASES)), 11))
+OF_ITS_PLAN = [n for n, case in enumerate(CASES) if case[0] == PLAN and case[1] in TABLES]
+
+
+@pytest.mark.parametrize("number", sorted({*some(range(1, len(CASES)), 11), *OF_ITS_PLAN[3:5]}))
 def test_the_study_runs_again_or_says_why_not(study: Path, fleet2d: Cli, number: int) -> None:
     file, _, damage = CASES[number]
     damage(study / file)
@@ -163,6 +167,22 @@ def test_the_study_runs_again_or_says_why_not(study: Path, fleet2d: Cli, number:
     assert "Traceback" not in err, err
     assert "\x1b" not in out + err
     assert code == 0 or err.startswith("error: "), (code, err)
+
+
+@pytest.mark.parametrize(
+    ("file", "change", "command"),
+    [("study.json", "columns=[]", "report"), (RESULTS, "all null", "status")],
+)
+def test_a_contradiction_within_a_file_is_named(
+    study: Path, fleet2d: Cli, file: str, change: str, command: str
+) -> None:
+    """They ended in `KeyError: 'seed'` and `cannot convert float NaN to integer`."""
+    next(damage for name, case, damage in CASES if (name, case) == (file, change))(study / file)
+
+    code, _, err = fleet2d("study", command, str(study))
+
+    assert (2, 1) == (code, err.count("\n"))
+    assert f"{file} is damaged" in err
 
 
 # --- Names and links ------------------------------------------------------------------------------

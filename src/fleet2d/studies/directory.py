@@ -194,7 +194,10 @@ class StudyDirectory:
                     f"{self.location} was written by a later Fleet2D (format {version}): update"
                     " Fleet2D"
                 )
-            return TypeAdapter(Meta).validate_python(content)
+            meta = TypeAdapter(Meta).validate_python(content)
+            if unknown := set(meta.populations) - set(meta.columns):
+                raise ValueError(f"its populations {', '.join(sorted(unknown))} are no columns")
+            return meta
 
     def write_meta(self, meta: Meta) -> None:
         """Write the description of the study.

@@ -270,7 +270,10 @@ def read_results(
             schema = pa.schema([schema.field(name) for name in columns])
         table = storage.read_table(part.results, schema.names)
         with storage.reading(part.results):
-            yield table.select(schema.names).cast(schema)
+            table = table.select(schema.names).cast(schema)
+            if table[VARIANT].null_count:
+                raise ValueError("it has results without the number of a variant")
+            yield table
 
 
 def _results_schema(storage: Storage, part: Part) -> "pa.Schema":

@@ -549,7 +549,7 @@ def reconcile(
     variants, stored = plan.variants, _StoredPlan.read(directory)
     place = _find(stored.identity, variants.identity)
     is_stored = place >= 0
-    number = np.where(is_stored, stored.number[place], -1).astype(np.int32)
+    number = np.append(stored.number, -1)[place].astype(np.int32)  # -1 for those at place -1
     has_result = np.append(finished, np.zeros(int(stored.number.max(initial=-1)) + 1, np.bool_))
     is_gone = _find(variants.identity, stored.identity) < 0
     stale = np.flatnonzero(is_gone & has_result[stored.number])
@@ -583,10 +583,11 @@ class _StoredPlan(NamedTuple):
     @classmethod
     def read(cls, directory: StudyDirectory) -> Self:
         """Read them, some rows at a time."""
-        parts = [
-            (numbers_of(batch), *(packed(batch[n].to_pylist()) for n in PLAN_COLUMNS[1:3]))
-            for batch in directory.storage.read_batches(PLAN, PLAN_COLUMNS[:3])
-        ]
+        with directory.storage.reading(PLAN):
+            parts = [
+                (numbers_of(batch), *(packed(batch[n].to_pylist()) for n in PLAN_COLUMNS[1:3]))
+                for batch in directory.plan_batches(PLAN_COLUMNS[:3])
+            ]
         empty = (np.zeros(0, np.int32), np.zeros(0, HASH), np.zeros(0, HASH))
         return cls(*map(np.concatenate, zip(*(parts or [empty]), strict=True)))
 
