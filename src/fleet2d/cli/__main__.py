@@ -22,7 +22,7 @@ GROUP = "fleet2d.command"
 COMMANDS = {
     "components": "scenarios",
     "convert": "scenarios",
-    "export": "export",
+    "export": "show",
     "reproduce": "stored",
     "resume": "run",
     "run": "run",

@@ -36,7 +36,7 @@ from fleet2d.kernels import (
     settle_coverage,
 )
 from fleet2d.metrics.metric import Metric
-from fleet2d.runs.layers import layer_rows, layer_table
+from fleet2d.runs.run import layer_rows, layer_table
 from fleet2d.runtime.events import Event
 from fleet2d.scenario.model import Scenario
 from fleet2d.sight.camera import TableContext, stack_lenses

@@ -20,8 +20,7 @@ from fleet2d.palette import TEXT_COLOR, VIEW_COLOR, VIEW_EDGE
 from fleet2d.pictures.floorplan import check_picture, figure_size, floorplan_axes, picture
 from fleet2d.pictures.life import SightWalls, field_of_view
 from fleet2d.pictures.theme import SCALE
-from fleet2d.runs.layers import PREFIX, layer_steps, read_layer
-from fleet2d.runs.run import Run
+from fleet2d.runs.run import LAYER_PREFIX, Run, layer_steps, read_layer
 from fleet2d.sight.camera import DEFAULT_ANGLE_DEG, DEFAULT_RANGE_M
 from fleet2d.sight.fov import FieldOfView, Flashlight, VisibleRegion
 
@@ -48,7 +47,7 @@ def draw_layer(run: Run, name: str, path: Path, step: int | None = None) -> None
     check_picture(path)
     values = read_layer(run, name, step)
     step = layer_steps(run, name)[-1] if step is None else step
-    field = run.tables[f"{PREFIX}{name}"].schema.field("value")
+    field = run.tables[f"{LAYER_PREFIX}{name}"].schema.field("value")
     unit = (field.metadata or {}).get(b"unit", b"").decode()
     plan = run.plan
     width, height = figure_size(plan)

@@ -1,4 +1,4 @@
-"""Reading a run back: its manifest and tables, and checking them against their digests."""
+"""Reading a run back: its manifest, tables and layers, checked against their digests."""
 
 from __future__ import annotations
 
@@ -8,12 +8,17 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from fleet2d.artifacts.manifest import FILE_NAME, FLOORPLAN_NAME, Manifest
 from fleet2d.artifacts.seal import changed_tables, digest_of_file, digest_table, run_digest
+from fleet2d.artifacts.table import Column, Kind, TableSpec
 from fleet2d.artifacts.unfinished import Prefix
 from fleet2d.configuration.components import hook
 from fleet2d.configuration.problems import suggest
 from fleet2d.errors import ArtifactError, RunDirectoryError, printable
+from fleet2d.floorplan.layers import Layer
 from fleet2d.storage.files import PARTIAL, path_in
 
 if TYPE_CHECKING:
@@ -26,6 +31,11 @@ if TYPE_CHECKING:
     from fleet2d.expectations.verdict import Verdict
     from fleet2d.floorplan.plan import FloorPlan
     from fleet2d.runs.trajectory import Trajectory
+
+LAYER_PREFIX = "layer."
+ALL_CELLS = -1
+"""Row and column of the entry that holds the fill value: of all cells without an entry."""
+LAYER_KINDS: dict[str, Kind] = {"b": "bool", "i": "int64", "u": "int64", "f": "float64"}
 
 
 class Tables(Mapping[str, "pa.Table"]):
@@ -378,3 +388,92 @@ def _not_installed(package: str) -> ArtifactError:
     return ArtifactError(
         f"{package} is not installed: `pip install {package}`, or use .arrow(name)"
     )
+
+
+def layer_table(layer: Layer) -> TableSpec:
+    """Return the table that a layer is stored in."""
+    kind = LAYER_KINDS[layer.dtype.kind]
+    return TableSpec(
+        f"{LAYER_PREFIX}{layer.name}",
+        (
+            Column("step", "step", description="the layer as it was after this step"),
+            Column("time", "time", description="local time"),
+            Column("row", "int32", description="of the cell; -1: all cells not named"),
+            Column("column", "int32"),
+            Column("value", kind, layer.unit, kind == "float64", description=layer.description),
+        ),
+        layer.description,
+    )
+
+
+def layer_rows(layer: Layer) -> dict[str, NDArray[Any]]:
+    """Return the present values of a layer as rows: columns row, column and value."""
+    values, fill = layer.values, np.array(layer.fill)
+    differs = ~np.isnan(values) if np.isnan(fill) else values != fill.astype(values.dtype)
+    row, column = np.nonzero(differs)
+    kind = {"bool": np.bool_, "int64": np.int64, "float64": np.float64}[
+        LAYER_KINDS[layer.dtype.kind]
+    ]
+    return {
+        "row": np.concatenate([[ALL_CELLS], row]).astype(np.int32),
+        "column": np.concatenate([[ALL_CELLS], column]).astype(np.int32),
+        "value": np.concatenate([[fill.astype(kind)], values[differs].astype(kind)]),
+    }
+
+
+def layer_names(run: Run) -> list[str]:
+    """Return the names of the layers that a run stored."""
+    return [name.removeprefix(LAYER_PREFIX) for name in run.tables if name.startswith(LAYER_PREFIX)]
+
+
+def layer_steps(run: Run, name: str) -> list[int]:
+    """Return the steps after which a layer was stored, in order.
+
+    Raises:
+        ArtifactError: The run stored no such layer.
+    """
+    table = _layer_table(run, name)
+    begins = table["row"].to_numpy() == ALL_CELLS  # the first row of each step
+    return [int(step) for step in table["step"].to_numpy()[begins]]
+
+
+def read_layer(run: Run, name: str, step: int | None = None) -> NDArray[Any]:
+    """Return a stored layer: (rows, columns), NaN where a float has no value.
+
+    Args:
+        run: The run.
+        name: The layer's name.
+        step: One of `layer_steps`; None for the last.
+
+    Raises:
+        ArtifactError: The run stored no such layer, or not at that step, or it is damaged.
+    """
+    steps = layer_steps(run, name)
+    if not steps:
+        raise ArtifactError(f"the layer {name!r} was never stored")
+    if step is None:
+        step = steps[-1]
+    if step not in steps:
+        listed = ", ".join(map(str, steps[:10])) + (", …" if len(steps) > 10 else "")
+        raise ArtifactError(
+            f"the layer {name!r} was not stored at step {step}; stored steps: {listed}"
+        )
+    table = _layer_table(run, name)
+    at_step = table["step"].to_numpy() == step
+    row, column, value = (
+        table[key].to_numpy(zero_copy_only=False)[at_step] for key in ("row", "column", "value")
+    )
+    lattice = run.plan.lattice
+    inside = (row < lattice.rows) & (column < lattice.columns) & (row >= 0) & (column >= 0)
+    if not inside[1:].all() or row[0] != ALL_CELLS:
+        raise ArtifactError(f"the layer {name!r} doesn't fit the floor plan of the run")
+    values = np.full((lattice.rows, lattice.columns), value[0])
+    values[row[1:], column[1:]] = value[1:]
+    return values
+
+
+def _layer_table(run: Run, name: str) -> Any:
+    if f"{LAYER_PREFIX}{name}" not in run.tables:
+        names = suggest(name, layer_names(run), "It has")
+        raise ArtifactError(f"the run stored no layer {name!r}{names}")
+    return run.tables[f"{LAYER_PREFIX}{name}"]

@@ -17,8 +17,7 @@ from fleet2d.errors import ArtifactError
 from fleet2d.floorplan.slow_area import SlowArea
 from fleet2d.kernels import I64, Bool
 from fleet2d.palette import body_color
-from fleet2d.runs.layers import PREFIX
-from fleet2d.runs.run import Run
+from fleet2d.runs.run import LAYER_PREFIX, Run
 from fleet2d.runtime.clock import Clock
 from fleet2d.sight.camera import DEFAULT_ANGLE_DEG, DEFAULT_RANGE_M
 from fleet2d.storage.files import path_in
@@ -415,7 +414,7 @@ def _columns_of(run: Run, name: str) -> list[dict[str, str]]:
 
 
 def _role(scenario: Mapping[str, Any], name: str) -> Role:
-    if name.startswith(PREFIX):
+    if name.startswith(LAYER_PREFIX):
         return "layer"
     if name in scenario.get("algorithms", {}):
         return "algorithm"
