@@ -102,7 +102,7 @@ describe("a stored run", () => {
   });
 
   it("shows beliefs as a lane with the rooms that were believed or true, and the truth in words", () => {
-    const [heat, error] = beliefLanes(run);
+    const [heat, error] = beliefLanes(run, "");
     const room = run.facts.home.rooms[valueAt(run.roomsOf("ana"), 20 * 3600e6)!]!.name;
     expect(heat!.words(20 * 3600e6)).toContain(`true: ${room}`);
     expect(heat!.paint().kind).toBe("heat");

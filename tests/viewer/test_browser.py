@@ -185,6 +185,109 @@ def test_last_sighting_before_a_time_is_one_question(page: Any, run_dir: Path) -
     assert moment(page) == first
 
 
+AT_HOME = [
+    {"at": "07:30", "place": ["living_room", "any"]},
+    {"at": "22:00", "place": "bedroom", "activity": "sleep"},
+]
+AWAY_AT_NIGHT = [AT_HOME[0], {"at": "20:00", "away": True, "activity": "work"}]
+DAYS = [
+    {"on": "tuesday", "items": AWAY_AT_NIGHT},
+    {"on": ["monday", "wednesday"], "items": AT_HOME},
+]
+
+
+class Tasks:
+    """What people come to the page for; an action is a click, a drag, a key, or a line sent."""
+
+    def __init__(self, page: Any) -> None:
+        self.page, self.actions = page, 0
+
+    def ask(self, question: str) -> str:
+        self.actions += 1
+        self.page.fill("#ask", question)
+        self.page.press("#ask", "Enter")
+        self.page.wait_for_selector("#ask-answer[data-count]")
+        return str(self.page.inner_text("#ask-answer"))
+
+    def press(self, key: str) -> None:
+        self.actions += 1
+        self.page.evaluate("document.activeElement.blur()")
+        self.page.keyboard.press(key)
+
+    def click(self, selector: str) -> None:
+        self.actions += 1
+        self.page.click(selector)
+
+    def last_sight_of_somebody_before_a_time(self) -> None:
+        self.ask("last seen ana before day 2 18:00")
+
+    def first_night_away(self) -> None:
+        self.ask("first night ana away")
+        assert 86_400 + 20 * 3600 <= moment(self.page) <= 86_400 + 23 * 3600
+
+    def where_somebody_was(self) -> None:
+        assert "astro is in" in self.ask("astro at day 2 12:00")
+
+    def who_was_in_a_room(self) -> None:
+        assert "ana" in self.ask("living_room at day 2 12:00")
+
+    def beliefs_over_time(self) -> None:
+        self.press("3")
+        self.page.wait_for_selector(".label >> text=ltp of ana")
+
+    def column_of_a_table(self) -> None:
+        self.press("5")
+        self.actions += 1
+        self.page.select_option("[aria-label='Column to plot']", "key_frames.x")
+        self.page.wait_for_selector("[aria-label='x of key_frames over the run'] canvas")
+
+    def reason_of_a_decision(self) -> None:
+        self.click(".label .name >> text=/^astro$/")
+        self.page.wait_for_selector("[data-inspected=astro] dt >> text=behavior")
+
+    def follow_a_body(self) -> None:
+        self.click(".label .name >> text=/^ana$/")
+        self.press("c")
+        self.page.wait_for_selector("text=Follow no longer")
+
+    def next_failure(self) -> None:
+        self.press("v")
+        self.page.wait_for_selector(".lanes:not([aria-valuenow='0'])")
+
+    def totals_of_a_range(self) -> None:
+        self.actions += 1
+        box = self.page.locator(".lanes").bounding_box()
+        self.page.keyboard.down("Shift")
+        self.page.mouse.move(box["x"] + 100, box["y"] + 60)
+        self.page.mouse.down()
+        self.page.mouse.move(box["x"] + 300, box["y"] + 60, steps=3)
+        self.page.mouse.up()
+        self.page.keyboard.up("Shift")
+        self.page.wait_for_selector(".totals dt >> text=ana")
+
+    def another_future(self) -> None:
+        self.click("text=Continue from here")
+        self.page.wait_for_selector(".live[data-paused=true]", timeout=20_000)
+
+
+def test_each_task_takes_one_or_two_actions(browser: Any) -> None:
+    run = fleet2d.run(
+        "bundled:base",
+        "simulation.duration=2 d",
+        "expect.unseen=never(seen(ana, by=astro))",
+        users={"ana": {"type": "schedule", "days": DAYS}},
+        seed=4,
+    )
+    two = {Tasks.column_of_a_table, Tasks.follow_a_body}
+    one = {task for name, task in vars(Tasks).items() if "_" in name.strip("_")} - two
+    with served(PageData(run)) as address, page_at(browser, address) as page:
+        tasks = Tasks(page)
+        for task in sorted(one | two, key=lambda task: task is Tasks.another_future):
+            tasks.actions = 0
+            task(tasks)
+            assert tasks.actions <= 1 + (task in two), task
+
+
 def test_address_holds_the_moment_and_the_view(browser: Any, page: Any) -> None:
     page.fill("#goto", "day 1 05:00")
     page.press("#goto", "Enter")
@@ -401,6 +504,11 @@ def test_two_runs_are_compared_in_step(browser: Any, run_dir: Path, other_dir: P
         assert [str(8 * 3600)] * 2 == steps
         page.click("#tab-metrics")
         assert page.locator("table.results tr.differs").count() > 0
+        for name in ("ana · first", "ana · second"):
+            page.locator(".u-legend", has_text=name).first.wait_for()
+        page.click("#tab-beliefs")
+        for name in ("first", "second"):
+            page.wait_for_selector(f".label .name >> text=/^ltp of ana · {name}/")
 
 
 def test_exported_file_plays_without_a_server(browser: Any, run_dir: Path, tmp_path: Path) -> None:

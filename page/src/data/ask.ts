@@ -90,8 +90,9 @@ export function ask(run: Run, question: string, nearUs: number, other: Run | nul
   const length = / ([<>]) ?(\d+(?:\.\d+)?) ?(s|min|h|d) /.exec(rest);
   if (length) rest = rest.replace(length[0], " ");
   const which = / (last|first) /.exec(rest)?.[1];
-  const part = Object.keys(PARTS).find((name) => rest.includes(` ${name} `));
-  const words = rest.split(" ").filter((word) => word && word !== which && word !== part);
+  const singular = (name: string): string => name.slice(0, -1); // the first night, and nights
+  const part = Object.keys(PARTS).find((name) => rest.includes(` ${name} `) || rest.includes(` ${singular(name)} `));
+  const words = rest.split(" ").filter((word) => word && word !== which && word !== part && !(part && word === singular(part)));
   const asksDifference = other && words.includes("differs");
   let found = asksDifference ? differing(run, other, words.filter((word) => word !== "differs")) : stretchesOf(run, words);
   if (typeof found === "string") return answer([], found);

@@ -63,14 +63,15 @@ function split(plot: string): [string, string] {
 
 function Chart({ run, name, column }: { run: Run; name: string; column: string }) {
   const box = useRef<HTMLDivElement>(null);
+  const runs = state.runs.value;
   const lines = useSignal<Series[]>([]);
   const unit = run.tableFacts(name)?.columns.find((entry) => entry.name === column)?.unit ?? "";
   useEffect(() => {
     void run.attempt(async () => {
-      const table = await run.open(name);
-      if (table) lines.value = (await readSeries(run.tableFacts(name)!, table, run.clock.stepUs, column)).map(thinned);
+      const ofRuns = await Promise.all(runs.map((entry) => linesOf(entry, name, column, runs.length > 1 ? entry.facts.title : "")));
+      lines.value = ofRuns.flat();
     });
-  }, [run, name, column]);
+  }, [runs, name, column]);
   useEffect(() => {
     if (lines.value.length === 0 || !box.current) return undefined;
     const chart = drawChart(box.current, run, lines.value);
@@ -82,6 +83,15 @@ function Chart({ run, name, column }: { run: Run; name: string; column: string }
       <div ref={box} role="img" aria-label={`${column} of ${name} over the run`} />
     </figure>
   );
+}
+
+/** The lines of a column of a run; those of several runs have the names of their runs. */
+async function linesOf(run: Run, name: string, column: string, title: string): Promise<Series[]> {
+  const facts = run.tableFacts(name);
+  const table = await run.open(name);
+  if (!facts || !table || !numberColumns(facts).includes(column)) return [];
+  const series = (await readSeries(facts, table, run.clock.stepUs, column)).map(thinned);
+  return title ? series.map((line) => ({ ...line, name: [line.name, title].filter(Boolean).join(" · ") })) : series;
 }
 
 function drawChart(box: HTMLElement, run: Run, lines: readonly Series[]): uPlot {

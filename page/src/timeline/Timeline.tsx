@@ -33,14 +33,15 @@ function useLanes(): ReadonlySignal<Lane[]> {
       last = performance.now();
       const runs = state.runs.value;
       const answer = state.answer.value;
+      const showsBeliefs = state.panel.value === "beliefs" || state.shown.value.has("beliefs");
       const own = runs.flatMap((run, i) => {
         const other = i === 1 ? runs[0]! : null;
         const title = runs.length > 1 ? run.facts.title : "";
         return [...lanesOf(run, `${i}:`, other, title), ...(extra.value.get(run) ?? [])];
       });
+      const believed = showsBeliefs ? runs.flatMap((run, i) => beliefLanes(run, `${i}:`, runs.length > 1 ? run.facts.title : "")) : [];
       const asked = answer && answer.spans.length > 0 ? [answerLane(answer)] : [];
-      const showsBeliefs = state.panel.value === "beliefs" || state.shown.value.has("beliefs");
-      lanes.value = [...asked, ...(runs[0] ? noteLane(runs[0]) : []), ...(showsBeliefs && runs[0] ? beliefLanes(runs[0]) : []), ...own];
+      lanes.value = [...asked, ...(runs[0] ? noteLane(runs[0]) : []), ...believed, ...own];
     };
     const stop = effect(() => {
       void [colors.value, state.answer.value, extra.value, state.panel.value, state.shown.value, state.belief.value];

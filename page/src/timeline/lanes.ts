@@ -62,10 +62,10 @@ export function lanesOf(run: Run, prefix: string, other: Run | null, title = "")
 }
 
 const HEAT_ROW_HEIGHT = 12;
-const MIN_HEAT = 0.02;
+const MIN_HEAT = 0.1;
 
 /** What is believed of each room over time, the true room drawn over it, and the error below. */
-export function beliefLanes(run: Run): Lane[] {
+export function beliefLanes(run: Run, prefix: string, title = ""): Lane[] {
   const chosen = chosenBelief(run);
   const beliefs = chosen?.beliefs.of(chosen.user);
   if (!chosen || !beliefs) return [];
@@ -78,7 +78,7 @@ export function beliefLanes(run: Run): Lane[] {
     (room) => been.has(room) || beliefs.shares.some((shares) => shares[room]! > MIN_HEAT),
   );
   const name = (room: number): string => rooms[room]?.name ?? "away";
-  const label = `${chosen.beliefs.name} of ${chosen.user}`;
+  const label = [`${chosen.beliefs.name} of ${chosen.user}`, title].filter(Boolean).join(" · ");
   const color = bodyColor(run.body(chosen.user)?.color ?? "#0077bb");
   const words = (us: number): string => {
     const at = lastAtMost(beliefs.us, us);
@@ -90,9 +90,9 @@ export function beliefLanes(run: Run): Lane[] {
   };
   const paint: LanePaint = { kind: "heat", beliefs, rows, names: rows.map(name), truth, color, endUs: run.endUs };
   const height = rows.length * HEAT_ROW_HEIGHT;
-  const heat: Lane = { id: "belief", label, height, group: "Beliefs", isMain: true, words, paint: () => paint, subject: chosen.user };
+  const heat: Lane = { id: `${prefix}belief`, label, height, group: "Beliefs", isMain: true, words, paint: () => paint, subject: chosen.user };
   const error = errorsOf(run, chosen);
-  return [heat, { ...lineLane("", label, error), label: `${label}: error`, group: "Beliefs" }];
+  return [heat, { ...lineLane(prefix, label, error), label: `error of ${label}`, group: "Beliefs" }];
 }
 
 /** What answers the question that was asked; its words are those of each mark. */
