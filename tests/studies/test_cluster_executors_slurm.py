@@ -2,6 +2,10 @@
 
 import os
 import shutil
+import signal
+import threading
+import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -109,3 +113,78 @@ def test_a_job_that_left_the_queue_without_results_is_lost(
     (event,) = executor.run(Square(tmp_path), tasks(1))
     assert isinstance(event, LostTask)
     assert "left the queue without results" in event.reason
+
+
+def test_a_job_with_results_counts_whatever_the_queue_says(
+    executor: SlurmExecutor, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(cluster_executors, "_queued_jobs", lambda cluster: set[str]())
+    (event,) = executor.run(Square(tmp_path), tasks(1))
+    assert isinstance(event, FinishedTask)
+
+
+def test_jobs_of_arrays_and_of_their_own_are_found_in_the_queue(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    squeue = tmp_path / "squeue"
+    squeue.write_text("#!/bin/sh\nprintf '12_3\\n13_N/A\\n'\n")
+    squeue.chmod(0o755)
+    monkeypatch.setenv("PATH", str(tmp_path), prepend=os.pathsep)
+    assert {"12_3", "13"} == cluster_executors._queued_jobs("slurm")
+
+
+@dataclass
+class SlowSquare:
+    """Squares the number of a task in some seconds, and writes down which process does it, where."""
+
+    folder: Path
+
+    def __call__(self, task: WorkerTask) -> int:
+        (self.folder / f"process-{task.number}").write_text(
+            f"{os.getpid()} {os.environ['SLURMD_NODENAME']}"
+        )
+        time.sleep(3)
+        return task.number**2
+
+
+def processes(folder: Path) -> list[tuple[int, str]]:
+    """The processes and nodes of all tasks that have begun."""
+    texts = [file.read_text().split() for file in sorted(folder.glob("process-*"))]
+    return [(int(text[0]), text[1]) for text in texts if len(text) == 2]
+
+
+def kill_a_job(folder: Path) -> None:
+    os.kill(processes(folder)[0][0], signal.SIGKILL)
+
+
+def kill_a_node(folder: Path) -> None:
+    node = processes(folder)[0][1]
+    daemon = Path(os.environ["SLURM_CONF"]).parent / f"slurmd.{node}.pid"
+    os.kill(int(daemon.read_text()), signal.SIGKILL)
+    for process, its_node in processes(folder):
+        if its_node == node and Path(f"/proc/{process}").exists():
+            os.kill(process, signal.SIGKILL)
+
+
+@pytest.mark.skipif("SLURM_CONF" not in os.environ, reason="needs two nodes: see .ci/cluster")
+@pytest.mark.parametrize("kill", [kill_a_job, kill_a_node])
+def test_tasks_of_a_killed_job_or_node_of_slurm_are_run_again(
+    kill: Callable[[Path], None], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By a controller and two nodes on this machine; without accounting, as many clusters are."""
+    monkeypatch.setattr(cluster_executors, "GRACE_S", 5.0)
+    executor = SlurmExecutor(2, {"timeout_min": 5, "slurm_mem": "500M"}, tmp_path / "jobs")
+
+    def wait_and_kill() -> None:
+        while not processes(tmp_path):
+            time.sleep(0.1)
+        kill(tmp_path)
+
+    killer = threading.Thread(target=wait_and_kill, daemon=True)
+    killer.start()
+    events = list(executor.run(SlowSquare(tmp_path), tasks(6)))
+    killer.join()
+    assert {i: i**2 for i in range(6)} == {
+        e.task.number: getattr(e, "payload", None) for e in events
+    }
+    assert 2 == max(event.attempts for event in events)

@@ -245,7 +245,7 @@ class SlurmExecutor:
                 for ended in self._ended(running):
                     chunk = running.pop(ended)
                     try:
-                        if ended.job_id in self._missing:
+                        if ended.job_id in self._missing and not _has_result(ended):
                             raise RuntimeError("it has left the queue without results")
                         payloads = ended.result()
                     except Exception as error:  # noqa: BLE001 - a job may fail in any way
@@ -268,7 +268,7 @@ class SlurmExecutor:
             return ended
         now_s = time.monotonic()
         for job in running:
-            if job.job_id in queued or job.paths.result_pickle.exists():
+            if job.job_id in queued or _has_result(job):
                 self._missing.pop(job.job_id, None)
             elif now_s - self._missing.setdefault(job.job_id, now_s) > GRACE_S:
                 ended.append(job)
@@ -305,10 +305,17 @@ class SlurmExecutor:
                 retries.append([task])
 
 
+def _has_result(job: Any) -> bool:
+    return bool(job.paths.result_pickle.exists())
+
+
 def _queued_jobs(cluster: str) -> set[str] | None:
-    """Return the numbers of jobs that wait or run; None if unknown."""
+    """Return the numbers of jobs that wait or run; None if unknown.
+
+    A job of an array is called 12_3, a job of its own 12, which squeue prints as 12_N/A.
+    """
     if cluster != "slurm":
         return None
     command = ("squeue", "--me", "--noheader", "--array", "--format=%F_%K")
     done = subprocess.run(command, capture_output=True, text=True, check=False)  # noqa: S603
-    return None if done.returncode else set(done.stdout.split())
+    return None if done.returncode else set(done.stdout.replace("_N/A", "").split())
