@@ -8,8 +8,7 @@ processor time.
 
 import time
 from collections.abc import Callable
-
-import numpy as np
+from random import Random
 
 HOME = {"floorplan.seed": 3, "users.ana.persona": "retired"}
 
@@ -28,13 +27,13 @@ def decisions_a_second(task: str) -> float:
     """Return the rate of decisions drawn at random in a known home."""
     from fleet2d.gym import RobotEnv
 
-    env, random, counts = RobotEnv(task), np.random.default_rng(0), list[int]()
+    env, random, counts = RobotEnv(task), Random(0), list[int]()
     values = {key: HOME[key] for key in env.variants.task.vary}
 
     def live() -> None:
         mask, count, is_over = env.action_masks(), 0, False
         while not is_over:
-            action = int(random.choice(np.flatnonzero(mask)))
+            action = random.choice(mask.nonzero()[0].tolist())
             _, _, terminated, truncated, info = env.step(action)
             mask, count, is_over = info["action_mask"], count + 1, terminated or truncated
         counts.append(count)

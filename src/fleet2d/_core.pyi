@@ -1787,6 +1787,54 @@ class Resident:
     def go(self, home: object, walk: object, legs: Legs, now: tuple[int, int, int, int, int], posture: int, venue: CoreVenue, draws: StepDraws) -> tuple[tuple[int, int, int, int, int], int, list[tuple[int, int]], list[tuple[int, int, int]]]:
         """Go to where an activity is done, and take its posture; see `live`."""
 
+def charge_pieces(track: tuple[Any, ...], battery: tuple[Any, ...]) -> tuple[numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
+    """
+    Return the charge of a battery while a body follows a track.
+
+    Args:
+        track: The track; without breakpoints, the body drives for good.
+        battery: The battery, a `BatteryState`.
+
+    Returns:
+        The moments at which the rate of the charge changes [us], int64 (n,), the charge at each, float64 (n,), and the
+        rate from each on [1/us], float64 (n,).
+    """
+
+def charge_at(track: tuple[Any, ...], battery: tuple[Any, ...], moment_us: int) -> float:
+    """Return the charge, 0 to 1, at a moment of a track [us]."""
+
+def charge_falls_to(track: tuple[Any, ...], battery: tuple[Any, ...], level: float) -> int | None:
+    """
+    Return the moment of a track at which the charge has fallen to a level [us]; None if it never does.
+    """
+
+def remember(step: numpy.typing.NDArray[numpy.int64], identity: numpy.typing.NDArray[numpy.int64], room: numpy.typing.NDArray[numpy.int16], start_us: int, step_us: int, memory: tuple[Any, ...]) -> None:
+    """
+    Add sightings to a memory.
+
+    Args:
+        step: int64 (n,), when.
+        identity: int64 (n,), whom the robot saw; -1: somebody whom it didn't recognize.
+        room: int16 (n,), where; below 0 for no room: these are left out.
+        start_us: Time of day at step 0 [us].
+        step_us: Length of a step [us].
+        memory: The `RoomMemory`, which changes.
+    """
+
+def show_memory(memory: tuple[Any, ...], shown: tuple[Any, ...], visited: numpy.typing.NDArray[numpy.int64], step: int, hour: int, step_s: float, table: numpy.typing.NDArray[numpy.float32]) -> None:
+    """
+    Fill the columns of an observation that show a memory.
+
+    Args:
+        memory: The `RoomMemory`.
+        shown: What it shows, `ShownMemory`.
+        visited: int64 (rooms,), the step at which the robot last went to each room; -1: never.
+        step: The present step.
+        hour: The present hour of the day.
+        step_s: Length of a step [s].
+        table: float32 (rows, columns), the observation, which changes; its first rows are the rooms.
+    """
+
 def encode_arrays(arrays: Sequence[numpy.typing.NDArray[Any]]) -> bytes:
     """
     Return arrays as bytes: values that repeat or grow slowly take few.

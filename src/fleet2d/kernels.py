@@ -73,6 +73,9 @@ from fleet2d._core import (
     CELL_CENTRE as CELL_CENTRE,
     cells_in_view as cells_in_view,
     CHANCE_BITS as CHANCE_BITS,
+    charge_at as charge_at,
+    charge_falls_to as charge_falls_to,
+    charge_pieces as charge_pieces,
     CoreVenue as CoreVenue,
     cosine as cosine,
     cost_distance as cost_distance,
@@ -134,6 +137,7 @@ from fleet2d._core import (
     region_contains_points as region_contains_points,
     region_outline as region_outline,
     regions_of_cells as regions_of_cells,
+    remember as remember,
     resampled as resampled,
     Resident as Resident,
     Role as Role,
@@ -142,6 +146,7 @@ from fleet2d._core import (
     RoomUse as RoomUse,
     Routes as Routes,
     settle_coverage as settle_coverage,
+    show_memory as show_memory,
     SightingColumn as SightingColumn,
     sine as sine,
     sliding_max as sliding_max,
@@ -366,6 +371,51 @@ def new_memory(cameras: int, users: int, backlog: int) -> SightMemory:
         backlog=np.zeros((cameras, backlog, len(SightingColumn)), np.int64),
         waiting=np.zeros((cameras, 2), np.int64),
     )
+
+
+class BatteryState(NamedTuple):
+    """A battery at a moment; its charge changes at one of three rates."""
+
+    level: float  # 0 to 1
+    since_us: int  # the moment
+    driving: float  # rates [1/us]: driving or turning,
+    standing: float  # standing still,
+    charging: float  # and at the charger
+    charger_x: int  # lattice units
+    charger_y: int
+    is_broken: bool  # whether the charger doesn't charge
+
+
+class RoomMemory(NamedTuple):
+    """Sightings of people by room; the last two rows are of people not recognized, and of anyone.
+
+    Attributes:
+        last: int64 (people + 2, rooms), the step of the last sighting, -1 for none.
+        looks: int64 (people + 2, rooms, 24), their number in each hour of the day.
+        total: int64 (people + 2, rooms), their number.
+    """
+
+    last: I64
+    looks: I64
+    total: I64
+
+
+class ShownMemory(NamedTuple):
+    """Which rows of a `RoomMemory` an observation shows, and in which of its columns.
+
+    Attributes:
+        fresh_rows: int64 (n,), rows of `last`; -1: the robot's own visits.
+        fresh_at: int64 (n,), their columns.
+        scale_s: float64 (n,), what happened this long ago counts half [s].
+        habit_rows: int64 (m,), first a row of `total`, then rows of `looks` in the present hour.
+        habit_at: int64 (m,), their columns.
+    """
+
+    fresh_rows: I64
+    fresh_at: I64
+    scale_s: F64
+    habit_rows: I64
+    habit_at: I64
 
 
 class PoseCache(NamedTuple):

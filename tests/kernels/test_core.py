@@ -21,6 +21,7 @@ from fleet2d import _core, kernels
 from fleet2d.floorplan.lattice import Lattice
 from fleet2d.kernels import (
     NEVER,
+    BatteryState,
     Breakpoints,
     Corners,
     CoverageRecord,
@@ -32,6 +33,8 @@ from fleet2d.kernels import (
     PeopleEvidence,
     PlaceNetwork,
     Reach,
+    RoomMemory,
+    ShownMemory,
     StayModel,
     Stretches,
     TracedEvidence,
@@ -233,6 +236,17 @@ def poses() -> Any:
 def track() -> Breakpoints:
     row = np.arange(5) * SECOND
     return Breakpoints(row, row // 20_000, row // 30_000, row % 4096, np.zeros(5, np.uint8))
+
+
+def battery() -> BatteryState:
+    return BatteryState(0.5, SECOND, -1e-8, -1e-9, 1e-8, 5, 7, is_broken=False)
+
+
+def memory() -> RoomMemory:
+    shape = 3, 2
+    return RoomMemory(
+        np.full(shape, -1), np.zeros((*shape, 24), np.int64), np.zeros(shape, np.int64)
+    )
 
 
 def setup() -> CoverageSetup:
@@ -443,6 +457,26 @@ CALLS: dict[str, Args] = {
     "record_coverage": lambda: (setup(), window(), 0, 0, STEPS, empty_pose_cache(8, 2), record()),
     "settle_coverage": lambda: (setup(), empty_pose_cache(8, 2), record().last),
     "trace_track": lambda: (track(), 0, SECOND, poses()),
+    "charge_pieces": lambda: (track(), battery()),
+    "charge_at": lambda: (track(), battery(), 3 * SECOND),
+    "charge_falls_to": lambda: (track(), battery(), 0.1),
+    "remember": lambda: (
+        np.array([5, 7]),
+        np.array([0, -1]),
+        np.array([1, -1], np.int16),
+        0,
+        SECOND,
+        memory(),
+    ),
+    "show_memory": lambda: (
+        memory(),
+        ShownMemory(*(np.array([0, 1]) for _ in range(2)), np.ones(2), *np.ones((2, 2), np.int64)),
+        np.array([-1, 5]),
+        9,
+        7,
+        1.0,
+        np.zeros((3, 4), np.float32),
+    ),
     "time_route": lambda: (POINTS[:2].copy(), 5, 7, 1000.0, 500.0),
     "trace_meander": lambda: (
         MESH,
@@ -760,7 +794,7 @@ def test_arrays_of_another_type_are_refused(name: str, places: list[Path_]) -> N
         other = np.int32 if array.dtype != np.int32 else np.int64
         wrong: list[Any] = [
             array.astype(other),
-            array.astype(np.float32),
+            array.astype(np.float64 if array.dtype == np.float32 else np.float32),
             array.astype(array.dtype.newbyteorder()) if array.itemsize > 1 else object(),
             array[None],
             array.ravel() if array.ndim > 1 else array.reshape(-1, 1),
@@ -816,6 +850,8 @@ WRITTEN = {
     "record_coverage": [*((5, i) for i in range(5)), *((6, i) for i in range(6))],
     "settle_coverage": [*((1, i) for i in range(5)), (2,)],
     "trace_track": [(3, i) for i in range(4)],
+    "remember": [(5, i) for i in range(3)],
+    "show_memory": [*((0, i) for i in range(3)), (6,)],
     "trace_meander": [(5, i) for i in range(4)],
     "detect": [(7, i) for i in range(5)],
     "follow": [(2,), (3,)],

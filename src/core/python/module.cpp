@@ -40,5 +40,7 @@ NB_MODULE(_core, m) {
     bind_interruptions(m);
     bind_planner(m);
     bind_residents(m);
+    bind_battery(m);
+    bind_room_memory(m);
     bind_encoding(m);
 }

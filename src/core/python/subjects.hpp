@@ -36,6 +36,8 @@ void bind_flows(nanobind::module_& m);
 void bind_interruptions(nanobind::module_& m);
 void bind_planner(nanobind::module_& m);
 void bind_residents(nanobind::module_& m);
+void bind_battery(nanobind::module_& m);
+void bind_room_memory(nanobind::module_& m);
 void bind_encoding(nanobind::module_& m);
 
 }  // namespace fleet2d

@@ -98,6 +98,7 @@ class Cameras(Watcher):
         owner: The body with the cameras.
         row: The owner's row among the bodies.
         index: Its index among the robots, or among the users.
+        event_names: The event kinds (lost, seen) of these cameras.
         others: The bodies that can be seen.
         names: Names of the cameras.
         errs: Whether observations can differ from the truth.
@@ -143,6 +144,7 @@ class Cameras(Watcher):
             ScenarioError: A period is not a multiple of the step, or an unknown body is named.
         """
         self.owner, self.row = actors[row], row
+        self.event_names = self.owner.entity.sight_events
         # Lines of sight are compiled into the look.
         self.method = None if isinstance(method, LineOfSight) else method
         self.radii, self.heights = radii, heights
@@ -264,11 +266,6 @@ class Cameras(Watcher):
             self.activity_senses.append(sense)
 
     @property
-    def event_names(self) -> tuple[str, str]:
-        """The event kinds (lost, seen) of these cameras."""
-        return self.owner.entity.sight_events
-
-    @property
     def stops(self) -> tuple[bool, bool]:
         """Whether its owner's plan ends when a body is lost, and when a body is seen."""
         interrupts, names = self.owner.plan.interrupts, self.event_names
@@ -284,7 +281,8 @@ class Cameras(Watcher):
     @property
     def waits(self) -> bool:
         """Whether an event of it may end the present span."""
-        return any(self.ends)
+        names = self.event_names
+        return not (self.awaited.isdisjoint(names) and self.owner.plan.interrupts.isdisjoint(names))
 
     @property
     def counts(self) -> I64:
@@ -295,9 +293,9 @@ class Cameras(Watcher):
     def in_view(self) -> dict[str, tuple[float, float]]:
         """The last perceived place [m] of each body in view, by name, when it last looked."""
         lattice, in_view = self.owner.home.plan.lattice, {}
-        for identity in np.flatnonzero(self.memory.seen).tolist():
-            x, y = lattice.to_metres(self.perceived[identity]).tolist()
-            in_view[self.name_of(identity)] = (x, y)
+        for identity, is_seen in enumerate(self.memory.seen.tolist()):
+            if is_seen:
+                in_view[self.name_of(identity)] = lattice.xy_of(*self.perceived[identity].tolist())
         return in_view
 
     def name_of(self, identity: int) -> str:

@@ -46,7 +46,7 @@ from fleet2d.floorplan.formats.native import native_document
 from fleet2d.floorplan.home import Home
 from fleet2d.interventions.intervention import ClockTime, Intervention, parse_when
 from fleet2d.interventions.methods import InterventionMethods
-from fleet2d.kernels import in_radians
+from fleet2d.kernels import About, in_radians
 from fleet2d.runs.run import Run, open_store
 from fleet2d.runtime.clock import midnight_of
 from fleet2d.runtime.events import Event, EventKind
@@ -590,11 +590,13 @@ class Simulation(InterventionMethods):
 
     def perceived_s(self, robot: str) -> float:
         """Return for how long a robot has perceived people so far, summed over people [s]."""
-        cameras = [c for c in self._state.cameras if c.owner.name == robot]
-        for group in cameras:
-            self._state.take(group, self.step)
-        looks = [c.counts[..., 1].max(axis=0).sum() * int(c.lenses.period[0]) for c in cameras]
-        return float(sum(looks)) * self.clock.step_us / 1e6
+        steps = 0
+        for cameras in self._state.cameras:
+            if cameras.owner.name == robot:
+                self._state.take(cameras, self.step)
+                noticed = cameras.memory.about[..., About.NOTICED.value].T.tolist()
+                steps += sum(map(max, noticed)) * int(cameras.lenses.period[0])
+        return steps * self.clock.step_us / 1e6
 
     def _run_to(
         self, end: int, on_progress: Callable[[Self], None] | None = None, spans: int | None = None
@@ -693,10 +695,10 @@ class Simulation(InterventionMethods):
                 return
 
     def _body(self, name: str) -> DecidingActor:
-        actors = self.actors
-        if name not in actors:
-            raise ScenarioError(f"there is nobody named {name!r}{suggest(name, actors)}")
-        return actors[name]
+        for actor in self._state.actors:
+            if actor.name == name:
+                return actor
+        raise ScenarioError(f"there is nobody named {name!r}{suggest(name, self.actors)}")
 
     # Expectations
 

@@ -205,7 +205,7 @@ class KeyFrames:
         moment, track = step * self._clock.step_us, motion.breakpoints
         begin = self._emitted[row]
         if begin < len(track.time) and track.time[begin] <= moment:
-            end = int(np.searchsorted(track.time, moment, side="right"))
+            end = int(track.time.searchsorted(moment, side="right"))
             self._blocks.append(_keys(track, begin, end, row, TRACK, self._clock.step_us))
             self._rows += end - begin
             self._emitted[row] = end

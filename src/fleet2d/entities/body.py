@@ -265,11 +265,11 @@ class Bodies:
 
     def next_decision(self) -> int:
         """Return the step at which the next body decides, NEVER for none."""
-        return int(self.ask_at.min(initial=NEVER))
+        return int(np.minimum.reduce(self.ask_at, initial=NEVER))
 
     def due(self, step: int) -> Sequence[int]:
         """Return the rows of the bodies that decide at a step."""
-        return np.flatnonzero(self.ask_at <= step).tolist()
+        return (self.ask_at <= step).nonzero()[0].tolist()
 
     def forget(self, before: int) -> None:
         """Drop the poses at steps earlier than `before`."""

@@ -18,7 +18,12 @@ from fleet2d.kernels import (
     F64,
     I64,
     TURN,
+    BatteryState,
+    Breakpoints,
     Window,
+    charge_at,
+    charge_falls_to,
+    charge_pieces,
     random_bell,
     random_below,
     random_uniform,
@@ -28,6 +33,7 @@ from fleet2d.runtime.determinism import stream_key
 
 # The table of events gets a row `battery` when the charge has changed by this much.
 RECORDED_CHANGE = 0.05
+NO_BREAKPOINTS = Breakpoints(*(np.zeros(0, np.int64) for _ in range(4)), np.zeros(0, np.uint8))
 
 
 class Battery(Settings):
@@ -52,26 +58,20 @@ class ChargeCurve(NamedTuple):
     """The charge over time while a motion is followed.
 
     Attributes:
-        level: Charge at `begins[0]`, 0 to 1.
         begins: Moments at which the rate changes [us], int64 (n,).
-        rates: The rate from each of those moments on [1/us], (n,).
+        level: Charge at each of those moments, 0 to 1, float64 (n,).
+        rates: The rate from each of those moments on [1/us], float64 (n,).
     """
 
-    level: float
     begins: I64
-    rates: list[float]
+    level: F64
+    rates: F64
 
     def levels(self, moments: I64) -> F64:
         """Return the charge, float64 (n,), at moments from `begins[0]` on [us], int64 (n,)."""
-        level, rows = self.level, []
-        for i, rate in enumerate(self.rates):
-            rows.append(level)
-            if i + 1 < len(self.rates):
-                change = rate * int(self.begins[i + 1] - self.begins[i])
-                level = min(1.0, max(0.0, level + change))
         piece = np.searchsorted(self.begins, moments, side="right") - 1
         since = moments - self.begins[piece]
-        levels: F64 = np.array(rows)[piece] + np.array(self.rates)[piece] * since
+        levels: F64 = self.level[piece] + self.rates[piece] * since
         return levels.clip(0.0, 1.0)
 
 
@@ -88,8 +88,8 @@ class Charge:
 
     def __init__(self, battery: Battery, body: Body) -> None:
         self.level = battery.charge
-        self._drain = 1 / micros(battery.driving), 1 / micros(battery.standing)  # per us
-        self._gain = 1 / micros(battery.charging)
+        self._gain = 1 / micros(battery.charging)  # per us
+        self._rates = -1 / micros(battery.driving), -1 / micros(battery.standing), self._gain
         self.charger = stop_at(body, battery.charger)
         self._recorded = -1.0
         self._since_us = 0
@@ -116,27 +116,16 @@ class Charge:
 
     def follow(self, motion: Motion, until_us: int) -> None:
         """Update the charge: a motion was followed from the last decision to a moment."""
-        self.level = float(self.course(motion).levels(np.array([until_us]))[0])
+        self.level = charge_at(_track(motion), self._state, until_us)
         self._since_us = until_us
 
     def course(self, motion: Motion) -> ChargeCurve:
         """Return the charge from the last decision on, if a motion is followed."""
-        return ChargeCurve(self.level, *self._rates(motion, self._since_us))
+        return ChargeCurve(*charge_pieces(_track(motion), self._state))
 
     def falls_to(self, level: float, motion: Motion) -> int | None:
         """Return when the charge falls to a level [us], if a motion is followed; None: never."""
-        begins, rates = self._rates(motion, self._since_us)
-        now, charge = self._since_us, self.level
-        for begin, end, rate in zip(
-            begins.tolist(), [*begins.tolist()[1:], None], rates, strict=True
-        ):
-            if charge <= level:
-                return int(max(begin, now))
-            if rate < 0 and (end is None or charge + rate * (end - begin) <= level):
-                return int(begin) + int((charge - level) / -rate) + 1
-            if end is not None:
-                charge = min(1.0, charge + rate * (end - begin))
-        return None
+        return charge_falls_to(_track(motion), self._state, level)
 
     def time_to_charge(self, level: float) -> int:
         """Return how long it takes to charge to a level [us]."""
@@ -150,21 +139,16 @@ class Charge:
             begin_us = plan.began[0] * plan.step_us
             plan.notes.insert(0, Note(begin_us, "battery", self.percent))
 
-    def _rates(self, motion: Motion, since_us: int) -> tuple[I64, list[float]]:
-        """Return the moments at which the rate of the charge changes [us], and the rates [1/us]."""
-        driving, standing = -self._drain[0], -self._drain[1]
-        if not isinstance(motion, Track):  # a random walk never stands still
-            return np.array([since_us], np.int64), [driving]
-        track = motion.breakpoints
-        time, x, y = track.time, track.x, track.y
-        same = (np.diff(x) == 0) & (np.diff(y) == 0)
-        still = np.append(same & (np.diff(track.heading) == 0), True)
-        docked = np.append(same, True) & (x == self.charger[0]) & (y == self.charger[1])
-        docked &= not self.is_broken
-        rate = np.where(docked, self._gain, np.where(still, standing, driving))
-        first = max(0, int(np.searchsorted(time, since_us, side="right")) - 1)
-        begins = np.maximum(time[first:], since_us)
-        return begins, rate[first:].tolist()
+    @property
+    def _state(self) -> BatteryState:
+        return BatteryState(
+            self.level, self._since_us, *self._rates, *self.charger, is_broken=self.is_broken
+        )
+
+
+def _track(motion: Motion) -> Breakpoints:
+    """Return the track of a motion; one without breakpoints for a random walk, without a stop."""
+    return motion.breakpoints if isinstance(motion, Track) else NO_BREAKPOINTS
 
 
 MAX_CORRECTION_INTERVAL = timedelta(days=1)

@@ -40,12 +40,27 @@ class RobotLife:
     """
 
     def __init__(self, simulation: Simulation, robots: tuple[str, ...]) -> None:
-        self.simulation, self.robots = simulation, robots
+        self._follow(simulation, robots)
         self.due = simulation.run_until_asked(*robots)
+
+    def _follow(self, simulation: Simulation, robots: tuple[str, ...]) -> None:
+        self.simulation, self.robots = simulation, robots
+        actors = simulation.actors
+        self._actors = {robot: actors[robot] for robot in robots}
+        self._now: dict[str, Situation] = {}  # of the newest step at which each was asked for
+
+    def __getstate__(self) -> tuple[Simulation, tuple[str, ...], list[str]]:
+        """Leave out what belongs to the simulation, which keeps its state in its own way."""
+        return self.simulation, self.robots, self.due
+
+    def __setstate__(self, state: tuple[Simulation, tuple[str, ...], list[str]]) -> None:
+        """Continue the same life."""
+        simulation, robots, self.due = state
+        self._follow(simulation, robots)
 
     def actor(self, robot: str) -> DecidingActor:
         """Return a robot."""
-        return self.simulation.actors[robot]
+        return self._actors[robot]
 
     def policy(self, robot: str) -> Policy:
         """Return the policy of a robot."""
@@ -67,7 +82,10 @@ class RobotLife:
 
     def now(self, robot: str) -> Situation:
         """Return what a robot knows of the present step."""
-        return self.simulation.situation(robot)
+        now = self._now.get(robot)
+        if now is None or now.step != self.simulation.step:
+            now = self._now[robot] = self.simulation.situation(robot)
+        return now
 
     def is_empty(self, robot: str) -> bool:
         """Whether the battery of a robot is empty, so that it never decides again."""
@@ -83,10 +101,7 @@ class RobotLife:
 
     def copy(self) -> "RobotLife":
         """Return an independent copy."""
-        life = RobotLife.__new__(RobotLife)
-        life.simulation, life.robots = copy.deepcopy(self.simulation), self.robots
-        life.due = list(self.due)
-        return life
+        return copy.deepcopy(self)
 
 
 class RobotEnv(gymnasium.Env[F32, np.int64]):  # type: ignore[misc]

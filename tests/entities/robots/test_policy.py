@@ -231,8 +231,8 @@ def test_memory_counts_looks_by_room_hour_and_person() -> None:
     memory.take(rows)
     memory.take(rows[:0])
 
-    assert [70, NEVER, 30, 70] == memory.last[:, room].tolist()  # of anyone in the last row
-    assert [2, 1] == memory.looks[0, room, 7:9].tolist()
-    assert 1 == memory.looks[2, room, 7]
-    assert [3, 1] == memory.looks[3, room, 7:9].tolist()
-    assert [3, 0, 1, 4] == memory.total[:, room].tolist()
+    assert [70, NEVER, 30, 70] == memory.rooms.last[:, room].tolist()  # of anyone in the last row
+    assert [2, 1] == memory.rooms.looks[0, room, 7:9].tolist()
+    assert 1 == memory.rooms.looks[2, room, 7]
+    assert [3, 1] == memory.rooms.looks[3, room, 7:9].tolist()
+    assert [3, 0, 1, 4] == memory.rooms.total[:, room].tolist()

@@ -35,12 +35,24 @@ from fleet2d.entities.robots.approach import (
 from fleet2d.entities.robots.find import Sites
 from fleet2d.errors import ComponentError, InputError, PlacementError, extra
 from fleet2d.floorplan.plan import FloorPlan, Room, read_only
-from fleet2d.kernels import F32, F64, I64, SUB, TURN, UNIT, Bool, cosine, sine
+from fleet2d.kernels import (
+    F32,
+    I64,
+    TURN,
+    UNIT,
+    Bool,
+    RoomMemory,
+    ShownMemory,
+    cosine,
+    remember,
+    rooms_at,
+    show_memory,
+    sine,
+)
 from fleet2d.kernels import SightingColumn as Column
 from fleet2d.runtime.clock import (
     DAY_MINUTES,
     HOUR_S,
-    HOUR_US,
     MICROSECOND,
     Clock,
     midnight_of,
@@ -79,6 +91,9 @@ COLUMNS = (
 """The columns of an observation, in their order: see docs/gym.md."""
 _AT = {name: number for number, name in enumerate(COLUMNS)}
 
+# The rows of `ShownMemory.fresh_rows` and its like: first the visits, then the person.
+PERSON = 2
+
 TALLIED = ("relocations", "found", "gave_up", "searching_min", "overdue_h")
 """What a policy counts for rewards: see `fleet2d.gym.task.REWARDS`."""
 MAX_OVERDUE_H = 24.0
@@ -92,42 +107,33 @@ DIRECTIONS = np.array([(cosine(h), sine(h)) for h in range(0, TURN, TURN // 16)]
 SHORT_S, SEEN_S, LONG_S = 20 * 60, 30 * 60, 6 * HOUR_S
 # A way that takes this long, or longer, counts 1 [s].
 LONGEST_WAY_S = 60.0
+# The ways from so many places are kept.
+KEPT_WAYS = 256
 
 
 class SightingMemory:
     """When and where a robot perceived people: all that it remembers of its sightings.
 
     Attributes:
-        last: The last step at which it perceived each person in each room, int64 (people + 2,
-            rooms), NEVER for never; row -2 is of people whom it didn't recognize, row -1 of anyone.
-        looks: The number of such looks in each hour of the day, int64 (people + 2, rooms, 24).
-        total: The number of such looks, int64 (people + 2, rooms).
+        rooms: The sightings by person and room.
     """
 
     def __init__(self, plan: FloorPlan, people: int, clock: Clock) -> None:
         shape = people + 2, len(plan.rooms)
-        self.last = np.full(shape, NEVER, np.int64)
-        self.looks = np.zeros((*shape, HOURS), np.int64)
-        self.total = np.zeros(shape, np.int64)
+        self.rooms = RoomMemory(
+            np.full(shape, NEVER, np.int64),
+            np.zeros((*shape, HOURS), np.int64),
+            np.zeros(shape, np.int64),
+        )
         self._room_of_place = plan.room_of_place
         self._step_us = clock.step_us
         self._start_us = (clock.start - midnight_of(clock.start)) // MICROSECOND
 
     def take(self, rows: I64) -> None:
         """Add sightings, rows of `SightingColumn`."""
-        if not len(rows):
-            return
-        room = self._room_of_place[rows[:, Column.Y] // SUB, rows[:, Column.X] // SUB]
-        inside = room >= 0
-        person = rows[:, Column.IDENTITY][inside] % (len(self.last) - 1)  # -1 is row -2
-        step, room = rows[:, Column.STEP][inside], room[inside].astype(np.int64)
-        rooms, anyone = self.last.shape[1], len(self.last) - 1
-        hour = (self._start_us + step * self._step_us) // HOUR_US % HOURS
-        for row in (person, anyone):
-            at = row * rooms + room
-            np.maximum.at(self.last.reshape(-1), at, step)
-            np.add.at(self.looks.reshape(-1), at * HOURS + hour, 1)
-            np.add.at(self.total.reshape(-1), at, 1)
+        step, identity = rows[:, Column.STEP], rows[:, Column.IDENTITY]
+        room = rooms_at(self._room_of_place, rows[:, Column.X], rows[:, Column.Y])
+        remember(step, identity, room, self._start_us, self._step_us, self.rooms)
 
 
 class WaitingPoses:
@@ -137,6 +143,7 @@ class WaitingPoses:
         points: Lattice points (rooms, 2), of the rooms that it can enter.
         headings: The heading there, int64 (rooms,) [1/4096 turn].
         index: The index of each of these rooms, int64 (rooms,).
+        number: Their numbers, by index.
     """
 
     def __init__(self, actor: Actor) -> None:
@@ -146,7 +153,8 @@ class WaitingPoses:
         key = (home.walls, actor.space, actor.part, actor.entity.radius, repr(actor.entity.eyes))
         self.index, self.points, self.headings = home.cached(("standing", *key), self._choose)
         self._key = key
-        self._ways: tuple[object, F64] = None, np.zeros(0)  # from a position
+        self.number = {room: number for number, room in enumerate(self.index.tolist())}
+        self._ways: dict[object, Ways] = {}  # from the places where it was
 
     def _choose(self) -> tuple[I64, I64, I64]:
         rooms = self._actor.reachable_rooms()
@@ -172,73 +180,58 @@ class WaitingPoses:
                 best = int(place[0]), int(place[1]), facing * TURN // len(DIRECTIONS)
         return best
 
-    def seconds(self) -> F64:
-        """Return the time of the way from where the robot is to each place [s], inf for none."""
+    def ways(self, actions: int) -> "Ways":
+        """Return the ways from where the robot is to each room, for a number of actions."""
         actor = self._actor
-        at = actor.state.x, actor.state.y
-        here = at, actor.home.version, actor.space
-        if self._ways[0] != here:
-            key = ("standing ways", *self._key, actor.home.version, actor.speed, at)
-            self._ways = (
-                here,
-                actor.home.cached(
-                    key, lambda: read_only(actor.seconds(actor.space.distances(at, self.points)))
-                ),
-            )
-        return self._ways[1]
+        x, y, _, _ = actor.state
+        here = x, y, actor.home.version, actor.space, actions
+        ways = self._ways.get(here)
+        if ways is None:
+            key = ("standing ways", *self._key, actor.speed, *here)
+            ways = actor.home.cached(key, lambda: self._measure(x, y, actions))
+            if len(self._ways) >= KEPT_WAYS:
+                self._ways.clear()
+            self._ways[here] = ways
+        return ways
+
+    def _measure(self, x: int, y: int, actions: int) -> "Ways":
+        actor = self._actor
+        seconds = actor.seconds(actor.space.distances((x, y), self.points))
+        mask = np.zeros(actions, np.bool_)
+        mask[self.index] = np.isfinite(seconds)
+        mask[-1] = True
+        share = np.zeros(len(actor.home.rooms), np.float32)
+        share[self.index] = np.minimum(seconds, LONGEST_WAY_S) / LONGEST_WAY_S
+        return Ways(read_only(share), read_only(mask))
 
 
-class TravelTimes(NamedTuple):
+class Ways(NamedTuple):
     """How far the rooms are from where a robot is.
 
     Attributes:
-        seconds: How long each takes [s], float64 (places,); inf for none.
-        share: The same as a share of LONGEST_WAY_S, 1 at most.
-        mask: Which actions are possible, bool (rooms + 1,).
+        share: How long each way takes as a share of LONGEST_WAY_S, 1 at most, 0 for rooms in which
+            it can't stand, float32 (rooms,).
+        mask: Which actions are possible, bool (actions,): rooms with a way, and last to rest.
     """
 
-    seconds: F64
-    share: F64
+    share: F32
     mask: Bool
 
 
-# The first rows of `Shown.fresh_rows`: the visits, and the sightings of the person.
-VISITED = (SHORT_S, LONG_S)
-PERSON = len(VISITED)
-
-
-class Shown(NamedTuple):
-    """Which rows of a `SightingMemory` are in which columns of an observation.
-
-    Attributes:
-        fresh_rows: Rows of times, int64 (n,); the first ones are replaced by the visits.
-        fresh_at: Their columns, int64 (n,).
-        scale_s: After which time each counts half [s], float64 (n, 1).
-        habit_rows: Rows of numbers of looks, int64 (n,): of the whole day, then of this hour.
-        habit_at: Their columns, int64 (n,).
-    """
-
-    fresh_rows: I64
-    fresh_at: I64
-    scale_s: F64
-    habit_rows: I64
-    habit_at: I64
-
-    @classmethod
-    def of(cls, names: Sequence[str], user: str) -> Self:
-        """Return the rows and columns for a person, or ANYONE, among some people."""
-        person = -1 if user == ANYONE else names.index(user)
-        people = range(min(len(names), PEOPLE))
-        fresh = ["visited_20min", "visited_6h", "seen_30min", "seen_6h"]
-        fresh += [f"seen_30min_{n}" for n in people]
-        habits = ["habit", "habit_now", *(f"habit_now_{n}" for n in people)]
-        return cls(
-            np.array([person] * 4 + [*people]),
-            np.array([_AT[name] for name in fresh]),
-            np.array([[*VISITED, SEEN_S, LONG_S, *(SEEN_S for _ in people)]], np.float64).T,
-            np.array([person] * 2 + [*people]),
-            np.array([_AT[name] for name in habits]),
-        )
+def shown_memory(names: Sequence[str], user: str) -> ShownMemory:
+    """Return what observations show of the memory: about a person, or ANYONE, among some people."""
+    person = len(names) + 1 if user == ANYONE else names.index(user)
+    people = range(min(len(names), PEOPLE))
+    fresh = ["visited_20min", "visited_6h", "seen_30min", "seen_6h"]
+    fresh += [f"seen_30min_{n}" for n in people]
+    habits = ["habit", "habit_now", *(f"habit_now_{n}" for n in people)]
+    return ShownMemory(
+        np.array([-1, -1, person, person, *people]),
+        np.array([_AT[name] for name in fresh]),
+        np.array([SHORT_S, LONG_S, SEEN_S, LONG_S, *(SEEN_S for _ in people)], np.float64),
+        np.array([person, person, *people]),
+        np.array([_AT[name] for name in habits]),
+    )
 
 
 @register("behavior", "policy")
@@ -309,79 +302,64 @@ class Policy(BeliefBehavior):
         # From the beginning of the run, of rewards.
         self._tally = dict.fromkeys(TALLIED, 0.0)
         self._fixed = self._describe_home(actor)
-        self._shown = Shown.of(self.names, self.user)
-        self._from_here = TravelTimes(np.zeros(0), np.zeros(0), np.zeros(0, np.bool_))
+        self._shown = shown_memory(self.names, self.user)
 
     # What it knows
 
     def observe(self, now: Situation) -> F32:
         """Return the observation, float32 (rooms, columns): see docs/gym.md."""
-        table = self._fixed.copy()  # by columns: it is turned at the end
-        part, memory = table[:, : len(now.home.rooms)], now.actor.recall()
-        room, time, shown = now.room, now.time, self._shown
+        actor, room, time, memory = now.actor, now.room, now.time, now.actor.recall().rooms
+        table: F32 = self._fixed.copy()
+        part = table[: len(self.visited)]
+        step_s = actor.clock.step_us / 1e6
+        show_memory(memory, self._shown, self.visited, now.step, time.hour, step_s, table)
         if room is not None:
-            part[_AT["here"], room.index] = 1
-        part[_AT["way"], self.poses.index] = self._ways(now).share
-        last = memory.last[shown.fresh_rows]
-        last[: len(VISITED)] = self.visited
-        age_s = (now.step - last) * (now.actor.clock.step_us / 1e6)
-        part[shown.fresh_at] = (last >= 0) * (shown.scale_s / (shown.scale_s + age_s))
-        looks = memory.looks[shown.habit_rows, :, time.hour]
-        looks[0] = memory.total[shown.habit_rows[0]]
-        part[shown.habit_at] = looks / np.maximum(looks.sum(axis=1, keepdims=True), 1)
+            part[room.index, _AT["here"]] = 1
+        part[:, _AT["way"]] = self._ways(now).share
         for name, xy in now.in_view.items():
             seen = now.home.plan.room_at(*xy) if self.user in (ANYONE, name) else None
             if seen is not None:
-                part[_AT["in_view"], seen.index] = 1
+                part[seen.index, _AT["in_view"]] = 1
         away = 0.0
         if self.source is not None:
             belief = room_belief(now, self.source, self.user)
-            part[_AT["belief"]], away = belief.joint, belief.away
+            part[:, _AT["belief"]], away = belief.joint, belief.away
             for number, name in enumerate(self.names[:PEOPLE]):
-                part[_AT[f"belief_{number}"]] = room_belief(now, self.source, name).joint
-        newest, minute = (
-            int(last[PERSON].max()),
-            (time.hour * 60 + time.minute) * TURN // DAY_MINUTES,
-        )
-        charge, since = now.actor.charge, self.since
-        table[_AT["hour_sin"] :].T[:] = (
+                part[:, _AT[f"belief_{number}"]] = room_belief(now, self.source, name).joint
+        newest = max(memory.last[self._shown.fresh_rows[PERSON]].tolist())
+        age_s = (now.step - newest) * step_s
+        minute = (time.hour * 60 + time.minute) * TURN // DAY_MINUTES
+        charge, since = actor.charge, self.since
+        table[:, _AT["hour_sin"] :] = (
             sine(minute) / UNIT,
             cosine(minute) / UNIT,
             time.weekday() >= SATURDAY,
             away,
             1.0 if charge is None else charge.level,
-            0.0 if newest < 0 else SEEN_S / (SEEN_S + float(age_s[PERSON].min())),
+            0.0 if newest < 0 else SEEN_S / (SEEN_S + age_s),
             0.0 if since is None else min((time - since) / self.deadline, 1.0),
         )
-        return np.ascontiguousarray(table.T)
+        return table
 
     def mask(self, now: Situation) -> Bool:
         """Return which actions are possible, bool (rooms + 1,): rooms with a way, and to rest."""
         return self._ways(now).mask
 
-    def _ways(self, now: Situation) -> "TravelTimes":
-        """Return the travel times from where the robot is."""
-        seconds = self.poses.seconds()
-        if self._from_here.seconds is not seconds:  # as long as it stays, it is the same array
-            mask = np.zeros(self.rooms + 1, np.bool_)
-            mask[self.poses.index] = np.isfinite(seconds)
-            mask[-1] = True
-            share = np.minimum(seconds, LONGEST_WAY_S) / LONGEST_WAY_S
-            self._from_here = TravelTimes(seconds, share, read_only(mask))
-        return self._from_here
+    def _ways(self, now: Situation) -> Ways:
+        return self.poses.ways(self.rooms + 1)
 
     def _describe_home(self, actor: Actor) -> F32:
-        """Return what never changes in observations, by columns: float32 (columns, rooms)."""
-        table = np.zeros((len(COLUMNS), self.rooms), np.float32)
+        """Return what never changes in observations, float32 (rooms, columns)."""
+        table = np.zeros((self.rooms, len(COLUMNS)), np.float32)
         cells = sum(room.cells for room in actor.home.rooms)
         types = {kind: name for name, kinds in KINDS.items() for kind in kinds}
         for room in actor.home.rooms:
-            row = table[:, room.index]
+            row = table[room.index]
             row[_AT["room"]], row[_AT["area"]] = 1, room.cells / cells
             if self.source is None:
                 row[_AT["belief"]] = row[_AT["area"]]
             row[_AT[f"is_{types.get(room.type, 'other')}"]] = 1
-        table[_AT["reachable"], self.poses.index] = 1
+        table[self.poses.index, _AT["reachable"]] = 1
         return table
 
     def tally(self, now: Situation) -> dict[str, float]:
@@ -487,7 +465,7 @@ class Policy(BeliefBehavior):
 
     def _go(self, now: Situation, plan: Plan, room: int) -> Plan:
         """Go to a room, and wait or look round there."""
-        name, number = now.home.rooms[room].name, int(np.flatnonzero(self.poses.index == room)[0])
+        name, number = now.home.rooms[room].name, self.poses.number[room]
         begun, step_s = max(self.visited[room], 0), now.actor.clock.step_us / 1e6
         overdue_h = min((now.step - begun) * step_s / HOUR_S, MAX_OVERDUE_H)
         self.visited[room] = now.step

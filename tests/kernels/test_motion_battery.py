@@ -1,0 +1,77 @@
+"""The charge of a battery along tracks: the core against plain Python, rate by rate."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from tests.reference import battery as slow
+
+from fleet2d.kernels import (
+    BatteryState,
+    Breakpoints,
+    charge_at,
+    charge_falls_to,
+    charge_pieces,
+)
+
+MINUTE = 60_000_000
+DRIVING, STANDING, CHARGING = -1 / (60 * MINUTE), -1 / (300 * MINUTE), 1 / (90 * MINUTE)
+rows = st.tuples(st.integers(0, 30), st.integers(0, 1), st.integers(0, 1), st.integers(0, 1))
+tracks = st.lists(rows, max_size=9)
+charges = st.floats(0, 1)
+
+
+def track_of(legs: list[tuple[int, int, int, int]]) -> Breakpoints:
+    """Return a track of places and headings, each so many minutes after the last one."""
+    minutes, x, y, heading = np.array(legs, np.int64).reshape(-1, 4).T.copy()
+    time = np.cumsum(minutes) * MINUTE
+    return Breakpoints(time - time[:1].sum(), x, y, heading, np.zeros(len(x), np.uint8))
+
+
+def battery(level: float, since: int = 0, *, is_broken: bool = False) -> BatteryState:
+    """Return a battery whose charger is at (0, 0)."""
+    return BatteryState(level, since, DRIVING, STANDING, CHARGING, 0, 0, is_broken=is_broken)
+
+
+@given(tracks, charges, st.integers(0, 90), st.integers(0, 300), charges, st.booleans())
+def test_charge_along_a_track_equals_the_slow_twin(
+    legs: list, level: float, since: int, wait: int, target: float, is_broken: bool
+) -> None:
+    track, state = track_of(legs), battery(level, since * MINUTE, is_broken=is_broken)
+    moment = (since + wait) * MINUTE
+
+    assert slow.levels_of(track, state) == list(
+        zip(*(column.tolist() for column in charge_pieces(track, state)), strict=True)
+    )
+    assert slow.charge_at(track, state, moment) == charge_at(track, state, moment)
+    assert slow.falls_to(track, state, target) == charge_falls_to(track, state, target)
+
+
+def test_charge_is_at_the_level_when_it_has_fallen_to_it_and_above_a_microsecond_before() -> None:
+    track, state = track_of([(0, 5, 5, 0), (10, 9, 5, 0)]), battery(0.5)
+    moment = charge_falls_to(track, state, 0.25)
+
+    assert moment is not None
+    assert charge_at(track, state, moment) <= 0.25 < charge_at(track, state, moment - 2)
+
+
+def test_charge_rises_to_full_only_at_a_charger_that_works() -> None:
+    track = track_of([(0, 0, 0, 0)])
+    levels = [charge_at(track, battery(0.5, is_broken=b), 600 * MINUTE) for b in (False, True)]
+
+    assert [1.0, 0.0] == levels
+    assert charge_falls_to(track, battery(0.5), 0.4) is None
+
+
+@pytest.mark.parametrize(
+    "state",
+    [
+        battery(1.5),
+        battery(float("nan")),
+        battery(0.5)._replace(driving=0.0),
+        battery(0.5)._replace(charging=float("nan")),
+    ],
+)
+def test_impossible_battery_is_refused(state: BatteryState) -> None:
+    with pytest.raises(ValueError, match="must be"):
+        charge_at(track_of([(0, 0, 0, 0)]), state, 0)

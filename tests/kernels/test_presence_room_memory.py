@@ -1,0 +1,61 @@
+"""What a robot remembers of people in rooms: the core against plain Python."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from tests.reference import room_memory as slow
+
+from fleet2d.kernels import RoomMemory, ShownMemory, remember, show_memory
+
+PEOPLE, ROOMS, COLUMNS, START_S = 2, 3, 8, 5 * 3600
+SECOND = 1_000_000
+sightings = st.lists(
+    st.tuples(st.integers(0, 200_000), st.integers(-1, PEOPLE - 1), st.integers(-1, ROOMS - 1)),
+    max_size=30,
+)
+
+
+def empty() -> RoomMemory:
+    """Return a memory without sightings."""
+    shape = PEOPLE + 2, ROOMS
+    return RoomMemory(
+        np.full(shape, -1), np.zeros((*shape, 24), np.int64), np.zeros(shape, np.int64)
+    )
+
+
+def remembered(seen: list[slow.Sighting]) -> RoomMemory:
+    """Return a memory of sightings."""
+    memory, rows = empty(), np.array(seen, np.int64).reshape(-1, 3)
+    step, identity, room = rows.T.copy()
+    remember(step, identity, room.astype(np.int16), START_S * SECOND, SECOND, memory)
+    return memory
+
+
+@given(sightings)
+def test_memory_of_sightings_equals_the_slow_twin(seen: list) -> None:
+    expected = slow.memory_of(seen, PEOPLE, ROOMS, START_S)
+    assert expected == tuple(part.tolist() for part in remembered(seen))
+
+
+@given(sightings, st.lists(st.integers(-1, 300_000), min_size=ROOMS, max_size=ROOMS))
+def test_observation_of_a_memory_equals_the_slow_twin(seen: list, visited: list) -> None:
+    memory = remembered(seen)
+    columns = ShownMemory(
+        np.array([-1, 0, PEOPLE, PEOPLE + 1]),
+        np.array([0, 3, 4, 5]),
+        np.array([60.0, 1800.0, 7.0, 1e6]),
+        np.array([PEOPLE + 1, 0]),
+        np.array([1, 7]),
+    )
+    table = np.full((ROOMS + 1, COLUMNS), 7, np.float32)
+    expected = slow.shown(memory, columns, visited, 300_000, 9, table)
+    show_memory(memory, columns, np.array(visited), 300_000, 9, 1.0, table)
+
+    assert expected.tobytes() == table.tobytes()
+
+
+@pytest.mark.parametrize(("identity", "room"), [(PEOPLE, 0), (-2, 0), (0, ROOMS)])
+def test_sighting_of_nobody_or_nowhere_is_refused(identity: int, room: int) -> None:
+    with pytest.raises(ValueError, match="there is no such"):
+        remembered([(0, identity, room)])
