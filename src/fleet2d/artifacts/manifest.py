@@ -12,6 +12,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from datetime import datetime, timedelta
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, NoReturn
 
@@ -130,8 +131,11 @@ def versions() -> dict[str, str]:
 def _version(package: str) -> str:
     # Searching the installed packages takes longer than simulating a day.
     version = getattr(sys.modules.get(package), "__version__", None)
-    if isinstance(version, str):
-        return version
+    return version if isinstance(version, str) else _installed_version(package)
+
+
+@cache
+def _installed_version(package: str) -> str:
     from importlib import metadata
 
     try:

@@ -104,9 +104,10 @@ class Conversations(Watcher):
         for name, interaction in basis.scenario.interactions.items():
             by = interaction.by or next(iter(basis.scenario.robots))
             wanted.setdefault(rows[by], {})[name] = interaction
-        people = [basis.scenario.users[actor.name].answers or Answers() for actor in basis.users]
-        if any(answers.initiative != Initiative() for answers in people):
+        declared = [basis.scenario.users[actor.name].answers for actor in basis.users]
+        if any(answers and answers.initiative != Initiative() for answers in declared):
             wanted |= {row: wanted.get(row, {}) for row in range(users, len(basis.actors))}
+        people = [answers or Answers() for answers in declared] if wanted else []
         for row, interactions in wanted.items():
             queue = RequestQueue(interactions, clock.start)
             conversations.queues[row] = basis.actors[row].requests = queue

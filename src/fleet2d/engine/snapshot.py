@@ -39,6 +39,7 @@ from fleet2d.configuration.trust import (
 )
 from fleet2d.engine.basis import components_of
 from fleet2d.engine.state import State
+from fleet2d.engine.trajectories import KeySegment
 from fleet2d.entities.body import RandomWalk, Track
 from fleet2d.entities.plan import Note
 from fleet2d.errors import ArtifactError
@@ -146,8 +147,8 @@ REDUCERS = _reducers()
 # need their modules.
 _SHARED = frozenset(
     {
-        *(Column, ColumnChunk, CostedSpace, Event, FloorPlan, FunctionType, Mesh, Note, Persona),
-        *(PlacedObject, Polygon, RandomWalk, Room, Space, TableSpec, Track, UsePlace),
+        *(Column, ColumnChunk, CostedSpace, Event, FloorPlan, FunctionType, KeySegment, Mesh, Note),
+        *(Persona, PlacedObject, Polygon, RandomWalk, Room, Space, TableSpec, Track, UsePlace),
         *(datetime, timedelta, *_DTYPES),
     }
 )

@@ -3,7 +3,7 @@
 From key frames, which are few, all poses of a run can be rebuilt.
 """
 
-from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from fleet2d.artifacts.store import ArtifactSettings
 from fleet2d.artifacts.table import PLANNED, TRACK, WALK, Column, TableSpec
 from fleet2d.configuration.units import whole_steps
 from fleet2d.engine.basis import Basis
-from fleet2d.entities.body import Bodies, Track
+from fleet2d.entities.body import Bodies, Pose, Track
 from fleet2d.kernels import I64, SUB, Breakpoints, in_radians
 from fleet2d.runtime.clock import HOUR_US, Clock
 
@@ -127,6 +127,26 @@ def _steps_between(settings: ArtifactSettings, clock: Clock) -> int:
 WALK_KEY_US = HOUR_US
 
 
+class KeySegment(NamedTuple):
+    """Breakpoints `begin` to `end` - 1 of a track, which are key frames of a body.
+
+    Attributes:
+        track: The track.
+        begin: The number of the first one.
+        end: The number after the last one.
+        row: The row of the body.
+        kind: The kind of the key frames.
+        step: The step at which they take effect; -1: that of their time.
+    """
+
+    track: Breakpoints
+    begin: int
+    end: int
+    row: int
+    kind: int
+    step: int = -1
+
+
 class KeyFrames:
     """Collects the key frames of a run."""
 
@@ -148,14 +168,14 @@ class KeyFrames:
         self._walkers: set[int] = set()  # bodies whose present plan is a random walk
         self._walked = [1] * count  # the step before which it is collected
         self._moved: set[int] = set()  # bodies that were put elsewhere since their last plan
-        self._blocks: list[I64] = []
+        self._segments: list[KeySegment] = []
         self._rows = 0
         self._end = 0  # key frames before this step are collected when they are stored
 
     @property
     def count(self) -> int:
-        """Number of rows that are not stored yet, about; many small blocks take more memory."""
-        return self._rows + 8 * len(self._blocks)
+        """Number of rows that are not stored yet, about; many small segments take more memory."""
+        return self._rows + 8 * len(self._segments)
 
     def end_plan(self, row: int, step: int) -> None:
         """Collect the end of the plan that is replaced at `step`."""
@@ -183,7 +203,7 @@ class KeyFrames:
             self._walkers.discard(row)
         else:
             self._walkers.add(row)
-            self._blocks.append(_key(step, row, self._walk_kind, moment, actor.state))
+            self._segments.append(_key(row, self._walk_kind, moment, actor.state))
         self.pass_by(row, step)
 
     def move_body(self, row: int, step: int) -> None:
@@ -195,7 +215,7 @@ class KeyFrames:
         actor = self._actors[row]
         if self._walk_kind == WALK and not isinstance(actor.motion, Track):
             self._walk_on(row, step)
-            self._blocks.append(_key(step, row, WALK, step * self._clock.step_us, actor.state))
+            self._segments.append(_key(row, WALK, step * self._clock.step_us, actor.state))
 
     def pass_by(self, row: int, step: int) -> None:
         """Collect the breakpoints of the present plan that are reached up to a step."""
@@ -206,7 +226,7 @@ class KeyFrames:
         begin = self._emitted[row]
         if begin < len(track.time) and track.time[begin] <= moment:
             end = int(track.time.searchsorted(moment, side="right"))
-            self._blocks.append(_keys(track, begin, end, row, TRACK, self._clock.step_us))
+            self._segments.append(KeySegment(track, begin, end, row, TRACK))
             self._rows += end - begin
             self._emitted[row] = end
 
@@ -216,11 +236,8 @@ class KeyFrames:
         if isinstance(motion, Track):
             begin = self._emitted[row]
             if begin < len(motion.breakpoints.time):
-                planned = _keys(
-                    motion.breakpoints, begin, begin + 1, row, PLANNED, self._clock.step_us
-                )
-                planned[:, 0] = step
-                self._blocks.append(planned)
+                track = motion.breakpoints
+                self._segments.append(KeySegment(track, begin, begin + 1, row, PLANNED, step))
 
     def take(self, end: int) -> None:
         """Collect random walks up to step `end` - 1; `collect` the other key frames later.
@@ -243,40 +260,39 @@ class KeyFrames:
         every, first = self._walk_every, self._walked[row]
         for step in range(-(-first // every) * every, end, every):
             moment = step * self._clock.step_us
-            key = _key(step, row, self._walk_kind, moment, self._bodies.pose_at(row, step))
-            self._blocks.append(key)
+            pose = self._bodies.pose_at(row, step)
+            self._segments.append(_key(row, self._walk_kind, moment, pose))
         self._walked[row] = max(first, end)
 
     def store(self) -> None:
         """Append all key frames so far to the store."""
         self.collect()
-        if not self._blocks:
+        if not self._segments:
             return
-        rows = in_order(self._blocks)
-        self._blocks, self._rows = [], 0
-        xy = self._home.plan.lattice.to_metres(rows[:, 4:6])
+        segments, self._segments, self._rows = self._segments, [], 0
+        parts = [[column[s.begin : s.end] for column in s.track] for s in segments]
+        time, x, y, heading, away = (np.concatenate(column) for column in zip(*parts, strict=True))
+        numbers = np.array([(s.row, s.kind, s.step) for s in segments], np.int64)
+        counts = [s.end - s.begin for s in segments]
+        entity, kind, step = np.repeat(numbers, counts, axis=0).T
+        step = np.where(step < 0, -(-time // self._clock.step_us), step)
+        order = np.lexsort((entity, step))
+        xy = self._home.plan.lattice.to_metres(np.stack([x, y], axis=1)[order])
         self._store.append(
             "key_frames",
-            step=rows[:, 0],
-            time=self._clock.moments(rows[:, 3]),
-            entity=rows[:, 1].astype(np.int32),
-            kind=rows[:, 2].astype(np.int32),
+            step=step[order],
+            time=self._clock.moments(time[order]),
+            entity=entity[order].astype(np.int32),
+            kind=kind[order].astype(np.int32),
             x=xy[:, 0],
             y=xy[:, 1],
-            heading=in_radians(rows[:, 6]),
-            away=rows[:, 7].astype(bool),
+            heading=in_radians(heading[order]),
+            away=away[order].astype(bool),
         )
 
 
-def _key(step: int, row: int, kind: int, time_us: int, state: Sequence[int]) -> I64:
-    return np.array([[step, row, kind, time_us, *state]], np.int64)
-
-
-def _keys(track: Breakpoints, begin: int, end: int, row: int, kind: int, step_us: int) -> I64:
-    keys = np.empty((end - begin, 8), np.int64)
-    time = track.time[begin:end]
-    keys[:, 0] = -(-time // step_us)
-    keys[:, 1], keys[:, 2], keys[:, 3] = row, kind, time
-    keys[:, 4], keys[:, 5] = track.x[begin:end], track.y[begin:end]
-    keys[:, 6], keys[:, 7] = track.heading[begin:end], track.away[begin:end]
-    return keys
+def _key(row: int, kind: int, time_us: int, pose: Pose) -> KeySegment:
+    """Return the key frame of a random walk at a pose."""
+    moment, x, y, heading = (np.array([number], np.int64) for number in (time_us, *pose[:3]))
+    away = np.array([pose.away], np.uint8)
+    return KeySegment(Breakpoints(moment, x, y, heading, away), 0, 1, row, kind)

@@ -392,15 +392,18 @@ class Plan:
     @property
     def over_at(self) -> int | None:
         """The step at which it is over, after the one at which it begins; None: never."""
-        ends = [] if self.endless else [self.time_us]
-        ends += [] if self.asks_us is None else [self.asks_us]
+        end_us, asks_us = None if self.endless else self.time_us, self.asks_us
+        if asks_us is not None and (end_us is None or asks_us < end_us):
+            end_us = asks_us
+        if end_us is None:
+            return None
         # Else a behavior would be asked forever at one step for plans that take no time.
-        clock, least = self._body.clock, self.began[0] + 1
-        return max(clock.step_at_or_after(min(ends)), least) if ends else None
+        return max(self._body.clock.step_at_or_after(end_us), self.began[0] + 1)
 
     def is_over(self, step: int) -> bool:
         """Return whether it is over at a step."""
-        return self.over_at is not None and self.over_at <= step
+        end = self.over_at
+        return end is not None and end <= step
 
     def finish(self) -> Motion:
         """Return the motion of the plan."""

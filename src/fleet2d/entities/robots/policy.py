@@ -171,12 +171,15 @@ class WaitingPoses:
         limit, best, most = cosine(self._half_angle) / UNIT, (*actor.middle(room), 0), 0
         for place in stands:
             gaps = (goals[visible_from(actor, place, goals)] - place).astype(np.float64)
-            lengths = np.sqrt((gaps * gaps).sum(axis=1)) * limit
-            ahead = gaps[:, 0] * DIRECTIONS[:, :1] + gaps[:, 1] * DIRECTIONS[:, 1:]
-            shown = (ahead >= lengths).sum(axis=1)
-            facing = int(np.argmax(shown))
-            if shown[facing] > most:
-                most = int(shown[facing])
+            if len(gaps) <= most:
+                continue
+            x, y = gaps.T
+            ahead = x * DIRECTIONS[:, :1] + y * DIRECTIONS[:, 1:]
+            is_shown = ahead >= np.sqrt(x * x + y * y) * limit
+            shown = [np.count_nonzero(row) for row in is_shown]
+            if max(shown) > most:
+                most = max(shown)
+                facing = shown.index(most)
                 best = int(place[0]), int(place[1]), facing * TURN // len(DIRECTIONS)
         return best
 
