@@ -1,13 +1,15 @@
 """Compare policies with the bundled behaviors, in homes and with people that they have never seen.
 
     pip install "fleet2d[gym,onnx]"
-    python examples/agents/evaluate.py hangout hangout.onnx [HOMES]
+    python examples/agents/evaluate.py hangout [hangout.onnx] [--homes 30] [--search]
 
 Each life is lived by everyone: the same home, person and days, so differences are paired. Printed
-are means a day, and the difference to the first behavior with its 95 % interval.
+are means a day, and the difference to the first behavior with its 95 % interval. `--search` adds
+bounds: a robot that tries every action in a branch of its life, and for `find` one that always
+chooses the order of rooms that is optimal by its belief, or knows in which room the person is.
 """
 
-import sys
+import argparse
 from collections.abc import Callable
 from typing import Any
 
@@ -44,7 +46,11 @@ BUNDLED: dict[str, dict[str, Any]] = {
         },
     },
 }
+BOUNDS = {
+    "find": {"find, ltp, exact": BUNDLED["find"]["find, ltp"] | {"policy": "exact"}},
+}
 DAYS = 7
+Choice = Callable[[Any, Any, RobotEnv], int]
 
 
 def bundled(task: str, behavior: dict[str, Any], values: dict[str, Any], seed: int) -> list[float]:
@@ -59,7 +65,7 @@ def bundled(task: str, behavior: dict[str, Any], values: dict[str, Any], seed: i
     return terms(task, seen_s, events.to_pylist())
 
 
-def lived(task: str, choose: Callable[[Any, Any, RobotEnv], int], **settings: Any) -> list[float]:
+def lived(task: str, choose: Choice, **settings: Any) -> list[float]:
     """Return what a policy makes of a life."""
     env = RobotEnv(task)
     observation, info = env.reset(options=settings)
@@ -95,13 +101,21 @@ def look_ahead(_: Any, mask: Any, env: RobotEnv) -> int:
     return max(futures, key=lambda action: futures[action])
 
 
+def in_true_room(_: Any, mask: Any, env: RobotEnv) -> int:
+    """Choose the room in which the person is, to which no robot has access; else rest."""
+    simulation = env.present.simulation
+    people = (simulation.state[name] for name in simulation.scenario.users)
+    rooms = [simulation.home.plan.room(p["room"]).index for p in people if p["room"] is not None]
+    return next((room for room in rooms if mask[room]), len(mask) - 1)
+
+
 def last_seen(observation: Any, mask: Any, _: RobotEnv) -> int:
     """Choose the room in which somebody was seen last, with the same actions as what is learned."""
     scores = np.append(observation[:, COLUMNS.index("seen_6h")], 0.0)
     return int(np.argmax(np.where(mask, scores, -np.inf)))
 
 
-def learned(path: str) -> Callable[[Any, Any, RobotEnv], int]:
+def learned(path: str) -> Choice:
     """Return the policy of an ONNX file."""
     import onnxruntime
 
@@ -116,20 +130,29 @@ def learned(path: str) -> Callable[[Any, Any, RobotEnv], int]:
 
 def main() -> None:
     """Let everyone live in every home; print a row for each."""
-    task, path = sys.argv[1:3]
-    homes = int(sys.argv[3]) if len(sys.argv) > 3 else 30
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("task", choices=list(BUNDLED))
+    parser.add_argument("file", nargs="?", help="the learned policy; none: the others only")
+    parser.add_argument("--homes", type=int, default=30)
+    parser.add_argument("--search", action="store_true", help="bounds, too: slow")
+    arguments = parser.parse_args()
+    task, homes = arguments.task, arguments.homes
+    behaviors = BUNDLED[task] | (BOUNDS.get(task, {}) if arguments.search else {})
+    policies: dict[str, Choice] = {"last seen": last_seen}
+    if arguments.file:
+        policies["learned"] = learned(arguments.file)
+    if arguments.search:
+        policies |= (
+            {"knows the room": in_true_room} if task == "find" else {"looks ahead": look_ahead}
+        )
     random, rows = np.random.default_rng(0), dict[str, list[list[float]]]()
     for home in range(homes):
         values = load_task(task).draw(random, "test") | {"floorplan.seed": 1000 + home}
         seed = int(random.integers(2**53))
-        for name, behavior in BUNDLED[task].items():
+        for name, behavior in behaviors.items():
             rows.setdefault(name, []).append(bundled(task, behavior, values, seed))
-        rows.setdefault("last seen", []).append(lived(task, last_seen, values=values, seed=seed))
-        rows.setdefault("learned", []).append(lived(task, learned(path), values=values, seed=seed))
-        if "--search" in sys.argv:
-            rows.setdefault("look ahead", []).append(
-                lived(task, look_ahead, values=values, seed=seed)
-            )
+        for name, choose in policies.items():
+            rows.setdefault(name, []).append(lived(task, choose, values=values, seed=seed))
     first = np.array(next(iter(rows.values())))
     for name, values_of in rows.items():
         results = np.array(values_of)
