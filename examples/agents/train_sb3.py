@@ -17,7 +17,7 @@ from sb3_contrib.common.maskable.policies import MaskableActorCriticPolicy
 from stable_baselines3.common.vec_env import DummyVecEnv
 from torch import Tensor, nn
 
-from fleet2d.gym import DiscountByTime, RobotEnv
+from fleet2d.gym import RobotEnv
 
 LIVES, HORIZON = 8, 256
 
@@ -38,9 +38,9 @@ class Scores(nn.Module):
 def train(task: str, decisions: int, seed: int = 0, **settings: Any) -> MaskablePPO:
     """Return a model after some decisions; see MaskablePPO for its settings."""
     torch.set_num_threads(1)
-    lives = DummyVecEnv([lambda: DiscountByTime(RobotEnv(task), "1 d") for _ in range(LIVES)])
-    options = {"n_steps": HORIZON, "batch_size": 256, "gamma": 0.99, "device": "cpu"} | settings
-    model = MaskablePPO("MlpPolicy", lives, seed=seed, verbose=1, **options)
+    lives = DummyVecEnv([lambda: RobotEnv(task) for _ in range(LIVES)])
+    options = {"n_steps": HORIZON, "batch_size": 256, "device": "cpu", "verbose": 1} | settings
+    model = MaskablePPO("MlpPolicy", lives, seed=seed, **options)
     return model.learn(decisions)
 
 

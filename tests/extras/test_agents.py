@@ -5,7 +5,10 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+
+from fleet2d.entities.robots.policy import Policy
 
 torch = pytest.importorskip("torch", reason="needs torch")
 for name in ("gymnasium", "onnxruntime"):
@@ -31,11 +34,56 @@ def test_trained_policy_is_compared_with_the_bundled_behavior(
     monkeypatch.setitem(
         evaluate["main"].__globals__, "BUNDLED", {"hangout": {"hangout": {"type": "hangout"}}}
     )
-    monkeypatch.setattr(sys, "argv", ["evaluate.py", "hangout", str(path), "1"])
+    monkeypatch.setattr(sys, "argv", ["evaluate.py", "hangout", str(path), "--homes", "1"])
     evaluate["main"]()
 
     lines = capsys.readouterr().out.splitlines()
     assert ["hangout", "last", "learned"] == [line.split()[0] for line in lines]
+
+
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")
+def test_model_of_stable_baselines_becomes_the_policy_of_a_robot(tmp_path: Path) -> None:
+    pytest.importorskip("sb3_contrib", reason="needs sb3-contrib")
+    train, path = script("train_sb3"), tmp_path / "hangout.onnx"
+    for function in ("train", "export"):
+        train[function].__globals__["LIVES"] = 1
+    model = train["train"]("hangout", 8, n_steps=8, batch_size=8, n_epochs=1, verbose=0)
+    train["export"](model, path)
+    behavior = Policy(file=path)
+    observation = model.observation_space.sample()
+    mask = np.ones(17, np.bool_)
+    expected, _ = model.predict(observation, deterministic=True)
+
+    assert int(expected) == behavior.act(observation, mask)
+
+
+def test_search_knows_at_least_as_much_as_who_looks_without_a_map_of_habits(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A robot that knows the room finds the person in less time than the bundled behavior."""
+    evaluate = script("evaluate")
+    monkeypatch.setitem(evaluate["main"].__globals__, "BUNDLED", {"find": {}})
+    argv = ["evaluate.py", "find", "--homes", "1", "--search"]
+    monkeypatch.setattr(sys, "argv", argv)
+    evaluate["main"]()
+    lines = capsys.readouterr().out.splitlines()
+    rewards = {line[:20].strip(): float(line[20:].split(",")[0]) for line in lines}
+
+    assert rewards["knows the room"] == max(rewards.values())
+    assert rewards["find, ltp, exact"] > rewards["last seen"]
+
+
+def test_written_policy_is_the_behavior_of_a_robot(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pytest.importorskip("onnx", reason="needs onnx")
+    path = tmp_path / "small.onnx"
+    monkeypatch.setattr(sys, "argv", ["last_seen.py", str(path)])
+    script("last_seen")["main"]()
+    lines = capsys.readouterr().out.splitlines()
+
+    assert ["hangout", "small.onnx"] == [line.split()[0] for line in lines]
+    assert int(lines[1].split()[-2]) > 1
 
 
 def test_learning_improves_a_policy_in_a_home() -> None:
