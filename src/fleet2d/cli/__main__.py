@@ -23,14 +23,14 @@ COMMANDS = {
     "components": "scenarios",
     "convert": "scenarios",
     "export": "show",
-    "reproduce": "stored",
+    "reproduce": "run",
     "resume": "run",
     "run": "run",
     "schema": "scenarios",
     "show": "show",
     "test": "test",
     "validate": "scenarios",
-    "verify": "stored",
+    "verify": "run",
 }
 """The module of each command of this package."""
 

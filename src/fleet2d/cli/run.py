@@ -1,4 +1,4 @@
-"""`fleet2d run` and `resume`: simulate a scenario; its progress, its messages and its summary."""
+"""`fleet2d run`, `resume`, `reproduce`, `verify`: simulate, repeat, and check what is stored."""
 
 import gc
 import json
@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 
 FIRST_S = 30.0
 """Time after which a running component is named [s]; the next message comes after twice as long."""
+
+SEPARATOR = " · "
 
 
 @contextmanager
@@ -109,8 +111,6 @@ def _run_with_bar(simulation: "Simulation", *, show: bool) -> "Run":
 
         return simulation.run(update)
 
-
-SEPARATOR = " · "
 
 _LOADED = time.perf_counter()
 
@@ -324,3 +324,40 @@ def resume(
             typer.echo(note, err=True)
         run = run_with_progress(simulation, show=sys.stderr.isatty() and not quiet)
     print_results(run, as_json=as_json, quiet=quiet)
+
+
+def reproduce(
+    directory: Annotated[Path, typer.Argument(metavar="RUN_DIR", help="A stored run.")],
+    trust: TrustFiles = None,
+    trust_dir: TrustFolders = None,
+) -> None:
+    """Run a stored run again from its manifest, and compare."""
+    from fleet2d.engine.repeat import reproduce_trusting
+
+    result = reproduce_trusting(directory, trust_of(trust, trust_dir))
+    for cause in result.causes:
+        typer.echo(f"note: {cause}")
+    typer.echo(f"not compared: {', '.join(result.not_compared)}")
+    if result.same:
+        typer.echo(f"reproduced: digest {result.digest}")
+        return
+    typer.echo(f"not reproduced: {', '.join(result.differing)} differ", err=True)
+    raise typer.Exit(1)
+
+
+def verify(
+    directory: Annotated[Path, typer.Argument(metavar="RUN_DIR", help="A stored run.")],
+) -> None:
+    """Check that the files of a stored run are unchanged, without running anything."""
+    from fleet2d.artifacts.seal import verify_run
+
+    result = verify_run(directory)
+    for note in result.notes:
+        typer.echo(f"note: {note}")
+    for name in result.foreign:
+        typer.echo(f"note: {name} is not part of the run")
+    for name, difference in result.differing.items():
+        typer.echo(f"{name} {difference}", err=True)
+    if result.differing:
+        raise typer.Exit(1)
+    typer.echo(f"verified: {f'seal {result.digest}' if result.digest else 'the tables'}")
