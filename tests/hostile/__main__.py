@@ -17,7 +17,7 @@ HERE = Path(__file__).parent
 
 def count(file: Path, report: Path) -> tuple[int, int]:
     """Run the attacks of a file; return how many were tried, and how many test cases failed."""
-    options = ["-q", "-p", "no:cacheprovider", f"--junitxml={report}"]
+    options = ["-q", "-m", "", "-p", "no:cacheprovider", f"--junitxml={report}"]  # slow ones, too
     subprocess.run(
         [sys.executable, "-m", "pytest", *options, str(file)],
         cwd=HERE.parents[1],

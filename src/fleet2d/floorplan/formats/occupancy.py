@@ -167,8 +167,11 @@ def refuse_object(raw: OccupancyMap, free: Polygon) -> None:
     """Raise FloorPlanError if a home is far smaller than what is drawn around it."""
     if free.area >= OBJECT_M2 or not raw.occupied.any():
         return
-    rows, columns = np.nonzero(raw.occupied)
-    drawn = shapely.MultiPoint(np.stack([columns, rows], axis=1)).convex_hull
+    rows = np.flatnonzero(raw.occupied.any(axis=1))
+    first = raw.occupied[rows].argmax(axis=1)
+    last = raw.occupied.shape[1] - 1 - raw.occupied[rows, ::-1].argmax(axis=1)
+    ends = np.concatenate([np.stack([first, rows], axis=1), np.stack([last, rows], axis=1)])
+    drawn = shapely.MultiPoint(ends).convex_hull  # of the first and last pixel of each row
     drawn_m2 = drawn.area * raw.pixel**2
     if free.area < OBJECT_SHARE * drawn_m2:
         x, y = shapely.get_coordinates(free.representative_point())[0].tolist()
