@@ -214,10 +214,14 @@ def _marks() -> list[tuple[str, tuple[str, str | None]]]:
 
 def _load_image(path: Path, resolution: float | None, cell: float | None) -> FloorPlan:
     if resolution is None:
+        from fleet2d.floorplan.formats.drawing import guess_resolution
+
+        guess = guess_resolution(path)
+        by_doors = "" if guess is None else f": {guess[0]:g}, if its {guess[1]} doors are as usual"
         raise FloorPlanError(
             f"{path} is an image, without its scale: name the YAML file that goes with the map of a"
             f" robot, such as {path.with_suffix('.yaml').name}; of a drawing, give the metres per"
-            " pixel as resolution"
+            f" pixel as resolution{by_doors}"
         )
     return _load_by("image", path=path, resolution=resolution, cell=cell)
 

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,13 @@ from pydantic import Field, TypeAdapter
 from fleet2d.configuration.components import register
 from fleet2d.configuration.units import InputPath, Length, PositiveLength, Share
 from fleet2d.errors import FloorPlanError
-from fleet2d.floorplan.formats.cleaning import OccupancyMap
+from fleet2d.floorplan.formats.cleaning import USUAL_DOOR_M, OccupancyMap
+from fleet2d.floorplan.formats.drawn_walls import (
+    LINE_M,
+    find_gaps,
+    told_apart,
+    wall_candidates,
+)
 from fleet2d.floorplan.formats.files import in_file
 from fleet2d.floorplan.formats.occupancy import OBJECT_M2, PictureSource
 from fleet2d.floorplan.formats.raster import GreyPicture, read_grey
@@ -22,6 +29,13 @@ from fleet2d.kernels import Bool, label_parts, squared_distance
 GAPS = (0.1, 0.2, 0.3, 0.45, 0.6, 0.9, 1.2)
 # Share of the floor that closing gaps must keep.
 MOST = 0.8
+# Sides of a pixel that are tried to find doors [m], the fewest doors that tell the scale, and how
+# near to a side that was tried it is.
+TRIED_M, FEWEST_DOORS, LIKELY_FACTOR = (0.0075, 0.011, 0.016, 0.024, 0.036, 0.005), 3, 1.25
+# Share of what is dark that is lines if there are any, and of the enclosed space that is the home.
+LINES_SHARE, WHOLE = 0.02, 0.6
+# Pixels across the widest line, at least, for lines to be told from walls.
+LINE_PIXELS = 2.3
 
 
 @register("floorplan", "image")
@@ -32,6 +46,8 @@ class Image(PictureSource):
         path: The picture, PNG, JPEG or PGM.
         resolution: Side of a pixel, as a drawing has no scale.
         threshold: Share of white below which a pixel is wall.
+        line_width: What is drawn thinner than this, such as text, dimensions, doors and furniture,
+            is no wall, if thicker walls enclose the home; 0: all that is dark is wall.
         bridge_pixels: Width of the widest gap between two parts of the home that opens; 0 opens
             none, as furniture is drawn with thin lines, too.
         close_gaps: Width of the widest gap in outer walls that is closed, if the home would lose
@@ -41,6 +57,7 @@ class Image(PictureSource):
     path: InputPath
     resolution: PositiveLength = Field(le=MAX_CELL_M)
     threshold: Share = 0.5
+    line_width: Length = Field(default=LINE_M, ge=0, le=0.5)
     bridge_pixels: int = Field(default=0, ge=0, le=10)
     close_gaps: Length = Field(default=1.2, ge=0, le=5)
 
@@ -69,12 +86,99 @@ class Image(PictureSource):
                 )
             light = _light(picture, self.threshold)
             notes: list[str] = []
-            inside = self.known(picture, light, self.resolution, notes, saved=False)
+            found: list[str] = []
+            inside = self.known(picture, light, self.resolution, found, saved=False)
+            problem = None
             if inside is light:
-                inside = _inside(light, self.close_gaps, self.resolution, notes)
-            raw = OccupancyMap(inside[::-1], ~light[::-1], self.resolution)
+                try:
+                    inside = _inside(light, self.close_gaps, self.resolution, found)
+                except FloorPlanError as error:
+                    inside, problem = np.zeros_like(light), error
+            told = self._without_lines(picture, light, inside)
+            if told is None and problem is not None:
+                raise problem
+            inside, walls, found = told or (inside, ~light, found)
+            notes += found
+            raw = OccupancyMap(inside[::-1], walls[::-1], self.resolution)
             free = self.home(raw, picture, notes)
             return self.build(free, self.resolution, f"drawing, {self.path.name}", notes)
+
+    def _without_lines(
+        self, picture: GreyPicture, light: Bool, enclosed: Bool
+    ) -> tuple[Bool, Bool, list[str]] | None:
+        """Return what walls enclose, the walls, and notes, if walls are told from thin lines.
+
+        Else None: pixels are too large for that, nothing is thinner than `line_width`, or thicker
+        walls don't enclose a home as large.
+
+        Args:
+            picture: The drawing.
+            light: Pixels that are light, bool (rows, columns).
+            enclosed: What all that is dark encloses, of the same shape.
+        """
+        pixel, dark = self.resolution, ~light
+        if pixel > self.line_width / LINE_PIXELS:
+            return None
+        home = _largest_part(enclosed)
+        for what, walls in wall_candidates(picture, dark, self.line_width, pixel):
+            lines = np.count_nonzero(dark & ~walls)
+            if lines < LINES_SHARE * np.count_nonzero(dark):
+                continue
+            if not told_apart(walls, self.line_width, pixel):
+                continue
+            gaps = find_gaps(walls, dark, pixel)
+            closed = walls.copy()
+            for gap in gaps:
+                closed[gap.window] = True
+            notes: list[str] = []
+            try:
+                inside = _inside(~closed, self.close_gaps, pixel, notes)
+            except FloorPlanError:
+                continue
+            outside = ~closed & ~inside
+            outer = [gap for gap in gaps if outside[gap.surrounding].any()]
+            for among, is_open in ((gaps, True), (outer, False)):
+                for gap in among:
+                    inside[gap.window] = is_open
+            inside &= ~walls
+            area = np.count_nonzero(_largest_part(inside))
+            at_least = 0 if _frames(home, walls) else MOST * np.count_nonzero(home)
+            if area < max(at_least, WHOLE * np.count_nonzero(inside), OBJECT_M2 / pixel**2):
+                continue
+            note = (
+                f"walls {what}: thinner lines, of text, dimensions, doors or furniture, are left"
+                f" out, and {len(outer)} windows and doors in outer walls are closed;"
+                " line_width: 0 takes all that is dark for wall"
+            )
+            return inside, ~inside & ~outside, [note, *notes]
+        return None
+
+
+def guess_resolution(path: Path) -> tuple[float, int] | None:
+    """Return the side of a pixel [m] by which doors in a drawing are as wide as usual.
+
+    Also the number of those doors. None if at no likely scale there are enough.
+    """
+    for pixel in TRIED_M:
+        try:
+            plan = Image.model_construct(path=path, resolution=pixel, cell=None).load()
+        except FloorPlanError:
+            continue
+        widths = sorted(door.width_m for door in plan.doorways)
+        if len(widths) >= FEWEST_DOORS:
+            factor = USUAL_DOOR_M / widths[len(widths) // 2]
+            if 1 / LIKELY_FACTOR <= factor <= LIKELY_FACTOR:
+                return float(f"{pixel * factor:.2g}"), len(widths)
+    return None
+
+
+def _frames(ground: Bool, walls: Bool) -> bool:
+    """Return whether some pixels lie round all walls, as the ground in the frame of a drawing."""
+    for axis in (0, 1):
+        outer, inner = (np.flatnonzero(mask.any(axis=axis)) for mask in (ground, walls))
+        if not len(outer) or outer[0] >= inner[0] or outer[-1] <= inner[-1]:
+            return False
+    return True
 
 
 def _light(picture: GreyPicture, threshold: float) -> Bool:
@@ -143,8 +247,14 @@ def _enclosed(light: Bool, gap: float) -> Bool:
 
 def _largest(mask: Bool) -> int:
     """Return the number of pixels of the largest connected part."""
+    return int(np.count_nonzero(_largest_part(mask)))
+
+
+def _largest_part(mask: Bool) -> Bool:
+    """Return the pixels of the largest connected part."""
     part = label_parts(mask, False)
-    return int(np.bincount(part[mask], minlength=1).max())
+    largest: Bool = part == np.bincount(part[mask], minlength=1).argmax()
+    return largest & mask
 
 
 def _first_gap(light: Bool, inside: Bool, closed: Bool) -> tuple[int, int]:
