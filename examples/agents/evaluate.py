@@ -5,8 +5,8 @@
 
 Each life is lived by everyone: the same home, person and days, so differences are paired. Printed
 are means a day, and the difference to the first behavior with its 95 % interval. `--search` adds
-bounds: a robot that tries every action in a branch of its life, and for `find` one that always
-chooses the order of rooms that is optimal by its belief, or knows in which room the person is.
+robots that know more: one that tries every action in a branch of its life; for `find` one that
+looks into rooms in the order that is optimal by its belief, and one that knows the right room.
 """
 
 import argparse
@@ -134,7 +134,7 @@ def main() -> None:
     parser.add_argument("task", choices=list(BUNDLED))
     parser.add_argument("file", nargs="?", help="the learned policy; none: the others only")
     parser.add_argument("--homes", type=int, default=30)
-    parser.add_argument("--search", action="store_true", help="bounds, too: slow")
+    parser.add_argument("--search", action="store_true", help="also robots that know more: slow")
     arguments = parser.parse_args()
     task, homes = arguments.task, arguments.homes
     behaviors = BUNDLED[task] | (BOUNDS.get(task, {}) if arguments.search else {})

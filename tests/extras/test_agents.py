@@ -57,10 +57,9 @@ def test_model_of_stable_baselines_becomes_the_policy_of_a_robot(tmp_path: Path)
     assert int(expected) == behavior.act(observation, mask)
 
 
-def test_search_knows_at_least_as_much_as_who_looks_without_a_map_of_habits(
+def test_searches_that_know_more_beat_a_search_where_somebody_was_seen_last(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A robot that knows the room finds the person in less time than the bundled behavior."""
     evaluate = script("evaluate")
     monkeypatch.setitem(evaluate["main"].__globals__, "BUNDLED", {"find": {}})
     argv = ["evaluate.py", "find", "--homes", "1", "--search"]
@@ -69,7 +68,7 @@ def test_search_knows_at_least_as_much_as_who_looks_without_a_map_of_habits(
     lines = capsys.readouterr().out.splitlines()
     rewards = {line[:20].strip(): float(line[20:].split(",")[0]) for line in lines}
 
-    assert rewards["knows the room"] == max(rewards.values())
+    assert rewards["knows the room"] > rewards["last seen"]
     assert rewards["find, ltp, exact"] > rewards["last seen"]
 
 

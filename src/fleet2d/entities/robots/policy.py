@@ -154,7 +154,7 @@ class WaitingPoses:
         self.index, self.points, self.headings = home.cached(("standing", *key), self._choose)
         self._key = key
         self.number = {room: number for number, room in enumerate(self.index.tolist())}
-        self._ways: dict[object, Ways] = {}  # from the places where it was
+        self._ways: dict[object, RoomWays] = {}  # from the places where it was
 
     def _choose(self) -> tuple[I64, I64, I64]:
         rooms = self._actor.reachable_rooms()
@@ -183,7 +183,7 @@ class WaitingPoses:
                 best = int(place[0]), int(place[1]), facing * TURN // len(DIRECTIONS)
         return best
 
-    def ways(self, actions: int) -> "Ways":
+    def ways(self, actions: int) -> "RoomWays":
         """Return the ways from where the robot is to each room, for a number of actions."""
         actor = self._actor
         x, y, _, _ = actor.state
@@ -197,7 +197,7 @@ class WaitingPoses:
             self._ways[here] = ways
         return ways
 
-    def _measure(self, x: int, y: int, actions: int) -> "Ways":
+    def _measure(self, x: int, y: int, actions: int) -> "RoomWays":
         actor = self._actor
         seconds = actor.seconds(actor.space.distances((x, y), self.points))
         mask = np.zeros(actions, np.bool_)
@@ -205,10 +205,10 @@ class WaitingPoses:
         mask[-1] = True
         share = np.zeros(len(actor.home.rooms), np.float32)
         share[self.index] = np.minimum(seconds, LONGEST_WAY_S) / LONGEST_WAY_S
-        return Ways(read_only(share), read_only(mask))
+        return RoomWays(read_only(share), read_only(mask))
 
 
-class Ways(NamedTuple):
+class RoomWays(NamedTuple):
     """How far the rooms are from where a robot is.
 
     Attributes:
@@ -348,7 +348,7 @@ class Policy(BeliefBehavior):
         """Return which actions are possible, bool (rooms + 1,): rooms with a way, and to rest."""
         return self._ways(now).mask
 
-    def _ways(self, now: Situation) -> Ways:
+    def _ways(self, now: Situation) -> RoomWays:
         return self.poses.ways(self.rooms + 1)
 
     def _describe_home(self, actor: Actor) -> F32:
