@@ -33,7 +33,8 @@ from fleet2d.runtime.determinism import stream_key
 
 # The table of events gets a row `battery` when the charge has changed by this much.
 RECORDED_CHANGE = 0.05
-NO_BREAKPOINTS = Breakpoints(*(np.zeros(0, np.int64) for _ in range(4)), np.zeros(0, np.uint8))
+_NONE = np.zeros(0, np.int64)
+NO_BREAKPOINTS = Breakpoints(_NONE, _NONE, _NONE, _NONE, np.zeros(0, np.uint8))
 
 
 class Battery(Settings):

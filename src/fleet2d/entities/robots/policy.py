@@ -176,7 +176,7 @@ class WaitingPoses:
             x, y = gaps.T
             ahead = x * DIRECTIONS[:, :1] + y * DIRECTIONS[:, 1:]
             is_shown = ahead >= np.sqrt(x * x + y * y) * limit
-            shown = [np.count_nonzero(row) for row in is_shown]
+            shown = [int(np.count_nonzero(row)) for row in is_shown]
             if max(shown) > most:
                 most = max(shown)
                 facing = shown.index(most)
