@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.drawings import STYLES, Drawing
 
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.formats.drawing import Image
@@ -11,8 +12,7 @@ from fleet2d.floorplan.formats.drawn_walls import find_gaps
 from fleet2d.floorplan.load import load_floorplan
 from fleet2d.floorplan.plan import FloorPlan
 
-pytest.importorskip("PIL")
-from tests.drawings import STYLES, Drawing
+images = pytest.importorskip("PIL.Image")
 
 PIXEL = 0.025
 
@@ -51,6 +51,18 @@ def test_with_a_line_width_of_zero_lines_are_walls(tmp_path: Path) -> None:
 
     assert agreement(plan, "outlined") < 0.9
     assert not any(note.startswith("walls are ") for note in plan.notes)
+
+
+def test_thick_frame_around_a_drawing_is_no_wall(tmp_path: Path) -> None:
+    pixels = np.array(drawn("solid").picture)
+    framed = np.pad(pixels[8:-8, 8:-8], 8, constant_values=20)
+    path = tmp_path / "framed.png"
+    images.fromarray(framed).save(path)
+
+    plan = Image.model_construct(path=path, resolution=PIXEL, cell=None).load()
+
+    assert agreement(plan, "solid") > 0.96
+    assert plan.notes[0].startswith("walls are drawn thick, in a frame")
 
 
 def test_pixels_as_large_as_lines_leave_all_that_is_dark_wall(tmp_path: Path) -> None:

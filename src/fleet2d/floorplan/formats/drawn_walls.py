@@ -23,6 +23,8 @@ WALL_M, DOOR_M, WINDOW_M = 0.6, 1.4, 5.0
 HOLLOW_M, LONE_M = 0.45, 3.0
 # At least half of the walls is this many times as thick as a line.
 TYPICAL_WALL = 2
+# A frame lies within this share of the sides of what is drawn.
+FRAME_SHARE = 0.03
 # Sides of a gap in two rows may differ by this [m].
 RAGGED_M = 0.03
 # Share of a row in a gap that is drawn if a line joins both sides.
@@ -64,13 +66,34 @@ def wall_candidates(
         pixel: Side of a pixel [m].
     """
     least = max(round(line / pixel), 2)
-    yield "are drawn thick", _thick(dark, least)
+    thick = _thick(dark, least)
+    inner = without_frame(thick)
+    if inner is not None:
+        yield "are drawn thick, in a frame", inner
+    yield "are drawn thick", thick
     for grey, lightest in _fills(picture, ~dark):
         walls = dark | (picture.greys <= lightest)
         yield f"are filled with grey {grey}", _thick(walls, least)
     hollow = _thick(dark | _narrow(~dark, HOLLOW_M / pixel), least)
     part = label_parts(hollow, True)
     yield "are drawn by lines", hollow & ~_small_parts(part, LONE_M / pixel)[part]
+
+
+def without_frame(walls: Bool) -> Bool | None:
+    """Return the walls without a thick frame around all others; None if there is no frame."""
+    rows, columns = (np.flatnonzero(walls.any(axis=axis)) for axis in (1, 0))
+    if not len(rows):
+        return None
+    box = walls[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
+    part = label_parts(np.ascontiguousarray(box), True)
+    frame = part == part[0].max()  # of the first row
+    high, wide = (max(round(FRAME_SHARE * side), 1) for side in box.shape)
+    is_around = all(side.any() for side in (frame[0], frame[-1], frame[:, 0], frame[:, -1]))
+    if not is_around or frame[high:-high, wide:-wide].any() or frame[box].all():
+        return None
+    inner = walls.copy()
+    inner[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1] &= ~frame
+    return inner
 
 
 def told_apart(walls: Bool, line: float, pixel: float) -> bool:
