@@ -3,7 +3,9 @@
 import os
 import subprocess
 import sys
+from collections.abc import Generator
 from pathlib import Path
+from typing import Any, ClassVar
 
 import pytest
 from tests.scenes import OWN
@@ -13,7 +15,7 @@ import fleet2d
 from fleet2d.errors import ComponentError, InputError
 from fleet2d.runs.run import Run
 from fleet2d.studies.api import default_location, make_executor, map_runs
-from fleet2d.studies.executors import LocalExecutor
+from fleet2d.studies.executors import Event, LocalExecutor, SerialExecutor, TaskSchedule
 
 SEEDED = [base("1 min", simulation={"seed": seed}) for seed in range(4)]
 
@@ -21,6 +23,10 @@ SEEDED = [base("1 min", simulation={"seed": seed}) for seed in range(4)]
 def digest_of(run: Run) -> str:
     assert run.digest is not None
     return run.digest
+
+
+def seed_of(run: Run) -> int:
+    return int(run.manifest["seed"])
 
 
 def fail_on_seed_two(run: Run) -> int:
@@ -92,10 +98,6 @@ def test_a_worker_that_holds_too_much_memory_is_replaced() -> None:
     assert [0, 1] == map_runs(seed_of, SEEDED[:2], executor=executor)
 
 
-def seed_of(run: Run) -> int:
-    return int(run.manifest["seed"])
-
-
 def test_an_unknown_executor_is_refused() -> None:
     with pytest.raises(InputError, match="give local, ray, slurm or serial"):
         make_executor("cloud")  # type: ignore[arg-type]
@@ -103,3 +105,18 @@ def test_an_unknown_executor_is_refused() -> None:
 
 def test_a_study_is_stored_by_its_name() -> None:
     assert "studies/which-robot" == default_location("which robot?")
+
+
+def test_runs_in_one_home_follow_each_other_and_results_keep_their_order() -> None:
+    class Noting(SerialExecutor):
+        order: ClassVar[list[int]] = []
+
+        def run(self, job: Any, tasks: TaskSchedule) -> Generator[Event]:
+            for event in super().run(job, tasks):
+                self.order.append(event.task.index)
+                yield event
+
+    homes = [{"type": "synthetic", "seed": home} for home in (1, 2, 1, 2)]
+    scenarios = [{**one, "floorplan": home} for one, home in zip(SEEDED, homes, strict=True)]
+    assert [0, 1, 2, 3] == map_runs(seed_of, scenarios, executor=Noting())
+    assert [0, 2, 1, 3] == Noting.order

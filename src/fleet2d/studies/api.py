@@ -10,6 +10,7 @@ from typing import Any, Literal, TypeVar
 from fleet2d.errors import ComponentError, InputError
 from fleet2d.runs.run import Run
 from fleet2d.scenario.model import Scenario
+from fleet2d.studies.design import home_key
 from fleet2d.studies.driver import RunOptions, check_study, run_study
 from fleet2d.studies.executors import (
     Executor,
@@ -103,7 +104,8 @@ def map_runs(
     resolved = tuple(_resolve(scenario) for scenario in scenarios)
     if not resolved:
         return []
-    tasks = TaskSchedule(WorkerTask(i, i, "", "") for i in range(len(resolved)))
+    homes = map(home_key, resolved)  # scenarios that share a home go to one worker in turn
+    tasks = TaskSchedule(WorkerTask(i, i, "", home) for i, home in enumerate(homes))
     job = FunctionJob(pickled(function), resolved)
     results: dict[int, Result] = {}
     events = make_executor(executor, workers).run(job, tasks)
