@@ -374,3 +374,16 @@ def test_methods_of_runs_and_plans_find_their_hooks() -> None:
     names = {"run": ("draw", "html", "judge", "view"), "plan": ("draw", "png")}
 
     assert all(callable(hook(kind, name)) for kind in names for name in names[kind])
+
+
+def test_type_in_a_module_of_another_name_loads_that_module_alone() -> None:
+    code = (
+        "import sys\n"
+        "from fleet2d.configuration.components import lookup\n"
+        "lookup('metric', 'stays')\n"
+        "print(*sorted(m for m in sys.modules if m.startswith('fleet2d.metrics.')))"
+    )
+
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+
+    assert "fleet2d.metrics.bodies fleet2d.metrics.metric\n" == done.stdout
