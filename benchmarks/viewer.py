@@ -4,8 +4,9 @@
     python benchmarks/viewer.py --crowd --year
 
 Without a run, one of a robot and five users over thirty days is simulated first; `--crowd` adds one
-of 50 users and 10 robots in 1,049 m² over 14 days, `--year` the base scenario over a year. Needs
-Chromium at /usr/bin/chromium and the extra `test`.
+of 50 users and 10 robots in 1,049 m² over 14 days, `--year` the base scenario over a year. At the
+end, what has a limit is printed as a table. Needs Chromium at /usr/bin/chromium and the extra
+`test`.
 """
 
 import argparse
@@ -72,6 +73,20 @@ ROOMS = (
 )
 
 
+# What is measured of which run: unit, limit, aim.
+LIMITS = {
+    "month: first picture": ("s", 0.7, 0.4),
+    "month: slowest answer": ("ms", 100, 30),
+    "crowd: first picture": ("s", 3, 1.5),
+    "crowd: scrubbing the whole run": ("frames/s", 50, 60),
+    "crowd: scrubbing a day": ("frames/s", 50, 60),
+    "year: server's memory": ("MB", 300, 150),
+    "year: page's heap": ("MB", 100, 60),
+    "film of a day at 60 x": ("s", 20, 10),
+}
+measured: dict[str, float] = {}
+
+
 def crowd_scenario(folder: Path) -> dict[str, Any]:
     """Return the scenario of 50 users and 10 robots in a home of 1,049 m²: rooms on a corridor."""
     rooms, free = [], [_box(0, 0, 59.35, 2)]
@@ -129,6 +144,10 @@ def main() -> None:
             measure_page(browser, run)
         measure_live(browser)
         measure_film(runs[0], Path(folder))
+    print(f"\nload {os.getloadavg()[0]:.1f}{'measured':>33}{'limit':>8}{'aim':>8}")
+    for name, (unit, limit, aim) in LIMITS.items():
+        if name in measured:
+            print(f"{name:32}{measured[name]:8.2f}{limit:8g}{aim:8g} {unit}")
 
 
 def measure_page(browser: Any, run: Path) -> None:
@@ -141,21 +160,28 @@ def measure_page(browser: Any, run: Path) -> None:
     time.sleep(4)  # the server reads the run while the browser starts
     with page_at(browser, address) as page:
         marks = "performance.getEntriesByName('first-picture')[0].startTime"
-        print(f"{run.name}: first picture after {page.evaluate(marks):.0f} ms")
+        first = page.evaluate(marks)
+        measured[f"{run.name}: first picture"] = first / 1000
+        print(f"{run.name}: first picture after {first:.0f} ms")
         for view in ("the whole run", "a day"):
             times = sorted(page.evaluate(SCRUB, FRAMES))
             rate = 1000 / statistics.mean(times)
             slow = times[round(0.95 * FRAMES)]
+            measured[f"{run.name}: scrubbing {view}"] = rate
             print(f"  scrubbing {view}: {rate:.0f} frames/s, 95 % under {slow:.0f} ms")
             page.get_by_role("button", name="Day", exact=True).click()
         user = page.locator("tr[data-body]").first.get_attribute("data-body")
         for question in QUESTIONS:
             words = question.format(user=user)
             lasted, answer = page.evaluate(ASK, words)
+            slowest = f"{run.name}: slowest answer"
+            measured[slowest] = max(lasted, measured.get(slowest, 0.0))
             print(f"  '{words}' ({answer}): {lasted:.0f} ms")
         heap = page.evaluate("performance.memory.usedJSHeapSize / 1e6")
         pages = int(Path(f"/proc/{server.pid}/statm").read_text().split()[1])
         memory = pages * os.sysconf("SC_PAGE_SIZE") / 1e6
+        measured[f"{run.name}: page's heap"] = heap
+        measured[f"{run.name}: server's memory"] = memory
         print(f"  {heap:.0f} MB of heap; {memory:.0f} MB of the server")
     server.terminate()
     server.wait()
@@ -180,9 +206,13 @@ def measure_live(browser: Any) -> None:
 
 
 def measure_film(run: Path, folder: Path) -> None:
-    began = time.perf_counter()
+    began, work = time.perf_counter(), time.process_time()
     count = write_film(fleet2d.open_run(run), folder / "day.mp4", 86_400, 172_800)
-    print(f"film of a day at 60 x: {count} pictures in {time.perf_counter() - began:.1f} s")
+    lasted, work = time.perf_counter() - began, time.process_time() - work
+    measured["film of a day at 60 x"] = lasted
+    print(
+        f"film of a day at 60 x: {count} pictures in {lasted:.1f} s, {work:.1f} s of processor time"
+    )
 
 
 if __name__ == "__main__":
