@@ -159,7 +159,7 @@ function Label({ row }: { row: PlacedRow }) {
   const style = { top: `${row.top}px`, height: `${row.height}px`, paddingLeft: `${0.4 + 0.6 * row.indent}rem` };
   const isPinned = lane !== null && shown.pinned.value.has(lane.id);
   return (
-    <div class={`label${lane ? "" : " group-label"}${row.isPinned ? " pinned" : ""}`} style={style}>
+    <div class={`label${lane ? "" : " group-label"}${row.isPinned ? " pinned" : ""}${row.indent > 1 ? " nested" : ""}`} style={style}>
       {folds && (
         <button
           type="button"
