@@ -83,7 +83,9 @@ def cases() -> dict[str, dict[str, Any]]:
     parts = {f"only {key}": month({key: part}) for key, part in FULL.items()}
     return {
         "the bundled month as it is": {"extends": "bundled:base"},
+        "only heights": {"extends": "bundled:base", "sight": {"heights": True}},
         "only period, latency and 8 body points": month(None, **LOOK),
+        "the same, with heights": {**month(None, **LOOK), "sight": {"heights": True}},
         **parts,
         "only errors": month({"errors": {"outliers": {"share": "3 %"}}}),
         "full perception model on": month(FULL, **LOOK),
