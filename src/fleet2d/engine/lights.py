@@ -15,7 +15,7 @@ from fleet2d.kernels import rooms_at
 from fleet2d.runtime.events import HOME, Event, EventKind
 
 if TYPE_CHECKING:
-    from fleet2d.runtime.sun import Sun
+    from fleet2d.runtime.clock import Sun
 
 LYING = POSTURES.index("lie")
 NOWHERE = -1

@@ -23,7 +23,7 @@ from fleet2d.kernels import (
     in_radians,
 )
 from fleet2d.kernels import SightingColumn as Column
-from fleet2d.runtime.sun import Sun
+from fleet2d.runtime.clock import Sun
 from fleet2d.sight.perception import DARK_NIGHT, DARKEST, Curve, Detection, Perception
 from fleet2d.sight.perception_error import CameraSightings, ErrorStream, PerceptionError
 

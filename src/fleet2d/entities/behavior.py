@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from fleet2d.floorplan.home import Home
     from fleet2d.floorplan.plan import Room
     from fleet2d.interactions.interaction import RequestQueue
-    from fleet2d.runtime.sun import Sun
+    from fleet2d.runtime.clock import Sun
 
 
 DAY = timedelta(days=1)
@@ -113,7 +113,7 @@ Hours = Annotated[
 
 
 DARK = HoursSpan((), timedelta(0), timedelta(0), "dark")
-"""The hours from sunset to sunrise, which `fleet2d.runtime.sun.Sun` has for each day."""
+"""The hours from sunset to sunrise, which `fleet2d.runtime.clock.Sun` has for each day."""
 
 
 def _parse_light_hours(value: object) -> tuple[HoursSpan, ...]:

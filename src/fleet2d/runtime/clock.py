@@ -1,16 +1,15 @@
-"""Simulated time: steps of one length from a start; times are integer microseconds since then."""
+"""Simulated time: steps of one length from a start, local times, and the sun of each day."""
 
+from bisect import bisect_left
 from dataclasses import dataclass
-from datetime import datetime, time, timedelta
-from typing import TYPE_CHECKING
+from datetime import date, datetime, time, timedelta
+from functools import lru_cache
+from math import isqrt
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fleet2d.kernels import I64
-
-if TYPE_CHECKING:
-    from fleet2d.runtime.sun import Sun
+from fleet2d.kernels import F64, I64, TURN, UNIT, half_sines
 
 MICROSECOND = timedelta(microseconds=1)
 HOUR_S = 60 * 60
@@ -18,6 +17,16 @@ DAY_S = 24 * HOUR_S
 DAY_MINUTES = 24 * 60
 HOUR_US = HOUR_S * 1_000_000
 DAY_US = DAY_S * 1_000_000
+
+DAY = timedelta(days=1)
+# Angles are in 10**-7 degrees.
+DEGREE = 10_000_000
+CIRCLE = 360 * DEGREE
+OBLIQUITY = 234_393_000
+# How far below the horizon the middle of the sun is when its upper edge appears, by refraction.
+HORIZON = -8_330_000
+# It dawns from half an hour before sunrise to half an hour after it, and likewise at sunset.
+TWILIGHT = timedelta(minutes=30)
 
 
 @dataclass(frozen=True)
@@ -67,3 +76,89 @@ class Clock:
 def midnight_of(moment: datetime) -> datetime:
     """Return the midnight that begins the day of a moment."""
     return datetime.combine(moment.date(), time())
+
+
+# The day from which the numbers of the almanac count: 1 January 2000, at noon.
+EPOCH = date(2000, 1, 1).toordinal()
+
+
+@dataclass(frozen=True)
+class Sun:
+    """The sun over a home, by the low-precision formulas of the Astronomical Almanac.
+
+    Computed in integers; times are right within a minute or two, in the centuries around 2000.
+
+    Attributes:
+        latitude_deg: The latitude of the home, north is positive; the sun rises on each day.
+        noon: When the sun is highest by the home's clock, in the mean of the year.
+
+    Example:
+        >>> sun = Sun(52.52, timedelta(hours=12, minutes=6))  # Berlin
+        >>> [str(moment) for moment in sun.day(date(2026, 12, 21).toordinal())]
+        ['2026-12-21 08:14:20', '2026-12-21 15:53:48']
+    """
+
+    latitude_deg: float
+    noon: timedelta
+
+    def day(self, ordinal: int) -> tuple[datetime, datetime]:
+        """Return sunrise and sunset of a day, given as the ordinal of its date."""
+        half_day_s, late_s = _sun_on(ordinal, round(self.latitude_deg * DEGREE))
+        noon = datetime.fromordinal(ordinal) + self.noon - timedelta(seconds=late_s)
+        return noon - timedelta(seconds=half_day_s), noon + timedelta(seconds=half_day_s)
+
+    def shares(self, times: NDArray[np.datetime64]) -> F64:
+        """Return how much of the light of day there is: 1 by day, 0 at night, a line in between.
+
+        Args:
+            times: Local times, datetime64[us] (n,).
+        """
+        days, which = np.unique(times.astype("M8[D]"), return_inverse=True)
+        ends = [self.day(day.toordinal()) for day in days.tolist()]
+        rise, fall = np.array(ends, "M8[us]").reshape(-1, 2).T
+        twilight = np.timedelta64(TWILIGHT)
+        risen = (times - rise[which] + twilight) / (2 * twilight)
+        left = (fall[which] - times + twilight) / (2 * twilight)
+        share: F64 = np.clip(np.minimum(risen, left), 0, 1)
+        return share
+
+    def end_at(self, time: datetime) -> datetime | None:
+        """Return the end of the night that a moment lies in, as hours do; None by day."""
+        rise, fall = self.day(time.toordinal())
+        if time >= fall:
+            return self.day(time.toordinal() + 1)[0]
+        return rise if time < rise else None
+
+    def next_begin(self, time: datetime) -> datetime:
+        """Return when a night begins next after a moment."""
+        fall = self.day(time.toordinal())[1]
+        return fall if fall > time else self.day(midnight_of(time + DAY).toordinal())[1]
+
+
+@lru_cache(4096)
+def _sun_on(ordinal: int, latitude: int) -> tuple[int, int]:
+    """Return half of the length of a day, and how early the sun is at noon [s]."""
+    days = ordinal - EPOCH
+    anomaly = 3_575_280_000 + 9_856_003 * days
+    mean = 2_804_600_000 + 9_856_474 * days
+    longitude = mean + (19_150_000 * _sine(anomaly) + 200_000 * _sine(2 * anomaly)) // UNIT
+    # The equation of time: the true sun's right ascension against the mean sun's.
+    early = (
+        -19_150_000 * _sine(anomaly)
+        - 200_000 * _sine(2 * anomaly)
+        + 24_660_000 * _sine(2 * longitude)
+        - 530_000 * _sine(4 * longitude)
+    ) // UNIT
+    sine = _sine(OBLIQUITY) * _sine(longitude) // UNIT
+    cosine = isqrt(UNIT**2 - sine**2)
+    across = _sine(latitude + CIRCLE // 4) * cosine
+    height = (_sine(HORIZON) * UNIT - _sine(latitude) * sine) * UNIT // across
+    # The hour angle whose cosine that is: cosines fall from 0 to half a turn.
+    falling = half_sines()[TURN // 2 : TURN + TURN // 2 + 1]
+    angle = bisect_left(falling, -height, key=lambda value: -int(value))
+    return angle * DAY_S // (2 * TURN), early * DAY_S // CIRCLE
+
+
+def _sine(angle: int) -> int:
+    """Return UNIT times the sine of an angle [10**-7 degrees]."""
+    return int(half_sines()[(angle * 2 * TURN + CIRCLE // 2) // CIRCLE % (2 * TURN)])

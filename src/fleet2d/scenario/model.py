@@ -58,7 +58,7 @@ from fleet2d.floorplan.source import FloorPlanSource
 from fleet2d.interactions.interaction import Interaction
 from fleet2d.interventions.intervention import Entry
 from fleet2d.metrics.metric import Metric
-from fleet2d.runtime.clock import Clock
+from fleet2d.runtime.clock import Clock, Sun
 from fleet2d.scenario.compose import compose, slot_kind
 from fleet2d.sight.camera import SightSettings
 
@@ -184,8 +184,6 @@ class SimulationSettings(Settings):
         clock = Clock(self.start, self.step_us, self.steps)
         if self.daylight is None:
             return clock
-        from fleet2d.runtime.sun import Sun  # few scenarios need it
-
         return replace(clock, sun=Sun(self.daylight.latitude, self.daylight.noon))
 
 

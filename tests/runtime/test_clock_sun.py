@@ -6,7 +6,7 @@ from datetime import date, datetime, timedelta
 import numpy as np
 import pytest
 
-from fleet2d.runtime.sun import Sun
+from fleet2d.runtime.clock import Sun
 
 # Latitude, noon in the mean of the year by the clock, and sunrise and sunset in 2026 as almanacs have them.
 ALMANAC = [
