@@ -75,6 +75,13 @@ def _set_value(path: Path, key: str, value: Any) -> None:
     path.write_text(json.dumps(content))
 
 
+def _with_number(table: pa.Table, number: int) -> pa.Table:
+    """Return a table whose last row has another number of a variant."""
+    numbers = [*table["variant"].to_pylist()[:-1], number]
+    column = table.column_names.index("variant")
+    return table.set_column(column, "variant", pa.array(numbers, pa.int32()))
+
+
 def _change_table(path: Path, change: Callable[[pa.Table], pa.Table]) -> None:
     pq.write_table(change(pq.read_table(path)), path)
 
@@ -110,6 +117,15 @@ CASES: list[tuple[str, str, Damage]] = [
         (file, name, lambda p, c=change: _change_table(p, c))
         for file in PARQUET
         for name, change in TABLES.items()
+    ),
+    *(
+        (
+            file,
+            f"number {number}",
+            lambda p, n=number: _change_table(p, lambda table: _with_number(table, n)),
+        )
+        for file in (PLAN, RESULTS)
+        for number in (-5, 2**31 - 1)  # the latter took 2 GB, and the former another's place
     ),
 ]  # type: ignore[misc]
 
@@ -171,7 +187,13 @@ def test_the_study_runs_again_or_says_why_not(study: Path, fleet2d: Cli, number:
 
 @pytest.mark.parametrize(
     ("file", "change", "command"),
-    [("study.json", "columns=[]", "report"), (RESULTS, "all null", "status")],
+    [
+        ("study.json", "columns=[]", "report"),
+        (RESULTS, "all null", "status"),
+        (RESULTS, "number -5", "status"),
+        (RESULTS, f"number {2**31 - 1}", "status"),
+        (PLAN, f"number {2**31 - 1}", "status"),
+    ],
 )
 def test_a_contradiction_within_a_file_is_named(
     study: Path, fleet2d: Cli, file: str, change: str, command: str

@@ -26,7 +26,14 @@ from fleet2d.studies.parts import (
     record_names,
     write_part,
 )
-from fleet2d.studies.records import VARIANT, Journal, array_of, numbers_of, read_journal
+from fleet2d.studies.records import (
+    VARIANT,
+    Journal,
+    array_of,
+    check_numbers,
+    numbers_of,
+    read_journal,
+)
 from fleet2d.studies.storage import Storage, write_error
 
 if TYPE_CHECKING:
@@ -260,12 +267,9 @@ class StudyDirectory:
         Raises:
             RunDirectoryError: It is missing or damaged.
         """
-        import pyarrow as pa
-
         for table in self.storage.read_batches(PLAN, columns):
             with self.storage.reading(PLAN):
-                if table.schema.field(VARIANT).type != pa.int32() or table[VARIANT].null_count:
-                    raise ValueError("it has no numbers of variants")
+                check_numbers(table)
             yield table
 
     def statuses(self, parts: Sequence[Part]) -> U8:

@@ -19,7 +19,7 @@ import numpy as np
 from pydantic import TypeAdapter
 
 from fleet2d.kernels import I32
-from fleet2d.studies.records import VARIANT, VariantRecord, numbers_of, results_table
+from fleet2d.studies.records import VARIANT, VariantRecord, check_numbers, numbers_of, results_table
 from fleet2d.studies.storage import Storage, write_error
 
 if TYPE_CHECKING:
@@ -271,8 +271,7 @@ def read_results(
         table = storage.read_table(part.results, schema.names)
         with storage.reading(part.results):
             table = table.select(schema.names).cast(schema)
-            if table[VARIANT].null_count:
-                raise ValueError("it has results without the number of a variant")
+            check_numbers(table)
             yield table
 
 

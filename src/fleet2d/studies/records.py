@@ -24,6 +24,7 @@ FORMAT = JournalFormat(b"fleet2d study journal 2\n", ("variant",))
 SYNC_EVERY_S = 2.0  # maximum loss after a power cut; a killed process loses nothing
 VARIANT = "variant"
 GROUP_ROWS = 5_000  # of results, that are written together
+MAX_NUMBER = 1 << 27  # above those of variants: statuses and rows are arrays by number
 MAX_HEADERS = 1_000  # that a journal has in memory, 3 kB each; as rows of a table they take 0.4
 
 
@@ -112,6 +113,20 @@ def array_of(values: Iterable[Any], kind: "pa.DataType") -> "pa.Array":
     missing = np.array([item is None for item in items], np.bool_)
     numbers = [0 if item is None else item for item in items] if missing.any() else items
     return number_array(np.array(numbers, kind.to_pandas_dtype()), kind, missing)
+
+
+def check_numbers(table: "pa.Table") -> None:
+    """Refuse rows without the number of a variant, or with one that no study has.
+
+    Raises:
+        ValueError: There are such rows.
+    """
+    numbers = table.column(VARIANT)
+    if numbers.null_count or numbers.type != "int32":
+        raise ValueError("it has rows without the number of a variant")
+    found = numbers_of(table)
+    if len(found) and not 0 <= int(found.min()) <= int(found.max()) < MAX_NUMBER:
+        raise ValueError(f"it has numbers of variants outside of 0 to {MAX_NUMBER - 1}")
 
 
 def numbers_of(table: "pa.Table") -> I32:
@@ -276,7 +291,10 @@ def _record(frame: Frame, path: Path) -> VariantRecord:
         header = frame.description
         sizes = [(str(name), int(size)) for name, size in header["tables"]]
         header = {**header, "tables": sizes, "metrics": dict(header["metrics"])}
-        if header["status"] not in ("complete", "failed") or not 0 <= int(header["number"]) < 2**31:
+        if (
+            header["status"] not in ("complete", "failed")
+            or not 0 <= int(header["number"]) < MAX_NUMBER
+        ):
             raise ValueError("no result of a variant")
     except DAMAGE as error:
         raise damaged(path, error) from error
