@@ -314,7 +314,7 @@ CHANGES: dict[tuple[type, str], dict[str, Any]] = {
     },
     (ArtifactSettings, "artifacts"): {
         "trajectories": "1 min", "key_frames": False, "observations": False, "events": False,
-        "outputs": False,
+        "outputs": False, "decisions": True,
     },
     (SightSettings, "sight"): {
         "method": {"type": f"{TESTS.as_posix()}/engine/test_cameras_points:XRay"},
@@ -326,6 +326,11 @@ ELSEWHERE = {
     (User, "color"): "tests/pictures: pictures",
     (User, "lights"): "tests/engine/test_lights: it is day here",
     (User, "answers"): "tests/interactions: no robot wants anything here",
+    (User, "height"): "tests/engine/test_heights: there is no furniture here",
+    (Robot, "height"): "tests/engine/test_heights: there is no furniture here",
+    (Camera, "height"): "tests/engine/test_heights: there is no furniture here",
+    (SightSettings, "heights"): "tests/engine/test_heights: there is no furniture here",
+    (SimulationSettings, "daylight"): "tests/engine/test_lights: nothing depends on the sun here",
     (Robot, "localization"): "tests/entities/test_localization",
     (Robot, "color"): "tests/pictures: pictures",
     (Robot, "perceives"): "tests/entities/test_replayed_detections: it needs a table",

@@ -479,7 +479,7 @@ def bundled_days() -> dict[str, DayTemplate]:
     """Return the templates of days that every persona has for its year, by name.
 
     >>> sorted(bundled_days())
-    ['bad_day', 'day_off', 'ill']
+    ['bad_day', 'day_off', 'hot', 'ill']
     """
     data = read_document(FOLDER / "days.yaml").data
     return {name: DayTemplate.model_validate(fields) for name, fields in data.items()}
