@@ -1,6 +1,7 @@
 """Films of a stretch of a run: MP4, GIF or WebP, with text on each frame."""
 
 import re
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from fractions import Fraction
@@ -138,6 +139,8 @@ X264 = {
 ROWS_BETWEEN = 16  # equal rows between two parts of a picture that have changed
 # A GIF or WebP is written from pictures that are all in memory.
 MAX_PICTURES = 3_000
+# Pictures that wait to be encoded: only their changed parts are kept.
+MAX_WAITING = 16
 
 
 def write_film(
@@ -282,13 +285,14 @@ def _write_mp4(path: Path, frames: Iterator[tuple[int, U8]], total: int, rate: F
             frame.pts = number
             container.mux(stream.encode(frame))
 
-        # A picture is encoded, in a thread that needs no interpreter, while the next is drawn.
-        begun = thread.submit(encode, number, changed_parts(last, first))
+        # Encoded in a thread that needs no interpreter, while the next pictures are drawn.
+        waiting = deque([thread.submit(encode, number, changed_parts(last, first))])
         for number, pixels in frames:
-            parts = changed_parts(last, pixels)
-            begun.result()
-            begun = thread.submit(encode, number, parts)
-        begun.result()
+            waiting.append(thread.submit(encode, number, changed_parts(last, pixels)))
+            if len(waiting) > MAX_WAITING:
+                waiting.popleft().result()
+        while waiting:
+            waiting.popleft().result()
         if number < total - 1:  # the last picture stays to the end
             encode(total - 1, [])
         container.mux(stream.encode(None))
