@@ -96,7 +96,7 @@ ENTRIES = Bound("ENTRIES", 2_500, "entries")
 """Entries of a section of a scenario, such as its users."""
 MEMBERS = Bound("MEMBERS", 100, "members")
 """Members of a household, each of whom depends on all others."""
-PERSONA_VALUES = Bound("PERSONA_VALUES", 1_000_000, "values in the personas of its users")
+PERSONA_VALUES = Bound("PERSONA_VALUES", 500_000, "values in the personas of its users")
 """Values of personas that are read from files or extend others. They count for each user: for a
 member of a household, with its file and those of all its members. A long text counts for each 64
 characters."""
