@@ -21,7 +21,6 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sized
 from dataclasses import dataclass
 from functools import cache, lru_cache
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
 
 from pydantic import (
@@ -515,7 +514,8 @@ def _import_builtins(kind: str, name: str | None = None) -> None:
         # Most types stand in the file of their name, which is read first.
         for module in sorted(modules, key=lambda m: not name.startswith(m.rpartition(".")[2])):
             spec = importlib.util.find_spec(module)
-            source = Path(spec.origin).read_text("utf-8") if spec and spec.origin else ""
+            get_source = getattr(spec and spec.loader, "get_source", str)  # also of an archive
+            source = get_source(module) or ""
             if re.search(rf'^@register\("{kind}", .*"{re.escape(name)}"', source, re.MULTILINE):
                 importlib.import_module(module)
                 if _registered(kind, name):
