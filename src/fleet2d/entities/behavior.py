@@ -95,16 +95,21 @@ def _parse_hours(value: object) -> tuple[HoursSpan, ...]:
     return (parse_span(value),)
 
 
+_AS_TEXTS = PlainSerializer(lambda spans: [span.text for span in spans])
+_HOURS_FORMS: dict[str, Any] = {
+    "x-quantity": "hours",
+    "anyOf": [{"type": "string"}, {"type": "array", "items": {"type": "string"}}],
+}
+
 Hours = Annotated[
     tuple[HoursSpan, ...],
     BeforeValidator(_parse_hours),
-    PlainSerializer(lambda spans: [span.text for span in spans]),
+    _AS_TEXTS,
     WithJsonSchema(
         {
             "description": "hours of the week, like '08:00-22:00' or 'weekdays 9:00-17:00', or a"
             " list of them",
-            "x-quantity": "hours",
-            "anyOf": [{"type": "string"}, {"type": "array", "items": {"type": "string"}}],
+            **_HOURS_FORMS,
             "examples": ["08:00-22:00", ["weekdays 9:00-17:00", "weekend 10:00-20:00"]],
         }
     ),
@@ -127,13 +132,12 @@ def _parse_light_hours(value: object) -> tuple[HoursSpan, ...]:
 LightHours = Annotated[
     tuple[HoursSpan, ...],
     BeforeValidator(_parse_light_hours),
-    PlainSerializer(lambda spans: [span.text for span in spans]),
+    _AS_TEXTS,
     WithJsonSchema(
         {
             "description": "hours of the week, like '17:00-08:00', a list of them, or 'dark', from"
             " sunset to sunrise",
-            "x-quantity": "hours",
-            "anyOf": [{"type": "string"}, {"type": "array", "items": {"type": "string"}}],
+            **_HOURS_FORMS,
             "examples": ["17:00-08:00", "dark"],
         }
     ),
