@@ -109,6 +109,27 @@ def extra(name: str, need: str) -> Iterator[None]:
         raise InputError(f'{need}: pip install "fleet2d[{name}]"') from None
 
 
+@contextmanager
+def os_errors_as(error: type[Fleet2DError], message: str, advice: str = "") -> Iterator[None]:
+    """Raise an error of Fleet2D in place of an OSError in the block.
+
+    Args:
+        error: The class of the error.
+        message: The beginning of its message, which the operating system's reason follows.
+        advice: The end of its message.
+
+    Example:
+        >>> with os_errors_as(InputError, "absent.yaml can't be read"):
+        ...     open("absent.yaml")
+        Traceback (most recent call last):
+        fleet2d.errors.InputError: absent.yaml can't be read: No such file or directory
+    """
+    try:
+        yield
+    except OSError as reason:
+        raise error(f"{message}: {reason.strerror or reason}{advice}") from reason
+
+
 FRAMES = 4
 """The innermost frames of the user's own code that a message lists, at most."""
 

@@ -14,7 +14,7 @@ from fleet2d.algorithms.algorithm import Algorithm, Present, RoomDistribution
 from fleet2d.algorithms.history import History
 from fleet2d.algorithms.presence.belief import ANYONE, Presence
 from fleet2d.configuration.components import register
-from fleet2d.configuration.problems import suggest
+from fleet2d.configuration.problems import check_known, suggest
 from fleet2d.configuration.trust import check_trust
 from fleet2d.configuration.units import InputPath, PositiveDuration, micros
 from fleet2d.errors import ComponentError
@@ -213,8 +213,7 @@ class ReplayedOutput(Algorithm):
         table = table.filter(pc.not_equal(pc.cast(table[named["room"]], pa.string()), AWAY))
         texts = pc.cast(table[named["room"]], pa.string()).combine_chunks()
         for name in pc.unique(texts).to_pylist():
-            if name not in rooms:
-                raise LogError(f"{self.path}: there is no room {name!r}{suggest(str(name), rooms)}")
+            check_known(name, "room", rooms, LogError, f"{self.path}: ")
         room = pc.index_in(texts, value_set=pa.array(rooms)).to_numpy(zero_copy_only=False)
         line = np.arange(table.num_rows) + (2 if self.path.suffix.lower() == ".csv" else 1)
         share = numbers_of(table, named["share"], self.path, line)

@@ -35,7 +35,7 @@ from fleet2d.artifacts.table import (
 )
 from fleet2d.artifacts.unfinished import CHECKPOINT_NAME, FOLDER, JOURNAL_NAME
 from fleet2d.bounds import FILE_BYTES, read_bytes
-from fleet2d.errors import ArtifactError, RunDirectoryError, printable
+from fleet2d.errors import ArtifactError, RunDirectoryError, os_errors_as, printable
 from fleet2d.storage.files import path_in
 
 if TYPE_CHECKING:
@@ -257,7 +257,7 @@ def verify_run(directory: Path | str) -> Verification:
             f"{root} has no digest, because its status is {manifest.status}: there is nothing to"
             " compare with; `fleet2d resume` continues the run"
         )
-    try:
+    with os_errors_as(ArtifactError, f"{root} can't be read"):
         differing, notes = _differing_parts(root, manifest)
         for name, table in manifest.tables.items():
             file, entry = f"{name}.parquet", f"{FILE_NAME}: tables.{name}"
@@ -267,8 +267,6 @@ def verify_run(directory: Path | str) -> Verification:
         if run_digest(digests) != manifest.digest:
             differing.setdefault(f"{FILE_NAME}: digest", "is not that of the tables")
         foreign = foreign_files(root, manifest)
-    except OSError as error:
-        raise ArtifactError(f"{root} can't be read: {error.strerror or error}") from error
     digest = None if manifest.seal is None else manifest.seal.digest
     return Verification(differing, foreign, notes, digest)
 

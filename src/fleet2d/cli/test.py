@@ -11,7 +11,7 @@ from xml.etree import ElementTree as ET
 
 import typer
 
-from fleet2d.errors import Fleet2DError, InputError
+from fleet2d.errors import Fleet2DError, InputError, os_errors_as
 from fleet2d.options import file_name
 from fleet2d.storage.files import write_atomically
 
@@ -104,11 +104,9 @@ def write_junit(path: Path, cases: "Sequence[ScenarioCase]") -> None:
         suite.set("time", f"{sum(case.wall_s for case in cases_of_source):.3f}")
     ET.indent(root)
     text = ET.tostring(root, encoding="utf-8", xml_declaration=True)
-    try:
+    with os_errors_as(InputError, f"--junit {path} can't be written"):
         path.parent.mkdir(parents=True, exist_ok=True)
         write_atomically(path, text)
-    except OSError as error:
-        raise InputError(f"--junit {path} can't be written: {error.strerror}") from None
 
 
 def _add_case(suite: ET.Element, case: "ScenarioCase") -> None:

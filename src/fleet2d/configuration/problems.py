@@ -109,6 +109,31 @@ def suggest(name: object, known: Iterable[object], intro: str = "There are") -> 
     return f"{did_you_mean(name, names)} {intro}: {', '.join(names) or 'none'}"
 
 
+def check_known(
+    name: object,
+    noun: str,
+    known: Iterable[object],
+    error: Callable[[str], Exception] = ScenarioError,
+    where: str = "",
+) -> None:
+    """Raise an error if a name is not among the known ones.
+
+    Args:
+        name: The name.
+        noun: What it names.
+        known: The known names.
+        error: The error to raise.
+        where: The beginning of its message.
+
+    >>> check_known("hal", "room", ["hall"])
+    Traceback (most recent call last):
+    fleet2d.errors.ScenarioError: there is no room 'hal': did you mean 'hall'? There are: hall
+    """
+    names = list(known)
+    if name not in names:
+        raise error(f"{where}there is no {noun} {name!r}{suggest(name, names)}")
+
+
 def shown(value: object) -> str:
     """Return a value as text for a message: text in quotes, everything else as it is.
 

@@ -21,7 +21,7 @@ from fleet2d.algorithms.algorithm import Algorithm
 from fleet2d.artifacts.manifest import FLOORPLAN_NAME, LEARNED_NAME, SLOW, RunEnd, RunStart, Status
 from fleet2d.artifacts.store import RunStore, cannot_write
 from fleet2d.artifacts.unfinished import UnfinishedRun
-from fleet2d.configuration.problems import suggest
+from fleet2d.configuration.problems import check_known, suggest
 from fleet2d.configuration.units import micros, parse_duration
 from fleet2d.engine.basis import input_files
 from fleet2d.engine.checkpoint import Checkpoint, CheckpointWriter
@@ -319,7 +319,7 @@ class Simulation(InterventionMethods):
         state, known = self._state, self._event_kinds()
         names = known if kinds is None else frozenset(kinds)
         for name in names:
-            _check_name("event", name, known)
+            check_known(name, "event", sorted(known), InputError)
         state.settle(self.step)  # what happened before it listened
         state.events.listeners.append(Listener(function, names))
         state.wait_for(state.requested)
@@ -545,9 +545,9 @@ class Simulation(InterventionMethods):
         self, event: str, entity: str | None, timeout: str | timedelta | None
     ) -> Event | None:
         state, end = self._state, self._end_of_wait(timeout)
-        _check_name("event", event, self._event_kinds())
+        check_known(event, "event", sorted(self._event_kinds()), InputError)
         if entity is not None:
-            _check_name("entity", entity, [*self.actors, *self.scenario.objects])
+            check_known(entity, "entity", [*self.actors, *self.scenario.objects], InputError)
         state.wait_for(frozenset({event}))
         try:
             while self.step < end:
@@ -1029,13 +1029,6 @@ def has_to_choose(state: State, row: int, step: int) -> bool:
 def _situation(state: State, row: int, step: int) -> Situation:
     events = tuple(state.pending.get(row, ()))
     return Situation(state.actors[row], step, events, state.learners.readable_outputs)
-
-
-def _check_name(noun: str, name: str, known: Iterable[str]) -> None:
-    """Refuse an unknown name."""
-    names = list(known)
-    if name not in names:
-        raise InputError(f"there is no {noun} {name!r}{suggest(name, names)}")
 
 
 def _parsed(expectation: "Expectation | str") -> "Expectation":

@@ -42,7 +42,7 @@ from fleet2d.engine.state import State
 from fleet2d.engine.trajectories import KeySegment
 from fleet2d.entities.body import RandomWalk, Track
 from fleet2d.entities.plan import Note
-from fleet2d.errors import ArtifactError
+from fleet2d.errors import ArtifactError, os_errors_as
 from fleet2d.floorplan.costmap import CostedSpace
 from fleet2d.floorplan.placed_objects import PlacedObject, UsePlace
 from fleet2d.floorplan.plan import FloorPlan, Room
@@ -351,10 +351,8 @@ def open_snapshot(path: str | Path | BinaryIO) -> tuple[dict[str, Any], BinaryIO
     Raises:
         ArtifactError: It is not a snapshot, is damaged, or is of another version of Fleet2D.
     """
-    try:
+    with os_errors_as(ArtifactError, f"{path} can't be read"):
         content = Path(path).read_bytes() if isinstance(path, str | Path) else path.read()
-    except OSError as error:
-        raise ArtifactError(f"{path} can't be read: {error.strerror or error}") from error
     first, _, body = content.removeprefix(MAGIC + b"\n").partition(b"\n")
     if not content.startswith(MAGIC + b"\n"):
         raise ArtifactError(f"{path} is not a saved simulation")

@@ -10,7 +10,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from fleet2d.configuration.problems import did_you_mean, suggest
+from fleet2d.configuration.problems import check_known, did_you_mean, suggest
 from fleet2d.configuration.units import format_duration, micros
 from fleet2d.engine.intervention_queue import (
     OUTSIDE,
@@ -335,8 +335,4 @@ def check_trigger(world: EngineWorld, trigger: Trigger) -> None:
     # An empty detail is somebody who isn't recognized.
     if known is None or not trigger.detail or trigger.detail.startswith("come "):
         return
-    if trigger.detail not in known:
-        raise ScenarioError(
-            f"there is no {trigger.event!r} with the detail {trigger.detail!r}"
-            f"{suggest(trigger.detail, known)}"
-        )
+    check_known(trigger.detail, f"{trigger.event!r} with the detail", known)

@@ -9,7 +9,7 @@ import shapely
 from pydantic import Field
 
 from fleet2d.configuration.components import register
-from fleet2d.configuration.problems import suggest
+from fleet2d.configuration.problems import check_known, suggest
 from fleet2d.configuration.units import InputFileOrFolder, Length
 from fleet2d.entities.entity import SIGHTING, EvidenceSource
 from fleet2d.kernels import F64, I64, NOBODY, TURN, UNKNOWN_TRUTH, Bool
@@ -208,8 +208,8 @@ def identities(
             raise LogError(
                 f"people: the log has no label {label!r}{suggest(label, labels, 'It has')}"
             )
-        if user is not None and user not in users:
-            raise LogError(f"people: there is no user {user!r}{suggest(user, users)}")
+        if user is not None:
+            check_known(user, "user", users, LogError, "people: ")
     rows = []
     for label in labels:
         user = people.get(label, label if label in users else None)

@@ -16,7 +16,7 @@ from pydantic_core import PydanticCustomError
 
 from fleet2d.algorithms.observations import Activities
 from fleet2d.configuration.components import components
-from fleet2d.configuration.problems import suggest
+from fleet2d.configuration.problems import check_known
 from fleet2d.configuration.units import LENGTH, SHARE, SPEED, format_duration
 from fleet2d.entities.behavior import Actor, Behavior
 from fleet2d.entities.body import Pose
@@ -122,9 +122,7 @@ class Scene:
         Raises:
             ScenarioError: The name is unknown; the message has the nearest name, and all of them.
         """
-        names = list(dict.fromkeys(known))
-        if name not in names:
-            raise ScenarioError(f"{of}: there is no {noun} {name!r}{suggest(name, names)}")
+        check_known(name, noun, dict.fromkeys(known), where=f"{of}: ")
 
     def check_within(self, within: timedelta | Window | None, of: object) -> None:
         """Refuse a time that is longer than the run.

@@ -71,6 +71,7 @@ def fit_routine(
     Raises:
         LogError: The log can't be read, is of positions, or has too few days.
     """
+    from fleet2d.errors import os_errors_as
     from fleet2d.fit.persona import fit_persona, gaps, to_yaml
     from fleet2d.fit.timeline import find_days, read_timeline
     from fleet2d.fit.validation import validate
@@ -94,10 +95,8 @@ def fit_routine(
         "like the days of a log" if private else f"fitted to {len(days)} days of {log.path.name}"
     )
     fitted = fit_persona(timeline, days, about, model=model, private=private)  # type: ignore[arg-type]
-    try:
+    with os_errors_as(LogError, f"{out} can't be written"):
         out.write_text(to_yaml(fitted.document), encoding="utf-8")
-    except OSError as error:
-        raise LogError(f"{out} can't be written: {error.strerror}") from error
     lines = [f"note: {note}" for note in (*log.notes, *fitted.notes, *gaps(timeline, days))]
     lines += table(validation)
     if fitted.log:
@@ -209,7 +208,7 @@ def calibrate_perception(
     Raises:
         InputError: The log can't be read or fitted, a file can't be written, or scipy is missing.
     """
-    from fleet2d.errors import InputError
+    from fleet2d.errors import InputError, os_errors_as
     from fleet2d.fit.perception import calibrate, read_detections
 
     if picture is not None:
@@ -217,14 +216,12 @@ def calibrate_perception(
 
         check_picture(picture)
     calibration = calibrate(read_detections(path))
-    try:
+    with os_errors_as(InputError, f"{out} can't be written"):
         out.write_text(fragment(calibration, robot, extends), encoding="utf-8")
-        if picture is not None:
-            from fleet2d.fit.picture import draw_calibration
+    if picture is not None:
+        from fleet2d.fit.picture import draw_calibration
 
-            draw_calibration(calibration, picture)
-    except OSError as error:
-        raise InputError(f"{error.filename} can't be written: {error.strerror}") from None
+        draw_calibration(calibration, picture)
     return [*report(calibration), f"wrote {out}", *([f"wrote {picture}"] if picture else [])]
 
 

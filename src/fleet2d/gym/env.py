@@ -14,7 +14,7 @@ from gymnasium.vector.utils import batch_space
 from pettingzoo import ParallelEnv
 
 from fleet2d.configuration.documents import Document
-from fleet2d.configuration.problems import suggest
+from fleet2d.configuration.problems import check_known
 from fleet2d.configuration.units import parse_duration
 from fleet2d.engine.simulation import Simulation
 from fleet2d.entities.behavior import Situation
@@ -182,8 +182,7 @@ class RobotEnv(gymnasium.Env[F32, np.int64]):  # type: ignore[misc]
         """
         options = options or {}
         for name in options:
-            if name not in OPTIONS:
-                raise InputError(f"there is no option {name!r}{suggest(name, OPTIONS)}")
+            check_known(name, "option", OPTIONS, InputError)
         super().reset(seed=seed)
         values = self.variants.task.draw(self.np_random, self.split) | options.get("values", {})
         drawn = int(self.np_random.integers(2**53))

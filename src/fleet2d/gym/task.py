@@ -15,7 +15,7 @@ from pydantic import Field, ValidationError, field_validator
 
 from fleet2d.configuration.components import Settings
 from fleet2d.configuration.documents import Document, read_document
-from fleet2d.configuration.problems import problem, suggest
+from fleet2d.configuration.problems import check_known, problem, suggest
 from fleet2d.entities.robots.policy import Policy
 from fleet2d.errors import InputError, ScenarioError
 from fleet2d.scenario.model import Scenario, explain, load_scenario
@@ -83,8 +83,7 @@ class LearningTask(Settings):
     @classmethod
     def _is_known(cls, value: dict[str, float]) -> dict[str, float]:
         for name in value:
-            if name not in REWARDS:
-                raise problem(f"there is no term {name!r}{suggest(name, REWARDS)}")
+            check_known(name, "term", REWARDS, problem)
         return value
 
     def draw(self, random: np.random.Generator, split: Split) -> dict[str, Any]:

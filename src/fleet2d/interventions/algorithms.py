@@ -6,9 +6,8 @@ from pydantic import Field, model_validator
 
 from fleet2d.algorithms.algorithm import FROZEN, WITHHELD, RoomDistribution
 from fleet2d.configuration.components import register
-from fleet2d.configuration.problems import problem, suggest
+from fleet2d.configuration.problems import check_known, problem
 from fleet2d.configuration.units import InputPath
-from fleet2d.errors import ScenarioError
 from fleet2d.interventions.intervention import Intervention, Lasting, World
 
 
@@ -30,7 +29,7 @@ class Reset(Intervention):
 
     def check(self, world: World) -> None:
         """Refuse an unknown algorithm."""
-        check_algorithm(world, self.algorithm)
+        check_known(self.algorithm, "algorithm", world.algorithms)
 
     def begin(self, world: World) -> None:
         """Restart the algorithm."""
@@ -71,37 +70,16 @@ class Replace(Lasting):
 
     def check(self, world: World) -> None:
         """Refuse an unknown algorithm or room."""
-        check_algorithm(world, self.algorithm)
-        names = [room.name for room in world.home.rooms]
+        check_known(self.algorithm, "algorithm", world.algorithms)
         for room in self.rooms:
-            if room not in names:
-                raise ScenarioError(f"there is no room {room!r}{suggest(room, names)}")
+            check_known(room, "room", [room.name for room in world.home.rooms])
 
     def begin(self, world: World) -> None:
-        """Replace the output."""
-        world.replace(self.algorithm, self._output(world))
-
-    def end(self, world: World) -> None:
-        """Return to the latest intervention that is still active, else to the real output."""
-        active = (
-            act
-            for act in reversed(world.lasting)
-            if isinstance(act, Replace) and act.algorithm == self.algorithm
-        )
-        latest = next(active, None)
-        world.replace(self.algorithm, None if latest is None else latest._output(world))
+        """Apply the latest replacement that is active; if there is none, return to the output."""
+        active = self.active(world)
+        world.replace(self.algorithm, active[-1]._output(world) if active else None)
 
     def _output(self, world: World) -> Any:
         if self.rooms:
             return RoomDistribution([self.rooms.get(room.name, 0.0) for room in world.home.rooms])
         return dict(self.values) or (FROZEN if self.frozen else WITHHELD)
-
-
-def check_algorithm(world: World, name: str) -> None:
-    """Refuse an unknown algorithm.
-
-    Raises:
-        ScenarioError: There is no such algorithm; the message lists those that there are.
-    """
-    if name not in world.algorithms:
-        raise ScenarioError(f"there is no algorithm {name!r}{suggest(name, world.algorithms)}")

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 from pydantic import AfterValidator, Field, ValidationError
 
 from fleet2d.configuration.components import register
-from fleet2d.configuration.problems import refusal, suggest
+from fleet2d.configuration.problems import check_known, refusal, suggest
 from fleet2d.configuration.units import AngleDeg, PositiveDuration
 from fleet2d.entities.behavior import Actor, Behavior
 from fleet2d.entities.body import Pose
@@ -165,31 +165,19 @@ class Configure(BodyIntervention):
         behavior = self._behavior(actor)
         behavior.start(actor)
         for name in behavior.reads():
-            if name not in world.algorithms:
-                raise ScenarioError(
-                    f"there is no algorithm {name!r}{suggest(name, world.algorithms)}"
-                )
+            check_known(name, "algorithm", world.algorithms)
 
     def begin(self, world: World) -> None:
         """Replace the behavior."""
         actor = body(world, self.entity)
         behavior = self._behavior(actor)
         behavior.start(actor)
-        actor.replace(self._number(actor), behavior)
+        actor.replace(behavior_number(actor, self.behavior), behavior)
         actor.decide_again(world.step)
-
-    def _number(self, actor: Actor) -> int:
-        names = [behavior.type_name for behavior in actor.behaviors]
-        if self.behavior not in names:
-            raise ScenarioError(
-                f"{self.entity} has no behavior {self.behavior!r}"
-                f"{suggest(self.behavior, names, 'It has')}"
-            )
-        return names.index(self.behavior)
 
     def _behavior(self, actor: Actor) -> Behavior:
         """Return the behavior with the changed keys, not started."""
-        behavior = actor.behaviors[self._number(actor)]
+        behavior = actor.behaviors[behavior_number(actor, self.behavior)]
         present = behavior.model_dump(mode="json", exclude_defaults=True)
         try:
             return type(behavior).model_validate({**present, **self.keys})
@@ -235,6 +223,20 @@ class Decide(BodyIntervention):
                 plan = plan_of(actor, world.step, self.plan)
         actor.choose(plan)
         actor.decide_again(world.step)
+
+
+def behavior_number(actor: Actor, name: str) -> int:
+    """Return the number of a behavior of a body by its type.
+
+    Raises:
+        ScenarioError: It has no such behavior.
+    """
+    names = [behavior.type_name for behavior in actor.behaviors]
+    if name not in names:
+        raise ScenarioError(
+            f"{actor.name} has no behavior {name!r}{suggest(name, names, 'It has')}"
+        )
+    return names.index(name)
 
 
 def heading_of(heading_deg: float | None) -> int | None:

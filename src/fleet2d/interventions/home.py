@@ -5,7 +5,7 @@ from typing import ClassVar, Literal
 from pydantic import Field
 
 from fleet2d.configuration.components import register
-from fleet2d.configuration.problems import suggest
+from fleet2d.configuration.problems import check_known, suggest
 from fleet2d.entities.home_object import SensorFault
 from fleet2d.entities.place import Point
 from fleet2d.errors import ScenarioError
@@ -19,8 +19,9 @@ class HomeIntervention(Intervention):
 
     @property
     def home_change(self) -> HomeChange:
-        """The change."""
-        raise NotImplementedError
+        """The change, whose keys are those of the intervention."""
+        fields = dict(self)
+        return HomeChange.model_validate({self.type_name: fields.pop(self.subject), **fields})
 
     def check(self, world: World) -> None:
         """Refuse a change of something unknown."""
@@ -58,11 +59,6 @@ class DoorIntervention(HomeIntervention):
     subject: ClassVar[str] = "door"
     door: str
 
-    @property
-    def home_change(self) -> HomeChange:
-        """The change."""
-        return HomeChange.model_validate({self.type_name: self.door})
-
 
 @register("intervention", "open")
 class Open(DoorIntervention):
@@ -99,11 +95,6 @@ class Move(HomeIntervention):
     to: Point
     turn_deg: float = Field(default=0.0, ge=-3600, le=3600)
 
-    @property
-    def home_change(self) -> HomeChange:
-        """The change."""
-        return HomeChange(move=self.object, to=self.to, turn_deg=self.turn_deg)
-
 
 @register("intervention", "room")
 class SetRoomType(HomeIntervention):
@@ -118,11 +109,6 @@ class SetRoomType(HomeIntervention):
     name: str
     type: str
 
-    @property
-    def home_change(self) -> HomeChange:
-        """The change."""
-        return HomeChange(room=self.name, type=self.type)
-
 
 @register("intervention", "lights")
 class Lights(HomeIntervention):
@@ -136,11 +122,6 @@ class Lights(HomeIntervention):
     subject: ClassVar[str] = "room"
     room: str
     turn: Literal["on", "off"]
-
-    @property
-    def home_change(self) -> HomeChange:
-        """The change."""
-        return HomeChange(lights=self.room, turn=self.turn)
 
 
 @register("intervention", "slow")
@@ -159,10 +140,6 @@ class Slow(SlowArea, Lasting):
         """Apply all that are active."""
         world.slow([act for act in world.lasting if isinstance(act, Slow)])
 
-    def end(self, world: World) -> None:
-        """Apply the others."""
-        self.begin(world)
-
 
 @register("intervention", "report")
 class Report(Intervention):
@@ -179,7 +156,7 @@ class Report(Intervention):
 
     def check(self, world: World) -> None:
         """Refuse an unknown sensor, and one that is simulated."""
-        check_sensor(world, self.sensor)
+        check_known(self.sensor, "sensor", world.sensors)
         if self.sensor not in world.live_sensors:
             raise ScenarioError(
                 f"{self.sensor} is simulated: only a sensor of the type live_sensor reports what"
@@ -189,16 +166,6 @@ class Report(Intervention):
     def begin(self, world: World) -> None:
         """Set its state."""
         world.stick(self.sensor, self.says)
-
-
-def check_sensor(world: World, sensor: str) -> None:
-    """Refuse an unknown sensor.
-
-    Raises:
-        ScenarioError: There is none of that name.
-    """
-    if sensor not in world.sensors:
-        raise ScenarioError(f"there is no sensor {sensor!r}{suggest(sensor, world.sensors)}")
 
 
 @register("intervention", "stick")
@@ -216,20 +183,12 @@ class Stick(Lasting):
 
     def check(self, world: World) -> None:
         """Refuse an unknown sensor."""
-        check_sensor(world, self.sensor)
+        check_known(self.sensor, "sensor", world.sensors)
 
     def begin(self, world: World) -> None:
         """Apply the latest active intervention on the sensor."""
-        says = (
-            act.says
-            for act in reversed(world.lasting)
-            if isinstance(act, Stick) and act.sensor == self.sensor
-        )
-        world.stick(self.sensor, next(says, None))
-
-    def end(self, world: World) -> None:
-        """Return to the intervention before, if that is still active, else to its readings."""
-        self.begin(world)
+        active = self.active(world)
+        world.stick(self.sensor, active[-1].says if active else None)
 
 
 @register("intervention", "restore")

@@ -178,6 +178,8 @@ class Intervention(Component):
 class Lasting(Intervention):
     """Base of interventions with a duration; `begin` and `end` apply all that are active then.
 
+    By default, the end is a beginning of those that remain.
+
     Attributes:
         duration: How long it lasts; left out: until it is undone by `restore`.
     """
@@ -188,6 +190,16 @@ class Lasting(Intervention):
     def lasts(self) -> timedelta | None:
         """Its duration."""
         return self.duration
+
+    def active(self, world: World) -> list[Self]:
+        """Return the active interventions of this kind on the same subject, the latest last."""
+        name = getattr(self, self.subject)
+        same = (act for act in world.lasting if isinstance(act, type(self)))
+        return [act for act in same if getattr(act, act.subject) == name]
+
+    def end(self, world: World) -> None:
+        """Apply the others that are still active."""
+        self.begin(world)
 
 
 def body(world: World, name: str) -> DecidingActor:

@@ -14,7 +14,7 @@ from fleet2d.entities.equipment import Displacement
 from fleet2d.entities.place import Place
 from fleet2d.errors import PlacementError, ScenarioError
 from fleet2d.floorplan.plan import Room
-from fleet2d.interventions.bodies import Put, check_reach, heading_of
+from fleet2d.interventions.bodies import Put, behavior_number, check_reach, heading_of
 from fleet2d.interventions.intervention import Intervention, Lasting, World, body, robot, user
 from fleet2d.kernels import turn_between
 from fleet2d.runtime.events import EventKind
@@ -106,7 +106,7 @@ class Dismiss(RobotIntervention):
 
 
 @register("intervention", "keep_out")
-class KeepOut(Lasting):
+class KeepOut(RobotIntervention, Lasting):
     """Tell a robot to keep out of rooms: it leaves them, and goes round them until it may again.
 
     Events: `banned` and `allowed`, with the room.
@@ -116,12 +116,11 @@ class KeepOut(Lasting):
         of: The rooms, or kinds of rooms if the home has them.
     """
 
-    entity: str
     of: tuple[str, ...] | str
 
     def check(self, world: World) -> None:
         """Refuse an unknown robot or room."""
-        robot(world, self.entity)
+        super().check(world)
         self._rooms(world)
 
     def begin(self, world: World) -> None:
@@ -133,8 +132,7 @@ class KeepOut(Lasting):
     def end(self, world: World) -> None:
         """Let it in again, unless another one of these interventions doesn't."""
         actor = robot(world, self.entity)
-        acts = [a for a in world.lasting if isinstance(a, KeepOut) and a.entity == self.entity]
-        others = {room.index for act in acts for room in act._rooms(world)}
+        others = {room.index for act in self.active(world) for room in act._rooms(world)}
         for room in self._rooms(world):
             if room.index not in others:
                 actor.bans = {r: until for r, until in actor.bans.items() if r != room.index}
@@ -204,12 +202,7 @@ class Switch(Lasting):
         if self.behavior is None:
             check_camera(robot(world, self.entity), self.camera)
             return
-        names = [behavior.type_name for behavior in body(world, self.entity).behaviors]
-        if self.behavior not in names:
-            raise ScenarioError(
-                f"{self.entity} has no behavior {self.behavior!r}"
-                f"{suggest(self.behavior, names, 'It has')}"
-            )
+        behavior_number(body(world, self.entity), self.behavior)
 
 
 @register("intervention", "switch_off")
@@ -225,20 +218,9 @@ class SwitchOff(Switch):
         """Switch it off."""
         if self.behavior is None:
             disturb(world, self.entity)
-        else:
-            self._silence(world)
-
-    def end(self, world: World) -> None:
-        """Switch it on."""
-        self.begin(world)  # which applies all active interventions, without this one
-
-    def _silence(self, world: World) -> None:
+            return
         actor = body(world, self.entity)
-        off = {
-            act.behavior
-            for act in world.lasting
-            if isinstance(act, SwitchOff) and act.entity == self.entity
-        }
+        off = {act.behavior for act in self.active(world)}
         numbers = [i for i, behavior in enumerate(actor.behaviors) if behavior.type_name in off]
         actor.arbiter.off = frozenset(numbers)
         actor.decide_again(world.step)
@@ -269,7 +251,7 @@ class SwitchOn(Switch):
 
 
 @register("intervention", "fault")
-class Fault(Lasting):
+class Fault(RobotIntervention, Lasting):
     """Let a part of a robot fail for a while: stuck wheels, or a camera that sees less.
 
     With stuck wheels the robot can neither drive nor turn, and its behaviors don't decide. A robot
@@ -286,7 +268,6 @@ class Fault(Lasting):
         errs: The errors of its cameras instead of the usual ones.
     """
 
-    entity: str
     wheels: bool = False
     lost: bool = False
     charger: bool = False
@@ -347,8 +328,7 @@ class Fault(Lasting):
         if self.charger:
             actor = robot(world, self.entity)
             assert actor.charge is not None
-            acts = (act for act in world.lasting if isinstance(act, Fault))
-            is_broken = any(act.charger and act.entity == self.entity for act in acts)
+            is_broken = any(act.charger for act in self.active(world))
             now_us = world.step * world.clock.step_us
             actor.charge.set_broken(is_broken, actor.motion, now_us)
             actor.decide_again(world.step)
@@ -476,7 +456,7 @@ class Relocalize(RobotIntervention):
 
 
 @register("intervention", "kidnap")
-class Kidnap(Lasting):
+class Kidnap(RobotIntervention, Lasting):
     """Carry a robot elsewhere without its knowledge: it is lost there, until it knows its place.
 
     Meanwhile it stands still, and its behaviors don't decide. If it has errors of `localization`,
@@ -490,7 +470,6 @@ class Kidnap(Lasting):
             restored, or knows it by sight (`localization.relocalizes`).
     """
 
-    entity: str
     to: Place
     duration: PositiveDuration | None = timedelta(minutes=1)
 
@@ -498,7 +477,7 @@ class Kidnap(Lasting):
 
     def check(self, world: World) -> None:
         """Refuse an unknown robot, and a place where it doesn't fit."""
-        robot(world, self.entity)
+        super().check(world)
         self._put.check(world)
 
     def begin(self, world: World) -> None:
@@ -591,7 +570,7 @@ def disturb(world: World, name: str) -> None:
     world.disturb(name, disturbances_of(world, name))
 
 
-class PerceptionIntervention(Lasting):
+class PerceptionIntervention(RobotIntervention, Lasting):
     """Base of interventions on perception; they don't change the random draws of cameras.
 
     Attributes:
@@ -599,7 +578,6 @@ class PerceptionIntervention(Lasting):
         camera: The camera, by name where it has several; left out: all.
     """
 
-    entity: str
     camera: str | None = None
 
     @property
@@ -613,10 +591,6 @@ class PerceptionIntervention(Lasting):
 
     def begin(self, world: World) -> None:
         """Apply all active disturbances of its cameras."""
-        disturb(world, self.entity)
-
-    def end(self, world: World) -> None:
-        """Apply the active disturbances of its cameras, without this one."""
         disturb(world, self.entity)
 
 

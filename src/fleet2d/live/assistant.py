@@ -14,6 +14,7 @@ from typing import Any
 import yaml
 from pydantic_core import PydanticCustomError
 
+from fleet2d.configuration.problems import check_known
 from fleet2d.configuration.trust import Trust, restrict
 from fleet2d.engine.simulation import Simulation
 from fleet2d.errors import Fleet2DError, InputError, extra
@@ -219,8 +220,7 @@ class Workspace:
         import pyarrow.compute as pc
 
         tables = self._open(run).tables
-        if table not in tables:
-            raise InputError(f"there is no table {table!r}. There are: {', '.join(tables)}")
+        check_known(table, "table", tables, InputError)
         rows = tables[table]
         if where:
             parts = where.split(None, 2)
@@ -238,8 +238,7 @@ class Workspace:
                 raise InputError(f"{where!r}: {error}") from None
             rows = rows.filter(getattr(pc, _OPERATORS[parts[1]])(column, value))
         for name in columns or ():
-            if name not in rows.column_names:
-                raise InputError(f"there is no column {name!r}. There are: {rows.column_names}")
+            check_known(name, "column", rows.column_names, InputError)
         chosen = rows.select(columns) if columns else rows
         part = chosen.slice(0, max(0, min(limit, MAX_ROWS))).to_pylist()
         return {
@@ -324,9 +323,7 @@ class Workspace:
         return {"status": finished.status, "metrics": finished.metrics}
 
     def _get(self, name: str) -> Simulation:
-        if name not in self._running:
-            names = ", ".join(self._running) or "none"
-            raise InputError(f"there is no simulation {name!r}; waiting: {names}")
+        check_known(name, "simulation", self._running, InputError)
         return self._running[name]
 
 

@@ -20,7 +20,7 @@ from fleet2d.configuration.trust import current_trust
 from fleet2d.configuration.units import parse_peer_address
 from fleet2d.engine.simulation import Simulation
 from fleet2d.entities.home_object import Sensor
-from fleet2d.errors import InputError, extra
+from fleet2d.errors import InputError, extra, os_errors_as
 from fleet2d.live.bridge import LiveStep, Peer, Post, sources_of
 from fleet2d.live.messages import MAX_BYTES
 from fleet2d.runs.run import Run
@@ -158,10 +158,8 @@ class WebSocketPeer:
         with extra("live", "ws:// needs websockets"):
             from websockets.sync.server import serve
 
-        try:
+        with os_errors_as(InputError, f"ws://{host}:{port}"):
             self._server = serve(self._serve, host, port, max_size=MAX_BYTES, origins=ORIGINS)
-        except OSError as error:
-            raise InputError(f"ws://{host}:{port}: {error.strerror or error}") from error
         self._clients: dict[Any, queue.Queue[str | None]] = {}
         self._lock = threading.Lock()
         self._hello, self._numbers = "", itertools.count()
@@ -312,12 +310,8 @@ class MqttPeer:
         self._client.will_set(f"{prefix}/status", "offline", retain=True)
         self._is_on = threading.Event()
         self._client.on_connect = self._subscribe
-        try:
+        with os_errors_as(InputError, f"mqtt://{host}:{port}: there is no broker"):
             self._client.connect(host, port)
-        except OSError as error:
-            raise InputError(
-                f"mqtt://{host}:{port}: there is no broker: {error.strerror or error}"
-            ) from error
         self._client.loop_start()
         if not self._is_on.wait(WAIT_S):
             self._client.loop_stop()

@@ -11,7 +11,7 @@ from typing import Literal, NamedTuple
 
 from fleet2d.bounds import LOG_BYTES, LOG_DAYS, LOG_ROWS, check_file, one_line
 from fleet2d.configuration.units import micros
-from fleet2d.errors import InputError
+from fleet2d.errors import InputError, os_errors_as
 from fleet2d.kernels import F64, I64
 from fleet2d.runtime.clock import DAY_US, Clock, midnight_of
 from fleet2d.storage.bags import is_bag
@@ -39,7 +39,7 @@ def log_lines(path: Path) -> Iterator[tuple[int, str]]:
     Raises:
         LogError: The file can't be read, is not a text file, or is beyond a bound.
     """
-    try:
+    with os_errors_as(LogError, f"{path} can't be read"):
         check_file(path, LOG_BYTES, LogError)
         with path.open(encoding="utf-8", errors="replace") as lines:
             for number, text in enumerate(iter(lambda: lines.readline(_LONGEST), ""), 1):
@@ -51,8 +51,6 @@ def log_lines(path: Path) -> Iterator[tuple[int, str]]:
                     )
                 if stripped := text.strip():
                     yield number, stripped
-    except OSError as error:
-        raise LogError(f"{path} can't be read: {error.strerror or error}") from error
 
 
 class LogError(InputError):

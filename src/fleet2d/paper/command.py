@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from fleet2d.configuration.problems import suggest
-from fleet2d.errors import InputError
+from fleet2d.configuration.problems import check_known
+from fleet2d.errors import InputError, os_errors_as
 
 if TYPE_CHECKING:
     from fleet2d.paper.results import Result
@@ -56,12 +56,8 @@ def reproduce_paper(
 
     names = check_names(results or [], months.RESULTS)
     options = months.PaperOptions(quick, seeds, days, workers or cores(), real_map, out / "studies")
-    try:
+    with os_errors_as(InputError, f"{out} can't be created", "; name another directory by --out"):
         out.mkdir(parents=True, exist_ok=True)  # an error is shown before hours of work
-    except OSError as error:
-        raise InputError(
-            f"{out} can't be created: {error.strerror}; name another directory by --out"
-        ) from error
     can_draw = _can_draw()
     for name in names:
         result = measures[name](options)
@@ -86,8 +82,7 @@ def check_names(names: Sequence[str], known: Sequence[str]) -> list[str]:
         ['speed', 'feedback']
     """
     for name in names:
-        if name not in known:
-            raise InputError(f"there is no result {name!r}{suggest(name, known)}")
+        check_known(name, "result", known, InputError)
     return [name for name in known if name in names or not names]
 
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fleet2d.configuration.documents import read_document
-from fleet2d.errors import ComponentError, InputError
+from fleet2d.errors import ComponentError, InputError, os_errors_as
 from fleet2d.metrics.rtp_score import ALL, GAPS
 from fleet2d.studies.api import study
 from fleet2d.studies.intervals import estimate
@@ -71,12 +71,10 @@ class Result:
 
         path = directory / f"{self.name}.json"
         content = {"result": self.title, "fleet2d": __version__, **self.numbers}
-        try:
+        with os_errors_as(
+            InputError, f"{path} can't be written", "; name another directory by --out"
+        ):
             path.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
-        except OSError as error:
-            raise InputError(
-                f"{path} can't be written: {error.strerror}; name another directory by --out"
-            ) from error
         return path
 
 

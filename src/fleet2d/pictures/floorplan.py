@@ -21,7 +21,7 @@ from matplotlib.patches import PathPatch, Rectangle
 from matplotlib.path import Path as Outline
 from shapely.geometry.base import BaseGeometry
 
-from fleet2d.errors import InputError
+from fleet2d.errors import InputError, os_errors_as
 from fleet2d.floorplan.checkup import Finding
 from fleet2d.floorplan.lattice import UNITS_PER_CELL
 from fleet2d.floorplan.placed_objects import PlacedObject
@@ -252,10 +252,8 @@ def save_figure(figure: Figure, path: Path) -> None:
     unstamped = {DATE_METADATA[path.suffix.lower()]: None}
     content = io.BytesIO()
     apply_theme(figure).savefig(content, format=path.suffix[1:].lower(), metadata=unstamped)
-    try:
+    with os_errors_as(InputError, f"can't write the picture {path}"):
         write_atomically(path, content.getvalue())
-    except OSError as error:
-        raise InputError(f"can't write the picture {path}: {error.strerror}") from error
 
 
 def figure_size(plan: FloorPlan) -> tuple[float, float]:

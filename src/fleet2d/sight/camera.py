@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from fleet2d.configuration.components import OneOf, Settings
-from fleet2d.configuration.problems import problem, problem_at, suggest
+from fleet2d.configuration.problems import check_known, problem, problem_at
 from fleet2d.configuration.units import (
     AngleDeg,
     Duration,
@@ -376,11 +376,7 @@ def _whole(sums: list[int], shares: Mapping[str, float], order: Sequence[str]) -
 
 def _check_users(names: Mapping[str, object], key: str, context: TableContext) -> None:
     for name in names:
-        if name not in context.users:
-            raise ScenarioError(
-                f"{context.path}: perception: {key}: there is no user {name!r}"
-                f"{suggest(name, context.users)}"
-            )
+        check_known(name, "user", context.users, where=f"{context.path}: perception: {key}: ")
 
 
 def _fill_attributes(table: I64, model: Attributes, context: TableContext) -> None:

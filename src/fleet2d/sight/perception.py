@@ -15,7 +15,7 @@ from pydantic import Field, GetJsonSchemaHandler, model_serializer, model_valida
 from pydantic_core import CoreSchema
 
 from fleet2d.configuration.components import CheckNames, NameAsType, OneOf, Settings, register
-from fleet2d.configuration.problems import problem, problem_at
+from fleet2d.configuration.problems import check_known, problem, problem_at
 from fleet2d.configuration.units import AngleDeg, Duration, Length, Share, micros
 from fleet2d.errors import ComponentError
 from fleet2d.floorplan.placed_objects import Posture
@@ -469,8 +469,5 @@ class TakenFor(PerceptionError):
     def _number(sightings: CameraSightings, name: str) -> int:
         if name == UNKNOWN:
             return NOBODY
-        if name not in sightings.users:
-            raise ComponentError(
-                f"taken_for: there is no user {name!r}; there are: {', '.join(sightings.users)}"
-            )
+        check_known(name, "user", sightings.users, ComponentError, "taken_for: ")
         return list(sightings.users).index(name)

@@ -16,7 +16,7 @@ import numpy as np
 from fleet2d import __version__
 from fleet2d.configuration.documents import Document
 from fleet2d.configuration.problems import suggest
-from fleet2d.errors import InputError, ScenarioError
+from fleet2d.errors import InputError, ScenarioError, os_errors_as
 from fleet2d.kernels import I32
 from fleet2d.scenario.compose import apply_changes, assignment, merge
 from fleet2d.scenario.model import Scenario, scenario_of
@@ -60,15 +60,11 @@ class FileHashes:
         Raises:
             InputError: The file can't be read.
         """
-        try:
+        with os_errors_as(InputError, f"{path} can't be read", "; a variant needs it"):
             status = path.stat()
             key = (str(path), status.st_mtime_ns, status.st_size)
             if key not in self._hashes:
                 self._hashes[key] = hashlib.sha256(path.read_bytes()).hexdigest()
-        except OSError as error:
-            raise InputError(
-                f"{path} can't be read: {error.strerror}; a variant needs it"
-            ) from error
         return self._hashes[key]
 
 

@@ -12,7 +12,7 @@ from pathlib import Path
 from statistics import median_high
 from typing import TYPE_CHECKING, Any
 
-from fleet2d.errors import ArtifactError, InputError
+from fleet2d.errors import ArtifactError, InputError, os_errors_as
 from fleet2d.studies.answers import FEW_UNITS, RESIDUAL, holm
 from fleet2d.studies.directory import PairedComparison
 from fleet2d.studies.figures import over_time
@@ -80,13 +80,9 @@ def write_report(study: "Study", folder: Path) -> Path:
 
     if not study.counts.complete:
         raise ArtifactError(f"{study.location} has no complete variant: run it first")
-    try:
+    with os_errors_as(InputError, f"{folder} can't be created", "; name another --out"):
         for name in ("figures", "tables"):
             (folder / name).mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(
-            f"{folder} can't be created: {error.strerror}; name another --out"
-        ) from error
     page = _Page(study, folder)
     with drawing_style():
         content = "\n".join(page.sections())

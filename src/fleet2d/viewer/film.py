@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 from numpy.typing import NDArray
 
-from fleet2d.errors import InputError, extra
+from fleet2d.errors import InputError, extra, os_errors_as
 from fleet2d.kernels import I64, U8
 from fleet2d.pictures.floorplan import drawing_style, figure_size
 from fleet2d.pictures.theme import apply_theme
@@ -188,14 +188,11 @@ def write_film(
 def _store(path: Path, frames: Iterator[tuple[int, U8]], total: int, rate: Fraction) -> None:
     """Write a film under another name, and rename it when it is complete."""
     kind = path.suffix.lower()[1:]
-    try:
-        with partial_file(path) as partial:
-            if kind == "mp4":
-                _write_mp4(partial, frames, total, rate)
-            else:
-                _write_pictures(partial, kind, frames, total, rate)
-    except OSError as error:
-        raise InputError(f"{path} can't be written: {error.strerror or error}") from error
+    with os_errors_as(InputError, f"{path} can't be written"), partial_file(path) as partial:
+        if kind == "mp4":
+            _write_mp4(partial, frames, total, rate)
+        else:
+            _write_pictures(partial, kind, frames, total, rate)
 
 
 def _check(path: Path, speed: float, height: int) -> None:

@@ -18,7 +18,7 @@ import numpy as np
 
 from fleet2d.artifacts.table import categories
 from fleet2d.engine.repeat import decisions_of
-from fleet2d.errors import ArtifactError, InputError, extra
+from fleet2d.errors import ArtifactError, InputError, extra, os_errors_as
 from fleet2d.kernels import TURN
 from fleet2d.runs.run import Run
 from fleet2d.storage.files import path_in, write_atomically
@@ -34,10 +34,8 @@ def write_file(path: Path, content: bytes) -> None:
     Raises:
         InputError: It can't be written.
     """
-    try:
+    with os_errors_as(InputError, f"{path} can't be written"):
         write_atomically(path, content)
-    except OSError as error:
-        raise InputError(f"{path} can't be written: {error.strerror}") from error
 
 
 POSES = "poses"

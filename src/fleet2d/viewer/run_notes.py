@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from fleet2d.errors import InputError
+from fleet2d.errors import InputError, os_errors_as
 from fleet2d.runs.run import Run
 from fleet2d.storage.files import write_atomically
 from fleet2d.viewer.contract import NoteFacts
@@ -52,10 +52,8 @@ def write_notes(run: Run, body: bytes) -> list[NoteFacts]:
     """
     notes, path = checked_notes(body), notes_path(run)
     content = json.dumps(notes, indent=1, ensure_ascii=False).encode()
-    try:
+    with os_errors_as(InputError, f"{path} can't be written"):
         write_atomically(path, content)
-    except OSError as error:
-        raise InputError(f"{path} can't be written: {error.strerror}") from error
     return notes
 
 

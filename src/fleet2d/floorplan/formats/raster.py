@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fleet2d.bounds import PICTURE_BYTES, PIXELS, read_bytes
-from fleet2d.errors import FloorPlanError
+from fleet2d.errors import FloorPlanError, os_errors_as
 from fleet2d.floorplan.formats.foreign import foreign_file
 from fleet2d.kernels import U8, Bool
 
@@ -94,10 +94,8 @@ def read_grey(path: Path) -> GreyPicture:
         FloorPlanError: It can't be read, is damaged, too large or of another kind, or is PNG or
             JPEG and Pillow is not installed.
     """
-    try:
+    with os_errors_as(FloorPlanError, f"the image {path} can't be read"):
         content = read_bytes(path, PICTURE_BYTES, FloorPlanError)
-    except OSError as error:
-        raise FloorPlanError(f"the image {path} can't be read: {error.strerror}") from None
     try:
         if content.startswith((b"P2", b"P5")):
             return _read_pgm(content)

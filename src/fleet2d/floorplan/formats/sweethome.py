@@ -12,7 +12,7 @@ from shapely import LineString, Polygon, affinity
 from fleet2d.bounds import FILE_BYTES, read_bytes
 from fleet2d.configuration.components import register
 from fleet2d.configuration.units import InputPath
-from fleet2d.errors import FloorPlanError
+from fleet2d.errors import FloorPlanError, os_errors_as
 from fleet2d.floorplan.formats.features import Draft, Feature
 from fleet2d.floorplan.formats.files import MAX_COORDINATE_M, in_file
 from fleet2d.floorplan.furniture import FURNITURE
@@ -77,10 +77,8 @@ class SweetHome(FloorPlanSource):
 
 def _parse(path: Path) -> ET.Element:
     """Return the root of an XML file without entities of its own, which could fill the memory."""
-    try:
+    with os_errors_as(FloorPlanError, f"{path} can't be read"):
         content = read_bytes(path, FILE_BYTES, FloorPlanError)
-    except OSError as error:
-        raise FloorPlanError(f"{path} can't be read: {error.strerror}") from None
     if b"<!ENTITY" in content or b"<!DOCTYPE" in content:
         raise FloorPlanError(f"{path} declares entities, which no home of Sweet Home 3D does")
     try:

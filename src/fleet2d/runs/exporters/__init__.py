@@ -19,7 +19,7 @@ import numpy as np
 from pydantic_core import PydanticCustomError
 
 from fleet2d.configuration.units import parse_duration, whole_steps
-from fleet2d.errors import InputError, RunDirectoryError
+from fleet2d.errors import InputError, RunDirectoryError, os_errors_as
 from fleet2d.runs.trajectory import PathReader, Trajectory
 from fleet2d.storage.files import replacing
 
@@ -302,11 +302,12 @@ def new_file(path: Path) -> Iterator[BinaryIO]:
     Raises:
         RunDirectoryError: It can't be written.
     """
-    try:
-        with replacing(path) as handle, os.fdopen(handle, "wb", closefd=False) as file:
-            yield file
-    except OSError as error:
-        raise RunDirectoryError(f"{path} can't be written: {error.strerror or error}") from error
+    with (
+        os_errors_as(RunDirectoryError, f"{path} can't be written"),
+        replacing(path) as handle,
+        os.fdopen(handle, "wb", closefd=False) as file,
+    ):
+        yield file
 
 
 def exporter(name: str) -> Exporter:
