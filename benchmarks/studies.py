@@ -1,7 +1,9 @@
 """How fast studies are: overhead per variant, speed-up by workers, memory of the driver, reading.
 
-    python benchmarks/studies.py                    # all but the thousand months
+    python benchmarks/studies.py                    # all but the next three
     python benchmarks/studies.py months --workers 2 # the paper's 10 x 10 x 10 runs of 30 days
+    python benchmarks/studies.py forecasts          # five studies, alone and beside other programs
+    python benchmarks/studies.py driver --variants 10000000
 
 Run it on a machine that does nothing else.
 """
@@ -13,7 +15,8 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Generator
+from collections.abc import Generator, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +31,8 @@ from fleet2d.studies.executors import (
     WorkerJob,
     WorkerTask,
 )
+from fleet2d.studies.plan import check_setups
+from fleet2d.studies.progress import forecast
 from fleet2d.studies.reader import open_study
 from fleet2d.studies.records import VariantRecord, record_of
 from fleet2d.studies.simulator import VariantOutcome
@@ -106,19 +111,87 @@ def reading(folder: Path) -> None:
     study = {"base": HOUR, "axes": {"robots.astro.speed": speeds}, "replicates": 10}
     run(study, folder / "thousand", InstantExecutor())
     code = (
-        "import time; start_s = time.perf_counter()\n"
+        "import sys, time; start_s, start_core_s = time.perf_counter(), time.process_time()\n"
         "import fleet2d\n"
         f"study = fleet2d.open_study({str(folder / 'thousand')!r})\n"
         "opened = time.perf_counter()\n"
         "study.summary('metric_1.ana.value', ['robots.astro.speed'])\n"
-        "first = time.perf_counter()\n"
+        "first, core_s = time.perf_counter(), time.process_time() - start_core_s\n"
         "again = fleet2d.open_study(study.location)\n"
         "again.summary('metric_1.ana.value', ['robots.astro.speed'])\n"
-        "print(f'opening and aggregating 1,000 variants: {first - start_s:.2f} s with imports,'\n"
-        "      f' {time.perf_counter() - first:.3f} s again')\n"
+        "print(first - start_s, core_s, time.perf_counter() - first)\n"
     )
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
-    subprocess.run([sys.executable, "-c", code], check=True, env=environment)
+    # As installed: pip compiles modules to bytecode unless it is told not to.
+    bytecode = {"PYTHONDONTWRITEBYTECODE": "", "PYTHONPYCACHEPREFIX": str(folder / "bytecode")}
+    paths = {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+    command = [sys.executable, "-c", code]
+    times = []
+    for _ in range(6):  # the first compiles
+        text = subprocess.check_output(command, env={**os.environ, **bytecode, **paths})
+        times.append([float(seconds) for seconds in text.split()])
+    first_s, core_s, again_s = map(min, zip(*times[1:], strict=True))
+    print(
+        f"opening and aggregating 1,000 variants: {first_s:.2f} s with imports ({core_s:.2f} s of a"
+        f" core), {again_s:.3f} s again; best of five"
+    )
+
+
+def forecast_cases() -> dict[str, dict[str, Any]]:
+    """Return studies by name, whose runs are short, long, in many homes, or differ."""
+    speeds = {"robots.astro.speed": [0.3, 0.6]}
+    homes = {"home": {"synthetic": 30, "settings": {"furnish": True}}}
+    mixed = {
+        "simulation.duration": ["2 d", "20 d"],
+        "robot": {
+            "options": {
+                "patrols": {"robots.astro.behaviors": [{"type": "patrol"}]},
+                "waits": {"robots.astro.speed": 0.6},
+            }
+        },
+    }
+
+    def case(duration: str, axes: dict[str, Any], seeds: int, **keys: Any) -> dict[str, Any]:
+        base = {"extends": "bundled:base", "simulation": {"duration": duration}}
+        return {"base": base, "axes": axes, "replicates": seeds, **keys}
+
+    return {
+        "short": case("1 h", speeds, 200),
+        "long": case("90 d", speeds, 6),
+        "many homes": case("2 d", homes, 5),
+        "mixed": case("2 d", mixed, 15),
+        "tables": case("7 d", speeds, 30, keep={"tables": ["observations", "events"]}),
+    }
+
+
+@contextmanager
+def busy(processes: int) -> Iterator[None]:
+    """Keep cores busy by other programs."""
+    command = [sys.executable, "-c", "while True: pass"]
+    others = [subprocess.Popen(command) for _ in range(processes)]
+    try:
+        yield
+    finally:
+        for process in others:
+            process.kill()
+            process.wait()
+
+
+def forecasts(folder: Path, workers: int, cases: list[str]) -> None:
+    """Print how long studies are said to take, and how long they take."""
+    print("| study | other programs | said | taken |\n| --- | ---: | ---: | ---: |")
+    for name in cases:
+        for others in (0, workers):
+            with busy(others):
+                start_s = time.perf_counter()
+                checked = check_study(forecast_cases()[name])
+                executor = LocalExecutor(workers)
+                check_setups(checked.plan, executor)
+                said = forecast(checked.plan, executor, time.perf_counter() - start_s)
+                seconds = run(forecast_cases()[name], folder / f"{name}{others}", executor)
+            low, high = said.shortest.total_seconds(), said.longest.total_seconds()
+            print(
+                f"| {name} | {others} | {low:.0f} to {high:.0f} s | {seconds:.0f} s |", flush=True
+            )
 
 
 def months(folder: Path, workers: int) -> None:
@@ -135,9 +208,10 @@ def months(folder: Path, workers: int) -> None:
 def main() -> None:
     """Measure what is asked for."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parts = ("overhead", "speedup", "driver", "reading", "months")
-    parser.add_argument("what", nargs="*", metavar="|".join(parts), default=parts[:-1])
+    parts = ("overhead", "speedup", "driver", "reading", "forecasts", "months")
+    parser.add_argument("what", nargs="*", metavar="|".join(parts), default=parts[:-2])
     parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--variants", type=int, default=100_000, help="of the driver")
     parser.add_argument("--small", action="store_true", help="few variants: does it work?")
     arguments = parser.parse_args()
     if unknown := set(arguments.what) - set(parts):
@@ -153,7 +227,10 @@ def main() -> None:
             elif name == "speedup":
                 speedup(folder_of, 1 if arguments.small else 5, 1 if arguments.small else 40)
             elif name == "driver":
-                driver(folder_of, 1_000 if arguments.small else 100_000)
+                driver(folder_of, 1_000 if arguments.small else arguments.variants)
+            elif name == "forecasts":
+                cases = ["short"] if arguments.small else [*forecast_cases()]
+                forecasts(folder_of, arguments.workers, cases)
             else:
                 reading(folder_of)
 

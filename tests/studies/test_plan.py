@@ -1,6 +1,5 @@
 """Plans: all variants built and checked, with identities that change with what matters only."""
 
-from collections.abc import Generator
 from pathlib import Path
 from typing import Any
 
@@ -9,26 +8,20 @@ import pytest
 from tests.scenes import OWN
 from tests.studies.scenes import SPEED, base, run, small
 
-from fleet2d.errors import ComponentError, ScenarioError
+from fleet2d.errors import ScenarioError
 from fleet2d.scenario.model import load_scenario
 from fleet2d.studies.design import FileHashes, build_design, code_version, input_hash
 from fleet2d.studies.driver import Observer, check_study
 from fleet2d.studies.executors import (
-    Event,
-    FinishedTask,
     SerialExecutor,
-    TaskSchedule,
-    WorkerJob,
 )
 from fleet2d.studies.plan import (
     PlanSchedule,
     StudyPlan,
     check_setups,
-    forecast,
     make_plan,
     setups_to_check,
 )
-from fleet2d.studies.simulator import RunSpeed
 from fleet2d.studies.specification import read_specification
 
 ATTIC = {"key": "users.ana.start", "values": ["kitchen", "attic", "kitchn"]}
@@ -213,35 +206,6 @@ def test_variants_without_a_metric_are_noted(tmp_path: Path) -> None:
     run(small(rules=rules, keep=keep), tmp_path, observer=Notes())
     assert "3 of 6 complete variants have no metric sightings.*" in notes
     assert not any("distance" in note for note in notes)
-
-
-def test_a_forecast_counts_each_home_and_each_variant() -> None:
-    """Times are made up: what is tested is how they are put together."""
-
-    class Steady(SerialExecutor):
-        """Measures 2 s for a home, 0.5 s for a set-up, and an hour each second."""
-
-        def run(self, job: WorkerJob, tasks: TaskSchedule) -> Generator[Event]:
-            while (task := tasks.take(self)) is not None:
-                yield FinishedTask(task, (RunSpeed(2.0, 0.5, 3600.0), 0.0), 1)
-
-    axes = {"home": {"synthetic": 10}}
-    plan = make_plan(
-        build_design(read_specification(small(base=base("2 h"), axes=axes, replicates=3)))
-    )
-    expected = forecast(plan, Steady())
-    assert 60 * 3600 == pytest.approx(expected.simulated.total_seconds())
-    # Ten homes, built to be checked and to run; thirty variants.
-    assert 2 * 10 * 2 + 30 * (0.5 + 2) == pytest.approx(expected.work.total_seconds())
-    assert expected.by(2) - expected.start == expected.work / 2
-
-
-def test_variants_that_fail_are_no_part_of_a_forecast() -> None:
-    broken = base()
-    broken["robots"]["astro"]["radius"] = 2.0  # wider than the rooms
-    plan = make_plan(build_design(read_specification(small(base=broken))))
-    with pytest.raises(ComponentError, match="all measured variants fail"):
-        forecast(plan, SerialExecutor())
 
 
 def test_a_plan_takes_at_most_48_bytes_a_variant() -> None:

@@ -1,11 +1,26 @@
-"""The time left of a study: right on a simulated clock, whatever runs and workers do."""
+"""How long studies take: said before and while they run, whatever runs and workers do."""
 
 import heapq
+from collections.abc import Generator
 
 import numpy as np
 import pytest
+from tests.studies.scenes import base, small
 
-from fleet2d.studies.progress import MIN_RUNS, TimeLeft
+from fleet2d.errors import ComponentError
+from fleet2d.studies.design import build_design
+from fleet2d.studies.executors import Event, FinishedTask, SerialExecutor, TaskSchedule, WorkerJob
+from fleet2d.studies.plan import StudyPlan, make_plan
+from fleet2d.studies.progress import (
+    MAX_SAMPLES,
+    MIN_RUNS,
+    MIN_SAMPLES,
+    Forecast,
+    TimeLeft,
+    forecast,
+)
+from fleet2d.studies.simulator import RunSpeed
+from fleet2d.studies.specification import read_specification
 
 
 def forecasts(
@@ -57,3 +72,64 @@ def test_half_the_workers_take_twice_as_long() -> None:
     assert four is not None
     assert two is not None
     assert sum(two) == pytest.approx(2 * sum(four), rel=0.05)
+
+
+class Measured(SerialExecutor):
+    """Measures 2 s for a home, and an hour each second after the set-ups that are given [s]."""
+
+    def __init__(self, setups_s: list[float], workers: int = 1, core_share: float = 1.0) -> None:
+        self.setups_s, self.workers, self.core_share = setups_s, workers, core_share
+        self.tasks: list[int] = []
+
+    def run(self, job: WorkerJob, tasks: TaskSchedule) -> Generator[Event]:
+        while (task := tasks.take(self)) is not None:
+            setup_s = self.setups_s[len(self.tasks) % len(self.setups_s)]
+            self.tasks.append(task.index)
+            speed = RunSpeed(2.0, setup_s, 3600.0, core_share=self.core_share)
+            yield FinishedTask(task, speed, 1)
+
+
+def ten_homes() -> StudyPlan:
+    """Thirty variants of two hours, in ten homes."""
+    axes = {"home": {"synthetic": 10}}
+    specification = read_specification(small(base=base("2 h"), axes=axes, replicates=3))
+    return make_plan(build_design(specification))
+
+
+def seconds(said: Forecast) -> tuple[float, float]:
+    return said.shortest.total_seconds(), said.longest.total_seconds()
+
+
+def test_a_forecast_counts_the_checks_each_home_and_each_variant() -> None:
+    said = forecast(ten_homes(), Measured([0.5]), checked_s=5.0)
+    truth_s = 5 + 10 * 2 + 30 * (0.5 + 2)
+    assert 60 * 3600 == pytest.approx(said.simulated.total_seconds())
+    assert (0.9 * truth_s, 1.1 * truth_s) == pytest.approx(seconds(said), abs=0.1)
+
+
+def test_a_forecast_of_two_workers_waits_for_the_last_run() -> None:
+    said = forecast(ten_homes(), Measured([0.5], workers=2))
+    truth_s = (10 * 2 + 30 * 2.5) / 2
+    assert (0.9 * truth_s, 1.1 * truth_s + 1.25) == pytest.approx(seconds(said), abs=0.1)
+
+
+def test_without_other_programs_a_study_is_faster_by_their_share_of_the_cores() -> None:
+    alone, beside = (forecast(ten_homes(), Measured([0.5], core_share=c)) for c in (1.0, 0.25))
+    assert seconds(alone)[0] / 4 == pytest.approx(seconds(beside)[0], abs=0.1)
+    assert seconds(alone)[1] == pytest.approx(seconds(beside)[1], abs=0.1)
+
+
+def test_runs_that_differ_are_measured_until_their_mean_is_known() -> None:
+    alike, differing = Measured([0.5]), Measured([0.5, 40.0])
+    forecast(ten_homes(), alike)
+    low_s, high_s = seconds(forecast(ten_homes(), differing))
+    assert (MIN_SAMPLES, MAX_SAMPLES) == (len(alike.tasks), len(differing.tasks))
+    assert low_s < 10 * 2 + 30 * (20.25 + 2) < high_s
+
+
+def test_variants_that_fail_are_no_part_of_a_forecast() -> None:
+    broken = base()
+    broken["robots"]["astro"]["radius"] = 2.0  # wider than the rooms
+    plan = make_plan(build_design(read_specification(small(base=broken))))
+    with pytest.raises(ComponentError, match="all measured variants fail"):
+        forecast(plan, SerialExecutor())

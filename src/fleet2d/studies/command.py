@@ -5,6 +5,7 @@ import itertools
 import json
 import signal
 import sys
+import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -37,6 +38,7 @@ SlurmParameters = Annotated[
 Where = Annotated[str, typer.Argument(metavar="DIR", help="The folder or store of a study.")]
 MAX_LINES = 10  # of a list that is printed
 MANY_VARIANTS = 20_000
+BUSY = 0.9  # share of a core that workers get, below which other programs are mentioned
 PIVOTED = 4  # columns of a table of two kinds of units, such as homes and seeds
 IDENTITY_START = 6
 """The minimum number of characters of an identity that name a variant."""
@@ -79,10 +81,11 @@ def run(  # noqa: PLR0913 - options of the command line
     from fleet2d.studies.driver import RunOptions, check_study, run_study
     from fleet2d.studies.progress import observing
 
+    begin_s = time.perf_counter()
     with restrict_to(trust, trust_dir):
         checked = check_study(source, _print_size)
         if dry_run:
-            _print_plan(checked, workers)
+            _print_plan(checked, workers, begin_s)
             return
     location = out or default_location(checked.specification.name)
     gc.freeze()  # loaded modules live to the end: the collector needn't scan them
@@ -279,15 +282,16 @@ def _print_size(count: int) -> None:
         _print(f"{count:,} variants: all are checked first, a million takes minutes", err=True)
 
 
-def _print_plan(checked: "CheckedStudy", workers: int | None) -> None:
+def _print_plan(checked: "CheckedStudy", workers: int | None, begin_s: float) -> None:
     """Print the axes, the first variants, and the time that all will take."""
     from fleet2d.studies.executors import LocalExecutor, cores
-    from fleet2d.studies.plan import check_setups, forecast
-    from fleet2d.studies.progress import in_words
+    from fleet2d.studies.plan import check_setups
+    from fleet2d.studies.progress import forecast, in_words
 
     plan = checked.plan
-    count = workers or cores()
-    check_setups(plan, LocalExecutor(count))
+    executor = LocalExecutor(workers or cores())
+    check_setups(plan, executor)
+    checked_s = time.perf_counter() - begin_s
     for column, labels in plan.design.labels.items():
         values = ", ".join(map(str, labels[:MAX_LINES]))
         more = f", … {len(labels)} in all" if len(labels) > MAX_LINES else ""
@@ -297,12 +301,15 @@ def _print_plan(checked: "CheckedStudy", workers: int | None) -> None:
         _print(f"  {plan.design.describe(variant.index)}")
     if len(plan.variants) > MAX_LINES:
         _print(f"  … {len(plan.variants) - MAX_LINES} more")
-    expected = forecast(plan, LocalExecutor(1))
+    expected = forecast(plan, executor, checked_s)
     _print(
         f"\n{len(plan.variants)} variants, {len(plan.variants.home_keys)} homes,"
-        f" {in_words(expected.simulated)} of simulated time: about"
-        f" {in_words(expected.by(count))} by {count} workers here"
+        f" {in_words(expected.simulated)} of simulated time: {in_words(expected.shortest)} to"
+        f" {in_words(expected.longest)} by {executor.workers} workers here"
     )
+    if expected.core_share < BUSY:
+        others = f"{100 * (1 - expected.core_share):.0f} %"
+        _print(f"other programs use {others} of the cores; the shorter time is without them")
 
 
 def _print_failures(location: str) -> None:

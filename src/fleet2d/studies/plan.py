@@ -1,13 +1,10 @@
-"""The plan of a study: its variants, checked and stored, and the time that they will take."""
+"""The plan of a study: its variants, checked and stored."""
 
 import json
 import re
-import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import closing
 from dataclasses import dataclass, field, replace
-from datetime import timedelta
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Self
 
 import numpy as np
@@ -17,14 +14,12 @@ from fleet2d.configuration.problems import did_you_mean, suggest
 from fleet2d.configuration.trust import Trust, current_trust, restrict
 from fleet2d.configuration.units import parse_duration
 from fleet2d.errors import (
-    ComponentError,
     Fleet2DError,
     InputError,
     RunDirectoryError,
     ScenarioError,
 )
 from fleet2d.kernels import F64, I32, Bool
-from fleet2d.runtime.determinism import sum_in_order
 from fleet2d.scenario.model import Scenario
 from fleet2d.studies.axes import Label
 from fleet2d.studies.design import (
@@ -41,14 +36,13 @@ from fleet2d.studies.design import (
 from fleet2d.studies.directory import PLAN, SCENARIOS, MetricFacts, StudyDirectory
 from fleet2d.studies.executors import (
     Executor,
-    FinishedTask,
     LostTask,
     SerialExecutor,
     TaskSchedule,
     WorkerTask,
 )
 from fleet2d.studies.records import VARIANT, array_of, numbers_of
-from fleet2d.studies.simulator import check_setup, is_kept, measure
+from fleet2d.studies.simulator import check_setup, is_kept
 from fleet2d.studies.specification import SEED, StudyFile
 
 if TYPE_CHECKING:
@@ -675,72 +669,3 @@ def write_catalogue(
 def write_plan(directory: StudyDirectory, plan: StudyPlan) -> None:
     """Write the plan of a study."""
     directory.storage.write_batches(PLAN, plan_batches(plan), directory.scratch)
-
-
-SAMPLES = 3
-BUILDS = 2  # of each home: to check the set-ups, and to run
-
-
-@dataclass(frozen=True)
-class Forecast:
-    """The time that a study will take.
-
-    Attributes:
-        simulated: The simulated time of all variants.
-        start: The wall time until workers are ready.
-        work: The wall time of all variants and homes with one worker.
-    """
-
-    simulated: timedelta
-    start: timedelta
-    work: timedelta
-
-    def by(self, workers: int) -> timedelta:
-        """Return the wall time with a number of workers."""
-        return self.start + self.work / max(workers, 1)
-
-
-@dataclass
-class SpeedJob(SetupJob):
-    """Measures the speed of variants, after a warm-up that loads all code."""
-
-    is_warm: bool = False
-
-    def __call__(self, task: WorkerTask) -> Any:
-        """Return the speed of a variant and the wall time of measuring it [s]; None if it fails."""
-        try:
-            with restrict(self.trust):
-                scenario = self.design.scenario(task.index)
-                if not self.is_warm:
-                    measure(scenario, max_s=0.0)
-                    self.is_warm = True
-                start_s = time.perf_counter()
-                return measure(scenario), time.perf_counter() - start_s
-        except Fleet2DError:  # a variant may fail without ending the study
-            return None
-
-
-def forecast(plan: StudyPlan, executor: Executor, samples: int = SAMPLES) -> Forecast:
-    """Measure the speed of some variants in a worker.
-
-    Raises:
-        ComponentError: All measured variants fail.
-    """
-    count = len(plan.variants)
-    numbers = {round(i * (count - 1) / max(samples - 1, 1)) for i in range(samples)}
-    tasks = [WorkerTask(i, plan.variants[i].index, "") for i in sorted(numbers)]
-    begin_s = time.perf_counter()
-    with closing(executor.run(SpeedJob(plan.design), TaskSchedule(tasks))) as events:
-        results = [event.payload for event in events if isinstance(event, FinishedTask)]
-    measured = [result for result in results if result is not None]
-    if not measured:
-        raise ComponentError("all measured variants fail: run one of them with `fleet2d run`")
-    worker_s = time.perf_counter() - begin_s - sum_in_order(seconds for _, seconds in measured)
-    simulated_s = plan.variants.total_simulated_s
-    homes = len(plan.variants.home_keys)
-    start_s = worker_s * (1 + (len(setups_to_check(plan)) > FEW_SETUPS))
-    # The first variant finds its home built by the warm-up.
-    home_s = max(speed.home_s for speed, _ in measured)
-    runs_s = sum_in_order(speed.seconds(simulated_s / count) for speed, _ in measured)
-    work_s = BUILDS * homes * home_s + count * runs_s / len(measured)
-    return Forecast(*(timedelta(seconds=s) for s in (simulated_s, start_s, work_s)))

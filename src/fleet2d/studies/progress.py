@@ -1,15 +1,22 @@
-"""The progress of a study on a terminal: a bar with rate, time left and failures."""
+"""How long a study takes: a forecast before it runs, and a bar with the time left while it does."""
 
 import math
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from datetime import timedelta
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from fleet2d.configuration.trust import restrict
+from fleet2d.errors import ComponentError, Fleet2DError
 from fleet2d.runtime.clock import DAY_S, HOUR_S
 from fleet2d.studies.driver import Observer
+from fleet2d.studies.executors import Executor, FinishedTask, TaskSchedule, WorkerTask, cores
+from fleet2d.studies.plan import SetupJob, StudyPlan
+from fleet2d.studies.simulator import RunSpeed, measure
 
 if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
@@ -21,6 +28,102 @@ if TYPE_CHECKING:
 
 MIN_RUNS = 5  # that have finished before the time left is estimated
 CONFIDENCE = 2.0  # standard errors: 95 %
+MIN_SAMPLES, MAX_SAMPLES = 4, 24  # variants that are measured for a forecast
+MEASURING_S = 15.0  # wall time after which MIN_SAMPLES are enough
+PRECISION = 0.1  # relative error at which they are enough, too
+MODEL_ERROR = 0.1  # of a forecast: the first days of a run differ from the others
+
+
+@dataclass(frozen=True)
+class Forecast:
+    """The time that a study will take.
+
+    Attributes:
+        simulated: The simulated time of all variants.
+        shortest: The wall time if nothing else runs on this machine.
+        longest: The wall time if other programs use the machine as now.
+        core_share: The share of a core that each worker got, 0 to 1.
+    """
+
+    simulated: timedelta
+    shortest: timedelta
+    longest: timedelta
+    core_share: float
+
+
+@dataclass
+class SpeedJob(SetupJob):
+    """Measures the speed of variants, after a warm-up that loads all code."""
+
+    is_warm: bool = False
+
+    def __call__(self, task: WorkerTask) -> Any:
+        """Return the speed of a variant; None if it fails."""
+        try:
+            with restrict(self.trust):
+                scenario = self.design.scenario(task.index)
+                if not self.is_warm:
+                    measure(scenario, max_s=0.0)
+                    self.is_warm = True
+                return measure(scenario)
+        except Fleet2DError:  # a variant may fail without ending the study
+            return None
+
+
+def forecast(plan: StudyPlan, executor: Executor, checked_s: float = 0.0) -> Forecast:
+    """Measure the speed of some variants, on as many workers as will run the study.
+
+    Args:
+        plan: The study.
+        executor: Its workers.
+        checked_s: The wall time of all checks, which come before the runs of a study [s].
+
+    Raises:
+        ComponentError: All measured variants fail.
+    """
+    variants, begin_s = plan.variants, time.perf_counter()
+    count, start_s = len(variants), 0.0
+    random = np.random.Generator(np.random.Philox(0))
+    places = random.choice(count, min(count, MAX_SAMPLES), replace=False)
+    tasks = [WorkerTask(i, variants[i].index, "") for i in places.tolist()]
+    speeds: list[RunSpeed] = []
+    runs_s: list[float] = []
+    with closing(executor.run(SpeedJob(plan.design), TaskSchedule(tasks))) as events:
+        for event in events:
+            speed = event.payload if isinstance(event, FinishedTask) else None
+            if speed is None:
+                continue
+            elapsed_s = time.perf_counter() - begin_s
+            if not speeds:
+                start_s = max(elapsed_s - speed.wall_s, 0.0)
+            speeds.append(speed)
+            runs_s.append(speed.seconds(variants[event.task.number].simulated_s))
+            is_late = elapsed_s - start_s > MEASURING_S
+            if len(runs_s) >= MIN_SAMPLES and (is_late or _error(runs_s, count) < PRECISION):
+                break
+    if not speeds:
+        raise ComponentError("all measured variants fail: run one of them with `fleet2d run`")
+    run_s, workers = float(np.mean(runs_s)), min(executor.workers, count)
+    # The first variant finds its home built by the warm-up.
+    homes_s = len(variants.home_keys) * max(speed.home_s for speed in speeds)
+    wall_s = checked_s + start_s + (homes_s + count * run_s) / workers
+    last_s = max(runs_s) * (1 - 1 / workers)  # the others wait for the last worker
+    core_share = float(np.mean([speed.core_share for speed in speeds]))
+    core_share = min(core_share * max(workers / cores(), 1.0), 1.0)  # not what workers share
+    error = MODEL_ERROR + _error(runs_s, count)
+    return Forecast(
+        timedelta(seconds=variants.total_simulated_s),
+        timedelta(seconds=wall_s * core_share * max(1 - error, 0.0)),
+        timedelta(seconds=wall_s * (1 + error) + last_s),
+        core_share,
+    )
+
+
+def _error(runs_s: list[float], count: int) -> float:
+    """Return the relative error of the mean of some of `count` runs."""
+    n = len(runs_s)
+    deviation = float(np.std(runs_s, ddof=1)) if n > 1 else 0.0
+    return CONFIDENCE * deviation / float(np.mean(runs_s)) * math.sqrt(1 / n - 1 / count)
 
 
 @dataclass

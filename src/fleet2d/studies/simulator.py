@@ -193,11 +193,15 @@ class RunSpeed:
         home_s: Wall time of building its home, which the variants of a home share [s].
         setup_s: Wall time of setting it up in a home that is there, and of closing the run [s].
         speedup: Simulated time over wall time between the two.
+        wall_s: Wall time of measuring it [s].
+        core_share: Processor time over wall time: below 1 as far as other programs run.
     """
 
     home_s: float
     setup_s: float
     speedup: float
+    wall_s: float = 0.0
+    core_share: float = 1.0
 
     def seconds(self, simulated_s: float) -> float:
         """Return the wall time of a run in a home that is there [s]."""
@@ -214,7 +218,7 @@ def measure(scenario: Scenario, max_s: float = 2.0) -> RunSpeed:
     Raises:
         Fleet2DError: The scenario is wrong, or a component failed.
     """
-    start_s = time.perf_counter()
+    start_s, start_core_s = time.perf_counter(), time.process_time()
     Simulation(scenario)
     built_s = time.perf_counter()
     simulation = Simulation(scenario)
@@ -225,9 +229,12 @@ def measure(scenario: Scenario, max_s: float = 2.0) -> RunSpeed:
     end_s = time.perf_counter()
     done_s = simulation.step * simulation.clock.step_us / 1e6
     simulation.finish("interrupted")
-    setup_s = ready_s - built_s
+    setup_s, finished_s = ready_s - built_s, time.perf_counter()
+    wall_s = finished_s - start_s
     return RunSpeed(
         max(built_s - start_s - setup_s, 0.0),
-        setup_s + time.perf_counter() - end_s,
+        setup_s + finished_s - end_s,
         done_s / max(end_s - ready_s, 1e-6),
+        wall_s,
+        min((time.process_time() - start_core_s) / wall_s, 1.0),
     )
