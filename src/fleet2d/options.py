@@ -15,6 +15,15 @@ Resolution = Annotated[
     typer.Option(help="Metres per pixel, for a floor plan that is a picture without a scale."),
 ]
 
+Scale = Annotated[
+    float | None,
+    typer.Option(
+        min=1e-6,
+        max=1000,
+        help="What lengths of a floor plan are multiplied by, such as 0.001 for millimetres.",
+    ),
+]
+
 ThemeChoice = Annotated[
     Literal["light", "dark"], typer.Option(help="Theme of pictures: a light or a dark background.")
 ]

@@ -5,13 +5,16 @@ from collections.abc import Callable, Collection
 from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from fleet2d.cli.__main__ import entries
 from fleet2d.errors import InputError
-from fleet2d.options import Resolution, file_name, split
+from fleet2d.options import Resolution, Scale, file_name, split
+
+if TYPE_CHECKING:
+    from fleet2d.floorplan.plan import FloorPlan
 
 
 def validate(
@@ -29,9 +32,10 @@ def validate(
         float, typer.Option(min=0.01, max=5, help="Radius of the robot for a floor plan [m].")
     ] = 0.15,
     resolution: Resolution = None,
+    scale: Scale = None,
 ) -> None:
     """Check a scenario, with the places of all people and robots; or a floor plan."""
-    from fleet2d.floorplan.load import is_floorplan
+    from fleet2d.floorplan.load import is_floorplan, load_floorplan
 
     scenario, overrides = split(arguments)
     if scenario is not None and is_floorplan(scenario):
@@ -40,7 +44,8 @@ def validate(
                 f"{scenario} is a floor plan, and {overrides[0]} changes a scenario: leave it out,"
                 " or name a scenario"
             )
-        _check_floorplan(scenario, out, radius, resolution)
+        plan = load_floorplan(scenario, resolution=resolution, scale=scale)
+        _check_floorplan(plan, out, radius)
         return
     from fleet2d.engine.simulation import Simulation
 
@@ -62,17 +67,13 @@ def validate(
                 typer.echo(f"note: {actor.path}: {note}")
 
 
-def _check_floorplan(
-    source: str, out: Path | None, radius: float, resolution: float | None
-) -> None:
+def _check_floorplan(plan: "FloorPlan", out: Path | None, radius: float) -> None:
     """Print the findings of a floor plan and draw them; exit with 2 if it is unlivable.
 
     Without matplotlib there is no picture, which is an error only if one is asked for.
     """
     from fleet2d.floorplan.checkup import checkup
-    from fleet2d.floorplan.load import load_floorplan
 
-    plan = load_floorplan(source, resolution=resolution)
     findings = checkup(plan, radius)
     picture = str(out or Path(f"{file_name(plan.name) or 'plan'}-checkup.png"))
     try:
@@ -112,6 +113,7 @@ def convert(
         typer.Argument(help="The floor plan (.json, .yaml, .geojson) or the scenario to write."),
     ],
     resolution: Resolution = None,
+    scale: Scale = None,
 ) -> None:
     """Turn a floor plan into Fleet2D's own format, or a published configuration into a scenario."""
     from fleet2d.floorplan.load import is_floorplan, load_floorplan
@@ -119,7 +121,7 @@ def convert(
     if is_floorplan(source):
         from fleet2d.floorplan.load import save_floorplan
 
-        plan = load_floorplan(source, resolution=resolution)
+        plan = load_floorplan(source, resolution=resolution, scale=scale)
         save_floorplan(plan, target)
         notes = list(plan.notes)
     else:

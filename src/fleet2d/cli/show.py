@@ -9,6 +9,7 @@ from fleet2d.configuration.problems import refusal, suggest
 from fleet2d.errors import InputError, RunDirectoryError
 from fleet2d.options import (
     Resolution,
+    Scale,
     ThemeChoice,
     TrustFiles,
     TrustFolders,
@@ -71,6 +72,7 @@ def show(  # noqa: PLR0913 - options of the command line
     ] = None,
     out: Annotated[Path | None, typer.Option(help="Picture to write, .png, .svg or .pdf.")] = None,
     resolution: Resolution = None,
+    scale: Scale = None,
     layer: Annotated[
         str | None, typer.Option(help="Of a run: draw this layer, such as explored.astro.")
     ] = None,
@@ -114,7 +116,7 @@ def show(  # noqa: PLR0913 - options of the command line
             for line in show_diary(None if source is None else str(source), out, days, seed):
                 typer.echo(line)
         else:
-            typer.echo(_draw(source, out, picture, fov, resolution))
+            typer.echo(_draw(source, out, picture, fov, resolution=resolution, scale=scale))
 
 
 class RunPicture(NamedTuple):
@@ -147,7 +149,7 @@ def _draw(
     out: Path | None,
     picture: RunPicture,
     fov: str | None,
-    resolution: float | None,
+    **lengths: float | None,
 ) -> Path:
     """Draw a run or a floor plan; return the path of the picture."""
     if picture.step is not None and picture.layer is None:
@@ -169,7 +171,7 @@ def _draw(
             f"there is no {source}: give the directory of a run (what --out named), a floor plan's"
             " file, synthetic:SEED, or family_home"
         )
-    return _draw_floorplan(source, out, fov, resolution)
+    return _draw_floorplan(source, out, fov, **lengths)
 
 
 def _draw_run(directory: Path, out: Path | None, picture: RunPicture) -> Path:
@@ -211,13 +213,13 @@ def _draw_run(directory: Path, out: Path | None, picture: RunPicture) -> Path:
 
 
 def _draw_floorplan(
-    source: Path | None, out: Path | None, fov: str | None, resolution: float | None
+    source: Path | None, out: Path | None, fov: str | None, **lengths: float | None
 ) -> Path:
     """Draw a floor plan, or a field of view in it; return the path of the picture."""
     from fleet2d.floorplan.load import load_floorplan
     from fleet2d.pictures.floorplan import draw_floorplan
 
-    plan = load_floorplan(source, resolution=resolution) if source else load_floorplan()
+    plan = load_floorplan(source or "family_home", **lengths)
     target = out or Path(f"{file_name(plan.name) or 'plan'}.png")
     if fov is not None:
         from fleet2d.pictures.layers import draw_fov, parse_pose

@@ -1,15 +1,18 @@
 """The check-up of a floor plan: errors and anomalies, and their places."""
 
 from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 import shapely
+from shapely import affinity
 from shapely.geometry.base import BaseGeometry
 
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.home import Home
+from fleet2d.floorplan.lattice import UNITS
 from fleet2d.floorplan.placed_objects import PlacedObject, Point
 from fleet2d.floorplan.plan import FloorPlan, Room
 from fleet2d.floorplan.rooms.room import UNKNOWN, LabelledRegion
@@ -25,20 +28,17 @@ PERSON_RADIUS = 0.2
 HOME_M2 = (8.0, 2000.0)
 """Least and largest area of a home."""
 
-# Units that a file may have instead of metres, and their length [m].
-OTHER_UNITS = (
-    ("centimetres", 0.01),
-    ("millimetres", 0.001),
-    ("inches", 0.0254),
-    ("feet", 0.3048),
-    ("pixels of 5 cm", 0.05),
-)
 LIKELY_M2 = (25.0, 400.0)
+# Area of a home and median area of its rooms from which on it may be in feet, unless doors are as
+# wide as usual.
+LARGE_M2, LARGE_ROOM_M2 = 350.0, 40.0
 ROOM_M2 = (0.8, 200.0)  # median area of a home's rooms
 TINY_ROOM_M2 = 0.5
 SPECK_M2 = 0.02  # minimum area of a pillar
 PART_M2 = 0.5  # minimum area of floor whose loss matters
 DOOR_M = (0.5, 1.6)  # median width of a home's doors
+# Usual median, the fewest doors that tell a scale, and how near to the usual width they must be.
+USUAL_DOOR_M, FEWEST_DOORS, DOOR_FACTOR = 0.85, 3, 1.4
 WIDEST_DOOR_M = 2.0
 # How far labels may reach over the outer walls, and which share of them may lie farther out.
 MAX_OVER_WALLS_M = 0.3
@@ -121,31 +121,68 @@ def errors_in(home: Home, radii: Iterable[float]) -> list[str]:
 
 
 def _scale(plan: FloorPlan) -> Iterator[Finding]:
-    area = plan.area_m2
+    """Find an unlikely size of the home, its rooms or its doors, and the unit that explains it."""
+    area, widths = plan.area_m2, sorted(door.width_m for door in plan.doorways if door.leaf)
+    rooms = sorted(room.area_m2 for room in plan.rooms if room.type != UNKNOWN)
+    door = widths[len(widths) // 2] if len(widths) >= FEWEST_DOORS else None
+    room = rooms[len(rooms) // 2] if len(rooms) >= FEWEST_DOORS else None
+    severity: Severity = "odd"
     if not HOME_M2[0] <= area <= HOME_M2[1]:
-        size = "small" if area < HOME_M2[0] else "large"
-        yield Finding(
-            "scale",
-            "wrong",
-            f"{area:,.1f} m2 is very {size} for a home: is the plan in metres?{_guess(area)}",
-        )
+        text = f"{area:,.1f} m2 is very {'small' if area < HOME_M2[0] else 'large'} for a home"
+        severity = "wrong"
+    elif door is not None and not DOOR_M[0] <= door <= DOOR_M[1]:
+        text = f"half of the doors are about {door:.2f} m wide or {'less' if door < 1 else 'more'}"
+    elif room is not None and not ROOM_M2[0] <= room <= ROOM_M2[1]:
+        text = f"half of the rooms are {'smaller' if rooms[0] < 1 else 'larger'} than {room:.1f} m2"
+    elif door is None and area > LARGE_M2 and (room or area) > LARGE_ROOM_M2:
+        text = f"{area:,.1f} m2 without three doors is large for a home"
+    else:
         return
-    areas = sorted(room.area_m2 for room in plan.rooms if room.type != UNKNOWN)
-    if len(areas) >= 3 and not ROOM_M2[0] <= areas[len(areas) // 2] <= ROOM_M2[1]:
-        yield Finding(
-            "scale",
-            "odd",
-            f"half of the rooms are {'smaller' if areas[0] < 1 else 'larger'} than"
-            f" {areas[len(areas) // 2]:.1f} m2: is the plan in metres?",
-        )
+    likely = _unit_by_doors(plan, door)
+    if likely is not None:
+        unit, doors = likely
+        text += f": by the width of {doors} doors the plan is in {unit}: {_rescaled(plan, unit)}"
+        yield Finding("scale", "wrong", text)
+    else:
+        fits = [f"if in {u}: {_rescaled(plan, u)}" for u in UNITS if _is_likely(plan, u)]
+        guess = "".join(f"; {fit}" for fit in fits)
+        yield Finding("scale", severity, f"{text}: is the plan in metres?{guess}")
 
 
-def _guess(area: float) -> str:
-    """Return a hint about the unit in which the numbers would make a plausible home."""
-    for unit, metres in OTHER_UNITS:
-        if LIKELY_M2[0] <= area * metres**2 <= LIKELY_M2[1]:
-            return f" It looks like {unit} ({area * metres**2:.0f} m2)"
-    return ""
+def _rescaled(plan: FloorPlan, unit: str) -> str:
+    scale = UNITS[unit]
+    area = plan.area_m2 * scale**2
+    return f"floorplan.scale={scale:g} (or --scale {scale:g}) makes it {area:.0f} m2"
+
+
+def _is_likely(plan: FloorPlan, unit: str) -> bool:
+    return LIKELY_M2[0] <= plan.area_m2 * UNITS[unit] ** 2 <= LIKELY_M2[1]
+
+
+def _unit_by_doors(plan: FloorPlan, door: float | None) -> tuple[str, int] | None:
+    """Return the unit in which doors are as wide as usual, and the number of these doors.
+
+    Args:
+        plan: The plan.
+        door: The median width of its doors in the present unit; None if it has too few: then they
+            are sought in the walls, in units that make the plan a home.
+    """
+
+    def misfit(width: float) -> float:
+        return max(width / USUAL_DOOR_M, USUAL_DOOR_M / width)
+
+    found: list[tuple[float, str, int]] = []
+    for unit, metres in UNITS.items():
+        widths = [door.width_m * metres for door in plan.doorways if door.leaf]
+        if door is None and _is_likely(plan, unit):
+            free = affinity.scale(plan.free_space, metres, metres, origin=(0, 0))
+            with suppress(FloorPlanError):
+                scaled = FloorPlan.build(plan.name, free, doorways=None, regions_are="none")
+                widths = [doorway.width_m for doorway in scaled.doorways]
+        if len(widths) >= FEWEST_DOORS:
+            found.append((misfit(sorted(widths)[len(widths) // 2]), unit, len(widths)))
+    error, unit, doors = min(found, default=(DOOR_FACTOR, "", 0))
+    return (unit, doors) if error < DOOR_FACTOR else None
 
 
 def _parts(plan: FloorPlan) -> Iterator[Finding]:
@@ -267,9 +304,8 @@ def _doors(plan: FloorPlan) -> Iterator[Finding]:
             ((x0 + x1) / 2, (y0 + y1) / 2),
             shapely.LineString([line.start, line.end]),
         )
-    doors = [door for door in plan.doorways if door.leaf]
-    for door in doors:
-        if door.width_m > WIDEST_DOOR_M:
+    for door in plan.doorways:
+        if door.leaf and door.width_m > WIDEST_DOOR_M:
             yield Finding(
                 "door",
                 "odd",
@@ -277,14 +313,6 @@ def _doors(plan: FloorPlan) -> Iterator[Finding]:
                 _middle(door.start, door.end),
                 shapely.LineString([door.start, door.end]),
             )
-    widths = sorted(door.width_m for door in doors)
-    if len(widths) >= 3 and not DOOR_M[0] <= widths[len(widths) // 2] <= DOOR_M[1]:
-        yield Finding(
-            "scale",
-            "odd",
-            f"half of the doors are about {widths[len(widths) // 2]:.2f} m wide or"
-            f" {'less' if widths[len(widths) // 2] < 1 else 'more'}: is the plan in metres?",
-        )
 
 
 # --- Routes ---------------------------------------------------------------------------------------

@@ -24,6 +24,46 @@ COORDINATE_LIMIT = 2**20
 MAX_CELLS = 20_000_000
 
 
+# Units that a file may have instead of metres, and the length of each [m].
+UNITS = {
+    "millimetres": 0.001,
+    "centimetres": 0.01,
+    "inches": 0.0254,
+    "pixels of 5 cm": 0.05,
+    "decimetres": 0.1,
+    "feet": 0.3048,
+    "tens of metres": 10.0,
+    "hundreds of metres": 100.0,
+    "kilometres": 1000.0,
+}
+# Length of a home's longer side [m].
+SIDE_M = (4.0, 80.0)
+
+
+def unit_hint(size: tuple[float, float]) -> str:
+    """Return the end of a sentence on a plan of an unlikely size: the units that would explain it.
+
+    Args:
+        size: Its width and height [m].
+
+    Example:
+        >>> unit_hint((11_400, 8_200))
+        ': floorplan.scale=0.001 if it is in millimetres (11.4 m x 8.2 m)'
+        >>> unit_hint((11.4, 8.2))
+        ''
+    """
+    width, height = size
+    if SIDE_M[0] <= max(size) <= SIDE_M[1]:
+        return ""
+    likely = [
+        f"floorplan.scale={metres:g} if it is in {unit} ({width * metres:.1f} m x"
+        f" {height * metres:.1f} m)"
+        for unit, metres in UNITS.items()
+        if SIDE_M[0] <= max(size) * metres <= SIDE_M[1]
+    ]
+    return f": {', '.join(likely)}" if likely else ""
+
+
 @dataclass(frozen=True)
 class Lattice:
     """A square grid of cells over a floor plan, 64 lattice units to the side of a cell.
@@ -54,21 +94,22 @@ class Lattice:
     def __post_init__(self) -> None:
         check_cell(self.cell)
         if UNITS_PER_CELL * max(self.columns, self.rows) >= COORDINATE_LIMIT:
-            width, height = self.columns * self.cell, self.rows * self.cell
+            width, height = self.size
             raise FloorPlanError(
                 f"the floor plan is {width:.0f} m x {height:.0f} m, too large for cells of"
                 f" {self.cell:g} m (at most {COORDINATE_LIMIT // UNITS_PER_CELL - 1} cells a side):"
                 f" set floorplan.cell to {_smallest_cell(max(width, height)):g} or more,"
-                " and check that the file is in metres"
+                f" and check that the file is in metres{unit_hint(self.size)}"
             )
         if self.columns * self.rows > MAX_CELLS:
-            width, height = self.columns * self.cell, self.rows * self.cell
+            width, height = self.size
             fits = math.ceil(100 * math.sqrt(width * height / MAX_CELLS)) / 100
             millions, most = self.columns * self.rows / 1e6, MAX_CELLS / 1e6
             raise FloorPlanError(
                 f"the floor plan is {width:.0f} m x {height:.0f} m: {millions:.0f} million cells of"
                 f" {self.cell:g} m, and at most {most:.0f} million fit into 1 GB of memory:"
                 f" set floorplan.cell to {fits:g} or more, and check that the file is in metres"
+                f"{unit_hint(self.size)}"
             )
 
     @classmethod
@@ -96,6 +137,11 @@ class Lattice:
             columns=last[0] - first[0],
             rows=last[1] - first[1],
         )
+
+    @property
+    def size(self) -> tuple[float, float]:
+        """Its width and height [m]."""
+        return self.columns * self.cell, self.rows * self.cell
 
     @cached_property
     def units_per_m(self) -> float:

@@ -33,7 +33,11 @@ SYNTHETIC = re.compile(r"synthetic:(0|[1-9][0-9]{0,17})", re.ASCII)
 
 
 def load_floorplan(
-    plan: str | Path = "family_home", cell: float | None = None, *, resolution: float | None = None
+    plan: str | Path = "family_home",
+    cell: float | None = None,
+    *,
+    resolution: float | None = None,
+    scale: float | None = None,
 ) -> FloorPlan:
     """Read a floor plan.
 
@@ -42,6 +46,8 @@ def load_floorplan(
             `synthetic:` and the seed of a synthetic one.
         cell: Side of a grid cell [m]; None for 0.05, or for the side of the pixels of a map.
         resolution: Side of a pixel [m] of a picture without a YAML file.
+        scale: What lengths are multiplied by, such as 0.001 for millimetres; None for 1, or what
+            the file says.
 
     Raises:
         FloorPlanError: There is no such plan, or it can't be read.
@@ -53,26 +59,26 @@ def load_floorplan(
     names = bundled_names()
     path, usual = Path(plan), DEFAULT_CELL_M if cell is None else cell
     if path.suffix.lower() in IMAGES and path.is_file():
-        return _load_image(path, resolution, cell)
+        return _load_image(path, resolution, cell, scale)
     if resolution is not None:
         raise FloorPlanError(
             f"{plan} is not a picture: leave out --resolution, because the file contains lengths"
         )
     if str(plan) in names:
-        return read_bundled(str(plan), usual)
+        return read_bundled(str(plan), usual, scale)
     seed = SYNTHETIC.fullmatch(str(plan))
     if seed is not None:
-        return _load_by("synthetic", seed=int(seed[1]), cell=usual)
+        return _load_by("synthetic", seed=int(seed[1]), cell=usual, scale=scale)
     if not path.exists() and path.suffix == "" and path.name == str(plan):
         raise FloorPlanError(
             f"there is no floor plan file {str(plan)!r}, and no bundled home of that name"
             f"{suggest(plan, names, 'Bundled homes')}; synthetic ones:"
             " synthetic:0, synthetic:1, …"
         )
-    return _load_document(path, cell)
+    return _load_document(path, cell, scale)
 
 
-def _load_document(path: Path, cell: float | None) -> FloorPlan:
+def _load_document(path: Path, cell: float | None, scale: float | None) -> FloorPlan:
     """Read a file whose ending or content determines its format."""
     kind, content = format_by_suffix(path), {}
     if kind is None:
@@ -81,8 +87,8 @@ def _load_document(path: Path, cell: float | None) -> FloorPlan:
     if kind is None:
         raise _unknown_format(path, content)
     if kind == "native":
-        return native_plan(content, path, DEFAULT_CELL_M if cell is None else cell)
-    return _load_by(kind, path=path, cell=cell)
+        return native_plan(content, path, DEFAULT_CELL_M if cell is None else cell, scale)
+    return _load_by(kind, path=path, cell=cell, scale=scale)
 
 
 def _load_by(kind: str, **settings: Any) -> FloorPlan:
@@ -212,7 +218,9 @@ def _marks() -> list[tuple[str, tuple[str, str | None]]]:
     return [(kind, mark) for kind, source in sources for mark in getattr(source, "marks", ())]
 
 
-def _load_image(path: Path, resolution: float | None, cell: float | None) -> FloorPlan:
+def _load_image(
+    path: Path, resolution: float | None, cell: float | None, scale: float | None
+) -> FloorPlan:
     if resolution is None:
         from fleet2d.floorplan.formats.drawing import guess_resolution
 
@@ -223,7 +231,7 @@ def _load_image(path: Path, resolution: float | None, cell: float | None) -> Flo
             f" robot, such as {path.with_suffix('.yaml').name}; of a drawing, give the metres per"
             f" pixel as resolution{by_doors}"
         )
-    return _load_by("image", path=path, resolution=resolution, cell=cell)
+    return _load_by("image", path=path, resolution=resolution, cell=cell, scale=scale)
 
 
 _NUMBER = r"[-+.\deE]+"

@@ -10,7 +10,7 @@ from shapely.geometry.base import BaseGeometry
 
 from fleet2d.bounds import CROSSINGS
 from fleet2d.errors import FloorPlanError
-from fleet2d.floorplan.lattice import COORDINATE_LIMIT, Lattice
+from fleet2d.floorplan.lattice import COORDINATE_LIMIT, Lattice, unit_hint
 from fleet2d.kernels import I32, I64, SUB, WALL, Mesh
 from fleet2d.runtime.determinism import sum_in_order
 
@@ -435,7 +435,7 @@ def free_on_lattice(
     if not snapped.polygons:
         raise FloorPlanError(
             f"nothing is left of {name} ({free.area:.3g} m2) at cells of {cell:g} m: choose a"
-            " smaller floorplan.cell, and check that the file is in metres"
+            f" smaller floorplan.cell, and check that the file is in metres{unit_hint(first.size)}"
         )
     if abs(snapped.area_change) > snapped.tolerance:
         change = snapped.area_change / first.units_per_m**2

@@ -13,14 +13,16 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 from shapely import MultiPolygon, Polygon
+from shapely.geometry.base import BaseGeometry
 
 from fleet2d.bounds import CORNERS, POLYGONS
 from fleet2d.errors import FloorPlanError
-from fleet2d.floorplan.lattice import Lattice
+from fleet2d.floorplan.lattice import Lattice, unit_hint
 from fleet2d.floorplan.mesh import build_mesh, canonical_order, free_on_lattice, part_notes
 from fleet2d.floorplan.placed_objects import (
     PlacedObject,
     Portal,
+    UsePlace,
     describe_object,
     find_named,
     number_objects,
@@ -102,6 +104,28 @@ def read_only(array: A) -> A:
     return array
 
 
+def _scaled(part: Any, scale: float) -> Any:
+    """Return a part of a home, or a sequence of parts, with all lengths on the floor multiplied."""
+    match part:
+        case BaseGeometry():
+            return shapely.transform(part, lambda xy: xy * scale)
+        case LabelledRegion():
+            return replace(part, shape=_scaled(part.shape, scale))
+        case DoorLine():
+            return replace(part, start=_scaled(part.start, scale), end=_scaled(part.end, scale))
+        case PlacedObject():
+            footprint, uses = _scaled(part.footprint, scale), _scaled(part.uses, scale)
+            return replace(part, footprint=footprint, uses=uses)
+        case UsePlace():
+            x, y = _scaled((part.x, part.y), scale)
+            return replace(part, x=x, y=y, approach=_scaled(part.approach, scale))
+        case float() | int():
+            return part * scale
+        case None:
+            return None
+    return tuple(_scaled(item, scale) for item in part)
+
+
 __all__ = ["FloorPlan", "LabelledRegion", "Room"]
 
 
@@ -168,6 +192,7 @@ class FloorPlan:
         objects: Sequence[PlacedObject] = (),
         no_go: Sequence[Polygon] = (),
         notes: Sequence[str] = (),
+        scale: float | None = None,
     ) -> Self:
         """Make a floor plan of free space and labels, both in metres.
 
@@ -186,11 +211,17 @@ class FloorPlan:
             objects: Furniture and devices [m].
             no_go: Areas that robots keep out of [m].
             notes: Sentences on anomalies in the source.
+            scale: What all lengths but the cell and heights are multiplied by; None for 1.
 
         Raises:
             FloorPlanError: There is no free space at this cell size, it would lose more area than
                 rounding explains, it is too large, or the entrance is not in it.
         """
+        if scale is not None and scale != 1:
+            free, regions, objects, no_go = (
+                _scaled(part, scale) for part in (free, regions, objects, no_go)
+            )
+            entrance, doorways = _scaled(entrance, scale), _scaled(doorways, scale)
         lines = list(doorways or ())
         POLYGONS.check(len(regions) + len(objects) + len(lines), "it", FloorPlanError)
         shapes = [free, *(region.shape for region in regions), *(o.footprint for o in objects)]
@@ -206,7 +237,7 @@ class FloorPlan:
         if not cells.any():
             raise FloorPlanError(
                 f"the free space of {name} holds no cell of {cell:g} m: choose a smaller"
-                " floorplan.cell, and check that the file is in metres"
+                f" floorplan.cell, and check that the file is in metres{unit_hint(lattice.size)}"
             )
         room_of_cell, rooms, room_notes = divide(
             lattice, polygons, mesh, cells, regions, regions_are, passages

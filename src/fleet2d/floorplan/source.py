@@ -25,6 +25,7 @@ from fleet2d.configuration.units import (
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.costmap import CostmapSettings
 from fleet2d.floorplan.furniture import FURNITURE, stand_furniture
+from fleet2d.floorplan.lattice import MAX_CELL_M, MIN_CELL_M
 from fleet2d.floorplan.layers import LayerSettings, check_layers
 from fleet2d.floorplan.placed_objects import Blocks, PlacedObject, Portal, number_objects
 from fleet2d.floorplan.plan import Cache, FloorPlan
@@ -327,11 +328,17 @@ def keep_plans(count: int) -> None:
     _PLANS.grow(count)
 
 
+# Largest `scale`: of a file in kilometres.
+MAX_SCALE = 1000.0
+
+
 class FloorPlanSource(Component):
     """A source of a floor plan.
 
     Attributes:
         cell: Side of a grid cell, 0.01 m to 1 m.
+        scale: What lengths of the source are multiplied by, such as 0.001 for millimetres; left
+            out: 1, or what the file says.
         rooms: Rooms to name, retype or draw, beyond what the source says.
         furniture: Pieces to place in the home.
         furnish: Furnish rooms without furniture by rule, by their types.
@@ -351,6 +358,7 @@ class FloorPlanSource(Component):
     suffixes: ClassVar[tuple[str, ...]] = ()
 
     cell: Length = 0.05
+    scale: float | None = Field(default=None, gt=0, le=MAX_SCALE)
     rooms: tuple[RoomCorrection, ...] = Field(
         default=(), examples=[[{"at": [2.5, 1.0], "name": "den", "type": "office"}]]
     )
@@ -425,7 +433,7 @@ class PixelSource(FloorPlanSource):
         """Return the side of a cell [m] that suits the pixels.
 
         Args:
-            settings: The settings in the scenario; only `path` is validated already.
+            settings: The settings in the scenario; only `path` and `scale` are validated already.
 
         Raises:
             FloorPlanError: The file can't be read.
@@ -440,6 +448,8 @@ class PixelSource(FloorPlanSource):
             return data
         try:
             path = TypeAdapter(InputPath).validate_python(data["path"])
-            return {**data, "cell": cls.usual_cell({**data, "path": path})}
+            scale = TypeAdapter(float).validate_python(data.get("scale") or 1.0)
+            cell = cls.usual_cell({**data, "path": path, "scale": scale})
+            return {**data, "cell": min(max(cell, MIN_CELL_M), MAX_CELL_M)}
         except (ValidationError, FloorPlanError):
             return data

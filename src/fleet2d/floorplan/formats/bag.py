@@ -14,7 +14,6 @@ from fleet2d.configuration.units import InputFileOrFolder
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.formats.cleaning import OccupancyMap
 from fleet2d.floorplan.formats.occupancy import OccupancySource
-from fleet2d.floorplan.lattice import MIN_CELL_M
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.kernels import I8
 from fleet2d.storage.bags import open_bag, planar
@@ -54,8 +53,7 @@ class BagMap(OccupancySource):
     @classmethod
     def usual_cell(cls, settings: Mapping[str, Any]) -> float:
         """Return the map's resolution."""
-        grid = _read(Path(settings["path"]), settings.get("topic"))
-        return max(grid.resolution, MIN_CELL_M)
+        return _read(Path(settings["path"]), settings.get("topic"), settings["scale"]).resolution
 
     def files(self) -> list[Path]:
         """Return the files of the bag."""
@@ -69,7 +67,7 @@ class BagMap(OccupancySource):
         Raises:
             FloorPlanError: The bag can't be read, or has no map, or the map has no home.
         """
-        grid = _read(self.path, self.topic)
+        grid = _read(self.path, self.topic, self.scale or 1.0)
         x, y, heading = grid.origin
         # Rounded, so that the last bit of a machine's cosine doesn't matter, and for quarter turns.
         turn = (round(math.cos(heading), 12), round(math.sin(heading), 12))
@@ -86,7 +84,7 @@ class BagMap(OccupancySource):
         return self.build(home, grid.resolution, f"map of a bag, {self.path.name}", notes)
 
 
-def _read(path: Path, topic: str | None) -> _Grid:
+def _read(path: Path, topic: str | None, scale: float) -> _Grid:
     """Return the last map of a topic.
 
     Raises:
@@ -108,12 +106,14 @@ def _read(path: Path, topic: str | None) -> _Grid:
         (_, _, data), *_ = deque(reader.messages([connection]), maxlen=1)
         message = reader.deserialize(data, connection.msgtype)
     info = message.info
-    rows, columns, side = int(info.height), int(info.width), float(np.float32(info.resolution))
+    rows, columns = int(info.height), int(info.width)
+    side = float(np.float32(info.resolution)) * scale
     cells = np.asarray(message.data, np.int8)
     if len(cells) != rows * columns or not rows * columns or not 0 < side <= 1:
         raise FloorPlanError(
             f"{path}: the map of {topic} is damaged: {len(cells)} cells for {columns} × {rows} of"
             f" {side:g} m"
         )
-    origin = planar(info.origin.position, info.origin.orientation)
+    x, y, heading = planar(info.origin.position, info.origin.orientation)
+    origin = (x * scale, y * scale, heading)
     return _Grid(cells.reshape(rows, columns), round(side, 6), origin, topic, connection.msgcount)

@@ -21,7 +21,7 @@ from fleet2d.floorplan.formats.drawn_walls import (
 from fleet2d.floorplan.formats.files import in_file
 from fleet2d.floorplan.formats.occupancy import OBJECT_M2, PictureSource
 from fleet2d.floorplan.formats.raster import GreyPicture, read_grey
-from fleet2d.floorplan.lattice import MAX_CELL_M, MIN_CELL_M
+from fleet2d.floorplan.lattice import MAX_CELL_M
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.kernels import Bool, label_parts, squared_distance
 
@@ -65,7 +65,12 @@ class Image(PictureSource):
     def usual_cell(cls, settings: Mapping[str, Any]) -> float:
         """Return the side of a pixel."""
         side = TypeAdapter(PositiveLength).validate_python(settings.get("resolution"))
-        return max(side, MIN_CELL_M)
+        return side * settings["scale"]
+
+    @property
+    def pixel(self) -> float:
+        """Side of a pixel [m]."""
+        return self.resolution * (self.scale or 1.0)
 
     def load(self) -> FloorPlan:
         """Read the drawing.
@@ -79,19 +84,20 @@ class Image(PictureSource):
         """
         picture = read_grey(self.path)
         with in_file(self.path):
-            if not 0 < self.resolution <= MAX_CELL_M:
+            pixel = self.pixel
+            if not 0 < pixel <= MAX_CELL_M:
                 raise FloorPlanError(
-                    f"resolution is {self.resolution:g} m per pixel: above 0 and at most"
-                    f" {MAX_CELL_M:g} m is expected"
+                    f"resolution is {pixel:g} m per pixel: above 0 and at most {MAX_CELL_M:g} m is"
+                    " expected"
                 )
             light = _light(picture, self.threshold)
             notes: list[str] = []
             found: list[str] = []
-            inside = self.known(picture, light, self.resolution, found, saved=False)
+            inside = self.known(picture, light, pixel, found, saved=False)
             problem = None
             if inside is light:
                 try:
-                    inside = _inside(light, self.close_gaps, self.resolution, found)
+                    inside = _inside(light, self.close_gaps, pixel, found)
                 except FloorPlanError as error:
                     inside, problem = np.zeros_like(light), error
             told = self._without_lines(picture, light, inside)
@@ -99,9 +105,9 @@ class Image(PictureSource):
                 raise problem
             inside, walls, found = told or (inside, ~light, found)
             notes += found
-            raw = OccupancyMap(inside[::-1], walls[::-1], self.resolution)
+            raw = OccupancyMap(inside[::-1], walls[::-1], pixel)
             free = self.home(raw, picture, notes)
-            return self.build(free, self.resolution, f"drawing, {self.path.name}", notes)
+            return self.build(free, pixel, f"drawing, {self.path.name}", notes)
 
     def _without_lines(
         self, picture: GreyPicture, light: Bool, enclosed: Bool
@@ -116,7 +122,7 @@ class Image(PictureSource):
             light: Pixels that are light, bool (rows, columns).
             enclosed: What all that is dark encloses, of the same shape.
         """
-        pixel, dark = self.resolution, ~light
+        pixel, dark = self.pixel, ~light
         if pixel > self.line_width / LINE_PIXELS:
             return None
         home = _largest_part(enclosed)

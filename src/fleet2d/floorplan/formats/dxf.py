@@ -17,6 +17,7 @@ from fleet2d.configuration.units import InputPath
 from fleet2d.errors import FloorPlanError, extra
 from fleet2d.floorplan.formats.features import Draft, Feature, enclosed_space
 from fleet2d.floorplan.formats.files import in_file
+from fleet2d.floorplan.lattice import SIDE_M
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.source import FloorPlanSource
 from fleet2d.kernels import F64
@@ -24,8 +25,6 @@ from fleet2d.kernels import F64
 # Metres to a unit, by the header variable $INSUNITS, and what is tried if it says nothing.
 UNITS_M = {1: 0.0254, 2: 0.3048, 4: 0.001, 5: 0.01, 6: 1.0}
 TRIED_M = (1.0, 0.001, 0.01, 0.0254, 0.3048)
-# Length of a home's longer side [m].
-SIDE_M = (4.0, 80.0)
 # Words in the names of layers, in several languages.
 WALLS = re.compile("wall|wand|mauer|mur|pared|paret|muur", re.IGNORECASE)
 WINDOWS = re.compile("window|fenster|fen[eê]tre|ventana|finestra|raam|glas", re.IGNORECASE)
@@ -81,7 +80,7 @@ class Dxf(FloorPlanSource):
             scale = self.scale or _scale(int(drawing.units), float((high - low).max()), notes)
             metres = [LineString(np.round((line - low) * scale, 4)) for line in lines]
             free = _inside(metres, notes)
-            draft = Draft([Feature("free", "walls", free, {})], lambda xy: xy, 0.0, notes)
+            draft = Draft([Feature("free", "walls", free, {})], 0.0, notes)
             return draft.plan(self.path.stem, self.cell, f"DXF, {self.path.name}")
 
     def _layers(self, drawing: Any, notes: list[str]) -> set[str]:

@@ -121,10 +121,31 @@ class Draft:
     """Converts features to the arguments of `FloorPlan.build`; all in metres."""
 
     def __init__(
-        self, features: Sequence[Feature], move: Move, wall_m: float, notes: list[str]
+        self,
+        features: Sequence[Feature],
+        wall_m: float,
+        notes: list[str],
+        *,
+        move: Move = lambda xy: xy,
+        scale: float | None = None,
     ) -> None:
-        self.features = features
+        """Take the features apart, and open doors in the walls.
+
+        Args:
+            features: The features [m].
+            wall_m: Thickness of walls that are drawn as lines, and between rooms that touch.
+            notes: Sentences on anomalies are added.
+            move: Converts further coordinates of the features' properties to metres.
+            scale: What lengths are multiplied by before that; None for 1.
+        """
         self.move = move
+        if scale is not None:
+            features = [
+                replace(f, shape=shapely.transform(f.shape, lambda xy: xy * scale))
+                for f in features
+            ]
+            self.move = lambda xy: move(xy) * scale
+        self.features = features
         self.notes = notes
         self.rooms = [_areas([room]) for room in self._of("room")]
         self.free = self._free(wall_m)

@@ -344,9 +344,10 @@ class GeoJson(FloorPlanSource):
         with in_file(self.path):
             notes: list[str] = []
             raw = read_features(content, self.level, notes)
-            features, move = in_metres(raw, content, self.units, notes)
+            units = "m" if self.scale and self.units == "auto" else self.units
+            features, move = in_metres(raw, content, units, notes)
             name = content.get("name")
-            return Draft(features, move, self.wall_m, notes).plan(
+            return Draft(features, self.wall_m, notes, move=move, scale=self.scale).plan(
                 name if isinstance(name, str) and name else self.path.stem,
                 self.cell,
                 f"GeoJSON, {self.path.name}",

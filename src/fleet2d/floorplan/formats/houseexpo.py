@@ -54,10 +54,10 @@ class HouseExpo(FloorPlanSource):
 
     def load(self) -> FloorPlan:
         """Read the plan."""
-        return read_houseexpo(self.path, self.cell)
+        return read_houseexpo(self.path, self.cell, self.scale)
 
 
-def read_houseexpo(path: Path, cell: float = 0.05) -> FloorPlan:
+def read_houseexpo(path: Path, cell: float = 0.05, scale: float | None = None) -> FloorPlan:
     """Read a HouseExpo file.
 
     Its `verts` are one outline that traces the inner walls, too. Its `room_category` boxes overlap
@@ -67,6 +67,7 @@ def read_houseexpo(path: Path, cell: float = 0.05) -> FloorPlan:
     Args:
         path: The JSON file.
         cell: Side of a grid cell [m].
+        scale: Metres to a unit of the file; None for 1.
 
     Raises:
         FloorPlanError: It can't be read, isn't HouseExpo, or has no free space.
@@ -89,6 +90,7 @@ def read_houseexpo(path: Path, cell: float = 0.05) -> FloorPlan:
             doorways=None,
             regions_are="boxes",
             notes=[*notes, *box_notes],
+            scale=scale,
         )
 
 

@@ -259,9 +259,11 @@ class PortalEntry(FileModel):
     takes: Annotated[Coordinate, Field(gt=0)] = 12.0
     type: Literal["stairs", "lift"] = "stairs"
 
-    def to_portal(self) -> Portal:
-        """Return it as a part of a plan."""
-        return Portal(self.type, self.start, self.end, round(self.takes * 1_000_000))
+    def to_portal(self, scale: float) -> Portal:
+        """Return it as a part of a plan, with its places multiplied by `scale`."""
+        (x0, y0), (x1, y1) = self.start, self.end
+        start, end = (x0 * scale, y0 * scale), (x1 * scale, y1 * scale)
+        return Portal(self.type, start, end, round(self.takes * 1_000_000))
 
 
 class PlanFile(FileModel):
@@ -353,23 +355,26 @@ class Native(FloorPlanSource):
 
     def load(self) -> FloorPlan:
         """Read the plan."""
-        return read_native(self.path, self.cell)
+        return read_native(self.path, self.cell, self.scale)
 
 
-def read_native(path: Path, cell: float = 0.05) -> FloorPlan:
+def read_native(path: Path, cell: float = 0.05, scale: float | None = None) -> FloorPlan:
     """Read a floor plan in Fleet2D's own format.
 
     Args:
         path: The file: YAML if its name ends in .yaml or .yml, else JSON.
         cell: Side of a grid cell [m].
+        scale: Metres to a unit of the file; None for 1.
 
     Raises:
         FloorPlanError: It can't be read, isn't in this format, or has no free space.
     """
-    return native_plan(read_document(path), path, cell)
+    return native_plan(read_document(path), path, cell, scale)
 
 
-def native_plan(content: dict[str, Any], path: Path, cell: float = 0.05) -> FloorPlan:
+def native_plan(
+    content: dict[str, Any], path: Path, cell: float = 0.05, scale: float | None = None
+) -> FloorPlan:
     """Return the floor plan of a file's content.
 
     Raises:
@@ -384,10 +389,10 @@ def native_plan(content: dict[str, Any], path: Path, cell: float = 0.05) -> Floo
             raise FloorPlanError(
                 f"version {version} of the format is not known: this Fleet2D reads {VERSION}"
             )
-        return plan_of(validate(PLAN_FILE, {**content, "version": VERSION}), path, cell)
+        return plan_of(validate(PLAN_FILE, {**content, "version": VERSION}), path, cell, scale)
 
 
-def plan_of(file: PlanFile, path: Path, cell: float) -> FloorPlan:
+def plan_of(file: PlanFile, path: Path, cell: float, scale: float | None = None) -> FloorPlan:
     """Return the floor plan of a file."""
     free, regions = space_of(file.free), [room.to_region() for room in file.rooms or ()]
     return FloorPlan.build(
@@ -401,7 +406,8 @@ def plan_of(file: PlanFile, path: Path, cell: float) -> FloorPlan:
         regions_are="none" if file.rooms is None else "exact",
         objects=[thing.to_object() for thing in file.objects],
         no_go=[area.polygon for area in file.no_go],
-    ).with_portals([portal.to_portal() for portal in file.portals])
+        scale=scale,
+    ).with_portals([portal.to_portal(scale or 1.0) for portal in file.portals])
 
 
 def _with_passages(
@@ -523,22 +529,23 @@ class Bundled(FloorPlanSource):
 
     def load(self) -> FloorPlan:
         """Read the plan."""
-        return read_bundled(self.name, self.cell)
+        return read_bundled(self.name, self.cell, self.scale)
 
 
-def read_bundled(name: str, cell: float = 0.05) -> FloorPlan:
+def read_bundled(name: str, cell: float = 0.05, scale: float | None = None) -> FloorPlan:
     """Read a home that comes with Fleet2D, whose file the tests check.
 
     Args:
         name: The name of the home.
         cell: Side of a grid cell [m].
+        scale: What its lengths are multiplied by; None for 1.
 
     Example:
         >>> len(read_bundled("family_home").rooms)
         14
     """
     path = HOMES / f"{name}.json"
-    return plan_of(unchecked(PlanFile, read_json(path)), path, cell)
+    return plan_of(unchecked(PlanFile, read_json(path)), path, cell, scale)
 
 
 def bundled_names() -> list[str]:

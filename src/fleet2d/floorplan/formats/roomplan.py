@@ -102,10 +102,13 @@ class RoomPlan(FloorPlanSource):
         Raises:
             FloorPlanError: The file can't be read, isn't such a scan, or its walls enclose nothing.
         """
-        return read_roomplan(read_json(self.path), self.path, self.cell, self.wall_m)
+        content = read_json(self.path)
+        return read_roomplan(content, self.path, self.cell, self.wall_m, self.scale)
 
 
-def read_roomplan(content: dict[str, Any], path: Path, cell: float, wall_m: float) -> FloorPlan:
+def read_roomplan(
+    content: dict[str, Any], path: Path, cell: float, wall_m: float, scale: float | None = None
+) -> FloorPlan:
     """Return the floor plan of a scan's content.
 
     Raises:
@@ -136,7 +139,7 @@ def read_roomplan(content: dict[str, Any], path: Path, cell: float, wall_m: floa
             for k, thing in enumerate(scan.objects)
         ]
         sound = [f for f in features if f.kind != "object" or shapely.is_valid(f.shape)]
-        draft = Draft(sound, lambda xy: xy, wall_m, [])
+        draft = Draft(sound, wall_m, [], scale=scale)
         return draft.plan(path.stem, cell, f"RoomPlan scan, {path.name}")
 
 

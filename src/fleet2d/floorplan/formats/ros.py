@@ -18,7 +18,7 @@ from fleet2d.floorplan.formats.cleaning import OccupancyMap
 from fleet2d.floorplan.formats.files import MAX_COORDINATE_M, in_file, read_yaml, shown_value
 from fleet2d.floorplan.formats.occupancy import PictureSource
 from fleet2d.floorplan.formats.raster import GreyPicture, read_grey
-from fleet2d.floorplan.lattice import MAX_CELL_M, MIN_CELL_M
+from fleet2d.floorplan.lattice import MAX_CELL_M
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.kernels import Bool
 
@@ -47,11 +47,11 @@ class Ros(PictureSource):
     @classmethod
     def usual_cell(cls, settings: Mapping[str, Any]) -> float:
         """Return the map's resolution."""
-        return max(_settings(read_yaml(settings["path"])).resolution, MIN_CELL_M)
+        return _settings(read_yaml(settings["path"]), settings["scale"]).resolution
 
     def files(self) -> list[Path]:
         """Return the YAML file and the image."""
-        settings = _settings(read_yaml(self.path))
+        settings = _settings(read_yaml(self.path), self.scale or 1.0)
         return [self.path, _image_file(settings.image, self.path)[0]]
 
     def load(self) -> FloorPlan:
@@ -62,7 +62,7 @@ class Ros(PictureSource):
         """
         content = read_yaml(self.path)
         with in_file(self.path):
-            settings = _settings(content)
+            settings = _settings(content, self.scale or 1.0)
             file, notes = _image_file(settings.image, self.path)
             picture = read_grey(file)
             free = self.home(self._occupancy(settings, picture, notes), picture, notes)
@@ -105,7 +105,7 @@ class _MapSettings:
     raw: bool
 
 
-def _settings(content: dict[str, Any]) -> _MapSettings:
+def _settings(content: dict[str, Any], scale: float) -> _MapSettings:
     for key, line in _KEYS.items():
         if key not in content:
             raise FloorPlanError(
@@ -116,11 +116,11 @@ def _settings(content: dict[str, Any]) -> _MapSettings:
         raise FloorPlanError(
             f"image is {shown_value(image)}: the name of a PGM or PNG file is expected"
         )
-    resolution = _number(content["resolution"], "resolution")
+    resolution = _number(content["resolution"], "resolution") * scale
     if not 0 < resolution <= MAX_CELL_M:
         raise FloorPlanError(
             f"resolution is {resolution:g} m per pixel: above 0 and at most"
-            f" {MAX_CELL_M:g} m is expected (0.05 is usual)"
+            f" {MAX_CELL_M:g} m is expected (0.05 is usual); floorplan.scale multiplies it"
         )
     free, occupied = (_threshold(content, key) for key in ("free_thresh", "occupied_thresh"))
     if free > occupied:
@@ -139,7 +139,8 @@ def _settings(content: dict[str, Any]) -> _MapSettings:
             "negate is 1 in mode raw, which ROS 1 and ROS 2 take differently: save the map with"
             " negate 0, or as trinary"
         )
-    origin = _origin(content["origin"])
+    x, y, yaw = _origin(content["origin"])
+    origin = (x * scale, y * scale, yaw)
     return _MapSettings(image, resolution, origin, bool(negate), occupied, free, mode == "raw")
 
 

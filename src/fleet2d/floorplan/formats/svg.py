@@ -83,9 +83,7 @@ class Svg(FloorPlanSource):
                 _feature(f"{kind} {number}", kind, name, corners * (scale, -scale), closed)
                 for number, (kind, name, corners, closed) in enumerate(shapes, 1)
             ]
-            draft = Draft(
-                [f for f in features if not f.shape.is_empty], lambda xy: xy, self.wall_m, notes
-            )
+            draft = Draft([f for f in features if not f.shape.is_empty], self.wall_m, notes)
             return draft.plan(self.path.stem, self.cell, f"SVG, {self.path.name}")
 
 

@@ -70,7 +70,7 @@ class SweetHome(FloorPlanSource):
             level = _level(root, self.level, notes)
             here = [e for e in root.iter() if level is None or e.get("level") in (None, level)]
             features = [feature for element in here for feature in _features(element)]
-            return Draft(features, lambda xy: xy, 0.1, notes).plan(
+            return Draft(features, 0.1, notes, scale=self.scale).plan(
                 root.get("name") or self.path.stem, self.cell, f"Sweet Home 3D, {self.path.name}"
             )
 

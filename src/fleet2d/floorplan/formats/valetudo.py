@@ -305,7 +305,7 @@ class Valetudo(PixelSource):
     @classmethod
     def usual_cell(cls, settings: Mapping[str, Any]) -> float:
         """Return the side of the map's pixels."""
-        return pixel_side(check_map(read_json(settings["path"])))
+        return pixel_side(check_map(read_json(settings["path"]))) * settings["scale"]
 
     def load(self) -> FloorPlan:
         """Read the map.
@@ -337,12 +337,13 @@ class Valetudo(PixelSource):
                 self.path.stem,
                 _in_metres(free, box, pixel_m),
                 regions,
-                pixel_m if self.cell is None else self.cell,
+                pixel_m * (self.scale or 1.0) if self.cell is None else self.cell,
                 source=f"Valetudo map, {self.path.name}",
                 doorways=None,
                 regions_are=self.borders if regions else "none",
                 objects=_charger(content, free, box),
                 no_go=areas,
+                scale=self.scale,
                 notes=notes,
             )
 

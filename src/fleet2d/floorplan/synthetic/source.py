@@ -19,7 +19,9 @@ from fleet2d.floorplan.synthetic.slicing import OUTER_WALL, UNIT_M, UNITS_PER_M,
 Rectangle = tuple[int, int, int, int]
 
 
-def floor_plan(house: House, name: str, cell: float, source: str) -> FloorPlan:
+def floor_plan(
+    house: House, name: str, cell: float, source: str, scale: float | None = None
+) -> FloorPlan:
     """Convert a generated home to a floor plan.
 
     Args:
@@ -27,6 +29,7 @@ def floor_plan(house: House, name: str, cell: float, source: str) -> FloorPlan:
         name: The name of the plan.
         cell: Side of a grid cell [m].
         source: The source of the plan, for readers.
+        scale: What its lengths are multiplied by; None for 1.
     """
     spaces = [_clear(box) for box in house.boxes]
     through = [_hole(gap) for gap in [*house.gaps, house.front_door]]
@@ -40,6 +43,7 @@ def floor_plan(house: House, name: str, cell: float, source: str) -> FloorPlan:
         source=source,
         entrance=_entrance(house.front_door),
         doorways=doors,
+        scale=scale,
     )
 
 
@@ -164,7 +168,8 @@ class Synthetic(FloorPlanSource):
         )
         house = generate(self.seed, wishes, style)
         name = f"synthetic_{self.seed}"
-        return floor_plan(house, name, self.cell, f"synthetic home, seed {self.seed}")
+        source = f"synthetic home, seed {self.seed}"
+        return floor_plan(house, name, self.cell, source, self.scale)
 
 
 def _units(length: float | None) -> int | None:

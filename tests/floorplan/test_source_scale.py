@@ -1,0 +1,100 @@
+"""`scale` multiplies the lengths of every source, and sizes that are no home's propose it."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import shapely
+from PIL import Image as Picture
+from tests.floorplan.test_damaged_files import FORMATS, PGM, write
+
+from fleet2d.configuration.components import lookup
+from fleet2d.errors import FloorPlanError
+from fleet2d.floorplan.checkup import checkup
+from fleet2d.floorplan.formats.drawing import Image
+from fleet2d.floorplan.load import load_floorplan
+from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.floorplan.source import FloorPlanSource
+from fleet2d.floorplan.synthetic.source import Synthetic
+
+
+@pytest.mark.parametrize("kind", sorted({name.split()[0] for name in FORMATS}))
+def test_scale_multiplies_lengths_of_every_format(kind: str, tmp_path: Path) -> None:
+    name, content, _ = FORMATS[kind]
+    path = write(tmp_path, name, content)
+    (tmp_path / "map.pgm").write_bytes(PGM)
+
+    def read(cell: float, scale: float | None) -> FloorPlan:
+        source = lookup("floorplan", kind).model_validate(
+            {"path": path, "cell": cell, "scale": scale}
+        )
+        assert isinstance(source, FloorPlanSource)
+        return source.plan()
+
+    usual, doubled = read(0.05, None), read(0.1, 2.0)
+
+    assert doubled.area_m2 == pytest.approx(4 * usual.area_m2, rel=0.15)
+    assert np.allclose(np.array(usual.bounds) * 2, doubled.bounds, atol=0.3)
+
+
+def test_scale_multiplies_everything_in_a_home() -> None:
+    usual, doubled = load_floorplan(cell=0.05), load_floorplan(cell=0.1, scale=2)
+    bed, large_bed = usual.objects_of_type("bed")[0], doubled.objects_of_type("bed")[0]
+
+    assert usual.room_of_cell.tolist() == doubled.room_of_cell.tolist()
+    assert [2 * door.width_m for door in usual.doorways] == pytest.approx(
+        [door.width_m for door in doubled.doorways]
+    )
+    assert shapely.get_coordinates(large_bed.footprint) == pytest.approx(
+        2 * shapely.get_coordinates(bed.footprint)
+    )
+    assert large_bed.uses[0].x == 2 * bed.uses[0].x
+    assert doubled.entrance == tuple(2 * value for value in usual.entrance or ())
+
+
+def test_pixels_of_a_scaled_map_are_its_cells(tmp_path: Path) -> None:
+    path = write(tmp_path, "map.yaml", {**FORMATS["ros"][1], "resolution": 5})
+    (tmp_path / "map.pgm").write_bytes(PGM)
+    source = lookup("floorplan", "ros").model_validate({"path": path, "scale": 0.01})
+    assert isinstance(source, FloorPlanSource)
+
+    assert source.cell == pytest.approx(0.05)
+    assert source.plan().lattice.cell == pytest.approx(0.05)
+    with pytest.raises(FloorPlanError, match=r"resolution is 5 m per pixel.*floorplan\.scale"):
+        load_floorplan(path)
+
+
+def test_drawing_has_the_product_of_resolution_and_scale(tmp_path: Path) -> None:
+    pixels = np.full((60, 80), 255, np.uint8)
+    pixels[5:55, 5:75] = 0
+    pixels[10:50, 10:70] = 255
+    Picture.fromarray(pixels).save(tmp_path / "flat.png")
+
+    plan = Image(path=tmp_path / "flat.png", resolution=0.2, scale=0.5).plan()
+
+    assert 0.1 == plan.lattice.cell
+    assert plan.area_m2 == pytest.approx(24.0)
+
+
+@pytest.mark.parametrize("scale", [10.0, 39.37, 100.0, 1000.0, 0.1])
+def test_home_in_another_unit_is_told_with_the_line_to_type(scale: float) -> None:
+    try:
+        plan = Synthetic(seed=3, cell=min(0.05 * max(scale, 1), 1), scale=scale).plan()
+        text = next(f.text for f in checkup(plan) if f.kind == "scale")
+    except FloorPlanError as error:
+        text = str(error)
+
+    assert f"floorplan.scale={1 / scale:.3g}" in text
+
+
+def test_unit_is_told_by_the_width_of_doors() -> None:
+    in_feet = Synthetic(seed=3, scale=3.28084).plan()
+    (finding,) = [f for f in checkup(in_feet) if f.kind == "scale"]
+
+    assert "wrong" == finding.severity
+    assert "doors the plan is in feet: floorplan.scale=0.3048" in finding.text
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_home_in_metres_has_no_finding_on_its_scale(seed: int) -> None:
+    assert [] == [f for f in checkup(Synthetic(seed=seed).plan()) if f.kind == "scale"]
