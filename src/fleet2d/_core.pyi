@@ -1843,5 +1843,5 @@ def encode_arrays(arrays: Sequence[numpy.typing.NDArray[Any]]) -> bytes:
         arrays: Arrays (n,) of int32, int64, float64, bool, or uint8 for text.
 
     Returns:
-        For each array a header and its values; see `fleet2d.artifacts.encoding`.
+        For each array a header and its values; see `fleet2d.artifacts.unfinished`.
     """

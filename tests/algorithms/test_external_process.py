@@ -109,7 +109,7 @@ def program(folder: Path, answers: str) -> Path:
             "ended with code 1 instead of answering 'update'; on stderr it wrote: no more memory",
         ),
         ("time.sleep(60)", "didn't answer 'update' within 0.3 s and was ended"),
-        ("print('hello', flush=True)", "which is no line of JSON with a type"),
+        ("print('hello', flush=True)", "which is not a line of JSON with a type"),
         ("say({'type': 'error', 'text': 'no rooms'})", "reports: no rooms"),
         ("say({'type': 'output'})", "expected 'share' (one for each room)"),
         ("say({'type': 'output', 'share': ['x']})", "returned invalid values"),

@@ -124,7 +124,7 @@ def test_a_wrong_time_and_name_are_told(place: Workspace) -> None:
         place.intervene(name, {"reset": "ltp", "learned": str(place.folder.parent / "secret.yaml")})
     with pytest.raises(InputError, match="nonsense"):
         place.advance(name, "nonsense")
-    with pytest.raises(InputError, match="is no name of a file"):
+    with pytest.raises(InputError, match="can't be the name of a file"):
         place.read("\0")
 
 

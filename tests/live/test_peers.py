@@ -71,7 +71,7 @@ def test_an_address_in_use_is_refused(scheme: str) -> None:
     ],
 )
 def test_a_wrong_address_is_refused(address: str, why: str) -> None:
-    with pytest.raises(InputError, match=f"is no address of a peer{why}"):
+    with pytest.raises(InputError, match=f"is not the address of a peer{why}"):
         open_peer(address)
 
 

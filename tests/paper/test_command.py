@@ -10,6 +10,7 @@ import pytest
 from fleet2d import cli
 from fleet2d.errors import InputError
 from fleet2d.paper import command as paper
+from fleet2d.paper import results
 
 Result = tuple[int, str, str]
 TINY = ("--quick", "--seeds", "1", "--days", "2", "--workers", "1")
@@ -79,6 +80,22 @@ def test_missing_matplotlib_is_named(
     monkeypatch.setattr(sys, "meta_path", [Absent(), *sys.meta_path])
     assert not paper._can_draw()
     assert 'pip install "fleet2d[viz]"' in capsys.readouterr().err
+
+
+def test_results_come_in_the_order_of_the_paper(
+    reproduce: Callable[..., Result], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    measured = []
+    for name in ("ltp_gap", "feedback"):
+        monkeypatch.setattr(
+            results,
+            name,
+            lambda _, name=name: measured.append(name) or results.Result(name, "", ()),
+        )
+    monkeypatch.setattr(paper, "_can_draw", lambda: False)
+    code, _, _ = reproduce("feedback", "ltp-gap", "feedback", *TINY)
+    assert 0 == code
+    assert ["ltp_gap", "feedback"] == measured
 
 
 def test_what_does_not_exist_is_refused(reproduce: Callable[..., Result]) -> None:

@@ -143,7 +143,7 @@ def test_own_components_run_in_a_study() -> None:
     ("keys", "message"),
     [
         ({"keep": {"metrics": ["sigthings.*"]}}, r"keep.metrics.*'sigthings': did you mean 'sight"),
-        ({"keep": {"metrics": ["sightings"]}}, r"is no number: write sightings\.\*"),
+        ({"keep": {"metrics": ["sightings"]}}, r"is not a number: write sightings\.\*"),
         ({"keep": {"metrics": ["sightings.anna"]}}, "'anna', which no variant has.*'ana'"),
         ({"keep": {"metrics": ["sigthin*"]}}, "no variant has a metric 'sigthin'"),
         (

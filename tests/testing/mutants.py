@@ -10,7 +10,8 @@ from fleet2d.entities.plan import Plan
 from fleet2d.entities.robots.dock import Dock
 from fleet2d.entities.robots.find import Find
 from fleet2d.entities.robots.follow import Come, Follow
-from fleet2d.entities.robots.patrol import Opportunistic, Patrol, Scheduled
+from fleet2d.entities.robots.interact import Opportunistic
+from fleet2d.entities.robots.patrol import Patrol, Scheduled
 
 LATE = timedelta(seconds=30)
 

@@ -60,7 +60,7 @@ Args:
     arrays: Arrays (n,) of int32, int64, float64, bool, or uint8 for text.
 
 Returns:
-    For each array a header and its values; see `fleet2d.artifacts.encoding`.)");
+    For each array a header and its values; see `fleet2d.artifacts.unfinished`.)");
 }
 
 }  // namespace fleet2d

@@ -137,7 +137,7 @@ class TimingAlgorithm(Algorithm):
         return {}
 
     def recall(self, learned: Mapping[str, Any]) -> None:
-        """Refuse a state of another run.
+        """Refuse to restore what another run has learned.
 
         Raises:
             ComponentError: Always.

@@ -543,7 +543,7 @@ class Prefix:
 
     @classmethod
     def find(cls, directory: Path) -> Prefix | None:
-        """Return the prefix in a run directory, if it has one.
+        """Return what a run directory holds up to the last commit; None if there is no commit.
 
         Raises:
             ArtifactError: The journal can't be read.

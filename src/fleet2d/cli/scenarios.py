@@ -1,15 +1,16 @@
 """Commands on scenarios and plans: `fleet2d validate`, `convert`, `components` and `schema`."""
 
 import json
-from collections.abc import Callable, Collection
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from fleet2d.cli.__main__ import entries
+from fleet2d.configuration.problems import counted
 from fleet2d.errors import InputError
 from fleet2d.options import Resolution, Scale, file_name, split
 
@@ -52,8 +53,8 @@ def validate(
     simulation = Simulation(scenario, *overrides)
     plan, settings = simulation.home.plan, simulation.scenario.simulation
     typer.echo(
-        f"ok: {_count(simulation.scenario.users, 'user')} and"
-        f" {_count(simulation.scenario.robots, 'robot')} in {plan.name}"
+        f"ok: {counted(len(simulation.scenario.users), 'user')} and"
+        f" {counted(len(simulation.scenario.robots), 'robot')} in {plan.name}"
         f" ({plan.area_m2:.1f} m2, {len(plan.rooms)} rooms),"
         f" {settings.steps} steps of {settings.step_us / 1e6:g} s from {settings.start}"
     )
@@ -84,7 +85,7 @@ def _check_floorplan(plan: "FloorPlan", out: Path | None, radius: float) -> None
         picture = f"no picture: {error}"
     else:
         draw_checkup(plan, findings, Path(picture))
-    typer.echo(f"{plan.name}: {plan.area_m2:.1f} m2, {_count(plan.rooms, 'room')}")
+    typer.echo(f"{plan.name}: {plan.area_m2:.1f} m2, {counted(len(plan.rooms), 'room')}")
     for number, finding in enumerate(findings, start=1):
         typer.echo(f"{number:>3} {finding.severity}: {finding.text}")
     if not findings:
@@ -95,10 +96,6 @@ def _check_floorplan(plan: "FloorPlan", out: Path | None, radius: float) -> None
     typer.echo(picture)
     if any(finding.severity == "unlivable" for finding in findings):
         raise typer.Exit(2)
-
-
-def _count(items: Collection[Any], noun: str) -> str:
-    return f"{len(items)} {noun}{'' if len(items) == 1 else 's'}"
 
 
 def convert(

@@ -11,6 +11,7 @@ from xml.etree import ElementTree as ET
 
 import typer
 
+from fleet2d.configuration.problems import counted
 from fleet2d.errors import Fleet2DError, InputError, os_errors_as
 from fleet2d.options import file_name
 from fleet2d.storage.files import write_atomically
@@ -166,7 +167,7 @@ def print_cases(cases: "Sequence[ScenarioCase]") -> None:
     for case in cases:
         _print_failure(console, case)
     failed = sum(case.fails for case in cases)
-    runs = f"{len(cases)} run{'' if len(cases) == 1 else 's'}"
+    runs = counted(len(cases), "run")
     console.print(f"{failed} of {runs} failed" if failed else f"all held: {runs}", highlight=False)
 
 

@@ -134,6 +134,15 @@ def check_known(
         raise error(f"{where}there is no {noun} {name!r}{suggest(name, names)}")
 
 
+def counted(number: int, noun: str) -> str:
+    """Return a number with its noun.
+
+    >>> counted(1, "day"), counted(30, "day")
+    ('1 day', '30 days')
+    """
+    return f"{number} {noun}{'' if number == 1 else 's'}"
+
+
 def shown(value: object) -> str:
     """Return a value as text for a message: text in quotes, everything else as it is.
 

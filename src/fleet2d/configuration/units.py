@@ -104,7 +104,7 @@ def parse_peer_address(text: str) -> SplitResult:
             return parts
         wrong = ": it has no host." if is_known else did_you_mean(parts.scheme, PEER_SCHEMES)
     raise problem(
-        f"{text!r} is no address of a peer{wrong or '.'} Write udp://HOST:PORT, ws://HOST:PORT,"
+        f"{text!r} is not the address of a peer{wrong or '.'} Write udp://HOST:PORT, ws://HOST:PORT,"
         " rosbridge://HOST:PORT or mqtt://HOST:PORT/PREFIX"
     )
 

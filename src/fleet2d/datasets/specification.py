@@ -227,7 +227,7 @@ def plan_dataset(source: str | Path | Mapping[str, Any]) -> DatasetPlan:
         source: A YAML file, or the same as a mapping.
 
     Raises:
-        ScenarioError: The file is wrong, or its base is no scenario.
+        ScenarioError: The file is wrong, or its base isn't a scenario.
         InputError: Splits overlap; the message names the homes, households or personas.
     """
     document = (

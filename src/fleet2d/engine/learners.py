@@ -118,7 +118,7 @@ class Learners:
         if not self.replaced:
             return outputs
         merged = {**outputs, **self.replaced}
-        return {name: output for name, output in merged.items() if not _is(output, WITHHELD)}
+        return {name: output for name, output in merged.items() if not _is_marked(output, WITHHELD)}
 
     def replace(self, name: str, output: Any) -> None:
         """Let all but metrics read another output of an algorithm from now on.
@@ -129,7 +129,7 @@ class Learners:
                 again.
         """
         self.replaced = {key: value for key, value in self.replaced.items() if key != name}
-        if _is(output, FROZEN):
+        if _is_marked(output, FROZEN):
             output = self.outputs.get(name, WITHHELD)
         if output is not None:
             self.replaced[name] = output
@@ -343,6 +343,6 @@ def update_order(algorithms: Mapping[str, Algorithm]) -> list[str]:
         raise ScenarioError(f"algorithms read each other in a cycle: {circle}") from None
 
 
-def _is(output: Any, word: str) -> bool:
-    """Whether an output is FROZEN or WITHHELD; outputs of algorithms are never bare text."""
-    return isinstance(output, str) and output == word
+def _is_marked(output: Any, mark: str) -> bool:
+    """Whether an output is a mark, FROZEN or WITHHELD: no algorithm's output is bare text."""
+    return isinstance(output, str) and output == mark

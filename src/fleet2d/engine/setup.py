@@ -175,7 +175,7 @@ def _cameras_of(
 
 def _basis(scenario: Scenario, clock: Clock, seed: int, store: RunStore) -> Basis:
     """Return the basis of a run: its home, and the bodies in it."""
-    home = _furnished_home(scenario)
+    home = _home_with_doors(scenario)
     people: dict[str, DecidingActor | None] = dict.fromkeys(scenario.users)
     actors = []
     for bucket, entities in (("users", scenario.users), ("robots", scenario.robots)):
@@ -193,7 +193,7 @@ def _basis(scenario: Scenario, clock: Clock, seed: int, store: RunStore) -> Basi
     return Basis(scenario, clock, seed, store, home, actors, bodies)
 
 
-def _furnished_home(scenario: Scenario) -> Home:
+def _home_with_doors(scenario: Scenario) -> Home:
     """Return the home, with a door in every doorway that the scenario names."""
     plan = scenario.floorplan.plan()
     doors, door_names = [], dict[int, str]()

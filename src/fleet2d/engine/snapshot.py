@@ -529,7 +529,7 @@ class _OwnCode:
         return cls(packages, None if current_trust() is None else own)
 
     def may_hold(self, module: str) -> bool:
-        """Whether the classes of a module that is no part of Fleet2D may be part of a state."""
+        """Whether the classes of a module outside of Fleet2D may be part of a state."""
         if self.classes is not None:
             return is_listed(module, self.classes)
         return module.partition(".")[0] in self.packages or is_scenario_module(module)

@@ -193,7 +193,7 @@ class EngineWorld:
 
 
 def request(state: State, act: Mapping[str, Any] | Intervention, step: int) -> bool:
-    """Schedule an intervention from outside, at a step or as its entry of a script says.
+    """Schedule an intervention from outside: at a step, or when its entry in a script says.
 
     Args:
         state: The run.

@@ -148,7 +148,7 @@ class Charge:
 
 
 def _track(motion: Motion) -> Breakpoints:
-    """Return the track of a motion; one without breakpoints for a random walk, without a stop."""
+    """Return the track of a motion; an empty one for a random walk, which never stops."""
     return motion.breakpoints if isinstance(motion, Track) else NO_BREAKPOINTS
 
 

@@ -9,7 +9,7 @@ import shapely
 from pydantic import Field
 
 from fleet2d.configuration.components import register
-from fleet2d.configuration.problems import check_known, suggest
+from fleet2d.configuration.problems import check_known, counted, suggest
 from fleet2d.configuration.units import InputFileOrFolder, Length
 from fleet2d.entities.entity import SIGHTING, EvidenceSource
 from fleet2d.kernels import F64, I64, NOBODY, TURN, UNKNOWN_TRUTH, Bool
@@ -114,8 +114,8 @@ class ReplayedDetections(EvidenceSource):
         turns = self.frame.turn_headings(log.heading / (2 * np.pi))
         since = f" from {log.first_day}" if log.first_day else ""
         notes = [
-            f"{log.path.name}: {len(step)} detections of {log.days}"
-            f" day{'' if log.days == 1 else 's'}{since}; who was really there is unknown",
+            f"{log.path.name}: {len(step)} detections of {counted(log.days, 'day')}{since}; who"
+            " was really there is unknown",
             *log.notes,
         ]
         if self.frame.matches:

@@ -288,7 +288,7 @@ def _is_on(value: Any, path: Path) -> bool:
     """Return whether a state means on.
 
     Raises:
-        LogError: It is no known word.
+        LogError: The word is unknown.
     """
     word = str(value).strip().lower()
     if word not in ON | OFF:

@@ -547,7 +547,7 @@ def _number(value: object, unit: str, beside: object) -> float:
     """Return a number in the unit of the signal beside it.
 
     Raises:
-        InputError: It can't be read, or is no share from 0 to 1.
+        InputError: It can't be read, or isn't a share from 0 to 1.
     """
     try:
         if unit in QUANTITIES:

@@ -584,7 +584,7 @@ class during(Condition):
             names = [name.strip() for name in self.days.split(",")] if self.days else "daily"
             if first == last:
                 raise InputError(
-                    f"during: {self.hours} is no time: write 00:00-24:00 for the whole day"
+                    f"during: {self.hours} has no length: write 00:00-24:00 for the whole day"
                 )
             length = last - first if last > first else last + DAY - first
             self._set(_begin=first, _length=length, _weekdays=frozenset(weekdays_of(names)))

@@ -99,7 +99,7 @@ def checkup(plan: FloorPlan, radius: float = 0.15) -> list[Finding]:
         *_doors(plan),
         *_standing_in_walls(plan),
         *_routes(Home(plan), radius),
-        *_uses(plan),
+        *_unreachable_objects(plan),
     ]
     return sorted(findings, key=lambda finding: _ORDER.index(finding.severity))
 
@@ -402,14 +402,14 @@ def _standing_in_walls(plan: FloorPlan) -> Iterator[Finding]:
                 yield Finding("object", "odd", text, _centre(thing), both)
 
 
-def _uses(plan: FloorPlan) -> Iterator[Finding]:
+def _unreachable_objects(plan: FloorPlan) -> Iterator[Finding]:
     """Find the objects that nobody can get to."""
     if not plan.objects:
         return
     try:
         space = Home(plan).space(PERSON_RADIUS)
     except FloorPlanError:
-        return  # reported for the robot; for a home of dolls it doesn't matter
+        return  # reported for the robot; for a doll's house it doesn't matter
     standing = space.part_of_cell == (main_part(plan, space) or 0)
     for thing in plan.objects:
         if thing.uses:

@@ -121,7 +121,7 @@ def format_of_file(path: Path) -> str:
     """Return the `type` of a floor plan in a scenario that reads a file.
 
     Raises:
-        FloorPlanError: It can't be read, or is no floor plan that Fleet2D knows.
+        FloorPlanError: It can't be read, or isn't a floor plan that Fleet2D knows.
     """
     kind = format_by_suffix(path)
     if kind is not None:

@@ -244,7 +244,7 @@ class Space:
         return cells[np.argsort(away, kind="stable")]
 
     def _corners(self) -> Corners:
-        """Return the vertices at which the border turns into the space."""
+        """Return the reflex vertices of the border, round which shortest ways bend."""
         vertices = self.mesh.vertices
         before, at, after = [], [], []
         for polygon in self.polygons:

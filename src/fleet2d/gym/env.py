@@ -226,7 +226,7 @@ class RobotEnv(gymnasium.Env[F32, np.int64]):  # type: ignore[misc]
         """Return an action, or that to rest in place of one that is masked, if so configured.
 
         Raises:
-            InputError: The action is no whole number.
+            InputError: The action isn't a whole number.
         """
         try:
             action = operator.index(action)

@@ -238,7 +238,7 @@ class RequestQueue:
         return sorted(changes, key=lambda change: (change.time, change.request.name))
 
     def find(self, text: str) -> Request | None:
-        """Return the first open request that events name by a text."""
+        """Return the first open request that a text, as in events, names."""
         return next((request for request in self.open if request.text == text), None)
 
     def ready(self, time: datetime, people: Iterable[str] | None = None) -> list[Request]:

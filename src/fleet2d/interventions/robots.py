@@ -22,7 +22,7 @@ from fleet2d.sight.camera import Disturbance, FalseSighting
 from fleet2d.sight.perception import Perception
 
 UNKNOWN = "unknown"
-# Coordinates beyond this are no places of a home [m].
+# Coordinates beyond this are not in a home [m].
 MAX_PLACE_M = 1e4
 # The behavior of Fleet2D that responds to each command.
 RESPONDERS = {"come": "come", "find": "find", "dock": "dock"}

@@ -63,7 +63,7 @@ class Workspace:
             InputError: It leads out of the folder.
         """
         if "\0" in name:
-            raise InputError(f"{name!r} is no name of a file")
+            raise InputError(f"{name!r} can't be the name of a file")
         path = (self.folder / name).resolve()
         if not path.is_relative_to(self.folder) or path == self.folder:
             raise InputError(f"{name!r} leads out of the folder: give a name like 'home.yaml'")

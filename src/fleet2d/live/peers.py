@@ -249,9 +249,9 @@ def open_peer(address: str) -> Peer:
         InputError: There is no such scheme, the address can't be used, or an extra isn't installed.
 
     Example:
-        >>> open_peer("wss://localhost:1")
+        >>> open_peer("wss://here:1")
         Traceback (most recent call last):
-        fleet2d.errors.InputError: 'wss://localhost:1' is no address of a peer: did you mean 'ws'? \
+        fleet2d.errors.InputError: 'wss://here:1' is not the address of a peer: did you mean 'ws'? \
 Write udp://HOST:PORT, ws://HOST:PORT, rosbridge://HOST:PORT or mqtt://HOST:PORT/PREFIX
     """
     try:

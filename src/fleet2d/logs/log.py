@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Literal, NamedTuple
 
 from fleet2d.bounds import LOG_BYTES, LOG_DAYS, LOG_ROWS, check_file, one_line
+from fleet2d.configuration.problems import counted
 from fleet2d.configuration.units import micros
 from fleet2d.errors import InputError, os_errors_as
 from fleet2d.kernels import F64, I64
@@ -180,7 +181,7 @@ def in_order(readings: list[Reading], path: Path, *, sort: bool) -> tuple[list[R
     if early and not sort:
         raise LogError(
             f"{path}, line {early[0].line}: the time runs backwards there"
-            f" ({_counted(len(early), 'such line')}); check the clock of the log, or put its"
+            f" ({counted(len(early), 'such line')}); check the clock of the log, or put its"
             " lines in order of time by 'sort: true'"
         )
     for reading in readings:
@@ -198,12 +199,8 @@ def in_order(readings: list[Reading], path: Path, *, sort: bool) -> tuple[list[R
         notes.append(f"an end before the beginning is ignored, in line {lines}")
     if early:
         readings = sorted(readings, key=lambda reading: reading.begin_us)  # stable
-        notes.append(f"{_counted(len(early), 'line')} ran backwards in time and were sorted in")
+        notes.append(f"{counted(len(early), 'line')} ran backwards in time and were sorted in")
     return [r._replace(end_us=max(r.end_us, r.begin_us)) for r in readings], notes
-
-
-def _counted(count: int, noun: str) -> str:
-    return f"{count} {noun}{'' if count == 1 else 's'}"
 
 
 def parse_time(text: str, path: Path, line: int) -> datetime:

@@ -198,7 +198,7 @@ def _anybody(history: History, state: Present) -> Bool:
 
 
 def shares(counts: I64, steps: float) -> tuple[F64, F64]:
-    """Return counts as shares of rooms given at home, NaN without any time there, and of away."""
+    """Return the shares of rooms in the time at home (NaN if there was none), and that of away."""
     rooms = counts[..., :-1].astype(np.float64)
     total = rooms.sum(axis=-1, keepdims=True)
     home = np.where(total > 0, rooms / np.where(total > 0, total, 1), np.nan)

@@ -70,7 +70,7 @@ class UnknownPlaces:
     """The steps at which nobody knows where a user is, as in the gaps of a log."""
 
     def __init__(self) -> None:
-        """Begin with known places."""
+        """Begin with all places known."""
         self._since: dict[str, bool] = {}  # whether a place is unknown at the end of the history
 
     def at(self, user: str, history: History, steps: I64) -> Bool:

@@ -1,17 +1,13 @@
 """The command that repeats the measurements of the paper: `fleet2d reproduce-paper`."""
 
 import sys
-from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from fleet2d.configuration.problems import check_known
 from fleet2d.errors import InputError, os_errors_as
-
-if TYPE_CHECKING:
-    from fleet2d.paper.results import Result
 
 WIDTH = 200  # of lines in a file [characters]
 
@@ -42,26 +38,28 @@ def reproduce_paper(
     ] = None,
 ) -> None:
     """Repeat the measurements of the paper, and print them beside its figures."""
+    from rich.console import Console
+
     from fleet2d.paper import results as months
     from fleet2d.paper.speed import measure_rows
     from fleet2d.studies.executors import cores
 
-    measures = dict(
-        zip(
-            months.RESULTS,
-            (measure_rows, months.ltp_gap, months.rtp_gap, months.feedback),
-            strict=True,
-        )
-    )
-
-    names = check_names(results or [], months.RESULTS)
+    functions = (measure_rows, months.ltp_gap, months.rtp_gap, months.feedback)
+    measures = dict(zip(months.RESULTS, functions, strict=True))
+    for name in results or ():
+        check_known(name, "result", measures, InputError)
     options = months.PaperOptions(quick, seeds, days, workers or cores(), real_map, out / "studies")
     with os_errors_as(InputError, f"{out} can't be created", "; name another directory by --out"):
         out.mkdir(parents=True, exist_ok=True)  # an error is shown before hours of work
     can_draw = _can_draw()
-    for name in names:
+    console = Console(soft_wrap=True, width=None if sys.stdout.isatty() else WIDTH)
+    for name in [name for name in measures if name in (results or measures)]:
         result = measures[name](options)
-        _print(result)
+        console.print(f"\n{result.title}", highlight=False, markup=False)
+        for table in result.tables:
+            console.print(table)
+        for note in result.notes:
+            console.print(f"note: {note}", highlight=False, markup=False)
         typer.echo(result.save(out))
         if can_draw:
             from fleet2d.paper.pictures import draw
@@ -69,21 +67,6 @@ def reproduce_paper(
             target = out / f"{name}.png"
             draw(result, target)
             typer.echo(target)
-
-
-def check_names(names: Sequence[str], known: Sequence[str]) -> list[str]:
-    """Return names of results in the order of the known ones; all of them if `names` is empty.
-
-    Raises:
-        InputError: There is no such result.
-
-    Example:
-        >>> check_names(["feedback", "speed"], ["speed", "ltp-gap", "feedback"])
-        ['speed', 'feedback']
-    """
-    for name in names:
-        check_known(name, "result", known, InputError)
-    return [name for name in known if name in names or not names]
 
 
 def _can_draw() -> bool:
@@ -94,30 +77,3 @@ def _can_draw() -> bool:
         typer.echo(f"no pictures: {error}", err=True)
         return False
     return True
-
-
-def _print(result: "Result") -> None:
-    """Print the tables of a result."""
-    from rich.console import Console
-    from rich.markup import escape
-    from rich.table import Table
-
-    from fleet2d.paper.results import PAPER_COLUMN
-
-    console = Console(soft_wrap=True, width=None if sys.stdout.isatty() else WIDTH)
-    console.print(f"\n{escape(result.title)}", highlight=False)
-    for table in result.tables:
-        title = escape(table.title)
-        grid = Table(title=title, title_justify="left", title_style="", show_edge=False)
-        for number, head in enumerate(table.columns):
-            is_text = head == PAPER_COLUMN
-            grid.add_column(
-                escape(head),
-                justify="left" if is_text or not number else "right",
-                no_wrap=not is_text,
-            )
-        for row in table.rows:
-            grid.add_row(*map(escape, row))
-        console.print(grid)
-        for note in table.notes:
-            console.print(f"note: {note}", highlight=False, markup=False)

@@ -54,7 +54,7 @@ def draw_speed(numbers: Mapping[str, Any], axes: Axes) -> None:
     axes.set_xscale("log")
     axes.set_xlim(1, max(speedups) * 8)
     pairs = zip(rows, positions, strict=True)
-    markers = [(row["paper_speedup"], y) for row, y in pairs if row["paper_speedup"]]
+    markers = [(row["paper_speedup"], y) for row, y in pairs if "paper_speedup" in row]
     axes.plot(
         *zip(*markers, strict=True), "D", ms=5, color=COLORS[0], label="the paper's", ls="none"
     )

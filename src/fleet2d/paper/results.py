@@ -1,17 +1,18 @@
 """The paper's results over months: studies in YAML beside this file, and what their tables say."""
 
-import atexit
 import json
-import tempfile
 import time
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
+from rich.markup import escape
+from rich.table import Table
 
 from fleet2d.configuration.documents import read_document
+from fleet2d.configuration.problems import counted
 from fleet2d.errors import ComponentError, InputError, os_errors_as
 from fleet2d.metrics.rtp_score import ALL, GAPS
 from fleet2d.studies.api import study
@@ -29,23 +30,6 @@ QUICK_SIZES = {SPEED: (1, 2), LTP_GAP: (4, 3), RTP_GAP: (2, 3), FEEDBACK: (2, 3)
 
 
 @dataclass(frozen=True)
-class Table:
-    """One table, with its cells as text.
-
-    Attributes:
-        title: Its title, with units.
-        columns: The headings of its columns.
-        rows: Its cells.
-        notes: Notes to print below it.
-    """
-
-    title: str
-    columns: Sequence[str]
-    rows: Sequence[Sequence[str]]
-    notes: Sequence[str] = ()
-
-
-@dataclass(frozen=True)
 class Result:
     """One result of the paper, measured again.
 
@@ -54,12 +38,14 @@ class Result:
         title: Its title.
         tables: Its tables.
         numbers: The numbers of every single run, as JSON data.
+        notes: Notes to print below the tables.
     """
 
     name: str
     title: str
     tables: Sequence[Table]
     numbers: Mapping[str, Any] = field(default_factory=dict)
+    notes: Sequence[str] = ()
 
     def save(self, directory: Path) -> Path:
         """Write the numbers to `NAME.json` in a directory; return the path.
@@ -89,7 +75,7 @@ class PaperOptions:
         days: The days of a month; None: 30, or a few if `quick`.
         workers: The number of worker processes; 1: this process. Results don't depend on it.
         map: The map of a real home, for the speed table.
-        folder: The folder of the studies; None: a temporary folder.
+        folder: The folder of the studies.
     """
 
     quick: bool = False
@@ -97,7 +83,7 @@ class PaperOptions:
     days: int | None = None
     workers: int = 1
     map: Path | None = None
-    folder: Path | None = None
+    folder: Path = Path("studies")
 
     def size(self, name: str) -> tuple[int, int]:
         """Return the number of months of a result and their days: as requested, else the defaults.
@@ -110,14 +96,16 @@ class PaperOptions:
         return self.seeds or seeds, self.days or days
 
 
-def counted(number: int, noun: str) -> str:
-    """Return a number with its noun.
-
-    Example:
-        >>> counted(1, "day"), counted(30, "day")
-        ('1 day', '30 days')
-    """
-    return f"{number} {noun}{'' if number == 1 else 's'}"
+def table_of(title: str, columns: Sequence[str], rows: Iterable[Sequence[str]]) -> Table:
+    """Return a table: words to the left, numbers to the right."""
+    table = Table(title=escape(title), title_justify="left", title_style="", show_edge=False)
+    for number, head in enumerate(columns):
+        is_text = head == PAPER_COLUMN
+        justify: Literal["left", "right"] = "left" if is_text or not number else "right"
+        table.add_column(escape(head), justify=justify, no_wrap=not is_text)
+    for row in rows:
+        table.add_row(*map(escape, row))
+    return table
 
 
 def study_content(name: str, seeds: int, days: int) -> dict[str, Any]:
@@ -142,10 +130,9 @@ def run_months(name: str, options: PaperOptions) -> "Study":
         ComponentError: A month failed.
         InputError: polars or scipy is missing, or the folder can't be used.
     """
-    folder = options.folder or _temporary_folder()
     months = study(
         study_content(name, *options.size(name)),
-        folder / name,
+        options.folder / name,
         workers=options.workers,
         executor="serial" if options.workers == 1 else "local",
         fail_fast=True,
@@ -156,21 +143,14 @@ def run_months(name: str, options: PaperOptions) -> "Study":
     return months
 
 
-def _temporary_folder() -> Path:
-    """Return a folder that is there until the process ends, as long as a study may be read."""
-    folder = tempfile.TemporaryDirectory(prefix="fleet2d-paper-")
-    atexit.register(folder.cleanup)
-    return Path(folder.name)
-
-
-def interval(values: Iterable[float]) -> tuple[float, float, float]:
+def interval(values: Sequence[float]) -> tuple[float, float, float]:
     """Return the mean of values and the ends of its 95 % interval.
 
     Example:
         >>> interval([0.5, 0.5, 0.5])
         (0.5, 0.5, 0.5)
     """
-    mean = estimate(list(values))
+    mean = estimate(values)
     return mean.mean, mean.low, mean.high
 
 
@@ -203,16 +183,13 @@ def ltp_gap(options: PaperOptions) -> Result:
     means = dict(zip(rooms, gaps.mean(axis=1), strict=True))
     lines = {**means, "all rooms": overall.mean(axis=0), "  band, low": low, "  band, high": high}
     listed_days = [day for day in SHOWN_DAYS if day <= days]
-    table = Table(
+    table = table_of(
         f"mean |estimated - true| share of time at home; {counted(robots, 'robot')},"
         f" {counted(days, 'day')}, likelihood",
         ("room", *(f"day {day}" for day in listed_days)),
         [(name, *(f"{line[day - 1]:.3f}" for day in listed_days)) for name, line in lines.items()],
-        (
-            LTP_NOTE,
-            f"{robots * days} days of one home in {duration_s:.1f} s, {options.workers} at a time",
-        ),
     )
+    speed = f"{robots * days} days of one home in {duration_s:.1f} s, {options.workers} at a time"
     numbers = {
         "robots": robots,
         "days": days,
@@ -224,7 +201,7 @@ def ltp_gap(options: PaperOptions) -> Result:
         },
         "gaps": [dict(zip(rooms, gaps[:, i].tolist(), strict=True)) for i in range(robots)],
     }  # fmt: skip
-    return Result(LTP_GAP, months.meta.description, (table,), numbers)
+    return Result(LTP_GAP, months.meta.description, (table,), numbers, (LTP_NOTE, speed))
 
 
 MODELS = ("routine", "hmm", "semi_markov", "markov", "hour_of_week", "long_term")
@@ -250,7 +227,7 @@ def rtp_gap(options: PaperOptions) -> Result:
     means = {
         score: {
             model: {
-                gap: interval(life[model][gap][score] for life in lives if gap in life[model])
+                gap: interval([life[model][gap][score] for life in lives if gap in life[model]])
                 for gap in (*GAPS, ALL)
                 if any(gap in life[model] for life in lives)
             }
@@ -259,19 +236,18 @@ def rtp_gap(options: PaperOptions) -> Result:
         for score in SCORES
     }
     tables = [
-        Table(
+        table_of(
             f"{title}; {counted(seeds, 'seed')} of {counted(days, 'day')}",
             ("model", *GAPS, ALL),
             [
                 (_words(model), *(f"{of[gap][0]:.3f}" if gap in of else "" for gap in (*GAPS, ALL)))
                 for model, of in means[score].items()
             ],
-            (RTP_NOTE,) if score == "top_1" else (),
         )
         for score, title in SCORES.items()
     ]
     numbers = {"seeds": seeds, "days": days, "means": means, "scores": lives}
-    return Result(RTP_GAP, months.meta.description, tables, numbers)
+    return Result(RTP_GAP, months.meta.description, tables, numbers, (RTP_NOTE,))
 
 
 def _scores(row: Mapping[str, Any]) -> dict[str, dict[str, dict[str, float]]]:
@@ -317,11 +293,7 @@ def feedback(options: PaperOptions) -> Result:
             values += [] if error is None else [error]
     size = f"{counted(seeds, 'paired seed')} of {counted(days, 'day')}"
     tables = [
-        _error_table(
-            f"total variation from the truth at the end; {size}: mean (95 %)",
-            errors,
-            ("the paper has no such table: it is what its figures of learning robots stand on",),
-        ),
+        _error_table(f"total variation from the truth at the end; {size}: mean (95 %)", errors),
         _error_table(
             f"the same less that of {_words(NAIVE_ESTIMATOR)} on the same seed, smaller is better:"
             " mean (95 %)",
@@ -329,7 +301,8 @@ def feedback(options: PaperOptions) -> Result:
         ),
     ]
     numbers = {"seeds": seeds, "days": days, "tv": errors}
-    return Result(FEEDBACK, months.meta.description, tables, numbers)
+    note = "the paper has no such table: it is what its figures of learning robots stand on"
+    return Result(FEEDBACK, months.meta.description, tables, numbers, (note,))
 
 
 def differences(errors: Errors) -> Errors:
@@ -344,13 +317,13 @@ def differences(errors: Errors) -> Errors:
     }
 
 
-def _error_table(title: str, errors: Errors, notes: Sequence[str] = ()) -> Table:
+def _error_table(title: str, errors: Errors) -> Table:
     estimators = next(iter(errors.values()))
     rows = [
         (policy, *("{:.3f} ({:.3f} to {:.3f})".format(*interval(v)) for v in of.values()))
         for policy, of in errors.items()
     ]
-    return Table(title, ("robot", *map(_words, estimators)), rows, notes)
+    return table_of(title, ("robot", *map(_words, estimators)), rows)
 
 
 def _words(name: str) -> str:

@@ -21,6 +21,7 @@ from matplotlib.patches import PathPatch, Rectangle
 from matplotlib.path import Path as Outline
 from shapely.geometry.base import BaseGeometry
 
+from fleet2d.configuration.problems import counted
 from fleet2d.errors import InputError, os_errors_as
 from fleet2d.floorplan.checkup import Finding
 from fleet2d.floorplan.lattice import UNITS_PER_CELL
@@ -292,7 +293,7 @@ def floorplan_axes(plan: FloorPlan, axes: Axes, *, names: bool = True, title: bo
             _write_room(plan, room, empty, axes)
         label_objects(plan, axes)
     if title:
-        rooms = f"{len(plan.rooms)} room{'s' * (len(plan.rooms) != 1)}"
+        rooms = counted(len(plan.rooms), "room")
         height = 0.65 * _margin(plan)
         left, _, _, top = plan.bounds
         style: dict[str, Any] = {"va": "center", "color": TEXT_COLOR, "zorder": 5}

@@ -298,7 +298,7 @@ class Lives:
         return with_absences(day, datetime.fromordinal(ordinal), away, visits)
 
     def _visits(self, name: str, ordinal: int) -> Sequence[Period] | None:
-        """Return the visits of a member on a day and those next to it; None: it lives here."""
+        """Return a member's visits on a day and the days beside it; None: the member lives here."""
         visits = self.household.visits.get(name)
         if not isinstance(visits, RandomVisits):
             return visits or None

@@ -168,7 +168,7 @@ class ExternalProgram:
         except (ValueError, TypeError, AttributeError) as error:
             line = bytes(self._unread[:80])
             raise self._failure(
-                f"wrote {line!r}, which is no line of JSON with a type ({error})"
+                f"wrote {line!r}, which is not a line of JSON with a type ({error})"
             ) from None
         if answer is None:
             process = self._process

@@ -42,7 +42,7 @@ def plain_name(name: object, folder: Path | str) -> str:
         folder: The folder, or the location of a store, for the message.
 
     Raises:
-        RunDirectoryError: It is no such name.
+        RunDirectoryError: It isn't such a name.
 
     Example:
         >>> plain_name("learned/ltp.npz", "month")

@@ -157,7 +157,7 @@ def power_table(
 def _all_pairs(
     frame: "pl.DataFrame", columns: Sequence[str], metric: str, axis: str, reference: Any
 ) -> "Iterator[tuple[Any, pl.DataFrame]]":
-    """Yield each other value of an axis with its pairs.
+    """Yield every value of an axis but the reference, with its pairs.
 
     Raises:
         InputError: No variant has the reference.

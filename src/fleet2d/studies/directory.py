@@ -338,7 +338,7 @@ class StudyDirectory:
     def _variant_tables(
         self, parts: Sequence[Part], headers: Sequence[Mapping[str, Any]]
     ) -> "Iterator[pa.Table]":
-        """Yield the variants, some rows of the plan after the other."""
+        """Yield the variants, a block of rows of the plan at a time."""
         import pyarrow as pa
 
         results = ResultRows(self.storage, parts, headers)

@@ -249,7 +249,7 @@ class KnownNames:
             )
         elif entry in self._metrics:
             raise ScenarioError(
-                f"{key}: {name!r} is no number: write {name}.* for all of its numbers"
+                f"{key}: {name!r} is not a number: write {name}.* for all of its numbers"
             )
         raise ScenarioError(
             f"{key}: no variant has a metric {entry!r}{suggest(entry, sorted(self._metrics))}"

@@ -275,7 +275,7 @@ def make_sampler(settings: TuneSettings, finished: int) -> "optuna.samplers.Base
             options.setdefault("seed", settings.seed + finished)
         sampler = kind(**options)
         if not isinstance(sampler, samplers.BaseSampler):
-            raise TypeError("it is no sampler of Optuna")
+            raise TypeError("it is not a sampler of Optuna")
     except (ImportError, TypeError, ValueError) as error:
         raise ScenarioError(f"tune.sampler: {name} can't be used: {error}") from error
     return sampler

@@ -11,6 +11,7 @@ from types import CodeType
 from typing import Any
 
 from fleet2d.artifacts.store import ArtifactSettings
+from fleet2d.configuration.problems import counted
 from fleet2d.engine.simulation import Simulation
 from fleet2d.errors import InputError
 from fleet2d.expectations.expectation import Expectation, Term
@@ -287,7 +288,7 @@ class ClaimResult:
         """The decision, and the number of trials that it is based on."""
         number, failures = len(self.trials), len(self.failed)
         rate, unit = self.claim.rate, "run" if self.claim.varies else "seed"
-        held = f"held in {number - failures} of {number} {plural(unit, number)}"
+        held = f"held in {number - failures} of {counted(number, unit)}"
         if rate.seeds == 1:
             return "held" if self.holds else "failed"
         if rate.holds == 1:
@@ -394,12 +395,3 @@ def _line_of(error: AssertionError) -> str:
     while trace is not None and trace.tb_next is not None:
         trace = trace.tb_next
     return "" if trace is None else f"{trace.tb_frame.f_code.co_filename}:{trace.tb_lineno}"
-
-
-def plural(word: str, number: int) -> str:
-    """Return the singular or plural of a word for a number.
-
-    >>> plural("seed", 1), plural("run", 2)
-    ('seed', 'runs')
-    """
-    return word if number == 1 else f"{word}s"

@@ -175,12 +175,10 @@ def write_film(
     rate = Fraction(speed).limit_denominator(1000) * 1_000_000
     rate /= run.manifest["step_us"] * stride
     with drawing_style():
-        figure = _figure(run, height)
-        stage = Stage(run, first, end, figure=figure, stride=stride)
-        apply_theme(figure)
+        stage = stage_of(run, first, end, stride, height)
         moments = np.flatnonzero(stage.changes())
         total = -(-(end - first) // stride)
-        frames = _frames(stage, first, moments, on_progress)
+        frames = draw_frames(stage, first, moments, on_progress)
         _store(path, frames, total, rate)
     return len(moments)
 
@@ -219,13 +217,29 @@ def _figure(run: Run, height: int) -> Figure:
     return figure
 
 
-def _frames(
+def stage_of(run: Run, first: int, end: int, stride: int, height: int = HEIGHT_PX) -> Stage:
+    """Return the stage of a film, in the current theme; see `write_film`.
+
+    Args:
+        run: The run.
+        first: First step.
+        end: The step before which to end.
+        stride: Steps between two frames.
+        height: The height of a frame [pixels].
+    """
+    figure = _figure(run, height)
+    stage = Stage(run, first, end, figure=figure, stride=stride)
+    apply_theme(figure)
+    return stage
+
+
+def draw_frames(
     stage: Stage,
     first: int,
     moments: I64,
-    on_progress: Callable[[int, int], None] | None,
+    on_progress: Callable[[int, int], None] | None = None,
 ) -> Iterator[tuple[int, U8]]:
-    """Yield the number and the pixels of each frame that differs from the one before."""
+    """Yield the number and the pixels of some frames of a film."""
     canvas: Any = stage.figure.canvas
     for _, artist in (*stage.body_artists, *stage.clock_artists):
         artist.set_animated(True)

@@ -267,11 +267,11 @@ class PageServer:
                 (`ssh -L`) or a proxy.
 
         Raises:
-            InputError: The port is in use, or `seen_at` is no address.
+            InputError: The port is in use, or `seen_at` isn't an address.
         """
         if seen_at and not re.fullmatch(r"https?://[\w.:\[\]-]+(/[\w./~-]*)?", seen_at):
             raise InputError(
-                f"--seen-at {one_line(seen_at, 80)!r} is no address of a page: give one like"
+                f"--seen-at {one_line(seen_at, 80)!r} is not the address of a page: give one like"
                 " http://localhost:9000 or https://robots.example/fleet2d"
             )
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
@@ -289,7 +289,7 @@ class PageServer:
         self._runs = ServedRuns(sources)
         self._live = LiveRuns(self._runs, live)
         app = page_app(self._runs, token, self._port, self._live, seen_at=seen_at)
-        # Quiet: a page that is open when the server ends is no error.
+        # Quiet: a page that is open when the server ends is not an error.
         config = uvicorn.Config(
             app, log_level="critical", lifespan="off", ws="none", timeout_graceful_shutdown=1
         )

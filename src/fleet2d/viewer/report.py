@@ -164,7 +164,7 @@ def _png(figure: Any) -> str:
 
 
 def _timeline(run: Run) -> str:
-    """Return the page of a run in a frame that has no access to the report."""
+    """Return the page of a run, in a sandboxed frame."""
     with suppress(ArtifactError):  # no plan or no key frames
         page = html_of([embedded_run(PageData(run), 0, run.manifest["steps"])])
         if len(page) <= MAX_TIMELINE_CHARS:

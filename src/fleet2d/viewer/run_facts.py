@@ -215,7 +215,7 @@ def _observations(run: Run) -> Iterator[Any]:
 
 
 class _SightingColumns(NamedTuple):
-    """Some observations.
+    """Columns of observations, all of one length.
 
     Attributes:
         step: int64 (rows,).

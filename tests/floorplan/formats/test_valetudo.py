@@ -559,7 +559,7 @@ def test_component_of_a_damaged_file_says_so_when_it_loads(tmp_path: Path) -> No
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"__class": "Map"}, "no Valetudo map"),
+        ({"__class": "Map"}, "not a Valetudo map"),
         ({"metaData": {"version": 3}}, "version 3 of Valetudo's map format"),
         ({"metaData": None}, "version null"),
         ({"pixelSize": None}, "pixelSize is null"),

@@ -95,7 +95,7 @@ class ExposureRatio(Estimator):
         self.is_recalled = True
 
     def sums(self, evidence: Evidence) -> F64:
-        """Return seen and watched of each patch, in bins."""
+        """Return for how long each patch was watched, and somebody seen in it, in bins."""
         return seen_and_watched(
             evidence.by_patch.seen,
             evidence.by_patch.watched,
@@ -225,7 +225,7 @@ class Fremen(Estimator):
         return 2 * rooms + 1
 
     def sums(self, evidence: Evidence) -> F64:
-        """Return seen and watched of each room, in bins."""
+        """Return for how long each room was watched, and somebody seen in it, in bins."""
         is_counted = np.ones(len(evidence), bool)
         return seen_and_watched(evidence.seen, evidence.watched, is_counted, evidence.bin_steps)
 

@@ -277,7 +277,9 @@ class ToldPresence(Algorithm):
         if belief is None:
             return None
         if not isinstance(belief, Presence) or belief.track is None:
-            raise ComponentError(f"{self.reads[0]!r} is no real-time presence: name one in `reads`")
+            raise ComponentError(
+                f"{self.reads[0]!r} is not a real-time presence: name one in `reads`"
+            )
         for event in history.events:
             name, _, where = event.detail.partition(" ")
             if event.event == "told" and name in state.users:

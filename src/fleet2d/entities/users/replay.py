@@ -10,6 +10,7 @@ import numpy as np
 from pydantic import BeforeValidator, Field, WithJsonSchema
 
 from fleet2d.configuration.components import register
+from fleet2d.configuration.problems import counted
 from fleet2d.configuration.units import (
     Duration,
     InputFileOrFolder,
@@ -448,7 +449,7 @@ def report_fixes(
 
 def _head(log: ActivityLog | PositionLog, count: int, noun: str) -> str:
     since = f" from {log.first_day}" if log.first_day else ""
-    days = f"{log.days} day{'' if log.days == 1 else 's'}"
+    days = counted(log.days, "day")
     return f"{log.path.name}, layout {log.layout}: {count} {noun} of {days}{since}"
 
 

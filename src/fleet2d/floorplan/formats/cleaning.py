@@ -26,7 +26,7 @@ TINY = 1e-9
 # Widths of what is opened at a threshold or a shut door [m].
 DOOR_M = (0.4, 1.4)
 USUAL_DOOR_M = 0.8
-# A part of a map in which this can't stand is no part of a home: its area and width [m², m].
+# A part of a map in which this can't stand is not part of a home: its area and width [m², m].
 SCRAP_M2, SCRAP_WIDTH_M = 1.0, 0.3
 # A part that nothing joins is a room of the home from this area on [m²].
 ROOM_M2 = 4.0

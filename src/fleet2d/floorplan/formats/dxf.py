@@ -143,7 +143,7 @@ def _scale(units: int, extent: float, notes: list[str]) -> float:
                 notes.append(f"a unit is taken for {scale:g} m, by the extent; scale: sets another")
             return scale
     raise FloorPlanError(
-        f"its walls extend over {extent:.4g} units, which is no home in metres, centimetres,"
+        f"its walls extend over {extent:.4g} units, which is not a home in metres, centimetres,"
         " millimetres, inches or feet: set floorplan.scale to the metres to a unit"
     )
 

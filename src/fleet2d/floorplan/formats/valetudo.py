@@ -127,7 +127,7 @@ def check_map(content: dict[str, Any]) -> dict[str, Any]:
     if raw is not None:
         return as_valetudo(raw)
     if content.get("__class") != MAP_CLASS:
-        raise FloorPlanError(f'no Valetudo map: "__class" is not "{MAP_CLASS}"')
+        raise FloorPlanError(f'not a Valetudo map: "__class" is not "{MAP_CLASS}"')
     version = _meta(content).get("version")
     if version not in VERSIONS:
         raise FloorPlanError(

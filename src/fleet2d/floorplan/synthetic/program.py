@@ -9,6 +9,7 @@ from typing import NamedTuple, TypeVar
 
 import numpy as np
 
+from fleet2d.configuration.problems import counted
 from fleet2d.errors import FloorPlanError
 from fleet2d.kernels import random_below
 
@@ -248,16 +249,16 @@ def _check(area: float, wishes: Wishes) -> None:
     beds = wishes.bedrooms or max(baths - 2, 1)
     if baths > beds + 2:
         raise FloorPlanError(
-            f"a synthetic home with {_count(beds, 'bedroom')} has at most {beds + 2} bathrooms, not"
-            f" {baths}: give it more bedrooms (floorplan.bedrooms) or fewer bathrooms"
+            f"a synthetic home with {counted(beds, 'bedroom')} has at most {beds + 2} bathrooms,"
+            f" not {baths}: give it more bedrooms (floorplan.bedrooms) or fewer bathrooms"
         )
     least, most = minimum_area(beds, baths, garage), maximum_area(beds, baths)
-    rooms = f"{_count(beds, 'bedroom')} and {_count(baths, 'bathroom')}"
+    rooms = f"{counted(beds, 'bedroom')} and {counted(baths, 'bathroom')}"
     if garage:
         rooms += " and a garage"
     if area < least:
         fits = [n for n in range(1, beds) if minimum_area(n, 1, garage=False) <= area]
-        at_most = f"; {area:g} m2 fits {_count(max(fits), 'bedroom')}" if fits else ""
+        at_most = f"; {area:g} m2 fits {counted(max(fits), 'bedroom')}" if fits else ""
         raise FloorPlanError(
             f"a synthetic home of {area:g} m2 can't have {rooms}: they need at least {least:g} m2"
             f"{at_most}. Change floorplan.area_m2, or the rooms"
@@ -267,10 +268,6 @@ def _check(area: float, wishes: Wishes) -> None:
             f"a synthetic home with {rooms} has at most {most:g} m2, not {area:g} m2: its rooms"
             " would be halls. Give it more bedrooms (floorplan.bedrooms), or less area"
         )
-
-
-def _count(number: int, kind: str) -> str:
-    return f"{number} {kind}{'s' * (number != 1)}"
 
 
 def _base(bedrooms: int, bathrooms: int) -> list[str]:

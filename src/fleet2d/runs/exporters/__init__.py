@@ -66,7 +66,7 @@ class Selection:
             every: Time between two poses, such as "10 s".
 
         Raises:
-            InputError: `every` is no duration, or no multiple of the step.
+            InputError: `every` isn't a duration, or not a multiple of the step.
         """
         step_us = run.manifest["step_us"]
         try:
@@ -171,7 +171,7 @@ class _Rows:
         self._waiting: list[pa.RecordBatch] = []
 
     def between(self, first: int, end: int) -> "pa.Table":
-        """Return the rows of steps from `first` to before `end`, which follow those before."""
+        """Return the rows of steps `first` to `end` - 1; stretches must be requested in order."""
         import pyarrow as pa
 
         parts: list[pa.RecordBatch] = []
