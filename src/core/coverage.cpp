@@ -1,6 +1,7 @@
 #include "coverage.hpp"
 
 #include <algorithm>
+#include <cstring>
 #include <stdexcept>
 
 #include "visible_cells.hpp"
@@ -50,6 +51,18 @@ i64 slot_of(const PoseCache& cache, const Stance& stance) {
 template <class T>
 View<T> cells_of(View<T, 2> grid, const Span& span) {
     return grid[span.row].slice(span.first, span.last + 1);
+}
+
+// One past the last of the equal numbers from index `first` on; four are compared at a time.
+i64 end_of_run(View<const i16> numbers, i64 first) {
+    const u64 same = static_cast<u16>(numbers[first]) * u64{0x0001000100010001};
+    i64 end = first + 1;
+    for (u64 four; end + 4 <= numbers.size(); end += 4) {
+        std::memcpy(&four, &numbers[end], sizeof four);
+        if (four != same) break;
+    }
+    while (end < numbers.size() && numbers[end] == numbers[first]) ++end;
+    return end;
 }
 
 // Add cells of one patch, -1 for none.
@@ -153,12 +166,14 @@ void CoverageRecorder::look_from(i64 slot, i64 step) {
 }
 
 void CoverageRecorder::mark(const Span& span, i64 step, View<i32> cells) {
-    for (i64& first : cells_of(record_.first, span)) first = first == NEVER ? step : first;
+    if (record_.keeps_first()) {
+        for (i64& first : cells_of(record_.first, span)) first = first == NEVER ? step : first;
+    }
     if (record_.keeps_last()) std::ranges::fill(cells_of(record_.last, span), step);
     const View<const i16> patches = cells_of(setup_.patch_of_cell, span);
     if (setup_.cameras() == 1) {
         for (i64 i = 0, end = 0; i < patches.size(); i = end) {  // neighbours mostly belong to one patch
-            while (end < patches.size() && patches[end] == patches[i]) ++end;
+            end = end_of_run(patches, i);
             count_cells(patches[i], end - i, cells);
         }
         return;

@@ -26,7 +26,7 @@ struct PoseCache {
 
 // What a robot has seen since the start. A patch is a room, or a part of one.
 struct CoverageRecord {
-    View<i64, 2> first;    // (rows, columns) the first step at which each cell was in view, or NEVER
+    View<i64, 2> first;    // (rows, columns) the first step at which each cell was in view, or NEVER; empty: not kept
     View<i64, 2> last;     // (rows, columns) the last such step as far as `settle_coverage` was called; empty: not kept
     View<i64> exposure;    // (patches,) cells of each patch in view, summed over the steps
     View<i64, 2> counted;  // (rows, columns) the last look that counted each cell; empty for a single camera
@@ -35,6 +35,7 @@ struct CoverageRecord {
     View<i64, 2> peak;     // (bins, patches) the most cells of each patch in view at a step, likewise
 
     i64 patches() const { return exposure.size(); }
+    bool keeps_first() const { return first.size() > 0; }
     bool keeps_last() const { return last.size() > 0; }
     bool keeps_bins() const { return binned.size() > 0; }
 };

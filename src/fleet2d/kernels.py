@@ -440,7 +440,8 @@ class CoverageRecord(NamedTuple):
     """What a robot has seen since the start.
 
     Attributes:
-        first: int64 (rows, columns), first step at which each cell was in view, -1 for never.
+        first: int64 (rows, columns), first step at which each cell was in view, -1 for never;
+            empty: not recorded.
         last: int64 (rows, columns), the last such step, up to the last call of `settle_coverage`;
             empty: not recorded.
         exposure: int64 (patches,), cells of each patch in view, summed over the steps.

@@ -189,6 +189,24 @@ def test_sight_record_equals_brute_force(
     assert (expected.first >= 0).sum() > 20
 
 
+def test_first_steps_may_be_left_out() -> None:
+    """`explored` and `first_seen` are kept only if something reads them; the counts are the same."""
+    shape, window = (FLAT.rows, FLAT.columns), window_of(random_poses(np.random.default_rng(1), 60))
+    setup = CoverageSetup(FLAT.mesh, lenses_of(*ONE), rooms_of(FLAT), SECOND, 1, BIN)
+    records = [
+        CoverageRecord(
+            np.full(grid, NEVER), np.zeros((0, 0), np.int64), np.zeros(ROOMS, np.int64),
+            np.zeros((0, 0), np.int64), *np.zeros((2, 8, ROOMS), np.int64),
+        )
+        for grid in (shape, (0, 0))
+    ]  # fmt: skip
+    for record in records:
+        record_coverage(setup, window, 0, 0, 60, empty_pose_cache(64, ROOMS), record)
+
+    assert records[0].exposure.tolist() == records[1].exposure.tolist()
+    assert records[0].exposure.sum() > 0
+
+
 @quick
 @given(seeds(), st.sampled_from([ONE, TWO]), st.integers(1, 4), st.lists(st.integers(1, 59)))
 def test_sight_record_in_spans_equals_brute_force(

@@ -49,7 +49,8 @@ void check_glances(const PoseCache& cache) {
 bool is_grid(View<i64, 2> cells, const CoverageSetup& setup) { return cells.shape == setup.patch_of_cell.shape; }
 
 void check_record(const CoverageSetup& setup, const CoverageRecord& record) {
-    require(is_grid(record.first, setup) && (!record.keeps_last() || is_grid(record.last, setup)) &&
+    require((!record.keeps_first() || is_grid(record.first, setup)) &&
+                (!record.keeps_last() || is_grid(record.last, setup)) &&
                 (setup.cameras() <= 1 || is_grid(record.counted, setup)),
             "first, last and counted must be as large as patch_of_cell");
     require(record.peak.shape == record.binned.shape &&

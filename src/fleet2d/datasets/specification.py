@@ -13,10 +13,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from pydantic import Field, ValidationError
 
+from fleet2d.algorithms.evidence import steps_of_bin
 from fleet2d.configuration.components import Settings
 from fleet2d.configuration.documents import Document, read_document
 from fleet2d.configuration.trust import check_code
-from fleet2d.configuration.units import PositiveDuration
+from fleet2d.configuration.units import PositiveDuration, micros, parse_duration
 from fleet2d.errors import InputError, ScenarioError
 from fleet2d.runtime.determinism import Draws, stream_key
 from fleet2d.scenario.compose import apply_changes, assignment
@@ -26,6 +27,7 @@ from fleet2d.studies.axes import AnyAxis, Choice
 NAMES = ("ana", "ben", "cleo", "dan", "eva", "finn", "gina", "hugo")
 EVIDENCE, STAYS, BELIEF = "evidence", "stays", "belief_"
 MAX_SEED = 1 << 31
+MAX_PERIOD = timedelta(days=1)
 
 
 class SplitSettings(Settings):
@@ -208,11 +210,17 @@ class DatasetPlan:
         scenario = deepcopy(apply_changes(self.base, changes).data)
         scenario["users"] = members_of(household)
         every = f"{self.file.every.total_seconds()} s"
+        period = f"{_period(scenario['simulation']).total_seconds()} s"
         scenario["algorithms"] = {
             **scenario.get("algorithms", {}),
-            EVIDENCE: {"type": "evidence_table"},
+            EVIDENCE: {"type": "evidence_table", "period": period},
             **{
-                f"{BELIEF}{model}": {"type": "rtp", "model": model, "period": every}
+                f"{BELIEF}{model}": {
+                    "type": "belief_table",
+                    "model": model,
+                    "every": every,
+                    "period": period,
+                }
                 for model in self.file.beliefs
             },
         }
@@ -251,6 +259,18 @@ def plan_dataset(source: str | Path | Mapping[str, Any]) -> DatasetPlan:
     plan = DatasetPlan(file, Document(base), homes)
     plan.check()
     return plan
+
+
+def _period(simulation: Mapping[str, Any]) -> timedelta:
+    """Return the longest time up to a day that divides a run into equal parts of whole bins.
+
+    The tables of a data set are filled once in that time, which costs least; an hour if there is
+    none.
+    """
+    duration, step = (parse_duration(simulation[name]) for name in ("duration", "step"))
+    parts = -(-duration // MAX_PERIOD)
+    is_even = duration % (parts * steps_of_bin(micros(step)) * step) == timedelta(0)
+    return duration / parts if is_even else timedelta(hours=1)
 
 
 def members_of(household: Any) -> dict[str, Any]:

@@ -223,7 +223,8 @@ def whereabouts(run: "Run", user: str) -> Whereabouts:
 def _beliefs(run: "Run", names: Sequence[str]) -> list[dict[str, Any]]:
     made = []
     for name in names:
-        columns = columns_of(run, name, ["step", "user", "room", "share"])
+        at = "at" if "at" in run.arrow(name).column_names else "step"  # of belief_table, of rtp
+        columns = columns_of(run, name, [at, "user", "room", "share"])
         places = int(np.argmax(columns["room"] == AWAY)) + 1  # rooms in order, and last away
         share = columns["share"].reshape(-1, places)
         joint = share.copy()
@@ -231,7 +232,7 @@ def _beliefs(run: "Run", names: Sequence[str]) -> list[dict[str, Any]]:
         own = np.repeat(columns["user"].reshape(-1, places)[:, 0] != ANYONE, places)
         made.append(
             {
-                "step": columns["step"][own],
+                "step": columns[at][own],
                 "model": np.full(int(own.sum()), name.removeprefix(BELIEF), object),
                 "user": columns["user"][own],
                 "place": columns["room"][own],

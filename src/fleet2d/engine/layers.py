@@ -68,6 +68,7 @@ class SeenArea(Watcher):
         bodies: Bodies,
         *,
         every: int = 1,
+        keeps_first: bool = True,
         keeps_last: bool = True,
         bin_steps: int = 0,
     ) -> None:
@@ -79,7 +80,8 @@ class SeenArea(Watcher):
             patches: The parts of rooms that bins distinguish.
             bodies: All bodies of the run.
             every: Number of steps between two looks; each look counts for this many steps.
-            keeps_last: Whether `last_seen` is available.
+            keeps_first: Whether `explored` and `first_seen` are available.
+            keeps_last: Whether `last_seen` and `time_since_seen` are available.
             bin_steps: Steps in a bin of exposure, for `take_bins`; 0: no bins.
         """
         assert isinstance(robot.entity, Robot)
@@ -94,7 +96,7 @@ class SeenArea(Watcher):
         self._open_lenses = self._lenses
         grid, none = (lattice.rows, lattice.columns), (0, 0)
         self._record = CoverageRecord(
-            first=np.full(grid, NEVER, np.int64),
+            first=np.full(grid if keeps_first else none, NEVER, np.int64),
             last=np.full(grid if keeps_last else none, NEVER, np.int64),
             exposure=np.zeros(len(patches.room), np.int64),
             counted=np.full(grid if len(lenses) > 1 else none, NEVER, np.int64),
@@ -312,7 +314,6 @@ class LayerBook:
     def _open_areas(self, basis: Basis, names: Set[str]) -> list[SeenArea]:
         """Return the area that each robot with a camera has seen, before the first step."""
         every = self._multiple(basis.scenario.sight.seen_every, "sight.seen_every") or 1
-        keeps_last = bool({"last_seen", "time_since_seen"} & names)
         return [
             SeenArea(
                 actor,
@@ -320,7 +321,8 @@ class LayerBook:
                 self._patches,
                 basis.bodies,
                 every=every,
-                keeps_last=keeps_last,
+                keeps_first=not names.isdisjoint({"explored", "first_seen"}),
+                keeps_last=not names.isdisjoint({"last_seen", "time_since_seen"}),
                 bin_steps=self._bin_steps,
             )
             for row, actor in enumerate(basis.actors)

@@ -175,8 +175,7 @@ class Learners:
                 output = self._update(learner, end, log, inputs)
                 learner.since = end
                 if isinstance(learner.component, Algorithm) and output is not None:
-                    # A copy: a component may continue to change its arrays.
-                    fresh[learner.name] = copy.deepcopy(output)
+                    fresh[learner.name] = _copy(output)
         self.fresh, self._due = fresh, self._earliest_due()
         self.outputs = {**self.outputs, **fresh}  # a new mapping: others may hold the old one
 
@@ -272,6 +271,16 @@ class Learners:
         _check_kinds(learner, kinds)
         steps = np.full(len(next(iter(columns.values()))), step, np.int64)
         self.store.append(learner.table, step=steps, time=self.clock.times(steps), **columns)
+
+
+def _copy(output: Any) -> Any:
+    """Return a copy of an output: a component may continue to change its arrays.
+
+    Arrays of columns hold numbers or texts, so texts are not copied one by one.
+    """
+    if type(output) is dict and all(isinstance(value, np.ndarray) for value in output.values()):
+        return {name: values.copy() for name, values in output.items()}
+    return copy.deepcopy(output)
 
 
 def check_result(result: Any, where: str = "result()") -> Any:

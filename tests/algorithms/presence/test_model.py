@@ -1,6 +1,9 @@
 """The ladder of real-time presence: by hand on small evidence, and better from rung to rung."""
 
+from dataclasses import replace
 from datetime import datetime, timedelta
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,6 +20,7 @@ from tests.algorithms.presence.worlds import (
     pieces,
 )
 
+from fleet2d.algorithms.algorithm import to_columns
 from fleet2d.algorithms.evidence import Evidence
 from fleet2d.algorithms.presence.belief import BeliefSeries, Presence
 from fleet2d.algorithms.presence.chain_model import (
@@ -27,8 +31,17 @@ from fleet2d.algorithms.presence.chain_model import (
     steps_of,
 )
 from fleet2d.algorithms.presence.exposure_ratio import ExposureRatio
-from fleet2d.algorithms.presence.model import HourOfWeek, LastSeen, LongTerm, Model
+from fleet2d.algorithms.presence.learned import LearnedModel
+from fleet2d.algorithms.presence.model import (
+    BeliefTable,
+    HourOfWeek,
+    LastSeen,
+    LongTerm,
+    Model,
+    RealTimePresence,
+)
 from fleet2d.configuration.components import components
+from fleet2d.errors import ComponentError
 from fleet2d.metrics.rtp_score import log_loss
 
 CHAINS = [MarkovDecay, Filter, SemiMarkov, RoutineModel]
@@ -69,11 +82,51 @@ def test_the_future_changes_nothing(cls: type[Model]) -> None:
     )
     one, two = (followed(cls(), b, 3, 2).track for b in (bins, mixed))
     assert np.array_equal(one.home[:60], two.home[:60])
-    if cls in (LastSeen, *CHAINS):  # bin by bin, too
+    if cls.is_by_bin:
         one, two = (followed(cls(), b, 3, 2, length=120).track for b in (bins, mixed))
         late = bins.day == bins.day[0]  # what is learned at midnight isn't known before
         late &= np.arange(120) < 60
         assert np.array_equal(one.home[late], two.home[late])
+
+
+@pytest.mark.parametrize("island", [None, [0, 0, 2]], ids=["joined", "islands"])
+@pytest.mark.parametrize("cls", [LastSeen, HourOfWeek, RoutineModel, LearnedModel])
+def test_a_table_of_beliefs_has_those_of_frequent_updates(
+    cls: type[Model], island: list[int] | None
+) -> None:
+    """Every seven minutes, from periods of 35 minutes; what lies behind a row isn't used in it."""
+    bins = any_evidence(2, bins=70)
+    bins.watched[:40, 2] = 0  # so that the second island is unknown at first
+    islands = None if island is None else np.array(island)
+    bins = replace(bins, by_patch=bins.by_patch._replace(island=islands))
+
+    expected = [rows["share"] for rows in updates(RealTimePresence(model=cls()), bins, 7)]
+    made = updates(BeliefTable(model=cls(), every=timedelta(minutes=7)), bins, 35)
+
+    assert (
+        np.abs(np.concatenate(expected) - [s for rows in made for s in rows["share"]]).max() < 1e-12
+    )
+    steps = [int(at) for rows in made for at in rows["at"][:: 3 * 4]]
+    assert [42 * k - 1 for k in range(1, 11)] == steps
+
+
+def updates(algorithm: Any, bins: Evidence, length: int) -> list[dict[str, Any]]:
+    """The columns that an algorithm makes of evidence that comes in pieces."""
+    home = home_of(3)
+    algorithm.start(home)
+    state: Any = SimpleNamespace(users=("u0", "u1"), start=SUNDAY_LATE, path="algorithms.x")
+    made = []
+    for part in pieces(bins, length):
+        history: Any = SimpleNamespace(evidence=part, step_s=60 / part.bin_steps)
+        output = algorithm.update(history, state)
+        made.append(to_columns(output, [room.name for room in home.rooms], "algorithms.x"))
+    return made
+
+
+def test_a_table_of_beliefs_is_due_at_whole_minutes() -> None:
+    table = BeliefTable(model=LastSeen(), every=timedelta(seconds=90))
+    with pytest.raises(ComponentError, match=r"algorithms\.x\.every must be a whole number of min"):
+        updates(table, any_evidence(2), 20)
 
 
 def test_last_seen_is_the_room_of_the_newest_sighting() -> None:

@@ -169,7 +169,7 @@ class Presence:
                 f"presence has {self._home.shape[1]} rooms, but the home has {len(rooms)}"
             )
         columns: dict[str, NDArray[Any]] = {
-            **_labels(self.names, tuple(places)),
+            **belief_labels(self.names, tuple(places)),
             "share": np.concatenate([self._home, self._away[:, None]], axis=1).ravel(),
         }
         if self._interval is not None:
@@ -187,7 +187,7 @@ class Presence:
 
 
 @lru_cache(64)
-def _labels(names: tuple[str, ...], places: tuple[str, ...]) -> dict[str, NDArray[Any]]:
+def belief_labels(names: tuple[str, ...], places: tuple[str, ...]) -> dict[str, NDArray[Any]]:
     """Return the columns that are the same each time: a row for each name and place."""
     user = np.repeat(np.array(names, dtype=object), len(places))
     room = np.tile(np.array(places, dtype=object), len(names))

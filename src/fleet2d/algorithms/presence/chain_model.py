@@ -226,6 +226,7 @@ class Filter(Model):
         restless: Chance per bin that a person in a room changes patch, before it is learned.
     """
 
+    is_by_bin: ClassVar[bool] = True
     detection: Share = Field(default=0.95, gt=0, lt=1)
     restless: Share = 0.05
     stages: ClassVar[int] = 1

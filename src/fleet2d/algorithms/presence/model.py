@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from datetime import datetime, timedelta
+from itertools import pairwise
 from typing import Annotated, Any, ClassVar, NamedTuple, cast
 
 import numpy as np
@@ -12,15 +13,17 @@ from fleet2d.algorithms.evidence import Evidence
 from fleet2d.algorithms.history import History
 from fleet2d.algorithms.presence.belief import (
     ANYONE,
+    AWAY,
     HOURS,
     BeliefSeries,
     Presence,
     WeeklyPresence,
     are_distributions,
+    belief_labels,
 )
 from fleet2d.algorithms.presence.estimator import SECOND_US, Estimator, PresenceAlgorithm
 from fleet2d.configuration.components import Component, OneOf, register
-from fleet2d.configuration.units import PositiveDuration
+from fleet2d.configuration.units import PositiveDuration, whole_steps
 from fleet2d.errors import ComponentError
 from fleet2d.floorplan.home import Home
 from fleet2d.kernels import F64
@@ -36,6 +39,8 @@ class Model(Component):
     """
 
     kind: ClassVar[str] = "presence_model"
+    # Whether the belief after a bin is the same however many bins `observe` gets at a time.
+    is_by_bin: ClassVar[bool] = False
 
     def check(self) -> None:
         """Refuse files that it can't use; called when a run is set up.
@@ -93,6 +98,8 @@ class LastSeen(Model):
     In a bin with sightings in several rooms, the room with most of them counts; nobody is ever
     away. The naive baseline: right just after a sighting, and overconfident later.
     """
+
+    is_by_bin: ClassVar[bool] = True
 
     def begin(self, home: Home, users: Sequence[str], start: datetime) -> None:
         """Prepare for a run."""
@@ -195,12 +202,14 @@ class RealTimePresence(PresenceAlgorithm):
         """Process the evidence of the period; return the present belief."""
         self._begin_once(state)
         evidence = history.evidence
-        if not len(evidence):
-            return None
+        return self._process(evidence, history.step_s, state) if len(evidence) else None
+
+    def _process(self, evidence: Evidence, step_s: float, state: Present) -> Presence:
+        """Process evidence of a bin or more; return the belief after it."""
         home, away = self.model.observe(evidence)
         self._check(home, away, len(evidence), state)
         track = BeliefSeries(evidence.begin, evidence.bin_steps, home, away)
-        step_us = round(history.step_s * SECOND_US)
+        step_us = round(step_s * SECOND_US)
         steps = evidence.begin + len(evidence) * evidence.bin_steps
         time = state.start + timedelta(microseconds=steps * step_us)
         return self.model.presence(state.users, time, evidence.bin_steps * step_us, track)
@@ -234,6 +243,57 @@ class RealTimePresence(PresenceAlgorithm):
                 f" {home[k, row].tolist()}, which sum to {home[k, row].sum():g}, away"
                 f" {away[k, row]:g}"
             )
+
+
+@register("algorithm", "belief_table")
+class BeliefTable(RealTimePresence):
+    """The belief of a model of real-time presence at regular times, as rows of a table.
+
+    The rows are those that `real_time_presence` stores with the period `every`, up to rounding. But
+    there is no present belief, which anything could read during the run, and models that follow
+    people bin by bin get the evidence of a whole `period` at once, which is many times as fast.
+
+    Columns: `at`, the step of the belief; `user`; `room`, or away; `share`, of rooms given at home.
+
+    Attributes:
+        every: Time between two beliefs.
+    """
+
+    period: PositiveDuration = timedelta(hours=1)
+    every: PositiveDuration = timedelta(minutes=5)
+
+    def update(self, history: History, state: Present) -> Any:
+        """Process the evidence of the period; return its beliefs, None without any."""
+        self._begin_once(state)
+        evidence = history.evidence
+        step_us, bin_steps = round(history.step_s * SECOND_US), evidence.bin_steps
+        every = whole_steps(self.every, step_us, f"{state.path}.every", ComponentError)
+        if every % bin_steps:
+            raise ComponentError(f"{state.path}.every must be a whole number of minutes")
+        first, end = evidence.begin, evidence.begin + len(evidence) * bin_steps
+        due = np.arange(first // every + 1, end // every + 1) * every
+        bins = (due - first) // bin_steps  # that are over by then
+        # With islands, what is watched in the whole evidence says where people can be.
+        is_whole = self.model.is_by_bin and evidence.by_patch.island is None
+        ends = [len(evidence)] if is_whole else [*bins.tolist(), len(evidence)]
+        parts = [evidence.between(a, b) for a, b in pairwise([0, *ends]) if a < b]
+        beliefs = [self._process(part, history.step_s, state) for part in parts]
+        if not len(due):
+            return None
+        if is_whole:
+            track = beliefs[0].track
+            assert track is not None, "models that go bin by bin have one"
+            home, away = track.home[bins - 1], track.away[bins - 1]
+        else:
+            home, away = map(np.array, zip(*(b.arrays for b in beliefs[: len(due)]), strict=True))
+        names = (*state.users, ANYONE)
+        places = (*(room.name for room in self.home.rooms), AWAY)
+        columns = belief_labels(names, places)
+        return {
+            "at": np.repeat(due - 1, len(names) * len(places)),
+            **{name: np.tile(column, len(due)) for name, column in columns.items()},
+            "share": np.concatenate([home, away[..., np.newaxis]], axis=2).ravel(),
+        }
 
 
 class Told(NamedTuple):
