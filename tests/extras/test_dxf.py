@@ -16,7 +16,13 @@ RIGHT = [(4.2, 2.4), (4.2, 3.8), (7.8, 3.8), (7.8, 0.2), (4.2, 0.2), (4.2, 1.5)]
 JAMBS = [[(4.0, 1.5), (4.2, 1.5)], [(4.0, 2.4), (4.2, 2.4)]]
 
 
-def write(folder: Path, unit_m: float = 1.0, units: int = 6, layer: str = "A-WALL") -> Path:
+def write(
+    folder: Path,
+    unit_m: float = 1.0,
+    units: int = 6,
+    layer: str = "A-WALL",
+    windows: tuple[Any, ...] = (),
+) -> Path:
     drawing: Any = ezdxf.new(units=units)
     space = drawing.modelspace()
 
@@ -27,6 +33,8 @@ def write(folder: Path, unit_m: float = 1.0, units: int = 6, layer: str = "A-WAL
     line(OUTSIDE, layer, close=True)
     for points in (LEFT, RIGHT, *JAMBS):
         line(points, layer)
+    for points in windows:
+        line(points, "A-WINDOW")
     line([(1, 1), (3, 1), (3, 2), (1, 2)], "FURNITURE", close=True)
     path = folder / "plan.dxf"
     drawing.saveas(path)
@@ -63,3 +71,16 @@ def test_damaged_and_empty_drawings_are_refused(tmp_path: Path) -> None:
         load_floorplan(tmp_path / "empty.dxf")
     with pytest.raises(FloorPlanError, match="can't be read"):
         load_floorplan(tmp_path / "none.dxf")
+
+
+def test_one_sees_through_windows_between_rooms(tmp_path: Path) -> None:
+    inner = [[(x, 2.7), (x, 3.5)] for x in (4.0, 4.1, 4.2)]
+    outer = [[(1, y), (2, y)] for y in (0, 0.1, 0.2)]
+    sides = [[(4.0, y), (4.2, y)] for y in (2.7, 3.5)]
+
+    plan = load_floorplan(write(tmp_path, windows=(*inner, *sides, *outer)))
+
+    (pane,) = plan.glass
+    assert pane.area / plan.lattice.units_per_m**2 == pytest.approx(0.8 * 0.22, abs=0.05)
+    assert 2 == len(plan.rooms)
+    assert "windows in outer walls, through which nobody is seen: 1" in plan.notes

@@ -71,3 +71,16 @@ def test_layers_of_inkscape_with_walls_as_lines(tmp_path: Path) -> None:
 def test_what_is_no_plan_is_refused(tmp_path: Path, text: str, problem: str) -> None:
     with pytest.raises(FloorPlanError, match=problem):
         load_floorplan(write(tmp_path, text))
+
+
+def test_one_sees_through_windows_between_rooms(tmp_path: Path) -> None:
+    inner = CUBICASA.replace(
+        '<g class="Door',
+        '<g class="Window"><polygon points="500,250 520,250 520,380 500,380"/></g><g class="Door',
+    )
+
+    plan = load_floorplan(write(tmp_path, inner))
+
+    (pane,) = plan.glass
+    assert pane.area / plan.lattice.units_per_m**2 == pytest.approx(1.3 * 0.22, abs=0.02)
+    assert load_floorplan(write(tmp_path, CUBICASA)).glass == ()

@@ -322,5 +322,5 @@ class Clearance(Watcher):
 
 
 def _sees(robot: DecidingActor, x: int, y: int, place: tuple[int, int]) -> bool:
-    walls = robot.home.walls
+    walls = robot.home.barriers
     return bool(line_of_sight(walls, x, y, locate(walls, x, y), *place))

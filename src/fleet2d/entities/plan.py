@@ -342,7 +342,7 @@ class Plan:
         self.take("stand")
         home, body = self._body.home, self._body
         # A random walk doesn't open doors: a shut one is a wall.
-        self._motion = RandomWalk(home.walls, home.space(body.entity.radius).mesh, rule)
+        self._motion = RandomWalk(home.barriers, home.space(body.entity.radius).mesh, rule)
         self.endless = True
         return self
 

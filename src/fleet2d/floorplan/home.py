@@ -76,7 +76,7 @@ class Home:
         self.version = 0
         self.layers = Layers(plan)
         self._shapes = _shapes_of(plan, doorway_segments(plan.lattice, self.doors))
-        self._walls: tuple[int, Mesh] = (-1, plan.mesh)
+        self._walls: tuple[int, Mesh] = (-1, plan.sight_mesh)
         self._places: tuple[int, dict[tuple[int, int], tuple[int, int]]] = (-1, {})
         # The layer `costmap` at its last use, the number of its changes, and the spaces of bodies
         # that pay its costs.
@@ -87,7 +87,7 @@ class Home:
     @property
     def constants(self) -> dict[str, object]:
         """The parts of it that never change during a run, by name."""
-        return {"plan": self.plan, "walls": self.plan.mesh, "shapes": self._shapes}
+        return {"plan": self.plan, "walls": self.plan.sight_mesh, "shapes": self._shapes}
 
     def draw(self, ax: Any = None) -> Any:
         """Draw the floor plan; see `FloorPlan.draw`."""
@@ -114,6 +114,13 @@ class Home:
         if self._walls[0] != self.version:
             self._walls = self.version, self._shapes.walls(self.shut, _tall(self.objects))
         return self._walls[1]
+
+    @property
+    def barriers(self) -> Mesh:
+        """What blocks bodies and sight at present: as `walls`, but glass is wall [lattice]."""
+        if not self.plan.glass:
+            return self.walls
+        return self._shapes.walls(self.shut, _tall(self.objects), glass=False)
 
     def space(
         self,
@@ -299,19 +306,21 @@ class _Shapes:
     ) -> Space:
         return self.space_of(radius, frozenset(shut), _solid(objects), without)
 
-    def _make_walls(self, shut: frozenset[int], tall: tuple[PlacedObject, ...]) -> Mesh:
+    def _make_walls(
+        self, shut: frozenset[int], tall: tuple[PlacedObject, ...], glass: bool = True
+    ) -> Mesh:
         if not self.door_lines:
-            return self._build_mesh(tall)
-        return self._gates(tall).shut(shut)
+            return self._build_mesh(tall, glass)
+        return self._gates(tall, glass).shut(shut)
 
-    def _make_gates(self, tall: tuple[PlacedObject, ...]) -> Gates:
-        return Gates(self._build_mesh(tall), self.door_lines)
+    def _make_gates(self, tall: tuple[PlacedObject, ...], glass: bool) -> Gates:
+        return Gates(self._build_mesh(tall, glass), self.door_lines)
 
-    def _build_mesh(self, tall: tuple[PlacedObject, ...]) -> Mesh:
+    def _build_mesh(self, tall: tuple[PlacedObject, ...], glass: bool) -> Mesh:
         plan = self.plan
         if not tall and not self.door_lines:
-            return plan.mesh
-        polygons = plan.polygons
+            return plan.sight_mesh if glass else plan.mesh
+        polygons = plan.sight_polygons if glass else plan.polygons
         if tall:
             blocks = shapely.union_all([lattice_footprint(plan, thing) for thing in tall])
             rest = shapely.get_parts(shapely.difference(shapely.MultiPolygon(polygons), blocks))
@@ -332,7 +341,7 @@ class _Shapes:
         space = Space(
             self.plan,
             radius,
-            walls=self.walls(shut, _tall(solid)),
+            walls=self.walls(shut, _tall(solid), glass=not self.plan.glass),
             obstacles=[
                 *(lattice_footprint(self.plan, thing) for thing in solid),
                 *(shape for room in rooms for shape in _outlines(self.plan, room)),

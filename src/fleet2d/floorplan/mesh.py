@@ -63,7 +63,7 @@ class SnappedPolygon(NamedTuple):
     tolerance: float
 
 
-def snap_polygon(polygon: Polygon | MultiPolygon) -> SnappedPolygon:
+def snap_polygon(polygon: BaseGeometry) -> SnappedPolygon:
     """Move a polygon in lattice units onto even coordinates, and drop what collapses to nothing.
 
     Parts thinner than the lattice vanish, and a part that is joined by less than that becomes a
@@ -450,6 +450,47 @@ def free_on_lattice(
     shift = lattice.to_lattice((0.0, 0.0))
     moved = [shapely.transform(polygon, lambda xy: xy + shift) for polygon in snapped.polygons]
     return lattice, canonical_order(moved)
+
+
+def glazed(
+    lattice: Lattice, polygons: Sequence[Polygon], areas: Sequence[Polygon]
+) -> tuple[tuple[Polygon, ...], list[str]]:
+    """Return the areas of glass that join free space on two sides of a wall, and notes on others.
+
+    Args:
+        lattice: The lattice.
+        polygons: Free space [lattice].
+        areas: Glass in walls, which may reach into the free space [m].
+
+    Returns:
+        The areas [lattice], on even coordinates; and the notes.
+
+    Example:
+        >>> lattice = Lattice.around((0, 0, 4.1, 2), cell=0.05)
+        >>> rooms = [shapely.box(128, 128, 2688, 2688), shapely.box(2816, 128, 5376, 2688)]
+        >>> panes, notes = glazed(lattice, rooms, [shapely.box(1.9, 0.5, 2.2, 1.5)])
+        >>> [pane.bounds for pane in panes], notes
+        ([(2560.0, 768.0, 2944.0, 2048.0)], [])
+    """
+    free, panes, notes, outer = MultiPolygon(list(polygons)), [], list[str](), 0
+    for area in areas:
+        pane = Polygon(lattice.to_walls(np.asarray(area.exterior.coords)[:-1]))
+        in_wall = shapely.difference(pane, free)
+        contact = shapely.intersection(in_wall.buffer(GRID / 2, join_style="mitre"), free)
+        sides = [part for part in shapely.get_parts(contact).tolist() if part.area > 0]
+        along = shapely.length(shapely.intersection(in_wall.boundary, free.buffer(GRID / 2)))
+        if len(sides) > 1 or along > in_wall.length / 2:
+            panes.append(pane)
+        elif sides and in_wall.area > 0:
+            outer += 1
+        else:
+            at = area.centroid
+            notes.append(
+                f"the glass at ({at.x:.2f}, {at.y:.2f}) m is in no wall beside free space: ignored"
+            )
+    if outer:
+        notes.append(f"windows in outer walls, through which nobody is seen: {outer}")
+    return tuple(panes), notes
 
 
 def canonical_order(polygons: Sequence[Polygon]) -> list[Polygon]:

@@ -18,7 +18,14 @@ from shapely.geometry.base import BaseGeometry
 from fleet2d.bounds import CORNERS, POLYGONS
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.lattice import Lattice, unit_hint
-from fleet2d.floorplan.mesh import build_mesh, canonical_order, free_on_lattice, part_notes
+from fleet2d.floorplan.mesh import (
+    build_mesh,
+    canonical_order,
+    free_on_lattice,
+    glazed,
+    part_notes,
+    snap_polygon,
+)
 from fleet2d.floorplan.placed_objects import (
     PlacedObject,
     Portal,
@@ -147,6 +154,8 @@ class FloorPlan:
         objects: Furniture and devices, in the order of the source.
         no_go: Areas that robots keep out of [m].
         portals: Stairs and lifts between parts of the free space.
+        glass: Areas of glass in walls [lattice], even integer coordinates: people and robots see
+            through them and can't walk through them.
         notes: Sentences on anomalies in the file and how it was read; not part of the content.
         regions: The labels as the file gives them; not part of the content.
         lost_doorways: Doorways of the file that stand in no passage; not part of the content.
@@ -173,6 +182,7 @@ class FloorPlan:
     objects: tuple[PlacedObject, ...] = ()
     no_go: tuple[Polygon, ...] = ()
     portals: tuple[Portal, ...] = ()
+    glass: tuple[Polygon, ...] = ()
     notes: tuple[str, ...] = ()
     regions: tuple[LabelledRegion, ...] = ()
     lost_doorways: tuple[DoorLine, ...] = ()
@@ -191,6 +201,7 @@ class FloorPlan:
         regions_are: RegionKind = "exact",
         objects: Sequence[PlacedObject] = (),
         no_go: Sequence[Polygon] = (),
+        glass: Sequence[Polygon] = (),
         notes: Sequence[str] = (),
         scale: float | None = None,
     ) -> Self:
@@ -210,6 +221,7 @@ class FloorPlan:
                 `none`: there are none, and rooms are segmented from the walls alone.
             objects: Furniture and devices [m].
             no_go: Areas that robots keep out of [m].
+            glass: Areas of glass in walls, which may reach into the free space on both sides [m].
             notes: Sentences on anomalies in the source.
             scale: What all lengths but the cell and heights are multiplied by; None for 1.
 
@@ -218,8 +230,8 @@ class FloorPlan:
                 rounding explains, it is too large, or the entrance is not in it.
         """
         if scale is not None and scale != 1:
-            free, regions, objects, no_go = (
-                _scaled(part, scale) for part in (free, regions, objects, no_go)
+            free, regions, objects, no_go, glass = (
+                _scaled(part, scale) for part in (free, regions, objects, no_go, glass)
             )
             entrance, doorways = _scaled(entrance, scale), _scaled(doorways, scale)
         lines = list(doorways or ())
@@ -251,6 +263,7 @@ class FloorPlan:
             )
             polygons = canonical_order(polygons)
         names = [room.name for room in rooms]
+        panes, glass_notes = glazed(lattice, polygons, glass)
         plan = cls(
             name=name,
             source=source,
@@ -264,7 +277,14 @@ class FloorPlan:
             doorways=name_doorways(lattice, fill_from_neighbors(room_of_cell), names, fitted),
             objects=number_objects(objects),
             no_go=tuple(no_go),
-            notes=(*notes, *part_notes(lattice, polygons), *room_notes, *door_notes),
+            glass=panes,
+            notes=(
+                *notes,
+                *part_notes(lattice, polygons),
+                *room_notes,
+                *door_notes,
+                *glass_notes,
+            ),
             regions=tuple(regions),
             lost_doorways=tuple(
                 line for line, at in zip(lines, segments, strict=True) if at is None
@@ -301,6 +321,21 @@ class FloorPlan:
         """Area of the free space on the lattice [m²], exact and independent of cells."""
         units2 = sum_in_order(polygon.area for polygon in self.polygons)
         return float(units2) / self.lattice.units_per_m**2
+
+    @cached_property
+    def sight_polygons(self) -> Sequence[Polygon]:
+        """The space through which one sees: the free space and glass [lattice]."""
+        if not self.glass:
+            return self.polygons
+        joined = shapely.union_all([*self.polygons, *self.glass])
+        return snap_polygon(joined).polygons
+
+    @cached_property
+    def sight_mesh(self) -> Mesh:
+        """The same in triangles [lattice]."""
+        if not self.glass:
+            return self.mesh
+        return build_mesh(self.sight_polygons, self.lattice.columns, self.lattice.rows)
 
     @cached_property
     def free_space(self) -> MultiPolygon:
@@ -343,6 +378,8 @@ class FloorPlan:
             head["objects"] = [describe_object(thing) for thing in self.objects]
         if self.no_go:
             head["no_go"] = [shapely.get_coordinates(area).tolist() for area in self.no_go]
+        if self.glass:
+            head["glass"] = [shapely.get_coordinates(pane).tolist() for pane in self.glass]
         if self.portals:
             head["portals"] = [[p.type, *p.start, *p.end, p.takes_us] for p in self.portals]
         content = hashlib.sha256(json.dumps(head).encode())

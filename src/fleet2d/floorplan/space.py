@@ -78,7 +78,7 @@ class Space:
         Args:
             plan: The floor plan.
             radius: The body's radius [m].
-            walls: The mesh that blocks sight; None for the plan's.
+            walls: The mesh that bounds where a body can be; None for the plan's.
             obstacles: Further obstacles to movement [lattice].
             shut: The lines of shut doors [lattice].
 

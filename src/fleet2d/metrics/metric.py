@@ -141,7 +141,7 @@ def in_sight(plan: FloorPlan, pair: RobotUserPair, steps: I64) -> Bool:
     begins = [0, *(np.flatnonzero(has_moved) + 1).tolist()]
     for begin, end in zip(begins, [*begins[1:], len(places)], strict=True):
         x, y = robot_xy[begin].tolist()
-        is_visible[begin:end] = points_in_sight(plan.mesh, x, y, user_xy[[begin]])[0]
+        is_visible[begin:end] = points_in_sight(plan.sight_mesh, x, y, user_xy[[begin]])[0]
     return is_visible
 
 

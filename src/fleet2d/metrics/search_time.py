@@ -239,7 +239,7 @@ class TimeToFind(Metric):
         points = np.stack([np.interp(at, along, route[:, k]) for k in (0, 1)], axis=1)
         points = np.rint(points).astype(np.int64)
         is_near = ((points - target) ** 2).sum(axis=1) <= (self.sight * lattice.units_per_m) ** 2
-        is_visible = is_near & points_in_sight(plan.mesh, target[0], target[1], points)
+        is_visible = is_near & points_in_sight(plan.sight_mesh, target[0], target[1], points)
         first = int(np.argmax(is_visible)) if is_visible.any() else len(at) - 1
         return float(at[first]) / lattice.units_per_m
 

@@ -46,6 +46,7 @@ EDGE_COLOR = "#6d737c"
 FILL_COLORS = MappingProxyType({"nothing": "none", "path": "#fbfaf7", "sight": "#c9c6bf"})
 LABEL_COLOR = "#6d737c"
 NO_GO_COLOR = "#c8452f"
+GLASS_COLOR = "#a9d5ea"
 
 LABEL_PT = (2.6, 5.0)
 # Width of a letter of the font, as a share of its size.
@@ -104,6 +105,7 @@ def draw_objects(plan: FloorPlan, axes: Axes) -> None:
         axes.add_collection(PathCollection(outlines, linewidths=0.6, linestyles=dashes, **style))
     lines = [line for item in plan.objects for line in _symbol(item)]
     axes.add_collection(LineCollection(lines, lw=0.4, color=EDGE_COLOR, zorder=1.65))
+    _draw_glass(plan, axes)
     _draw_no_go(plan, axes)
     _draw_doorways(plan, axes)
     for number, portal in enumerate(plan.portals, 1):
@@ -111,6 +113,18 @@ def draw_objects(plan: FloorPlan, axes: Axes) -> None:
         box = {"boxstyle": "square,pad=0.2", "fc": "white", "ec": DOOR_COLOR, "lw": 0.6}
         for at in (portal.start, portal.end):
             axes.text(*at, f"{sign}{number}", ha="center", va="center", size=5, bbox=box)
+
+
+def _draw_glass(plan: FloorPlan, axes: Axes) -> None:
+    """Draw what is seen through, and not walked through, as glass in its walls."""
+    panes = shapely.difference(list(plan.glass), shapely.MultiPolygon(plan.polygons))
+    parts = [part for part in shapely.get_parts(panes).tolist() if part.geom_type == "Polygon"]
+    outlines = [
+        Outline(plan.lattice.to_metres(shapely.get_coordinates(part.exterior)), closed=True)
+        for part in parts
+    ]
+    style: dict[str, Any] = {"facecolor": GLASS_COLOR, "edgecolor": EDGE_COLOR, "zorder": 1.7}
+    axes.add_collection(PathCollection(outlines, linewidths=0.5, **style))
 
 
 def label_objects(plan: FloorPlan, axes: Axes) -> None:

@@ -354,7 +354,7 @@ RIM_COLOR = "#ffffffb0"  # around names
 class SightWalls:
     """The walls that block sight, with shut doors and tall furniture; see `field_of_view`."""
 
-    mesh: Mesh
+    sight_mesh: Mesh
     lattice: Lattice
 
     @classmethod

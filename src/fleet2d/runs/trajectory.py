@@ -176,7 +176,7 @@ class PathReader:
         step = int(keys["step"][begin])
         state = Pose(*(int(keys[n][begin]) for n in ("x", "y", "heading", "away")))
         poses = empty_poses(stop - step + 1)
-        trace_meander(home.walls, actor.space.mesh, behavior.rule, step, state[:3], poses)
+        trace_meander(home.barriers, actor.space.mesh, behavior.rule, step, state[:3], poses)
         # The stored end of the walk; a walk without a step ended as the body was put elsewhere.
         if begin + 1 < len(keys["x"]) and stop > step:
             last = (poses.x[-1], poses.y[-1], poses.heading[-1])

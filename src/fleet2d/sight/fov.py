@@ -52,8 +52,8 @@ class WallPlan(Protocol):
     """Protocol of plans with walls, as lines of sight need them: such as a floor plan."""
 
     @property
-    def mesh(self) -> Mesh:
-        """The free space between the walls."""
+    def sight_mesh(self) -> Mesh:
+        """The space between walls that block sight."""
 
     @property
     def lattice(self) -> Lattice:
@@ -92,7 +92,7 @@ class VisibleRegion:
         Raises:
             PlacementError: The eye is outside free space or on a wall.
         """
-        self._mesh, self._lattice = plan.mesh, plan.lattice
+        self._mesh, self._lattice = plan.sight_mesh, plan.lattice
         eye = self._lattice.to_lattice((x, y))
         self.eye = (int(eye[0]), int(eye[1]))
         self.right, self.wall = visible_region_fast(self._mesh, *self.eye)

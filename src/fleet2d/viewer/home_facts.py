@@ -66,10 +66,16 @@ def home_facts(plan: FloorPlan, doors: Sequence[DoorFacts] = ()) -> HomeFacts:
         place_cells=runs_of(plan.room_of_place),
         doorways=[(d.start, d.end) for d in plan.doorways],
         doors=list(doors),
-        objects=[object_facts(item) for item in plan.objects],
+        objects=[object_facts(item) for item in (*plan.objects, *_panes(plan))],
         no_go=[points(shapely.get_coordinates(area.exterior)[:-1]) for area in plan.no_go],
         entrance=plan.entrance,
     )
+
+
+def _panes(plan: FloorPlan) -> list[PlacedObject]:
+    """Return glass as objects, for which the page draws outlines and names."""
+    inside = [shapely.transform(pane, plan.lattice.to_metres) for pane in plan.glass]
+    return [PlacedObject(f"glass_{k}", "glass", pane) for k, pane in enumerate(inside)]
 
 
 def object_facts(item: PlacedObject) -> ObjectFacts:

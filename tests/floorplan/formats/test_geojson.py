@@ -552,3 +552,25 @@ def test_outline_that_crosses_itself_is_repaired_with_a_note(tmp_path: Path) -> 
 
     assert 8 == pytest.approx(plan.area_m2, abs=0.01)
     assert "features[0].geometry.coordinates touches or crosses itself at (2, 2)" in plan.notes[0]
+
+
+def test_glass_walls_of_imdf_are_seen_through(tmp_path: Path) -> None:
+    def unit(category: str, box: tuple[float, ...]) -> dict[str, Any]:
+        geometry = shapely.geometry.mapping(shapely.box(*box))
+        properties = {"category": category}
+        return {
+            "type": "Feature",
+            "feature_type": "unit",
+            "properties": properties,
+            "geometry": geometry,
+        }
+
+    units = [
+        unit("room", (0, 0, 4, 3)),
+        unit("office", (4.2, 0, 8, 3)),
+        unit("glass", (4, 0, 4.2, 3)),
+    ]
+    plan = load_floorplan(write(tmp_path, *units, units="m"))
+
+    assert 1 == len(plan.glass)
+    assert () == plan.doorways

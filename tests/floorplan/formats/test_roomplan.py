@@ -82,3 +82,16 @@ def test_damaged_scan_is_refused(tmp_path: Path, change: dict[str, Any], message
         load_floorplan(write(tmp_path, {**scan(), **change}))
 
     assert message in str(caught.value)
+
+
+@pytest.mark.parametrize("turn_deg", [0, 33])
+def test_one_sees_through_windows_between_rooms(tmp_path: Path, turn_deg: float) -> None:
+    content = scan(turn_deg)
+    c, s = math.cos(math.radians(turn_deg)), math.sin(math.radians(turn_deg))
+    content["windows"].append(surface(c * 4 + s * 3, -s * 4 + c * 3, 1.2, 90 + turn_deg))
+
+    plan = load_floorplan(write(tmp_path, content))
+
+    (pane,) = plan.glass
+    assert pane.area / plan.lattice.units_per_m**2 == pytest.approx(1.2 * 0.12, abs=0.01)
+    assert "windows in outer walls, through which nobody is seen: 1" in plan.notes

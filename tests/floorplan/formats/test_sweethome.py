@@ -1,6 +1,7 @@
 from pathlib import Path
 
 import pytest
+import shapely
 
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.formats.sweethome import SweetHome
@@ -88,3 +89,16 @@ def test_damaged_file_is_refused(tmp_path: Path, content: str, message: str) -> 
 
     assert message in str(caught.value)
     assert "Home.xml" in str(caught.value)
+
+
+def test_one_sees_through_low_windows_between_rooms_only(tmp_path: Path) -> None:
+    inner = WINDOW.replace('x="0" y="200"', 'x="400" y="80"')
+    plan = load_floorplan(write(tmp_path, WALLS, ROOMS, DOOR, WINDOW, inner))
+    high = load_floorplan(
+        write(tmp_path, WALLS, ROOMS, DOOR, inner.replace('elevation="90"', 'elevation="150"'))
+    )
+
+    (pane,) = shapely.transform(plan.glass, plan.lattice.to_metres)
+    assert (3.94, -1.25, 4.06, -0.35) == pytest.approx(pane.bounds, abs=0.011)
+    assert "windows in outer walls, through which nobody is seen: 1" in plan.notes
+    assert () == high.glass

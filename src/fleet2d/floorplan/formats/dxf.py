@@ -1,7 +1,7 @@
 """Drawings of CAD programs as DXF: their walls as lines, on layers."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -37,6 +37,8 @@ DRAWN = ("LINE", "LWPOLYLINE", "POLYLINE")
 # drawn by its two sides [m].
 LINE_M, NARROW_M = 0.02, 0.5
 MIN_PART_M2 = 1.0
+# Largest distance between two lines of one window [m].
+WINDOW_LINES_M = 0.3
 
 
 @register("floorplan", "dxf")
@@ -60,7 +62,8 @@ class Dxf(FloorPlanSource):
         """Read the drawing.
 
         Lines on the layers of walls bound the home, and the space between the two lines of a wall
-        is wall. Gaps in the outer walls are closed. Rooms are found from the walls.
+        is wall; through windows between two rooms one sees. Gaps in the outer walls are closed.
+        Rooms are found from the walls.
 
         Raises:
             FloorPlanError: The file can't be read, or its lines enclose no home.
@@ -69,7 +72,9 @@ class Dxf(FloorPlanSource):
         drawing = _read(self.path)
         with in_file(self.path):
             notes: list[str] = []
-            lines = list(_lines(drawing, self._layers(drawing, notes)))
+            layers = self._layers(drawing, notes)
+            windows = {name for name in layers if WINDOWS.search(name)}
+            lines = list(_lines(drawing, layers))
             CORNERS.check(sum(map(len, lines)), "it", FloorPlanError)
             if not lines:
                 raise FloorPlanError(
@@ -80,7 +85,8 @@ class Dxf(FloorPlanSource):
             scale = self.scale or _scale(int(drawing.units), float((high - low).max()), notes)
             metres = [LineString(np.round((line - low) * scale, 4)) for line in lines]
             free = _inside(metres, notes)
-            draft = Draft([Feature("free", "walls", free, {})], 0.0, notes)
+            panes = _panes([(line - low) * scale for line in _lines(drawing, windows)])
+            draft = Draft([Feature("free", "walls", free, {}), *panes], 0.0, notes)
             return draft.plan(self.path.stem, self.cell, f"DXF, {self.path.name}")
 
     def _layers(self, drawing: Any, notes: list[str]) -> set[str]:
@@ -133,6 +139,19 @@ def _lines(drawing: Any, layers: set[str]) -> Iterator[F64]:
                 corners = np.array(points, np.float64).reshape(-1, 2)
                 if len(corners) > 1 and np.isfinite(corners).all():
                     yield corners
+
+
+def _panes(lines: Sequence[F64]) -> list[Feature]:
+    """Return the windows that lines [m] draw: a box round those that are near each other."""
+    shapes = np.array([LineString(line) for line in lines], np.object_)
+    near = shapely.union_all(shapely.buffer(shapes, WINDOW_LINES_M / 2))
+    windows = [
+        shapely.union_all(shapes[shapely.intersects(p, shapes)]) for p in shapely.get_parts(near)
+    ]
+    return [
+        Feature("window", f"window {k}", window.minimum_rotated_rectangle, {})
+        for k, window in enumerate(windows, 1)
+    ]
 
 
 def _scale(units: int, extent: float, notes: list[str]) -> float:

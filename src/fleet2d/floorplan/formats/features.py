@@ -1,6 +1,6 @@
 """Plans of features: rooms, walls, doors and furniture as shapes, however a file draws them."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -38,6 +38,7 @@ GEOMETRIES = {
     "object": (*SURFACES, "Point"),
     "door": (*LINES, *SURFACES),
     "opening": (*LINES, *SURFACES),
+    "window": (*LINES, *SURFACES),
     "wall": (*LINES, *SURFACES),
     "entrance": ("Point", "LineString"),
 }
@@ -152,6 +153,7 @@ class Draft:
         self.doors: list[_DrawnDoor] = []
         self.ways_out: list[Passage] = []
         self._cut_doors()
+        self.panes = list(self._glaze())
 
     def plan(self, name: str, cell: float, source: str) -> FloorPlan:
         """Build the plan."""
@@ -166,6 +168,7 @@ class Draft:
             regions_are="exact" if self.rooms else "none",
             objects=self._objects(),
             no_go=[part for area in self._of("no_go") for part in _parts(area.shape)],
+            glass=self.panes,
             notes=self.notes,
         )
 
@@ -233,6 +236,19 @@ class Draft:
                 else:
                     self.notes.append(f"the {feature.kind} {name} is in no room's wall: ignored")
         self.free = _multi(shapely.union_all([self.free, *cuts]))
+
+    def _glaze(self) -> Iterator[Polygon]:
+        """Yield the panes of windows between two rooms; nobody sees in or out through others."""
+        outer = 0
+        for feature in self._of("window"):
+            for axes in door_axes(feature.shape):
+                passages = [find_passage(self.free, start, end) for start, end in axes]
+                through = next((p for p in passages if p and p.through and p.halves), None)
+                if through:
+                    yield through.pane
+                outer += not through
+        if outer:
+            self.notes.append(f"windows in outer walls, through which nobody is seen: {outer}")
 
     # --- Rooms and objects ---------------------------------------------------------------------
 
@@ -357,9 +373,10 @@ def enclosed_space(
     shut = [walls, *(door.buffer(GAPS_M[1]) for door in doors)]
     outlines = []
     for gap in GAPS_M:
-        solid = _parts(shapely.union_all(shut).buffer(gap / 2, join_style="mitre"))
-        shells = [Polygon(part.exterior) for part in solid if part.interiors]
-        whole = shapely.union_all(shells).buffer(-gap / 2, join_style="mitre")
+        with np.errstate(invalid="ignore"):  # GEOS divides by zero at corners in line, without harm
+            solid = _parts(shapely.union_all(shut).buffer(gap / 2, join_style="mitre"))
+            shells = [Polygon(part.exterior) for part in solid if part.interiors]
+            whole = shapely.union_all(shells).buffer(-gap / 2, join_style="mitre")
         inside = sum_in_order(Polygon(hole).area for part in solid for hole in part.interiors)
         outlines.append((inside, whole, gap))
     most = max(inside for inside, *_ in outlines)

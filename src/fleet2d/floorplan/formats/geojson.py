@@ -100,6 +100,8 @@ def read_features(content: dict[str, Any], level: str | None, notes: list[str]) 
             corners += int(shapely.get_num_coordinates(shape))
             CORNERS.check(corners, "it", FloorPlanError, prefix="at least ")
             features.append(Feature(kind, where, shape, properties, _level(properties)))
+            if kind == "wall" and properties.get("category") == "glass":
+                features.append(replace(features[-1], kind="window"))
     if ignored:
         names = ", ".join(f"{name} ({count})" for name, count in ignored.items())
         notes.append(f"also in the file, without effect on the plan: {names}")
@@ -373,6 +375,7 @@ def geojson_document(plan: FloorPlan) -> dict[str, Any]:
         del properties["footprint"]
         features.append(_feature(thing.footprint, "object", **properties))
     features += [_feature(area, "no_go") for area in plan.no_go]
+    features += [_feature(shapely.transform(pane, to_metres), "window") for pane in plan.glass]
     if plan.entrance is not None:
         features.append(_feature(Point(plan.entrance), "entrance"))
     return {"type": COLLECTION, "name": plan.name, "units": "m", "features": features}

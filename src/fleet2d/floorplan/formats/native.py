@@ -277,6 +277,8 @@ class PlanFile(FileModel):
         doorways: Passages between rooms; left out: the walls are searched.
         objects: Furniture and devices, which are separate from the walls.
         no_go: Areas that robots keep out of.
+        glass: Areas of glass in walls, such as a rectangle for each inner window: seen through, not
+            walked through.
         entrance: A place just inside the front door.
         portals: Stairs and lifts between storeys, which lie side by side.
     """
@@ -291,6 +293,7 @@ class PlanFile(FileModel):
     doorways: Listed[DoorwayEntry] | None = None
     objects: Listed[ObjectEntry] = Field(default_factory=list)
     no_go: Listed[Area] = Field(default_factory=list)
+    glass: Listed[Area] = Field(default_factory=list)
     entrance: Point | None = None
     portals: Listed[PortalEntry] = Field(default_factory=list)
 
@@ -306,6 +309,7 @@ _LISTS: dict[str, type[FileModel]] = {
     "objects": ObjectEntry,
     "uses": UseEntry,
     "no_go": AreaEntry,
+    "glass": AreaEntry,
     "portals": PortalEntry,
 }
 _AREAS = ("polygon", "footprint")
@@ -406,6 +410,7 @@ def plan_of(file: PlanFile, path: Path, cell: float, scale: float | None = None)
         regions_are="none" if file.rooms is None else "exact",
         objects=[thing.to_object() for thing in file.objects],
         no_go=[area.polygon for area in file.no_go],
+        glass=[area.polygon for area in file.glass],
         scale=scale,
     ).with_portals([portal.to_portal(scale or 1.0) for portal in file.portals])
 
@@ -462,6 +467,10 @@ def native_document(plan: FloorPlan) -> dict[str, Any]:
         document["objects"] = [object_document(thing) for thing in plan.objects]
     if plan.no_go:
         document["no_go"] = [_area_document(area) for area in plan.no_go]
+    if plan.glass:
+        document["glass"] = [
+            _area_document(shapely.transform(pane, to_metres)) for pane in plan.glass
+        ]
     if plan.portals:
         document["portals"] = [
             {"type": p.type, "start": list(p.start), "end": list(p.end), "takes": p.takes_us / 1e6}

@@ -76,6 +76,7 @@ class _Scan(BaseModel):
     walls: Listed[_Surface]
     doors: Listed[_Surface] = []
     openings: Listed[_Surface] = []
+    windows: Listed[_Surface] = []
     objects: Listed[_Surface] = []
 
 
@@ -129,7 +130,8 @@ def read_roomplan(
             Feature("wall", f"walls[{k}]", LineString(place(line)), {})
             for k, line in enumerate(lines)
         ]
-        for kind, surfaces in (("door", scan.doors), ("opening", scan.openings)):
+        openings = (("door", scan.doors), ("opening", scan.openings), ("window", scan.windows))
+        for kind, surfaces in openings:
             features += [
                 Feature(kind, f"{kind}s[{k}]", LineString(place(surface.line)), {})
                 for k, surface in enumerate(surfaces)

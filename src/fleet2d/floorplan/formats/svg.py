@@ -6,6 +6,7 @@ The published layout of CubiCasa5K is one of them: groups of the classes `Wall`,
 
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, ClassVar
 from xml.etree.ElementTree import ParseError
@@ -59,9 +60,9 @@ class Svg(FloorPlanSource):
         """Read the drawing.
 
         Shapes count by the class, label or id of the group or layer that they are in, or by their
-        own: those named like walls and windows are wall (without a fill: their lines), those like
-        rooms are rooms with the rest of the name (`Space Bedroom`), those like doors open walls.
-        Others don't count.
+        own: those named like walls and windows are wall (without a fill: their lines), through
+        windows between rooms one sees, those like rooms are rooms with the rest of the name (`Space
+        Bedroom`), those like doors open walls. Others don't count.
 
         Raises:
             FloorPlanError: The file can't be read, or has no such shapes.
@@ -83,7 +84,13 @@ class Svg(FloorPlanSource):
                 _feature(f"{kind} {number}", kind, name, corners * (scale, -scale), closed)
                 for number, (kind, name, corners, closed) in enumerate(shapes, 1)
             ]
-            draft = Draft([f for f in features if not f.shape.is_empty], self.wall_m, notes)
+            sound = [f for f in features if not f.shape.is_empty]
+            panes = [
+                replace(f, kind="window", shape=f.shape.minimum_rotated_rectangle)
+                for f in sound
+                if f.kind == "wall" and f.properties.get("is_window")
+            ]
+            draft = Draft([*sound, *panes], self.wall_m, notes)
             return draft.plan(self.path.stem, self.cell, f"SVG, {self.path.name}")
 
 
@@ -169,7 +176,7 @@ def _feature(where: str, kind: str, name: str, corners: F64, closed: bool) -> Fe
     if closed or (kind == "room" and len(outline) > 2):
         shape = shapely.make_valid(Polygon(outline), method="structure", keep_collapsed=False)
     if kind != "room":
-        return Feature(kind, where, shape, {})
+        return Feature(kind, where, shape, {"is_window": bool(WINDOWS.search(name))})
     words = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", ROOMS.sub(" ", name)).split()
     use = "_".join(words).lower() if words else None
     return Feature(kind, where, shape, {"type": use} if use else {})

@@ -23,6 +23,8 @@ from fleet2d.floorplan.source import FloorPlanSource
 CM_PER_M = 100
 # What begins higher above the floor is a window or hangs on a wall [cm].
 RAISED_CM = 20
+# Through what begins higher above the floor nobody is seen [cm].
+SILL_CM = 130
 # Words in names and catalogues of furniture, and the type in Fleet2D's catalogue.
 FURNITURE_WORDS = {
     "refrigerator": "fridge",
@@ -57,7 +59,7 @@ class SweetHome(FloorPlanSource):
         """Read the home.
 
         Free space is the rooms without the walls or, without rooms, what the walls enclose. Doors
-        lead through walls; windows don't.
+        lead through walls, and one sees through windows between rooms.
 
         Raises:
             FloorPlanError: The file can't be read, isn't such a home, or has no free space.
@@ -136,8 +138,10 @@ def _features(element: ET.Element) -> Iterator[Feature]:
             wall = LineString(ends).buffer(thickness / 2, cap_style="square")
             yield Feature("wall", where, wall, properties)
     elif element.tag == "doorOrWindow":
-        if _number(element, "elevation") < RAISED_CM:
-            yield Feature("door", where, _box(element), {})
+        elevation = _number(element, "elevation")
+        if elevation < SILL_CM:
+            kind = "door" if elevation < RAISED_CM else "window"
+            yield Feature(kind, where, _box(element), {})
     elif element.tag == "pieceOfFurniture" and _number(element, "elevation") < RAISED_CM:
         kind = _furniture_type(f"{element.get('catalogId', '')} {name or ''}")
         yield Feature("object", where, _box(element), {"type": kind})

@@ -386,6 +386,7 @@ NEAR_M = 0.25
 
 # Places along a door's width, as shares of it, at which the wall is measured; the first decides.
 _ALONG = (0.5, 0.1, 0.9)
+_PANE_OVER = 0.01  # how far glass reaches into the space on either side, to be joined to it [m]
 _OVER = 1e-3  # how far an opening reaches into the space on either side, to be joined to it [m]
 
 
@@ -417,6 +418,11 @@ class Passage:
     def opening(self) -> Polygon:
         """The part of the wall that is opened."""
         return self._between(self.low - _OVER, self.high + _OVER)
+
+    @property
+    def pane(self) -> Polygon:
+        """The part of the wall that glass fills, and a centimetre of the space on either side."""
+        return self._between(self.low - _PANE_OVER, self.high + _PANE_OVER)
 
     @property
     def halves(self) -> tuple[Polygon, ...]:
