@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
 
-from fleet2d.algorithms.presence.belief import ANYONE, AWAY
+from fleet2d.algorithms.presence.belief import ANYONE
 from fleet2d.datasets.specification import BELIEF, EVIDENCE, STAYS, PlannedRun
 from fleet2d.kernels import I64
 
@@ -130,12 +131,11 @@ def tables_of(run: "Run", planned: PlannedRun, labels: timedelta) -> dict[str, p
     number = planned.number
 
     def table(name: str, columns: Mapping[str, Any], rows: int) -> pa.Table:
-        given = {"run": np.full(rows, number, np.int32), **columns}
+        values = {"run": np.full(rows, number, np.int32), **columns}
         if "step" in columns:
-            given["time"] = start + np.asarray(columns["step"], np.int64) * step_us
+            values["time"] = start + np.asarray(columns["step"], np.int64) * step_us
         schema = SCHEMAS[name]
-        arrays = [pa.array(given[f.name], f.type, from_pandas=True) for f in schema]
-        return pa.table(arrays, schema=schema)
+        return pa.table([_array(values[field.name], field.type) for field in schema], schema=schema)
 
     rooms = run.plan.rooms
     made = {
@@ -153,12 +153,12 @@ def tables_of(run: "Run", planned: PlannedRun, labels: timedelta) -> dict[str, p
         ),
     }
     bin_steps = max(1, 60_000_000 // step_us)
+    made["evidence"] = SCHEMAS["evidence"].empty_table()
     if EVIDENCE in run.tables:
-        columns = columns_of(run, EVIDENCE, ["bin", "room", "kind", "user", "watched", "seen"])
-        columns["step"] = columns.pop("bin") + bin_steps - 1
-    else:
-        columns = {name: [] for name in ("step", "room", "kind", "user", "watched", "seen")}
-    made["evidence"] = table("evidence", columns, len(columns["step"]))
+        looks = run.arrow(EVIDENCE)
+        columns = {name: looks[name] for name in ("room", "kind", "user", "watched", "seen")}
+        columns["step"] = looks["bin"].to_numpy() + bin_steps - 1
+        made["evidence"] = table("evidence", columns, len(looks))
     every = max(1, labels // timedelta(microseconds=step_us))
     steps = np.arange(every - 1, int(manifest["steps"]), every)
     parts = {user: whereabouts(run, user).at(steps) for user in users}
@@ -172,8 +172,10 @@ def tables_of(run: "Run", planned: PlannedRun, labels: timedelta) -> dict[str, p
     made["beliefs"] = pa.concat_tables(
         [SCHEMAS["beliefs"].empty_table()]
         + [
-            table("beliefs", columns, len(columns["step"]))
-            for columns in _beliefs(run, [name for name in run.tables if name.startswith(BELIEF)])
+            table("beliefs", columns, len(columns["step"])).filter(
+                pc.not_equal(columns["user"], ANYONE)
+            )
+            for columns in (_belief(run, name) for name in run.tables if name.startswith(BELIEF))
         ]
     )
     return made
@@ -220,23 +222,23 @@ def whereabouts(run: "Run", user: str) -> Whereabouts:
     return Whereabouts(begin[is_new], place[is_new], int(end[-1]), since, activity)
 
 
-def _beliefs(run: "Run", names: Sequence[str]) -> list[dict[str, Any]]:
-    made = []
-    for name in names:
-        at = "at" if "at" in run.arrow(name).column_names else "step"  # of belief_table, of rtp
-        columns = columns_of(run, name, [at, "user", "room", "share"])
-        places = int(np.argmax(columns["room"] == AWAY)) + 1  # rooms in order, and last away
-        share = columns["share"].reshape(-1, places)
-        joint = share.copy()
-        joint[:, :-1] *= 1 - share[:, -1:]
-        own = np.repeat(columns["user"].reshape(-1, places)[:, 0] != ANYONE, places)
-        made.append(
-            {
-                "step": columns[at][own],
-                "model": np.full(int(own.sum()), name.removeprefix(BELIEF), object),
-                "user": columns["user"][own],
-                "place": columns["room"][own],
-                "probability": joint.ravel()[own],
-            }
-        )
-    return made
+def _belief(run: "Run", name: str) -> dict[str, Any]:
+    """Return the rows of the belief of a model, also those about anyone."""
+    rows = run.arrow(name)
+    share = rows["share"].to_numpy().reshape(-1, len(run.plan.rooms) + 1).copy()  # away last
+    share[:, :-1] *= 1 - share[:, -1:]  # of all time, not given at home
+    at = "at" if "at" in rows.column_names else "step"  # of `belief_table`, of `rtp`
+    return {
+        "step": rows[at].to_numpy(),
+        "model": pa.repeat(name.removeprefix(BELIEF), len(rows)),
+        "user": _array(rows["user"], pa.string()),
+        "place": rows["room"],
+        "probability": share.ravel(),
+    }
+
+
+def _array(values: Any, kind: pa.DataType) -> Any:
+    """Return values as an array of a type; NaN as null."""
+    if isinstance(values, pa.Array | pa.ChunkedArray):
+        return values.cast(kind)
+    return pa.array(values, kind, from_pandas=True)

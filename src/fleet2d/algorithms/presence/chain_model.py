@@ -41,8 +41,8 @@ class Habits(NamedTuple):
     total: F64
     smoothing: float
 
-    def at(self, model: StayModel, weekday: int, hour: int) -> StayModel:
-        """Return the transition probabilities at an hour.
+    def at(self, model: StayModel, weekday: int, hours: Sequence[int]) -> list[StayModel]:
+        """Return the transition probabilities at some hours of a day.
 
         Let c be the share of time in each place at that hour of working days, or of weekends,
         divided by the share over all hours, clipped to 1/20 … 20. The probability T_ij to go from i
@@ -53,25 +53,28 @@ class Habits(NamedTuple):
         Args:
             model: The transition probabilities over all hours.
             weekday: Day of the week, 0 is Monday.
-            hour: Hour of the day.
+            hours: Hours of the day.
         """
         if self.total[-1] < MIN_BINS:
-            return model
-        days = self.week.reshape(7, 24, -1)[:, hour]
+            return [model] * len(hours)
+        days = self.week.reshape(7, 24, -1)[:, hours]
         same_days = days[:WEEKEND] if weekday < WEEKEND else days[WEEKEND:]
         at_hour = same_days.sum(axis=0) + self.smoothing / self.total[-1] * self.total
-        mean_share, share = self.total[:-1] / self.total[-1], at_hour[:-1] / at_hour[-1]
+        mean_share, share = self.total[:-1] / self.total[-1], at_hour[:, :-1] / at_hour[:, -1:]
         ratio = np.maximum(share, MIN_SHARE) / np.maximum(mean_share, MIN_SHARE)
         pull = np.sqrt(np.clip(ratio, 1 / MAX_RATIO, MAX_RATIO))
-        places = len(pull)
-        leave = (1 - model.stay)[:, np.newaxis] * model.follow
-        leave[:, :places] *= pull / np.repeat(pull, len(model.stay) // places)[:, np.newaxis]
-        chance = np.zeros(len(leave))
-        for column in leave.T:  # summed in the same order on every machine
-            chance += column
-        follow = leave / np.maximum(chance, MIN_SHARE)[:, np.newaxis]
-        most = np.maximum(1 - model.stay, MAX_LEAVE)
-        return model._replace(stay=1 - np.minimum(chance, most), follow=follow)
+        count, places = pull.shape
+        leave = np.tile((1 - model.stay)[:, np.newaxis] * model.follow, (count, 1, 1))
+        stages = len(model.stay) // places
+        leave[..., :places] *= (
+            pull[:, np.newaxis] / np.repeat(pull, stages, axis=1)[..., np.newaxis]
+        )
+        chance = np.zeros(leave.shape[:2])
+        for column in range(leave.shape[2]):  # summed in the same order on every machine
+            chance += leave[..., column]
+        follow = leave / np.maximum(chance, MIN_SHARE)[..., np.newaxis]
+        stay = 1 - np.minimum(chance, np.maximum(1 - model.stay, MAX_LEAVE))
+        return [model._replace(stay=s, follow=f) for s, f in zip(stay, follow, strict=True)]
 
 
 class PersonForecast(NamedTuple):
@@ -101,7 +104,7 @@ class PersonForecast(NamedTuple):
             past = timedelta(minutes=time.minute, seconds=time.second)
             to_next_hour = -((past - timedelta(hours=1)) // timedelta(microseconds=bin_us))
             part = min(bins, max(to_next_hour, 1))
-            model = self.habits.at(self.model, time.weekday(), time.hour)
+            [model] = self.habits.at(self.model, time.weekday(), [time.hour])
             now = advance(now, steps_of(model), part)
             bins, time = bins - part, time + timedelta(microseconds=part * bin_us)
         return self._replace(now=now)
@@ -196,6 +199,19 @@ class Follower:
         nodes = self.layout.room[:, np.newaxis] * stages + np.arange(stages)
         mass = np.bincount(nodes.ravel(), (self.now[0] + self.now[1]).T.ravel())
         return PersonForecast(mass.astype(np.float64), model, habits)
+
+
+def part_of(stretches: Stretches, first: int, end: int) -> Stretches:
+    """Return the stretches `first` to `end` - 1."""
+    begin = stretches.begin[first : end + 1]
+    rows = slice(*begin[[0, -1]].tolist())
+    return stretches._replace(
+        bins=stretches.bins[first:end],
+        view=stretches.view[first:end],
+        begin=begin - begin[0],
+        patch=stretches.patch[rows],
+        share=stretches.share[rows],
+    )
 
 
 def steps_of(model: StayModel) -> F64:
@@ -312,14 +328,16 @@ class RoutineModel(SemiMarkov):
     smoothing: float = Field(default=60, gt=0)
 
     def _follow(self, user: int, day: DayEvidence, model: StayModel) -> F64:
-        habits = self.habits(user)
         hours = day.minute // 60
-        ends = [0, *(np.flatnonzero(np.diff(hours)) + 1).tolist(), len(hours)]
-        places = []
-        for part in (day.between(a, b) for a, b in pairwise(ends)):
-            at_hour = habits.at(model, (day.number - 1) % 7, int(part.minute[0]) // 60)
-            places.append(self.followers[user].follow(at_hour, part.stretches(user, 1)))
-        return np.concatenate(places)
+        begins = [0, *(np.flatnonzero(np.diff(hours)) + 1).tolist()]
+        models = self.habits(user).at(model, (day.number - 1) % 7, hours[begins].tolist())
+        whole, parts = day.stretches(user, 1), pairwise([*begins, len(hours)])
+        return np.concatenate(
+            [
+                self.followers[user].follow(at_hour, part_of(whole, first, end))
+                for at_hour, (first, end) in zip(models, parts, strict=True)
+            ]
+        )
 
     def habits(self, user: int) -> Habits:
         """Return how a user's transitions depend on the hour, as learned so far."""
