@@ -20,7 +20,7 @@ FILES = {
     "plan.pdf": (b"%PDF-1.7\n%\xe2\xe3", "is a PDF", "save the page as PNG"),
     "plan.json": (b"%PDF-1.7\n", "is a PDF", "save the page as PNG"),
     "plan.dwg": (b"AC1032\0\0\0\xff", "is a DWG drawing", "save it as DXF"),
-    "plan.ifc": (b"ISO-10303-21;\nHEADER;", "is an IFC", "as DXF"),
+    "plan.stp": (b"ISO-10303-21;\nHEADER;", "is an IFC", "as DXF"),
     "plan.gif": (b"GIF89a\xff\xff", "is a GIF picture", "save it as PNG"),
     "plan.webp": (b"RIFF\x10\0\0\xffWEBPVP8 ", "is a WebP picture", "save it as PNG"),
     "plan.heic": (b"\0\0\0\x18ftypheic\xff", "is a HEIC picture", "save it as PNG"),

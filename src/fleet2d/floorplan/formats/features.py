@@ -384,3 +384,35 @@ def enclosed_space(
     if gap > 0 and most > 0:
         notes.append(f"gaps in the walls are closed up to {gap:g} m to find the inside")
     return _multi(whole)
+
+
+def choose_level(
+    levels: Sequence[tuple[str, str, float]], level: str | None, notes: list[str]
+) -> str | None:
+    """Return the id of the storey to read, or None if there is only one.
+
+    Args:
+        levels: Id, name and elevation of each.
+        level: The name or id of one; None for the lowest that is not below the ground.
+        notes: A note is added if others are left out.
+
+    Raises:
+        FloorPlanError: There is no such storey.
+
+    Example:
+        >>> choose_level([("a", "Cellar", -2.5), ("c", "Up", 2.8), ("b", "Ground", 0)], None, [])
+        'b'
+    """
+    names = {key: name for key, name, _ in levels}
+    if level is not None:
+        matches = [key for key, name in names.items() if level in (key, name)]
+        if not matches:
+            known = ", ".join(names.values()) or "none"
+            raise FloorPlanError(f"there is no level {level!r}; its levels are: {known}")
+        return matches[0]
+    if len(levels) < 2:
+        return None
+    chosen = min(levels, key=lambda entry: (entry[2] < 0, entry[2]))[0]
+    others = ", ".join(name for key, name in names.items() if key != chosen)
+    notes.append(f"of its levels, {names[chosen]} is used, not {others}")
+    return chosen

@@ -22,7 +22,7 @@ _BEGINNINGS: tuple[tuple[bytes, str, str], ...] = (
     (b"%!PS", "PostScript", "save it as PNG"),
     (b"AC10", "a DWG drawing of AutoCAD", "save it as DXF"),
     (b"AutoCAD Binary DXF", "a binary DXF drawing", "save it as DXF in text"),
-    (b"ISO-10303-21", "an IFC or STEP model", _VECTOR),
+    (b"ISO-10303-21", "an IFC or STEP model", f"give an IFC model the ending .ifc; else {_VECTOR}"),
     (b"\xff\xfe\xff\x0eS\0k\0e\0t", "a SketchUp model", _MESH),
     (b"BLENDER", "a Blender scene", _MESH),
     (b"glTF", "a glTF model", _MESH),

@@ -13,7 +13,7 @@ from fleet2d.bounds import FILE_BYTES, read_bytes
 from fleet2d.configuration.components import register
 from fleet2d.configuration.units import InputPath
 from fleet2d.errors import FloorPlanError, os_errors_as
-from fleet2d.floorplan.formats.features import Draft, Feature
+from fleet2d.floorplan.formats.features import Draft, Feature, choose_level
 from fleet2d.floorplan.formats.files import MAX_COORDINATE_M, in_file
 from fleet2d.floorplan.furniture import FURNITURE
 from fleet2d.floorplan.plan import FloorPlan
@@ -69,7 +69,9 @@ class SweetHome(FloorPlanSource):
             if root.tag != "home":
                 raise FloorPlanError(f"no home of Sweet Home 3D: it begins with <{root.tag}>")
             notes: list[str] = []
-            level = _level(root, self.level, notes)
+            levels = [(str(e.get("id")), e) for e in root.findall("level")]
+            named = [(key, e.get("name") or key, _number(e, "elevation")) for key, e in levels]
+            level = choose_level(named, self.level, notes)
             here = [e for e in root.iter() if level is None or e.get("level") in (None, level)]
             features = [feature for element in here for feature in _features(element)]
             return Draft(features, 0.1, notes, scale=self.scale).plan(
@@ -87,25 +89,6 @@ def _parse(path: Path) -> ET.Element:
         return ET.fromstring(content)  # noqa: S314 - it declares no entities
     except (ET.ParseError, ValueError, LookupError) as error:
         raise FloorPlanError(f"{path} is not XML: {error}") from None
-
-
-def _level(root: ET.Element, level: str | None, notes: list[str]) -> str | None:
-    """Return the id of the floor to read, or None if there is only one."""
-    levels = root.findall("level")
-    names = {str(e.get("id")): e.get("name") or str(e.get("id")) for e in levels}
-    if level is not None:
-        matches = [key for key, name in names.items() if level in (key, name)]
-        if not matches:
-            known = ", ".join(names.values()) or "none"
-            raise FloorPlanError(f"there is no level {level!r}; its levels are: {known}")
-        return matches[0]
-    if len(levels) < 2:
-        return None
-    ranked = sorted(levels, key=lambda e: (_number(e, "elevation") < 0, _number(e, "elevation")))
-    chosen = str(ranked[0].get("id"))
-    others = ", ".join(name for key, name in names.items() if key != chosen)
-    notes.append(f"of its levels, {names[chosen]} is used, not {others}")
-    return chosen
 
 
 def _number(element: ET.Element, key: str, default: float = 0.0) -> float:
@@ -143,7 +126,7 @@ def _features(element: ET.Element) -> Iterator[Feature]:
             kind = "door" if elevation < RAISED_CM else "window"
             yield Feature(kind, where, _box(element), {})
     elif element.tag == "pieceOfFurniture" and _number(element, "elevation") < RAISED_CM:
-        kind = _furniture_type(f"{element.get('catalogId', '')} {name or ''}")
+        kind = furniture_type(f"{element.get('catalogId', '')} {name or ''}")
         yield Feature("object", where, _box(element), {"type": kind})
 
 
@@ -166,7 +149,7 @@ def _metres(points: Iterable[tuple[float, float]]) -> list[tuple[float, float]]:
     return [(round(x / CM_PER_M, 4), round(-y / CM_PER_M, 4)) for x, y in points]
 
 
-def _furniture_type(words: str) -> str:
+def furniture_type(words: str) -> str:
     """Return the type in the catalogue that a name means, else the name as a type."""
     kind = room_type(words.rpartition("#")[2])
     flat = kind.replace("_", "")

@@ -1,0 +1,169 @@
+"""Building models in IFC: the spaces, walls, doors, windows and furniture of one storey."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+import shapely
+from pydantic import Field
+from shapely.geometry.base import BaseGeometry
+
+from fleet2d.bounds import CORNERS, FILE_BYTES
+from fleet2d.configuration.components import register
+from fleet2d.configuration.units import InputPath
+from fleet2d.errors import FloorPlanError, extra
+from fleet2d.floorplan.formats.features import Draft, Feature, choose_level
+from fleet2d.floorplan.formats.files import in_file
+from fleet2d.floorplan.formats.sweethome import furniture_type
+from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.floorplan.source import FloorPlanSource
+
+# What each class of IFC is in a plan; classes that a version of IFC lacks are left out.
+KINDS = {
+    "IfcSpace": "room",
+    "IfcWall": "wall",
+    "IfcColumn": "wall",
+    "IfcDoor": "door",
+    "IfcWindow": "window",
+    "IfcFurnishingElement": "object",
+    "IfcSanitaryTerminal": "object",
+    "IfcElectricAppliance": "object",
+}
+# Coordinates are rounded to this, so that faces of one wall meet [m].
+ROUNDED_M = 1e-4
+# Objects whose lowest point is higher above the storey hang on a wall; through windows whose sill
+# is higher nobody is seen [m].
+RAISED_M, SILL_M = 0.5, 1.3
+
+
+@register("floorplan", "ifc")
+class Ifc(FloorPlanSource):
+    """A building model in IFC; needs the extra `ifc`.
+
+    Attributes:
+        path: The IFC file.
+        level: The storey, by name or GlobalId; left out: the lowest that is not below the ground.
+    """
+
+    suffixes: ClassVar[tuple[str, ...]] = (".ifc",)
+
+    path: InputPath
+    level: str | None = Field(default=None, coerce_numbers_to_str=True)
+
+    def load(self) -> FloorPlan:
+        """Read a storey of the model, as seen from above.
+
+        Free space is the spaces (`IfcSpace`) without the walls or, without spaces, what the walls
+        enclose. Doors lead through walls, and one sees through windows between rooms. Their
+        geometry is computed by ifcopenshell, in metres whatever the units of the model.
+
+        Raises:
+            FloorPlanError: The file can't be read, or its storey has no spaces and no closed walls.
+            InputError: ifcopenshell is not installed.
+        """
+        model = _read(self.path)
+        with in_file(self.path):
+            notes: list[str] = []
+            storeys = {str(s.GlobalId): s for s in model.by_type("IfcBuildingStorey")}
+            level = choose_level(
+                [(k, s.Name or k, float(s.Elevation or 0.0)) for k, s in storeys.items()],
+                self.level,
+                notes,
+            )
+            features = list(_features(model, None if level is None else storeys[level], notes))
+            corners = shapely.get_num_coordinates([feature.shape for feature in features]).sum()
+            CORNERS.check(int(corners), "it", FloorPlanError)
+            draft = Draft(features, 0.1, notes, scale=self.scale)
+            return draft.plan(self.path.stem, self.cell, f"IFC, {self.path.name}")
+
+
+def _read(path: Path) -> Any:
+    """Return the model in a file."""
+    with extra("ifc", "reading IFC needs ifcopenshell"):
+        import ifcopenshell
+    try:
+        FILE_BYTES.check(path.stat().st_size, path, FloorPlanError)
+        with path.open("rb") as file:
+            if not file.read(64).lstrip().startswith(b"ISO-10303-21"):
+                raise FloorPlanError(
+                    f"{path} is damaged, or not IFC: it has no header ISO-10303-21"
+                )
+        return ifcopenshell.open(str(path))
+    except OSError as error:
+        raise FloorPlanError(f"{path} can't be read: {error.strerror or error}") from None
+    except (ifcopenshell.Error, RuntimeError, ValueError) as error:
+        raise FloorPlanError(f"{path} is damaged, or not IFC: {error}") from None
+
+
+def _elements(model: Any, storey: Any) -> Iterator[tuple[str, Any]]:
+    """Yield kind and element of what is on a storey; all that the model has without storeys."""
+    from ifcopenshell.util.element import get_aggregate, get_container
+
+    for name, kind in KINDS.items():
+        try:
+            elements = model.by_type(name)
+        except RuntimeError:  # this version of IFC has no such class
+            continue
+        for element in elements:
+            place = get_aggregate(element) if kind == "room" else get_container(element)
+            if storey is None or place is None or place == storey:
+                yield kind, element
+
+
+def _features(model: Any, storey: Any, notes: list[str]) -> Iterator[Feature]:
+    """Yield what is on a storey as features [m]; what hangs on walls is left out."""
+    from ifcopenshell import geom
+
+    settings = geom.settings()
+    settings.set("use-world-coords", True)
+    highest = {"object": RAISED_M, "window": SILL_M}
+    lost = 0
+    for kind, element in _elements(model, storey):
+        try:
+            shape, low = _seen_from_above(geom.create_shape(settings, element))
+        except RuntimeError:  # it has no geometry, or a damaged one
+            shape, low = shapely.Polygon(), 0.0
+        lost += shape.is_empty
+        if shape.is_empty or low - _height(storey) > highest.get(kind, np.inf):
+            continue
+        label = getattr(element, "LongName", None) or element.Name
+        properties = {"name": label} if label else {}
+        if kind in ("door", "window"):
+            shape = shape.minimum_rotated_rectangle
+        elif kind == "object":
+            words = " ".join(filter(None, (label, _predefined_type(element))))
+            properties = {"type": furniture_type(words or "object")}
+        yield Feature(kind, f"{element.is_a()} {element.GlobalId}", shape, properties)
+    if lost:
+        notes.append(f"elements without a geometry, which are left out: {lost}")
+
+
+def _predefined_type(element: Any) -> str | None:
+    """Return the kind of furniture or appliance that the model's vocabulary has for it."""
+    kind = getattr(element, "PredefinedType", None)
+    return None if kind in (None, "NOTDEFINED", "USERDEFINED") else str(kind)
+
+
+def _height(storey: Any) -> float:
+    """Return how high a storey is [m]."""
+    if storey is None or storey.ObjectPlacement is None:
+        return 0.0
+    from ifcopenshell.util.placement import get_local_placement
+    from ifcopenshell.util.unit import calculate_unit_scale
+
+    return float(get_local_placement(storey.ObjectPlacement)[2, 3]) * float(
+        calculate_unit_scale(storey.file)
+    )
+
+
+def _seen_from_above(element: Any) -> tuple[BaseGeometry, float]:
+    """Return what an element covers of the floor [m], and the height of its lowest point [m]."""
+    points = np.asarray(element.geometry.verts, np.float64).reshape(-1, 3)
+    faces = np.asarray(element.geometry.faces, np.int64).reshape(-1, 3)
+    if not len(faces) or not np.isfinite(points).all():
+        return shapely.Polygon(), 0.0
+    flat = np.round(points[:, :2] / ROUNDED_M) * ROUNDED_M
+    triangles = np.asarray(shapely.polygons(flat[faces]))
+    area = shapely.union_all(triangles[shapely.area(triangles) > 0], grid_size=ROUNDED_M)
+    return area, float(points[:, 2].min())

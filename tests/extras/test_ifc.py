@@ -1,0 +1,165 @@
+from pathlib import Path
+from typing import Any
+
+import pytest
+import shapely
+
+from fleet2d.errors import FloorPlanError
+from fleet2d.floorplan.formats.ifc import Ifc
+from fleet2d.floorplan.load import load_floorplan
+
+ifcopenshell = pytest.importorskip("ifcopenshell")
+
+Box = tuple[float, float, float, float]
+
+
+class Model:
+    """An IFC model of boxes, written by ifcopenshell's own functions in millimetres."""
+
+    def __init__(self, storeys: dict[str, float], schema: str = "IFC4") -> None:
+        from ifcopenshell.api import aggregate, context, project, root, unit
+
+        self.file = project.create_file(version=schema)
+        top = root.create_entity(self.file, ifc_class="IfcProject", name="flat")
+        unit.assign_unit(self.file)
+        model = context.add_context(self.file, context_type="Model")
+        self.body = context.add_context(
+            self.file,
+            context_type="Model",
+            context_identifier="Body",
+            target_view="MODEL_VIEW",
+            parent=model,
+        )
+        building = root.create_entity(self.file, ifc_class="IfcBuilding")
+        aggregate.assign_object(self.file, products=[building], relating_object=top)
+        self.storeys = {
+            name: root.create_entity(self.file, ifc_class="IfcBuildingStorey", name=name)
+            for name in storeys
+        }
+        for name, storey in self.storeys.items():
+            storey.Elevation = storeys[name] * 1000
+            self._place(storey, storeys[name])
+            aggregate.assign_object(self.file, products=[storey], relating_object=building)
+
+    def _place(self, element: Any, z: float) -> None:
+        import numpy as np
+        from ifcopenshell.api import geometry
+
+        matrix = np.eye(4)
+        matrix[2, 3] = z
+        geometry.edit_object_placement(self.file, product=element, matrix=matrix)
+
+    def add(
+        self,
+        kind: str,
+        box: Box,
+        name: str | None = None,
+        storey: str = "Ground",
+        z: tuple[float, float] = (0.0, 2.5),
+        **keys: Any,
+    ) -> None:
+        """Add a box (x0, y0, x1, y1) [m] of a class; `z` is its bottom and top above the storey."""
+        from ifcopenshell.api import aggregate, geometry, root, spatial
+
+        element = root.create_entity(self.file, ifc_class=kind, name=name)
+        for key, value in keys.items():
+            setattr(element, key, value)
+        x0, y0, x1, y1 = box
+        corners = [(x, y, h) for h in z for x, y in ((x0, y0), (x1, y0), (x1, y1), (x0, y1))]
+        faces = [(3, 2, 1, 0), (4, 5, 6, 7)] + [
+            (k, (k + 1) % 4, (k + 1) % 4 + 4, k + 4) for k in range(4)
+        ]
+        shape = geometry.add_mesh_representation(
+            self.file, context=self.body, vertices=[corners], faces=[faces]
+        )
+        geometry.assign_representation(self.file, product=element, representation=shape)
+        self._place(element, self.storeys[storey].Elevation / 1000)
+        if kind == "IfcSpace":
+            aggregate.assign_object(
+                self.file, products=[element], relating_object=self.storeys[storey]
+            )
+        else:
+            spatial.assign_container(
+                self.file, products=[element], relating_structure=self.storeys[storey]
+            )
+
+    def write(self, folder: Path) -> Path:
+        path = folder / "flat.ifc"
+        self.file.write(str(path))
+        return path
+
+
+def flat(schema: str = "IFC4", spaces: bool = True) -> Model:
+    """Two rooms of 4 m x 4 m beside each other, and a storey above."""
+    model = Model({"Up": 2.8, "Ground": 0.0, "Cellar": -2.5}, schema)
+    for storey in ("Ground", "Up"):
+        for wall in ((-0.2, -0.2, 8.4, 0), (-0.2, 4, 8.4, 4.2), (-0.2, 0, 0, 4), (8.2, 0, 8.4, 4)):
+            model.add("IfcWall", wall, storey=storey)
+    model.add("IfcWall", (4, 0, 4.2, 4))
+    if spaces:
+        model.add("IfcSpace", (0, 0, 4, 4), "1", LongName="Kitchen")
+        model.add("IfcSpace", (4.2, 0, 8.2, 4), "2", LongName="Schlafzimmer")
+        model.add("IfcSpace", (0, 0, 8.2, 4), "3", "Up", LongName="Studio")
+    model.add("IfcDoor", (4.02, 0.5, 4.18, 1.4), z=(0, 2.1))
+    model.add("IfcWindow", (4.02, 2, 4.18, 3.5), z=(0.9, 2.1))
+    model.add("IfcWindow", (-0.15, 1, -0.05, 2), z=(0.9, 2.1))
+    model.add("IfcWindow", (4.02, 3.6, 4.18, 3.9), z=(1.9, 2.2))
+    model.add("IfcFurnishingElement", (6, 2, 7.6, 4), "Bed 160 x 200", z=(0, 0.5))
+    model.add("IfcFurnishingElement", (5, 3.7, 6, 4), "Shelf", z=(1.5, 1.8))
+    return model
+
+
+@pytest.mark.parametrize("schema", ["IFC4", "IFC4X3"])
+def test_spaces_doors_windows_and_furniture_of_the_ground_floor_become_a_home(
+    tmp_path: Path, schema: str
+) -> None:
+    plan = load_floorplan(flat(schema).write(tmp_path))
+
+    assert [("Kitchen", "kitchen"), ("Schlafzimmer", "bedroom")] == [
+        (room.name, room.type) for room in plan.rooms
+    ]
+    assert plan.area_m2 == pytest.approx(32 + 0.2 * 0.9, abs=0.05)
+    assert [(0, 1)] == [tuple(sorted(door.rooms)) for door in plan.doorways]
+    assert plan.doorways[0].width_m == pytest.approx(0.9, abs=0.01)
+    assert ["bed"] == [thing.type for thing in plan.objects]
+    (pane,) = shapely.transform(plan.glass, plan.lattice.to_metres)
+    assert (3.99, 2, 4.21, 3.5) == pytest.approx(pane.bounds, abs=0.002)
+    assert "of its levels, Ground is used, not Up, Cellar" in plan.notes
+    assert "windows in outer walls, through which nobody is seen: 1" in plan.notes
+
+
+def test_a_storey_can_be_named_and_without_spaces_walls_enclose_the_home(tmp_path: Path) -> None:
+    path = flat().write(tmp_path)
+    walls_only = load_floorplan(flat(spaces=False).write(tmp_path))
+
+    assert 2 == len(walls_only.rooms)
+    assert walls_only.area_m2 == pytest.approx(32.2, abs=0.1)
+    upstairs = Ifc(path=flat().write(tmp_path), level="Up").load()
+    assert [("Studio", 32.8)] == [
+        (r.name, pytest.approx(r.area_m2, abs=0.2)) for r in upstairs.rooms
+    ]
+    with pytest.raises(FloorPlanError, match="its levels are: Up, Ground, Cellar"):
+        Ifc(path=path, level="Roof").load()
+
+
+def test_damaged_and_empty_models_are_refused(tmp_path: Path) -> None:
+    whole = flat().write(tmp_path).read_text()
+    for text, reason in (
+        ("hello", "no header ISO-10303-21"),
+        (whole[:300], "damaged|no room and no free space|can't be read"),
+        (Model({"Ground": 0.0}).file.to_string(), "no room and no free space"),
+    ):
+        (tmp_path / "bad.ifc").write_text(text)
+        with pytest.raises(FloorPlanError, match=reason):
+            load_floorplan(tmp_path / "bad.ifc")
+
+
+def test_elements_without_geometry_are_noted(tmp_path: Path) -> None:
+    from ifcopenshell.api import root
+
+    model = flat()
+    root.create_entity(model.file, ifc_class="IfcWall")
+
+    notes = load_floorplan(model.write(tmp_path)).notes
+
+    assert "elements without a geometry, which are left out: 1" in notes
