@@ -44,6 +44,8 @@ struct Stepper {
     }
 };
 
+Span empty_span(i64 row) { return {static_cast<i32>(row), 0, -1}; }
+
 // The rows that a camera may see, and which columns of each.
 struct VisibleRows {
     i64 first_row, last_row;
@@ -116,12 +118,29 @@ i64 highest_row(const Piece& piece, i64 eye_x, i64 eye_y, i64 centre) {
     return floor_div(eye_y + static_cast<i64>(top) + 2 - centre, SUB);
 }
 
-// Writes the cells of pieces that lie in a window, and aren't too near, as spans.
+// Writes the cells of pieces that lie in a window, and aren't too near, as spans. Pieces side by side have
+// neighbouring cells in a row, so a span is kept open until one comes that isn't next to it.
 class Filler {
 public:
-    Filler(i64 x, i64 y, i64 near_squared, const VisibleRows& window, std::vector<Span>& spans)
-        : x_(x), y_(y), near_squared_(near_squared), window_(window), spans_(spans), eye_row_(last_up_to(y)) {
+    // `open` has an empty span for each row, and has so again after `close`.
+    Filler(i64 x, i64 y, i64 near_squared, const VisibleRows& window, std::vector<Span>& open, std::vector<Span>& spans)
+        : x_(x),
+          y_(y),
+          near_squared_(near_squared),
+          window_(window),
+          open_(open),
+          spans_(spans),
+          eye_row_(last_up_to(y)) {
         at_row_ = floor_mod(y - CELL_CENTRE, SUB) == 0 && window.first_row <= eye_row_ && eye_row_ <= window.last_row;
+    }
+
+    // Write the open spans.
+    void close() {
+        for (i64 row = window_.first_row; row <= window_.last_row; ++row) {
+            Span& open = open_[static_cast<std::size_t>(row)];
+            if (open.first <= open.last) spans_.push_back(open);
+            open = empty_span(row);
+        }
     }
 
     // The cell of the eye belongs to no piece.
@@ -156,7 +175,15 @@ private:
     }
 
     void append(i64 row, i64 first, i64 last) {
-        spans_.push_back({static_cast<i32>(row), static_cast<i32>(first), static_cast<i32>(last)});
+        Span& open = open_[static_cast<std::size_t>(row)];
+        if (open.last + 1 == first) {
+            open.last = static_cast<i32>(last);
+        } else if (last + 1 == open.first) {
+            open.first = static_cast<i32>(first);
+        } else {
+            if (open.first <= open.last) spans_.push_back(open);
+            open = {static_cast<i32>(row), static_cast<i32>(first), static_cast<i32>(last)};
+        }
     }
 
     // Add the same in coordinates that are turned by half a turn for sign -1; within the window.
@@ -237,6 +264,7 @@ private:
 
     i64 x_, y_, near_squared_;
     VisibleRows window_;
+    std::vector<Span>& open_;
     std::vector<Span>& spans_;
     i64 eye_row_;
     bool at_row_;  // whether the eye is as high as the centres of its row, and the window has that row
@@ -256,7 +284,9 @@ CellFinder::CellFinder(const Mesh& mesh, i64 rows, i64 columns)
       columns_(columns),
       lookout_(mesh),
       low_(Array<i64>::empty({rows})),
-      high_(Array<i64>::empty({rows})) {}
+      high_(Array<i64>::empty({rows})) {
+    for (i64 row = 0; row < rows; ++row) open_.push_back(empty_span(row));
+}
 
 const std::vector<Span>& CellFinder::cells_in_view(Pose camera, const Reach& reach) {
     spans_.clear();
@@ -280,7 +310,7 @@ const std::vector<Span>& CellFinder::cells_in_view(Pose camera, const Reach& rea
             window.limit_to(to_left, x, y);
         }
         window.trim();
-        Filler filler(x, y, reach.near_squared, window, spans_);
+        Filler filler(x, y, reach.near_squared, window, open_, spans_);
         filler.fill_eye();
         for (i64 i = 0; i < pieces.count(); ++i) {
             const WallLine wall = wall_line(mesh_, pieces.wall[i]);
@@ -290,6 +320,7 @@ const std::vector<Span>& CellFinder::cells_in_view(Pose camera, const Reach& rea
                               {wall.end.x - wall.start.x, wall.end.y - wall.start.y}};
             if (!is_beside(piece, from_right) && !is_beside(piece, to_left)) filler.fill(piece);
         }
+        filler.close();
     }
     return spans_;
 }

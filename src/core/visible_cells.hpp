@@ -48,7 +48,8 @@ private:
     Mesh mesh_;
     i64 rows_, columns_;
     Lookout lookout_;
-    Array<i64> low_, high_;  // (rows,) the first and the last column within range and angle
+    Array<i64> low_, high_;   // (rows,) the first and the last column within range and angle
+    std::vector<Span> open_;  // (rows,) empty between calls
     std::vector<Span> spans_;
 };
 

@@ -136,3 +136,25 @@ def test_expectations_know_the_details_of_requests() -> None:
     assert fleet2d.run(expecting("pill ana")).manifest["expectations"]["taken"]["holds"]
     with pytest.raises(ScenarioError, match="'pil ana': did you mean 'pill ana'"):
         fleet2d.run(expecting("pil ana"))
+
+
+STANDS = {"astro": {"behaviors": [{"type": "patrol", "rooms": ["bathroom"], "dwell": "1 d"}]}}
+SHORT = {**PILL, "within": "1 min"}
+
+
+@pytest.mark.parametrize("max_span", [7, 600])
+def test_spans_are_invisible_to_requests_that_nothing_waits_for(max_span: int) -> None:
+    content = home("30 min", robots=STANDS, interactions={"pill": SHORT})
+    content["metrics"] = {"interactions": {}}
+    other = {**content, "simulation": {**content["simulation"], "max_span": max_span}}
+    run = fleet2d.run(content)
+
+    assert [(600, "due"), (660, "expired")] == events_of(run)
+    assert digests(run) == digests(fleet2d.run(other))
+
+
+def test_who_waits_for_a_request_to_expire_is_told_at_its_deadline() -> None:
+    run = fleet2d.Simulation(home("30 min", robots=STANDS, interactions={"pill": SHORT}))
+    event = run.run_until(event="expired", entity="astro")
+
+    assert (660, 661) == (event.step, run.step)

@@ -27,8 +27,10 @@ def test_requests_come_up_at_their_times_and_expire() -> None:
     expired = [change.time for change in changes if change.event == "expired"]
     days = [MONDAY + timedelta(days=day) for day in range(5)]
     assert [day + at * HOUR for day in days for at in (8, 20)] == due
-    assert [] == expired == requests.open  # they were late before anybody looked
-    assert MONDAY + timedelta(days=7, hours=8) == requests.next_change()
+    assert [time + 30 * MINUTE for time in due] == expired
+    assert [] == requests.open
+    next_due = MONDAY + timedelta(days=7, hours=8)
+    assert {"due": next_due, "expired": next_due + 30 * MINUTE} == requests.next_changes()
 
 
 def test_a_request_expires_at_its_deadline() -> None:

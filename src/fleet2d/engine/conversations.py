@@ -1,10 +1,10 @@
 """Conversations: requests of robots come up, people are addressed, and they answer.
 
 All of it follows from the poses and plans alone, step by step, so it doesn't depend on spans. A
-span ends when a request comes up and with each question and answer; the robot decides after it.
+span ends with each question and answer, and where the robot's plan waits for requests to come up.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Sequence, Set
 from dataclasses import dataclass, field
 from datetime import timedelta
 from typing import NamedTuple
@@ -71,6 +71,7 @@ class Conversations(Watcher):
         attitudes: The attitude of each user to each robot: truth, by their rows.
         log: How people answered: truth, for metrics.
         wanted: The requests that came up, for metrics.
+        awaited: Kinds of events that end a span, whatever plans wait for.
     """
 
     actors: Sequence[DecidingActor]
@@ -80,6 +81,7 @@ class Conversations(Watcher):
     attitudes: dict[tuple[int, int], AttitudeState] = field(default_factory=dict)
     log: list[AnswerRecord] = field(default_factory=list)
     wanted: list[Wanted] = field(default_factory=list)
+    awaited: Set[str] = frozenset()
     next_step: int = 0
 
     def __post_init__(self) -> None:
@@ -87,8 +89,9 @@ class Conversations(Watcher):
         self._questions: list[Question] = []  # at the ends of plans that were replaced
         self._replies: list[PendingReply] = []
         self._last: list[tuple[int, SightEvent]] = []
-        # The next step with a question, an answer, a request or the end of a ban; None: unknown.
-        self._next: int | None = None
+        self._next: int | None = None  # the next step that ends a span; None: unknown
+        self._agenda = 0  # the next step with an answer, the end of a ban, or what people start
+        self._changes: dict[int, dict[str, int]] = {}  # of each queue: when requests come up next
         self._initiators: list[tuple[int, int]] = []  # users who start something, and robots
         self._starts: list[tuple[int, int, int, str]] = []  # today: step, user, robot, kind
         self._begun_days = 0
@@ -128,36 +131,45 @@ class Conversations(Watcher):
         """Record what a plan that is replaced at a step has done until then."""
         if not self.queues:
             return
-        self._next = None
         if row < self.users:
             self._activity[row] = self._activity_at(row, step)
         elif row in self.queues:
+            self._next = None
             self._questions += [q for q in _questions(row, actor) if q.step == step]
 
     def limit(self, bodies: Bodies, end: int) -> int:
-        """Return the step after the first question, answer or request that comes up."""
+        """Return the step after the first question or answer, or request that a robot hears of."""
         if self._next is None:
             self._next = self._next_step()
         return min(end, self._next + 1)
 
     def _next_step(self) -> int:
-        """Return the next step at which anything happens."""
-        first = self.next_step
-        steps = [reply.step for reply in self._replies]
-        steps += [question.step for question in self._questions]
+        """Return the next step at which anything happens that ends a span."""
+        steps = [self._agenda, *(question.step for question in self._questions)]
+        for row, changes in self._changes.items():
+            robot = self.actors[row]
+            heard = self.awaited | robot.plan.interrupts
+            steps += [at for kind, at in changes.items() if kind in heard]
+            if robot.plan.notes:
+                steps += [question.step for question in _questions(row, robot)]
+        return min(step for step in steps if step >= self.next_step)
+
+    def _look_ahead(self) -> None:
+        """Note when anything happens next that doesn't depend on the plans of robots."""
+        steps = [NEVER, *(reply.step for reply in self._replies)]
         steps += [start[0] for start in self._starts] + [ban[0] for ban in self._bans]
         if self._initiators:
-            steps.append(max(self._day_begin(self._begun_days), first))
+            steps.append(self._day_begin(self._begun_days))
+        self._agenda, self._next = max(min(steps), self.next_step), None
         for row, queue in self.queues.items():
-            steps += [q.step for q in _questions(row, self.actors[row]) if q.step >= first]
-            change = queue.next_change()
-            if change is not None:
-                clock = self.actors[row].clock
-                steps.append(max(clock.step_at_or_after(clock.elapsed(change)), first))
-        return min((step for step in steps if step >= first), default=NEVER)
+            clock = self.actors[row].clock
+            self._changes[row] = {
+                kind: max(clock.step_at_or_after(clock.elapsed(time)), self.next_step)
+                for kind, time in queue.next_changes().items()
+            }
 
     def take(self, bodies: Bodies, end: int) -> Sequence[Event]:
-        """Take in the steps up to `end` - 1; only in the last of them can anything happen."""
+        """Take in the steps up to `end` - 1: only requests change before the last of them."""
         first, self.next_step = self.next_step, end
         self._last = []
         if not self.queues or end == first:
@@ -167,17 +179,19 @@ class Conversations(Watcher):
             for row, queue in self.queues.items()
             for at, text in queue.take_opportunities()
         ]
-        if self._next is not None and end <= self._next:
+        step, block = end - 1, None
+        is_quiet = self._next is not None and step < self._next
+        if is_quiet and all(step < at for each in self._changes.values() for at in each.values()):
             return events
-        step, block, self._next = end - 1, None, None
         for row, queue in self.queues.items():
             robot = self.actors[row]
             for change in queue.advance(robot.clock.time(step)):
+                at = robot.clock.step_at_or_after(robot.clock.elapsed(change.time))
                 interaction = change.request.interaction
                 text = f"{change.request.name} {interaction.to}"
-                events.append(Event(step, robot.name, change.event, text))
+                events.append(Event(max(at, first), robot.name, change.event, text))
                 if change.event == "due":
-                    self.wanted.append(Wanted(step, robot.name, text, interaction))
+                    self.wanted.append(Wanted(max(at, first), robot.name, text, interaction))
                 self._tell(row, change.event, text)
             asked = [q for q in _questions(row, robot) if q.step == step]
             asked += [q for q in self._questions if q.step == step and q.robot == row]
@@ -189,6 +203,7 @@ class Conversations(Watcher):
         for pending in [reply for reply in self._replies if reply.step <= step]:
             self._replies.remove(pending)
             events += self._give(pending, step, bodies)
+        self._look_ahead()
         return events
 
     def interruptions(self, events: Sequence[Event]) -> Iterable[tuple[int, SightEvent]]:

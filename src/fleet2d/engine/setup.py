@@ -66,6 +66,7 @@ def set_up(scenario: Scenario, clock: Clock, seed: int, store: RunStore) -> Stat
         group.awaited = learners.awaited
     sensors.awaited = EventKind.SENSOR in learners.awaited
     conversations = Conversations.of(basis)
+    conversations.awaited = learners.awaited
     log = _log(basis, cameras, recorder) if learners.all else None
     if log is not None:
         log.answers, log.wanted = conversations.log, conversations.wanted

@@ -260,6 +260,7 @@ class State:
         awaited = self.awaited | self.learners.awaited
         for cameras in [*self.user_cameras, *self.cameras]:
             cameras.awaited = awaited
+        self.conversations.awaited = awaited
         self.sensors.awaited = EventKind.SENSOR in awaited
 
     def expect(self, scenario: Scenario, name: str, expectation: "Expectation", since: int) -> None:

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime, timedelta
+from functools import cached_property
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple
 
 from pydantic import BeforeValidator, PlainSerializer, WithJsonSchema
@@ -224,7 +225,7 @@ class Situation:
     events: Sequence[SightEvent] = ()
     outputs: Mapping[str, Any] = field(default_factory=dict)
 
-    @property
+    @cached_property
     def time(self) -> datetime:
         """The local time."""
         return self.actor.clock.time(self.step)

@@ -216,25 +216,28 @@ class RequestQueue:
         taken, self.opportunities = self.opportunities, []
         return taken
 
-    def next_change(self) -> datetime | None:
-        """Return when a request comes up next, or a deadline passes; None: never."""
-        times = [*self._next.values(), *(request.until for request in self.open)]
-        return min(times, default=None)
+    def next_changes(self) -> dict[str, datetime]:
+        """Return when a request comes up next (`due`), and a deadline passes (`expired`)."""
+        if not self._next:
+            return {}
+        until = [request.until for request in self.open]
+        until += [due + self.interactions[name].within for name, due in self._next.items()]
+        return {"due": min(self._next.values()), "expired": min(until)}
 
     def advance(self, time: datetime) -> list[RequestChange]:
         """Open what has come up by a time, drop what is too late; return what has changed."""
-        changes = [RequestChange(r.until, "expired", r) for r in self.open if r.until <= time]
-        self.open = [request for request in self.open if request.until > time]
+        came_up = []
         for name, due in self._next.items():
             each = self.interactions[name]
             while due <= time:
-                request = Request(name, each, due, due)
-                changes.append(RequestChange(due, "due", request))
-                if request.until > time:
-                    self.open.append(request)
+                came_up.append(Request(name, each, due, due))
                 due = next(each.times(self.start, due + timedelta(microseconds=1)))
             self._next[name] = due
+        requests = [*self.open, *came_up]
+        self.open = [request for request in requests if request.until > time]
         self.open.sort(key=lambda request: (request.since, request.name))
+        changes = [RequestChange(r.until, "expired", r) for r in requests if r.until <= time]
+        changes += [RequestChange(request.since, "due", request) for request in came_up]
         return sorted(changes, key=lambda change: (change.time, change.request.name))
 
     def find(self, text: str) -> Request | None:
