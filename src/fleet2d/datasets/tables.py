@@ -9,6 +9,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from fleet2d.algorithms.presence.belief import ANYONE
+from fleet2d.artifacts.arrow import values_of
 from fleet2d.datasets.specification import BELIEF, EVIDENCE, STAYS, PlannedRun
 from fleet2d.kernels import I64
 
@@ -157,7 +158,7 @@ def tables_of(run: "Run", planned: PlannedRun, labels: timedelta) -> dict[str, p
     if EVIDENCE in run.tables:
         looks = run.arrow(EVIDENCE)
         columns = {name: looks[name] for name in ("room", "kind", "user", "watched", "seen")}
-        columns["step"] = looks["bin"].to_numpy() + bin_steps - 1
+        columns["step"] = values_of(looks["bin"]) + bin_steps - 1
         made["evidence"] = table("evidence", columns, len(looks))
     every = max(1, labels // timedelta(microseconds=step_us))
     steps = np.arange(every - 1, int(manifest["steps"]), every)
@@ -199,13 +200,8 @@ def _run_row(planned: PlannedRun, users: Sequence[str], start: Any, run: "Run") 
 
 def columns_of(run: "Run", name: str, columns: Sequence[str]) -> dict[str, Any]:
     """Return columns of a table of a run as arrays; texts as objects."""
-    table = run.arrow(name).select(list(columns))
-    return {
-        field.name: table[field.name].combine_chunks().to_numpy(zero_copy_only=False)
-        if not pa.types.is_dictionary(field.type)
-        else np.asarray(table[field.name].cast(pa.string()).to_pylist(), object)
-        for field in table.schema
-    }
+    table = run.arrow(name)
+    return {column: values_of(table[column]) for column in columns}
 
 
 def whereabouts(run: "Run", user: str) -> Whereabouts:
@@ -216,20 +212,22 @@ def whereabouts(run: "Run", user: str) -> Whereabouts:
     is_new = np.append(True, place[1:] != place[:-1])[: len(place)]
     since, activity = np.zeros(0, np.int64), np.zeros(0, object)
     if "events" in run.tables:
-        events = columns_of(run, "events", ["step", "entity", "event", "detail"])
-        is_own = (events["entity"] == user) & (events["event"] == "activity")
-        since, activity = events["step"][is_own], events["detail"][is_own]
+        events = run.arrow("events")
+        is_own = pc.equal(events["event"].cast(pa.string()), "activity")
+        is_own = pc.and_(is_own, pc.equal(events["entity"].cast(pa.string()), user))
+        since = values_of(events.filter(is_own)["step"])
+        activity = np.array(events.filter(is_own)["detail"].to_pylist(), object)
     return Whereabouts(begin[is_new], place[is_new], int(end[-1]), since, activity)
 
 
 def _belief(run: "Run", name: str) -> dict[str, Any]:
     """Return the rows of the belief of a model, also those about anyone."""
     rows = run.arrow(name)
-    share = rows["share"].to_numpy().reshape(-1, len(run.plan.rooms) + 1).copy()  # away last
+    share = values_of(rows["share"]).reshape(-1, len(run.plan.rooms) + 1).copy()  # away last
     share[:, :-1] *= 1 - share[:, -1:]  # of all time, not given at home
     at = "at" if "at" in rows.column_names else "step"  # of `belief_table`, of `rtp`
     return {
-        "step": rows[at].to_numpy(),
+        "step": values_of(rows[at]),
         "model": pa.repeat(name.removeprefix(BELIEF), len(rows)),
         "user": _array(rows["user"], pa.string()),
         "place": rows["room"],

@@ -230,7 +230,8 @@ def _keys_of(run: "Run", plan: FloorPlan, entity: str) -> dict[str, Any]:
     own = values_of(table["entity"]) == entity
     names = ("step", "time", "x", "y", "heading", "away", "kind")
     column = {name: values_of(table[name])[own] for name in names}
-    kind = np.array([KEY_KINDS.index(name) for name in column["kind"]], np.int64)
+    numbers = {name: number for number, name in enumerate(KEY_KINDS)}
+    kind = np.array([numbers[name] for name in column["kind"].tolist()], np.int64)
     xy = plan.lattice.to_lattice(np.stack([column["x"], column["y"]], axis=-1))
     start = np.datetime64(run.manifest["start"], "us")
     return {

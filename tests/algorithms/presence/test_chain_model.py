@@ -44,7 +44,7 @@ def test_without_evidence_the_filter_converges_to_the_shares_of_the_hour(
     seed: int, weekday: int, hour: int
 ) -> None:
     of, known = model(seed), habits(seed)
-    now = known.at(of, weekday, hour)
+    now = known.at(of, weekday, [hour])[0]
     days = known.week.reshape(7, 24, -1)[:, hour]
     expected = (days[:5] if weekday < 5 else days[5:]).sum(axis=0)
     drawn = expected[:-1] / expected[-1] / stationary(of)
@@ -57,21 +57,22 @@ def test_without_evidence_the_filter_converges_to_the_shares_of_the_hour(
 def test_hours_that_are_alike_change_nothing() -> None:
     of, known = model(1), habits(1)
     same = known._replace(week=np.tile(known.total / 168, (168, 1)))
-    now = same.at(of, 2, 12)
+    now = same.at(of, 2, [12])[0]
     for part, before in zip(now, of, strict=True):
         assert np.abs(part - before).max() < 1e-9 if np.ndim(part) else part == before
 
 
 def test_on_the_first_day_nothing_is_known_of_hours() -> None:
     of, known = model(2), habits(2)
-    assert of is known._replace(total=known.total / known.total[-1] * 1439).at(of, 0, 0)
+    assert of is known._replace(total=known.total / known.total[-1] * 1439).at(of, 0, [0])[0]
 
 
 @pytest.mark.parametrize("smoothing", [60.0, 1e9])
 def test_average_evidence_draws_to_the_average(smoothing: float) -> None:
     of = model(3)
     usual, sure, smooth = (
-        stationary(k) for k in (of, habits(3).at(of, 1, 8), habits(3, smoothing).at(of, 1, 8))
+        stationary(k)
+        for k in (of, habits(3).at(of, 1, [8])[0], habits(3, smoothing).at(of, 1, [8])[0])
     )
     assert np.abs(smooth - usual).sum() < np.abs(sure - usual).sum()
     if smoothing > 1e6:
@@ -83,6 +84,6 @@ def test_rates_of_an_hour_without_transitions_are_bounded() -> None:
     week = known.week.copy()
     week[:, :-1] = 0
     week[:, 1] = 240
-    now = known._replace(week=week).at(of, 3, 3)
+    now = known._replace(week=week).at(of, 3, [3])[0]
     assert np.isfinite(now.follow).all()
     assert stationary(now)[1] > 0.9

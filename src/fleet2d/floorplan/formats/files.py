@@ -288,6 +288,16 @@ def _numbers(value: object, count: int) -> tuple[float, ...]:
     return tuple(clean_coordinate(number) for number in value)
 
 
+def _point(value: object) -> tuple[float, ...]:
+    """Return a place [m]; the plan of a home has thousands."""
+    if type(value) is list and len(value) == 2:
+        x, y = value
+        is_plain = type(x) is float and type(y) is float
+        if is_plain and TINY <= abs(x) <= MAX_COORDINATE_M and TINY <= abs(y) <= MAX_COORDINATE_M:
+            return x, y
+    return _numbers(value, 2)
+
+
 def clean_coordinate(number: float) -> float:
     """Return a coordinate as a float, with tiny ones set to 0, since GEOS divides by them."""
     return 0.0 if abs(number) < TINY else float(number)
@@ -308,9 +318,7 @@ Coordinate = Annotated[
 """A length [m] or an angle [rad]."""
 
 _POINT = {"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 2}
-Point = Annotated[
-    tuple[float, float], PlainValidator(lambda value: _numbers(value, 2)), WithJsonSchema(_POINT)
-]
+Point = Annotated[tuple[float, float], PlainValidator(_point), WithJsonSchema(_POINT)]
 """A place (x, y) [m]."""
 BoxSides = Annotated[
     tuple[float, float, float, float], PlainValidator(lambda box: _numbers(box, 4))

@@ -77,7 +77,8 @@ class AreaEntry(FileModel):
     @cached_property
     def polygon(self) -> Polygon:
         """The area [m]."""
-        return Polygon(self.outline, self.holes)
+        # From arrays: Shapely reads corners in lists one by one.
+        return Polygon(np.array(self.outline), [np.array(hole) for hole in self.holes])
 
 
 class _CornersAlone:
