@@ -67,8 +67,8 @@ def test_what_a_run_stored_is_put_out_again(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "settings", "message"),
     [
-        (ROWS, {}, "has several: select one by 'user': ana, ben"),
-        (ROWS, {"user": "anna"}, "has nobody named 'anna'"),
+        (ROWS, {}, "holds 2 users: ana, ben: select one by 'user'"),
+        (ROWS, {"user": "anna"}, "has no user 'anna': did you mean 'ana'"),
         ("time,room,share\n0,attic,1\n", {}, "there is no room 'attic'"),
         ("time,room\n0,kitchen_0\n", {}, "has no column 'share'"),
     ],

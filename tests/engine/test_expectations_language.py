@@ -217,7 +217,7 @@ def test_holds_for_120_s_is_120_s() -> None:
 
 REFUSED = {
     "always(battery(astro) > 20)": "a share is a number from 0 to 1, or from 0 % to 100 %, such as 20 %",
-    "never(during(22:00-22:00))": "22:00-22:00 is not a stretch of time: write 00:00-24:00 for the whole day",
+    "never(during(22:00-22:00))": "22:00-22:00 has no length: write 00:00-24:00 for the whole day",
     "never(activity(ana) == slep)": "there is no activity of ana 'slep': did you mean 'sleep'?",
     "never(activity(ben) == sleep)": "there is no activity of ben 'sleep'",
     "never(events(called, astro, detail='find anna'))": "'find anna': did you mean 'find ana'?",

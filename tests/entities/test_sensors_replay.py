@@ -42,10 +42,11 @@ def test_readings_are_those_of_the_table(tmp_path: Path, span: int | None) -> No
 @pytest.mark.parametrize(
     ("text", "settings", "message"),
     [
-        (ROWS, {}, "several sensors; select one by 'sensor'"),
+        (ROWS, {}, "2 sensors: door, hall: select one by 'sensor'"),
         (ROWS, {"sensor": "doors"}, "no sensor 'doors'"),
         ("time,state\n0,maybe\n", {}, "the state 'maybe' is unknown"),
         ("time,state\n5,ON\n1,OFF\n", {}, "the time runs backwards"),
+        ("time,sensor,state\n5,oven,ON\n5,door,ON\n1,door,OFF\n", {"sensor": "door"}, "line 4:"),
         (ROWS, {"sensor": "door", "day": 4}, "the run begins on day 4 of the log"),
     ],
 )

@@ -89,7 +89,7 @@ def test_frames_have_every_intervention_once(live: LiveRun) -> None:
 def test_steps_are_taken_one_by_one(live: LiveRun) -> None:
     assert "" == live.submit(order("step", value=1))
     assert "" == live.submit(order("step", value=60))
-    assert 61 == live.engine.step
+    assert 61 == live.engine.simulation.step
 
 
 def test_body_is_put_somewhere_and_the_run_says_so(live: LiveRun) -> None:
@@ -199,9 +199,9 @@ def test_orders_need_the_page_s_origin_and_json(live: LiveRun) -> None:
     form = {"Origin": OWN, "Content-Type": "text/plain"}
     assert 415 == client.post("/token/live/0/order", content=body, headers=form).status_code
     assert 403 == client.post("/wrong/live/0/order", content=body, headers=own_headers).status_code
-    assert 0 == live.engine.step
+    assert 0 == live.engine.simulation.step
     assert 200 == client.post("/token/live/0/order", content=body, headers=own_headers).status_code
-    assert 1 == live.engine.step
+    assert 1 == live.engine.simulation.step
 
 
 def test_facts_of_a_run_under_way_name_home_and_bodies(live: LiveRun) -> None:

@@ -48,7 +48,7 @@ def test_branch_has_the_past_of_its_run_and_a_future_of_its_own(
     session = lives.branch(BranchOrder(of="run/0", step=AT))
     assert ("live/0", "day-branch-1", "run/0", AT) == tuple(session.values())
     live = lives._live(0)
-    assert AT == live.engine.step
+    assert AT == live.engine.simulation.step
     assert "" == live.submit(order("configure", "astro", key="hangout.tau", text="10 min"))
     assert "" == live.submit(order("door", "bath_door", value=0))
     assert "" == live.submit(order("resume"))

@@ -14,13 +14,13 @@ from fleet2d.algorithms.algorithm import Algorithm, Present, RoomDistribution
 from fleet2d.algorithms.history import History
 from fleet2d.algorithms.presence.belief import ANYONE, Presence
 from fleet2d.configuration.components import register
-from fleet2d.configuration.problems import check_known, suggest
+from fleet2d.configuration.problems import check_known
 from fleet2d.configuration.trust import check_trust
 from fleet2d.configuration.units import InputPath, PositiveDuration, micros
 from fleet2d.errors import ComponentError
 from fleet2d.floorplan.home import Home
 from fleet2d.logs.log import AWAY, LogError
-from fleet2d.logs.positions import Stamps, columns_of, local_times, numbers_of, read_table, times_of
+from fleet2d.logs.positions import LogTable, local_times
 from fleet2d.runtime.clock import midnight_of
 from fleet2d.runtime.program import ExternalProgram
 
@@ -205,22 +205,19 @@ class ReplayedOutput(Algorithm):
         Raises:
             LogError: It can't be read, lacks a column, or names rooms or people of another home.
         """
-        table = read_table(self.path)
-        named = columns_of(table, self.columns, self.path, NAMES, ("time", "room", "share"))
-        if "user" in named:
-            table = self._of_user(table, named["user"])
+        table = LogTable.read(self.path, self.columns, NAMES, ("time", "room", "share"))
+        if "user" in table.named:
+            table = table.of("user", self.user)
         rooms = [room.name for room in home.rooms]
-        table = table.filter(pc.not_equal(pc.cast(table[named["room"]], pa.string()), AWAY))
-        texts = pc.cast(table[named["room"]], pa.string()).combine_chunks()
+        is_at_home = pc.fill_null(pc.not_equal(table.texts("room"), AWAY), False).combine_chunks()
+        table = table.where(is_at_home.to_numpy(zero_copy_only=False))
+        texts = table.texts("room").combine_chunks()
         for name in pc.unique(texts).to_pylist():
             check_known(name, "room", rooms, LogError, f"{self.path}: ")
         room = pc.index_in(texts, value_set=pa.array(rooms)).to_numpy(zero_copy_only=False)
-        line = np.arange(table.num_rows) + (2 if self.path.suffix.lower() == ".csv" else 1)
-        share = numbers_of(table, named["share"], self.path, line)
-        time_us, has_date, has_zone = times_of(table[named["time"]], self.path, line)
-        stamps = Stamps(time_us, line, has_date=has_date, has_zone=has_zone)
+        share, stamps, zone = table.numbers("share"), table.stamps(), self.time_zone
         local = local_times(
-            self.path, "shares", stamps, np.isfinite(share), [], time_zone=self.time_zone, sort=True
+            self.path, "shares", stamps, np.isfinite(share), [], time_zone=zone, sort=True
         )
         begins = np.flatnonzero(np.append(True, np.diff(local.time_us) > 0))
         self._times = local.time_us[begins]
@@ -236,16 +233,6 @@ class ReplayedOutput(Algorithm):
             midnight = datetime.combine(self._day, datetime.min.time())
         row = int(np.searchsorted(self._times, micros(state.time - midnight), side="right")) - 1
         return None if row < 0 else RoomDistribution(self._shares[row])
-
-    def _of_user(self, table: pa.Table, column: str) -> pa.Table:
-        """Return the rows of one person."""
-        users = pc.cast(table[column], pa.string())
-        known = sorted(str(name) for name in pc.unique(users).to_pylist())
-        name = known[0] if self.user is None and len(known) == 1 else self.user
-        if name not in known:
-            which = f"has nobody named {name!r}{suggest(name, known)}" if name else "has several"
-            raise LogError(f"{self.path} {which}: select one by 'user': {', '.join(known)}")
-        return table.filter(pc.equal(users, name))
 
 
 @register("algorithm", "evidence_table")

@@ -19,7 +19,6 @@ from fleet2d.storage.files import write_atomically
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from fleet2d.engine.simulation import Simulation
     from fleet2d.expectations.verdict import Verdict
     from fleet2d.scenario.model import Scenario
 
@@ -317,9 +316,11 @@ def _run(case: ScenarioCase) -> None:
     """Run a case, and judge it."""
     import time
 
+    from fleet2d.engine.simulation import Simulation
+
     start_s = time.perf_counter()
     try:
-        simulation = _simulation(case)
+        simulation = Simulation(case.scenario)
         simulation.run()
         case.verdicts = simulation.verdicts()
     except Fleet2DError as error:
@@ -327,16 +328,12 @@ def _run(case: ScenarioCase) -> None:
     case.wall_s = time.perf_counter() - start_s
 
 
-def _simulation(case: ScenarioCase, out: Path | None = None) -> "Simulation":
-    from fleet2d.engine.simulation import Simulation
-
-    return Simulation(case.scenario, out=out)
-
-
 def _store(case: ScenarioCase, pictures: Path | None, out: Path | None) -> None:
     """Run a failed case again, to store it and to draw the worst moments."""
+    from fleet2d.engine.simulation import Simulation
+
     directory = None if out is None else out / case.name
-    simulation = _simulation(case, directory)
+    simulation = Simulation(case.scenario, out=directory)
     run = simulation.run()
     if directory is not None:
         case.files.append(directory)

@@ -9,7 +9,6 @@ import shapely
 from pydantic import Field
 
 from fleet2d.configuration.components import register
-from fleet2d.configuration.problems import suggest
 from fleet2d.configuration.units import (
     AngleDeg,
     Duration,
@@ -246,28 +245,15 @@ class ReplaySensor(Sensor):
         Raises:
             LogError: It can't be read, lacks a column, has no such sensor, or a state is unknown.
         """
-        import pyarrow as pa
-        import pyarrow.compute as pc
+        from fleet2d.logs.positions import LogTable, local_times
 
-        from fleet2d.logs.positions import Stamps, columns_of, local_times, read_table, times_of
-
-        table = read_table(self.path)
-        named = columns_of(table, self.columns, self.path, NAMES, ("time", "state"))
-        if "sensor" in named:
-            names = pc.cast(table[named["sensor"]], pa.string())
-            known = sorted(str(name) for name in pc.unique(names).to_pylist())
-            name = known[0] if self.sensor is None and len(known) == 1 else self.sensor
-            if name not in known:
-                which = f"no sensor {name!r}{suggest(name, known)}" if name else "several sensors"
-                raise LogError(f"{self.path} has {which}; select one by 'sensor'")
-            table = table.filter(pc.equal(names, name))
-        line = np.arange(table.num_rows) + (2 if self.path.suffix.lower() == ".csv" else 1)
-        states = [_is_on(value, self.path) for value in table[named["state"]].to_pylist()]
-        time_us, has_date, has_zone = times_of(table[named["time"]], self.path, line)
-        stamps = Stamps(time_us, line, has_date=has_date, has_zone=has_zone)
-        usable = np.ones(len(line), bool)
+        table = LogTable.read(self.path, self.columns, NAMES, ("time", "state"))
+        if "sensor" in table.named:
+            table = table.of("sensor", self.sensor)
+        states = [_is_on(value, self.path) for value in table.column("state").to_pylist()]
+        stamps, usable, zone = table.stamps(), np.ones(len(states), bool), self.time_zone
         local = local_times(
-            self.path, "readings", stamps, usable, [], time_zone=self.time_zone, sort=self.sort
+            self.path, "readings", stamps, usable, [], time_zone=zone, sort=self.sort
         )
         nothing = np.zeros((len(local.row), 2))
         log = PositionLog(

@@ -370,6 +370,18 @@ class Measurement(Word, Term):
 # Kinds of signals
 
 
+def _comparison(sign: str) -> Callable[["Signal", Any], Expectation]:
+    """Return the method that compares a signal with a number, a text like "5 cm", or a signal."""
+    return lambda signal, limit: SignalComparison(signal, sign, limit)
+
+
+def _arithmetic(sign: str, *, is_mirrored: bool = False) -> Callable[["Signal", Any], "Signal"]:
+    """Return the method that computes with a signal and a number, a text or another signal."""
+    if is_mirrored:
+        return lambda signal, other: Arithmetic(other, sign, signal)
+    return lambda signal, other: Arithmetic(signal, sign, other)
+
+
 class Signal(Term):
     """A number at each step; compare it by `>`, `>=`, `<`, `<=`, `==`, `!=`.
 
@@ -380,63 +392,16 @@ class Signal(Term):
         """Return its values from the first judged step on."""
         raise NotImplementedError
 
-    def __gt__(self, limit: "float | str | Signal") -> Expectation:
-        """Expect the signal above a limit."""
-        return SignalComparison(self, ">", limit)
-
-    def __ge__(self, limit: "float | str | Signal") -> Expectation:
-        """Expect the signal at a limit or above it."""
-        return SignalComparison(self, ">=", limit)
-
-    def __lt__(self, limit: "float | str | Signal") -> Expectation:
-        """Expect the signal below a limit."""
-        return SignalComparison(self, "<", limit)
-
-    def __le__(self, limit: "float | str | Signal") -> Expectation:
-        """Expect the signal at a limit or below it."""
-        return SignalComparison(self, "<=", limit)
-
-    def __eq__(self, limit: object) -> Expectation:  # type: ignore[override]
-        """Expect the signal to equal a limit."""
-        return SignalComparison(self, "==", limit)
-
-    def __ne__(self, limit: object) -> Expectation:  # type: ignore[override]
-        """Expect the signal to differ from a limit."""
-        return SignalComparison(self, "!=", limit)
-
+    __gt__, __ge__ = _comparison(">"), _comparison(">=")
+    __lt__, __le__ = _comparison("<"), _comparison("<=")
+    __eq__ = _comparison("==")  # type: ignore[assignment]
+    __ne__ = _comparison("!=")  # type: ignore[assignment]
     __hash__ = object.__hash__
 
-    def __add__(self, other: "float | str | Signal") -> "Signal":
-        """Return the sum of the signal and another."""
-        return Arithmetic(self, "+", other)
-
-    def __radd__(self, other: "float | str") -> "Signal":
-        """Return the same with the operands exchanged."""
-        return Arithmetic(other, "+", self)
-
-    def __sub__(self, other: "float | str | Signal") -> "Signal":
-        """Return the signal less another."""
-        return Arithmetic(self, "-", other)
-
-    def __rsub__(self, other: "float | str") -> "Signal":
-        """Return the same with the operands exchanged."""
-        return Arithmetic(other, "-", self)
-
-    def __mul__(self, other: "float | str | Signal") -> "Signal":
-        """Return the product of the signal and another."""
-        return Arithmetic(self, "*", other)
-
-    def __rmul__(self, other: "float | str") -> "Signal":
-        """Return the same with the operands exchanged."""
-        return Arithmetic(other, "*", self)
-
-    def __truediv__(self, other: "float | str | Signal") -> "Signal":
-        """Return the signal divided by another."""
-        return Arithmetic(self, "/", other)
-
-    def __rtruediv__(self, other: "float | str") -> "Signal":
-        """Return the same with the operands exchanged."""
-        return Arithmetic(other, "/", self)
+    __add__, __radd__ = _arithmetic("+"), _arithmetic("+", is_mirrored=True)
+    __sub__, __rsub__ = _arithmetic("-"), _arithmetic("-", is_mirrored=True)
+    __mul__, __rmul__ = _arithmetic("*"), _arithmetic("*", is_mirrored=True)
+    __truediv__, __rtruediv__ = _arithmetic("/"), _arithmetic("/", is_mirrored=True)
 
     def __neg__(self) -> "Signal":
         """Return the negated signal."""

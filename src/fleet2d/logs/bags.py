@@ -10,7 +10,7 @@ from fleet2d.bounds import FIXES
 from fleet2d.configuration.problems import did_you_mean
 from fleet2d.kernels import F64, I64
 from fleet2d.logs.log import LogError, PositionLog
-from fleet2d.logs.positions import RawFixes, localize
+from fleet2d.logs.positions import RawFixes, Stamps, localize
 from fleet2d.storage.bags import LATEST_SIMULATED_NS, open_bag, planar, stamp_of
 
 TRANSFORMS = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
@@ -68,11 +68,9 @@ def read_bag(
     time_us = poses.time // 1000
     if not has_date and len(time_us):
         time_us = time_us - time_us.min()
-    number = np.arange(1, len(time_us) + 1)
-    fixes = RawFixes(time_us, poses.x, poses.y, poses.heading, number, [source])
-    return localize(
-        path, "bag", fixes, has_date=has_date, has_zone=has_date, time_zone=time_zone, sort=sort
-    )
+    stamps = Stamps(time_us, np.arange(1, len(time_us) + 1), has_date, has_date)
+    fixes = RawFixes(stamps, poses.x, poses.y, poses.heading, [source])
+    return localize(path, "bag", fixes, time_zone=time_zone, sort=sort)
 
 
 def _poses(reader: Any, path: Path, name: str | None) -> tuple[_PlanarPoses, str]:

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -13,17 +13,9 @@ import pyarrow.compute as pc
 
 from fleet2d.bounds import FIXES, one_line
 from fleet2d.configuration.problems import did_you_mean
-from fleet2d.kernels import F64, I64
+from fleet2d.kernels import I64
 from fleet2d.logs.log import LogError, PositionLog
-from fleet2d.logs.positions import (
-    NAMES,
-    Stamps,
-    columns_of,
-    local_times,
-    numbers_of,
-    read_table,
-    times_of,
-)
+from fleet2d.logs.positions import NAMES, LogTable, RawFixes, Stamps, fixes_in
 from fleet2d.storage.bags import LATEST_SIMULATED_NS, is_bag, open_bag, stamp_of
 
 COLUMNS = {
@@ -99,60 +91,37 @@ def read_detections(
     if not path.exists():
         raise LogError(f"no such file: {path}")
     if is_bag(path):
-        raw = _from_bag(path, topic, columns or {})
+        fixes, label, labels = _from_bag(path, topic, columns or {})
     else:
         if topic is not None:
             raise LogError(f"{path} is a table: 'topic' is for bags")
-        raw = _from_table(path, columns or {})
-    usable = np.isfinite(raw.x) & np.isfinite(raw.y)
-    notes = list(raw.notes)
-    local = local_times(
-        path, "detections", raw.stamps, usable, notes, time_zone=time_zone, sort=sort
-    )
-    row = local.row
+        fixes, label, labels = _from_table(path, columns or {})
+    local = fixes.local(path, "detections", time_zone=time_zone, sort=sort)
     return RobotDetections(
         path,
         "detections",
         local.first_day,
         local.time_us,
-        np.stack([raw.x, raw.y], 1)[row],
-        raw.heading[row],
-        tuple(notes),
-        label=raw.label[row],
-        labels=raw.labels,
+        np.stack([fixes.x, fixes.y], 1)[local.row],
+        fixes.heading[local.row],
+        tuple(fixes.notes),
+        label=label[local.row],
+        labels=labels,
     )
 
 
-class _RawDetections(NamedTuple):
-    """Detections as a file has them; see `RobotDetections`."""
-
-    stamps: Stamps
-    x: F64
-    y: F64
-    heading: F64
-    label: I64
-    labels: tuple[str, ...]
-    notes: tuple[str, ...] = ()
+_LabelledFixes = tuple[RawFixes, I64, tuple[str, ...]]
+"""Detections as a file has them, the label of each, and all labels; see `RobotDetections`."""
 
 
-def _from_table(path: Path, columns: Mapping[str, str]) -> _RawDetections:
-    table = read_table(path)
-    named = columns_of(table, columns, path, COLUMNS)
-    line = np.arange(table.num_rows) + (2 if path.suffix.lower() == ".csv" else 1)
-    if not table.num_rows:
+def _from_table(path: Path, columns: Mapping[str, str]) -> _LabelledFixes:
+    table = LogTable.read(path, columns, COLUMNS)
+    if not table.rows.num_rows:
         raise LogError(f"{path} holds no detection")
-    x, y = (numbers_of(table, named[axis], path, line) for axis in "xy")
-    heading = np.full(len(x), np.nan)
-    if "heading" in named:
-        heading = numbers_of(table, named["heading"], path, line)
-        if named["heading"].endswith("_deg"):
-            heading = heading / 180 * np.pi
-    label, labels = np.full(len(x), -1, np.int64), tuple[str, ...]()
-    if "user" in named:
-        label, labels = _codes(pc.cast(table[named["user"]], pa.string()).combine_chunks())
-    time_us, has_date, has_zone = times_of(table[named["time"]], path, line)
-    stamps = Stamps(time_us, line, has_date=has_date, has_zone=has_zone)
-    return _RawDetections(stamps, x, y, heading, label, labels)
+    label, labels = np.full(len(table.line), -1, np.int64), tuple[str, ...]()
+    if "user" in table.named:
+        label, labels = _codes(table.texts("user").combine_chunks())
+    return fixes_in(table), label, labels
 
 
 def _codes(texts: pa.Array) -> tuple[I64, tuple[str, ...]]:
@@ -166,7 +135,7 @@ def _codes(texts: pa.Array) -> tuple[I64, tuple[str, ...]]:
 # Bags
 
 
-def _from_bag(path: Path, topic: str | None, columns: Mapping[str, str]) -> _RawDetections:
+def _from_bag(path: Path, topic: str | None, columns: Mapping[str, str]) -> _LabelledFixes:
     with open_bag(path, LogError) as reader:
         connection, fields = _topic(reader, path, topic, columns)
         FIXES.check(connection.msgcount, path, LogError)
@@ -198,11 +167,11 @@ def _from_bag(path: Path, topic: str | None, columns: Mapping[str, str]) -> _Raw
     time_ns = np.array(times, np.int64)
     has_date = int(time_ns.max()) >= LATEST_SIMULATED_NS
     time_us = time_ns // 1000 if has_date else (time_ns - time_ns.min()) // 1000
-    stamps = Stamps(time_us, np.arange(1, len(times) + 1), has_date=has_date, has_zone=has_date)
+    stamps = Stamps(time_us, np.arange(1, len(times) + 1), has_date, has_date)
     x, y, heading = np.array(rows, np.float64).T
     label, labels = _codes(pa.array(users, pa.string()))
     note = f"{connection.topic}: {len(times)} detections in {number} messages"
-    return _RawDetections(stamps, x, y, heading, label, labels, (note,))
+    return RawFixes(stamps, x, y, heading, [note]), label, labels
 
 
 def _topic(

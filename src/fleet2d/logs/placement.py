@@ -21,40 +21,22 @@ RoomChoice = tuple[str, ...]
 
 DOOR = "door"
 """The front door: after a long silence there, the person is out."""
-USUAL_ROOMS: dict[str, RoomChoice] = {
-    "away": (AWAY,),
-    "outsidedoor": (DOOR,),
-    "outside_door": (DOOR,),
-    "maindoor": (DOOR,),
-    "frontdoor": (DOOR,),
-    "front_door": (DOOR,),
-    "entrance": (DOOR,),
-    "livingroom": ("living_room",),
-    "living": ("living_room",),
-    "lounge": ("living_room",),
-    "loungechair": ("living_room",),
-    "diningroom": ("dining_room", "kitchen"),
-    "dining_room": ("dining_room", "kitchen"),
-    "dining": ("dining_room", "kitchen"),
-    "workarea": ("office", "living_room"),
-    "home_office": ("office", "living_room"),
-    "office": ("office", "living_room"),
-    "toilet": ("toilet", "bathroom"),
-    "bathroom": ("bathroom", "toilet"),
-    "hallway": ("hallway", "hall"),
-    "hall": ("hall", "hallway"),
-    # activities of a log that tells no rooms
-    "sleeping": ("bedroom",),
-    "toileting": ("bathroom", "toilet"),
-    "showering": ("bathroom",),
-    "grooming": ("bathroom",),
-    "breakfast": ("kitchen",),
-    "lunch": ("kitchen",),
-    "dinner": ("kitchen",),
-    "snack": ("kitchen",),
-    "spare_time_tv": ("living_room",),
-}
-"""Meanings of the labels of known data sets: rooms or kinds of rooms to be tried in turn."""
+_MEANINGS: tuple[tuple[str, RoomChoice], ...] = (
+    ("away", (AWAY,)),
+    ("outsidedoor outside_door maindoor frontdoor front_door entrance", (DOOR,)),
+    ("livingroom living lounge loungechair spare_time_tv", ("living_room",)),
+    ("diningroom dining_room dining", ("dining_room", "kitchen")),
+    ("workarea home_office office", ("office", "living_room")),
+    ("toilet", ("toilet", "bathroom")),
+    ("bathroom toileting", ("bathroom", "toilet")),
+    ("showering grooming", ("bathroom",)),
+    ("hallway", ("hallway", "hall")),
+    ("hall", ("hall", "hallway")),
+    ("sleeping", ("bedroom",)),
+    ("breakfast lunch dinner snack", ("kitchen",)),
+)
+USUAL_ROOMS = {label: rooms for labels, rooms in _MEANINGS for label in labels.split()}
+"""Meanings of the labels of known data sets, rooms and activities: rooms to be tried in turn."""
 UNKNOWN = "unknown"
 
 

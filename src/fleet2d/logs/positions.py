@@ -1,9 +1,10 @@
 """Position fixes of a real-time location system: CSV or Parquet with time, id, x, y and heading."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from datetime import UTC, date, datetime, timedelta
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 from zoneinfo import ZoneInfo, available_timezones
 
 import numpy as np
@@ -72,57 +73,35 @@ def read_positions(
     Raises:
         LogError: A column or the tag is missing, a value is not a number, or times run backwards.
     """
-    table = read_table(path)
-    named = columns_of(table, columns or {}, path)
-    table, line, notes = _of_tag(table, named.get("id"), id, path)
-    x, y = (numbers_of(table, named[axis], path, line) for axis in ("x", "y"))
-    heading = np.full(len(x), np.nan)
-    if "heading" in named:
-        heading = numbers_of(table, named["heading"], path, line)
-        if named["heading"].endswith("_deg"):
-            heading = heading / 180 * np.pi
-    time_us, has_date, has_zone = times_of(table[named["time"]], path, line)
-    fixes = RawFixes(time_us, x, y, heading, line, notes)
-    return localize(
-        path,
-        "positions",
-        fixes,
-        has_date=has_date,
-        has_zone=has_zone,
-        time_zone=time_zone,
-        sort=sort,
-    )
+    table, notes = _of_tag(LogTable.read(path, columns or {}), id)
+    return localize(path, "positions", fixes_in(table, notes), time_zone=time_zone, sort=sort)
 
 
 class RawFixes(NamedTuple):
     """Fixes as a file has them.
 
     Attributes:
-        time_us: Times [us since 1970], or since the beginning of the log, int64 (n,).
+        stamps: Their times.
         x: float64 (n,), NaN where there is none.
         y: float64 (n,), NaN where there is none.
         heading: float64 (n,) [rad], NaN where there is none.
-        line: The number of its line or message in the file, int64 (n,).
         notes: Anomalies in the file.
     """
 
-    time_us: I64
+    stamps: "Stamps"
     x: F64
     y: F64
     heading: F64
-    line: I64
     notes: list[str]
+
+    def local(self, path: Path, noun: str, *, time_zone: str | None, sort: bool) -> "LocalTimes":
+        """Return those that have a place in the local time of the home; see `local_times`."""
+        usable, notes = np.isfinite(self.x) & np.isfinite(self.y), self.notes
+        return local_times(path, noun, self.stamps, usable, notes, time_zone=time_zone, sort=sort)
 
 
 def localize(
-    path: Path,
-    layout: str,
-    fixes: RawFixes,
-    *,
-    has_date: bool,
-    has_zone: bool,
-    time_zone: str | None,
-    sort: bool,
+    path: Path, layout: str, fixes: RawFixes, *, time_zone: str | None, sort: bool
 ) -> PositionLog:
     """Return fixes as a log in the local time of the home.
 
@@ -130,8 +109,6 @@ def localize(
         path: The file that they are from.
         layout: The layout of the file.
         fixes: The fixes.
-        has_date: Whether times count from 1970; else from the beginning of the log.
-        has_zone: Whether times are UTC, and become times of `time_zone`.
         time_zone: The time zone of the home.
         sort: Put fixes in order of time instead of refusing times that run backwards.
 
@@ -139,17 +116,14 @@ def localize(
         LogError: There is no fix, times run backwards or are out of range, or a time zone is
             missing or unknown.
     """
-    time_us, x, y, heading, line, notes = fixes
-    stamps = Stamps(time_us, line, has_date=has_date, has_zone=has_zone)
-    usable = np.isfinite(x) & np.isfinite(y)
-    local = local_times(path, "fixes", stamps, usable, notes, time_zone=time_zone, sort=sort)
-    time_us, row = local.time_us, local.row
+    _, x, y, heading, notes = fixes
+    time_us, row, first_day = fixes.local(path, "fixes", time_zone=time_zone, sort=sort)
     last = np.append(np.diff(time_us) > 0, True)
     if not last.all():
         notes.append(f"of {np.count_nonzero(~last)} fixes at equal times the last counts")
         time_us, row = time_us[last], row[last]
     xy = np.stack([x, y], 1)[row]
-    return PositionLog(path, layout, local.first_day, time_us, xy, heading[row], tuple(notes))
+    return PositionLog(path, layout, first_day, time_us, xy, heading[row], tuple(notes))
 
 
 class Stamps(NamedTuple):
@@ -307,36 +281,107 @@ def columns_of(
     return named
 
 
-def _of_tag(
-    table: pa.Table, column: str | None, tag: str | None, path: Path
-) -> tuple[pa.Table, I64, list[str]]:
-    """Return the rows of one tag, their lines in the file, and notes."""
-    line = np.arange(table.num_rows) + (2 if path.suffix.lower() == ".csv" else 1)
-    if not table.num_rows:
-        raise LogError(f"{path} holds no position")
-    if column is None:
+@dataclass(frozen=True)
+class LogTable:
+    """A table of a log.
+
+    Attributes:
+        path: Its file.
+        rows: Its rows.
+        named: The name of the column of each quantity, such as time or x.
+        line: The line of each row in the file, int64 (n,).
+    """
+
+    path: Path
+    rows: pa.Table
+    named: Mapping[str, str]
+    line: I64
+
+    @classmethod
+    def read(
+        cls,
+        path: Path,
+        columns: Mapping[str, str],
+        usual: Mapping[str, Sequence[str]] = NAMES,
+        needed: Sequence[str] = ("time", "x", "y"),
+    ) -> Self:
+        """Read a file; see `columns_of`.
+
+        Raises:
+            LogError: It can't be read, or lacks a column.
+        """
+        rows = read_table(path)
+        line = np.arange(rows.num_rows) + (2 if path.suffix.lower() == ".csv" else 1)
+        return cls(path, rows, columns_of(rows, columns, path, usual, needed), line)
+
+    def column(self, quantity: str) -> pa.ChunkedArray:
+        """Return the column of a quantity."""
+        return self.rows[self.named[quantity]]
+
+    def texts(self, quantity: str) -> pa.ChunkedArray:
+        """Return the column of a quantity as texts."""
+        return pc.cast(self.column(quantity), pa.string())
+
+    def numbers(self, quantity: str) -> F64:
+        """Return a column of numbers, float64 (n,); NaN where it is empty."""
+        return numbers_of(self.rows, self.named[quantity], self.path, self.line)
+
+    def headings(self) -> F64:
+        """Return the headings [rad], float64 (n,); NaN where there is none."""
+        if "heading" not in self.named:
+            return np.full(len(self.line), np.nan)
+        heading = self.numbers("heading")
+        return heading / 180 * np.pi if self.named["heading"].endswith("_deg") else heading
+
+    def stamps(self) -> Stamps:
+        """Return the times of the rows."""
+        return stamps_of(self.column("time"), self.path, self.line)
+
+    def where(self, is_kept: Bool) -> Self:
+        """Return the table with some of its rows: bool (n,)."""
+        return replace(self, rows=self.rows.filter(pa.array(is_kept)), line=self.line[is_kept])
+
+    def of(self, quantity: str, name: str | None) -> Self:
+        """Return the rows of one of several names in a column; None: of the only one.
+
+        Raises:
+            LogError: There is no such name, or there are several.
+        """
+        texts = self.texts(quantity)
+        known = sorted(str(text) for text in pc.unique(texts).to_pylist())
+        listed = ", ".join(known[:10])
+        if name is None and len(known) > 1:
+            raise LogError(
+                f"{self.path} holds {len(known)} {quantity}s: {listed}: select one by {quantity!r}"
+            )
+        if name is not None and name not in known:
+            near = did_you_mean(name, known)
+            raise LogError(f"{self.path} has no {quantity} {name!r}{near} There are: {listed}")
+        if len(known) <= 1:
+            return self
+        is_named = pc.fill_null(pc.equal(texts, name), False).combine_chunks()
+        return self.where(is_named.to_numpy(zero_copy_only=False))
+
+
+def fixes_in(table: LogTable, notes: Sequence[str] = ()) -> RawFixes:
+    """Return the fixes that a table has."""
+    x, y = table.numbers("x"), table.numbers("y")
+    return RawFixes(table.stamps(), x, y, table.headings(), list(notes))
+
+
+def _of_tag(table: LogTable, tag: str | None) -> tuple[LogTable, list[str]]:
+    """Return the rows of one tag, and notes."""
+    if not table.rows.num_rows:
+        raise LogError(f"{table.path} holds no position")
+    if "id" not in table.named:
         if tag is not None:
-            raise LogError(f"{path} has no column of ids: leave out 'id', or name it by columns")
-        return table, line, []
-    tags = pc.cast(table[column], pa.string())
-    known = sorted(str(name) for name in pc.unique(tags).to_pylist())
-    if tag is None and len(known) > 1:
-        raise LogError(
-            f"{path} holds {len(known)} ids: {', '.join(known[:10])}: select one by 'id'"
-        )
-    name = known[0] if tag is None else tag
-    if name not in known:
-        raise LogError(
-            f"{path} has no id {name!r}{did_you_mean(name, known)}"
-            f" There are: {', '.join(known[:10])}"
-        )
-    is_tag = np.ones(len(line), bool)
-    if known != ["None"]:
-        equal = pc.fill_null(pc.equal(tags, name), False).combine_chunks()
-        is_tag = equal.to_numpy(zero_copy_only=False)
-    others = len(line) - int(np.count_nonzero(is_tag))
-    notes = [f"{others} fixes of other ids were left out"] if others else []
-    return table.filter(pa.array(is_tag)), line[is_tag], notes
+            raise LogError(
+                f"{table.path} has no column of ids: leave out 'id', or name it by columns"
+            )
+        return table, []
+    of_tag = table.of("id", tag)
+    others = len(table.line) - len(of_tag.line)
+    return of_tag, [f"{others} fixes of other ids were left out"] if others else []
 
 
 def numbers_of(table: pa.Table, name: str, path: Path, line: I64) -> F64:
@@ -359,24 +404,22 @@ def numbers_of(table: pa.Table, name: str, path: Path, line: I64) -> F64:
     return numbers.to_numpy().astype(np.float64)
 
 
-def times_of(column: pa.ChunkedArray, path: Path, line: I64) -> tuple[I64, bool, bool]:
-    """Return times [us], whether they count from 1970, and whether they have a time zone.
-
-    Times that don't count from 1970 count from the beginning of the log; those with a zone are UTC.
-    """
+def stamps_of(column: pa.ChunkedArray, path: Path, line: I64) -> Stamps:
+    """Return the times in a column; those with a zone are UTC."""
     if column.null_count:
         empty = np.flatnonzero(pc.is_null(column).combine_chunks().to_numpy(zero_copy_only=False))
         raise LogError(f"{path}, line {line[empty[0]]}: it has no time")
     kind: Any = column.type
     if pa.types.is_string(kind) or pa.types.is_large_string(kind):
         values, has_zone = _parse_texts(column.to_pylist(), path, line)
-        return values, True, has_zone
+        return Stamps(values, line, True, has_zone)
     if pa.types.is_timestamp(kind):
         values = pc.cast(column, pa.timestamp("us", kind.tz), safe=False)
-        return pc.cast(values, pa.int64()).to_numpy(), True, kind.tz is not None
+        time_us = pc.cast(values, pa.int64()).to_numpy()
+        return Stamps(time_us, line, True, kind.tz is not None)
     if pa.types.is_integer(kind) or pa.types.is_floating(kind):
         values, has_date = _scale_numbers(column.to_numpy(), path, line)
-        return values, has_date, has_date
+        return Stamps(values, line, has_date, has_date)
     raise LogError(f"{path}: expected times as text, timestamps or numbers, got {kind}")
 
 

@@ -243,38 +243,26 @@ def _edited(variant: Variant, **sections: Any) -> Variant | None:
         return None
 
 
-@dataclass(frozen=True)
-class FailureFolder:
-    """The folder for the artifacts of a failing test.
-
-    Attributes:
-        parent: The folder for all tests.
-        test: The node id of the test in pytest.
-    """
-
-    parent: Path
-    test: str
-
-    def create(self) -> Path:
-        """Return the test's own folder, without the artifacts of earlier failures."""
-        name = re.sub(r"[^\w.-]+", "-", self.test).strip("-")
-        folder = self.parent / name
-        shutil.rmtree(folder, ignore_errors=True)
-        folder.mkdir(parents=True, exist_ok=True)
-        return folder
+def failure_folder(parent: Path, test: str) -> Path:
+    """Return a folder for the artifacts of a failing test, without those of earlier failures."""
+    folder = parent / re.sub(r"[^\w.-]+", "-", test).strip("-")
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder
 
 
-def explain(result: ClaimResult, body: Body, place: FailureFolder, tries: int) -> str:
+def explain(result: ClaimResult, body: Body, folder: Path, test: str, tries: int) -> str:
     """Store a failing run, and the smallest similar one, and return a report.
 
     Args:
         result: The result of a claim that was refused.
         body: The test.
-        place: Where to store the runs.
+        folder: The folder of the runs of all tests.
+        test: The test, as pytest names it.
         tries: Largest number of runs to make it smaller.
     """
-    folder, trial = place.create(), result.shown
-    command = f"pytest {shlex.quote(place.test)} --fleet2d-seed {trial.variant.seed}"
+    folder, trial = failure_folder(folder, test), result.shown
+    command = f"pytest {shlex.quote(test)} --fleet2d-seed {trial.variant.seed}"
     lines = [result.text, *_by_expectation(result), ""]
     lines += describe_trial(trial, body, folder, tries, command)
     text = "\n".join(lines)

@@ -71,7 +71,7 @@ def pytest_pyfunc_call(pyfuncitem: pytest.Function) -> bool | None:
             pytest.fail("a test with `trial` needs @fleet2d.testing.trial(…)", pytrace=False)
         return None
     from fleet2d.errors import Fleet2DError
-    from fleet2d.testing.failures import FailureFolder, explain
+    from fleet2d.testing.failures import explain
     from fleet2d.testing.trials import run_claim
 
     # pytest shows the lines of the test, but not those of its call to `fail`.
@@ -89,8 +89,7 @@ def pytest_pyfunc_call(pyfuncitem: pytest.Function) -> bool | None:
     pyfuncitem.user_properties.append((PROPERTY, result.text))
     if not result.holds:
         tries = pyfuncitem.config.getoption("--fleet2d-shrink")
-        folder = FailureFolder(_folder(pyfuncitem), pyfuncitem.nodeid)
-        text = explain(result, body, folder, tries)
+        text = explain(result, body, _folder(pyfuncitem), pyfuncitem.nodeid, tries)
         failure = result.shown.error
         if failure is None:
             pytest.fail(text, pytrace=False)

@@ -48,24 +48,6 @@ class LiveEngine:
         self._called: set[str] = set()
         self._recorded = len(simulation.interventions)
 
-    @property
-    def step(self) -> int:
-        """The next step to simulate."""
-        return self.simulation.step
-
-    @property
-    def done(self) -> bool:
-        """Whether all steps are simulated."""
-        return self.simulation.done
-
-    def advance(self, steps: int) -> None:
-        """Simulate a number of steps."""
-        self.simulation.advance(steps)
-
-    def finish(self) -> Run:
-        """Close the run."""
-        return self.simulation.finish()
-
     def bodies(self) -> list[LiveBody]:
         """Return the poses of all users and robots, and their paths ahead."""
         return [self._body(name, actor) for name, actor in self.simulation.actors.items()]
@@ -88,7 +70,7 @@ class LiveEngine:
         """Yield the corners of the path ahead: time [us], x and y [lattice]."""
         if not isinstance(actor.motion, Track):
             return
-        now_us = self.step * self.simulation.clock.step_us
+        now_us = self.simulation.step * self.simulation.clock.step_us
         track = actor.motion.breakpoints
         time = np.asarray(track.time)
         first = int(np.searchsorted(time, now_us, side="right"))
@@ -125,7 +107,7 @@ class LiveEngine:
         """Return the events since the last call."""
         users = self.simulation.scenario.users
         recorded = self.simulation.events(self._events_until)
-        self._events_until = self.step
+        self._events_until = self.simulation.step
         return [
             LiveEvent(
                 step=event.step,
@@ -291,7 +273,7 @@ class LiveRun:
     def _run_loop(self) -> None:
         """Advance the simulation and apply orders until the end; this is the thread."""
         try:
-            while not self._is_ending and not self.engine.done:
+            while not self._is_ending and not self.engine.simulation.done:
                 self._apply_orders(IDLE_S if self._paused else 0.0)
                 if not self._paused:
                     self._advance()
@@ -299,7 +281,7 @@ class LiveRun:
             self.failure = error
             self._frame = {**self._frame, "message": f"the simulation failed: {error}"}
         finally:
-            self.run = self.engine.finish()
+            self.run = self.engine.simulation.finish()
             served_as = self._serve(self.run) if self._serve is not None else -1
             self._frame = {
                 **self._frame,
@@ -312,10 +294,10 @@ class LiveRun:
 
     def _advance(self) -> None:
         """Advance the simulation by a frame, send the frame, and wait as the speed requires."""
-        start_s, step = time.perf_counter(), self.engine.step
-        self.engine.advance(self._steps_per_frame())
+        start_s, step = time.perf_counter(), self.engine.simulation.step
+        self.engine.simulation.advance(self._steps_per_frame())
         self._send(self._state())
-        simulated_s = (self.engine.step - step) * self._clock.step_us / 1e6
+        simulated_s = (self.engine.simulation.step - step) * self._clock.step_us / 1e6
         if self._speed:
             wait_s = simulated_s / self._speed - (time.perf_counter() - start_s)
             if wait_s > 0:
@@ -359,11 +341,11 @@ class LiveRun:
             if not 0 <= order["value"] <= 1e6:
                 raise InputError("a speed is 0 (as fast as it goes) to 1,000,000 times real time")
             self._speed = order["value"]
-        elif self.engine.done:
+        elif self.engine.simulation.done:
             raise InputError(OVER)
         elif action == "step":
             self._paused = True
-            self.engine.advance(max(1, min(DAY_S, round(order["value"]))))
+            self.engine.simulation.advance(max(1, min(DAY_S, round(order["value"]))))
         else:
             self.engine.apply(order)
 
@@ -372,9 +354,9 @@ class LiveRun:
         engine = self.engine
         records = engine.interventions()
         self._frame = LiveFrame(
-            step=engine.step,
+            step=engine.simulation.step,
             paused=self._paused,
-            done=engine.done,
+            done=engine.simulation.done,
             speed=self._speed,
             achieved=self._achieved,
             bodies=engine.bodies(),
