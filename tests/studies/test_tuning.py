@@ -70,7 +70,7 @@ def tuned(tmp_path: Path, executor: Any = None, **keys: Any) -> TuneResult:
 def test_it_finds_what_is_better_on_homes_it_has_not_seen(tmp_path: Path) -> None:
     result = tuned(tmp_path)
     assert 0.2 <= result.settings["tuned"][SPEED] <= 1.0
-    (row,) = result.held_out.paired("distance.astro", {"setting": "as it was"}).to_dicts()
+    (row,) = result.held_out.paired("distance.astro", {"setting": "base"}).to_dicts()
     assert row["difference"] > 0
     assert {0.15} == set(result.held_out.variants["radius"])
 
@@ -185,10 +185,10 @@ def test_trials_are_the_same_with_any_number_of_workers(tmp_path: Path) -> None:
 
 
 CHANGES: dict[str, tuple[dict[str, Any], dict[str, Any], str]] = {
-    "held_out": ({"held_out": {"radius": [0.1]}}, {}, "of the training, what is held out changed"),
+    "held_out": ({"held_out": {"radius": [0.1]}}, {}, "the held-out part changed"),
     "homes": ({}, {"axes": {"radius": {"key": RADIUS, "values": [0.1, 0.12, 0.15]}}}, "homes"),
     "base": ({}, {"base": base("3 min", robots=PATROL)}, "base scenario"),
-    "replicates": ({}, {"replicates": 1}, "seeds of the training"),
+    "replicates": ({}, {"replicates": 1}, "seeds"),
     "search": ({"search": {"speed": {"key": SPEED, "low": 0.2, "high": 0.9}}}, {}, "parameters"),
     "objectives": ({"objectives": {"distance.ana": "maximize"}}, {}, "the objectives changed"),
     "direction": ({"objectives": {"distance.astro": "minimize"}}, {}, "the objectives changed"),

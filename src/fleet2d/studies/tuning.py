@@ -48,7 +48,7 @@ if TYPE_CHECKING:
 
 SEARCH, TRIALS, HELD_OUT = "search.json", "trials.log", "held_out"
 INPUTS = "input files"
-SETTING, BEFORE, TUNED = "setting", "as it was", "tuned"
+SETTING, BEFORE, TUNED = "setting", "base", "tuned"
 MAX_JUDGED_SETTINGS = 5  # settings to judge after a search for several objectives
 
 
@@ -93,8 +93,8 @@ def search_identity(plan: StudyPlan, settings: TuneSettings, storage: str) -> di
         scenarios[matches(settings.held_out, plan.parameters(variant))].append(variant.scenario)
     content = {key: content_hash(value) for key, value in settings.model_dump(mode="json").items()}
     return {
-        "the homes, base scenario or seeds of the training": content_hash(sorted(scenarios[False])),
-        "what is held out": content_hash(sorted(scenarios[True])),
+        "the training (homes, base scenario or seeds)": content_hash(sorted(scenarios[False])),
+        "the held-out part": content_hash(sorted(scenarios[True])),
         "the searched parameters": content["search"],
         "the objectives": content["objectives"],
         "prune_at": content["prune_at"],
@@ -240,9 +240,9 @@ def _check_identity(
         changes = ["the version of Fleet2D"]
     if changes and changed is None:
         raise RunDirectoryError(
-            f"{storage.location} holds another search: {', '.join(changes)} changed, and what it"
-            " found can't be judged as a result of this one. --changed redo starts over and keeps"
-            " the old trials in the storage under a name of their own; or choose another --out"
+            f"{storage.location} holds another search, whose trials can't count for this one:"
+            f" {' and '.join(changes)} changed. --changed redo starts over and keeps the old trials"
+            " in the storage under a name of their own; or choose another --out"
         )
     storage.write(SEARCH, json.dumps(identity, indent=1).encode())
 
