@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 COPY_BYTES = 1 << 22
 BATCH_ROWS = 5_000  # of a table that is read in parts
+GROUP_ROWS = 50_000  # most of a table that are written together
+GROUP_SHARE = 0.05  # of the rows before them
 # What libraries raise on damaged files; pyarrow's errors are subclasses of these.
 DAMAGE = (
     ArithmeticError, AttributeError, LookupError, MemoryError, NotImplementedError, OSError,
@@ -258,13 +260,11 @@ class Storage:
             names = file.schema_arrow.names if columns is None else list(columns)
             if missing := [name for name in names if name not in file.schema_arrow.names]:
                 raise ValueError(f"it has no columns {', '.join(missing)}")
-            batches = file.iter_batches(BATCH_ROWS, columns=names, use_threads=False)
-            first = next(batches, None)
-            if first is None:
+            if not file.metadata.num_rows:
                 yield file.read(names)
-                return
-            for batch in itertools.chain([first], batches):
-                yield pa.Table.from_batches([batch])
+            for group in range(file.num_row_groups):  # over all at once it keeps the whole file
+                for batch in file.iter_batches(BATCH_ROWS, [group], names, use_threads=False):
+                    yield pa.Table.from_batches([batch])
 
     def write_batches(self, name: str, tables: "Iterator[pa.Table]", scratch: Path) -> None:
         """Write tables of one schema as a Parquet file, without having all of them in memory.
@@ -277,14 +277,23 @@ class Storage:
         Raises:
             ArtifactError: It can't be written.
         """
+        import pyarrow as pa
         import pyarrow.parquet as pq
 
         local, first = scratch / f"{PurePosixPath(name).name}{PARTIAL}", next(tables)
+        group, rows, written = list[pa.Table](), 0, 0
         try:
             scratch.mkdir(parents=True, exist_ok=True)
             with pq.ParquetWriter(local, first.schema, compression="zstd") as file:
                 for table in itertools.chain([first], tables):
-                    file.write_table(table)
+                    group.append(table)
+                    rows += table.num_rows
+                    # Each column of a group takes 5 kB of memory until the file is finished.
+                    if rows >= min(GROUP_SHARE * written, GROUP_ROWS):
+                        file.write_table(pa.concat_tables(group))
+                        group, rows, written = [], 0, written + rows
+                if group:
+                    file.write_table(pa.concat_tables(group))
         except OSError as error:
             raise write_error(self.location, error) from error
         self.publish(local, name)
