@@ -15,7 +15,7 @@ from fleet2d.configuration.problems import suggest
 from fleet2d.configuration.units import folder_of
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.formats.files import YAML, read_document, read_yaml
-from fleet2d.floorplan.formats.foreign import foreign_document
+from fleet2d.floorplan.formats.foreign import foreign_document, foreign_file
 from fleet2d.floorplan.formats.native import (
     FORMAT,
     bundled_names,
@@ -109,12 +109,21 @@ def is_floorplan(plan: str | Path) -> bool:
     if path.suffix.lower() not in YAML:
         is_home = str(plan) in bundled_names() or SYNTHETIC.fullmatch(str(plan)) is not None
         is_known = path.suffix.lower() in (*JSON, *IMAGES) or format_by_suffix(path) is not None
-        return is_home or is_known
+        return is_home or is_known or _is_foreign(path)
     try:
         content = read_yaml(path)
     except FloorPlanError:
         return False
     return _format_of(content) is not None or "image" in content
+
+
+def _is_foreign(path: Path) -> bool:
+    """Return whether a file is one of another program, which may have had a plan in it."""
+    try:
+        with path.open("rb") as file:
+            return foreign_file(file.read(65536)) is not None
+    except OSError:
+        return False
 
 
 def format_of_file(path: Path) -> str:

@@ -34,6 +34,8 @@ MOST = 0.8
 TRIED_M, FEWEST_DOORS, LIKELY_FACTOR = (0.0075, 0.011, 0.016, 0.024, 0.036, 0.005), 3, 1.25
 # Share of what is dark that is lines if there are any, and of the enclosed space that is the home.
 LINES_SHARE, WHOLE = 0.02, 0.6
+# Side of a picture below which it is no home's [m].
+SMALLEST_M = 1.0
 # Pixels across the widest line, at least, for lines to be told from walls.
 LINE_PIXELS = 2.3
 
@@ -114,8 +116,8 @@ class Image(PictureSource):
     ) -> tuple[Bool, Bool, list[str]] | None:
         """Return what walls enclose, the walls, and notes, if walls are told from thin lines.
 
-        Else None: pixels are too large for that, nothing is thinner than `line_width`, or thicker
-        walls don't enclose a home as large.
+        Else None: pixels are too large for that or the picture too small, nothing is thinner than
+        `line_width`, or thicker walls don't enclose a home as large.
 
         Args:
             picture: The drawing.
@@ -123,7 +125,7 @@ class Image(PictureSource):
             enclosed: What all that is dark encloses, of the same shape.
         """
         pixel, dark = self.pixel, ~light
-        if pixel > self.line_width / LINE_PIXELS:
+        if pixel > self.line_width / LINE_PIXELS or min(dark.shape) * pixel < SMALLEST_M:
             return None
         home = _largest_part(enclosed)
         for what, walls in wall_candidates(picture, dark, self.line_width, pixel):

@@ -1,6 +1,8 @@
 """Files of other programs, recognized by their content, and what to convert them to."""
 
 import re
+import zlib
+from contextlib import suppress
 from typing import Any
 
 _VECTOR = "export the floor as DXF or SVG, or draw its walls in a picture"
@@ -11,6 +13,10 @@ _BAG = "give it the ending .bag, .mcap or .db3; {type: bag, path: …} reads its
 _MAP = "export one floor of it as GeoJSON"
 _UNPACK = "unpack it, and name the floor plan in it"
 _ROBOT = "save the map by map_saver as PGM and YAML"
+_SCAN = "of an Apple RoomPlan scan, export the JSON"
+_BUILDING = "export the floor as IFC, DXF or SVG"
+_VACUUM = "save the map by Valetudo as JSON, or as a picture"
+_BY_HAND = "write each room as a rectangle: see draw-your-flat.md in the docs"
 
 # The first bytes of a file, what it is, and what to do.
 _BEGINNINGS: tuple[tuple[bytes, str, str], ...] = (
@@ -26,8 +32,8 @@ _BEGINNINGS: tuple[tuple[bytes, str, str], ...] = (
     (b"\xff\xfe\xff\x0eS\0k\0e\0t", "a SketchUp model", _MESH),
     (b"BLENDER", "a Blender scene", _MESH),
     (b"glTF", "a glTF model", _MESH),
-    (b"PXR-USDC", "a USD model", "of an Apple RoomPlan scan, export the JSON"),
-    (b"#usda", "a USD model", "of an Apple RoomPlan scan, export the JSON"),
+    (b"PXR-USDC", "a USD model", _SCAN),
+    (b"#usda", "a USD model", _SCAN),
     (b"ply\n", "a PLY model", _POINTS),
     (b"solid ", "an STL model", _MESH),
     (b"# .PCD", "a point cloud (PCD)", _POINTS),
@@ -44,6 +50,23 @@ _BEGINNINGS: tuple[tuple[bytes, str, str], ...] = (
     (b"\x93NUMPY", "a NumPy array", "save it as a picture"),
     (b"MATLAB", "a MATLAB file", "save the grid as a picture"),
     (b"v ", "an OBJ model", _MESH),
+    (b"Kaydara FBX", "an FBX model", _MESH),
+    (b"\xd0\xcf\x11\xe0", "a model of Revit or a document of Office", _BUILDING),
+    (b"\xfd7zXZ\0", "a packed file (XZ)", _UNPACK),
+    (b"rr\x14\0", "a map of a Roborock or Xiaomi vacuum", _VACUUM),
+    (b"\xdb\x01\xf5\x5b\x7b\x1f\x1d\x7b", "a state of Cartographer", _ROBOT),
+    (b"\x16\0\0\0\0\0\0\0serialization::archive", "a pose graph of slam_toolbox", _ROBOT),
+)
+# What the name of a file in a ZIP file contains, what the whole is, and what to do.
+_MEMBERS = (
+    (b"Home", "a home of Sweet Home 3D", "unpack it as a ZIP file, and name the Home.xml in it"),
+    (b"xl/", "a spreadsheet", _BY_HAND),
+    (b"word/", "a text document", _PICTURE),
+    (b"visio/", "a drawing of Visio", "export it as SVG or DXF"),
+    (b"3D/3dmodel", "a 3MF model", _MESH),
+    (b".usd", "a USD model (USDZ)", _SCAN),
+    (b".ifc", "a packed IFC model", _UNPACK),
+    (b".kml", "KML", _MAP),
 )
 # What a text begins with, after white space and an XML declaration; a regular expression.
 _TEXTS = (
@@ -53,7 +76,14 @@ _TEXTS = (
     (r"<osm", "OpenStreetMap data", _MAP),
     (r"<(\w+:)?(CityModel|FeatureCollection)", "GML", _MAP),
     (r"<html|<!DOCTYPE html", "a web page", "download the file itself"),
+    (r"<COLLADA", "a COLLADA model", _MESH),
+    (r"<(sdf|world|robot)\b", "a model of Gazebo or URDF", _ROBOT),
     (r"<", "XML", _VECTOR),
+    (r"#VRML", "a VRML model", _MESH),
+    (r"((#|mtllib |o |g )[^\n]*\n)+v\s", "an OBJ model", _MESH),
+    (r"VERSION [\d.]+\s+FIELDS", "a point cloud (PCD)", _POINTS),
+    (r"define \w+ ", "a world of Stage", "name its bitmap, and give its resolution"),
+    (r"[^\n{\[]*[,;\t][^\n]*\n[^\n{\[]*[,;\t]", "a table (CSV)", _BY_HAND),
     (r"\s*0\s*\n\s*SECTION", "a DXF drawing", "name it with the ending .dxf"),
 )
 # Keys of a JSON file, what it is, and what to do.
@@ -87,6 +117,11 @@ def foreign_file(content: bytes) -> str | None:
         >>> foreign_file(b"{}") is None
         True
     """
+    if content.startswith(b"\x1f\x8b"):
+        with suppress(zlib.error):
+            inner = foreign_file(zlib.decompressobj(31).decompress(content, 65536))
+            if inner is not None:
+                return f"is packed by gzip: unpacked it {inner}"
     for beginning, kind, advice in _BEGINNINGS:
         if content.startswith(beginning):
             return _sentence(kind, advice)
@@ -95,10 +130,9 @@ def foreign_file(content: bytes) -> str | None:
     if content[4:8] == b"ftyp":
         return _sentence("a HEIC picture or a film", _PICTURE)
     if content.startswith(b"PK\x03\x04"):
-        if b"Home.xml" in content or b"Home" in content[30:34]:
-            advice = "unpack it as a ZIP file, and name the Home.xml in it"
-            return _sentence("a home of Sweet Home 3D", advice)
-        return _sentence("a packed file (ZIP)", _UNPACK)
+        names = b"\n".join(re.findall(rb"PK\x03\x04.{26}([ -~]{1,200})", content, re.DOTALL))
+        known = ((kind, advice) for part, kind, advice in _MEMBERS if part in names)
+        return _sentence(*next(known, ("a packed file (ZIP)", _UNPACK)))
     text = content.decode("utf-8-sig", "replace")
     text = re.sub(r"\A(\s|<\?[^>]*\?>|<!--.*?-->)*", "", text, flags=re.DOTALL)
     for pattern, kind, advice in _TEXTS:
