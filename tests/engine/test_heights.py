@@ -1,5 +1,6 @@
 """Heights of cameras, bodies and furniture: in runs, for every span and by every exact method."""
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -60,6 +61,22 @@ def test_a_high_camera_looks_over_furniture_that_hides_from_a_low_one(
     camera_m: float, expected: dict[str, list[int]]
 ) -> None:
     assert expected == seen(behind(SOFA, camera_m, x=4.7, height=0.3))
+
+
+@pytest.mark.parametrize(("height_cm", "expected"), [(80, {}), (15, {"ana": ALL})])
+def test_a_sofa_of_sweet_home_3d_hides_as_high_as_its_file_says(
+    tmp_path: Path, height_cm: int, expected: dict[str, list[int]]
+) -> None:
+    """Ana lies behind it; its back is to the right."""
+    home = tmp_path / "Home.xml"
+    home.write_text(
+        '<home><room name="Living room"><point x="0" y="0"/><point x="600" y="0"/>'
+        '<point x="600" y="-600"/><point x="0" y="-600"/></room><pieceOfFurniture name="Sofa"'
+        f' x="260" y="-330" width="120" depth="90" height="{height_cm}" angle="1.5707963"/></home>'
+    )
+    content = behind(None) | {"floorplan": {"type": "sweethome", "path": str(home)}}
+
+    assert expected == seen({**content, "script": [LIES]})
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,14 @@ from shapely import Polygon
 
 from fleet2d.configuration.problems import suggest
 from fleet2d.errors import FloorPlanError
-from fleet2d.floorplan.placed_objects import Blocks, PlacedObject, Point, Posture, UsePlace
+from fleet2d.floorplan.placed_objects import (
+    MAX_HEIGHT_M,
+    Blocks,
+    PlacedObject,
+    Point,
+    Posture,
+    UsePlace,
+)
 from fleet2d.kernels import QUARTER, TURN, UNIT, cosine, in_radians, sine
 
 Range = tuple[float, float]
@@ -139,6 +146,25 @@ def furniture_type(name: str) -> Furniture:
             f"there is no furniture of type {name!r}{suggest(name, sorted(FURNITURE))}"
         )
     return FURNITURE[name]
+
+
+def measured_height(kind: str, height_m: float) -> float | None:
+    """Return the height of a piece of furniture for `sight.heights` by what a file measures.
+
+    Args:
+        kind: Its type, in the catalogue or not.
+        height_m: How high it is [m].
+
+    Returns:
+        The height, rounded to millimetres; None for what its type says: it stands on legs, whatever
+        its height, or the file says nothing.
+
+    Example:
+        >>> measured_height("sofa", 0.78), measured_height("desk", 0.74), measured_height("bed", 0)
+        (0.78, None, None)
+    """
+    hides = kind not in FURNITURE or FURNITURE[kind].height > 0
+    return min(round(height_m, 3), MAX_HEIGHT_M) if hides and height_m > 0 else None
 
 
 def stand_furniture(

@@ -15,6 +15,9 @@ from fleet2d.errors import FloorPlanError, InputError
 from fleet2d.floorplan.lattice import Lattice
 from fleet2d.kernels import F64, TURN, UNIT, cosine, in_radians, sine
 
+# No piece of furniture is higher [m].
+MAX_HEIGHT_M = 8.0
+
 
 class Named(Protocol):
     """Something with a name."""

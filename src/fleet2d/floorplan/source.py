@@ -27,7 +27,13 @@ from fleet2d.floorplan.costmap import CostmapSettings
 from fleet2d.floorplan.furniture import FURNITURE, stand_furniture
 from fleet2d.floorplan.lattice import MAX_CELL_M, MIN_CELL_M
 from fleet2d.floorplan.layers import LayerSettings, check_layers
-from fleet2d.floorplan.placed_objects import Blocks, PlacedObject, Portal, number_objects
+from fleet2d.floorplan.placed_objects import (
+    MAX_HEIGHT_M,
+    Blocks,
+    PlacedObject,
+    Portal,
+    number_objects,
+)
 from fleet2d.floorplan.plan import Cache, FloorPlan
 from fleet2d.floorplan.rooms.doorways import DoorLine, doorway_segments, name_doorways
 from fleet2d.floorplan.rooms.room import (
@@ -244,7 +250,7 @@ class FurniturePiece(Settings):
     size: tuple[PositiveLength, PositiveLength] | None = Field(default=None, examples=[[1.6, 2.0]])
     name: str | None = Field(default=None, min_length=1)
     blocks: Blocks | None = None
-    height: Length | None = Field(default=None, ge=0, le=8)
+    height: Length | None = Field(default=None, ge=0, le=MAX_HEIGHT_M)
 
     @model_validator(mode="after")
     def _check_type(self) -> Self:

@@ -69,6 +69,42 @@ def test_furniture_has_the_names_of_the_catalogue_and_its_place(tmp_path: Path) 
 
 
 @pytest.mark.parametrize(
+    ("category", "high_m", "begins_m", "expected"),
+    [
+        ("sofa", 0.8, 0.0, 0.8),
+        ("table", 0.75, 0.0, None),
+        ("storage", 0.9, 0.0, 0.9),
+        ("storage", 0.7, 1.5, 0.0),
+        ("television", 0.7, 0.1, 0.8),
+        ("fireplace", 1.2, 0.0, 1.2),
+    ],
+    ids=["measured", "on legs", "low", "on the wall", "on a low stand", "of no known type"],
+)
+def test_furniture_is_as_high_above_the_floor_as_the_scan_says(
+    tmp_path: Path, category: str, high_m: float, begins_m: float, expected: float | None
+) -> None:
+    piece = surface(6, 3, 1.6, depth=0.5, category={category: {}})
+    piece["dimensions"][1], piece["transform"][13] = high_m, begins_m + high_m / 2
+    raised = {**scan(), "objects": [piece]}
+    for surfaces in (raised["walls"], raised["objects"]):  # a scan's own zero is not at the floor
+        for each in surfaces:
+            each["transform"][13] -= 1.3
+
+    plan = load_floorplan(write(tmp_path, raised))
+
+    assert expected == pytest.approx(plan.objects[0].height)
+
+
+@pytest.mark.parametrize("turn_deg", [0, 33])
+def test_the_front_of_furniture_is_where_z_of_its_axes_points(
+    tmp_path: Path, turn_deg: float
+) -> None:
+    plan = load_floorplan(write(tmp_path, scan(turn_deg)))
+
+    assert 1.5 * math.pi == pytest.approx(plan.objects[0].heading, abs=1e-3)
+
+
+@pytest.mark.parametrize(
     ("change", "message"),
     [
         ({"walls": 3}, "walls is 3"),

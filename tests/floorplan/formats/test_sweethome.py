@@ -1,3 +1,4 @@
+import math
 from pathlib import Path
 
 import pytest
@@ -47,6 +48,42 @@ def test_rooms_walls_doors_and_furniture_become_a_home(tmp_path: Path) -> None:
     assert [(0, 1)] == [tuple(sorted(door.rooms)) for door in plan.doorways]
     assert ["bed"] == [thing.type for thing in plan.objects]
     assert (6.3, -3.0, 7.7, -1.0) == pytest.approx(plan.objects[0].footprint.bounds)
+
+
+def piece(name: str, height: float, *, elevation: float = 0, angle: float = 0) -> str:
+    return (
+        f'<pieceOfFurniture name="{name}" x="600" y="200" width="200" depth="90"'
+        f' height="{height}" elevation="{elevation}" angle="{angle}"/>'
+    )
+
+
+@pytest.mark.parametrize(
+    ("element", "height"),
+    [
+        (piece("Sofa", 78.2), 0.782),
+        (piece("Sofa", 78, elevation=12), 0.9),
+        (piece("Table", 74), None),
+        (piece("Fireplace", 110), 1.1),
+        (piece("Sofa", 9000), 8.0),
+        (BED, None),
+    ],
+    ids=["measured", "on a podium", "on legs", "of no known type", "damaged", "none in the file"],
+)
+def test_furniture_is_as_high_as_the_file_says(
+    tmp_path: Path, element: str, height: float | None
+) -> None:
+    plan = load_floorplan(write(tmp_path, WALLS, ROOMS, element))
+
+    assert [height] == [thing.height for thing in plan.objects]
+
+
+@pytest.mark.parametrize(("angle", "heading"), [(0, 1.5 * math.pi), (math.pi / 2, math.pi)])
+def test_the_front_of_furniture_is_its_lower_side_turned_clockwise(
+    tmp_path: Path, angle: float, heading: float
+) -> None:
+    plan = load_floorplan(write(tmp_path, WALLS, ROOMS, piece("Sofa", 80, angle=angle)))
+
+    assert heading == pytest.approx(plan.objects[0].heading, abs=1e-5)
 
 
 def test_walls_alone_enclose_the_home(tmp_path: Path) -> None:

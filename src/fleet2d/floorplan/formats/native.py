@@ -47,7 +47,14 @@ from fleet2d.floorplan.formats.files import (
     validate,
 )
 from fleet2d.floorplan.lattice import UNITS_PER_CELL
-from fleet2d.floorplan.placed_objects import Blocks, PlacedObject, Portal, Posture, UsePlace
+from fleet2d.floorplan.placed_objects import (
+    MAX_HEIGHT_M,
+    Blocks,
+    PlacedObject,
+    Portal,
+    Posture,
+    UsePlace,
+)
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.rooms.doorways import DoorLine
 from fleet2d.floorplan.rooms.room import MAX_GAP_M2, UNKNOWN, LabelledRegion, room_type
@@ -212,7 +219,7 @@ class ObjectUse(FileModel):
 
     blocks: Blocks = "path"
     heading: Coordinate = 0.0
-    height: Annotated[float, Field(ge=0, le=8)] | None = None
+    height: Annotated[float, Field(ge=0, le=MAX_HEIGHT_M)] | None = None
     uses: Listed[UseEntry] = Field(default_factory=list)
 
     def use_places(self) -> tuple[UsePlace, ...]:

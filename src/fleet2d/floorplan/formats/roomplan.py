@@ -1,5 +1,6 @@
 """Room scans of Apple's RoomPlan, as its JSON has them: walls, doors, openings and furniture."""
 
+import math
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
@@ -12,6 +13,7 @@ from fleet2d.configuration.components import register
 from fleet2d.configuration.units import InputPath, Length
 from fleet2d.floorplan.formats.features import Draft, Feature
 from fleet2d.floorplan.formats.files import Listed, in_file, read_json, validate
+from fleet2d.floorplan.furniture import measured_height
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.source import FloorPlanSource
 from fleet2d.kernels import F64
@@ -27,6 +29,8 @@ FURNITURE = {
 }
 # Axes of a scan are rounded to this [m], and turned so that its longest wall is along x.
 ROUNDED_M = 0.001
+# What begins higher above the floor hangs on a wall, and hides nobody who stands behind it [m].
+RAISED_M = 0.2
 
 Number = Annotated[float, Field(ge=-1e4, le=1e4)]  # metres, none of them infinite or NaN
 Extent = Annotated[list[Number], Field(min_length=3, max_length=3)]
@@ -59,6 +63,28 @@ class _Surface(BaseModel):
         matrix = np.array(self.transform).reshape(4, 4)
         along, at = matrix[0, [0, 2]] * self.dimensions[0] / 2, matrix[3, [0, 2]]
         return np.stack([at - along, at + along]) * (1, -1)
+
+    @property
+    def kind(self) -> str:
+        """The type of furniture."""
+        kind = self.category.lower()
+        return FURNITURE.get(kind, kind)
+
+    @property
+    def low_m(self) -> float:
+        """How high it begins, in the frame of the scan [m]."""
+        return self.transform[13] - self.dimensions[1] / 2
+
+    def height(self, floor_m: float) -> float | None:
+        """Return its height above the floor [m]: 0 for what hangs, None for that of its type."""
+        if self.low_m - floor_m > RAISED_M:
+            return 0.0
+        return measured_height(self.kind, self.low_m + self.dimensions[1] - floor_m)
+
+    @property
+    def front(self) -> F64:
+        """The direction of its front (x, y), float64 (2,); seen from above."""
+        return np.array([self.transform[8], -self.transform[10]])
 
     @property
     def box(self) -> F64:
@@ -136,15 +162,15 @@ def read_roomplan(
                 Feature(kind, f"{kind}s[{k}]", LineString(place(surface.line)), {})
                 for k, surface in enumerate(surfaces)
             ]
-        features += [
-            Feature("object", f"objects[{k}]", Polygon(place(thing.box)), _furniture(thing))
-            for k, thing in enumerate(scan.objects)
-        ]
+        floor_m = min((wall.low_m for wall in scan.walls), default=0.0)
+        for k, thing in enumerate(scan.objects):
+            front_x, front_y = (thing.front @ turn).tolist()
+            piece = {
+                "type": thing.kind,
+                "heading": round(math.atan2(front_y, front_x), 6) % math.tau,
+                "height": thing.height(floor_m),
+            }
+            features.append(Feature("object", f"objects[{k}]", Polygon(place(thing.box)), piece))
         sound = [f for f in features if f.kind != "object" or shapely.is_valid(f.shape)]
         draft = Draft(sound, wall_m, [], scale=scale)
         return draft.plan(path.stem, cell, f"RoomPlan scan, {path.name}")
-
-
-def _furniture(thing: _Surface) -> dict[str, Any]:
-    kind = thing.category.lower()
-    return {"type": FURNITURE.get(kind, kind)}

@@ -15,7 +15,7 @@ from fleet2d.configuration.units import InputPath
 from fleet2d.errors import FloorPlanError, os_errors_as
 from fleet2d.floorplan.formats.features import Draft, Feature, choose_level
 from fleet2d.floorplan.formats.files import MAX_COORDINATE_M, in_file
-from fleet2d.floorplan.furniture import FURNITURE
+from fleet2d.floorplan.furniture import FURNITURE, measured_height
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.rooms.room import room_type
 from fleet2d.floorplan.source import FloorPlanSource
@@ -127,7 +127,11 @@ def _features(element: ET.Element) -> Iterator[Feature]:
             yield Feature(kind, where, _box(element), {})
     elif element.tag == "pieceOfFurniture" and _number(element, "elevation") < RAISED_CM:
         kind = furniture_type(f"{element.get('catalogId', '')} {name or ''}")
-        yield Feature("object", where, _box(element), {"type": kind})
+        top = _number(element, "elevation") + _number(element, "height")
+        heading = -math.pi / 2 - _number(element, "angle")
+        height = measured_height(kind, top / CM_PER_M)
+        piece = {"type": kind, "heading": round(heading, 6) % math.tau, "height": height}
+        yield Feature("object", where, _box(element), piece)
 
 
 def _box(element: ET.Element) -> Polygon:
