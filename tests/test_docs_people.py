@@ -4,6 +4,7 @@ All are drawn from fixed seeds, so that they must be equal to the digits that th
 """
 
 import re
+import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -12,14 +13,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from benchmarks.visits import grouped_stays, traces_of_persona
 from tests.thorough import THOROUGH
 
 import fleet2d
+from fleet2d.routines.persona import bundled_names
+from fleet2d.studies.intervals import estimate
 
 ROOT = Path(__file__).parents[1]
 pytestmark = pytest.mark.skipif(
     not THOROUGH, reason="FLEET2D_THOROUGH=1 computes all figures again"
 )
+FOLDERS = {"CASAS AL": "casas_al", "UCI ADL A": "uci_adl_a", "HOMER+ A": "homer_plus_a"}
 NUMBER = re.compile(r"\d[\d,]*\.?\d*")
 
 
@@ -56,13 +61,23 @@ def data(shared_data: Path) -> str:
 def test_measures_of_days_are_those_of_the_page(data: str) -> None:
     lines = printed("people", "measures", "--data", data)
     found = {re.split(r"  +", line)[0]: re.findall(r"\d+\.\d+|nan", line) for line in lines[3:21]}
-    columns = (3, 4, 5, 6, 13, 15, 16)
-    base = ""
+    columns = (3, 4, 5, 6, 13, 14, 15, 16, 17)
+    base, sums = "", {False: set(), True: set()}
     for name, cells in rows("people", "| | short visits | changes"):
-        base = name if name != "the same, with `short_stays`" else base
-        key = base if name == base else f"{base}, short_stays"
+        has_part = name == "the same, with `short_stays`"
+        base = base if has_part else name.replace("`", "")
+        key = f"{base}, short_stays" if has_part else base
         for cell, column in zip(cells, columns, strict=True):
             assert not cell or agrees(cell, float(found[key][column]), 0.01), (key, column)
+        if base in bundled_names():
+            sums[has_part].add(round(sum(float(cell) for cell in cells[-2:]), 2))
+    assert [(0.55, 0.58), (0.44, 0.48)] == [(min(each), max(each)) for each in sums.values()]
+
+
+def test_stays_in_the_living_room_are_as_long_with_another_seed_as_the_page_says() -> None:
+    trace, _ = traces_of_persona({"extends": ["retired", "short_stays"]}, 28, 5)
+    lengths = [stay.length for stay in grouped_stays(trace) if stay.kind == "living_room"]
+    assert "9.0" == f"{np.median(lengths) / 60:.1f}"
 
 
 def test_visits_are_those_of_the_page(data: str) -> None:
@@ -73,14 +88,20 @@ def test_visits_are_those_of_the_page(data: str) -> None:
 
 
 def test_the_population_is_as_near_to_the_survey_as_the_page_says() -> None:
-    *_, last = printed("people", "compare")
-    assert ["0.012", "0.045"] == [f"{float(value):.3f}" for value in last.split()[1:]]
+    for options, said in (
+        ((), ["0.012", "0.045"]),
+        (("--people", "4000", "--weeks", "4"), ["0.003", "0.009"]),
+    ):
+        *_, last = printed("people", "compare", *options)
+        assert said == [f"{float(value):.3f}" for value in last.split()[1:]]
 
 
 def test_shares_of_rooms_are_as_near_as_the_page_says() -> None:
     lines = [line.split() for line in printed("people", "rooms")[1:]]
-    errors = {int(day): f"{float(error):.3f}" for day, error, _ in lines}
-    assert ["0.080", "0.037", "0.017", "0.008"] == [errors[day] for day in (1, 4, 16, 64)]
+    errors = {int(day): [f"{float(x):.3f}" for x in found] for day, *found in lines}
+    assert [
+        ["0.080", "0.066"], ["0.037", "0.033"], ["0.017", "0.016"], ["0.008", "0.008"]
+    ] == [errors[day] for day in (1, 4, 16, 64)]  # fmt: skip
 
 
 def overlaps(*arguments: str) -> dict[str, list[str]]:
@@ -98,20 +119,23 @@ def test_people_are_in_each_others_way_as_often_as_the_page_says() -> None:
     assert ["1955", "380950"] == [overlaps(flat)["null"][0], overlaps(flat, *own)["null"][0]]
 
 
-def test_a_patrol_that_never_saw_the_beds_errs_as_the_page_says(shared_data: Path) -> None:
-    """The worst of the eight homes of `presence_views.yaml`, without and with stops that see."""
-    (home,) = (shared_data / "houseexpo").glob("6951eec7*.json")
+def test_patrols_that_stop_where_they_see_err_as_the_page_says(
+    shared_data: Path, tmp_path: Path
+) -> None:
+    shutil.copytree(ROOT / "examples/studies", tmp_path / "studies")
+    (tmp_path / "studies/houseexpo").symlink_to(shared_data / "houseexpo")
+    found = fleet2d.study(tmp_path / "studies/presence_views.yaml", tmp_path / "views").complete
     errors = []
-    for stop_at in ("middle", "view"):
-        patrol = {"type": "patrol", "dwell": "5 min", "stop_at": stop_at}
-        stored = fleet2d.run(
-            str(ROOT / "examples/studies/base/presence_rounds.yaml"),
-            floorplan={"type": "houseexpo", "path": str(home), "furnish": True},
-            robots={"astro": {"behaviors": [patrol]}},
-            seed=1,
-        )
-        errors.append(f"{stored.metrics['likelihood_error']['ana']['tv']:.3f}")
-    assert ["0.450", "0.013"] == errors
+    for stops, cells in rows("presence", "| stops | `likelihood` | the worst home"):
+        of_it = found.filter(found["stops"] == stops.removeprefix("in "))
+        assert 8 == len(of_it), stops
+        error = of_it["likelihood_error.ana.tv"]
+        score = [of_it[f"hmm_score.ana.all.{key}"].mean() for key in ("log_loss", "top_1")]
+        values = [error.mean(), error.max(), *score, of_it["distance.astro"].mean()]
+        said = [cell.replace(",", "") for cell in cells]
+        assert all(map(agrees, said, values)), (stops, values)
+        errors.append(of_it.filter(of_it["home"].str.contains("6951eec7"))[error.name].item())
+    assert ["0.450", "0.013"] == [f"{error:.3f}" for error in errors]
 
 
 def test_the_robot_of_the_readme_sees_her_as_often_as_it_says_and_enters_no_bedroom(
@@ -134,14 +158,13 @@ def test_after_events_of_a_year_estimators_err_as_the_page_says(tmp_path: Path) 
     found = fleet2d.study(ROOT / "examples/studies/presence_year.yaml", tmp_path / "year").complete
     columns = ("exposure_ratio", "exposure_ratio_14", "likelihood", "likelihood_14", "likelihood_5")
     for event, cells in rows("presence", "| event | `exposure_ratio`"):
+        of_it = found.filter(found["event"] == event)
         for column, cell in zip(columns, cells, strict=True):
-            values = [
-                row[f"{column}_error.ana.tv"]
-                for row in found.iter_rows(named=True)
-                if row["event"] == event
-            ]
+            values = of_it[f"{column}_error.ana.tv"].to_list()
+            mean = estimate(values, {"home": of_it["home"].to_list()})
+            said = re.findall(r"-?\d\.\d+", cell)
             assert 5 == len(values)
-            assert agrees(cell.split()[0], sum(values) / 5), (event, column)
+            assert all(map(agrees, said, (mean.mean, mean.low, mean.high))), (event, column, mean)
 
 
 def test_fitted_personas_are_as_near_to_their_logs_as_the_page_says(
@@ -165,3 +188,17 @@ def test_fitted_personas_are_as_near_to_their_logs_as_the_page_says(
         )
         values = [*by_minute, by_second[2], by_second[4]]
         assert all(map(agrees, cells, values)), (log, name, values)
+
+    worse = re.findall(r"(\d\.\d+), copies (\d\.\d+)", text)
+    page = (ROOT / "docs/fit.md").read_text(encoding="utf-8")
+    most = max(float(persona) - float(copies) for persona, copies in worse)
+    assert f"worse than copies by up to {most:.3f}" in " ".join(page.split())
+
+    for log, cells in rows("fit", "| log | persona | `--private`"):
+        part = next(p for p in text.split("\n## ")[1:] if p.startswith(FOLDERS[log])).splitlines()
+        counted = [
+            re.findall(r"[\d.]+", line.partition(":")[2])
+            for line in part
+            if line.startswith(("the persona repeats", "a private one:", "days of the log, of"))
+        ]
+        assert [NUMBER.findall(cell) for cell in cells] == counted, log

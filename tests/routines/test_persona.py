@@ -9,7 +9,7 @@ from pydantic import TypeAdapter, ValidationError
 from tests.routines.days import MONDAY
 
 from fleet2d.configuration.documents import read_document
-from fleet2d.routines.activity import find_activity
+from fleet2d.routines.activity import catalogue, find_activity
 from fleet2d.routines.interruptions import usual_needs
 from fleet2d.routines.life import Life
 from fleet2d.routines.persona import PARTS, AnyPersona, Persona, bundled_persona, part_names
@@ -43,6 +43,19 @@ def test_a_part_adds_to_the_needs_of_an_adult_that_a_persona_has_by_default(
     (tmp_path / "ana.yaml").write_text("days: {every: {on: daily}}\n")
     extended = read({"extends": [str(tmp_path / "ana.yaml"), "short_stays"]})
     assert {*usual_needs(), "pick_up", "freshen_up"} == set(extended.needs)
+
+
+def test_a_part_changes_the_errands_and_activities_that_a_persona_has_by_default(
+    tmp_path: Path,
+) -> None:
+    own = "activities: {tv: {rooms: [office], fetches: 5 min}}\n"
+    (tmp_path / "ana.yaml").write_text(f"days: {{every: {{on: daily}}}}\n{own}")
+    extended = read({"extends": [str(tmp_path / "ana.yaml"), "short_stays"]})
+    assert {"check_door"} == set(extended.errands)
+    read_it = find_activity("read", extended.activities)
+    assert catalogue()["read"].model_copy(update={"fetches": None}) == read_it
+    tv = find_activity("tv", extended.activities)
+    assert (("office",), None) == (tv.rooms, tv.fetches)
 
 
 @pytest.mark.parametrize(
@@ -83,6 +96,6 @@ def test_short_stays_interrupt_a_stay_for_less_than_minutes() -> None:
         for episode in lived.day(ordinal)
         if episode.activity == "pick_up"
     ]
-    assert 8 * 28 < len(took) < 20 * 28
+    assert 20 * 28 < len(took) < 40 * 28
     assert timedelta(minutes=4).total_seconds() >= max(took)
     assert sorted(took)[len(took) // 2] < 60

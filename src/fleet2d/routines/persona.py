@@ -41,6 +41,7 @@ from fleet2d.routines.activity import (
     DurationDistribution,
     SchemaForms,
     catalogue,
+    catalogue_data,
     find_activity,
 )
 from fleet2d.routines.interruptions import (
@@ -578,8 +579,17 @@ def _extended(names: Any, chain: tuple[str, ...], files: list[Path]) -> Any:
         above = _data_of(name, (*chain, ""), files)
         if below and "needs" in above and "needs" not in below:
             below = {**below, "needs": usual_needs()}  # a part adds to them
+        if isinstance(below, Mapping) and name in part_names():
+            below = _with_defaults(below, above["activities"])
         below = merge(below, above)
     return below
+
+
+def _with_defaults(persona: Mapping[str, Any], changed: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a persona with the errands and activities that it has by default."""
+    activities = {k: v for k, v in catalogue_data().items() if k in changed}
+    activities |= persona.get("activities") or {}
+    return {"errands": usual_errands(), **persona, "activities": activities}
 
 
 def _persona_file(value: str | Path, *, is_extended: bool) -> Path:
