@@ -190,7 +190,7 @@ def print_summary(summary: dict[str, Any], run: "Run") -> None:
     for verdict in run.manifest["expectations"].values():
         console.print(verdict["says"], highlight=False, markup=False, soft_wrap=True)
     for note in run.notes or run.manifest["notes"]:
-        console.print(f"note: {note}", highlight=False, markup=False)
+        console.print(f"note: {note}", highlight=False, markup=False, soft_wrap=True)
     console.print(f"seed {summary['seed']}, digest {summary['digest'][:16]}", highlight=False)
     console.print(f"stored in {summary['run_dir']}", highlight=False, soft_wrap=True, markup=False)
 

@@ -61,8 +61,6 @@ def validate(
     for note in simulation.notes:
         typer.echo(f"note: {note}")
     for actor in simulation.actors.values():
-        for note in actor.notes:
-            typer.echo(f"note: {actor.path}.{note}")
         for behavior in actor.behaviors:
             for note in getattr(behavior, "notes", ()):
                 typer.echo(f"note: {actor.path}: {note}")

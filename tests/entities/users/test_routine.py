@@ -372,6 +372,14 @@ def test_people_without_a_household_are_told_once_that_they_share_seats() -> Non
     assert told_of_households(scenario("1 h", users=apart)) == {}
 
 
+def test_a_run_says_so_too() -> None:
+    """Only `fleet2d validate` did, whatever the page of behaviors said."""
+    users = {name: {"type": "routine"} for name in ("ana", "ben")}
+    notes = fleet2d.run(scenario("1 min", users=users)).manifest["notes"]
+    said = [note.partition(",")[0] for note in notes if "household" in note]
+    assert ["users.ben.household: none"] == said
+
+
 def told_of_households(content: dict[str, Any]) -> dict[str, str]:
     """What each user is told of households."""
     actors = Simulation(content).actors
