@@ -65,6 +65,22 @@ def odd(minutes: Counter[tuple[str, str]]) -> dict[tuple[str, str], int]:
 
 
 @pytest.mark.slow
+def test_members_of_a_household_leave_the_bathroom_before_a_short_rest() -> None:
+    """Who had washed hands for a moment during a rest finished it there, beside the next one."""
+    household = {"members": {"ana": "retired", "ben": "retired"}}
+    users = {name: {"type": "routine", "household": household} for name in household["members"]}
+    stored = run(scenario("28 d", users=users, robots={}))
+    events = stored.polars("events").filter(pl.col("detail") == "rest")
+    kinds: Counter[str] = Counter()
+    for name in users:
+        room = path(stored, name).room
+        steps = events.filter(pl.col("entity") == name)["step"].to_list()
+        kinds.update(stored.plan.rooms[room[step]].type for step in steps)
+    assert kinds["living_room"] > 100
+    assert 0 == kinds["bathroom"]
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("name", some(range(29), 29))
 def test_nothing_is_done_in_an_odd_room_of_a_real_home(shared_data: Path, name: int) -> None:
     """Children played in bathrooms of 11 of 20 homes, up to an hour a day, while others showered."""

@@ -609,12 +609,17 @@ class ResidentBehavior(Behavior):
         if room != ANY_ROOM or self.is_hindered:
             venue = self._in_room(venue, room)
         core_venue = self.known_home.in_core(activity, self.seated(venue, which))
-        stays = activity == REST and end - begin < NO_GAP_S
+        is_short = end - begin < NO_GAP_S
+        stays = activity == REST and is_short and not self.makes_room(which)
         return core_venue, which[0] * EPISODES_PER_DAY + which[1], end_us, role, stays
 
     def seated(self, venue: Venue, which: tuple[int, int]) -> Venue:
         """Return the venue with only the places at furniture that it has for the episode."""
         return venue
+
+    def makes_room(self, which: tuple[int, int]) -> bool:
+        """Return whether it leaves the room before a short rest, as others may want to use it."""
+        return False
 
     def _at_present(self, venue: Venue) -> Venue:
         """Return the venue of an activity, without the rooms that shut doors block at present."""

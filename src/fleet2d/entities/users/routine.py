@@ -462,6 +462,12 @@ class Routine(ResidentBehavior):
             return venue
         return venue._replace(seats=list(places))
 
+    def makes_room(self, which: tuple[int, int]) -> bool:
+        """Return whether members of its household may want to use the bathroom that it was in."""
+        if self.household is None or which[1] == 0:
+            return False
+        return self.venues[self.day(which[0])[which[1] - 1].activity].activity.exclusive
+
     def _with_absences(self, day: Sequence[Episode], ordinal: int) -> Sequence[Episode]:
         if not self.away and not self.visits:
             return day
