@@ -109,6 +109,16 @@ def flat(schema: str = "IFC4", spaces: bool = True) -> Model:
     return model
 
 
+def test_furniture_is_as_high_above_its_storey_as_the_model_says(tmp_path: Path) -> None:
+    model = flat()
+    model.add("IfcFurnishingElement", (0.5, 2, 2, 3), "Sideboard", storey="Up", z=(0, 0.9))
+    model.add("IfcFurnishingElement", (4, 2, 5, 3), "Table", storey="Up", z=(0, 0.75))
+    path = model.write(tmp_path)
+
+    assert [0.5] == [thing.height for thing in load_floorplan(path).objects]
+    assert [0.9, None] == [thing.height for thing in Ifc(path=path, level="Up").load().objects]
+
+
 @pytest.mark.parametrize("schema", ["IFC4", "IFC4X3"])
 def test_spaces_doors_windows_and_furniture_of_the_ground_floor_become_a_home(
     tmp_path: Path, schema: str

@@ -16,6 +16,7 @@ from fleet2d.errors import FloorPlanError, extra
 from fleet2d.floorplan.formats.features import Draft, Feature, choose_level
 from fleet2d.floorplan.formats.files import in_file
 from fleet2d.floorplan.formats.sweethome import furniture_type
+from fleet2d.floorplan.furniture import measured_height
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.source import FloorPlanSource
 
@@ -121,9 +122,9 @@ def _features(model: Any, storey: Any, notes: list[str]) -> Iterator[Feature]:
     lost = 0
     for kind, element in _elements(model, storey):
         try:
-            shape, low = _seen_from_above(geom.create_shape(settings, element))
+            shape, low, high = _seen_from_above(geom.create_shape(settings, element))
         except RuntimeError:  # it has no geometry, or a damaged one
-            shape, low = shapely.Polygon(), 0.0
+            shape, low, high = shapely.Polygon(), 0.0, 0.0
         lost += shape.is_empty
         if shape.is_empty or low - _height(storey) > highest.get(kind, np.inf):
             continue
@@ -133,7 +134,9 @@ def _features(model: Any, storey: Any, notes: list[str]) -> Iterator[Feature]:
             shape = shape.minimum_rotated_rectangle
         elif kind == "object":
             words = " ".join(filter(None, (label, _predefined_type(element))))
-            properties = {"type": furniture_type(words or "object")}
+            type_name = furniture_type(words or "object")
+            height = measured_height(type_name, high - _height(storey))
+            properties = {"type": type_name, "height": height}
         yield Feature(kind, f"{element.is_a()} {element.GlobalId}", shape, properties)
     if lost:
         notes.append(f"elements without a geometry, which are left out: {lost}")
@@ -157,13 +160,13 @@ def _height(storey: Any) -> float:
     )
 
 
-def _seen_from_above(element: Any) -> tuple[BaseGeometry, float]:
-    """Return what an element covers of the floor [m], and the height of its lowest point [m]."""
+def _seen_from_above(element: Any) -> tuple[BaseGeometry, float, float]:
+    """Return what an element covers of the floor, and where it begins and ends in height [m]."""
     points = np.asarray(element.geometry.verts, np.float64).reshape(-1, 3)
     faces = np.asarray(element.geometry.faces, np.int64).reshape(-1, 3)
     if not len(faces) or not np.isfinite(points).all():
-        return shapely.Polygon(), 0.0
+        return shapely.Polygon(), 0.0, 0.0
     flat = np.round(points[:, :2] / ROUNDED_M) * ROUNDED_M
     triangles = np.asarray(shapely.polygons(flat[faces]))
     area = shapely.union_all(triangles[shapely.area(triangles) > 0], grid_size=ROUNDED_M)
-    return area, float(points[:, 2].min())
+    return area, float(points[:, 2].min()), float(points[:, 2].max())
