@@ -1,9 +1,12 @@
 """Training: right gradients, the same weights again, and fewer losses than before."""
 
+import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
+from tests.datasets.small import SOURCE
 from tests.scenes import Cli
 
 from fleet2d.algorithms.presence.learned import PLACE_FEATURES, Weights, shipped_weights
@@ -106,8 +109,24 @@ def test_a_data_set_trains_weights_that_a_run_uses(
 
     code, out, err = fleet2d("leaderboard", folder, f"--weights={tuned}")
     assert 0 == code, err
-    for word in ("rtp (", "tuned ", "next_room (", "time_to_return (", "activity (", "ltp ("):
+    for word in ("rtp (", "tuned.npz ", "next_room (", "time_to_return (", "activity (", "ltp ("):
         assert word in out
+
+
+def test_the_file_of_a_data_set_is_made_and_the_weights_compared_with_the_shipped(
+    tmp_path: Path, data: Dataset, fleet2d: Cli
+) -> None:
+    """The data set is there already, beside the weights, so it is opened."""
+    (tmp_path / "small.yaml").write_text(yaml.safe_dump(SOURCE))
+    shutil.copytree(data.root, tmp_path / "learned_data")
+    options = (f"--on={tmp_path / 'small.yaml'}", f"--out={tmp_path / 'learned.npz'}")
+
+    code, out, err = fleet2d("train", "rtp", *options, "--epochs=1", "--hidden=4")
+
+    assert 0 == code, err
+    assert "learned_data: train 3, test 1 runs" in out
+    [line] = [line for line in out.splitlines() if line.startswith("  log_loss  ")]
+    assert ["routine", "last_seen", "learned", "learned.npz"] == line.split()[1::2]
 
 
 def test_weights_that_could_not_be_written_are_refused_before_training(

@@ -11,6 +11,10 @@ from fleet2d.errors import InputError
 from fleet2d.options import TrustFiles, TrustFolders, restrict_to
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from fleet2d.datasets.reader import Dataset
+    from fleet2d.datasets.tasks import LeaderboardEntry
     from fleet2d.datasets.windows import Windows
 
 Folder = Annotated[Path, typer.Argument(metavar="DIR", help="A data set.")]
@@ -35,25 +39,44 @@ def dataset(
     trust_dir: TrustFolders = None,
 ) -> None:
     """Make a data set of labelled evidence, or the rest of one that was interrupted."""
-    from fleet2d.datasets.generate import dataset as make
     from fleet2d.datasets.reader import open_dataset
 
+    if not verify:
+        _make(source, out, workers, trust, trust_dir)
+        return
+    made = open_dataset(out)
+    differing = made.verify()
+    for name in differing:
+        typer.echo(f"{out / name} is missing, or differs from what was written", err=True)
+    if differing:
+        raise typer.Exit(1)
+    _print_size(made)
+
+
+def _make(
+    source: Path, out: Path, workers: int | None, trust: TrustFiles, trust_dir: TrustFolders
+) -> None:
+    """Make a data set, or the rest of one."""
+    from fleet2d.datasets.generate import dataset as make
+
     with restrict_to(trust, trust_dir):
-        made = open_dataset(out) if verify else make(source, out, workers=workers)
-    if verify:
-        differing = made.verify()
-        for name in differing:
-            typer.echo(f"{out / name} is missing, or differs from what was written", err=True)
-        if differing:
-            raise typer.Exit(1)
+        _print_size(make(source, out, workers=workers))
+
+
+def _print_size(made: "Dataset") -> None:
     size = sum(file["bytes"] for file in made.manifest["files"].values())
     runs = ", ".join(f"{name} {count}" for name, count in made.manifest["splits"].items())
-    typer.echo(f"{out}: {runs} runs, {size / 1e6:.2f} MB")
+    typer.echo(f"{made.root}: {runs} runs, {size / 1e6:.2f} MB")
 
 
 @training.command()
 def rtp(
-    on: Annotated[Path, typer.Option(metavar="DIR", help="A data set, or a stored run.")],
+    on: Annotated[
+        Path,
+        typer.Option(
+            metavar="PATH", help="A data set, the YAML file of one, which is made, or a stored run."
+        ),
+    ],
     out: Annotated[Path, typer.Option(help="The file of weights to write.")] = Path("learned.npz"),
     start: Annotated[
         str | None,
@@ -62,13 +85,24 @@ def rtp(
     hidden: Annotated[int, typer.Option(min=1, max=256, help="Width of the layers.")] = 32,
     epochs: Annotated[int, typer.Option(min=1, help="How often each window is used.")] = 10,
     seed: Annotated[int, typer.Option(min=0, help="Of the first weights.")] = 0,
+    trust: TrustFiles = None,
+    trust_dir: TrustFolders = None,
 ) -> None:
-    """Train the network of `model: learned`, or fit one to the days of a run."""
+    """Train the network of `model: learned`, or fit one to the days of a run.
+
+    The data set of a YAML file is made beside the weights, once: learned_data for learned.npz. If a
+    data set has a split `test`, the weights are scored on it in the end, beside the shipped ones.
+    """
     from fleet2d.algorithms.presence.learned import Weights, shipped_weights
+    from fleet2d.datasets.reader import MANIFEST, open_dataset
+    from fleet2d.datasets.tasks import leaderboard as score
     from fleet2d.datasets.training import TrainingSettings, fine_tune, train
 
     if not out.absolute().parent.is_dir():
         raise InputError(f"--out {out}: there is no folder {out.absolute().parent}")
+    if on.is_file():
+        file, on = on, out.with_name(f"{out.stem}_data")
+        _make(file, on, None, trust, trust_dir)
     began = time.process_time()
     train_on, check_on = _windows(on)
     weights: Weights | None = None
@@ -81,6 +115,8 @@ def rtp(
     made.save(out)
     count = sum(len(part.truth) for part in train_on)
     typer.echo(f"{out}: {count:,} windows, {time.process_time() - began:.0f} s")
+    if (on / MANIFEST).is_file() and "test" in (data := open_dataset(on)).splits:
+        _print_scores(score(data, ["rtp"], models={out.name: made}), "test")
 
 
 def _print_epoch(epoch: int, loss: float, checked: float) -> None:
@@ -127,7 +163,7 @@ def leaderboard(
     from fleet2d.datasets.tasks import forecasts
     from fleet2d.datasets.tasks import leaderboard as score
 
-    models = {path.stem: Weights.read(path) for path in weights or []}
+    models = {path.name: Weights.read(path) for path in weights or []}
     if picture is not None:
         from fleet2d.pictures.charts import draw_forecasts
 
@@ -144,6 +180,11 @@ def leaderboard(
         ]
         typer.echo(json.dumps({"split": split, "entries": rows}))
         return
+    _print_scores(entries, split)
+
+
+def _print_scores(entries: "Sequence[LeaderboardEntry]", split: str) -> None:
+    """Print a line for each metric of each task, with the score of each model."""
     for name in dict.fromkeys(entry.task for entry in entries):
         own = [entry for entry in entries if entry.task == name]
         typer.echo(f"{name} ({own[0].cases:,} cases of {split})")

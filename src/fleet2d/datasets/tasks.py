@@ -1,7 +1,8 @@
 """Tasks on a data set, each with its metrics and baselines, and the leaderboard that they fill.
 
 - `rtp`: where a person is now, given the evidence so far, at each label with a stored belief: log
-  loss [nats], accuracy and calibration error, over all and by the gap since the last sighting.
+  loss [nats], accuracy and calibration error, over all and by the gap since the last sighting; and
+  the difference in log loss to `routine`, by home, with its 95 % interval.
 - `ltp`: the share of time in each room, at home: total variation distance to the true shares.
 - `next_room`: the kind of place where a person goes next, for each stay: log loss, accuracy.
 - `time_to_return`: when a person who is away comes back: mean absolute error [min].
@@ -20,10 +21,11 @@ from fleet2d.algorithms.presence.belief import ANYONE, AWAY
 from fleet2d.algorithms.presence.learned import Weights, shipped_weights
 from fleet2d.datasets.reader import Dataset
 from fleet2d.datasets.training import predict
-from fleet2d.datasets.windows import Windows, windows_of
+from fleet2d.datasets.windows import PRIOR, Windows, windows_of
 from fleet2d.errors import InputError
 from fleet2d.kernels import F64, I64
 from fleet2d.metrics.rtp_score import GAP_ENDS, GAPS, calibration_error, log_loss, top_k
+from fleet2d.studies.intervals import estimate
 
 TRAIN = "train"
 Cases = list[tuple[tuple[str, ...], str]]
@@ -121,11 +123,13 @@ class SplitForecasts(NamedTuple):
         beliefs: By model, float64 (n, places); homes with fewer places have zeros.
         truth: int64 (n,), the place where the person was.
         gap: float64 (n,), minutes since the newest sighting.
+        home: str (n,), the home.
     """
 
     beliefs: Mapping[str, F64]
     truth: I64
     gap: F64
+    home: Any
 
 
 def forecasts(
@@ -150,6 +154,7 @@ def forecasts(
         {name: _padded(own, width) for name, own in beliefs.items()},
         np.concatenate([part.truth for part in parts]),
         np.concatenate([part.gap for part in parts]),
+        np.repeat([part.home for part in parts], [len(part.truth) for part in parts]),
     )
 
 
@@ -158,9 +163,25 @@ def _score_rtp(data: Dataset, split: str, models: Mapping[str, Weights]) -> list
     if made is None:
         return []
     return [
-        LeaderboardEntry("rtp", name, rtp_scores(belief, made.truth, made.gap), len(made.truth))
+        LeaderboardEntry(
+            "rtp",
+            name,
+            {**rtp_scores(belief, made.truth, made.gap), **_difference(made, name)},
+            len(made.truth),
+        )
         for name, belief in made.beliefs.items()
     ]
+
+
+def _difference(made: SplitForecasts, name: str) -> dict[str, float]:
+    """Return the difference in log loss to `routine`, and the ends of its interval over homes."""
+    loss, prior = (log_loss(made.beliefs[model], made.truth) for model in (name, PRIOR))
+    homes, number = np.unique(made.home, return_inverse=True)
+    by_home = np.bincount(number, loss - prior) / np.bincount(number)
+    difference = estimate(by_home, {"home": homes.tolist()})
+    ends = {"lower end": difference.low, "upper end": difference.high}
+    scores = {"": difference.mean, **(ends if len(homes) > 1 else {})}
+    return {f"log_loss - {PRIOR} {words}".rstrip(): value for words, value in scores.items()}
 
 
 def _padded(beliefs: Sequence[F64], width: int) -> F64:

@@ -1,0 +1,25 @@
+"""Scores of tasks: differences by home, in which each home counts alike."""
+
+import numpy as np
+import pytest
+
+from fleet2d.datasets.tasks import SplitForecasts, _difference
+
+
+def test_the_difference_to_routine_is_a_mean_over_homes() -> None:
+    """Two homes with one and three windows, and a model that is better by a factor of 2 or 4."""
+    prior = np.array([[0.2, 0.8], [0.4, 0.6], [0.4, 0.6], [0.4, 0.6]])
+    model = np.array([[0.8, 0.2], [0.8, 0.2], [0.8, 0.2], [0.8, 0.2]])
+    home = np.array(["a", "b", "b", "b"])
+    made = SplitForecasts(
+        {"routine": prior, "mine": model}, np.zeros(4, np.int64), np.zeros(4), home
+    )
+
+    scores = _difference(made, "mine")
+
+    assert -np.log([2, 4]).mean() == pytest.approx(scores["log_loss - routine"])
+    assert scores["log_loss - routine lower end"] < -np.log(4)
+    assert 0 < scores["log_loss - routine upper end"]
+    assert [0, 0, 0] == list(_difference(made, "routine").values())
+    one = made._replace(home=np.array(["a"] * 4))
+    assert ["log_loss - routine"] == list(_difference(one, "mine"))
