@@ -12,6 +12,7 @@ from fleet2d.algorithms.presence.belief import ANYONE
 from fleet2d.artifacts.arrow import values_of
 from fleet2d.datasets.specification import BELIEF, EVIDENCE, STAYS, PlannedRun
 from fleet2d.kernels import I64
+from fleet2d.runtime.clock import DAY_S
 
 if TYPE_CHECKING:
     from fleet2d.runs.run import Run
@@ -193,7 +194,7 @@ def _run_row(planned: PlannedRun, users: Sequence[str], start: Any, run: "Run") 
         "users": [list(users)],
         "seed": [planned.seed],
         "start": np.array([start]),
-        "days": [float(run.manifest["simulated_s"]) / 86_400],
+        "days": [float(run.manifest["simulated_s"]) / DAY_S],
         "digest": [run.digest],
     }
 

@@ -29,7 +29,7 @@ from fleet2d.floorplan.rooms.room import PRIORITY, usual_type
 from fleet2d.floorplan.slow_area import SlowArea
 from fleet2d.floorplan.space import grow_shape
 from fleet2d.kernels import F64, Breakpoints
-from fleet2d.runtime.clock import midnight_of
+from fleet2d.runtime.clock import midnights
 from fleet2d.runtime.events import HOME, Event, EventKind
 
 
@@ -352,25 +352,18 @@ class ChangeQueue:
 
     def _schedule(self, number: int, door: Door) -> None:
         """Put the schedule of a door into the queue, for all days of the run."""
-        midnight = midnight_of(self.clock.start)
-        end = self.clock.time(self.clock.steps)
-        while midnight < end:
+        begin, end = self.clock.start, self.clock.time(self.clock.steps)
+        for midnight in midnights(begin, end):
             for turn in door.schedule:
-                self._turn_daily(self.names[number], turn.open, turn.locked, midnight + turn.at)
-            midnight += timedelta(days=1)
-
-    def _turn_daily(
-        self, name: str, is_open: bool | None, is_locked: bool | None, moment: datetime
-    ) -> None:
-        if moment < self.clock.start:
-            return
-        step = self._step_of(moment)
-        if is_open is not None:
-            change = HomeChange(open=name) if is_open else HomeChange(shut=name)
-            self._put(step, change, "schedule")
-        if is_locked is not None:
-            change = HomeChange(lock=name) if is_locked else HomeChange(unlock=name)
-            self._put(step, change, "schedule")
+                if midnight + turn.at < begin:
+                    continue
+                for value, verbs in (
+                    (turn.open, ("shut", "open")),
+                    (turn.locked, ("unlock", "lock")),
+                ):
+                    if value is not None:
+                        change = HomeChange.model_validate({verbs[value]: self.names[number]})
+                        self._put(self._step_of(midnight + turn.at), change, "schedule")
 
     def _step_of(self, time: datetime | timedelta) -> int:
         elapsed = micros(time) if isinstance(time, timedelta) else self.clock.elapsed(time)

@@ -6,7 +6,6 @@ span ends with each question and answer, and where the robot's plan waits for re
 
 from collections.abc import Iterable, Sequence, Set
 from dataclasses import dataclass, field
-from datetime import timedelta
 from typing import NamedTuple
 
 import numpy as np
@@ -30,11 +29,10 @@ from fleet2d.interactions.answers import (
 from fleet2d.interactions.attitude import AttitudeState
 from fleet2d.interactions.interaction import Interaction, Outcome, RequestQueue
 from fleet2d.kernels import TURN, heading_of, line_of_sight, locate
-from fleet2d.runtime.clock import midnight_of
+from fleet2d.runtime.clock import DAY, midnight_of
 from fleet2d.runtime.determinism import Draws, stream_key
 from fleet2d.runtime.events import Event, EventKind
 
-DAY = timedelta(days=1)
 LYING = POSTURES.index("lie")
 # Nobody is taken for the person addressed, and nobody notices, from farther away [m].
 EARSHOT_M = 8.0

@@ -18,7 +18,7 @@ from fleet2d.entities.plan import Plan
 from fleet2d.errors import blame
 from fleet2d.floorplan.placed_objects import PlacedObject
 from fleet2d.kernels import TURN
-from fleet2d.runtime.clock import midnight_of
+from fleet2d.runtime.clock import DAY, midnight_of
 from fleet2d.runtime.determinism import Draws
 
 if TYPE_CHECKING:
@@ -29,7 +29,6 @@ if TYPE_CHECKING:
     from fleet2d.runtime.clock import Sun
 
 
-DAY = timedelta(days=1)
 # After this time, a body tries again to pass a shut door.
 DOOR_WAIT = timedelta(seconds=10)
 

@@ -17,6 +17,7 @@ from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.rooms.doorways import Doorway
 from fleet2d.kernels import I64, Bool
+from fleet2d.runtime.clock import DAY
 
 
 class HomeObject(Component):
@@ -239,7 +240,7 @@ class Door(HomeObject):
 
     @model_validator(mode="after")
     def _opens_by_day(self) -> Self:
-        late = [turn.at for turn in self.schedule if turn.at >= timedelta(days=1)]
+        late = [turn.at for turn in self.schedule if turn.at >= DAY]
         if late:
             raise problem("a door's schedule ends at 23:59:59: write 00:00 for midnight")
         return self

@@ -7,7 +7,6 @@ values. It can be written in texts and imported from `fleet2d.expectations` at o
 
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass, field
-from datetime import timedelta
 from typing import Any
 
 import numpy as np
@@ -43,7 +42,7 @@ from fleet2d.kernels import (
     rooms_at,
     speeds,
 )
-from fleet2d.runtime.clock import midnight_of
+from fleet2d.runtime.clock import DAY, midnights
 from fleet2d.runtime.events import EventKind
 
 Target = str | tuple[float, float] | WordSignal
@@ -55,8 +54,6 @@ BODY = ("user or robot", "bodies")
 # The charge of a battery is rounded down to thousandths; errors of floats must not lower it.
 PARTS = 1000
 ROUNDING = 1e-9
-
-DAY = timedelta(days=1)
 
 
 # Numbers
@@ -599,9 +596,8 @@ class during(Condition):
         """Return 1 where the time is within these hours, 0 elsewhere."""
         clock = run.clock
         begin, length, weekdays = (vars(self)[n] for n in ("_begin", "_length", "_weekdays"))
-        midnight = midnight_of(clock.time(run.first)) - DAY
         starts, values = [run.first], [0.0]
-        while midnight < clock.time(run.end):
+        for midnight in midnights(clock.time(run.first) - DAY, clock.time(run.end)):
             if midnight.weekday() in weekdays:
                 for offset, is_within in ((begin, 1.0), (begin + length, 0.0)):
                     step = clock.step_at_or_after(clock.elapsed(midnight + offset))
@@ -610,5 +606,4 @@ class during(Condition):
                     elif step < run.end:
                         starts.append(step)
                         values.append(is_within)
-            midnight += DAY
         return Trace(np.array(starts, np.int64), np.array(values), run.end)

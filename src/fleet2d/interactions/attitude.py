@@ -13,10 +13,8 @@ from pydantic import Field
 from fleet2d.configuration.components import Component, register
 from fleet2d.configuration.units import PositiveDuration, Share
 from fleet2d.interactions.interaction import Outcome
-from fleet2d.runtime.clock import midnight_of
+from fleet2d.runtime.clock import DAY, DAY_S, midnight_of
 from fleet2d.runtime.determinism import exp2
-
-DAY = timedelta(days=1)
 
 
 @dataclass
@@ -46,7 +44,7 @@ class AttitudeState:
         """Return how much an interaction is expected at a time, 0 to 1."""
         strength, usual_s = self.habits.get(name, (0.0, 0.0))
         off_s = abs((time - midnight_of(time)).total_seconds() - usual_s)
-        return strength if min(off_s, 86400 - off_s) <= window.total_seconds() else 0.0
+        return strength if min(off_s, DAY_S - off_s) <= window.total_seconds() else 0.0
 
 
 @register("attitude", "fading")
@@ -122,7 +120,7 @@ class SteadyAttitude(Attitude):
     """A person whose interest doesn't fade, and who is soon at peace: about a quarter of people."""
 
     novelty_lasts: PositiveDuration = timedelta(days=36500)
-    annoyance_lasts: PositiveDuration = timedelta(days=1)
+    annoyance_lasts: PositiveDuration = DAY
     annoyed_by: float = Field(default=0.2, ge=0, le=100)
 
 

@@ -19,11 +19,9 @@ from fleet2d.configuration.units import (
     TimeOfDay,
     weekdays_of,
 )
-from fleet2d.runtime.clock import midnight_of
+from fleet2d.runtime.clock import midnights
 
 InteractionKind = Literal["remind", "offer", "ask", "greet", "deliver", "patrol_report"]
-
-DAY = timedelta(days=1)
 
 
 class Outcome(StrEnum):
@@ -128,11 +126,10 @@ class Interaction(Settings):
                 yield start + number * self.every
                 number += 1
         names = (self.on,) if isinstance(self.on, str) else self.on
-        days, midnight = weekdays_of(names), midnight_of(after)
-        while True:
+        days = weekdays_of(names)
+        for midnight in midnights(after):
             if midnight.weekday() in days:
                 yield from (midnight + at for at in sorted(self.at) if midnight + at >= after)
-            midnight += DAY
 
 
 @dataclass

@@ -44,7 +44,7 @@ from fleet2d.entities.home_object import SensorFault
 from fleet2d.errors import ScenarioError
 from fleet2d.floorplan.home import Home, HomeChange, format_moment, parse_moment
 from fleet2d.floorplan.slow_area import SlowArea
-from fleet2d.runtime.clock import Clock, midnight_of
+from fleet2d.runtime.clock import Clock, midnights
 from fleet2d.runtime.events import Event, EventKind
 from fleet2d.sight.camera import Disturbance, FalseSighting
 
@@ -342,9 +342,6 @@ def dump_intervention(act: Intervention) -> dict[str, Any]:
     return _ADAPTER.dump_python(act, mode="json", exclude_defaults=True)
 
 
-DAY = timedelta(days=1)
-
-
 class ClockTime(NamedTuple):
     """A time of day, on some days of the week.
 
@@ -360,13 +357,11 @@ class ClockTime(NamedTuple):
 
     def moments(self, clock: Clock) -> Iterator[datetime]:
         """Yield all such moments of a run, in order."""
-        midnight = midnight_of(clock.start)
         end = clock.time(clock.steps)
-        while midnight < end:
+        for midnight in midnights(clock.start, end):
             moment = midnight + self.time
             if midnight.weekday() in self.days and clock.start <= moment < end:
                 yield moment
-            midnight += DAY
 
 
 def parse_when(value: object) -> datetime | timedelta | ClockTime:

@@ -37,6 +37,7 @@ from fleet2d.routines.persona import AnyPersona, Dates, Timing, YearEvent, value
 from fleet2d.routines.planner import (
     Episode,
 )
+from fleet2d.runtime.clock import DAY
 
 SECOND = timedelta(seconds=1)
 AWAY = "holiday"
@@ -175,7 +176,7 @@ class RandomVisits(Timing):
     def _has_a_time(self) -> Self:
         if self.at is None and self.between is None:
             raise problem("visits need 'at' or 'between'")
-        if self.every < timedelta(days=1):
+        if self.every < DAY:
             raise problem_at(("every",), "visits come once a day at most: give 1 d or more")
         return self
 

@@ -56,6 +56,7 @@ from fleet2d.routines.interruptions import (
 )
 from fleet2d.routines.planner import REST, SLEEP, AnyRecordedDay, DayPlan
 from fleet2d.routines.templates import check, day_plans
+from fleet2d.runtime.clock import DAY
 
 
 class Manners(Settings):
@@ -98,7 +99,6 @@ class Manners(Settings):
 
 FOLDER = Path(__file__).parent
 BUNDLED, PARTS = FOLDER / "personas", FOLDER / "parts"
-DAY = timedelta(days=1)
 Dates = tuple[date | tuple[date, date], ...]
 
 

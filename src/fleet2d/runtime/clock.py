@@ -1,6 +1,7 @@
 """Simulated time: steps of one length from a start, local times, and the sun of each day."""
 
 from bisect import bisect_left
+from collections.abc import Iterator
 from dataclasses import dataclass
 from datetime import date, datetime, time, timedelta
 from functools import lru_cache
@@ -76,6 +77,18 @@ class Clock:
 def midnight_of(moment: datetime) -> datetime:
     """Return the midnight that begins the day of a moment."""
     return datetime.combine(moment.date(), time())
+
+
+def midnights(begin: datetime, end: datetime | None = None) -> Iterator[datetime]:
+    """Yield the midnight that begins the day of a moment, and all later ones before `end`.
+
+    >>> [midnight.day for midnight in midnights(datetime(2026, 1, 5, 8), datetime(2026, 1, 7, 1))]
+    [5, 6, 7]
+    """
+    midnight = midnight_of(begin)
+    while end is None or midnight < end:
+        yield midnight
+        midnight += DAY
 
 
 # The day from which the numbers of the almanac count: 1 January 2000, at noon.

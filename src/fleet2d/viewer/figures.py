@@ -30,7 +30,7 @@ from fleet2d.pictures.life import blurred
 from fleet2d.pictures.run import run_figure
 from fleet2d.pictures.theme import SCALE
 from fleet2d.runs.run import Run
-from fleet2d.runtime.clock import midnight_of
+from fleet2d.runtime.clock import DAY, midnight_of
 from fleet2d.viewer.moments import clock_of, part_of_run
 from fleet2d.viewer.run_facts import bodies_of
 from fleet2d.viewer.stage import Stage, draw_strip, strip_rows
@@ -285,5 +285,5 @@ def _day_around(run: Run, step: int) -> tuple[int, int]:
     clock = clock_of(run)
     midnight = midnight_of(clock.time(step))
     first = clock.step_at_or_after(clock.elapsed(midnight))
-    end = clock.step_at_or_after(clock.elapsed(midnight + timedelta(days=1)))
+    end = clock.step_at_or_after(clock.elapsed(midnight + DAY))
     return max(0, first), min(clock.steps, end)

@@ -14,12 +14,12 @@ import yaml
 from fleet2d.configuration.units import format_duration
 from fleet2d.errors import ArtifactError, InputError
 from fleet2d.runs.run import Run
+from fleet2d.runtime.clock import DAY
 from fleet2d.viewer.moments import clock_of
 from fleet2d.viewer.notebook import figure_png
 from fleet2d.viewer.page_data import POLICY, PageData, embedded_run, html_of, write_file
 from fleet2d.viewer.run_facts import run_title
 
-DAY = timedelta(days=1)
 MAX_TIMELINE_CHARS = 20_000_000
 """The maximum number of characters of a page that is embedded in a report."""
 STYLE = """

@@ -19,6 +19,7 @@ from fleet2d.configuration.units import PositiveDuration, Share
 from fleet2d.errors import ComponentError
 from fleet2d.floorplan.home import Home
 from fleet2d.kernels import F64, I64, resampled
+from fleet2d.runtime.clock import DAY
 from fleet2d.runtime.determinism import stream_key
 
 EXACT = 1 << 40
@@ -28,7 +29,6 @@ LN_2 = 0.6931471805599453
 ROOT_HALF = 0.7071067811865476
 TERMS = 11  # of the series: the first left out is below 1e-17 of the sum
 
-DAY = timedelta(days=1)
 SECOND_US = 1_000_000
 
 

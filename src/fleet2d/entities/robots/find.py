@@ -40,7 +40,7 @@ from fleet2d.entities.robots.search import (
 )
 from fleet2d.errors import PlacementError
 from fleet2d.kernels import F64, TURN
-from fleet2d.runtime.clock import midnight_of
+from fleet2d.runtime.clock import DAY, midnight_of
 from fleet2d.runtime.determinism import sum_in_order
 
 # The part of a room to be shown by its viewpoints, if there are few enough of them.
@@ -119,9 +119,6 @@ class Sites:
     def _seconds(self, start: tuple[int, int], goal: tuple[int, int]) -> float:
         seconds = way_seconds(self._actor, start, goal)
         return BLOCKED_ROUTE_S if seconds is None else seconds
-
-
-DAY = timedelta(days=1)
 
 
 class EmptyLook(NamedTuple):

@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 from fleet2d.configuration.components import Settings, register
 from fleet2d.configuration.problems import problem
 from fleet2d.configuration.units import Days, Duration, TimeOfDay, weekdays_of
-from fleet2d.entities.behavior import DAY, DOOR_WAIT, Actor, Behavior, Situation
+from fleet2d.entities.behavior import DOOR_WAIT, Actor, Behavior, Situation
 from fleet2d.entities.place import (
     Place,
     Point,
@@ -27,7 +27,7 @@ from fleet2d.entities.robots.approach import (
     unwatched,
 )
 from fleet2d.floorplan.plan import Room
-from fleet2d.runtime.clock import midnight_of
+from fleet2d.runtime.clock import DAY, midnight_of
 
 MAX_NAMED = 6  # how many rooms a note names
 

@@ -12,12 +12,11 @@ from fleet2d.configuration.units import Duration, OnDays, TimeOfDay, format_time
 from fleet2d.entities.behavior import Behavior, Situation
 from fleet2d.entities.place import Place, Point, RoomChoice, available_places, is_point, seat_at
 from fleet2d.entities.plan import Plan
-from fleet2d.runtime.clock import midnight_of
+from fleet2d.runtime.clock import DAY, midnight_of, midnights
 
 if TYPE_CHECKING:
     from fleet2d.entities.behavior import Actor
 
-DAY = timedelta(days=1)
 AWAY: tuple[()] = ()
 
 
@@ -146,12 +145,10 @@ class Schedule(Behavior):
 
     def _between(self, since: datetime, until: datetime) -> Iterator[tuple[datetime, AgendaEntry]]:
         """Yield the entries that begin from `since` on and before the midnight `until`."""
-        midnight = midnight_of(since)
-        while midnight < until:
+        for midnight in midnights(since, until):
             for entry in self.week[midnight.weekday()]:
                 if midnight + entry.begins >= since:
                     yield midnight + entry.begins, entry
-            midnight += DAY
 
     def _week(self) -> list[list[AgendaEntry]]:
         week: list[list[AgendaEntry]] = [[] for _ in range(7)]
