@@ -10,8 +10,8 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager, suppress
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager, nullcontext, suppress
 from dataclasses import dataclass
 from time import perf_counter
 from typing import Any
@@ -90,8 +90,7 @@ def change_home(state: State, span: Span) -> None:
 def decide(state: State, span: Span) -> None:
     """Let bodies decide whose plan is over, and robots that would drive at a person."""
     step, clearance, blocking = span.first, state.clearance, state.blocking
-    rows = {*state.bodies.due(step), *clearance.robots, *blocking.rows}
-    for row in sorted(rows):
+    for row in _asked(state, step):
         actor = state.actors[row]
         if clearance.looks(row, step):
             state.bodies.ask_at[row] = step
@@ -120,6 +119,12 @@ def decide(state: State, span: Span) -> None:
         if begins:
             state.changes.expect(row, actor)
             state.begin_plan(row, step)
+
+
+def _asked(state: State, step: int) -> Sequence[int]:
+    """Return the rows of the bodies that may begin a plan at a step, in order."""
+    rows, giving_way, blocking = state.bodies.due(step), state.clearance.robots, state.blocking.rows
+    return sorted({*rows, *giving_way, *blocking}) if giving_way or blocking else rows
 
 
 def _follow_plan(state: State, row: int) -> None:
@@ -227,6 +232,7 @@ Phase = Callable[[State, Span], None]
 
 PHASES: tuple[Phase, ...] = (intervene, change_home, decide, move, watch, record, learn)
 """The phases of a span, in order."""
+AT_DECISIONS = PHASES.index(decide)
 
 
 # The loop
@@ -311,14 +317,14 @@ class Loop:
         """
         began, stored_s = perf_counter(), state.recorder.wall_s
         try:
-            with restrict(self._trust):
+            with nullcontext() if current_trust() is self._trust else restrict(self._trust):
                 while state.bodies.step < end:
                     span = Span(state.bodies.step, end)
                     intervene(state, span)
                     change_home(state, span)
                     if asks(state, span.first):
                         return True
-                    for phase in PHASES[PHASES.index(decide) :]:
+                    for phase in PHASES[AT_DECISIONS:]:
                         phase(state, span)
             return False
         except BaseException:

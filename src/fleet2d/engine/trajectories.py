@@ -180,18 +180,16 @@ class KeyFrames:
     def end_plan(self, row: int, step: int) -> None:
         """Collect the end of the plan that is replaced at `step`."""
         self.pass_by(row, step)
-        self._walk_on(row, step)
-        self.break_off(row, step)
-        motion = self._actors[row].motion
-        track = motion.breakpoints if isinstance(motion, Track) else None
-        self._complete_until[row] = (
-            int(track.time[-1])
-            if track is not None and self._emitted[row] == len(track.time)
-            else -1
-        )
+        motion, self._complete_until[row] = self._actors[row].motion, -1
+        if not isinstance(motion, Track):
+            self._walk_on(row, step)
+        elif self._emitted[row] < len(motion.breakpoints.time):
+            self.break_off(row, step)
+        else:
+            self._complete_until[row] = int(motion.breakpoints.time[-1])
 
     def begin_plan(self, row: int, step: int) -> None:
-        """Collect the key frame at the beginning of a body's plan, which was made at `step`."""
+        """Note the beginning of a body's plan, which was made at `step`."""
         moment = step * self._clock.step_us
         # A plan that begins at the end of the last one needs no key frame there.
         self._walked[row] = step + 1
@@ -204,7 +202,6 @@ class KeyFrames:
         else:
             self._walkers.add(row)
             self._segments.append(_key(row, self._walk_kind, moment, actor.state))
-        self.pass_by(row, step)
 
     def move_body(self, row: int, step: int) -> None:
         """Begin the next plan of a body with a key frame, as it doesn't continue the last one.

@@ -243,7 +243,8 @@ class Situation:
     @property
     def room(self) -> "Room | None":
         """The room that the body is in; None when it is away."""
-        return None if self.actor.state.away else self.home.plan.room_at(*self.xy)
+        state = self.actor.state
+        return None if state.away else self.home.plan.room_of_point(state.x, state.y)
 
     @property
     def in_view(self) -> Mapping[str, "Point"]:
@@ -471,10 +472,9 @@ class Actor(Body):
         """Which actions of robots interrupt its plans: those of the first attentive behavior."""
         return self._attentive[1] if self._attentive else None
 
-    @property
-    def event_kinds(self) -> frozenset[str]:
-        """The kinds of events that its behaviors declare in `records`."""
-        return frozenset().union(*(behavior.records for behavior in self.behaviors))
+    def may_record(self, event: str) -> bool:
+        """Return whether one of its behaviors declares a kind of events in `records`."""
+        return any(event in behavior.records for behavior in self.behaviors)
 
     def own_furniture(self, kind: str) -> PlacedObject | None:
         """Return the piece of furniture of a kind that is its own, if its behaviors say so."""

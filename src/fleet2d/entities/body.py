@@ -155,7 +155,8 @@ NEVER = 1 << 62
 """The step of what never happens."""
 
 
-STANDING = np.zeros(1, np.int8), np.zeros(0, np.int64)
+# When the posture of who only stands changes, and the postures: see `Plan.posture_times`.
+STANDING = np.zeros(0, np.int64), np.zeros(1, np.int8)
 
 
 class PoseBlock(NamedTuple):
@@ -239,7 +240,7 @@ class Bodies:
         moment = np.array([self.step * self._step_us], np.int64)
         x, y, heading = (np.array([value], np.int64) for value in pose[:3])
         track = Breakpoints(moment, x, y, heading, np.array([pose.away], np.uint8))
-        self._timelines.follow(row, self.step, track, *STANDING[::-1])
+        self._timelines.follow(row, self.step, track, *STANDING)
         self._window = self._block = None
 
     def window(self, first: int, end: int) -> Window:
@@ -421,10 +422,9 @@ class Body:
         """Return the posture at a moment, by its number in POSTURES; a plain body stands."""
         return 0
 
-    @property
-    def event_kinds(self) -> frozenset[str]:
-        """The kinds of events that its behaviors declare in `records`."""
-        return frozenset()
+    def may_record(self, event: str) -> bool:
+        """Return whether its plans may record a kind of events besides those of Fleet2D."""
+        return False
 
     @property
     def slows(self) -> tuple[SlowRegion, ...]:

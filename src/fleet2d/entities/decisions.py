@@ -464,6 +464,8 @@ class DecidingActor(Actor):
             self._keep_to_bans(now.step)
         if self._chosen is not None or self.order is not None or self.is_stuck:
             return False
+        if self.arbiter.active is None or self.plan.is_over(now.step):
+            return False
         with blame(self.path, now.step):
             answer = self.arbiter.keeps_plan(now, self.plan, self._ask_behavior)
             if answer is True:

@@ -10,7 +10,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationErr
 
 from fleet2d.configuration.problems import did_you_mean, problem, refusal
 from fleet2d.configuration.units import MAX_DURATION, micros
-from fleet2d.entities.body import Motion, RandomWalk, Track
+from fleet2d.entities.body import STANDING, Motion, RandomWalk, Track
 from fleet2d.entities.place import seat_at
 from fleet2d.errors import ComponentError, NoWayError
 from fleet2d.floorplan.placed_objects import POSTURES, PlacedObject, Posture
@@ -70,6 +70,7 @@ class Plan:
         self.began = (step, state)
         self.legs = Legs()
         self._motion: Motion | None = None
+        self._over: tuple[int | None] | None = None  # `over_at`, once it is complete
         self.time_us = step * body.clock.step_us
         self.x, self.y, self.heading, self.away = state
         self.notes: list[Note] = []
@@ -221,6 +222,8 @@ class Plan:
 
     def posture_times(self) -> tuple[I64, I8]:
         """Return when the posture changes [us], int64 (n,), and the postures, int8 (n + 1,)."""
+        if not self.postures and self._posture_before == 0:
+            return STANDING
         codes = [self._posture_before, *(code for _, code in self.postures)]
         times = [time for time, _ in self.postures]
         return np.array(times, np.int64), np.array(codes, np.int8)
@@ -352,7 +355,7 @@ class Plan:
         Raises:
             ComponentError: Neither Fleet2D nor a behavior of the body declares such events.
         """
-        if event not in KINDS and event not in self._body.event_kinds:
+        if event not in KINDS and not self._body.may_record(event):
             raise ComponentError(
                 f"{self._body.path}: there is no event {event!r}{did_you_mean(event, KINDS)} A"
                 f" behavior declares its own: records = frozenset({{{event!r}}})"
@@ -385,13 +388,16 @@ class Plan:
 
     def ask_by(self, time: datetime) -> Self:
         """Ask the behavior again no later than a local time, even if the plan isn't over."""
-        asks_us = self._body.clock.elapsed(time)
+        asks_us, self._over = self._body.clock.elapsed(time), None
         self.asks_us = asks_us if self.asks_us is None else min(asks_us, self.asks_us)
         return self
 
     @property
     def over_at(self) -> int | None:
         """The step at which it is over, after the one at which it begins; None: never."""
+        return self._over_at() if self._over is None else self._over[0]
+
+    def _over_at(self) -> int | None:
         end_us, asks_us = None if self.endless else self.time_us, self.asks_us
         if asks_us is not None and (end_us is None or asks_us < end_us):
             end_us = asks_us
@@ -406,9 +412,10 @@ class Plan:
         return end is not None and end <= step
 
     def finish(self) -> Motion:
-        """Return the motion of the plan."""
+        """Return the motion of the plan, which is complete."""
         if self._motion is None:
             self._motion = Track(Breakpoints(*self.legs.track()), self.step_us)
+        self._over = (self._over_at(),)
         return self._motion
 
     def _check_goes_on(self) -> None:
