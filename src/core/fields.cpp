@@ -4,7 +4,6 @@
 #include <array>
 #include <limits>
 #include <optional>
-#include <queue>
 #include <vector>
 
 #include "lattice.hpp"
@@ -71,6 +70,19 @@ private:
     Array<i64> start_;  // first column at which each of them is the lowest
 };
 
+// Cells that wait, the first one first.
+class CellQueue {
+public:
+    bool empty() const { return next_ == cells_.size(); }
+    i64 front() const { return cells_[next_]; }
+    void push(i64 cell) { cells_.push_back(cell); }
+    void pop() { ++next_; }
+
+private:
+    std::vector<i64> cells_;  // with those before the first one, as many as the grid has, or a few times that
+    std::size_t next_ = 0;
+};
+
 // A grid with a wall around it, so that no step leads out, and the state of the search on it.
 // Cells are numbered row by row.
 class Walk {
@@ -120,19 +132,19 @@ private:
     i64 number(GridCell cell) const { return (cell.row + 1) * wide_ + cell.column + 1; }
     bool is_closed(i64 cell) const { return state_[cell] == State::closed; }
 
-    void reach(i64 cell, i32 distance, std::queue<i64>& waiting) {
+    void reach(i64 cell, i32 distance, CellQueue& waiting) {
         if (state_[cell] == State::open && distance < distance_[cell]) {
             distance_[cell] = distance;
             waiting.push(cell);
         }
     }
 
-    void drop_settled(std::queue<i64>& waiting) {
+    void drop_settled(CellQueue& waiting) {
         while (!waiting.empty() && state_[waiting.front()] == State::settled) waiting.pop();
     }
 
     // Whether the nearest cell is in the first of two queues, of which one may be empty.
-    bool is_first(const std::queue<i64>& one, const std::queue<i64>& other) const {
+    bool is_first(const CellQueue& one, const CellQueue& other) const {
         if (one.empty() || other.empty()) return other.empty();
         return distance_[one.front()] <= distance_[other.front()];
     }
@@ -140,8 +152,8 @@ private:
     i64 wide_;
     Array<State> state_;
     Array<i32> distance_;
-    std::queue<i64> straight_;  // cells that a step to a side leads to, by distance
-    std::queue<i64> across_;    // cells that a step across a corner leads to, by distance
+    CellQueue straight_;  // cells that a step to a side leads to, by distance
+    CellQueue across_;    // cells that a step across a corner leads to, by distance
 };
 
 // A power of two above the most that a step costs.
