@@ -199,6 +199,8 @@ public:
           cameras_(lenses.widest.shape[0]),
           users_(lenses.widest.shape[1]) {
         for (const i64 seen : memory.seen) identities_in_view_ += seen;
+        result_.newest.assign(static_cast<std::size_t>(memory.seen.size()), -1);
+        latest_.assign(static_cast<std::size_t>(cameras_ * memory.seen.size()), -1);
         for (i64 c = 0; c < cameras_; ++c) {
             is_prompt_ &= lenses.latency[c] == 0 && memory.waiting(c, 1) == 0;
             has_ghosts_ |= errors.has_ghosts[c] != 0;
@@ -210,7 +212,7 @@ public:
     DetectionResult run() {
         for (now_ = next_step(window_.first); now_ < window_.end; now_ = next_step(now_ + 1)) {
             take_up();
-            const std::size_t before = result_.sightings.size();
+            const std::size_t before = result_.sighted_at.size();
             std::size_t i = 0;
             for (i64 c = 0; c < cameras_; ++c) {
                 const bool looks = now_ % lenses_.period[c] == 0;
@@ -221,7 +223,7 @@ public:
                 if (looks) add_injected(c);
             }
             if (!is_prompt_) deliver();
-            if (result_.sightings.size() > before || identities_in_view_ > 0) {
+            if (result_.sighted_at.size() > before || identities_in_view_ > 0) {
                 if (note_events()) {
                     result_.steps = now_ + 1 - window_.first;
                     return std::move(result_);
@@ -385,7 +387,7 @@ private:
     // Publish a sighting, or put it in the backlog. Without latency the backlog isn't needed: the order is the same.
     void record(i64 camera, const Sighting& sighting) {
         if (is_prompt_) {
-            publish(sighting);
+            publish(camera, sighting);
             return;
         }
         i64& length = memory_.waiting(camera, 1);
@@ -402,16 +404,24 @@ private:
             while (length > 0) {
                 const Sighting sighting = read(ring[begin]);
                 if (sighting.step > now_) break;
-                publish(sighting);
+                publish(c, sighting);
                 begin = (begin + 1) % ring.size();
                 --length;
             }
         }
     }
 
-    void publish(const Sighting& sighting) {
-        result_.sightings.push_back(sighting);
-        const i64 identity = sighting.identity == NOBODY ? memory_.noticed.size() - 1 : sighting.identity;
+    void publish(i64 camera, const Sighting& sighting) {
+        const i64 identities = memory_.noticed.size();
+        const i64 identity = sighting.identity == NOBODY ? identities - 1 : sighting.identity;
+        i64& latest = latest_[static_cast<std::size_t>(camera * identities + identity)];
+        if (latest < 0 || !sighting.repeats(result_.distinct[static_cast<std::size_t>(latest)])) {
+            latest = static_cast<i64>(result_.distinct.size());
+            result_.distinct.push_back(sighting);
+        }
+        result_.sighted_at.push_back(sighting.step);
+        result_.index.push_back(static_cast<i32>(latest));
+        result_.newest[static_cast<std::size_t>(identity)] = latest;
         memory_.noticed[identity] = now_;
     }
 
@@ -447,6 +457,7 @@ private:
     i64 identities_in_view_ = 0;
     i64 run_ = 0;  // of the onlooker at the present step
     i64 now_ = 0;
+    std::vector<i64> latest_;  // (cameras * identities,) what each camera last saw of each, among the distinct; -1: none
     DetectionResult result_{};
 };
 

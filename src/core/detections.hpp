@@ -25,6 +25,13 @@ struct Sighting {
     i64 true_x, true_y;
     i64 true_heading;
     i64 true_posture;
+
+    bool operator==(const Sighting&) const = default;
+    // Whether it is as an earlier one, but for the step.
+    bool repeats(Sighting earlier) const {
+        earlier.step = step;
+        return *this == earlier;
+    }
 };
 
 // The columns of a row of sightings, by name.
@@ -81,9 +88,13 @@ struct Onlooker {
     i64 first_other;  // the first of the others, as many as the lenses' users
 };
 
+// While nobody moves, a camera that doesn't err sees the same at each look, so sightings refer to what was seen.
 struct DetectionResult {
-    i64 steps;  // done, the one that stopped it included
-    std::vector<Sighting> sightings;
+    i64 steps;                          // done, the one that stopped it included
+    std::vector<i64> sighted_at;        // the step of each sighting, in order
+    std::vector<i32> index;             // the number of each among the distinct ones
+    std::vector<Sighting> distinct;     // sightings that differ not only in the step, which is that of the first
+    std::vector<i64> newest;            // (identities,) of each the number of its last sighting; -1: none
     std::vector<IdentityEvent> events;  // in order of (step, identity)
 };
 

@@ -20,18 +20,26 @@ struct RoomMemory {
     View<i64, 2> total;  // (people + 2, rooms) their number
 };
 
-// Add sightings to a memory: their steps, whom the robot saw (-1: not recognized), and the rooms, below 0 for none.
-// `start_us` is the time of day at step 0.
-inline void remember(View<const i64> step, View<const i64> identity, View<const i16> room, i64 start_us, i64 step_us,
-                     const RoomMemory& memory) {
+// Add sightings to a memory: their steps, and of each the number of what was seen: whom (-1: not recognized), and the
+// room, below 0 for none. `start_us` is the time of day at step 0.
+inline void remember(View<const i64> step, View<const i32> index, View<const i64> identity, View<const i16> room,
+                     i64 start_us, i64 step_us, const RoomMemory& memory) {
     const i64 anyone = memory.last.size() - 1;
-    for (i64 k = 0; k < step.size(); ++k) {
-        if (room[k] < 0) continue;
-        const i64 hour = (start_us + step[k] * step_us) / US_PER_HOUR % HOURS_OF_DAY;
-        for (const i64 row : {identity[k] < 0 ? anyone - 1 : identity[k], anyone}) {
-            memory.last(row, room[k]) = std::max(memory.last(row, room[k]), step[k]);
-            ++memory.looks(row, room[k], hour);
-            ++memory.total(row, room[k]);
+    for (i64 k = 0; k < step.size();) {
+        // Those that repeat this one within the hour are added at once.
+        const i64 first = k, at = room[index[k]];
+        const i64 hours = (start_us + step[k] * step_us) / US_PER_HOUR;
+        const i64 until = ((hours + 1) * US_PER_HOUR - start_us + step_us - 1) / step_us;
+        i64 last = step[k];
+        for (; k < step.size() && index[k] == index[first] && step[k] >= step[first] && step[k] < until; ++k) {
+            last = std::max(last, step[k]);
+        }
+        if (at < 0) continue;
+        const i64 who = identity[index[first]];
+        for (const i64 row : {who < 0 ? anyone - 1 : who, anyone}) {
+            memory.last(row, at) = std::max(memory.last(row, at), last);
+            memory.looks(row, at, hours % HOURS_OF_DAY) += k - first;
+            memory.total(row, at) += k - first;
         }
     }
 }

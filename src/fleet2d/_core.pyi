@@ -975,7 +975,7 @@ USER_LOST: int = 0
 
 USER_SEEN: int = 1
 
-def detect(walls: Mesh, lenses: tuple[Any, ...], errors: tuple[Any, ...], rule: tuple[Any, ...], window: Window, body: int, first_other: int, memory: tuple[Any, ...], shown: numpy.typing.NDArray[numpy.uint64] | None = None, radii: numpy.typing.NDArray[numpy.int64] | None = None, heights: tuple[Any, ...] | None = None) -> tuple[int, numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64]]:
+def detect(walls: Mesh, lenses: tuple[Any, ...], errors: tuple[Any, ...], rule: tuple[Any, ...], window: Window, body: int, first_other: int, memory: tuple[Any, ...], shown: numpy.typing.NDArray[numpy.uint64] | None = None, radii: numpy.typing.NDArray[numpy.int64] | None = None, heights: tuple[Any, ...] | None = None) -> tuple[int, numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int32], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64]]:
     """
     Look at all others in the steps of a window, up to the first with an event that stops it.
 
@@ -994,9 +994,10 @@ def detect(walls: Mesh, lenses: tuple[Any, ...], errors: tuple[Any, ...], rule: 
         heights: The heights of cameras, bodies and furniture, a `fleet2d.kernels.Heights`; None: they don't matter.
 
     Returns:
-        The steps done (the stopping one included); the sightings, int64 (SIGHTING, n), with the columns of
-        `SightingColumn`; and the identities that came into view or were lost, in order of (step, identity): step, identity
-        and kind (USER_SEEN or USER_LOST), int64 (m,) each.
+        The steps done (the stopping one included); of each sighting the step, int64 (n,), and the number among the
+        distinct ones, int32 (n,); these, int64 (SIGHTING, k), with the columns of `SightingColumn` and the step of the
+        first; the number of the last sighting of each identity, int64 (identities,), -1 for none; and the identities that came into view or were
+        lost, in order of (step, identity): step, identity and kind (USER_SEEN or USER_LOST), int64 (m,) each.
 
     Raises:
         ValueError: Shapes don't agree, or a number is none of a user or camera.
@@ -1808,14 +1809,15 @@ def charge_falls_to(track: tuple[Any, ...], battery: tuple[Any, ...], level: flo
     Return the moment of a track at which the charge has fallen to a level [us]; None if it never does.
     """
 
-def remember(step: numpy.typing.NDArray[numpy.int64], identity: numpy.typing.NDArray[numpy.int64], room: numpy.typing.NDArray[numpy.int16], start_us: int, step_us: int, memory: tuple[Any, ...]) -> None:
+def remember(step: numpy.typing.NDArray[numpy.int64], index: numpy.typing.NDArray[numpy.int32], identity: numpy.typing.NDArray[numpy.int64], room: numpy.typing.NDArray[numpy.int16], start_us: int, step_us: int, memory: tuple[Any, ...]) -> None:
     """
     Add sightings to a memory.
 
     Args:
         step: int64 (n,), when.
-        identity: int64 (n,), whom the robot saw; -1: somebody whom it didn't recognize.
-        room: int16 (n,), where; below 0 for no room: these are left out.
+        index: int32 (n,), the number of each among those that differ not only in the step.
+        identity: int64 (m,), whom the robot saw in each of these; -1: somebody whom it didn't recognize.
+        room: int16 (m,), where; below 0 for no room: these are left out.
         start_us: Time of day at step 0 [us].
         step_us: Length of a step [us].
         memory: The `RoomMemory`, which changes.

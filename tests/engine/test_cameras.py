@@ -8,8 +8,9 @@ import pytest
 from tests.scenes import OWN, everything, scenario
 
 import fleet2d
+from fleet2d.algorithms.observations import SightingTable
 from fleet2d.engine import loop
-from fleet2d.engine.cameras import Cameras
+from fleet2d.engine.cameras import NOTHING, Cameras
 from fleet2d.engine.loop import PHASES, Span
 from fleet2d.kernels import new_memory
 
@@ -67,10 +68,9 @@ def test_those_who_wait_have_looked_at_the_same_steps(stops: list[int]) -> None:
 
 def observed(cameras: Cameras) -> Any:
     """Return all that cameras carry along and have perceived."""
-    sightings = cameras.collect()
-    cameras._sightings = [sightings]
+    sightings = SightingTable.joined(cameras._sightings or [NOTHING])
     memory = [array.tolist() for array in cameras.memory]
-    return cameras.next_step, memory, cameras.perceived.tolist(), sightings.tolist()
+    return cameras.next_step, memory, cameras.perceived.tolist(), sightings.rows().tolist()
 
 
 def looks() -> dict[str, Any]:

@@ -462,6 +462,7 @@ CALLS: dict[str, Args] = {
     "charge_falls_to": lambda: (track(), battery(), 0.1),
     "remember": lambda: (
         np.array([5, 7]),
+        np.array([1, 0], np.int32),
         np.array([0, -1]),
         np.array([1, -1], np.int16),
         0,
@@ -850,7 +851,7 @@ WRITTEN = {
     "record_coverage": [*((5, i) for i in range(5)), *((6, i) for i in range(6))],
     "settle_coverage": [*((1, i) for i in range(5)), (2,)],
     "trace_track": [(3, i) for i in range(4)],
-    "remember": [(5, i) for i in range(3)],
+    "remember": [(6, i) for i in range(3)],
     "show_memory": [*((0, i) for i in range(3)), (6,)],
     "trace_meander": [(5, i) for i in range(4)],
     "detect": [(7, i) for i in range(5)],

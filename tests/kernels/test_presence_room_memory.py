@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from tests.reference import room_memory as slow
 
@@ -27,12 +27,16 @@ def empty() -> RoomMemory:
 def remembered(seen: list[slow.Sighting]) -> RoomMemory:
     """Return a memory of sightings."""
     memory, rows = empty(), np.array(seen, np.int64).reshape(-1, 3)
-    step, identity, room = rows.T.copy()
-    remember(step, identity, room.astype(np.int16), START_S * SECOND, SECOND, memory)
+    step, distinct, index = rows[:, 0].copy(), *np.unique(rows[:, 1:], axis=0, return_inverse=True)
+    identity, room = distinct[:, 0].copy(), distinct[:, 1].astype(np.int16)
+    index = index.ravel().astype(np.int32)
+    remember(step, index, identity, room, START_S * SECOND, SECOND, memory)
     return memory
 
 
 @given(sightings)
+@example([(step, 0, 1) for step in range(3590, 3611)])  # over an hour, and the next ones again
+@example([(3599, 0, 1), (3600, 0, 1), (3600, 0, 1), (10, 0, 1)])
 def test_memory_of_sightings_equals_the_slow_twin(seen: list) -> None:
     expected = slow.memory_of(seen, PEOPLE, ROOMS, START_S)
     assert expected == tuple(part.tolist() for part in remembered(seen))

@@ -16,6 +16,8 @@ from tests.reference.random import key_of_word
 from tests.strategies import homes, quick, seeds
 
 from fleet2d._core import in_wedge
+from fleet2d.algorithms.observations import SightingTable
+from fleet2d.engine.cameras import newest_of
 from fleet2d.floorplan.lattice import Lattice
 from fleet2d.kernels import (
     I64,
@@ -268,7 +270,7 @@ def looked(
     rule = rule._replace(stop_lost=stops[0], stop_seen=stops[1])
     before = memory.about.copy()
     heights = scene.heights_for(eyes)
-    done, columns, *events = detect(
+    done, step, index, distinct, newest, *events = detect(
         home.mesh,
         lenses,
         errors,
@@ -279,10 +281,14 @@ def looked(
         scene.radii(),
         heights and heights[0],
     )
+    rows = SightingTable(step, index, distinct.T).rows()
+    assert newest_of(rows, len(newest)) == [
+        int(np.flatnonzero(index == number)[-1]) if number >= 0 else -1 for number in newest
+    ]
     counts = (memory.about - before)[..., [About.IN_VIEW, About.NOTICED]]
     return Seen(
         done,
-        [tuple(row) for row in columns.T.tolist()],
+        [tuple(row) for row in rows.tolist()],
         list(zip(*(column.tolist() for column in events), strict=True)),
         counts.tolist(),
         memory.noticed.tolist(),

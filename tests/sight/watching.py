@@ -10,6 +10,7 @@ import numpy.typing as npt
 import shapely
 from tests.homes import home_of
 
+from fleet2d.algorithms.observations import SightingTable
 from fleet2d.floorplan.lattice import Lattice
 from fleet2d.kernels import (
     F64,
@@ -100,9 +101,11 @@ class Watch:
         poses = _lattice(np.concatenate([robot[None], self.users]))
         window = Window(self.first, *poses, np.zeros((count + 1, steps), np.uint8), posture)
         lenses = stack_lenses([lens], [True], scene)
-        done, sightings, *_ = detect(self.walls, lenses, errors, rule, window, 0, 1, self.memory)
+        done, step, index, distinct, *_ = detect(
+            self.walls, lenses, errors, rule, window, 0, 1, self.memory
+        )
         assert done == steps
-        return sightings.T
+        return SightingTable(step, index, distinct.T).rows()
 
 
 def _lattice(poses: F64) -> list[I64]:

@@ -21,6 +21,7 @@
 #include <stdexcept>
 #include <string>
 #include <tuple>
+#include <vector>
 
 #include "../array.hpp"
 
@@ -51,6 +52,12 @@ bool all_in_range(View<const T, N> numbers, i64 first, i64 last) {
         if (!all_in_range(numbers[i], first, last)) return false;
     }
     return true;
+}
+
+// What a kernel has collected, as an array.
+template <class T>
+Array<T> array_of(const std::vector<T>& values) {
+    return Array<T>::copy_of({values.data(), {static_cast<i64>(values.size())}});
 }
 
 namespace border {

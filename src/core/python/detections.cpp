@@ -173,8 +173,9 @@ for standing, 1 sitting, 2 lying.)");
                 const IdentityEvent& event = result.events[static_cast<std::size_t>(i)];
                 step[i] = event.step, identity[i] = event.identity, kind[i] = static_cast<i64>(event.kind);
             }
-            return std::tuple(result.steps, columns_of(result.sightings), std::move(step), std::move(identity),
-                              std::move(kind));
+            return std::tuple(result.steps, array_of(result.sighted_at), array_of(result.index),
+                              columns_of(result.distinct), array_of(result.newest), std::move(step),
+                              std::move(identity), std::move(kind));
         },
         "walls"_a, "lenses"_a, "errors"_a, "rule"_a, "window"_a, "body"_a, "first_other"_a, "memory"_a,
         "shown"_a = nb::none(), "radii"_a = nb::none(), "heights"_a = nb::none(),
@@ -195,9 +196,10 @@ Args:
     heights: The heights of cameras, bodies and furniture, a `fleet2d.kernels.Heights`; None: they don't matter.
 
 Returns:
-    The steps done (the stopping one included); the sightings, int64 (SIGHTING, n), with the columns of
-    `SightingColumn`; and the identities that came into view or were lost, in order of (step, identity): step, identity
-    and kind (USER_SEEN or USER_LOST), int64 (m,) each.
+    The steps done (the stopping one included); of each sighting the step, int64 (n,), and the number among the
+    distinct ones, int32 (n,); these, int64 (SIGHTING, k), with the columns of `SightingColumn` and the step of the
+    first; the number of the last sighting of each identity, int64 (identities,), -1 for none; and the identities that came into view or were
+    lost, in order of (step, identity): step, identity and kind (USER_SEEN or USER_LOST), int64 (m,) each.
 
 Raises:
     ValueError: Shapes don't agree, or a number is none of a user or camera.)");

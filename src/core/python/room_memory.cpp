@@ -32,25 +32,27 @@ void check(const RoomMemory& memory) {
 void bind_room_memory(nb::module_& m) {
     m.def(
         "remember",
-        [](View<const i64> step, View<const i64> identity, View<const i16> room, i64 start_us, i64 step_us,
-           const RoomMemory& memory) {
+        [](View<const i64> step, View<const i32> index, View<const i64> identity, View<const i16> room, i64 start_us,
+           i64 step_us, const RoomMemory& memory) {
             check(memory);
-            require(identity.size() == step.size() && room.size() == step.size(),
-                    "step, identity and room must have one length");
+            require(index.size() == step.size() && identity.size() == room.size(),
+                    "step and index must have one length, identity and room, too");
+            require(all_in_range(index, 0, room.size()), "index must hold numbers of sightings that differ");
             require(all_in_range(identity, -1, memory.last.size() - 2), "there is no such person");
             require(all_in_range(room, INT16_MIN, memory.last.shape[1]), "there is no such room");
             require(
                 step_us > 0 && start_us >= 0 && start_us <= LATEST_STEP && all_in_range(step, 0, LATEST_STEP / step_us),
                 "times must be from 0 to 2**60 us");
-            remember(step, identity, room, start_us, step_us, memory);
+            remember(step, index, identity, room, start_us, step_us, memory);
         },
-        "step"_a, "identity"_a, "room"_a, "start_us"_a, "step_us"_a, "memory"_a,
+        "step"_a, "index"_a, "identity"_a, "room"_a, "start_us"_a, "step_us"_a, "memory"_a,
         R"(Add sightings to a memory.
 
 Args:
     step: int64 (n,), when.
-    identity: int64 (n,), whom the robot saw; -1: somebody whom it didn't recognize.
-    room: int16 (n,), where; below 0 for no room: these are left out.
+    index: int32 (n,), the number of each among those that differ not only in the step.
+    identity: int64 (m,), whom the robot saw in each of these; -1: somebody whom it didn't recognize.
+    room: int16 (m,), where; below 0 for no room: these are left out.
     start_us: Time of day at step 0 [us].
     step_us: Length of a step [us].
     memory: The `RoomMemory`, which changes.)");

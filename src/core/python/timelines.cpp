@@ -12,11 +12,6 @@ std::vector<T> copied(View<const T> values) {
     return {values.begin(), values.end()};
 }
 
-template <class T>
-Array<T> array_of(const std::vector<T>& values) {
-    return Array<T>::copy_of({values.data(), {static_cast<i64>(values.size())}});
-}
-
 constexpr i64 FAR = i64{1} << 29;  // where a random walk is, and its headings, are nearer to 0
 constexpr const char* NO_STATE = "this is no state of timelines";
 

@@ -19,6 +19,7 @@ from fleet2d.algorithms.observations import (
     Looks,
     NearestRooms,
     Observations,
+    SightingTable,
     Truth,
     frozen,
 )
@@ -39,13 +40,14 @@ from fleet2d.kernels import (
     rooms_at,
     sum_moves,
 )
-from fleet2d.kernels import SightingColumn as Column
 from fleet2d.runtime.clock import Clock
 from fleet2d.runtime.events import HOME, Event, EventKind
 
 
 class Blocks:
-    """Consecutive arrays, each for an interval of steps; only their first dimension differs.
+    """Consecutive arrays, or `SightingTable`, each for an interval of steps.
+
+    Arrays only differ in their first dimension.
 
     Example:
         >>> blocks = Blocks()
@@ -62,16 +64,16 @@ class Blocks:
         """Begin without blocks."""
         self._begins: list[int] = []
         self._ends: list[int] = []
-        self._rows: list[NDArray[Any]] = []
+        self._rows: list[Any] = []
 
-    def append(self, begin: int, end: int, rows: NDArray[Any]) -> None:
+    def append(self, begin: int, end: int, rows: NDArray[Any] | SightingTable) -> None:
         """Append the rows of the stretch from `begin` up to before `end`, the latest so far."""
         self._begins.append(begin)
         self._ends.append(end)
         self._rows.append(rows)
 
     def touching(self, begin: int, end: int) -> tuple[int, NDArray[Any] | None]:
-        """Return all blocks that overlap a stretch of time, joined, and where they begin."""
+        """Return all arrays that overlap a stretch of time, joined, and where they begin."""
         overlap = self._touching(begin, end)
         blocks = self._rows[overlap]
         if not blocks:
@@ -79,7 +81,7 @@ class Blocks:
         rows = blocks[0] if len(blocks) == 1 else np.concatenate(blocks)
         return self._begins[overlap.start], rows
 
-    def each_touching(self, begin: int, end: int) -> list[NDArray[Any]]:
+    def each_touching(self, begin: int, end: int) -> list[Any]:
         """Return each block that overlaps a stretch of time."""
         return self._rows[self._touching(begin, end)]
 
@@ -235,7 +237,7 @@ class Log:
         self.wanted: Sequence[Wanted] = ()  # the requests that came up
         self.answer_models: Mapping[str, Answers] = {}  # of each user: truth
         self._motions = motions
-        self._observations = Blocks()  # (n, OBSERVATION), by step
+        self._observations = Blocks()  # SightingTable, by step
         self._events: list[Event] = []
         self.readings: list[SensorRow] = []
         self.cameras: list[tuple[int, str]] = []  # index of the robot, and name of the camera
@@ -305,12 +307,10 @@ class Log:
             self._poses[key] = BodyPoses(self.home, path)
         return self._poses[key]
 
-    def observe(self, rows: I64) -> None:
-        """Store the observations of a span: int64 (n, OBSERVATION), in order of step."""
-        if len(rows):
-            self._observations.append(
-                int(rows[0, Column.STEP]), int(rows[-1, Column.STEP]) + 1, rows
-            )
+    def observe(self, seen: SightingTable) -> None:
+        """Store the observations of a span."""
+        if len(seen):
+            self._observations.append(int(seen.step[0]), int(seen.step[-1]) + 1, seen)
 
     def observations(self, first: int, end: int) -> Observations:
         """Return the observations of the steps from `first` to `end` - 1."""
@@ -318,10 +318,7 @@ class Log:
         return Observations(
             self.home.plan,
             self._rooms,
-            [
-                rows[slice(*np.searchsorted(rows[:, Column.STEP], (first, end)).tolist())]
-                for rows in blocks
-            ],
+            [block.between(first, end) for block in blocks],
             self.activities,
         )
 

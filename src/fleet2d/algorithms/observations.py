@@ -26,11 +26,79 @@ from fleet2d.kernels import SightingColumn as Column
 
 Names = NDArray[np.object_]  # str, or None where no activity is known
 
-# A row of observations is a row of the sight kernel, followed by the robot's index.
+# Columns of observations are those of the sight kernel, followed by the robot's index.
 ROBOT = len(Column)
 NOTHING = 0  # the code for no known activity
 NOWHERE = -1  # the room of a body that is away
 OBSERVATION = ROBOT + 1  # number of columns of a row of observations
+
+
+@dataclass(frozen=True, slots=True)
+class SightingTable:
+    """Sightings, or observations, in order of step.
+
+    While nobody moves, most repeat the one before at another step, so what was seen is stored once.
+
+    Attributes:
+        step: int64 (n,), when each became known.
+        index: int32 (n,), the number of each among the distinct ones.
+        distinct: int64 (k, columns), sightings that differ not only in the step.
+
+    Example:
+        >>> rows = np.zeros((2, OBSERVATION), np.int64)
+        >>> rows[:, Column.STEP] = 5, 9
+        >>> both = SightingTable(np.array([5, 6, 7]), np.array([0, 0, 0], np.int32), rows[:1])
+        >>> len(both), both.between(6, 9).column(Column.STEP).tolist()
+        (3, [6, 7])
+        >>> SightingTable.joined([both, SightingTable.of_rows(rows)]).index.tolist()
+        [0, 0, 0, 1, 2]
+    """
+
+    step: I64
+    index: I32
+    distinct: I64
+
+    def __len__(self) -> int:
+        """Return the number of sightings."""
+        return len(self.step)
+
+    @classmethod
+    def of_rows(cls, rows: I64) -> Self:
+        """Return sightings from all columns of each: int64 (n, columns)."""
+        return cls(rows[:, Column.STEP], np.arange(len(rows), dtype=np.int32), rows)
+
+    @classmethod
+    def joined(cls, blocks: "Sequence[SightingTable]") -> "SightingTable":
+        """Return one or more blocks, one after the other."""
+        if len(blocks) == 1:
+            return blocks[0]
+        counts = [len(block.distinct) for block in blocks]
+        index = np.concatenate([block.index for block in blocks])
+        index += np.repeat(np.cumsum([0, *counts[:-1]]), [len(block) for block in blocks])
+        return cls(
+            np.concatenate([block.step for block in blocks]),
+            index,
+            np.concatenate([block.distinct for block in blocks]),
+        )
+
+    def between(self, first: int, end: int) -> "SightingTable":
+        """Return those of the steps from `first` to `end` - 1."""
+        part = slice(*np.searchsorted(self.step, (first, end)).tolist())
+        index, distinct = self.index[part], self.distinct
+        if len(index) < len(distinct):
+            used, of_used = np.unique(index, return_inverse=True)
+            index, distinct = of_used.astype(np.int32), distinct[used]
+        return SightingTable(self.step[part], index, distinct)
+
+    def column(self, number: int) -> I64:
+        """Return a column: int64 (n,)."""
+        return self.step if number == Column.STEP else self.distinct[:, number][self.index]
+
+    def rows(self) -> I64:
+        """Return all columns of each: int64 (n, columns), stored by column."""
+        rows: I64 = np.take(self.distinct.T, self.index, axis=1).T
+        rows[:, Column.STEP] = self.step
+        return rows
 
 
 @dataclass(frozen=True)
@@ -164,94 +232,90 @@ class Observations:
         self,
         plan: FloorPlan,
         rooms: "NearestRooms",
-        blocks: Sequence[I64],
+        blocks: Sequence[SightingTable],
         activities: Activities,
     ) -> None:
-        """Keep the rows.
+        """Keep the blocks.
 
         Args:
             plan: The floor plan.
             rooms: The rooms of the plan.
-            blocks: Consecutive rows, int64 (n, OBSERVATION); columns are only joined on demand.
+            blocks: Consecutive ones, with the columns of observations; joined on demand.
             activities: What users do.
         """
         self._plan, self._rooms, self._activities = plan, rooms, activities
-        self._blocks = blocks or [np.empty((0, OBSERVATION), np.int64)]
+        self._blocks = blocks or [SightingTable.of_rows(np.empty((0, OBSERVATION), np.int64))]
 
     def __len__(self) -> int:
         """Return the number of observations."""
         return sum(map(len, self._blocks))
 
-    def _column(self, number: int) -> I64:
-        columns = [block[:, number] for block in self._blocks]
-        return columns[0] if len(columns) == 1 else np.concatenate(columns)
-
     @cached_property
-    def _rows(self) -> I64:
-        """All columns of all rows: int64 (n, OBSERVATION)."""
-        return self._blocks[0] if len(self._blocks) == 1 else np.concatenate(self._blocks)
+    def _all(self) -> SightingTable:
+        return SightingTable.joined(self._blocks)
+
+    def _spread(self, values: NDArray[Any]) -> NDArray[Any]:
+        """Return of each observation the value of its distinct one, read-only."""
+        return read_only(values[self._all.index])
 
     @cached_property
     def step(self) -> I64:
         """Step at which the observation became known: int64 (n,)."""
-        return read_only(self._column(Column.STEP))
+        return read_only(self._all.step)
 
     @cached_property
     def robot(self) -> I32:
         """Index of the robot: int32 (n,)."""
-        return read_only(self._column(ROBOT).astype(np.int32))
+        return self._spread(self._all.distinct[:, ROBOT].astype(np.int32))
 
     @cached_property
     def user(self) -> I32:
         """Index of the recognized user, NOBODY if not recognized: int32 (n,)."""
-        return read_only(self._column(Column.IDENTITY).astype(np.int32))
+        return self._spread(self._all.distinct[:, Column.IDENTITY].astype(np.int32))
 
     @cached_property
     def _xy(self) -> F64:
-        return read_only(
-            self._plan.lattice.to_metres(
-                np.stack([self._column(Column.X), self._column(Column.Y)], axis=1)
-            )
-        )
+        return self._plan.lattice.to_metres(self._all.distinct[:, [Column.X, Column.Y]])
 
-    @property
+    @cached_property
     def x(self) -> F64:
         """Perceived position along x [m]: float64 (n,)."""
-        return self._xy[:, 0]
+        return self._spread(self._xy[:, 0])
 
-    @property
+    @cached_property
     def y(self) -> F64:
         """Perceived position along y [m]: float64 (n,)."""
-        return self._xy[:, 1]
+        return self._spread(self._xy[:, 1])
 
     @cached_property
     def room(self) -> I16:
         """Room of the perceived position, or the nearest room: int16 (n,)."""
-        return read_only(self.room_in(self._rooms))
+        return self.room_in(self._rooms)
 
     def room_in(self, rooms: "NearestRooms") -> I16:
         """Return the nearest of some rooms, or patches, to each perceived position: int16 (n,)."""
-        return rooms.of(self._column(Column.X), self._column(Column.Y))
+        distinct = self._all.distinct
+        return self._spread(rooms.of(distinct[:, Column.X], distinct[:, Column.Y]))
 
     @cached_property
     def heading(self) -> F64:
         """Perceived heading [rad]: float64 (n,)."""
-        return read_only(in_radians(self._column(Column.HEADING)))
+        return self._spread(in_radians(self._all.distinct[:, Column.HEADING]))
 
     @cached_property
     def posture(self) -> I8:
         """Perceived posture, 0 stands, 1 sits, 2 lies: int8 (n,)."""
-        return read_only(self._column(Column.POSTURE).astype(np.int8))
+        return self._spread(self._all.distinct[:, Column.POSTURE].astype(np.int8))
 
     @cached_property
     def camera(self) -> I8:
         """Index among the robot's cameras: int8 (n,)."""
-        return read_only(self._column(Column.CAMERA).astype(np.int8))
+        return self._spread(self._all.distinct[:, Column.CAMERA].astype(np.int8))
 
     @cached_property
     def activity(self) -> Names:
         """Perceived activity; None where activities aren't perceived: object (n,)."""
-        return read_only(self._activities.perceived(self._rows))
+        return read_only(self._activities.perceived(self._all.rows()))
 
 
 class Truth(NamedTuple):
@@ -271,7 +335,7 @@ class Truth(NamedTuple):
     @classmethod
     def behind(cls, observations: Observations) -> Self:
         """Return the truth behind observations."""
-        rows = observations._rows
+        rows = observations._all.rows()
         xy = observations._plan.lattice.to_metres(rows[:, [Column.TRUE_X, Column.TRUE_Y]])
         return cls(
             rows[:, Column.USER].astype(np.int32),

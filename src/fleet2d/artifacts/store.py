@@ -151,14 +151,14 @@ class TableWriter:
 
     Attributes:
         buffer: The newest rows.
-        digest: Digest of the rows that left the buffer.
+        digest: Digest of the rows in the file; None before the first, and for a run in memory.
         chunks: Those rows and the number in each chunk, if the run is in memory.
         file: The file with those rows, if the run is in a directory; None before the first.
         logged: How many rows of the buffer are in the journal.
     """
 
     buffer: TableBuffer
-    digest: TableDigest
+    digest: TableDigest | None = None
     chunks: list[tuple[Chunk, int]] = field(default_factory=list)
     file: ParquetTable | None = None
     logged: int = 0
@@ -167,11 +167,14 @@ class TableWriter:
         """Leave out the functions that listen: they belong to the caller, not to the run."""
         return {**self.__dict__, "row_listeners": []}
 
-    def rehash(self) -> None:
-        """Compute the digest again from the chunks in memory."""
-        self.digest = TableDigest(self.buffer.spec)
+    def hashed(self) -> TableDigest:
+        """Return the digest of the rows that left the buffer; those in memory are hashed now."""
+        if self.digest is not None:
+            return self.digest
+        digest = TableDigest(self.buffer.spec)
         for chunk, rows in self.chunks:
-            self.digest.update(chunk, rows)
+            digest.update(chunk, rows)
+        return digest
 
     def log(self, unfinished: UnfinishedRun | None) -> None:
         """Append the rows of the buffer to the journal that are not in it yet.
@@ -192,10 +195,6 @@ class TableWriter:
         if self.file is None:
             self.file = ParquetTable(root, self.buffer.spec)
         return self.file
-
-    def record(self, digest: str) -> TableRecord:
-        """Return the entry of the manifest about the table."""
-        return table_record(self.buffer.spec, self.digest.rows, digest)
 
 
 class RunStore:
@@ -243,11 +242,6 @@ class RunStore:
         self._unfinished = None if self.root is None else UnfinishedRun(self.root)
         for spec in specs:
             self.add_table(spec)
-
-    def rehash(self) -> None:
-        """Compute the digests of a run in memory again from its rows, after it was unpickled."""
-        for entry in self._tables.values():
-            entry.rehash()
 
     def check(self) -> None:
         """Check, without writing, that the directory can be used.
@@ -365,7 +359,7 @@ class RunStore:
         entry = self._tables.get(spec.name)
         if entry is None:
             buffer = TableBuffer(spec, self._flush_rows)
-            self._tables[spec.name] = TableWriter(buffer, TableDigest(spec))
+            self._tables[spec.name] = TableWriter(buffer)
         elif entry.buffer.spec != spec:
             raise ArtifactError(
                 f"there is a table {spec.name!r} with other columns already: choose another name"
@@ -441,11 +435,13 @@ class RunStore:
             self._flush(entry)
         if self.root is not None:
             self._finish_files(self.root)
-        digests = {
-            name: entry.digest.hexdigest(entry.buffer.words) for name, entry in self._tables.items()
-        }
-        tables = {name: self._tables[name].record(digests[name]) for name in sorted(digests)}
-        self.manifest.tables, self.manifest.digest = tables, run_digest(digests)
+        digests, tables = dict[str, str](), dict[str, TableRecord]()
+        for name, entry in self._tables.items():
+            digest, spec = entry.hashed(), entry.buffer.spec
+            digests[name] = digest.hexdigest(entry.buffer.words)
+            tables[name] = table_record(spec, digest.rows, digests[name])
+        self.manifest.tables = dict(sorted(tables.items()))
+        self.manifest.digest = run_digest(digests)
         self._digests = digests
         return digests
 
@@ -491,7 +487,7 @@ class RunStore:
         return self._digests is not None
 
     def _flush(self, entry: TableWriter) -> None:
-        """Move rows from the buffer to the file, or to the chunks in memory, and hash them."""
+        """Move rows from the buffer to the file and hash them, or to the chunks in memory."""
         rows = entry.buffer.rows
         if not rows:
             return
@@ -499,10 +495,11 @@ class RunStore:
             entry.log(self._unfinished)
         chunk = entry.buffer.take(reuse=self.root is not None)
         entry.logged = 0
-        entry.digest.update(chunk, rows)
         if self.root is None:
             entry.chunks.append((chunk, rows))
             return
+        entry.digest = entry.hashed()
+        entry.digest.update(chunk, rows)
         name = entry.buffer.spec.name
         with self._writing(f"{name}.parquet", entry):
             entry.file_in(self.root).write(chunk, rows, entry.buffer.words)

@@ -6,12 +6,13 @@ that are written in Python.
 
 import math
 from collections.abc import Iterator, Sequence, Set
+from dataclasses import replace
 from fractions import Fraction
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from fleet2d.algorithms.observations import ActivitySense
+from fleet2d.algorithms.observations import OBSERVATION, ActivitySense, SightingTable
 from fleet2d.configuration.units import micros
 from fleet2d.engine.basis import Watcher
 from fleet2d.engine.sighting_errors import sight_events
@@ -88,7 +89,7 @@ GHOST_STREAMS = {
     GhostDraw.HEADING: "faces",
 }
 
-NOTHING: I64 = np.zeros((0, len(SightingColumn)), np.int64)
+NOTHING = SightingTable.of_rows(np.zeros((0, OBSERVATION), np.int64))
 
 
 class Cameras(Watcher):
@@ -159,7 +160,7 @@ class Cameras(Watcher):
         self.perceived = np.zeros((len(self.others) + 1, 2), np.int64)
         self.awaited: Set[str] = frozenset()
         self.remembered: SightingMemory | None = None
-        self._sightings: list[I64] = []  # not collected yet
+        self._sightings: list[SightingTable] = []  # not collected yet
         self._ahead: Look | None = None
 
     def expect_disturbances(self) -> None:
@@ -321,15 +322,16 @@ class Cameras(Watcher):
             result = None
         if result is None:
             result = self._look(bodies, end, stop=False)
-        rows = result.sightings
+        seen = result.sightings
         self.next_step = end
-        if len(rows):
-            self._sightings.append(rows)
+        if len(seen):
+            self._sightings.append(seen)
             if self.remembered is not None:
-                self.remembered.take(rows)
-        identity = rows[:, SightingColumn.IDENTITY]  # -1, somebody unknown, is the last row
-        self.perceived[identity, 0] = rows[:, SightingColumn.X]
-        self.perceived[identity, 1] = rows[:, SightingColumn.Y]
+                self.remembered.take(seen.step, seen.index, seen.distinct)
+            places = seen.distinct[:, SightingColumn.X : SightingColumn.Y + 1]
+            for identity, number in enumerate(result.newest):
+                if number >= 0:
+                    self.perceived[identity] = places[number]
         names, entity = self.event_names, self.owner.name
         return [
             Event(step, entity, names[kind], self.name_of(identity))
@@ -347,12 +349,15 @@ class Cameras(Watcher):
                 x, y = lattice.to_metres(place).tolist()
                 yield self.row, SightEvent(event.event, event.detail, x, y)
 
-    def collect(self) -> I64:
-        """Return the sightings since the last call, int64 (n, columns), stored by column."""
+    def collect(self) -> SightingTable:
+        """Return the sightings since the last call, with the columns of observations."""
         blocks, self._sightings = self._sightings, []
-        if len(blocks) == 1:
-            return blocks[0]
-        return np.concatenate(blocks) if blocks else NOTHING
+        if not blocks:
+            return NOTHING
+        all_blocks = SightingTable.joined(blocks)
+        columns = all_blocks.distinct.T
+        robot = np.full((1, columns.shape[1]), self.index)
+        return replace(all_blocks, distinct=np.concatenate([columns, robot]).T)
 
     def _look(self, bodies: Bodies, end: int, *, stop: bool = True) -> "Look":
         if self.owner.home.unlit and self.sighting_errors is None and self._first == 0:
@@ -375,7 +380,7 @@ class Cameras(Watcher):
                     self.method, home, lenses, poses, crowd, self.next_step, step_us
                 )
                 points[self._dark] = 0
-        count, sightings, step, identity, kind = detect(
+        count, seen_at, index, distinct, latest, step, identity, kind = detect(
             home.walls,
             self.lenses,
             self.errors,
@@ -389,18 +394,19 @@ class Cameras(Watcher):
             self._heights_in(home),
         )
         events = list(zip(step.tolist(), identity.tolist(), kind.tolist(), strict=True))
-        sightings, looked = sightings.T, self.next_step + count
-        end = looked
+        sightings, newest = SightingTable(seen_at, index, distinct.T), latest.tolist()
+        end = looked = self.next_step + count
         if self.sighting_errors is not None:
             before = SightMemory(*old_memory)
-            sightings, differs = self.sighting_errors.change(
-                sightings, self.memory, before, window, looked
+            rows, differs = self.sighting_errors.change(
+                sightings.rows(), self.memory, before, window, looked
             )
+            sightings, newest = SightingTable.of_rows(rows), newest_of(rows, len(newest))
             if differs:
                 patience, stops = self.rule.patience, {USER_LOST: stop_lost, USER_SEEN: stop_seen}
-                events = sight_events(sightings, self.memory, patience, self.next_step, looked)
+                events = sight_events(rows, self.memory, patience, self.next_step, looked)
                 end = next((step + 1 for step, _, kind in events if stops[kind]), looked)
-        return Look(looked, end, sightings, events, old_memory)
+        return Look(looked, end, sightings, newest, events, old_memory)
 
     def _heights_in(self, home: Home) -> Heights | None:
         """Return the heights that matter at present; None if none does."""
@@ -423,14 +429,23 @@ def _drift_of(owner: Actor) -> Drift | None:
 class Look(NamedTuple):
     """The result of a look up to step `looked` - 1, and the memory before it.
 
-    The span ends at `end`, which is earlier if an error changed who was seen when.
+    The span ends at `end`, which is earlier if an error changed who was seen when. `newest` is of
+    each identity the number of the last sighting among the distinct ones, -1 for none.
     """
 
     looked: int
     end: int
-    sightings: I64
+    sightings: SightingTable
+    newest: list[int]
     events: list[tuple[int, int, int]]
     old_memory: list[I64]
+
+
+def newest_of(rows: I64, identities: int) -> list[int]:
+    """Return of each identity the number of its last row, -1 for none."""
+    newest = np.full(identities, -1)
+    newest[rows[:, SightingColumn.IDENTITY]] = np.arange(len(rows))  # -1, unknown, is the last
+    return newest.tolist()
 
 
 # Interventions

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fleet2d.algorithms.history import SensorRow
-from fleet2d.algorithms.observations import Activities
+from fleet2d.algorithms.observations import Activities, SightingTable
 from fleet2d.artifacts.store import RunStore
 from fleet2d.artifacts.table import Column, TableSpec
 from fleet2d.configuration.units import MICROSECOND
@@ -30,7 +30,7 @@ from fleet2d.expectations.verdict import (
     is_decided,
     verdict_of,
 )
-from fleet2d.kernels import I64, SightMemory
+from fleet2d.kernels import SightMemory
 from fleet2d.metrics.metric import Metric
 from fleet2d.runtime.events import Event
 from fleet2d.scenario.model import Scenario
@@ -168,12 +168,12 @@ class RunExpectations:
         for gauge in self._gauges.values():
             gauge.signal.learn(learners.fresh, results, gauge)
 
-    def take(self, end: int, observations: I64, readings: Sequence[SensorRow]) -> None:
+    def take(self, end: int, observations: SightingTable, readings: Sequence[SensorRow]) -> None:
         """Measure the signals up to step `end` - 1, in which the home doesn't change.
 
         Args:
             end: One past the last step.
-            observations: The observations of robots, int64 (n, OBSERVATION).
+            observations: The observations of robots.
             readings: The readings of sensors.
         """
         names, rest = self._sensors.names, [e for e in self._events if e.step >= end]

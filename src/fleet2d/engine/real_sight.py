@@ -4,7 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fleet2d.engine.cameras import Cameras, Look
+from fleet2d.algorithms.observations import SightingTable
+from fleet2d.engine.cameras import Cameras, Look, newest_of
 from fleet2d.engine.sighting_errors import sight_events
 from fleet2d.entities.body import Bodies
 from fleet2d.entities.entity import SIGHTING, EvidenceSource, LiveDetections
@@ -70,14 +71,15 @@ class RealSight(Cameras):
         if self.source.relative and len(rows):
             rows = self._on_map(rows, bodies, first, looked)
         if self.source.besides_cameras:
-            rows = np.concatenate([seen.sightings, rows])
+            rows = np.concatenate([seen.sightings.rows(), rows])
             rows[len(seen.sightings) :, Column.USER] = NOBODY  # of the simulated people
             rows = rows[np.argsort(rows[:, Column.STEP], kind="stable")]
         patience = self.rule.patience
         events = sight_events(rows, SightMemory(*self.memory), patience, first, looked)
         ends = dict(zip((USER_LOST, USER_SEEN), self.ends, strict=True)) if stop else {}
         ends_at = next((step + 1 for step, _, kind in events if ends.get(kind)), looked)
-        return Look(looked, ends_at, rows, events, old_memory)
+        newest = newest_of(rows, len(self.memory.seen))
+        return Look(looked, ends_at, SightingTable.of_rows(rows), newest, events, old_memory)
 
     def _on_map(self, rows: I64, bodies: Bodies, first: int, end: int) -> I64:
         """Return sightings in the frame of the robot as sightings in the floor plan."""

@@ -7,12 +7,19 @@ depend on the spans of a run.
 import time
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import accumulate
 from typing import Any
 
 import numpy as np
 
 from fleet2d.algorithms.history import SensorRow
-from fleet2d.algorithms.observations import Activities, NearestRooms, Observations, Truth
+from fleet2d.algorithms.observations import (
+    Activities,
+    NearestRooms,
+    Observations,
+    SightingTable,
+    Truth,
+)
 from fleet2d.artifacts.table import KEY_KINDS, Column, TableSpec
 from fleet2d.engine.basis import Basis
 from fleet2d.engine.cameras import Cameras
@@ -148,7 +155,9 @@ DECISION = (
 USER_EVENTS = frozenset({EventKind.USER_LOST, EventKind.USER_SEEN})
 ACTIVITY = EventKind.ACTIVITY.value
 # Rows that are collected before they are stored: so many, or more with many bodies.
-MAX_ROWS = 1 << 15
+MAX_ROWS = 1 << 16
+# Sightings that repeat another one take as much memory as one other row, if they are so many.
+REPEATS_PER_ROW = 8
 UNSTORED = (
     "changes of the home are not in the table of events, as the scenario has none: announce them,"
     " like changes: [{at: 0 s, lights: all, turn: on}]"
@@ -195,7 +204,7 @@ class Recorder:
         self._events: list[Event] = []
         self._actors = basis.actors
         self._decisions: list[tuple[int, int, str, str, int | None]] = []
-        self._observations: list[I64] = []
+        self._observations: list[SightingTable] = []
         self._sensors, self._readings = sensors, list[SensorRow]()
         self._rooms = NearestRooms(basis.home.plan)
         self._camera_codes = _codes_of(cameras)
@@ -232,13 +241,15 @@ class Recorder:
         for step, entity, _, detail in begun:
             self.activities.begin(self._users[entity], step, detail)
 
-    def take(self, first: int, end: int, observations: I64, readings: Sequence[SensorRow]) -> None:
+    def take(
+        self, first: int, end: int, observations: SightingTable, readings: Sequence[SensorRow]
+    ) -> None:
         """Collect the rows of the steps from `first` to `end` - 1.
 
         Args:
             first: First step.
             end: One past the last step.
-            observations: Observations of robots, (n, OBSERVATION), in order.
+            observations: Observations of robots, in order.
             readings: Readings of sensors, in order.
         """
         self._samples.take(self.bodies, first, end)
@@ -247,7 +258,8 @@ class Recorder:
         if "observations" in self._tables and len(observations):
             self._observations.append(observations)
         self._readings += readings
-        self._count += len(observations) + len(readings)
+        self._count += len(observations.distinct) + len(observations) // REPEATS_PER_ROW
+        self._count += len(readings)
         count = self._count + self._samples.count + self._keys.count
         count += len(self._events) + len(self._decisions)
         if count > self._most or self.keeps_none:
@@ -276,10 +288,15 @@ class Recorder:
         self.wall_s += time.perf_counter() - began
 
     def _store_observations(self) -> None:
-        if not self._observations:
-            return
-        o = Observations(self.home.plan, self._rooms, self._observations, self.activities)
-        self._observations = []
+        blocks, self._observations = self._observations, []
+        while blocks:  # so many rows at a time that their columns take little memory
+            counts = accumulate(map(len, blocks))
+            size = next((k for k, count in enumerate(counts, 1) if count > MAX_ROWS), len(blocks))
+            self._store_blocks(blocks[:size])
+            del blocks[:size]
+
+    def _store_blocks(self, blocks: Sequence[SightingTable]) -> None:
+        o = Observations(self.home.plan, self._rooms, blocks, self.activities)
         columns: dict[str, Any] = {
             **self._times(o.step),
             "robot": o.robot,

@@ -846,7 +846,6 @@ class Simulation(InterventionMethods):
         header, body = open_snapshot(path)
         simulation = cls(header["scenario"], seed=header["seed"])
         simulation._take(read_state(body, simulation._constants))
-        simulation._store.rehash()
         loop = simulation._loop
         simulation._setup_s, loop.simulate_s, loop.save_s = header["wall_s"]
         return simulation
@@ -1019,10 +1018,10 @@ def run(
 def has_to_choose(state: State, row: int, step: int) -> bool:
     """Return whether a robot's policy, its first behavior, has to choose at a step."""
     actor = state.actors[row]
-    if state.bodies.ask_at[row] > step and not state.clearance.looks(row, step):
-        return False
     policy: Any = actor.behaviors[0]
     if policy.given is not None:
+        return False
+    if state.bodies.ask_at[row] > step and not state.clearance.looks(row, step):
         return False
     now = _situation(state, row, step)
     return actor.asks_first(now) and policy.asks(now)

@@ -29,6 +29,7 @@ from numpy.typing import NDArray
 from shapely import Polygon
 
 from fleet2d import __version__
+from fleet2d.algorithms.observations import SightingTable
 from fleet2d.artifacts.manifest import plain
 from fleet2d.artifacts.table import Column, ColumnChunk, TableSpec
 from fleet2d.configuration.trust import (
@@ -125,7 +126,6 @@ def _reduce_type(kind: np.dtype[Any]) -> tuple[Any, ...]:
     return plain_type, (plain_type(kind.str).str,)
 
 
-_HASH = type(hashlib.sha256())
 _DTYPES = {type(np.dtype(scalar)) for scalar in set(np.sctypeDict.values()) - {np.void, np.object_}}
 
 
@@ -148,7 +148,8 @@ REDUCERS = _reducers()
 _SHARED = frozenset(
     {
         *(Column, ColumnChunk, CostedSpace, Event, FloorPlan, FunctionType, KeySegment, Mesh, Note),
-        *(Persona, PlacedObject, Polygon, RandomWalk, Room, Space, TableSpec, Track, UsePlace),
+        *(Persona, PlacedObject, Polygon, RandomWalk, Room, SightingTable, Space, TableSpec, Track),
+        UsePlace,
         *(datetime, timedelta, *_DTYPES),
     }
 )
@@ -402,8 +403,8 @@ class _StateCopier(pickle.Pickler):
         kind: Any = type(obj)
         if obj is shared_object:
             return NotImplemented
-        if kind is _HASH or kind is Timelines:
-            obj = obj.copy() if kind is _HASH else copy.copy(obj)
+        if kind is Timelines:
+            obj = copy.copy(obj)
         elif not (_is_shared(kind) or id(obj) in self._constants):
             return NotImplemented
         self.shared.append(obj)
@@ -437,8 +438,6 @@ class _StateWriter(pickle.Pickler):
         if name is not None:
             return name
         kind = type(obj)
-        if kind is _HASH:  # of a table: when a file is read it is computed again from the rows
-            return ("sha256",)
         if isinstance(obj, _REFERENCES) and id(obj) not in self._checked:
             self._check_reference(obj)
             self._checked.add(id(obj))
@@ -468,8 +467,6 @@ class _StateReader(pickle.Unpickler):
         return state
 
     def persistent_load(self, pid: Any) -> object:
-        if isinstance(pid, tuple) and pid[0] == "sha256":
-            return hashlib.sha256()
         if isinstance(pid, tuple) and pid[0] == "space":
             return self._constants["shapes"].space_of(*pid[1])  # type: ignore[attr-defined]
         return self._constants[pid]

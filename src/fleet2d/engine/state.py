@@ -4,17 +4,17 @@ from array import array
 from collections import defaultdict, deque
 from collections.abc import Callable, Iterable, Iterator, Sequence, Set
 from dataclasses import dataclass, field
-from itertools import chain, islice, pairwise
+from itertools import chain, islice
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 
 from fleet2d.algorithms.history import Log
-from fleet2d.algorithms.observations import OBSERVATION, ROBOT
+from fleet2d.algorithms.observations import SightingTable
 from fleet2d.artifacts.store import RunStore
 from fleet2d.engine.basis import Watcher
-from fleet2d.engine.cameras import Cameras
+from fleet2d.engine.cameras import NOTHING, Cameras
 from fleet2d.engine.change_queue import ChangeQueue
 from fleet2d.engine.collisions import BlockedWays, Clearance
 from fleet2d.engine.conversations import Conversations
@@ -30,8 +30,6 @@ from fleet2d.entities.body import Bodies
 from fleet2d.entities.decisions import DecidingActor
 from fleet2d.errors import InputError
 from fleet2d.floorplan.home import Home
-from fleet2d.kernels import I64
-from fleet2d.kernels import SightingColumn as Column
 from fleet2d.runtime.events import HOME, Event, EventKind, new_event
 from fleet2d.scenario.model import Scenario
 
@@ -210,6 +208,7 @@ class State:
             listeners wait for.
         expectations: The expectations of the run; None if there are none.
         notes_emitted: Number of notes of each body's present plan that have happened.
+        capacity: The maximum number of steps that watchers process together.
     """
 
     bodies: Bodies
@@ -240,15 +239,12 @@ class State:
     awaited: frozenset[str] = frozenset()
     expectations: "RunExpectations | None" = None
     notes_emitted: list[int] = field(init=False)
+    capacity: int = field(init=False)
 
     def __post_init__(self) -> None:
         """Begin without notes."""
         self.notes_emitted = [0] * len(self.actors)
-
-    @property
-    def capacity(self) -> int:
-        """The maximum number of steps that watchers process together."""
-        return max(MIN_STEPS, min(MAX_STEPS, MAX_POSES // max(1, len(self.actors))))
+        self.capacity = max(MIN_STEPS, min(MAX_STEPS, MAX_POSES // max(1, len(self.actors))))
 
     # Decisions of scripts
 
@@ -306,7 +302,8 @@ class State:
 
     def emit_notes(self, row: int, step: int) -> None:
         """Emit the notes of a body's plan up to a step as events."""
-        self.events.emit(self._due_notes(row, step))
+        if self.notes_emitted[row] < len(self.actors[row].plan.notes):
+            self.events.emit(self._due_notes(row, step))
 
     def _due_notes(self, row: int, step: int) -> Sequence[Event]:
         """Return the notes of a body's plan up to a step, once, as events."""
@@ -390,22 +387,16 @@ class State:
             self.log.forget(before)
         self.bodies.forget(min(before, self.settled))
 
-    def _observations(self) -> I64:
+    def _observations(self) -> SightingTable:
         """Return the sightings of all robots, in order of step and robot."""
-        blocks = [cameras.collect() for cameras in self.cameras]
+        blocks = [cameras.collect() for cameras in self.cameras] or [NOTHING]
         for cameras in self.user_cameras:
             cameras.collect()
-        ends = np.cumsum([0, *map(len, blocks)])
-        rows = np.empty((OBSERVATION, ends[-1]), np.int64).T  # columns are read as a whole
-        index: Any = slice(None)  # of each sighting among the rows
+        seen = SightingTable.joined(blocks)
         if len(blocks) > 1:
-            steps = np.concatenate([block[:, Column.STEP] for block in blocks])
-            index = np.empty(len(rows), np.int64)
-            index[np.argsort(steps, kind="stable")] = np.arange(len(rows))
-        for cameras, block, (begin, end) in zip(self.cameras, blocks, pairwise(ends), strict=True):
-            part = index[begin:end] if len(blocks) > 1 else index
-            rows[part, : len(Column)], rows[part, ROBOT] = block, cameras.index
-        return rows
+            order = np.argsort(seen.step, kind="stable")
+            seen = SightingTable(seen.step[order], seen.index[order], seen.distinct)
+        return seen
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from typing import Any, ClassVar, Protocol
 import numpy as np
 from pydantic_core import PydanticCustomError
 
-from fleet2d.algorithms.observations import Activities
+from fleet2d.algorithms.observations import Activities, SightingTable
 from fleet2d.configuration.components import components
 from fleet2d.configuration.problems import check_known
 from fleet2d.configuration.units import LENGTH, SHARE, SPEED, format_duration
@@ -41,7 +41,7 @@ from fleet2d.expectations.expectation import (
 )
 from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.rooms.room import PRIORITY, usual_type
-from fleet2d.kernels import F64, I64
+from fleet2d.kernels import F64
 from fleet2d.kernels import Window as PoseRuns
 from fleet2d.runtime.clock import Clock
 from fleet2d.runtime.events import KINDS, Event, EventKind
@@ -255,7 +255,7 @@ class SignalBlock:
         end: The step after the last one.
         bodies: The bodies and their poses.
         home: The home in these steps.
-        observations: The observations of robots, int64 (n, OBSERVATION).
+        observations: The observations of robots.
         readings: The readings of sensors: step, name and whether it is on.
         events: The events, in order of step.
     """
@@ -264,7 +264,7 @@ class SignalBlock:
     end: int
     bodies: MeasuredBodies
     home: Home
-    observations: I64
+    observations: SightingTable
     readings: Sequence[tuple[int, str, bool]]
     events: Sequence[Event] = ()
 

@@ -461,9 +461,10 @@ class perceived(_CameraCondition):
 
     def measure(self, block: SignalBlock, gauge: Gauge) -> Trace:
         """Return the number of observations at each step at which there is one."""
-        rows, (robot, user) = block.observations, gauge.memory
-        is_it = (rows[:, ROBOT] == robot) & (rows[:, SightingColumn.IDENTITY] == user)
-        return pulses(np.unique(rows[is_it, SightingColumn.STEP]), block.first, block.end)
+        seen, (robot, user) = block.observations, gauge.memory
+        columns = seen.distinct
+        is_it = (columns[:, ROBOT] == robot) & (columns[:, SightingColumn.IDENTITY] == user)
+        return pulses(np.unique(seen.step[is_it[seen.index]]), block.first, block.end)
 
 
 @dataclass(frozen=True, eq=False)

@@ -228,8 +228,9 @@ def test_memory_counts_looks_by_room_hour_and_person() -> None:
     rows[:, SightingColumn.STEP] = 10, 20, 70, 30
     rows[:, SightingColumn.IDENTITY] = 0, 0, 0, -1
     rows[:, SightingColumn.X], rows[:, SightingColumn.Y] = column * SUB, row * SUB
-    memory.take(rows)
-    memory.take(rows[:0])
+    index = np.arange(4, dtype=np.int32)
+    memory.take(rows[:, SightingColumn.STEP], index, rows)
+    memory.take(rows[:0, SightingColumn.STEP], index[:0], rows[:0])
 
     assert [70, NEVER, 30, 70] == memory.rooms.last[:, room].tolist()  # of anyone in the last row
     assert [2, 1] == memory.rooms.looks[0, room, 7:9].tolist()

@@ -37,6 +37,7 @@ from fleet2d.errors import ComponentError, InputError, PlacementError, extra
 from fleet2d.floorplan.plan import FloorPlan, Room, read_only
 from fleet2d.kernels import (
     F32,
+    I32,
     I64,
     TURN,
     UNIT,
@@ -129,11 +130,11 @@ class SightingMemory:
         self._step_us = clock.step_us
         self._start_us = (clock.start - midnight_of(clock.start)) // MICROSECOND
 
-    def take(self, rows: I64) -> None:
-        """Add sightings, rows of `SightingColumn`."""
-        step, identity = rows[:, Column.STEP], rows[:, Column.IDENTITY]
-        room = rooms_at(self._room_of_place, rows[:, Column.X], rows[:, Column.Y])
-        remember(step, identity, room, self._start_us, self._step_us, self.rooms)
+    def take(self, step: I64, index: I32, distinct: I64) -> None:
+        """Add sightings; see `fleet2d.algorithms.observations.SightingTable`."""
+        room = rooms_at(self._room_of_place, distinct[:, Column.X], distinct[:, Column.Y])
+        identity = distinct[:, Column.IDENTITY]
+        remember(step, index, identity, room, self._start_us, self._step_us, self.rooms)
 
 
 class WaitingPoses:
@@ -306,6 +307,7 @@ class Policy(BeliefBehavior):
         self._tally = dict.fromkeys(TALLIED, 0.0)
         self._fixed = self._describe_home(actor)
         self._shown = shown_memory(self.names, self.user)
+        self._person = int(self._shown.fresh_rows[PERSON])
 
     # What it knows
 
@@ -329,7 +331,7 @@ class Policy(BeliefBehavior):
             part[:, _AT["belief"]], away = belief.joint, belief.away
             for number, name in enumerate(self.names[:PEOPLE]):
                 part[:, _AT[f"belief_{number}"]] = room_belief(now, self.source, name).joint
-        newest = max(memory.last[self._shown.fresh_rows[PERSON]].tolist())
+        newest = max(memory.last[self._person].tolist())
         age_s = (now.step - newest) * step_s
         minute = (time.hour * 60 + time.minute) * TURN // DAY_MINUTES
         charge, since = actor.charge, self.since
