@@ -212,6 +212,10 @@ public:
     DetectionResult run() {
         for (now_ = next_step(window_.first); now_ < window_.end; now_ = next_step(now_ + 1)) {
             take_up();
+            if (watch_on()) {
+                --now_;  // the first step that isn't done is the next one
+                continue;
+            }
             const std::size_t before = result_.sighted_at.size();
             std::size_t i = 0;
             for (i64 c = 0; c < cameras_; ++c) {
@@ -262,6 +266,29 @@ private:
         }
     }
 
+    // Look at the only user in view for as long as nothing else can happen; whether any step was done.
+    //
+    // That is the usual case: a camera that doesn't err, and a user who counts as seen.
+    bool watch_on() {
+        if (active_.size() != 1 || !is_prompt_ || has_ghosts_ || identities_in_view_ != 1) return false;
+        const Interval& target = active_.front();
+        const i64 camera = target.camera, user = target.user, period = lenses_.period[camera];
+        const View<i64> about = memory_.about[camera][user];
+        if (memory_.seen[user] != 1 || lenses_.errs[camera] != 0 || at(about, About::FORCED) != 0) return false;
+        i64 end = std::min(target.end, window_.end);
+        if (next_interval_ < intervals_.size()) end = std::min(end, intervals_[next_interval_].begin);
+        const i64 first = now_;
+        for (; now_ < end; ++now_) {
+            const bool looks = now_ % period == 0, notices = looks && is_detected(camera, user);
+            if (!notices && now_ - memory_.noticed[user] >= rule_.patience) break;
+            if (looks) ++at(about, About::IN_VIEW);
+            if (!notices) continue;
+            ++at(about, About::NOTICED);
+            publish(camera, sighting_of(target));
+        }
+        return now_ > first;
+    }
+
     // Record a user in view, if noticed.
     void look_at(Interval& target) {
         const i64 camera = target.camera;
@@ -272,22 +299,17 @@ private:
         const bool errs = lenses_.errs[camera] != 0;
         if (errs ? !is_noticed(target) : !is_detected(camera, target.user)) return;
         ++at(about, About::NOTICED);
-        const i64 x = target.eye.x + target.dx, y = target.eye.y + target.dy;
-        Sighting sighting{now_ + lenses_.latency[camera],
-                          camera,
-                          target.user,
-                          target.user,
-                          x,
-                          y,
-                          target.faces,
-                          target.posture,
-                          x,
-                          y,
-                          target.faces,
-                          target.posture};
+        Sighting sighting = sighting_of(target);
         if (errs) perceive(target, sighting);
         if (forced != 0) sighting.identity = forced - FORCED_IDENTITY;
         record(camera, sighting);
+    }
+
+    // The truth about a user in view at the present step.
+    Sighting sighting_of(const Interval& target) const {
+        const i64 x = target.eye.x + target.dx, y = target.eye.y + target.dy;
+        const i64 faces = target.faces, posture = target.posture, known_at = now_ + lenses_.latency[target.camera];
+        return {known_at, target.camera, target.user, target.user, x, y, faces, posture, x, y, faces, posture};
     }
 
     // Whether a camera that doesn't err notices a user in view.

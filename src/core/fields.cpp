@@ -70,53 +70,34 @@ private:
     Array<i64> start_;  // first column at which each of them is the lowest
 };
 
-// Cells that wait, the first one first.
-class CellQueue {
-public:
-    bool empty() const { return next_ == cells_.size(); }
-    i64 front() const { return cells_[next_]; }
-    void push(i64 cell) { cells_.push_back(cell); }
-    void pop() { ++next_; }
+// The costs of a step to a side of a cell, and across a corner.
+constexpr i32 STRAIGHT = 5, ACROSS = 7;
 
-private:
-    std::vector<i64> cells_;  // with those before the first one, as many as the grid has, or a few times that
-    std::size_t next_ = 0;
-};
-
-// A grid with a wall around it, so that no step leads out, and the state of the search on it.
+// A grid with a wall around it, so that no step leads out, and the distances of its cells.
 // Cells are numbered row by row.
 class Walk {
 public:
     explicit Walk(View<const bool, 2> mask)
-        : wide_(mask.shape[1] + 2),
-          state_(Array<State>::filled({(mask.shape[0] + 2) * wide_}, State::closed)),
-          distance_(Array<i32>::filled({(mask.shape[0] + 2) * wide_}, FAR)) {
+        : wide_(mask.shape[1] + 2), distance_(Array<i32>::filled({(mask.shape[0] + 2) * wide_}, CLOSED)) {
         for (i64 row = 0; row < mask.shape[0]; ++row) {
             for (i64 column = 0; column < mask.shape[1]; ++column) {
-                if (mask(row, column)) state_[number({row, column})] = State::open;
+                if (mask(row, column)) distance_[number({row, column})] = FAR;
             }
         }
     }
 
-    void start_at(GridCell goal) { reach(number(goal), 0, straight_); }
+    void start_at(GridCell goal) { reach(number(goal), 0); }
 
-    // Settle the nearest cell in the queues; false if they are empty.
-    bool settle() {
-        drop_settled(straight_);
-        drop_settled(across_);
-        if (straight_.empty() && across_.empty()) return false;
-        auto& nearest = is_first(straight_, across_) ? straight_ : across_;
-        const i64 cell = nearest.front();
-        nearest.pop();
-        state_[cell] = State::settled;
-        for (const i64 side : {i64{-1}, i64{1}, -wide_, wide_}) reach(cell + side, distance_[cell] + 5, straight_);
-        for (const i64 up : {-wide_, wide_}) {
-            for (const i64 side : {-1, 1}) {
-                const bool cuts_corner = is_closed(cell + up) || is_closed(cell + side);
-                if (!cuts_corner) reach(cell + up + side, distance_[cell] + 7, across_);
+    // Measure the distances of all cells, the nearest ones first.
+    void measure() {
+        for (i32 now = 0; waiting_ > 0; ++now) {
+            std::vector<i64>& cells = buckets_[bucket_of(now)];  // none is added to it by a step
+            for (const i64 cell : cells) {
+                if (distance_[cell] == now) step_from(cell, now);
             }
+            waiting_ -= cells.size();
+            cells.clear();
         }
-        return true;
     }
 
     // The result as of walking_distance.
@@ -126,34 +107,34 @@ public:
     }
 
 private:
-    enum class State : u8 { closed, open, settled };
-    static constexpr i32 FAR = std::numeric_limits<i32>::max();
+    static constexpr i32 CLOSED = -1, FAR = std::numeric_limits<i32>::max();
+    static constexpr std::size_t BUCKETS = 8;
+    static_assert(STRAIGHT < ACROSS && ACROSS < BUCKETS);
 
+    static std::size_t bucket_of(i32 distance) { return static_cast<std::size_t>(distance) % BUCKETS; }
     i64 number(GridCell cell) const { return (cell.row + 1) * wide_ + cell.column + 1; }
-    bool is_closed(i64 cell) const { return state_[cell] == State::closed; }
 
-    void reach(i64 cell, i32 distance, CellQueue& waiting) {
-        if (state_[cell] == State::open && distance < distance_[cell]) {
-            distance_[cell] = distance;
-            waiting.push(cell);
+    void step_from(i64 cell, i32 now) {
+        for (const i64 side : {i64{-1}, i64{1}, -wide_, wide_}) reach(cell + side, now + STRAIGHT);
+        for (const i64 up : {-wide_, wide_}) {
+            for (const i64 side : {-1, 1}) {
+                const bool cuts_corner = distance_[cell + up] == CLOSED || distance_[cell + side] == CLOSED;
+                if (!cuts_corner) reach(cell + up + side, now + ACROSS);
+            }
         }
     }
 
-    void drop_settled(CellQueue& waiting) {
-        while (!waiting.empty() && state_[waiting.front()] == State::settled) waiting.pop();
-    }
-
-    // Whether the nearest cell is in the first of two queues, of which one may be empty.
-    bool is_first(const CellQueue& one, const CellQueue& other) const {
-        if (one.empty() || other.empty()) return other.empty();
-        return distance_[one.front()] <= distance_[other.front()];
+    void reach(i64 cell, i32 distance) {
+        if (distance >= distance_[cell]) return;  // as of all closed cells
+        distance_[cell] = distance;
+        buckets_[bucket_of(distance)].push_back(cell);
+        ++waiting_;
     }
 
     i64 wide_;
-    Array<State> state_;
     Array<i32> distance_;
-    CellQueue straight_;  // cells that a step to a side leads to, by distance
-    CellQueue across_;    // cells that a step across a corner leads to, by distance
+    std::array<std::vector<i64>, BUCKETS> buckets_;  // cells to step from, by distance; some are nearer since
+    std::size_t waiting_ = 0;                        // their number
 };
 
 // A power of two above the most that a step costs.
@@ -215,8 +196,7 @@ Array<i32, 2> walking_distance(View<const bool, 2> mask, View<const i64, 2> goal
         const GridCell goal{goals(i, 0), goals(i, 1)};
         if (is_inside(mask.shape, goal)) walk.start_at(goal);
     }
-    while (walk.settle()) {
-    }
+    walk.measure();
     auto result = Array<i32, 2>::empty(mask.shape);
     const View<i32, 2> distance = result;
     for (i64 row = 0; row < mask.shape[0]; ++row) {
