@@ -29,6 +29,7 @@ from fleet2d.entities.robots.approach import (
     centres,
     check_has_camera,
     room_belief,
+    sight_range,
     spread,
     visible_from,
 )
@@ -169,20 +170,21 @@ class WaitingPoses:
         actor, plan = self._actor, self._actor.home.plan
         stands = centres(spread(actor.space.cells(room.index, actor.part), MAX_VIEWPOINT_CELLS))
         goals = centres(spread(np.argwhere(plan.room_of_cell == room.index), MAX_TARGET_CELLS))
-        limit, best, most = cosine(self._half_angle) / UNIT, (*actor.middle(room), 0), 0
-        for place in stands:
-            gaps = (goals[visible_from(actor, place, goals)] - place).astype(np.float64)
-            if len(gaps) <= most:
-                continue
-            x, y = gaps.T
-            ahead = x * DIRECTIONS[:, :1] + y * DIRECTIONS[:, 1:]
-            is_shown = ahead >= np.sqrt(x * x + y * y) * limit
-            shown = [int(np.count_nonzero(row)) for row in is_shown]
-            if max(shown) > most:
-                most = max(shown)
-                facing = shown.index(most)
-                best = int(place[0]), int(place[1]), facing * TURN // len(DIRECTIONS)
-        return best
+        reach, limit = sight_range(actor), cosine(self._half_angle) / UNIT
+        views = [(place, goals[visible_from(actor, place, goals, reach)]) for place in stands]
+        views = [(place, seen - place) for place, seen in views if len(seen)]
+        if not views:
+            return *actor.middle(room), 0
+        first = np.cumsum([0, *(len(gaps) for _, gaps in views[:-1])])
+        x, y = np.concatenate([gaps for _, gaps in views]).T.astype(np.float64)
+        ahead = x * DIRECTIONS[:, :1] + y * DIRECTIONS[:, 1:]
+        is_shown = ahead >= np.sqrt(x * x + y * y) * limit
+        shown = np.add.reduceat(is_shown, first, axis=1, dtype=np.intp).T  # (views, directions)
+        view, facing = divmod(int(shown.argmax()), len(DIRECTIONS))
+        if shown[view, facing] == 0:  # by a camera with a narrow angle
+            return *actor.middle(room), 0
+        (at_x, at_y), _ = views[view]
+        return int(at_x), int(at_y), facing * TURN // len(DIRECTIONS)
 
     def ways(self, actions: int) -> "RoomWays":
         """Return the ways from where the robot is to each room, for a number of actions."""
