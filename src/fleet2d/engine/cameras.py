@@ -238,6 +238,11 @@ class Cameras(Watcher):
             stop_lost=False,
             stop_seen=False,
         )
+        self._rules = {
+            (lost, seen): self.rule._replace(stop_lost=lost, stop_seen=seen)
+            for lost in (False, True)
+            for seen in (False, True)
+        }
         looks = self.lenses.latency // self.lenses.period + 2
         return new_memory(len(self.names), count, int((looks * bursts).max()))
 
@@ -305,7 +310,7 @@ class Cameras(Watcher):
 
     def limit(self, bodies: Bodies, end: int) -> int:
         """Return the step after the first event that ends the span, `end` if there is none."""
-        if not self.waits or end <= self.next_step:
+        if end <= self.next_step:
             return end
         self._ahead = self._look(bodies, end)
         return self._ahead.end
@@ -340,6 +345,8 @@ class Cameras(Watcher):
 
     def interruptions(self, events: Sequence[Event]) -> Iterator[tuple[int, SightEvent]]:
         """Yield the events of the last step that end its owner's plan."""
+        if not events:
+            return
         stops = {name for name, stop in zip(self.event_names, self.stops, strict=True) if stop}
         lattice = self.owner.home.plan.lattice
         index = {other.name: i for i, other in enumerate(self.others)}
@@ -384,7 +391,7 @@ class Cameras(Watcher):
             home.walls,
             self.lenses,
             self.errors,
-            self.rule._replace(stop_lost=stop_lost, stop_seen=stop_seen),
+            self._rules[stop_lost, stop_seen],
             window,
             self.row,
             self._first,

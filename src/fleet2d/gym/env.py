@@ -4,7 +4,7 @@ import copy
 import operator
 from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
-from typing import Any, Literal, Self, SupportsFloat
+from typing import Any, Literal, Self, SupportsFloat, cast
 
 import gymnasium
 import numpy as np
@@ -47,7 +47,9 @@ class RobotLife:
         self.simulation, self.robots = simulation, robots
         actors = simulation.actors
         self._actors = {robot: actors[robot] for robot in robots}
-        self._now: dict[str, Situation] = {}  # of the newest step at which each was asked for
+        # Of the newest step at which each was asked for.
+        self._now: dict[str, Situation] = {}
+        self._masks: dict[str, tuple[Situation, Bool]] = {}
 
     def __getstate__(self) -> tuple[Simulation, tuple[str, ...], list[str]]:
         """Leave out what belongs to the simulation, which keeps its state in its own way."""
@@ -64,9 +66,7 @@ class RobotLife:
 
     def policy(self, robot: str) -> Policy:
         """Return the policy of a robot."""
-        policy = self.actor(robot).behaviors[0]
-        assert isinstance(policy, Policy)
-        return policy
+        return cast("Policy", self._actors[robot].behaviors[0])
 
     def act(self, actions: Mapping[str, int]) -> None:
         """Let robots that have to choose act, up to the next step at which one has to choose.
@@ -75,7 +75,7 @@ class RobotLife:
             InputError: An action is masked or out of range; nothing has changed then.
         """
         for robot in self.due:
-            self.policy(robot).check(self.now(robot), actions[robot])
+            self.policy(robot).check(self.now(robot), actions[robot], self.mask(robot))
         for robot in self.due:
             self.policy(robot).given = int(actions[robot])
         self.due = self.simulation.run_until_asked(*self.robots)
@@ -86,6 +86,13 @@ class RobotLife:
         if now is None or now.step != self.simulation.step:
             now = self._now[robot] = self.simulation.situation(robot)
         return now
+
+    def mask(self, robot: str) -> Bool:
+        """Return which actions are possible at the present step, bool (rooms + 1,), read-only."""
+        now, known = self.now(robot), self._masks.get(robot)
+        if known is None or known[0] is not now:
+            known = self._masks[robot] = now, self.policy(robot).mask(now)
+        return known[1]
 
     def is_empty(self, robot: str) -> bool:
         """Whether the battery of a robot is empty, so that it never decides again."""
@@ -266,8 +273,7 @@ class RobotEnv(gymnasium.Env[F32, np.int64]):  # type: ignore[misc]
 
     def action_masks(self) -> Bool:
         """Return which actions are possible, bool (rooms + 1,), as MaskablePPO asks for it."""
-        life = self.present
-        return life.policy(self.robot).mask(life.now(self.robot))
+        return self.present.mask(self.robot)
 
     def render(self) -> Any:
         """Return a picture of the present moment, uint8 (height, width, 3)."""
@@ -292,7 +298,7 @@ class RobotEnv(gymnasium.Env[F32, np.int64]):  # type: ignore[misc]
         now, policy = life.now(self.robot), life.policy(self.robot)
         info: dict[str, Any] = {
             "elapsed_s": float(elapsed_s),
-            "action_mask": policy.mask(now).copy(),
+            "action_mask": life.mask(self.robot).copy(),
             "time": now.time.isoformat(),
         }
         if self.truth:
