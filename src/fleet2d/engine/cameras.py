@@ -298,11 +298,15 @@ class Cameras(Watcher):
     @property
     def in_view(self) -> dict[str, tuple[float, float]]:
         """The last perceived place [m] of each body in view, by name, when it last looked."""
-        lattice, in_view = self.owner.home.plan.lattice, {}
-        for identity, is_seen in enumerate(self.memory.seen.tolist()):
-            if is_seen:
-                in_view[self.name_of(identity)] = lattice.xy_of(*self.perceived[identity].tolist())
-        return in_view
+        seen = self.memory.seen.tolist()
+        if 1 not in seen:  # a quick answer, as policies ask for it again and again
+            return {}
+        xy_of = self.owner.home.plan.lattice.xy_of
+        return {
+            self.name_of(identity): xy_of(*self.perceived[identity].tolist())
+            for identity, is_seen in enumerate(seen)
+            if is_seen
+        }
 
     def name_of(self, identity: int) -> str:
         """Return the name of an identity; empty for somebody unknown."""
