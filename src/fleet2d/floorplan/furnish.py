@@ -46,6 +46,10 @@ class FurnitureRule:
     unless: tuple[str, ...] = ()
 
 
+# What a studio gets first.
+ESSENTIAL = ("bed", "stove", "sink", "fridge")
+
+
 def furnish(plan: FloorPlan, seed: int = 0, density: float = 1.0) -> FloorPlan:
     """Return a plan with furniture in its rooms, by their types.
 
@@ -89,8 +93,11 @@ def furnish(plan: FloorPlan, seed: int = 0, density: float = 1.0) -> FloorPlan:
 def _furnish_room(
     interior: Interior, room: Room, seed: int, density: float, kinds: set[str]
 ) -> None:
-    labels = dict.fromkeys((room.type, *room.labels))
+    first_uses = _first_uses(interior.plan, room)
+    labels = dict.fromkeys((*first_uses, room.type, *room.labels))
     rules = [rule for label in labels for rule in RULES.get(label, ())]
+    if first_uses:
+        rules.sort(key=lambda rule: rule.type not in ESSENTIAL)
     draws = Draws(stream_key(seed, f"floorplan.{room.name}", "furniture"), room.index)
     first = len(interior.objects)
     for rule in rules:
@@ -105,6 +112,14 @@ def _furnish_room(
                 break
         if rule.type == "sofa":
             _place_tv(interior, room, first, draws)
+
+
+def _first_uses(plan: FloorPlan, room: Room) -> tuple[str, ...]:
+    """Return what a room is furnished for before its type: a studio to sleep and to cook in."""
+    lived_in = {other.type for other in plan.rooms}
+    if room.type != "living_room" or "bedroom" not in room.labels or "bedroom" in lived_in:
+        return ()
+    return tuple(kind for kind in ("bedroom", "kitchen") if kind in room.labels)
 
 
 def _place_tv(interior: Interior, room: Room, first: int, draws: Draws) -> None:

@@ -577,6 +577,8 @@ class RoomLayout:
 
 def draw_layout(request: LayoutRequest, choices: Choices) -> RoomLayout | None:
     """Draw one layout, or return None where the rooms do not fit as drawn."""
+    if all(brief.kind != "bedroom" for brief in request.briefs):
+        return RoomLayout(request.briefs, _studio(request.briefs, choices))
     groups = group_rooms(request.briefs, choices)
     bedrooms = sum(brief.kind == "bedroom" for brief in request.briefs)
     briefs = [*request.briefs, Brief("hallway", 0.0)]
@@ -596,6 +598,20 @@ def draw_layout(request: LayoutRequest, choices: Choices) -> RoomLayout | None:
         return None
     boxes = _place_at_scale(placing, briefs, request.area_m2)
     return None if boxes is None else RoomLayout(briefs, boxes)
+
+
+def _studio(briefs: Sequence[Brief], choices: Choices) -> list[Box]:
+    """Return the boxes of a studio: its second and third room in a strip beside the first."""
+    (living, first, second) = (brief.area * UNITS_PER_M**2 for brief in briefs)
+    width = choices.between(32, 46)
+    bath, third = round(first / width), round(second / width)
+    height = bath + WALL + third
+    end = width + WALL + round(living / height) + WALL
+    return [
+        Box(0, width + WALL, 0, end, height + WALL),
+        Box(1, 0, 0, width + WALL, bath + WALL),
+        Box(2, 0, bath + WALL, width + WALL, height + WALL),
+    ]
 
 
 def _place_at_scale(placing: Placing, briefs: Sequence[Brief], area_m2: float) -> list[Box] | None:

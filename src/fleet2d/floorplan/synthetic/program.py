@@ -70,7 +70,11 @@ class Choices:
 # Area of a home over that of its rooms: corridors and door gaps add to it.
 TYPICAL_AREA_FACTOR = 1.10
 MAX_ROOMS_PER_TYPE = 8
-SMALLEST_M2 = 30.0
+SMALLEST_M2 = 18.0
+# A home that is smaller is a studio, unless it must have a bedroom.
+STUDIO_M2 = 30.0
+# From this area on a studio may have a kitchen of its own, with this probability [%].
+STUDIO_KITCHEN_M2, STUDIO_KITCHEN_PERCENT = 24.0, 50
 LARGEST_M2 = 450.0
 
 # Deciles and tails of the area of HouseExpo's plans [%, m2]; between them it is linear.
@@ -148,7 +152,7 @@ class Wishes:
 
     Attributes:
         area_m2: Area of the free space.
-        bedrooms: Number of bedrooms.
+        bedrooms: Number of bedrooms; once settled, 0 in a studio.
         bathrooms: Number of bathrooms.
         garage: Whether there is one.
     """
@@ -203,6 +207,9 @@ def settle_wishes(wishes: Wishes, choices: Choices, variety: int = 0) -> Wishes:
     beds = wishes.bedrooms or max(baths - 2, 1)
     garage = bool(wishes.garage)
     area = wishes.area_m2
+    asks_more = wishes.bedrooms or baths > 1 or garage
+    if area is not None and area < STUDIO_M2 and not asks_more:
+        return Wishes(area, 0, 1, False)
     if area is None:
         area = _draw_area(choices)
         most = maximum_area(wishes.bedrooms or MAX_ROOMS_PER_TYPE, baths)
@@ -292,6 +299,8 @@ def choose_rooms(
         spare = fsum(size.typical_area - size.min_area for size in sizes)
         return fsum(size.typical_area for size in sizes) - spare * variety / 100
 
+    if wishes.bedrooms == 0:
+        return _studio_rooms(wishes.area_m2 or 0.0, choices)
     area, beds, baths = wishes.area_m2 or 0.0, wishes.bedrooms or 1, wishes.bathrooms or 1
     kinds = _base(beds, baths) + ["garage"] * bool(wishes.garage)
     total = area / TYPICAL_AREA_FACTOR
@@ -309,6 +318,21 @@ def choose_rooms(
             kinds.append(kind)
     briefs = [Brief(kind, SIZES[kind].typical_area) for kind in kinds]
     return scale_areas(_assign_partners(briefs), total, choices)
+
+
+def _studio_rooms(area: float, choices: Choices) -> list[Brief]:
+    """Return the rooms of a studio: a room to live and sleep in, a bathroom, and a third.
+
+    That is a kitchen or, if one cooks in the large room, an entryway.
+    """
+    has_kitchen = area >= STUDIO_KITCHEN_M2 and choices.chance(STUDIO_KITCHEN_PERCENT)
+    kind, (low, high) = ("kitchen", (45, 62)) if has_kitchen else ("entryway", (26, 36))
+    bath, third = choices.between(33, 46) / 10, choices.between(low, high) / 10
+    return [
+        Brief("living_room", area - bath - third),
+        Brief("bathroom", bath),
+        Brief(kind, third),
+    ]
 
 
 def _assign_partners(briefs: Sequence[Brief]) -> list[Brief]:

@@ -94,8 +94,16 @@ def _regions(house: House) -> list[LabelledRegion]:
         wall = house.front_door.wall
         if house.boxes[max(wall.first, wall.second)].room == index:
             shapes.append(_hole(house.front_door))
-        regions.append(LabelledRegion((brief.kind,), _metres(shapes)))
+        labels = _studio_uses(house) if brief.kind == "living_room" else (brief.kind,)
+        regions.append(LabelledRegion(labels, _metres(shapes), None, brief.kind))
     return regions
+
+
+def _studio_uses(house: House) -> tuple[str, ...]:
+    """Return the types that the living room has: in a studio those of rooms that it lacks, too."""
+    kinds = {brief.kind for brief in house.briefs}
+    lacking = ("bedroom", "kitchen") if house.wishes.bedrooms == 0 else ()
+    return ("living_room", *(kind for kind in lacking if kind not in kinds))
 
 
 def _to_middle(box: Box) -> Rectangle:
@@ -117,7 +125,7 @@ class Synthetic(FloorPlanSource):
 
     Attributes:
         seed: The seed of the home.
-        area_m2: Free space, 30 to 450 m2.
+        area_m2: Free space, 18 to 450 m2; below 30 m2 a studio, whose living room is the bedroom.
         bedrooms: Number of bedrooms, 1 to 8.
         bathrooms: Number of bathrooms, 1 to 6.
         garage: Whether it has one.
