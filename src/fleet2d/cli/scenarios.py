@@ -36,7 +36,7 @@ def validate(
     scale: Scale = None,
 ) -> None:
     """Check a scenario, with the places of all people and robots; or a floor plan."""
-    from fleet2d.floorplan.load import is_floorplan, load_floorplan
+    from fleet2d.floorplan.load import is_floorplan, load_or_mark
 
     scenario, overrides = split(arguments)
     if scenario is not None and is_floorplan(scenario):
@@ -45,7 +45,7 @@ def validate(
                 f"{scenario} is a floor plan, and {overrides[0]} changes a scenario: leave it out,"
                 " or name a scenario"
             )
-        plan = load_floorplan(scenario, resolution=resolution, scale=scale)
+        plan = load_or_mark(scenario, resolution=resolution, scale=scale)
         _check_floorplan(plan, out, radius)
         return
     from fleet2d.engine.simulation import Simulation

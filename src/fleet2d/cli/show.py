@@ -216,10 +216,10 @@ def _draw_floorplan(
     source: Path | None, out: Path | None, fov: str | None, **lengths: float | None
 ) -> Path:
     """Draw a floor plan, or a field of view in it; return the path of the picture."""
-    from fleet2d.floorplan.load import load_floorplan
+    from fleet2d.floorplan.load import load_or_mark
     from fleet2d.pictures.floorplan import draw_floorplan
 
-    plan = load_floorplan(source or "family_home", **lengths)
+    plan = load_or_mark(source or "family_home", **lengths)
     target = out or Path(f"{file_name(plan.name) or 'plan'}.png")
     if fov is not None:
         from fleet2d.pictures.layers import draw_fov, parse_pose

@@ -78,6 +78,28 @@ def load_floorplan(
     return _load_document(path, cell, scale)
 
 
+def load_or_mark(plan: str | Path, **lengths: float | None) -> FloorPlan:
+    """Read a floor plan; where a drawing is unclear, mark the place in a copy of it.
+
+    Args:
+        plan: As of `load_floorplan`.
+        lengths: Its `resolution` and `scale`.
+
+    Raises:
+        FloorPlanError: As of `load_floorplan`; it names the copy, `NAME-question.png`.
+    """
+    try:
+        return load_floorplan(plan, **lengths)
+    except FloorPlanError as error:
+        from fleet2d.floorplan.formats.raster import UnclearPlaceError
+
+        if not isinstance(error.__cause__, UnclearPlaceError):
+            raise
+        out = Path(f"{Path(plan).stem}-question.png")
+        error.__cause__.mark(Path(plan), out)
+        raise FloorPlanError(f"{error}; {out} marks it") from error
+
+
 def _load_document(path: Path, cell: float | None, scale: float | None) -> FloorPlan:
     """Read a file whose ending or content determines its format."""
     kind, content = format_by_suffix(path), {}

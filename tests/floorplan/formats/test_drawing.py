@@ -1,15 +1,18 @@
+import contextlib
+import re
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import shapely
+from PIL import Image as Picture
 from pydantic import ValidationError
 
 from fleet2d.configuration.components import lookup
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.formats.drawing import Image
-from fleet2d.floorplan.load import load_floorplan
+from fleet2d.floorplan.load import load_floorplan, load_or_mark
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.kernels import U8
 
@@ -176,7 +179,7 @@ def test_inside_of_an_object_is_no_home(tmp_path: Path) -> None:
         read(tmp_path, pixels)
 
     assert "floorplan.close_gaps" in str(caught.value)
-    assert read(tmp_path, pixels, close_gaps=1.6).area_m2 > 11
+    assert read(tmp_path, pixels, close_gaps=1.6).area_m2 > 10
 
 
 def test_grey_ground_around_white_floor_is_outside(tmp_path: Path) -> None:
@@ -228,3 +231,28 @@ def test_load_floorplan_of_a_picture_asks_for_its_scale(tmp_path: Path) -> None:
         load_floorplan(path)
     with pytest.raises(FloorPlanError, match="family_home is not a picture"):
         load_floorplan("family_home", resolution=0.05)
+
+
+def test_drawing_of_light_walls_is_told_and_read_by_negate(tmp_path: Path) -> None:
+    with pytest.raises(FloorPlanError, match=r"light on dark ground: set floorplan\.negate=true"):
+        read(tmp_path, 255 - HOME)
+
+    assert read(tmp_path) == read(tmp_path, 255 - HOME, negate=True)
+
+
+def test_place_of_a_wide_gap_is_marked_and_closed_by_the_line_to_type(tmp_path: Path) -> None:
+    pixels = HOME.copy()
+    for wall in (slice(10, 14), slice(66, 70)):  # in each room 1.5 m of an outer wall
+        pixels[wall, 20:50] = pixels[wall, 70:100] = PAPER
+    path = draw(tmp_path, pixels)
+
+    with contextlib.chdir(tmp_path), pytest.raises(FloorPlanError) as caught:
+        load_or_mark(path, resolution=0.05)
+
+    assert "floorplan.close_gaps=1.6; flat-question.png marks it" in str(caught.value)
+    with Picture.open(tmp_path / "flat-question.png") as marked:
+        red = (np.asarray(marked).astype(int) @ (1, -1, -1)) > 200
+    column, row = (int(n) for n in re.search(r"\((\d+), (\d+)\)", str(caught.value)).groups())
+    assert red.any()
+    assert np.abs(np.argwhere(red).mean(axis=0) - (row, column)).max() < 8
+    assert read(tmp_path, pixels, close_gaps=1.6).area_m2 > 10

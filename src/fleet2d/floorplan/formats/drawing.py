@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,15 +21,19 @@ from fleet2d.floorplan.formats.drawn_walls import (
 )
 from fleet2d.floorplan.formats.files import in_file
 from fleet2d.floorplan.formats.occupancy import OBJECT_M2, PictureSource
-from fleet2d.floorplan.formats.raster import GreyPicture, read_grey
+from fleet2d.floorplan.formats.raster import GreyPicture, UnclearPlaceError, read_grey
 from fleet2d.floorplan.lattice import MAX_CELL_M
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.kernels import Bool, label_parts, squared_distance
 
 # Widths of gaps in outer walls that are tried in turn [m], from pixels to a door.
 GAPS = (0.1, 0.2, 0.3, 0.45, 0.6, 0.9, 1.2)
+# Wider ones, which are only reported [m].
+WIDE_GAPS = (1.6, 2.2, 3.2, 4.8)
 # Share of the floor that closing gaps must keep.
 MOST = 0.8
+# A shade darker than this at the edge of a picture is that of dark ground.
+DARK_EDGE = 100
 # Sides of a pixel that are tried to find doors [m], the fewest doors that tell the scale, and how
 # near to a side that was tried it is.
 TRIED_M, FEWEST_DOORS, LIKELY_FACTOR = (0.0075, 0.011, 0.016, 0.024, 0.036, 0.005), 3, 1.25
@@ -54,6 +59,7 @@ class Image(PictureSource):
             none, as furniture is drawn with thin lines, too.
         close_gaps: Width of the widest gap in outer walls that is closed, if the home would lose
             more than half of its floor through gaps; 0 closes none.
+        negate: Whether walls are light on dark ground.
     """
 
     path: InputPath
@@ -62,6 +68,7 @@ class Image(PictureSource):
     line_width: Length = Field(default=LINE_M, ge=0, le=0.5)
     bridge_pixels: int = Field(default=0, ge=0, le=10)
     close_gaps: Length = Field(default=1.2, ge=0, le=5)
+    negate: bool = False
 
     @classmethod
     def usual_cell(cls, settings: Mapping[str, Any]) -> float:
@@ -84,7 +91,29 @@ class Image(PictureSource):
         Raises:
             FloorPlanError: It can't be read, or no light space is enclosed by dark walls.
         """
+        try:
+            return self._read_home()
+        except FloorPlanError:
+            if not self.negate and self._is_negative():
+                raise FloorPlanError(
+                    f"{self.path}: its walls are light on dark ground: set floorplan.negate=true,"
+                    " or invert the picture"
+                ) from None
+            raise
+
+    def _is_negative(self) -> bool:
+        """Return whether the picture is a home with light and dark exchanged."""
+        try:
+            if read_grey(self.path).edge_grey()[0] >= DARK_EDGE:
+                return False
+            return bool(self.model_copy(update={"negate": True}).load())
+        except FloorPlanError:
+            return False
+
+    def _read_home(self) -> FloorPlan:
         picture = read_grey(self.path)
+        if self.negate:
+            picture = replace(picture, values=picture.white - picture.values)
         with in_file(self.path):
             pixel = self.pixel
             if not 0 < pixel <= MAX_CELL_M:
@@ -230,6 +259,18 @@ def _inside(light: Bool, close_gaps: float, pixel: float, notes: list[str]) -> B
         return inside
     if not light.any():
         raise FloorPlanError("all of the picture is darker than threshold: set it lower")
+    wider = [(width, _enclosed(light, width / pixel)) for width in WIDE_GAPS if width > close_gaps]
+    at_most = max((_largest(closed) for _, closed in wider), default=0)
+    for width, closed in wider:
+        if _largest(closed) >= max(MOST * at_most, OBJECT_M2 / pixel**2):
+            row, column = _first_gap(light, inside, closed)
+            raise UnclearPlaceError(
+                f"no space is enclosed by walls: one gap is at pixel ({column}, {row}), at most"
+                f" {width:g} m wide. Draw the outer walls without gaps, or set"
+                f" floorplan.close_gaps={width:g}",
+                (column, row),
+                width / pixel / 2,
+            )
     raise FloorPlanError(
         "no space is enclosed by walls: all that is light is joined to the edge of the picture."
         " Draw the outer walls without gaps, the front door shut; if walls are grey, set threshold"

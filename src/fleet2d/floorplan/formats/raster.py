@@ -87,6 +87,30 @@ class GreyPicture:
         return filled
 
 
+class UnclearPlaceError(FloorPlanError):
+    """A picture is no home because of one place in it.
+
+    Attributes:
+        place: The place (column, row) [pixels].
+        radius: Radius of what is unclear [pixels].
+    """
+
+    def __init__(self, message: str, place: tuple[int, int], radius: float) -> None:
+        super().__init__(message)
+        self.place, self.radius = place, radius
+
+    def mark(self, picture: Path, out: Path) -> None:
+        """Write a copy of a picture with a red circle round the place; needs Pillow."""
+        from PIL import Image, ImageDraw
+
+        with Image.open(picture) as image:
+            copy = image.convert("RGB")
+        (column, row), radius = self.place, max(self.radius, max(copy.size) / 30)
+        box = (column - radius, row - radius, column + radius, row + radius)
+        ImageDraw.Draw(copy).ellipse(box, outline="red", width=max(max(copy.size) // 200, 2))
+        copy.save(out)
+
+
 def read_grey(path: Path) -> GreyPicture:
     """Read a PGM (P2 or P5, 8 or 16 bits), PNG or JPEG file, by its content.
 
