@@ -5,9 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.scenes import everything
 
-import fleet2d
 from fleet2d.engine import state
 from fleet2d.entities.body import NEVER, Bodies, Pose, Track, poses_of
 from fleet2d.kernels import Breakpoints
@@ -43,9 +41,7 @@ def bodies_at(*xs: int) -> Bodies:
 def test_watchers_take_in_fewer_steps_the_more_bodies_there_are_but_never_few(
     actors: int, capacity: int
 ) -> None:
-    simulation = fleet2d.Simulation(everything("1 min"))
-    simulation._state.actors = [None] * actors  # type: ignore[list-item]
-    assert capacity == simulation._state.capacity
+    assert capacity == state.capacity_of(actors)
     assert state.MIN_STEPS <= capacity <= state.MAX_STEPS
 
 

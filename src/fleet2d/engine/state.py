@@ -178,6 +178,11 @@ def _unpacked(numbers: bytes, texts: list[str]) -> Iterator[Event]:
     return map(new_event, zip(steps, *codes, strict=True))
 
 
+def capacity_of(actors: int) -> int:
+    """Return the maximum number of steps that watchers process together."""
+    return max(MIN_STEPS, min(MAX_STEPS, MAX_POSES // max(1, actors)))
+
+
 @dataclass
 class State:
     """The state of a run at a step.
@@ -244,7 +249,7 @@ class State:
     def __post_init__(self) -> None:
         """Begin without notes."""
         self.notes_emitted = [0] * len(self.actors)
-        self.capacity = max(MIN_STEPS, min(MAX_STEPS, MAX_POSES // max(1, len(self.actors))))
+        self.capacity = capacity_of(len(self.actors))
 
     # Decisions of scripts
 

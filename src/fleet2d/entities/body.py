@@ -374,9 +374,11 @@ class Body:
     @property
     def space(self) -> Space:
         """Where its body can be at present."""
-        (version, costs_version, _), space = self._space  # nearly always up to date
-        if version == self.home.version and not (costs_version or self.entity.minds_costs):
-            return space
+        (version, costs_version, kept_out), space = self._space  # nearly always up to date
+        if version == self.home.version and kept_out is self.kept_out:
+            costs = self.home.costs_version if self.entity.minds_costs else 0
+            if costs_version == costs:
+                return space
         if self._space[0] != self.arrangement:
             self._space = self.arrangement, self._present_space()
             self.part = self._present_part()
