@@ -192,9 +192,9 @@ def _draw_run(directory: Path, out: Path | None, picture: RunPicture) -> Path:
         draw_reliability(run, picture.reliability, target)
     elif picture.at is not None:
         from fleet2d.viewer.figures import draw_moment
-        from fleet2d.viewer.moments import clock_of, step_of
+        from fleet2d.viewer.moments import step_of
 
-        step = step_of(picture.at, clock_of(run))
+        step = step_of(picture.at, run.clock)
         target = out or directory / f"step-{step}.png"
         draw_moment(run, min(step, run.manifest["steps"] - 1), target)
     elif picture == RunPicture():

@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Callable, Sequence
-from datetime import date, datetime, timedelta
+from datetime import date, timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -325,7 +325,7 @@ def asked_of(run: Run) -> tuple[list[AskedTime], list[AskedTime]]:
 
 def _hours_of(run: Run) -> Callable[[int], float]:
     """Return the function from steps to hours since the midnight before the run."""
-    start = datetime.fromisoformat(run.manifest["start"])
+    start = run.clock.start
     begin = (start - midnight_of(start)) / timedelta(hours=1)
     return lambda step: begin + step * run.manifest["step_us"] / 1e6 / HOUR_S
 

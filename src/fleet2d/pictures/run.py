@@ -288,9 +288,8 @@ class _Picture:
 
     def __init__(self, run: Run) -> None:
         self.run, self.plan = run, run.plan
-        manifest = run.manifest
-        self.start = datetime.fromisoformat(manifest["start"])
-        self.step_us, self.steps = manifest["step_us"], manifest["steps"]
+        clock = run.clock
+        self.start, self.step_us, self.steps = clock.start, clock.step_us, clock.steps
         self.notes: list[str] = []
         self.users = self._traces("users", robot=False)
         self.robots = self._traces("robots", robot=True)

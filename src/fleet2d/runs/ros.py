@@ -8,7 +8,7 @@ local times of the run, taken as UTC, because scenarios have no time zone.
 import json
 import struct
 from collections.abc import Callable, Iterator, Sequence
-from datetime import UTC, datetime
+from datetime import UTC
 from functools import cached_property
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -96,9 +96,9 @@ class RosMessages:
         self._records, self._margin = records, margin
         self._templates: dict[tuple[str, ...], Template] = {}
         self._run = records.run
-        start = datetime.fromisoformat(self._run.manifest["start"])
-        self._start_ns = int(start.replace(tzinfo=UTC).timestamp()) * 1_000_000_000
-        self._step_ns = self._run.manifest["step_us"] * 1000
+        clock = self._run.clock
+        self._start_ns = int(clock.start.replace(tzinfo=UTC).timestamp()) * 1_000_000_000
+        self._step_ns = clock.step_us * 1000
         topics = [
             Topic(MAP, "nav_msgs/msg/OccupancyGrid", latched=True),
             Topic(TRANSFORMS, "tf2_msgs/msg/TFMessage"),

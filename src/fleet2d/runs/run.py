@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from datetime import timedelta
+from datetime import datetime, timedelta
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,6 +19,7 @@ from fleet2d.configuration.components import hook
 from fleet2d.configuration.problems import suggest
 from fleet2d.errors import ArtifactError, RunDirectoryError, printable
 from fleet2d.floorplan.layers import Layer
+from fleet2d.runtime.clock import Clock
 from fleet2d.storage.files import PARTIAL, path_in
 
 if TYPE_CHECKING:
@@ -117,6 +118,14 @@ class Run:
         """Digest of all tables; None if the run was never closed."""
         digest = self.manifest["digest"]
         return None if digest is None else str(digest)
+
+    @property
+    def clock(self) -> Clock:
+        """Its steps and their local times."""
+        manifest = self.manifest
+        return Clock(
+            datetime.fromisoformat(manifest["start"]), manifest["step_us"], manifest["steps"]
+        )
 
     @property
     def metrics(self) -> dict[str, Any]:

@@ -4,7 +4,7 @@ from bisect import bisect_right
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from datetime import datetime, timedelta
+from datetime import timedelta
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -97,9 +97,7 @@ class PathReader:
         Raises:
             ArtifactError: The run stored no key frames or damaged ones, or there is no such body.
         """
-        manifest = run.manifest
-        start = datetime.fromisoformat(manifest["start"])
-        self.clock = Clock(start, manifest["step_us"], manifest["steps"])
+        self.clock = run.clock
         self._run, self._plan, self._entity = run, plan, entity
         if "key_frames" not in run.tables:
             raise ArtifactError(

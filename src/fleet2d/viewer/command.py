@@ -1,6 +1,6 @@
 """Commands that show runs: view, film, report."""
 
-from datetime import datetime, timedelta
+from datetime import timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -69,9 +69,7 @@ def _where(run: "Run") -> str:
         return f"the run is {run.status}; it is not stored: name a directory by --out"
     if run.status == "complete":
         return f"stored in {run.directory}"
-    time = datetime.fromisoformat(run.manifest["start"]) + timedelta(
-        seconds=run.manifest["simulated_s"]
-    )
+    time = run.clock.start + timedelta(seconds=run.manifest["simulated_s"])
     return (
         f"interrupted at {time:%Y-%m-%d %H:%M}; what was simulated until then is in"
         f" {run.directory}: continue it by `fleet2d resume {run.directory}`"

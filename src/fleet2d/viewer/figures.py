@@ -31,7 +31,7 @@ from fleet2d.pictures.run import run_figure
 from fleet2d.pictures.theme import SCALE
 from fleet2d.runs.run import Run
 from fleet2d.runtime.clock import DAY, midnight_of
-from fleet2d.viewer.moments import clock_of, part_of_run
+from fleet2d.viewer.moments import part_of_run
 from fleet2d.viewer.run_facts import bodies_of
 from fleet2d.viewer.stage import Stage, draw_strip, strip_rows
 
@@ -98,7 +98,7 @@ def draw_failure(
         stage.show(step)
         if evidence is not None:
             _mark(run.plan, stage, evidence, axes)
-        moment = f"{clock_of(run).time(step):%a %d %b %H:%M:%S}, step {step}"
+        moment = f"{run.clock.time(step):%a %d %b %H:%M:%S}, step {step}"
         lines = textwrap.wrap(text, round(width * 14))[:3]
         figure.text(0.02, 1 - 0.08 / whole, "\n".join([moment, *lines]), va="top", fontsize=8)
         for number, course in enumerate(courses):
@@ -282,7 +282,7 @@ def _hours_per_m2(run: Run, plan: FloorPlan, names: list[str]) -> F64:
 
 def _day_around(run: Run, step: int) -> tuple[int, int]:
     """Return the first step of the day of a step, and the first step after that day."""
-    clock = clock_of(run)
+    clock = run.clock
     midnight = midnight_of(clock.time(step))
     first = clock.step_at_or_after(clock.elapsed(midnight))
     end = clock.step_at_or_after(clock.elapsed(midnight + DAY))

@@ -55,12 +55,6 @@ def step_of(text: str, clock: Clock, option: str = "--at") -> int:
     return step
 
 
-def clock_of(run: Run) -> Clock:
-    """Return the clock of a stored run."""
-    manifest = run.manifest
-    return Clock(datetime.fromisoformat(manifest["start"]), manifest["step_us"], manifest["steps"])
-
-
 def steps_of(run: Run, begin: str | None, end: str | None) -> tuple[int, int]:
     """Return the first step of a part of a run, and the step before which it ends.
 
@@ -72,7 +66,7 @@ def steps_of(run: Run, begin: str | None, end: str | None) -> tuple[int, int]:
     Raises:
         InputError: A text names no moment of the run, or the part is empty.
     """
-    clock = clock_of(run)
+    clock = run.clock
     first = 0 if begin is None else step_of(begin, clock, "--from")
     last = clock.steps if end is None else step_of(end, clock, "--to")
     if first >= last:
@@ -121,7 +115,7 @@ def part_of_run(run: Run, first: int, end: int) -> Run:
     Raises:
         ArtifactError: A table is damaged.
     """
-    clock = clock_of(run)
+    clock = run.clock
     if (first, end) == (0, clock.steps):
         return run
     content = {

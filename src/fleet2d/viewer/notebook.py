@@ -9,7 +9,7 @@ from typing import Any
 from fleet2d.errors import Fleet2DError
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.runs.run import Run
-from fleet2d.viewer.moments import clock_of, step_of
+from fleet2d.viewer.moments import step_of
 from fleet2d.viewer.run_facts import run_title
 
 NOTEBOOK_DPI = 100
@@ -22,7 +22,7 @@ def draw_run(run: Run, at: str | int | None, axes: Any, theme: str = "light") ->
     from fleet2d.viewer.figures import moment_figure, moment_on_axes
 
     last = run.manifest["steps"] - 1
-    step = last if at is None else at if isinstance(at, int) else step_of(at, clock_of(run), "at")
+    step = last if at is None else at if isinstance(at, int) else step_of(at, run.clock, "at")
     if axes is not None:
         moment_on_axes(run, min(step, last), axes)
         return axes
@@ -62,7 +62,7 @@ def run_widget(run: Run, height: int) -> Any:
 
 def run_html(run: Run) -> str:
     """Return a run as HTML for notebooks: its facts and its picture."""
-    clock, entities = clock_of(run), run.manifest["entities"]
+    clock, entities = run.clock, run.manifest["entities"]
     facts = [
         run.status,
         f"{clock.start:%Y-%m-%d %H:%M} to {clock.time(clock.steps):%Y-%m-%d %H:%M}",

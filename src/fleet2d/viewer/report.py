@@ -15,7 +15,6 @@ from fleet2d.configuration.units import format_duration
 from fleet2d.errors import ArtifactError, InputError
 from fleet2d.runs.run import Run
 from fleet2d.runtime.clock import DAY
-from fleet2d.viewer.moments import clock_of
 from fleet2d.viewer.notebook import figure_png
 from fleet2d.viewer.page_data import POLICY, PageData, embedded_run, html_of, write_file
 from fleet2d.viewer.run_facts import run_title
@@ -76,7 +75,7 @@ def report_html(run: Run) -> str:
 
 
 def _what_ran(run: Run) -> str:
-    manifest, clock = run.manifest, clock_of(run)
+    manifest, clock = run.manifest, run.clock
     entities = manifest["entities"]
     rows = [
         ("status", run.status),

@@ -34,7 +34,6 @@ from fleet2d.viewer.contract import (
     WallsChange,
 )
 from fleet2d.viewer.home_facts import HomeDoors, WallsHistory, door_facts, home_facts
-from fleet2d.viewer.moments import clock_of
 
 INTERVENTIONS = "interventions"
 VIOLATIONS = "violations"  # name of the table
@@ -309,7 +308,7 @@ def run_facts(run: Run, doors: HomeDoors, walls: WallsHistory) -> RunFacts:
         tables=[_table_facts(run, name) for name in run.tables],
         walls=walls.changes,
         marks=marks_of(run),
-        slows=slow_floors(scenario, manifest.get("interventions") or (), clock_of(run)),
+        slows=slow_floors(scenario, manifest.get("interventions") or (), run.clock),
         starts_unlit=_starts_unlit(scenario),
         metrics=run.metrics,
         scenario=scenario,
