@@ -118,14 +118,14 @@ def recognized(log: DetectionLog) -> Bool:
     return np.equal(log.true_identity, log.identity)[log.detected]
 
 
-def _read_table(path: Path) -> "_LogTable":
+def _read_table(path: Path) -> "_PerceptionLog":
     try:
         check_file(path, LOG_BYTES)
         with path.open(encoding="utf-8-sig", newline="") as file:
             reader = csv.reader(file)
             columns = [name.strip() for name in next(reader, [])]
             _check_columns(path, columns)
-            table = _LogTable(path, columns)
+            table = _PerceptionLog(path, columns)
             for row in islice(filter(None, reader), LOG_ROWS.limit + 1):
                 table.add(reader.line_num, row)
         LOG_ROWS.check(len(table), path, prefix="at least ")
@@ -154,7 +154,7 @@ def _check_columns(path: Path, columns: list[str]) -> None:
             )
 
 
-class _LogTable:
+class _PerceptionLog:
     """The columns of a file that have a meaning, and which line each row is on."""
 
     def __init__(self, path: Path, columns: list[str]) -> None:
