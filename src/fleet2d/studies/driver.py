@@ -27,6 +27,7 @@ from fleet2d.studies.design import (
 )
 from fleet2d.studies.directory import (
     COMPLETE,
+    SCENARIOS,
     VARIANTS,
     Counts,
     Meta,
@@ -47,7 +48,6 @@ from fleet2d.studies.plan import (
     make_plan,
     reconcile,
     task_of,
-    write_catalogue,
     write_plan,
 )
 from fleet2d.studies.reader import Study
@@ -433,7 +433,8 @@ def _write_plan(directory: StudyDirectory, checked: CheckedStudy, plan: StudyPla
     file = checked.specification.file
     source = checked.specification.source
     directory.storage.delete(VARIANTS)  # it may belong to another plan
-    write_catalogue(directory, plan, checked.scenarios.content)
+    directory.storage.write(SCENARIOS, checked.scenarios.content())
+    write_plan(directory, plan)
     meta = Meta(
         checked.specification.name,
         file.description,

@@ -331,16 +331,12 @@ class ResultRows:
 
         rows = self._row[np.where(numbers < len(self._row), numbers, -1)]
         groups = np.searchsorted(self._first, rows, side="right") - 1
-        places, tables, before = (
-            np.full(len(numbers), -1),
-            [pa.Table.from_batches([], self._schema)],
-            0,
-        )
+        places, before = np.full(len(numbers), -1), 0
+        tables = [pa.Table.from_batches([], self._schema)]
         for group in np.unique(groups[rows >= 0]).tolist():
             here = np.flatnonzero(groups == group)
-            tables.append(
-                self._read(group).take(number_array(rows[here] - self._first[group], pa.int64()))
-            )
+            in_group = number_array(rows[here] - self._first[group], pa.int64())
+            tables.append(self._read(group).take(in_group))
             places[here] = before + np.arange(len(here))
             before += len(here)
         table = pa.concat_tables(tables, promote_options="default")

@@ -33,7 +33,7 @@ from fleet2d.studies.design import (
     scenario_content,
     scenario_hashes,
 )
-from fleet2d.studies.directory import PLAN, SCENARIOS, MetricFacts, StudyDirectory
+from fleet2d.studies.directory import PLAN, MetricFacts, StudyDirectory
 from fleet2d.studies.executors import (
     Executor,
     LostTask,
@@ -656,14 +656,6 @@ def label_array(labels: list[Label]) -> "pa.Array":
         return array_of(labels, pa.float64())
     texts = (None if label is None else str(label) for label in labels)
     return array_of(texts, pa.string())
-
-
-def write_catalogue(
-    directory: StudyDirectory, plan: StudyPlan, scenarios: Callable[[], bytes]
-) -> None:
-    """Write the plan and the scenarios of a study."""
-    directory.storage.write(SCENARIOS, scenarios())
-    write_plan(directory, plan)
 
 
 def write_plan(directory: StudyDirectory, plan: StudyPlan) -> None:
