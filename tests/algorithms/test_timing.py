@@ -16,6 +16,7 @@ from fleet2d.algorithms.timing import (
     TimingPolicy,
     TwoStageTiming,
 )
+from fleet2d.errors import ComponentError
 
 ROOMS, KITCHEN, BEDROOM = 3, 0, 1
 
@@ -161,3 +162,17 @@ def test_spans_are_invisible_to_the_learner() -> None:
     content["users"]["ana"] = ana() | {"answers": {"defers": 0.5}}
     other = {**content, "simulation": {**content["simulation"], "max_span": 7}}
     assert digests(fleet2d.run(content)) == digests(fleet2d.run(other))
+
+
+def test_hours_that_no_day_has_are_refused() -> None:
+    for hour in (-1, 24):
+        with pytest.raises(ValueError, match="hours"):
+            FixedTimes(hours=(hour,))
+
+
+def test_an_algorithm_without_chances_of_asking_is_refused_as_timing() -> None:
+    behavior = {"type": "interact", "timing": "ltp"}
+    content = home("1 h", robots={"astro": {"behaviors": [behavior]}})
+    content["algorithms"] = {"ltp": {"type": "long_term_presence", "period": "10 min"}}
+    with pytest.raises(ComponentError, match="output of 'ltp' has no chances of asking"):
+        fleet2d.run(content)

@@ -100,6 +100,7 @@ def test_an_answer_settles_a_request(
         ({"to": "anna"}, "there is no user 'anna': did you mean 'ana'?"),
         ({"by": "astra"}, "there is no robot 'astra': did you mean 'astro'?"),
         ({"do": "nag"}, "'remind', 'offer'"),
+        ({"at": [], "every": "1 us"}, "interactions.pill.every: expected a step (1 s) or more"),
         ({"on": "feast"}, "interactions.pill.on"),
     ],
 )

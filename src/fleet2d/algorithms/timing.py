@@ -203,7 +203,7 @@ class FixedTimes(TimingPolicy):
         hours: The hours of the day, 0 to 23; left out: all.
     """
 
-    hours: tuple[int, ...] = Field(default=tuple(range(HOURS)))
+    hours: tuple[Annotated[int, Field(ge=0, lt=HOURS)], ...] = tuple(range(HOURS))
 
     def chances(self) -> F64:
         """Return 1 in these hours, else 0."""

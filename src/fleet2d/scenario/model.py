@@ -271,6 +271,11 @@ class Scenario(Settings):
             known: dict[str, Mapping[str, Any]] = {"to": users, "fetch_from": users, "by": robots}
             if interaction.by is None and not self.robots:
                 raise problem_at(("interactions", name), "there is no robot that could do it")
+            if interaction.every is not None and interaction.every < self.simulation.step:
+                raise problem_at(
+                    ("interactions", name, "every"),
+                    f"expected a step ({self.simulation.step.total_seconds():g} s) or more",
+                )
             for key, bodies in known.items():
                 body = getattr(interaction, key)
                 if body is not None and body not in bodies:

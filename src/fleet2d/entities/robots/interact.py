@@ -19,6 +19,7 @@ from fleet2d.entities.robots.approach import (
     check_has_camera,
     is_in_rooms,
 )
+from fleet2d.errors import ComponentError
 from fleet2d.interactions.interaction import Outcome, Request
 from fleet2d.kernels import F64
 from fleet2d.runtime.determinism import sum_in_order
@@ -167,8 +168,11 @@ class Interact(BeliefBehavior):
 
     def _take_served(self, now: Situation) -> ServedRequest | None:
         """Return and forget what it is doing; None if another behavior has interrupted that."""
-        served, self.served = self.served, None
-        if served is None or now.actor.plan.root is self.plan:
+        served = self.served
+        if served is None:
+            return None
+        self.served = None
+        if now.actor.plan.root is self.plan:
             return served
         if served.step == "ask":  # maybe it was sent away
             self.left_alone[served.request.to] = now.time + self.again
@@ -262,10 +266,15 @@ class Interact(BeliefBehavior):
             return False
         assert now.requests is not None
         self.looked[request.text] = now.time
-        chances, chance, to = now.outputs.get(self.timing), 1.0, request.to
+        output, chance, to = now.outputs.get(self.timing), 1.0, request.to
+        if output is not None and not callable(getattr(output, "chance", None)):
+            raise ComponentError(
+                f"the output of {self.timing!r} has no chances of asking: name an algorithm of type"
+                " timing, or one whose output has a method `chance`, as TimingChances has"
+            )
         age = (now.time - request.since) / request.interaction.within
-        if chances is not None and age < self.only_urgent_at:
-            chance = chances.chance(to, request.name, now.time, self._room_of(now, to))
+        if output is not None and age < self.only_urgent_at:
+            chance = output.chance(to, request.name, now.time, self._room_of(now, to))
         since, best = self.best_so_far.get(request.text, (request.since, 0.0))
         best = best if since == request.since else 0.0
         # It is asked at the first moment whose chance exceeds a threshold drawn for the request.
