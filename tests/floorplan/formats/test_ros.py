@@ -506,6 +506,26 @@ def test_component_of_a_broken_map_says_so_when_it_loads(tmp_path: Path) -> None
         source.load()
 
 
+def test_map_with_too_many_corners_is_straightened_by_a_pixel(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A scanned building that wasn't turned to its walls was refused: each pixel is a corner."""
+    y, x = np.indices((60, 60))
+    pixels = np.where((x > 1) & (y > 1) & (x + 2 * y < 100), FREE, OCCUPIED).astype(np.uint8)
+    path = write(tmp_path, pixels)
+    exact = read_ros(path)
+    monkeypatch.setenv("FLEET2D_MAX_CORNERS", "50")
+
+    straight = read_ros(path)
+
+    assert shapely.count_coordinates(straight.polygons) < 50
+    assert 0.01 > abs(straight.area_m2 / exact.area_m2 - 1)
+    (note,) = [note for note in straight.notes if "by up to a pixel" in note]
+    keys = dict([note.split("; ")[1].split()[0].split("=")])
+    monkeypatch.setenv("FLEET2D_MAX_CORNERS", keys["FLEET2D_MAX_CORNERS"])
+    assert exact == read_ros(path)
+
+
 @pytest.mark.parametrize("key", ["speck_area_m2", "ray_width", "simplify"])
 def test_negative_cleaning_is_refused(tmp_path: Path, key: str) -> None:
     with pytest.raises(ValidationError, match=key):

@@ -11,6 +11,7 @@ import shapely
 from pydantic import Field
 from shapely import Polygon
 
+from fleet2d.bounds import CORNERS
 from fleet2d.configuration.components import register
 from fleet2d.configuration.units import InputPath, Length
 from fleet2d.errors import FloorPlanError
@@ -38,7 +39,8 @@ class Ros(PictureSource):
 
     Attributes:
         path: The map's YAML file; it names the image.
-        simplify: How far straightened walls may be from the map's pixels; 0: exact walls.
+        simplify: How far straightened walls may be from the map's pixels; 0: exact walls, or a
+            pixel where they have more corners than are read.
     """
 
     path: InputPath
@@ -66,8 +68,15 @@ class Ros(PictureSource):
             file, notes = _image_file(settings.image, self.path)
             picture = read_grey(file)
             free = self.home(self._occupancy(settings, picture, notes), picture, notes)
-            if self.simplify > 0:
-                free = _simplify(free, self.simplify, notes)
+            tolerance, corners = self.simplify, shapely.get_num_coordinates(free)
+            if tolerance == 0 and corners > CORNERS.limit:
+                tolerance = settings.resolution
+                notes.append(
+                    f"walls are straightened by up to a pixel, since they have {corners} corners;"
+                    f" {CORNERS.variable}={corners} in the environment keeps them exact"
+                )
+            if tolerance > 0:
+                free = _simplify(free, tolerance, notes)
             return self.build(free, settings.resolution, f"ROS map, {self.path.name}", notes)
 
     def _occupancy(
