@@ -45,17 +45,17 @@ def test_a_part_adds_to_the_needs_of_an_adult_that_a_persona_has_by_default(
     assert {*usual_needs(), "pick_up", "freshen_up"} == set(extended.needs)
 
 
-def test_a_part_changes_the_errands_and_activities_that_a_persona_has_by_default(
+def test_short_stays_take_the_place_of_fetches_and_of_the_errands_of_an_adult(
     tmp_path: Path,
 ) -> None:
     own = "activities: {tv: {rooms: [office], fetches: 5 min}}\n"
     (tmp_path / "ana.yaml").write_text(f"days: {{every: {{on: daily}}}}\n{own}")
     extended = read({"extends": [str(tmp_path / "ana.yaml"), "short_stays"]})
     assert {"check_door"} == set(extended.errands)
-    read_it = find_activity("read", extended.activities)
-    assert catalogue()["read"].model_copy(update={"fetches": None}) == read_it
-    tv = find_activity("tv", extended.activities)
-    assert (("office",), None) == (tv.rooms, tv.fetches)
+    reading = extended.activity("read")
+    assert catalogue()["read"].model_copy(update={"fetches": None}) == reading
+    assert (("office",), None) == (extended.activity("tv").rooms, extended.activity("tv").fetches)
+    assert read(str(tmp_path / "ana.yaml")).activity("tv").fetches is not None
 
 
 @pytest.mark.parametrize(

@@ -146,15 +146,12 @@ def privacy(fitted: "FittedPersona", private: bool) -> list[str]:
         f"  simulated days: {simulated_repeats(fitted)}",
         f"  days of the log, with each other: {repeats(fitted.log, fitted.log)}",
     ]
-    if private:
-        return [
-            *lines,
-            "no day of the log is in the persona; docs/fit.md says what it still tells",
-        ]
-    return [
-        *lines,
-        "the persona holds every day of the log to the second: --private, to give it away",
-    ]
+    verdict = (
+        "no day of the log is in the persona; docs/fit.md says what it still tells"
+        if private
+        else "the persona holds every day of the log to the second: --private, to give it away"
+    )
+    return [*lines, verdict]
 
 
 calibrating = typer.Typer(help="Fit a model to a log of a real device.", no_args_is_help=True)

@@ -1,7 +1,7 @@
 """Personas fitted to the days of a log, and how well their days match days held back."""
 
 import math
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
@@ -205,9 +205,8 @@ class _Fitter:
         wakes = [day.wake for day in days]
         beds = [day.bed for day in days]
         shortest = min(day.next_wake - day.bed for day in days)
-        least_night = (
-            self.dawn + DAY_MINUTES - max(beds)
-        )  # if the next day begins as early as possible
+        # If the next day begins as early as possible.
+        least_night = self.dawn + DAY_MINUTES - max(beds)
         tasks, rest = self._tasks(days)
         return {
             "wake": _timing(wakes),
@@ -226,10 +225,9 @@ class _Fitter:
         for state, done in sorted(by_state.items()):
             for number, cluster in enumerate(_clusters(done)):
                 longest: dict[int, Stretch] = {}
-                for number_of_day, run in cluster:
-                    known = longest.get(number_of_day)
-                    if known is None or run.length > known.length:
-                        longest[number_of_day] = run
+                for of_day, run in cluster:
+                    if of_day not in longest or run.length > longest[of_day].length:
+                        longest[of_day] = run
                 stretches = list(longest.values())
                 if not _is_task(stretches, len(cluster), len(days)):
                     rest += [run for _, run in cluster]
@@ -275,11 +273,9 @@ class _Fitter:
     @staticmethod
     def _main_state(done: Sequence[Stretch]) -> tuple[int, bool]:
         """Return the state with the most time, and whether that is more than half of the time."""
-        lasts: dict[int, int] = defaultdict(int)
-        for run in done:
-            lasts[run.state] += run.length
+        lasts = _time_by_state(done)
         state = max(lasts, key=lambda s: (lasts[s], -s))
-        return state, 2 * lasts[state] > sum(lasts.values())
+        return state, 2 * lasts[state] > lasts.total()
 
     def recorded(self, days: Sequence[LivedDay]) -> list[RecordedDay]:
         """Return days as recorded days."""
@@ -301,14 +297,11 @@ class _Fitter:
         state = max(sleep_states(self.timeline), key=lambda s: (self.timeline.minutes == s).sum())
         fields = self._where(state) | {"posture": "lie"}
         places = self.timeline.states
-        up = [r for day in days for r in day.up if places[r.state].place not in (AWAY,)]
-        own = places[state].place
-        up = [run for run in up if gets_up and places[run.state].place != own]
-        if up:
+        here = (AWAY, places[state].place)
+        up = [run for day in days for run in day.up if places[run.state].place not in here]
+        if up and gets_up:
             asleep = sum(day.next_wake - day.bed for day in days) - sum(r.length for r in up)
-            rooms: dict[str, int] = defaultdict(int)
-            for run in up:
-                rooms[places[run.state].place] += 1
+            rooms = Counter(places[run.state].place for run in up)
             usual = max(rooms, key=lambda place: (rooms[place], place))
             fields |= {
                 "fetches": _minutes(max(1, asleep // len(up))),
@@ -320,10 +313,7 @@ class _Fitter:
 
     def rest(self, days: Sequence[LivedDay]) -> None:
         """Describe rest, for times in which nothing else fits, by the most frequent state."""
-        lasts: dict[int, int] = defaultdict(int)
-        for day in days:
-            for run in day.awake:
-                lasts[run.state] += run.length
+        lasts = _time_by_state(run for day in days for run in day.awake)
         home = {s: n for s, n in lasts.items() if self.timeline.states[s].place != AWAY}
         state = max(home or lasts, key=lambda s: (lasts[s], -s))
         self.activities["rest"] = self._where(state) | {"takes": "15 min"}
@@ -375,6 +365,14 @@ def _recorded_day(timeline: Timeline, day: LivedDay, names: Sequence[str]) -> Re
     changes = [e for i, e in enumerate(last) if not i or e[1] != last[i - 1][1]]
     begins, activities = zip(*changes, strict=True)
     return RecordedDay(tuple(begins), tuple(activities), next_wake)
+
+
+def _time_by_state(done: Iterable[Stretch]) -> Counter[int]:
+    """Return the time of each state in some stretches [min]."""
+    lasts: Counter[int] = Counter()
+    for run in done:
+        lasts[run.state] += run.length
+    return lasts
 
 
 def _clusters(done: Sequence[tuple[int, Stretch]]) -> list[list[tuple[int, Stretch]]]:

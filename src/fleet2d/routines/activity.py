@@ -197,13 +197,8 @@ def catalogue() -> dict[str, Activity]:
     >>> catalogue()["cook"].rooms, catalogue()["work"].away
     (('kitchen', 'any'), True)
     """
-    return {name: Activity.model_validate(fields) for name, fields in catalogue_data().items()}
-
-
-@cache
-def catalogue_data() -> dict[str, Any]:
-    """Return the activities that come with Fleet2D as plain data, by name."""
-    return read_document(FOLDER / "activities.yaml").data
+    data = read_document(FOLDER / "activities.yaml").data
+    return {name: Activity.model_validate(fields) for name, fields in data.items()}
 
 
 def find_activity(name: str, own: dict[str, Activity]) -> Activity:

@@ -41,7 +41,6 @@ from fleet2d.routines.activity import (
     DurationDistribution,
     SchemaForms,
     catalogue,
-    catalogue_data,
     find_activity,
 )
 from fleet2d.routines.interruptions import (
@@ -362,6 +361,7 @@ class Persona(Settings):
         leisure: The pastimes between the tasks of a day.
         needs: Needs that interrupt a day, by name; left out: those of an adult; null: none.
         errands: Short tasks between activities, by name; left out: those of an adult; null: none.
+        fetches: Whether it fetches things from other rooms during activities, as these say.
         days: The kinds of days, by name.
         year: What changes its days in the course of a year, by name; a later one precedes others.
     """
@@ -373,6 +373,7 @@ class Persona(Settings):
     leisure: dict[str, AnyPastime] = Field(default_factory=lambda: {"rest": Pastime()})
     needs: dict[str, AnyNeed] = Field(default_factory=lambda: dict(usual_needs()))
     errands: dict[str, AnyErrand] = Field(default_factory=lambda: dict(usual_errands()))
+    fetches: bool = True
     days: dict[str, DayTemplate] = Field(min_length=1)
     year: dict[str, YearEvent] = Field(default_factory=dict)
 
@@ -446,7 +447,8 @@ class Persona(Settings):
 
     def activity(self, name: str) -> Activity:
         """Return an activity by name, its own first."""
-        return find_activity(name, self.known_activities)
+        activity = find_activity(name, self.known_activities)
+        return activity if self.fetches else activity.model_copy(update={"fetches": None})
 
     @cached_property
     def known_activities(self) -> dict[str, Activity]:
@@ -579,17 +581,10 @@ def _extended(names: Any, chain: tuple[str, ...], files: list[Path]) -> Any:
         above = _data_of(name, (*chain, ""), files)
         if below and "needs" in above and "needs" not in below:
             below = {**below, "needs": usual_needs()}  # a part adds to them
-        if isinstance(below, Mapping) and name in part_names():
-            below = _with_defaults(below, above["activities"])
+        if isinstance(below, Mapping) and "errands" not in below and name in part_names():
+            below = {**below, "errands": usual_errands()}  # of which it takes some away
         below = merge(below, above)
     return below
-
-
-def _with_defaults(persona: Mapping[str, Any], changed: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a persona with the errands and activities that it has by default."""
-    activities = {k: v for k, v in catalogue_data().items() if k in changed}
-    activities |= persona.get("activities") or {}
-    return {"errands": usual_errands(), **persona, "activities": activities}
 
 
 def _persona_file(value: str | Path, *, is_extended: bool) -> Path:
