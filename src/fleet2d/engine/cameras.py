@@ -238,11 +238,6 @@ class Cameras(Watcher):
             stop_lost=False,
             stop_seen=False,
         )
-        self._rules = {
-            (lost, seen): self.rule._replace(stop_lost=lost, stop_seen=seen)
-            for lost in (False, True)
-            for seen in (False, True)
-        }
         looks = self.lenses.latency // self.lenses.period + 2
         return new_memory(len(self.names), count, int((looks * bursts).max()))
 
@@ -395,7 +390,7 @@ class Cameras(Watcher):
             home.walls,
             self.lenses,
             self.errors,
-            self._rules[stop_lost, stop_seen],
+            self.rule._replace(stop_lost=stop_lost, stop_seen=stop_seen),
             window,
             self.row,
             self._first,
