@@ -334,7 +334,7 @@ def test_synthetic_homes_have_the_ranges_of_the_page() -> None:
         for cells in rows(page("synthetic"), "| key | default | range")
     }
     for key, less, more in (
-        ("area_m2", 29, 451),
+        ("area_m2", 17, 451),
         ("bedrooms", 0, 9),
         ("bathrooms", 0, 7),
         ("corridor_width", 0.85, 2.05),
