@@ -479,7 +479,8 @@ private:
     i64 identities_in_view_ = 0;
     i64 run_ = 0;  // of the onlooker at the present step
     i64 now_ = 0;
-    std::vector<i64> latest_;  // (cameras * identities,) what each camera last saw of each, among the distinct; -1: none
+    std::vector<i64>
+        latest_;  // (cameras * identities,) what each camera last saw of each, among the distinct; -1: none
     DetectionResult result_{};
 };
 
