@@ -59,7 +59,7 @@ def test_a_map_without_a_path_and_one_of_another_home_are_refused(
 def test_a_file_that_is_no_map_says_whose_it_is_and_what_reads_logs(tmp_path: Path) -> None:
     log = tmp_path / "log.csv"
     log.write_text("time,x,y\n0,1.0,3.0\n")
-    with pytest.raises(InputError, match=r"robots\.astro: .*log\.csv is not JSON.*'replay'"):
+    with pytest.raises(InputError, match=r"robots\.astro: .*log\.csv is a table.*'replay'"):
         fleet2d.Simulation(home_with([{"type": "retrace", "path": str(log)}]))
 
 
