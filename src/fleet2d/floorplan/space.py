@@ -176,7 +176,7 @@ class Space:
         self, x: int, y: int, part: int | None = None, room: int | None = None
     ) -> tuple[int, int] | None:
         """Return the centre of the free cell nearest to a point; ties: lowest row, column."""
-        cells = self._by_distance(x, y, part, room)
+        cells = self._by_distance(x, y, 1, part, room)
         return self.plan.lattice.cell_centre(*cells[0].tolist()) if len(cells) else None
 
     def _find_route(self, start: tuple[int, int], goal: tuple[int, int]) -> I64 | None:
@@ -228,20 +228,26 @@ class Space:
     def _way_in(self, x: int, y: int) -> tuple[int, int] | None:
         walls = self.walls
         triangle = locate(walls, x, y)
-        for row, column in self._by_distance(x, y)[:ESCAPE_ATTEMPTS].tolist():
+        for row, column in self._by_distance(x, y, ESCAPE_ATTEMPTS).tolist():
             target = self.plan.lattice.cell_centre(row, column)
             if triangle >= 0 and line_of_sight(walls, x, y, triangle, *target):
                 return target
         return None
 
-    def _by_distance(self, x: int, y: int, part: int | None = None, room: int | None = None) -> I64:
+    def _by_distance(
+        self, x: int, y: int, most: int, part: int | None = None, room: int | None = None
+    ) -> I64:
+        """Return the free cells (row, column) nearest to a point, at most so many, in order."""
         mask = self.part_of_cell >= 0 if part is None else self.part_of_cell == part
         if room is not None:
             mask = mask & (self.plan.room_of_cell == room)
         cells = np.argwhere(mask)
         xs, ys = self.plan.lattice.centre_axes()
         away = (xs[cells[:, 1]] - x) ** 2 + (ys[cells[:, 0]] - y) ** 2
-        return cells[np.argsort(away, kind="stable")]
+        if len(cells) > most:
+            near = away <= np.partition(away, most - 1)[most - 1]
+            cells, away = cells[near], away[near]
+        return cells[np.argsort(away, kind="stable")[:most]]
 
     def _corners(self) -> Corners:
         """Return the reflex vertices of the border, round which shortest ways bend."""

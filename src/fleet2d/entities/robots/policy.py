@@ -177,8 +177,9 @@ class WaitingPoses:
             return *actor.middle(room), 0
         first = np.cumsum([0, *(len(gaps) for _, gaps in views[:-1])])
         x, y = np.concatenate([gaps for _, gaps in views]).T.astype(np.float64)
-        ahead = x * DIRECTIONS[:, :1] + y * DIRECTIONS[:, 1:]
-        is_shown = ahead >= np.sqrt(x * x + y * y) * limit
+        half = DIRECTIONS[: len(DIRECTIONS) // 2]  # the others are opposite to these
+        ahead, least = x * half[:, :1] + y * half[:, 1:], np.sqrt(x * x + y * y) * limit
+        is_shown = np.concatenate([ahead >= least, ahead <= -least])
         shown = np.add.reduceat(is_shown, first, axis=1, dtype=np.intp).T  # (views, directions)
         view, facing = divmod(int(shown.argmax()), len(DIRECTIONS))
         if shown[view, facing] == 0:  # by a camera with a narrow angle
@@ -473,9 +474,7 @@ class Policy(BeliefBehavior):
     def _go(self, now: Situation, plan: Plan, room: int) -> Plan:
         """Go to a room, and wait or look round there."""
         name, number = now.home.rooms[room].name, self.poses.number[room]
-        begun, step_s = max(self.visited[room], 0), now.actor.clock.step_us / 1e6
-        overdue_h = min((now.step - begun) * step_s / HOUR_S, MAX_OVERDUE_H)
-        self.visited[room] = now.step
+        begun, self.visited[room] = max(int(self.visited[room]), 0), now.step
         if self.sites is not None and self.task == "find":
             self.sites.look_round(plan, number)
             self._tally["relocations"] += 1
@@ -487,7 +486,8 @@ class Policy(BeliefBehavior):
             plan.turn_to(int(self.poses.headings[number]))
         if self.task == "hangout":
             return plan.stay(self.period)
-        self._tally["overdue_h"] += overdue_h
+        overdue_s = (now.step - begun) * now.actor.clock.step_us / 1e6
+        self._tally["overdue_h"] += min(overdue_s / HOUR_S, MAX_OVERDUE_H)
         return plan.turn_by(1.0).stay(self.dwell)
 
     def _wait(self, plan: Plan, duration: timedelta) -> Plan:
