@@ -163,10 +163,6 @@ class TableWriter:
     file: ParquetTable | None = None
     logged: int = 0
 
-    def __getstate__(self) -> dict[str, Any]:
-        """Leave out the functions that listen: they belong to the caller, not to the run."""
-        return {**self.__dict__, "row_listeners": []}
-
     def hashed(self) -> TableDigest:
         """Return the digest of the rows that left the buffer; those in memory are hashed now."""
         if self.digest is not None:
@@ -242,6 +238,10 @@ class RunStore:
         self._unfinished = None if self.root is None else UnfinishedRun(self.root)
         for spec in specs:
             self.add_table(spec)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Leave out the functions that listen: they belong to the caller, not to the run."""
+        return {**self.__dict__, "row_listeners": []}
 
     def check(self) -> None:
         """Check, without writing, that the directory can be used.
