@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import polars as pl
 import pytest
 
 from fleet2d.configuration.documents import read_document
@@ -20,31 +21,40 @@ from fleet2d.paper.results import (
     PaperOptions,
     Result,
     differences,
+    estimates,
     feedback,
-    interval,
     ltp_gap,
     rtp_gap,
     run_months,
     study_content,
+    table_of_means,
 )
 from fleet2d.scenario.model import load_scenario
 from fleet2d.studies.design import Design, build_design
 from fleet2d.studies.specification import read_specification
 
 
-def test_intervals_hold_the_true_mean_as_often_as_they_say() -> None:
-    samples = np.random.default_rng(5).exponential(1.0, (200, 40))
-    hits = sum(low <= 1.0 <= high for _, low, high in map(interval, samples))
-    # 95 % less what 40 skewed values miss: 0.90 to 0.97, within three standard errors of 200.
-    assert 0.88 < hits / 200 < 0.98
+def test_estimates_keep_the_order_of_rows_and_hold_their_mean() -> None:
+    rows = pl.DataFrame(
+        {"robot": ["b"] * 4 + ["a"], "model": ["x"] * 5, "value": [0.1, 0.4, 0.2, 0.9, 0.5]}
+    )
+    first, single = estimates(rows, "robot", "model").to_dicts()
+    assert ("b", "x", "a") == (first["robot"], first["model"], single["robot"])
+    assert first["mean"] == pytest.approx(0.4)
+    assert first["low"] < first["mean"] < first["high"]
+    assert 0.5 == single["mean"]
+    assert np.isnan(single["low"])
 
 
-def test_an_interval_holds_its_mean_and_is_the_same_each_time() -> None:
-    values = [0.1, 0.4, 0.2, 0.9]
-    mean, low, high = interval(values)
-    assert mean == pytest.approx(0.4)
-    assert low < mean < high
-    assert (mean, low, high) == interval(values)
+def test_a_table_leaves_cells_without_a_mean_empty() -> None:
+    means = pl.DataFrame(
+        [("semi_markov", "all", 0.5, 0.4, 0.6)],
+        ["model", "gap", "mean", "low", "high"],
+        orient="row",
+    )
+    table = table_of_means("title", means, ("0-1 min", "all"))
+    assert ["model", "0-1 min", "all"] == [column.header for column in table.columns]
+    assert [["semi markov"], [""], ["0.500"]] == [list(column.cells) for column in table.columns]
 
 
 def test_the_study_files_hold_the_sizes_of_the_paper() -> None:
@@ -143,21 +153,24 @@ def test_gaps_are_of_every_room_and_day(measured: dict[str, Result]) -> None:
 def test_right_after_a_sighting_the_naive_guess_is_right_and_after_hours_is_not(
     measured: dict[str, Result],
 ) -> None:
-    top_1 = measured["rtp-gap"].numbers["means"]["top_1"]
-    assert top_1[NAIVE_GUESS]["0-1 min"][0] > 0.9
-    assert top_1[NAIVE_GUESS]["over 4 h"][0] < 0.2
-    assert top_1["hmm"]["over 4 h"][0] > 0.5
+    rows = measured["rtp-gap"].numbers["means"]["top_1"]
+    top_1 = {(row["model"], row["gap"]): row["mean"] for row in rows}
+    assert top_1[NAIVE_GUESS, "0-1 min"] > 0.9
+    assert top_1[NAIVE_GUESS, "over 4 h"] < 0.2
+    assert top_1["hmm", "over 4 h"] > 0.5
 
 
 def test_differences_are_paired_by_seed(measured: dict[str, Result]) -> None:
-    tv = measured["feedback"].numbers["tv"]
-    assert [*design_of(1).labels["robot"]] == [*tv]
-    less = differences(tv)
-    for policy, by in tv.items():
-        assert NAIVE_ESTIMATOR not in less[policy]
-        for name, values in less[policy].items():
-            expected = [a - b for a, b in zip(by[name], by[NAIVE_ESTIMATOR], strict=True)]
-            assert expected == values
+    errors = pl.DataFrame(measured["feedback"].numbers["tv"])
+    values = {(r["robot"], r["seed"], r["estimator"]): r["value"] for r in errors.to_dicts()}
+    robots = [*design_of(1).labels["robot"]]
+    assert robots == errors["robot"].unique(maintain_order=True).to_list()
+    less = differences(errors).to_dicts()
+    assert len(robots) * (len(ESTIMATORS) - 1) == len(less)
+    for row in less:
+        robot, seed, estimator = row["robot"], row["seed"], row["estimator"]
+        expected = values[robot, seed, estimator] - values[robot, seed, NAIVE_ESTIMATOR]
+        assert expected == row["value"]
 
 
 def design_of(seeds: int) -> Design:

@@ -1,16 +1,19 @@
 """The figures of the results."""
 
+import textwrap
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import polars as pl
 
 from fleet2d.errors import extra
 from fleet2d.metrics.rtp_score import GAPS
 from fleet2d.paper import results
-from fleet2d.paper.results import Result, interval
+from fleet2d.paper.results import Result
 from fleet2d.pictures.floorplan import check_picture, drawing_style, save_figure
+from fleet2d.studies.figures import COLORS, DARK, draw_interaction
 
 with extra("viz", "drawing needs matplotlib"):
     from matplotlib.axes import Axes
@@ -19,11 +22,8 @@ with extra("viz", "drawing needs matplotlib"):
 
 DPI = 150
 SIZE = (8.4, 4.4)
-COLORS = (
-    "#b5305c", "#2c6fb0", "#3f8a4f", "#c26a12", "#8153b5", "#1f8a8c", "#8a6d3b", "#5b6770",
-)  # fmt: skip
-DARK, PALE = "#2d3138", "#b9bec6"
-NEVER_SEEN = GAPS[-1]  # no time: it can't be drawn on a time axis
+PALE = "#b9bec6"
+DRAWN_GAPS = GAPS[:-1]  # without `never seen`, which is no time
 ROOMS = 6  # with the largest gaps, which get a colour and a name; other rooms are pale
 
 
@@ -35,15 +35,19 @@ def draw(result: Result, path: Path) -> None:
     """
     check_picture(path)
     with drawing_style():
-        figure = Figure(figsize=SIZE, dpi=DPI, layout="constrained")
-        axes = figure.subplots()
-        axes.spines[["top", "right"]].set_visible(False)
-        DRAWERS[result.name](result.numbers, axes)
-        save_figure(figure, path)
+        save_figure(DRAWERS[result.name](result.numbers), path)
 
 
-def draw_speed(numbers: Mapping[str, Any], axes: Axes) -> None:
+def _figure() -> tuple[Figure, Axes]:
+    figure = Figure(figsize=SIZE, dpi=DPI, layout="constrained")
+    axes = figure.subplots()
+    axes.spines[["top", "right"]].set_visible(False)
+    return figure, axes
+
+
+def draw_speed(numbers: Mapping[str, Any]) -> Figure:
     """Draw the speed of each row in times real time."""
+    figure, axes = _figure()
     rows = [row for row in numbers["rows"] if "speedup" in row][::-1]
     speedups = [row["speedup"] for row in rows]
     positions = np.arange(len(rows))
@@ -60,10 +64,12 @@ def draw_speed(numbers: Mapping[str, Any], axes: Axes) -> None:
     )
     axes.legend(frameon=False, fontsize=8, loc="upper right", bbox_to_anchor=(1, 1.06))
     axes.set_xlabel("times real time")
+    return figure
 
 
-def draw_ltp_gap(numbers: Mapping[str, Any], axes: Axes) -> None:
+def draw_ltp_gap(numbers: Mapping[str, Any]) -> Figure:
     """Draw the gap of each room over days, and of all rooms with their band over robots."""
+    figure, axes = _figure()
     days = np.arange(1, numbers["days"] + 1)
     by_size = sorted(numbers["mean"].items(), key=lambda item: -float(np.mean(item[1])))
     for number, (room, line) in enumerate(by_size):
@@ -81,56 +87,39 @@ def draw_ltp_gap(numbers: Mapping[str, Any], axes: Axes) -> None:
     axes.set_xlim(1, max(2, numbers["days"]))
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes.legend(frameon=False, fontsize=8)
+    return figure
 
 
-def draw_rtp_gap(numbers: Mapping[str, Any], axes: Axes) -> None:
+def draw_rtp_gap(numbers: Mapping[str, Any]) -> Figure:
     """Draw the share of right rooms by gap, with intervals."""
-    rows = numbers["means"]["top_1"]
-    gaps = [gap for gap in GAPS if gap in rows[results.NAIVE_GUESS] and gap != NEVER_SEEN]
-    for number, (name, by_gap) in enumerate(rows.items()):
-        is_naive = name == results.NAIVE_GUESS
-        values = np.array([by_gap[gap] for gap in gaps])
-        x = np.arange(len(gaps)) + 0.06 * (number - (len(rows) - 1) / 2)
-        axes.errorbar(
-            x,
-            values[:, 0],
-            yerr=np.abs(values[:, 1:] - values[:, :1]).T,
-            fmt="s--" if is_naive else "o-",
-            color=DARK if is_naive else COLORS[number],
-            lw=1.2,
-            ms=4,
-            capsize=2,
-            label="naive: where last seen" if is_naive else name.replace("_", " "),
-        )
-    axes.set_xticks(range(len(gaps)), gaps)
-    axes.set_xlabel("time since the user was last seen")
-    axes.set_ylabel("share of right rooms")
-    axes.set_ylim(0, 1)
-    axes.legend(frameon=False, fontsize=8, ncols=3, loc="lower center", bbox_to_anchor=(0.5, 1))
+    rows = [row for row in numbers["means"]["top_1"] if row["gap"] in DRAWN_GAPS]
+    means = pl.DataFrame(rows).rename({"gap": "time since the user was last seen"})
+    figure = draw_interaction(means, means.columns[1], "model", "share of right rooms")
+    figure.set_size_inches(*SIZE)
+    figure.axes[0].set_ylim(0, 1)
+    figure.axes[0].legend(frameon=False, fontsize=8, loc="lower left")
+    return figure
 
 
-def draw_feedback(numbers: Mapping[str, Any], axes: Axes) -> None:
+def draw_feedback(numbers: Mapping[str, Any]) -> Figure:
     """Draw the mean errors of estimators under each policy, with intervals."""
-    tv = numbers["tv"]
-    for number, estimator in enumerate(results.ESTIMATORS):
-        cells = np.array([interval(by[estimator]) for by in tv.values()])
-        x = np.arange(len(tv)) + 0.16 * (number - (len(results.ESTIMATORS) - 1) / 2)
-        ends = np.abs(cells[:, 1:] - cells[:, :1]).T
-        label = estimator.replace("_", " ")
-        axes.bar(x, cells[:, 0], 0.15, color=COLORS[number], label=label)
-        axes.errorbar(x, cells[:, 0], yerr=ends, fmt="none", ecolor=DARK, elinewidth=0.8)
-    axes.set_xticks(range(len(tv)), [_broken_lines(policy) for policy in tv], fontsize=8)
+    figure, axes = _figure()
+    estimators = pl.DataFrame(numbers["means"]).partition_by("estimator", maintain_order=True)
+    for number, of in enumerate(estimators):
+        x = np.arange(len(of)) + 0.16 * (number - (len(estimators) - 1) / 2)
+        mean, low, high = of.select("mean", "low", "high").to_numpy().T
+        label = of["estimator"][0].replace("_", " ")
+        ends = (mean - low, high - mean)
+        axes.bar(x, mean, 0.15, yerr=ends, color=COLORS[number], label=label, ecolor=DARK)
+    policies = [textwrap.fill(name, 18) for name in estimators[0]["robot"]]
+    axes.set_xticks(range(len(policies)), policies, fontsize=8)
     axes.set_ylabel("total variation from the truth")
     axes.set_ylim(bottom=0)
     axes.legend(frameon=False, fontsize=8, ncols=2)
+    return figure
 
 
-def _broken_lines(policy: str) -> str:
-    """Return the name of a policy with line breaks between its parts."""
-    return policy.replace(", ", ",\n").replace(" at ", "\nat ").replace(" by ", "\nby ")
-
-
-DRAWERS: dict[str, Callable[[Mapping[str, Any], Axes], None]] = {
+DRAWERS: dict[str, Callable[[Mapping[str, Any]], Figure]] = {
     results.SPEED: draw_speed,
     results.LTP_GAP: draw_ltp_gap,
     results.RTP_GAP: draw_rtp_gap,

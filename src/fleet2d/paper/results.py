@@ -19,6 +19,8 @@ from fleet2d.studies.api import study
 from fleet2d.studies.intervals import estimate
 
 if TYPE_CHECKING:
+    import polars as pl
+
     from fleet2d.studies.reader import Study
 
 USER = "ana"  # in all studies
@@ -143,22 +145,39 @@ def run_months(name: str, options: PaperOptions) -> "Study":
     return months
 
 
-def interval(values: Sequence[float]) -> tuple[float, float, float]:
-    """Return the mean of values and the ends of its 95 % interval.
+def estimates(rows: "pl.DataFrame", row: str, column: str) -> "pl.DataFrame":
+    """Return the mean of `value` with its 95 % interval by two columns of a frame, in its order.
 
-    Example:
-        >>> interval([0.5, 0.5, 0.5])
-        (0.5, 0.5, 0.5)
+    Returns:
+        A frame with the two columns, `mean`, `low` and `high`.
     """
-    mean = estimate(values)
-    return mean.mean, mean.low, mean.high
+    import polars as pl
+
+    cells = [
+        (*key, mean.mean, mean.low, mean.high)
+        for key, group in rows.group_by(row, column, maintain_order=True)
+        for mean in (estimate(group["value"].to_numpy()),)
+    ]
+    return pl.DataFrame(cells, [row, column, "mean", "low", "high"], orient="row")
+
+
+def table_of_means(
+    title: str, means: "pl.DataFrame", columns: Iterable[str], text: str = "{:.3f}"
+) -> Table:
+    """Return the table of `estimates`, a row for each value of the first column of the frame."""
+    cells = {(row, column): text.format(*numbers) for row, column, *numbers in means.iter_rows()}
+    rows = [
+        (_words(name), *(cells.get((name, column), "") for column in columns))
+        for name in dict.fromkeys(row for row, _ in cells)
+    ]
+    return table_of(title, (means.columns[0], *map(_words, columns)), rows)
+
+
+def _words(name: str) -> str:
+    return name.replace("_", " ")
 
 
 SHOWN_DAYS = (1, 3, 7, 14, 21, 30, 60)
-LTP_NOTE = (
-    "the paper's figure: gaps of the rooms that fall with the days, mean and band over 100 robot"
-    " behaviors for one user and home; its numbers are not printed"
-)
 
 
 def ltp_gap(options: PaperOptions) -> Result:
@@ -179,9 +198,10 @@ def ltp_gap(options: PaperOptions) -> Result:
     gaps = rows["gap"].to_numpy().reshape(robots, days, len(rooms))
     gaps = np.ascontiguousarray(np.moveaxis(gaps, 2, 0))  # shape: (rooms, robots, days)
     overall = gaps.mean(axis=0)
-    low, high = np.quantile(overall, (0.1, 0.9), axis=0)
-    means = dict(zip(rooms, gaps.mean(axis=1), strict=True))
-    lines = {**means, "all rooms": overall.mean(axis=0), "  band, low": low, "  band, high": high}
+    low, high = np.quantile(overall, (0.1, 0.9), axis=0).tolist()
+    means = dict(zip(rooms, gaps.mean(axis=1).tolist(), strict=True))
+    mean = overall.mean(axis=0).tolist()
+    lines = {**means, "all rooms": mean, "  band, low": low, "  band, high": high}
     listed_days = [day for day in SHOWN_DAYS if day <= days]
     table = table_of(
         f"mean |estimated - true| share of time at home; {counted(robots, 'robot')},"
@@ -189,28 +209,22 @@ def ltp_gap(options: PaperOptions) -> Result:
         ("room", *(f"day {day}" for day in listed_days)),
         [(name, *(f"{line[day - 1]:.3f}" for day in listed_days)) for name, line in lines.items()],
     )
-    speed = f"{robots * days} days of one home in {duration_s:.1f} s, {options.workers} at a time"
     numbers = {
         "robots": robots,
         "days": days,
         "estimator": "likelihood",
         "seconds": duration_s,
-        "mean": {room: line.tolist() for room, line in means.items()},
-        "all_rooms": {
-            "mean": overall.mean(axis=0).tolist(), "low": low.tolist(), "high": high.tolist(),
-        },
+        "mean": means,
+        "all_rooms": {"mean": mean, "low": low, "high": high},
         "gaps": [dict(zip(rooms, gaps[:, i].tolist(), strict=True)) for i in range(robots)],
-    }  # fmt: skip
-    return Result(LTP_GAP, months.meta.description, (table,), numbers, (LTP_NOTE, speed))
+    }
+    speed = f"{robots * days} days of one home in {duration_s:.1f} s, {options.workers} at a time"
+    return Result(LTP_GAP, months.meta.description, (table,), numbers, (months.meta.notes, speed))
 
 
-MODELS = ("routine", "hmm", "semi_markov", "markov", "hour_of_week", "long_term")
 NAIVE_GUESS = "naive"
+NAIVE_SOURCE = "routine"  # the model beside whose scores those of the naive guess are read
 SCORES = {"top_1": "share of right rooms", "log_loss": "log loss [nats], smaller is better"}
-RTP_NOTE = (
-    "the paper's figure: a model's accuracy above that of the naive guess, the more so the longer"
-    " the user was out of sight; its numbers are not printed"
-)
 
 
 def rtp_gap(options: PaperOptions) -> Result:
@@ -221,57 +235,42 @@ def rtp_gap(options: PaperOptions) -> Result:
     result is the mean over seeds with its interval; each seed is a month of another life
     with a robot on patrol.
     """
+    import polars as pl
+
     seeds, days = options.size(RTP_GAP)
     months = run_months(RTP_GAP, options)
-    lives = [_scores(row) for row in months.variants.to_dicts()]
+    pattern = rf"^score_(?<model>\w+)\.{USER}\.(?<gap>[^.]+)\.(?<naive>naive_)?(?<score>\w+)$"
+    is_naive = pl.col("naive").is_not_null()
+    scores = (
+        months.variants.unpivot(pl.selectors.starts_with("score_"), index="seed")
+        .with_columns(pl.col("variable").str.extract_groups(pattern))
+        .unnest("variable")
+        .filter(pl.col("score").is_in(list(SCORES)) & pl.col("value").is_not_null())
+        .filter(~is_naive | (pl.col("model") == NAIVE_SOURCE))
+        .sort(is_naive, maintain_order=True)
+        .with_columns(model=pl.when(is_naive).then(pl.lit(NAIVE_GUESS)).otherwise("model"))
+        .select("score", "seed", "model", "gap", "value")
+    )
     means = {
-        score: {
-            model: {
-                gap: interval([life[model][gap][score] for life in lives if gap in life[model]])
-                for gap in (*GAPS, ALL)
-                if any(gap in life[model] for life in lives)
-            }
-            for model in (*MODELS, NAIVE_GUESS)
-        }
+        score: estimates(scores.filter(pl.col("score") == score), "model", "gap")
         for score in SCORES
     }
+    size = f"{counted(seeds, 'seed')} of {counted(days, 'day')}"
     tables = [
-        table_of(
-            f"{title}; {counted(seeds, 'seed')} of {counted(days, 'day')}",
-            ("model", *GAPS, ALL),
-            [
-                (_words(model), *(f"{of[gap][0]:.3f}" if gap in of else "" for gap in (*GAPS, ALL)))
-                for model, of in means[score].items()
-            ],
-        )
+        table_of_means(f"{title}; {size}", means[score], (*GAPS, ALL))
         for score, title in SCORES.items()
     ]
-    numbers = {"seeds": seeds, "days": days, "means": means, "scores": lives}
-    return Result(RTP_GAP, months.meta.description, tables, numbers, (RTP_NOTE,))
-
-
-def _scores(row: Mapping[str, Any]) -> dict[str, dict[str, dict[str, float]]]:
-    """Return the scores of one life by model and gap, the naive guess as one more model."""
-
-    def value(model: str, gap: str, score: str) -> Any:
-        if model == NAIVE_GUESS:
-            model, score = MODELS[0], f"naive_{score}"
-        return row.get(f"score_{model}.{USER}.{gap}.{score}")
-
-    return {
-        model: {
-            gap: {score: value(model, gap, score) for score in SCORES}
-            for gap in (*GAPS, ALL)
-            if value(model, gap, "top_1") is not None
-        }
-        for model in (*MODELS, NAIVE_GUESS)
+    numbers = {
+        "seeds": seeds,
+        "days": days,
+        "means": {score: frame.to_dicts() for score, frame in means.items()},
+        "scores": scores.to_dicts(),
     }
+    return Result(RTP_GAP, months.meta.description, tables, numbers, (months.meta.notes,))
 
 
 NAIVE_ESTIMATOR = "sighting_share"
 ESTIMATORS = (NAIVE_ESTIMATOR, "exposure_ratio", "audit_only", "likelihood", "fremen")
-Errors = dict[str, dict[str, list[float]]]
-"""The errors of all seeds, by policy of the robot and estimator."""
 
 
 def feedback(options: PaperOptions) -> Result:
@@ -283,48 +282,39 @@ def feedback(options: PaperOptions) -> Result:
     difference to the naive estimator with each seed. A robot that hangs out uses the estimator of
     the column; with other policies all estimators watch the same robot.
     """
+    import polars as pl
+
     seeds, days = options.size(FEEDBACK)
     months = run_months(FEEDBACK, options)
-    errors: Errors = {}
-    for row in months.variants.to_dicts():  # the seeds of a combination in order
-        of_policy = errors.setdefault(row["robot"], {estimator: [] for estimator in ESTIMATORS})
-        for estimator, values in of_policy.items():
-            error = row.get(f"error_{estimator}.{USER}.tv")
-            values += [] if error is None else [error]
+    errors = (
+        months.variants.select("robot", "seed", *(
+            pl.col(f"error_{estimator}.{USER}.tv").alias(estimator) for estimator in ESTIMATORS
+        ))
+        .unpivot(index=["robot", "seed"], variable_name="estimator")
+        .drop_nulls()
+    )  # fmt: skip
     size = f"{counted(seeds, 'paired seed')} of {counted(days, 'day')}"
+    text = "{:.3f} ({:.3f} to {:.3f})"
+    means = estimates(errors, "robot", "estimator")
     tables = [
-        _error_table(f"total variation from the truth at the end; {size}: mean (95 %)", errors),
-        _error_table(
+        table_of_means(
+            f"total variation from the truth at the end; {size}: mean (95 %)",
+            means, ESTIMATORS, text,
+        ),
+        table_of_means(
             f"the same less that of {_words(NAIVE_ESTIMATOR)} on the same seed, smaller is better:"
             " mean (95 %)",
-            differences(errors),
+            estimates(differences(errors), "robot", "estimator"), ESTIMATORS[1:], text,
         ),
-    ]
-    numbers = {"seeds": seeds, "days": days, "tv": errors}
-    note = "the paper has no such table: it is what its figures of learning robots stand on"
-    return Result(FEEDBACK, months.meta.description, tables, numbers, (note,))
+    ]  # fmt: skip
+    numbers = {"seeds": seeds, "days": days, "means": means.to_dicts(), "tv": errors.to_dicts()}
+    return Result(FEEDBACK, months.meta.description, tables, numbers, (months.meta.notes,))
 
 
-def differences(errors: Errors) -> Errors:
+def differences(errors: "pl.DataFrame") -> "pl.DataFrame":
     """Return the errors minus that of the naive estimator under the same policy and seed."""
-    return {
-        policy: {
-            estimator: np.subtract(values, of[NAIVE_ESTIMATOR]).tolist()
-            for estimator, values in of.items()
-            if estimator != NAIVE_ESTIMATOR
-        }
-        for policy, of in errors.items()
-    }
+    import polars as pl
 
-
-def _error_table(title: str, errors: Errors) -> Table:
-    estimators = next(iter(errors.values()))
-    rows = [
-        (policy, *("{:.3f} ({:.3f} to {:.3f})".format(*interval(v)) for v in of.values()))
-        for policy, of in errors.items()
-    ]
-    return table_of(title, ("robot", *map(_words, estimators)), rows)
-
-
-def _words(name: str) -> str:
-    return name.replace("_", " ")
+    is_naive = pl.col("estimator") == NAIVE_ESTIMATOR
+    naive = pl.col("value").filter(is_naive).first().over("robot", "seed")
+    return errors.with_columns(pl.col("value") - naive).filter(~is_naive)

@@ -27,16 +27,10 @@ from fleet2d.paper.results import PAPER_COLUMN, SPEED, PaperOptions, Result, tab
 from fleet2d.runtime.clock import HOUR_S
 from fleet2d.studies.progress import progress_bar
 
-TITLE = "Section V.A: time of the base scenario and its variants"
 REAL_MAP = "real-world map"  # the row of the user's own map
 PHASES = ("setup", "simulate", "save")
 QUICK_FRAMES = 100
 NO_NUMBER = "–"
-NOTES = (
-    "the paper builds a cache of visibility once per home, 1 h for a HouseExpo plan and 6 h for a"
-    " real one; here nothing is built beforehand",
-    f"{NO_NUMBER}: the paper has no number",
-)
 
 
 def time_frames(period_s: int, count: int, from_hour: int = 0) -> dict[str, float]:
@@ -65,14 +59,19 @@ def time_frames(period_s: int, count: int, from_hour: int = 0) -> dict[str, floa
     return {"seconds": seconds, "speedup": count * period_s / seconds}
 
 
+def read_table() -> dict[str, Any]:
+    """Return the YAML beside this file: title, notes, rows."""
+    return read_document(Path(__file__).with_suffix(".yaml")).data
+
+
 def rows(options: PaperOptions, days: int) -> list[dict[str, Any]]:
-    """Return the rows of the table as in the YAML beside this file, with all overrides of each.
+    """Return the rows of the table, with all overrides of each.
 
     Raises:
         FloorPlanError: The map of `options` can't be read.
     """
     cases: list[dict[str, Any]] = []
-    for row in read_document(Path(__file__).with_suffix(".yaml")).data["rows"]:
+    for row in read_table()["rows"]:
         is_real, frames, users = row["case"] == REAL_MAP, row.get("frames"), row.get("users")
         if (is_real and options.map is None) or (options.quick and not row.get("quick", True)):
             continue
@@ -106,14 +105,14 @@ def _home(path: Path) -> tuple[str, ...]:
 def measure_rows(options: PaperOptions) -> Result:
     """Measure all rows, one process at a time."""
     runs, days = options.size(SPEED)
-    cases, measured = rows(options, days), []
+    content, cases, measured = read_table(), rows(options, days), []
     with _one_core(), progress_bar(show=sys.stderr.isatty()) as progress:
         task = progress.add_task(SPEED, total=len(cases)) if progress else None
         for row in cases:
             measured.append({**row, **measure(row, runs)})
             if progress and task is not None:
                 progress.advance(task)
-    notes = [*NOTES]
+    notes = content["notes"]
     if options.quick:
         notes.append("quick: short runs are mostly set-up")
     if options.map is None:
@@ -124,7 +123,13 @@ def measure_rows(options: PaperOptions) -> Result:
         ("scenario", "ours [s]", "process [s]", "x real time", "memory", PAPER_COLUMN),
         map(_cells, measured),
     )
-    return Result(SPEED, TITLE, (table,), {"days": days, "runs": runs, "rows": measured}, notes)
+    return Result(
+        SPEED,
+        content["description"],
+        (table,),
+        {"days": days, "runs": runs, "rows": measured},
+        notes,
+    )
 
 
 def measure(row: Mapping[str, Any], runs: int) -> dict[str, Any]:
