@@ -10,11 +10,10 @@ import os
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from datetime import datetime, timedelta
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, NoReturn
+from typing import Annotated, Any, Literal, NoReturn
 
 import numpy as np
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
@@ -26,9 +25,6 @@ from fleet2d.configuration.units import parse_duration
 from fleet2d.errors import RunDirectoryError, printable
 from fleet2d.sight.camera import DEFAULT_ANGLE_DEG, DEFAULT_RANGE_M
 from fleet2d.storage.files import path_in, write_atomically
-
-if TYPE_CHECKING:
-    from fleet2d.runtime.clock import Clock
 
 
 def plain(value: Any) -> Any:
@@ -357,55 +353,11 @@ class Seal(_Record):
     files: dict[FileName, FileRecord]
 
 
-@dataclass(frozen=True)
-class RunStart:
-    """What is known of a run before its first step.
-
-    Attributes:
-        scenario: The resolved configuration, with the seed.
-        seed: The seed of the scenario, or the one that was drawn.
-        clock: The steps of the run.
-        users: Names of the users.
-        robots: Names of the robots.
-        input_files: The files that the run reads.
-        notes: Remarks for the user.
-    """
-
-    scenario: dict[str, Any]
-    seed: int
-    clock: Clock
-    users: list[str]
-    robots: list[str]
-    input_files: Iterable[Path]
-    notes: list[str]
-
-
-@dataclass(frozen=True)
-class RunEnd:
-    """What is known of a run after its last step.
-
-    Attributes:
-        steps: Number of steps simulated.
-        metrics: The results of the metrics.
-        wall_s: Wall time by phase [s].
-        input_files: The files that were read after the run began.
-        interventions: All interventions from outside, in order.
-        notes: Further remarks for the user.
-    """
-
-    steps: int
-    metrics: Mapping[str, Any]
-    wall_s: Mapping[str, float]
-    input_files: Iterable[Path]
-    interventions: list[dict[str, Any]]
-    notes: list[str]
-
-
 class Manifest(BaseModel):
     """The content of `manifest.json`. A field that a later version adds has a default.
 
-    A field is declared below, with the mark `VARIES` if it differs between repetitions of a run,
-    and filled in `describe_start` or `describe_end`.
+    A field is declared below, with the mark `VARIES` if it differs between repetitions of a run;
+    the simulation sets it before the first step or after the last one.
 
     Attributes:
         format: Version of the layout of the run directory.
@@ -457,16 +409,6 @@ class Manifest(BaseModel):
     resumed: Annotated[list[Count], VARIES] = []
     seal: Seal | None = None
 
-    def describe_start(self, start: RunStart) -> None:
-        """Set the fields that are known before the first step."""
-        self.scenario, self.seed = start.scenario, start.seed
-        self.step_us = start.clock.step_us
-        self.start = start.clock.start.isoformat()
-        self.entities = Entities(users=start.users, robots=start.robots)
-        self.versions = versions()
-        self.inputs = [input_record(path) for path in start.input_files]
-        self.notes = start.notes
-
     def add_inputs(self, paths: Iterable[Path]) -> bool:
         """Add files that were read after the run began; return whether any was new."""
         known = {record.path for record in self.inputs}
@@ -475,16 +417,6 @@ class Manifest(BaseModel):
             with suppress(OSError):  # its code ran anyway
                 self.inputs.append(input_record(path))
         return bool(new_paths)
-
-    def describe_end(self, end: RunEnd) -> None:
-        """Set the fields that are known after the last step; tables and digest are set already."""
-        self.steps = end.steps
-        self.simulated_s = end.steps * self.step_us / 1e6
-        self.metrics = dict(end.metrics)
-        self.wall_s = dict(end.wall_s)
-        self.add_inputs(end.input_files)
-        self.interventions = end.interventions
-        self.notes += end.notes
 
     @classmethod
     def varying(cls) -> list[str]:

@@ -18,7 +18,15 @@ from typing import TYPE_CHECKING, Any, BinaryIO, Self
 from pydantic_core import PydanticCustomError
 
 from fleet2d.algorithms.algorithm import Algorithm
-from fleet2d.artifacts.manifest import FLOORPLAN_NAME, LEARNED_NAME, SLOW, RunEnd, RunStart, Status
+from fleet2d.artifacts.manifest import (
+    FLOORPLAN_NAME,
+    LEARNED_NAME,
+    SLOW,
+    Entities,
+    Status,
+    input_record,
+    versions,
+)
 from fleet2d.artifacts.store import RunStore, cannot_write
 from fleet2d.artifacts.unfinished import UnfinishedRun
 from fleet2d.configuration.problems import check_known, suggest
@@ -126,8 +134,7 @@ class Simulation(InterventionMethods):
             self._keeper = CheckpointWriter(store, settings, self.clock, self._checkpoint_header)
         self._loop = Loop(self.clock, simulation.speedup, self._keeper)
         self._setup_s = 0.0
-        store.manifest.describe_start(self._start())
-        store.manifest.interventions = outside
+        self._describe_start(outside)
 
     def _open_store(self) -> None:
         """Create the run directory, and store the floor plan in it.
@@ -916,48 +923,41 @@ class Simulation(InterventionMethods):
             self._store_learned()
         self._store.close_tables()
         self._loop.save_s += time.perf_counter() - began
-        self._store.manifest.describe_end(self._end(results))
+        self._describe_end(results)
         self._store.close(status)
         self._run = open_store(self._store)
         self._run.plan = self.home.plan
         return self._run
 
-    def _start(self) -> RunStart:
-        scenario = self.scenario.resolved()
+    def _describe_start(self, interventions: list[dict[str, Any]]) -> None:
+        """Set the fields of the manifest that are known before the first step."""
+        manifest, scenario = self._store.manifest, self.scenario.resolved()
         scenario["simulation"]["seed"] = self.seed
+        manifest.scenario, manifest.seed = scenario, self.seed
+        manifest.step_us, manifest.start = self.clock.step_us, self.clock.start.isoformat()
+        users, robots = list(self.scenario.users), list(self.scenario.robots)
+        manifest.entities = Entities(users=users, robots=robots)
+        manifest.versions = versions()
+        manifest.inputs = [input_record(path) for path in input_files(self.scenario)]
+        manifest.interventions = interventions
         idle = [actor.path for actor in self._state.actors if not actor.behaviors]
-        return RunStart(
-            scenario,
-            self.seed,
-            self.clock,
-            users=list(self.scenario.users),
-            robots=list(self.scenario.robots),
-            input_files=input_files(self.scenario),
-            notes=[
-                *self.notes,
-                *(f"{path} has no behavior: it stays where it is" for path in idle),
-            ],
-        )
+        still = [f"{path} has no behavior: it stays where it is" for path in idle]
+        manifest.notes = [*self.notes, *still]
 
-    def _end(self, results: Mapping[str, Any]) -> RunEnd:
-        interventions, pace = self._state.interventions, self._loop.pace
-        notes = []
-        speedup = pace.speedup_until(self.step * self.clock.step_us / 1e6) if pace else 0.0
+    def _describe_end(self, results: Mapping[str, Any]) -> None:
+        """Set the fields that are known after the last step; tables and digest are set already."""
+        manifest, queue, pace = self._store.manifest, self._state.interventions, self._loop.pace
+        simulated_s = self.step * self.clock.step_us / 1e6
+        manifest.steps, manifest.simulated_s = self.step, simulated_s
+        manifest.metrics, manifest.wall_s = dict(results), self._wall_s
+        manifest.add_inputs(self._state.interruptions.files)
+        manifest.interventions = queue.done if self.done else queue.records
+        speedup = pace.speedup_until(simulated_s) if pace else 0.0
         if pace and speedup < 0.98 * pace.speedup:
-            notes = [
+            manifest.notes.append(
                 f"{SLOW} {pace.speedup:g}, but only {speedup:.0f} times real time was reached,"
                 " because computing took longer"
-            ]
-        return RunEnd(
-            self.step,
-            results,
-            self._wall_s,
-            input_files=self._state.interruptions.files,
-            interventions=(
-                interventions.done if self.step >= self.clock.steps else interventions.records
-            ),
-            notes=notes,
-        )
+            )
 
     def _store_learned(self) -> None:
         """Store what algorithms have learned; failures are noted in the manifest."""
