@@ -8,9 +8,9 @@ holds there or not. Robustness and signals are traces: stretches of steps with e
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from datetime import timedelta
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self, dataclass_transform
 
 import numpy as np
 from pydantic_core import PydanticCustomError
@@ -224,11 +224,18 @@ class RunSignals:
         return 0, self.steps_in(within)
 
 
+@dataclass_transform(frozen_default=True, eq_default=False, field_specifiers=(field,))
 class Term:
-    """A part of an expectation: a signal, or a condition. The terms that it has are its fields."""
+    """A part of an expectation: a signal, or a condition. The terms that it has are its fields.
+
+    Each class derived from it is a frozen dataclass.
+    """
 
     unit: str = ""
     """Unit of its values; empty for conditions that are only true or false."""
+
+    def __init_subclass__(cls) -> None:
+        dataclass(frozen=True, eq=False)(cls)
 
     def parts(self) -> "Iterator[Term]":
         """Yield the terms that it is made of."""
@@ -353,7 +360,6 @@ class Expectation(Term, ABC):
         )
 
 
-@dataclass(frozen=True, eq=False)
 class Not(Expectation):
     """The negation of a condition."""
 
@@ -373,7 +379,6 @@ class Not(Expectation):
         return f"not {bracketed(self.part)}"
 
 
-@dataclass(frozen=True, eq=False)
 class And(Expectation):
     """The conjunction of two parts: both hold."""
 
@@ -437,6 +442,7 @@ class Word:
     word: ClassVar[str]
 
     def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
         if cls.__name__.islower():
             cls.word = cls.__dict__.get("word", cls.__name__)
             WORDS[cls.__name__] = cls

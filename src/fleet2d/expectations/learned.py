@@ -1,7 +1,6 @@
 """Words for what a run has learned: numbers of the outputs of algorithms, and of metrics."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -21,7 +20,6 @@ from fleet2d.expectations.signals import (
 from fleet2d.floorplan.home import Home
 
 
-@dataclass(frozen=True, eq=False)
 class _Value(NumberSignal):
     """Base of numbers that change when algorithms or metrics are updated; missing before."""
 
@@ -153,7 +151,6 @@ class metric(_Value):
         raise ScenarioError(f"{self} is not a number: extend it by one of {keys}")
 
 
-@dataclass(frozen=True, eq=False)
 class likeliest(WordSignal):
     """The room that an algorithm's newest output gives the highest probability, for a user or not.
 

@@ -314,7 +314,6 @@ class Gauge:
         return shortest(np.array(start, np.int64), np.array(value, np.float64), block.end)
 
 
-@dataclass(frozen=True, eq=False)
 class Measurement(Word, Term):
     """Base of what is measured during a run; signals of the same text are the same signal.
 
@@ -424,7 +423,6 @@ def values_of(value: "float | Signal", run: RunSignals) -> Trace:
     return constant(value, run.first, run.end)
 
 
-@dataclass(frozen=True, eq=False)
 class Arithmetic(Signal):
     """The sum, difference, product or quotient of signals and numbers."""
 
@@ -466,7 +464,6 @@ _SIGNS: Mapping[str, Callable[[F64, F64], F64]] = {
 }  # fmt: skip
 
 
-@dataclass(frozen=True, eq=False)
 class SignalComparison(Expectation):
     """A comparison of a signal with a limit, or with another signal.
 
@@ -537,7 +534,6 @@ def _check_units(one: object, other: object, of: object) -> None:
         raise InputError(f"{of}: the signals have different units: {names}")
 
 
-@dataclass(frozen=True, eq=False)
 class WordSignal(Measurement):
     """A word at each step, such as a room; compare it by `==`, `!=` and `is_in`.
 
@@ -576,7 +572,6 @@ class WordSignal(Measurement):
         raise ScenarioError(f"{self} is not a body: expected a name, or nearest(…)")
 
 
-@dataclass(frozen=True, eq=False)
 class WordComparison(Expectation):
     """The condition that a signal has one of several words."""
 
@@ -605,7 +600,6 @@ class WordComparison(Expectation):
         return f"{self.signal} in [{', '.join(map(argument_text, self.words))}]"
 
 
-@dataclass(frozen=True, eq=False)
 class SameWord(Expectation):
     """The condition that two signals have the same word; without a word none has."""
 
@@ -641,7 +635,6 @@ class SameWord(Expectation):
         return f"{self.one} == {self.other}"
 
 
-@dataclass(frozen=True, eq=False)
 class Condition(Measurement, Expectation):
     """A signal that is true or false at each step; it is an expectation itself."""
 

@@ -1,7 +1,7 @@
 """The operators of expectations: when something must hold, for how long, and how often."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from datetime import timedelta
 from itertools import pairwise
 from typing import Any, NamedTuple
@@ -79,7 +79,6 @@ class Temporal(Expectation):
         return None
 
 
-@dataclass(frozen=True, eq=False)
 class Windowed(Word, Expectation):
     """Base of expectations about a window before or after each step: `within`, or all time."""
 
@@ -138,7 +137,6 @@ class Invariant(Limited):
         return f"{' and '.join(texts)} never came" if texts else ""
 
 
-@dataclass(frozen=True, eq=False)
 class always(Invariant):
     """Expect a condition at every step, until the end of the run or for `within`."""
 
@@ -159,7 +157,6 @@ class never(always):
         return ~self.part
 
 
-@dataclass(frozen=True, eq=False)
 class eventually(Limited):
     """Expect a condition at some step, before the end of the run or `within` some time."""
 
@@ -201,7 +198,6 @@ class eventually(Limited):
         return deadline - begin
 
 
-@dataclass(frozen=True, eq=False)
 class at_end(Word, Temporal):
     """Expect a condition at the last step of the run."""
 
@@ -219,7 +215,6 @@ class at_end(Word, Temporal):
         return [v._replace(first=v.last) for v in super().violations(run)]
 
 
-@dataclass(frozen=True, eq=False)
 class until(Limited):
     """Expect `hold` at every step until `goal` holds, and `goal` in time."""
 
@@ -264,7 +259,6 @@ def _until(hold: Trace, goal: Trace, reach: tuple[int, int] | None, after: float
     )
 
 
-@dataclass(frozen=True, eq=False)
 class since(Windowed):
     """The condition that `goal` has held, by `within` ago, and `hold` at every step after it."""
 
@@ -278,7 +272,6 @@ class since(Windowed):
         return _until(hold, goal, reach, -INFINITE).reversed
 
 
-@dataclass(frozen=True, eq=False)
 class once(Windowed):
     """The condition that a condition has held at some step up to this one, or `within` the last."""
 
@@ -290,7 +283,6 @@ class once(Windowed):
         return self.part.robustness(run, high).sliding_max(-high_end, -low, -INFINITE, -INFINITE)
 
 
-@dataclass(frozen=True, eq=False)
 class implies(Word, Expectation):
     """The condition that `part` holds wherever `premise` does."""
 
@@ -313,7 +305,6 @@ def premises(operand: Expectation) -> list[Expectation]:
     return [premise for part in parts for premise in premises(part)]
 
 
-@dataclass(frozen=True, eq=False)
 class after(Limited):
     """Expect a condition each time that `trigger` begins: immediately, or `within` some time.
 
@@ -389,7 +380,6 @@ class after(Limited):
         return min((slack for slack in slacks if slack is not None), default=None)
 
 
-@dataclass(frozen=True, eq=False)
 class holds_for(Word, Expectation):
     """True at steps up to which a condition has held for at least `duration`."""
 
@@ -407,7 +397,6 @@ class holds_for(Word, Expectation):
         return self.part.robustness(run, high).sliding_min(-steps, 0, -INFINITE, INFINITE)
 
 
-@dataclass(frozen=True, eq=False)
 class Total(Word, Signal):
     """Base of what is summed over the present hour, day or week, or over the run so far.
 
@@ -447,7 +436,6 @@ class count(Total):
         return lambda first, end: _counts(steps, first, end)
 
 
-@dataclass(frozen=True, eq=False)
 class share(Total):
     """The share of the time in which a condition holds: in the present period, or so far.
 
@@ -478,7 +466,6 @@ class share(Total):
         return share_in
 
 
-@dataclass(frozen=True, eq=False)
 class may_be_untested(Word, Temporal):
     """An expectation that may end without a test, such as `after` without its trigger."""
 
@@ -512,7 +499,6 @@ class may_be_untested(Word, Temporal):
         return self.part.untested(run)
 
 
-@dataclass(frozen=True, eq=False)
 class at_most(Invariant):
     """Expect a condition to begin at most `times` times: each hour, day or week, or in the run."""
 

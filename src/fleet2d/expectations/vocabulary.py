@@ -6,7 +6,7 @@ values. It can be written in texts and imported from `fleet2d.expectations` at o
 """
 
 from collections.abc import Collection, Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 import numpy as np
@@ -59,7 +59,6 @@ ROUNDING = 1e-9
 # Numbers
 
 
-@dataclass(frozen=True, eq=False)
 class distance(NumberSignal):
     """The distance of a body from another, a room, an object or a point [m].
 
@@ -165,7 +164,6 @@ def _borders(differ: Bool) -> list[tuple[int, int, int]]:
     return [(r, a - 1, b - 1) for r, a, b in pairs]
 
 
-@dataclass(frozen=True, eq=False)
 class _Motion(Measurement):
     """Base of signals of the way of a body from step to step."""
 
@@ -201,7 +199,6 @@ class speed(_Motion, NumberSignal):
     unit = "m/s"
 
 
-@dataclass(frozen=True, eq=False)
 class battery(NumberSignal):
     """The charge of a robot, 0 to 1, rounded down to a tenth of a percent.
 
@@ -244,7 +241,6 @@ class battery(NumberSignal):
 # Names
 
 
-@dataclass(frozen=True, eq=False)
 class room(WordSignal):
     """The room that a body is in, for `room("ana") == "kitchen"`: a name or a type.
 
@@ -272,7 +268,6 @@ class room(WordSignal):
         return shortest(runs.step, np.where(runs.away != 0, -1.0, index), block.end)
 
 
-@dataclass(frozen=True, eq=False)
 class activity(WordSignal):
     """A user's activity, for `activity("ana") == "sleep"`; none before the first such event."""
 
@@ -311,7 +306,6 @@ def _code(word: str, gauge: Gauge) -> float:
     return float(code)
 
 
-@dataclass(frozen=True, eq=False)
 class nearest(WordSignal):
     """The robot that is nearest to a user, or the user who is nearest to a robot.
 
@@ -367,7 +361,6 @@ class moving(_Motion, Condition):
     """Whether a body's position differs from that at the step before."""
 
 
-@dataclass(frozen=True, eq=False)
 class away(Condition):
     """Whether a body is away from home."""
 
@@ -385,7 +378,6 @@ class away(Condition):
         return shortest(runs.step, (runs.away != 0).astype(np.float64), block.end)
 
 
-@dataclass(frozen=True, eq=False)
 class _CameraCondition(Condition):
     """Base of conditions about a camera.
 
@@ -467,7 +459,6 @@ class perceived(_CameraCondition):
         return pulses(np.unique(seen.step[is_it[seen.index]]), block.first, block.end)
 
 
-@dataclass(frozen=True, eq=False)
 class door(Condition):
     """Whether a door is open."""
 
@@ -484,7 +475,6 @@ class door(Condition):
         return constant(float(gauge.memory not in block.home.shut), block.first, block.end)
 
 
-@dataclass(frozen=True, eq=False)
 class light(Condition):
     """Whether the light of a room is on; of a kind of rooms, whether any of them is."""
 
@@ -504,7 +494,6 @@ class light(Condition):
         return constant(float(not gauge.memory <= block.home.unlit), block.first, block.end)
 
 
-@dataclass(frozen=True, eq=False)
 class sensor(Condition):
     """Whether a sensor is on; for the contact sensor of a door, whether the door is open."""
 
@@ -522,7 +511,6 @@ class sensor(Condition):
         return gauge.switched(block, changes)
 
 
-@dataclass(frozen=True, eq=False)
 class events(Condition):
     """Whether an event happens at a step, optionally only to an entity or with a detail.
 
@@ -561,7 +549,6 @@ class events(Condition):
         return np.repeat(steps, np.repeat(trace.value.clip(0).astype(np.int64), lengths))
 
 
-@dataclass(frozen=True, eq=False)
 class during(Condition):
     """Whether the time is within some hours, such as "22:00-07:00", on some days.
 
