@@ -59,7 +59,7 @@ from fleet2d.sight.camera import (
     of_camera,
     stack_lenses,
 )
-from fleet2d.sight.fov import FieldOfView, LineOfSight
+from fleet2d.sight.fov import FieldOfView
 from fleet2d.sight.perception import Perception
 
 if TYPE_CHECKING:
@@ -92,6 +92,24 @@ GHOST_STREAMS = {
 NOTHING = SightingTable.of_rows(np.zeros((0, OBSERVATION), np.int64))
 
 
+class SightSetup(NamedTuple):
+    """What the cameras of all bodies of a run share.
+
+    Attributes:
+        actors: All bodies, users first.
+        users: Number of users among them.
+        method: The method of sight; None: lines of sight, which the core follows.
+        radii: Radii of all bodies, if they hide each other [lattice units]; None: they don't.
+        heights: Heights of bodies and furniture, if they matter; None: they don't.
+    """
+
+    actors: Sequence[Actor]
+    users: int
+    method: FieldOfView | None
+    radii: I64 | None
+    heights: "BodyHeights | None"
+
+
 class Cameras(Watcher):
     """The cameras of one body. Robots look at users; a user who has a camera looks at robots.
 
@@ -104,9 +122,8 @@ class Cameras(Watcher):
         names: Names of the cameras.
         errs: Whether observations can differ from the truth.
         activity_senses: How each camera perceives activities.
-        method: The method of sight; None: lines of sight.
-        radii: Radii of all bodies, if they hide each other [lattice units]; None: they don't.
-        heights: Heights of bodies and furniture, if they matter; None: they don't.
+        shared: What it shares with the cameras of other bodies.
+        method, radii, heights: See `SightSetup`.
         memory: The memory from span to span.
         drift: The error of the owner's belief about its own pose; None: it has none.
         sighting_errors: What changes sightings after the look; None: nothing does.
@@ -122,33 +139,15 @@ class Cameras(Watcher):
     knows_truth = True
     notes: tuple[str, ...] = ()
 
-    def __init__(
-        self,
-        row: int,
-        actors: Sequence[Actor],
-        users: int,
-        method: FieldOfView | None = None,
-        radii: I64 | None = None,
-        heights: "BodyHeights | None" = None,
-    ) -> None:
-        """Set up the cameras of one body.
-
-        Args:
-            row: Its row among the bodies.
-            actors: All bodies, users first.
-            users: Number of users among them.
-            method: The method of sight; None: lines of sight.
-            radii: Radii of all bodies, if they hide each other [lattice units].
-            heights: Heights of bodies and furniture, if they matter.
+    def __init__(self, row: int, shared: SightSetup) -> None:
+        """Set up the cameras of the body in a row.
 
         Raises:
             ScenarioError: A period is not a multiple of the step, or an unknown body is named.
         """
+        actors, users, self.method, self.radii, self.heights = self.shared = shared
         self.owner, self.row = actors[row], row
         self.event_names = self.owner.entity.sight_events
-        # Lines of sight are compiled into the look.
-        self.method = None if isinstance(method, LineOfSight) else method
-        self.radii, self.heights = radii, heights
         is_robot = row >= users
         self.index = row - users if is_robot else row
         self._first = 0 if is_robot else users

@@ -302,15 +302,7 @@ class ExpectedCameras:
 
     def perfect(self) -> "PerfectCameras":
         """Return cameras that notice all bodies in view at each step, from the present one on."""
-        cameras, run = self.cameras, self.run
-        perfect = PerfectCameras(
-            cameras.row,
-            run.actors,
-            run.bodies.users,
-            cameras.method,
-            cameras.radii,
-            cameras.heights,
-        )
+        run, perfect = self.run, PerfectCameras(self.cameras.row, self.cameras.shared)
         perfect.bodies, perfect.next_step = run.bodies, run.first
         return perfect
 

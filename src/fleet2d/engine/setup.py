@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,7 +9,7 @@ from fleet2d.algorithms.history import Log
 from fleet2d.artifacts.store import RunStore
 from fleet2d.configuration.problems import suggest
 from fleet2d.engine.basis import Basis
-from fleet2d.engine.cameras import Cameras
+from fleet2d.engine.cameras import Cameras, SightSetup
 from fleet2d.engine.change_queue import ChangeQueue
 from fleet2d.engine.collisions import BlockedWays, Clearance
 from fleet2d.engine.conversations import Conversations
@@ -29,14 +28,10 @@ from fleet2d.entities.home_object import Door
 from fleet2d.errors import ComponentError, PlacementError, ScenarioError, blame
 from fleet2d.floorplan.home import Home
 from fleet2d.interventions.intervention import causes_errors
-from fleet2d.kernels import I64
 from fleet2d.runtime.clock import Clock
 from fleet2d.runtime.events import EventKind
 from fleet2d.scenario.model import Scenario
-from fleet2d.sight.fov import FieldOfView
-
-if TYPE_CHECKING:
-    from fleet2d.engine.heights import BodyHeights
+from fleet2d.sight.fov import LineOfSight
 
 
 def set_up(scenario: Scenario, clock: Clock, seed: int, store: RunStore) -> State:
@@ -147,29 +142,20 @@ def _open_cameras(basis: Basis) -> tuple[list[Cameras], list[Cameras]]:
         from fleet2d.engine.heights import BodyHeights  # few runs need it
 
         heights = BodyHeights(actors)
-    cameras = [
-        _cameras_of(row, basis, method, radii, heights)
-        for row, actor in enumerate(actors)
-        if actor.entity.eyes
-    ]
+    compiled = isinstance(method, LineOfSight)
+    shared = SightSetup(actors, users, None if compiled else method, radii, heights)
+    cameras = [_cameras_of(row, shared) for row, actor in enumerate(actors) if actor.entity.eyes]
     return [c for c in cameras if c.row < users], [c for c in cameras if c.row >= users]
 
 
-def _cameras_of(
-    row: int,
-    basis: Basis,
-    method: FieldOfView,
-    radii: I64 | None,
-    heights: "BodyHeights | None",
-) -> Cameras:
+def _cameras_of(row: int, shared: SightSetup) -> Cameras:
     """Return the cameras of one body, or what it perceives in place of their view."""
-    actors, users = basis.actors, basis.bodies.users
-    source = getattr(actors[row].entity, "perceives", None)
+    source = getattr(shared.actors[row].entity, "perceives", None)
     if source is None:
-        return Cameras(row, actors, users, method, radii, heights)
+        return Cameras(row, shared)
     from fleet2d.engine.real_sight import RealSight  # few runs need it
 
-    sight = RealSight(row, actors, users, method, radii, heights)
+    sight = RealSight(row, shared)
     sight.prepare(source)
     return sight
 

@@ -19,7 +19,7 @@ from fleet2d.configuration.components import components
 from fleet2d.configuration.problems import check_known
 from fleet2d.configuration.units import LENGTH, SHARE, SPEED, format_duration
 from fleet2d.entities.behavior import Actor, Behavior
-from fleet2d.entities.body import Pose
+from fleet2d.entities.body import Bodies
 from fleet2d.errors import InputError, ScenarioError
 from fleet2d.expectations.expectation import (
     INFINITE,
@@ -42,7 +42,6 @@ from fleet2d.expectations.expectation import (
 from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.rooms.room import PRIORITY, usual_type
 from fleet2d.kernels import F64
-from fleet2d.kernels import Window as PoseRuns
 from fleet2d.runtime.clock import Clock
 from fleet2d.runtime.events import KINDS, Event, EventKind
 
@@ -176,19 +175,6 @@ def _behaviors_with(kind: str) -> list[str]:
 # Measuring
 
 
-class MeasuredBodies(Protocol):
-    """The bodies of a run and their poses, each by its row."""
-
-    def window(self, first: int, end: int) -> PoseRuns:
-        """Return the runs of equal pose of all bodies in the steps from `first` to `end` - 1."""
-
-    def runs(self, row: int, first: int, end: int) -> PoseRuns:
-        """Return the runs of equal pose of one body in these steps."""
-
-    def pose_at(self, row: int, step: int) -> Pose:
-        """Return the pose of a body at a step."""
-
-
 class MeasuredCameras(Protocol):
     """The cameras of a body, as signals are measured by them."""
 
@@ -232,7 +218,7 @@ class MeasuredRun:
     """
 
     actors: Sequence[Actor]
-    bodies: MeasuredBodies
+    bodies: Bodies
     home: Home
     clock: Clock
     doors: Sequence[str]
@@ -262,7 +248,7 @@ class SignalBlock:
 
     first: int
     end: int
-    bodies: MeasuredBodies
+    bodies: Bodies
     home: Home
     observations: SightingTable
     readings: Sequence[tuple[int, str, bool]]
