@@ -1,8 +1,10 @@
 """Reading studies with polars, pandas, DuckDB and Arrow, and answers from them."""
 
+import json
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import polars as pl
 import pyarrow.parquet as pq
@@ -39,7 +41,7 @@ def test_opening_loads_neither_the_simulator_nor_pandas(study: Study) -> None:
     code = (
         "import sys, fleet2d\n"
         f"assert len(fleet2d.open_study({study.location!r}).arrow_variants) == 6\n"
-        "heavy = ('fleet2d.engine', 'fleet2d.scenario', 'pandas', 'polars', 'shapely')\n"
+        "heavy = ('fleet2d.engine', 'fleet2d.scenario', 'pandas', 'polars', 'pydantic', 'shapely')\n"
         "print([name for name in heavy if name in sys.modules])"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
@@ -115,6 +117,24 @@ def test_a_variant_can_be_stored_with_more_artifacts(study: Study, tmp_path: Pat
 def test_a_folder_without_a_study_is_refused(tmp_path: Path) -> None:
     with pytest.raises(RunDirectoryError, match="holds no study"):
         open_study(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        ({"columns": "seed"}, "seed is no list"),
+        ({"metrics": {"sightings": {"unit": 3}}}, "3 is no str"),
+        ({"color": "red"}, "'color'"),
+        ({"compare": [{"metric": 3}]}, "PairedComparison"),
+    ],
+)
+def test_a_description_with_other_types_is_damaged(
+    study: Study, tmp_path: Path, change: dict[str, Any], reason: str
+) -> None:
+    content = json.loads(Path(study.location, "study.json").read_text())
+    (tmp_path / "study.json").write_text(json.dumps({**content, **change}))
+    with pytest.raises(RunDirectoryError, match=rf"study\.json is damaged \(.*{reason}"):
+        _ = open_study(tmp_path).comparisons
 
 
 def test_paired_compares_the_same_seeds(study: Study) -> None:

@@ -1,43 +1,48 @@
 """Errors that validators raise: a message about a key, with the nearest valid name."""
 
 from collections.abc import Callable, Iterable, Mapping
-from typing import get_args
-
-from pydantic import ValidationError
-from pydantic_core import InitErrorDetails, PydanticCustomError, core_schema
+from typing import TYPE_CHECKING, get_args
 
 from fleet2d.bounds import one_line
 from fleet2d.errors import ScenarioError
+
+if TYPE_CHECKING:  # programs that validate nothing needn't load pydantic for a name's hint
+    from pydantic import ValidationError
+    from pydantic_core import InitErrorDetails, PydanticCustomError
 
 Location = tuple[int | str, ...]
 
 MAX_LINES = 100
 """Lines of an error that are explained; a file may have as many errors as values."""
 
-_PYDANTIC_ERRORS = frozenset(get_args(core_schema.ErrorType))
 
-
-def problem(message: str, group: str = "") -> PydanticCustomError:
+def problem(message: str, group: str = "") -> "PydanticCustomError":
     """Return the error that a validator raises about its value.
 
     Args:
         message: The message, shown as it is.
         group: Of several errors with the same group, only the first is shown.
     """
+    from pydantic_core import PydanticCustomError
+
     return PydanticCustomError("problem", "{message}", {"message": message, "group": group})
 
 
 def problem_at(
     location: Location, message: str, value: object = None, group: str = ""
-) -> ValidationError:
+) -> "ValidationError":
     """Return the error that a validator raises about a key within its value; see `problem`."""
+    from pydantic_core import InitErrorDetails, ValidationError
+
     return ValidationError.from_exception_data(
         "", [InitErrorDetails(type=problem(message, group), loc=location, input=value)]
     )
 
 
-def unknown_key(key: object, known: Iterable[str]) -> PydanticCustomError:
+def unknown_key(key: object, known: Iterable[str]) -> "PydanticCustomError":
     """Return the error about a key that is not among the known ones."""
+    from pydantic_core import PydanticCustomError
+
     names = sorted(known)
     return PydanticCustomError(
         "unknown_key",
@@ -52,14 +57,16 @@ def unknown_key(key: object, known: Iterable[str]) -> PydanticCustomError:
 
 
 def rewrite(
-    error: ValidationError, change: Callable[[InitErrorDetails], InitErrorDetails]
-) -> ValidationError:
+    error: "ValidationError", change: "Callable[[InitErrorDetails], InitErrorDetails]"
+) -> "ValidationError":
     """Return the same error, its first lines only, with ``change`` applied to each of them."""
-    lines = []
+    from pydantic_core import InitErrorDetails, PydanticCustomError, ValidationError, core_schema
+
+    own_kinds, lines = get_args(core_schema.ErrorType), []
     for line in error.errors(include_url=False)[:MAX_LINES]:
         kind, context = line["type"], line.get("ctx", {})
         details = InitErrorDetails(type=kind, loc=line["loc"], input=line["input"], ctx=context)
-        if kind not in _PYDANTIC_ERRORS:
+        if kind not in own_kinds:
             # The message comes last: braces within it are not placeholders.
             context = {key: context[key] for key in context if key != "message"}
             details["type"] = PydanticCustomError(
@@ -69,7 +76,7 @@ def rewrite(
     return ValidationError.from_exception_data(error.title, lines)
 
 
-def refusal(prefix: str, error: ValidationError) -> ScenarioError:
+def refusal(prefix: str, error: "ValidationError") -> ScenarioError:
     """Return the first error of a validation, on one line.
 
     Args:

@@ -261,7 +261,7 @@ def _reference(study: "Study", metric: str, against: str | None) -> Mapping[str,
         InputError: `against` is not AXIS=VALUE, or the study compares no such metric.
     """
     if against is None:
-        for comparison in study.meta.compare:
+        for comparison in study.comparisons:
             if comparison.metric == metric:
                 return comparison.against
         raise InputError(f"the study doesn't compare {metric!r}: give --against AXIS=VALUE")

@@ -5,14 +5,12 @@ import json
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
-from pydantic import Field, TypeAdapter
 
-from fleet2d.configuration.components import Settings
 from fleet2d.errors import ArtifactError, RunDirectoryError
 from fleet2d.kernels import I32, U8, Bool
 from fleet2d.storage.files import PARTIAL, FolderLock, path_in
@@ -34,7 +32,7 @@ from fleet2d.studies.records import (
     numbers_of,
     read_journal,
 )
-from fleet2d.studies.storage import Storage, write_error
+from fleet2d.studies.storage import Storage, from_json, write_error
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -90,22 +88,6 @@ class MetricFacts:
     units: Mapping[str, str] = field(default_factory=dict)
 
 
-class PairedComparison(Settings):
-    """A paired comparison that the report shows.
-
-    Attributes:
-        metric: A number, such as ltp_error.ana.tv.
-        against: The axis and its reference value.
-        by: The columns whose values are the units of intervals; left out: homes, people, seeds.
-        within: Axes with a separate comparison for each of their values.
-    """
-
-    metric: str
-    against: dict[str, Any] = Field(min_length=1, max_length=1)
-    by: tuple[str, ...] | None = None
-    within: tuple[str, ...] = ()
-
-
 @dataclass(frozen=True)
 class Meta:
     """The content of `study.json`.
@@ -117,7 +99,7 @@ class Meta:
         columns: The columns of the axes, the seed last.
         populations: The columns whose values are a sample of a population.
         tables: The names of the tables to keep.
-        compare: The comparisons that the report shows.
+        compare: The comparisons that the report shows, as `PairedComparison` takes them.
         source: The study file's text, for readers.
         metrics: The metrics of the scenarios, by name.
         tags: Words to find the study by.
@@ -130,7 +112,7 @@ class Meta:
     columns: tuple[str, ...]
     populations: tuple[str, ...]
     tables: tuple[str, ...]
-    compare: tuple[PairedComparison, ...] = ()
+    compare: tuple[Mapping[str, Any], ...] = ()
     source: str = ""
     metrics: Mapping[str, MetricFacts] = field(default_factory=dict)
     tags: tuple[str, ...] = ()
@@ -201,7 +183,7 @@ class StudyDirectory:
                     f"{self.location} was written by a later Fleet2D (format {version}): update"
                     " Fleet2D"
                 )
-            meta = TypeAdapter(Meta).validate_python(content)
+            meta: Meta = from_json(Meta, content)
             if unknown := set(meta.populations) - set(meta.columns):
                 raise ValueError(f"its populations {', '.join(sorted(unknown))} are no columns")
             return meta
@@ -213,7 +195,7 @@ class StudyDirectory:
             ArtifactError: It can't be written, or holds a Python value that JSON can't hold.
         """
         try:
-            content = {"format": FORMAT, **TypeAdapter(Meta).dump_python(meta, mode="json")}
+            content = {"format": FORMAT, **asdict(meta)}
             self.storage.write(META, json.dumps(content, indent=1).encode())
         except (TypeError, ValueError) as error:
             raise ArtifactError(f"the study can't be described: {error}") from error

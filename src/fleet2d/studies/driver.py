@@ -442,7 +442,7 @@ def _write_plan(directory: StudyDirectory, checked: CheckedStudy, plan: StudyPla
         checked.plan.design.columns,
         file.populations,
         file.keep.tables,
-        file.compare,
+        tuple(comparison.model_dump() for comparison in file.compare),
         source.read_text(encoding="utf-8") if source else "",
         checked.metrics,
         file.tags,

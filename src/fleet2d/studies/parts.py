@@ -16,11 +16,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
-from pydantic import TypeAdapter
 
 from fleet2d.kernels import I32
 from fleet2d.studies.records import VARIANT, VariantRecord, check_numbers, numbers_of, results_table
-from fleet2d.studies.storage import Storage, write_error
+from fleet2d.studies.storage import Storage, from_json, write_error
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -64,7 +63,7 @@ class Part:
             RunDirectoryError: The record is damaged, or names files that aren't of this part.
         """
         with storage.reading(record):
-            part = TypeAdapter(cls).validate_json(storage.read(record), strict=True)
+            part: Self = from_json(cls, json.loads(storage.read(record)))
             stem = part_name(part.number)
             files = re.compile(rf"({RESULTS}|{TABLES}/[^/]+)/{stem}\.parquet")
             unknown = [file.name for file in part.files if not files.fullmatch(file.name)]

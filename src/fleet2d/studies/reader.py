@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, cast
 from fleet2d.configuration.problems import did_you_mean, suggest
 from fleet2d.errors import ArtifactError, InputError, extra
 from fleet2d.studies import answers
-from fleet2d.studies.directory import Counts, StudyDirectory
+from fleet2d.studies.directory import META, Counts, StudyDirectory
 from fleet2d.studies.intervals import POWER
 from fleet2d.studies.parts import TABLES, Part, plain_schema, with_variant
 from fleet2d.studies.records import RESULT_COLUMNS, VARIANT, VariantRecord, read_journal
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     import pyarrow.dataset as pads
 
     from fleet2d.runs.run import Run
+    from fleet2d.studies.specification import PairedComparison
 
 
 class Study:
@@ -74,6 +75,18 @@ class Study:
     def counts(self) -> Counts:
         """The numbers of complete, failed and missing variants."""
         return Counts.of(self.arrow_variants.column("status").to_pylist())
+
+    @cached_property
+    def comparisons(self) -> "tuple[PairedComparison, ...]":
+        """The comparisons that the study file asks for.
+
+        Raises:
+            RunDirectoryError: Their description is damaged.
+        """
+        from fleet2d.studies.specification import PairedComparison
+
+        with self._directory.storage.reading(META):
+            return tuple(map(PairedComparison.model_validate, self.meta.compare))
 
     @property
     def columns(self) -> tuple[str, ...]:

@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, Any
 
 from fleet2d.errors import ArtifactError, InputError, os_errors_as
 from fleet2d.studies.answers import FEW_UNITS, RESIDUAL, holm
-from fleet2d.studies.directory import PairedComparison
 from fleet2d.studies.figures import over_time
 from fleet2d.studies.intervals import LEVEL
+from fleet2d.studies.specification import PairedComparison
 
 if TYPE_CHECKING:
     import polars as pl
@@ -115,7 +115,7 @@ class _Page:
     def sections(self) -> Iterator[str]:
         """Yield the page, section by section."""
         yield from self._head()
-        for number, comparison in enumerate(self.meta.compare):
+        for number, comparison in enumerate(self.study.comparisons):
             yield from self._comparison(number, comparison)
         metrics = self._metrics()
         for metric in metrics:
@@ -168,7 +168,7 @@ class _Page:
         import polars as pl
 
         tables: list[pl.DataFrame | InputError] = []
-        for c in self.meta.compare:
+        for c in self.study.comparisons:
             try:
                 tables.append(self.study.paired(c.metric, c.against, c.by, c.within))
             except InputError as error:
@@ -215,7 +215,7 @@ class _Page:
 
     def _metrics(self) -> list[str]:
         """Return the metrics of the report, those of comparisons first."""
-        compared = [comparison.metric for comparison in self.meta.compare]
+        compared = [comparison.metric for comparison in self.study.comparisons]
         ordered = dict.fromkeys([*compared, *self.study.metrics])
         return [name for name in ordered if name in self.study.metrics][:MAX_METRICS]
 

@@ -18,7 +18,6 @@ from fleet2d.errors import ScenarioError
 from fleet2d.scenario.compose import compose
 from fleet2d.scenario.model import Scenario, explain
 from fleet2d.studies.axes import AnyAxis, Parameter, check_count
-from fleet2d.studies.directory import PairedComparison
 
 
 def _with_type(value: Any) -> Any:
@@ -120,6 +119,22 @@ class AdaptSettings(Settings):
         if self.width is None and self.goal is None:
             raise problem("give width, or goal, or both: else every value gets all seeds")
         return self
+
+
+class PairedComparison(Settings):
+    """A paired comparison that the report shows.
+
+    Attributes:
+        metric: A number, such as ltp_error.ana.tv.
+        against: The axis and its reference value.
+        by: The columns whose values are the units of intervals; left out: homes, people, seeds.
+        within: Axes with a separate comparison for each of their values.
+    """
+
+    metric: str
+    against: dict[str, Any] = Field(min_length=1, max_length=1)
+    by: tuple[str, ...] | None = None
+    within: tuple[str, ...] = ()
 
 
 def _numbers_or_count(value: Any) -> Any:

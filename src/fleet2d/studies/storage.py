@@ -3,10 +3,11 @@
 import itertools
 import os
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import is_dataclass
 from pathlib import Path, PurePosixPath
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args, get_origin, get_type_hints
 
 from fleet2d.bounds import one_line
 from fleet2d.errors import ArtifactError, Fleet2DError, RunDirectoryError
@@ -52,6 +53,32 @@ def printable(text: str) -> str:
         'speeds?[2J'
     """
     return "".join(c if c.isprintable() else "?" for c in text)
+
+
+def from_json(kind: Any, value: Any) -> Any:
+    """Return a value of JSON as text, a number, a tuple, a mapping, or a dataclass of such.
+
+    Pydantic does the same, but takes as long to load as all else that reading a study needs.
+
+    Raises:
+        TypeError: It has another type, or lacks a key or has one too many.
+
+    Example:
+        >>> from_json(tuple[int, ...], [1, 2])
+        (1, 2)
+    """
+    origin, of = get_origin(kind) or kind, get_args(kind)
+    hints = get_type_hints(kind) if is_dataclass(kind) else None
+    expected = {tuple: list, Mapping: dict}.get(origin, origin) if hints is None else dict
+    if expected not in (type(value), Any):
+        raise TypeError(f"{one_line(value)} is no {expected.__name__}")
+    if hints is not None:
+        return kind(**{key: from_json(hints.get(key, Any), part) for key, part in value.items()})
+    if origin is tuple:
+        return tuple(from_json(of[0], part) for part in value)
+    if origin is Mapping:
+        return {key: from_json(of[1], part) for key, part in value.items()}
+    return value
 
 
 class Storage:

@@ -25,13 +25,18 @@ from fleet2d.studies.design import (
     matches,
     scenario_content,
 )
-from fleet2d.studies.directory import PairedComparison, StudyDirectory
+from fleet2d.studies.directory import StudyDirectory
 from fleet2d.studies.driver import CheckedStudy, RunOptions, check_study, run_study
 from fleet2d.studies.executors import Executor, LostTask
 from fleet2d.studies.plan import StudyPlan
 from fleet2d.studies.reader import Study, open_study
 from fleet2d.studies.simulator import files_of
-from fleet2d.studies.specification import Specification, TuneSettings, read_specification
+from fleet2d.studies.specification import (
+    PairedComparison,
+    Specification,
+    TuneSettings,
+    read_specification,
+)
 from fleet2d.studies.storage import Storage
 from fleet2d.studies.trials import (
     FAILURE,
