@@ -3,7 +3,9 @@
 import sys
 import types
 import typing
-from typing import Any, Literal, is_typeddict
+from typing import Any, Literal
+
+from typing_extensions import is_typeddict
 
 from fleet2d.viewer import contract
 

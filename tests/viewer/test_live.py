@@ -10,8 +10,8 @@ from starlette.testclient import TestClient
 
 import fleet2d
 from fleet2d.errors import InputError
-from fleet2d.viewer.contract import LiveOrder
-from fleet2d.viewer.live import LiveRun, read_order
+from fleet2d.viewer.contract import LIVE_ORDER, LiveOrder, read_body
+from fleet2d.viewer.live import LiveRun
 from fleet2d.viewer.live_runs import LiveRuns
 from fleet2d.viewer.page_data import PageData
 from fleet2d.viewer.page_server import page_app
@@ -27,9 +27,8 @@ def simulation(duration: str = "8 h") -> fleet2d.Simulation:
 
 
 def order(action: str, target: str = "", value: float = 0, x: float = 0, y: float = 0) -> LiveOrder:
-    return read_order(
-        json.dumps({"action": action, "target": target, "value": value, "x": x, "y": y}).encode()
-    )
+    content = {"action": action, "target": target, "value": value, "x": x, "y": y}
+    return read_body(json.dumps({**content, "key": "", "text": ""}).encode(), LIVE_ORDER, "")
 
 
 @pytest.fixture
@@ -173,15 +172,17 @@ def test_impossible_order_is_refused_with_a_reason(
         b"",
         b"[]",
         b'{"action": "pause"}',
-        b'{"action": "fly", "target": "", "value": 0, "x": 0, "y": 0}',
-        b'{"action": "place", "target": 3, "value": 0, "x": 0, "y": 0}',
-        b'{"action": "place", "target": "ana", "value": 0, "x": NaN, "y": 0}',
+        b'{"action": "fly", "target": "", "value": 0, "x": 0, "y": 0, "key": "", "text": ""}',
+        b'{"action": "place", "target": 3, "value": 0, "x": 0, "y": 0, "key": "", "text": ""}',
+        b'{"action": "place", "target": "a", "value": 0, "x": NaN, "y": 0, "key": "", "text": ""}',
+        b'{"action": "place", "target": "a", "value": 0, "x": 1e9, "y": 0, "key": "", "text": ""}',
+        b'{"action": "place", "target": "a", "value": 0, "x": 0, "y": "1", "key": "", "text": ""}',
         b" " * 5000,
     ],
 )
 def test_what_is_no_order_is_refused(body: bytes) -> None:
     with pytest.raises(InputError, match="not a valid order"):
-        read_order(body)
+        read_body(body, LIVE_ORDER, "it is not a valid order")
 
 
 def test_orders_need_the_page_s_origin_and_json(live: LiveRun) -> None:

@@ -11,9 +11,9 @@ from starlette.testclient import TestClient
 
 import fleet2d
 from fleet2d.errors import ArtifactError, InputError
-from fleet2d.viewer.contract import BranchOrder, LiveOrder
+from fleet2d.viewer.contract import BRANCH_ORDER, BranchOrder, LiveOrder, read_body
 from fleet2d.viewer.live import LiveRun
-from fleet2d.viewer.live_runs import LiveRuns, free_directory, read_branch
+from fleet2d.viewer.live_runs import LiveRuns, free_directory
 from fleet2d.viewer.page_server import page_app
 from fleet2d.viewer.served_runs import ServedRuns
 
@@ -117,7 +117,7 @@ def test_impossible_branch_is_refused_with_a_reason(
 )
 def test_what_is_no_branch_is_refused(body: bytes) -> None:
     with pytest.raises(InputError, match="not a valid wish"):
-        read_branch(body)
+        read_body(body, BRANCH_ORDER, "not a valid wish")
 
 
 def test_branch_needs_the_page_s_origin(lives: LiveRuns, served: ServedRuns) -> None:

@@ -4,9 +4,42 @@
 test compares both.
 """
 
-from typing import Any, Literal, TypedDict
+from typing import Annotated, Any, Literal, TypeVar
+
+from pydantic import Field, TypeAdapter
+from typing_extensions import TypedDict  # pydantic reads that of typing from Python 3.12 on only
+
+from fleet2d.errors import InputError
 
 Point = tuple[float, float]
+Shape = TypeVar("Shape")
+MAX_BODY_BYTES = 4_096  # of a request with an order
+
+
+def read_body(
+    body: bytes, shape: TypeAdapter[Shape], refusal: str, most: int = MAX_BODY_BYTES
+) -> Shape:
+    """Return the content of a request that is JSON of a type of the contract.
+
+    Args:
+        body: The body of the request.
+        shape: What reads the type.
+        refusal: The message if the body is of another type.
+        most: The largest number of bytes.
+
+    Raises:
+        InputError: The body is of another type, or too long.
+
+    Example:
+        >>> read_body(b'{"of": "run/0", "step": 4}', BRANCH_ORDER, "no order")
+        {'of': 'run/0', 'step': 4}
+    """
+    try:
+        if len(body) > most:
+            raise ValueError
+        return shape.validate_json(body, strict=True)
+    except ValueError:
+        raise InputError(refusal) from None
 
 
 class RoomFacts(TypedDict):
@@ -193,8 +226,11 @@ class RunFacts(TypedDict):
 class NoteFacts(TypedDict):
     """A note at a step of a run; without a text it is a bookmark."""
 
-    step: int
-    text: str
+    step: Annotated[int, Field(ge=0, lt=1 << 53)]
+    text: Annotated[str, Field(max_length=2_000)]
+
+
+NOTES = TypeAdapter(Annotated[list[NoteFacts], Field(max_length=1_000)])
 
 
 class Problem(TypedDict):
@@ -228,6 +264,9 @@ class BranchOrder(TypedDict):
 
     of: str
     step: int
+
+
+BRANCH_ORDER = TypeAdapter(BranchOrder)
 
 
 class LiveBody(TypedDict):
@@ -281,6 +320,9 @@ class LiveFrame(TypedDict):
     served_as: int
 
 
+OrderNumber = Annotated[float, Field(gt=-1e9, lt=1e9)]
+
+
 class LiveOrder(TypedDict):
     """A command of the page to a running simulation; `x` and `y` in metres.
 
@@ -292,8 +334,11 @@ class LiveOrder(TypedDict):
         "pause", "resume", "step", "speed", "door", "place", "call", "replan", "configure", "end"
     ]
     target: str
-    value: float
-    x: float
-    y: float
+    value: OrderNumber
+    x: OrderNumber
+    y: OrderNumber
     key: str
     text: str
+
+
+LIVE_ORDER = TypeAdapter(LiveOrder)

@@ -3,7 +3,6 @@
 This is the only module of the viewer that reads and changes the state of a simulation.
 """
 
-import json
 import queue
 import threading
 import time
@@ -11,7 +10,7 @@ from collections.abc import Callable, Iterator
 from contextvars import copy_context
 from functools import partial
 from pathlib import Path
-from typing import Any, get_args, get_type_hints
+from typing import Any
 
 import numpy as np
 
@@ -201,12 +200,10 @@ FRAME_US = 60_000_000  # maximum simulated time between two frames
 FRAMES_PER_S = 30  # at a chosen speed
 BATCHES_PER_S = 30
 MAX_QUEUED = 4_000  # frames in the queue of a page
-MAX_ORDER_BYTES = 4_096  # bytes of an order
 ORDER_WAIT_S = 10.0
 IDLE_S = 0.1
 FRAME_WAIT_S = 0.5  # less than the server waits for open responses when it ends
 OVER = "the run is over: it can't be changed any more"
-ACTIONS = get_args(get_type_hints(LiveOrder)["action"])
 
 
 class LiveRun:
@@ -403,27 +400,6 @@ class LiveRun:
     def end_streams(self) -> None:
         """End all `frames`, though the simulation goes on; lock-free for signal handlers."""
         self._streams_end = True
-
-
-def read_order(body: bytes) -> LiveOrder:
-    """Return the order in the body of a request.
-
-    Raises:
-        InputError: The body is not an order.
-    """
-    refusal = InputError("the request is not a valid order")
-    try:
-        content: Any = json.loads(body) if len(body) <= MAX_ORDER_BYTES else None
-        value, x, y = (float(content[key]) for key in ("value", "x", "y"))
-        action, target = content["action"], content["target"]
-    except (ValueError, KeyError, TypeError):
-        raise refusal from None
-    key, text = content.get("key", ""), content.get("text", "")
-    is_finite = all(abs(number) < 1e9 for number in (value, x, y))
-    are_texts = all(isinstance(word, str) for word in (target, key, text))
-    if action not in ACTIONS or not are_texts or not is_finite:
-        raise refusal
-    return LiveOrder(action=action, target=target, value=value, x=x, y=y, key=key, text=text)
 
 
 def read_value(text: str) -> Any:

@@ -1,6 +1,5 @@
 """The simulations that run while pages watch them: one of a scenario, and branches of runs."""
 
-import json
 import threading
 from collections.abc import Iterator
 from pathlib import Path
@@ -17,9 +16,9 @@ from fleet2d.engine.repeat import branch, repeat_until
 from fleet2d.engine.simulation import Simulation
 from fleet2d.errors import Fleet2DError, InputError
 from fleet2d.runs.run import Run
-from fleet2d.viewer.contract import BranchOrder, LiveSession
+from fleet2d.viewer.contract import BRANCH_ORDER, LIVE_ORDER, BranchOrder, LiveSession, read_body
 from fleet2d.viewer.home_facts import walls_facts
-from fleet2d.viewer.live import MAX_ORDER_BYTES, LiveRun, read_order
+from fleet2d.viewer.live import LiveRun
 from fleet2d.viewer.page_data import PageData, compact_json
 from fleet2d.viewer.run_facts import live_facts
 from fleet2d.viewer.served_runs import ServedRuns, json_answer, json_body, problem
@@ -129,7 +128,10 @@ class LiveRuns:
     async def _begin(self, request: Request) -> Response:
         def begin(body: bytes) -> Response:
             try:
-                return json_answer(compact_json(self.branch(read_branch(body))))
+                order = read_body(
+                    body, BRANCH_ORDER, "the request is not a valid wish for a branch"
+                )
+                return json_answer(compact_json(self.branch(order)))
             except (Fleet2DError, ValueError) as error:
                 return problem(str(error))
 
@@ -170,27 +172,12 @@ class LiveRuns:
         if isinstance(body, Response):
             return body
         try:
-            live, order = self._live(request.path_params["number"]), read_order(body)
+            live = self._live(request.path_params["number"])
+            order = read_body(body, LIVE_ORDER, "the request is not a valid order")
         except InputError as error:
             return problem(str(error))
         refusal = await run_in_threadpool(live.submit, order)
         return problem(refusal) if refusal else json_answer(b"{}")
-
-
-def read_branch(body: bytes) -> BranchOrder:
-    """Return the wish for a branch in the body of a request.
-
-    Raises:
-        InputError: The body is none.
-    """
-    try:
-        content: Any = json.loads(body) if len(body) <= MAX_ORDER_BYTES else None
-        of, step = content["of"], content["step"]
-    except (ValueError, KeyError, TypeError):
-        of, step = None, None
-    if not isinstance(of, str) or type(step) is not int:
-        raise InputError("the request is not a valid wish for a branch")
-    return BranchOrder(of=of, step=step)
 
 
 def free_directory(beside: Path | None) -> Path | None:

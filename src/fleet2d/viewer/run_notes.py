@@ -1,17 +1,13 @@
 """Notes and bookmarks of a run, in a file beside its directory: no part of the run or its seal."""
 
 import json
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 from fleet2d.errors import InputError, os_errors_as
 from fleet2d.runs.run import Run
 from fleet2d.storage.files import write_atomically
-from fleet2d.viewer.contract import NoteFacts
+from fleet2d.viewer.contract import NOTES, NoteFacts, read_body
 
-MAX_NOTES = 1_000
-MAX_TEXT = 2_000
 MAX_BYTES = 4_000_000
 SUFFIX = ".notes.json"
 
@@ -67,25 +63,6 @@ def checked_notes(body: bytes) -> list[NoteFacts]:
         >>> checked_notes(b'[{"step": 5, "text": "why?"}, {"step": 2, "text": ""}]')
         [{'step': 2, 'text': ''}, {'step': 5, 'text': 'why?'}]
     """
-    try:
-        content: Any = json.loads(body) if len(body) <= MAX_BYTES else None
-        if not isinstance(content, list):
-            raise TypeError
-        notes = [NoteFacts(step=entry["step"], text=entry["text"]) for entry in content]
-    except (ValueError, KeyError, TypeError, RecursionError):
-        raise InputError("notes are a list of {step, text}") from None
-    if len(notes) > MAX_NOTES or any(not _is_note(note) for note in notes):
-        raise InputError(
-            f"notes are at most {MAX_NOTES} of a step and a text of up to {MAX_TEXT} characters"
-        )
+    refusal = "notes are a list of up to 1000 {step, text}, a text of up to 2000 characters"
+    notes = read_body(body, NOTES, refusal, MAX_BYTES)
     return sorted(notes, key=lambda note: note["step"])
-
-
-def _is_note(note: Mapping[str, Any]) -> bool:
-    step, text = note["step"], note["text"]
-    return (
-        type(step) is int
-        and 0 <= step < 1 << 53
-        and isinstance(text, str)
-        and len(text) <= MAX_TEXT
-    )
