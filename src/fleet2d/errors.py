@@ -3,7 +3,7 @@
 import signal
 import sys
 import traceback
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, ClassVar
@@ -128,6 +128,31 @@ def os_errors_as(error: type[Fleet2DError], message: str, advice: str = "") -> I
         yield
     except OSError as reason:
         raise error(f"{message}: {reason.strerror or reason}{advice}") from reason
+
+
+@contextmanager
+def errors_as(
+    error: Callable[[str], BaseException] | None,
+    place: str = "",
+    of: type[BaseException] | tuple[type[BaseException], ...] = InputError,
+) -> Iterator[None]:
+    """Raise another error in place of one in the block, or the same one with its place.
+
+    Args:
+        error: The error to raise; None: one of the same class.
+        place: The beginning of its message, which that of the error in the block follows.
+        of: The errors in whose place it is raised.
+
+    Example:
+        >>> with errors_as(ScenarioError, "changes.2", of=KeyError):
+        ...     {}["hall_door"]
+        Traceback (most recent call last):
+        fleet2d.errors.ScenarioError: changes.2: 'hall_door'
+    """
+    try:
+        yield
+    except of as reason:
+        raise (error or type(reason))(f"{place}: {reason}" if place else str(reason)) from reason
 
 
 FRAMES = 4

@@ -20,7 +20,7 @@ import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sized
 from dataclasses import dataclass
-from functools import cache, lru_cache
+from functools import cache, lru_cache, partial
 from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
 
 from pydantic import (
@@ -49,7 +49,14 @@ from fleet2d.configuration.problems import (
     unknown_key,
 )
 from fleet2d.configuration.trust import BrokenModule, class_path, import_class
-from fleet2d.errors import Fleet2DError, InputError, ScenarioError, may_be_ctrl_c, text_of
+from fleet2d.errors import (
+    Fleet2DError,
+    InputError,
+    ScenarioError,
+    errors_as,
+    may_be_ctrl_c,
+    text_of,
+)
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
@@ -171,10 +178,8 @@ def count(info: ValidationInfo, bound: Bound, amount: int) -> None:
         return
     amounts = info.context.setdefault(Counter, Counter())  # by bound
     amounts[bound] += amount
-    try:
+    with errors_as(partial(problem, group=bound.name)):
         bound.check(amounts[bound], "the scenario", prefix="at least ")
-    except InputError as error:
-        raise problem(str(error), bound.name) from None
 
 
 def _name_as_type(entries: Any) -> Any:
@@ -329,10 +334,8 @@ def _refuse_early(data: Mapping[Any, Any], fields: Mapping[str, FieldInfo]) -> N
 
 
 def _check_count(bound: Bound, location: Location, entries: Sized) -> None:
-    try:
+    with errors_as(partial(problem_at, location)):
         bound.check(len(entries), "it")
-    except InputError as error:
-        raise problem_at(location, str(error)) from None
 
 
 def _example(cls: type[Settings], key: str) -> str:

@@ -19,7 +19,7 @@ from fleet2d.engine.sighting_errors import sight_events
 from fleet2d.entities.behavior import Actor, SightEvent
 from fleet2d.entities.body import Bodies, poses_of
 from fleet2d.entities.equipment import Drift, Localization
-from fleet2d.errors import ComponentError, ScenarioError, blame
+from fleet2d.errors import ComponentError, ScenarioError, blame, errors_as
 from fleet2d.floorplan.home import Home
 from fleet2d.kernels import (
     FORCED_IDENTITY,
@@ -179,12 +179,10 @@ class Cameras(Watcher):
         owner, lattice, clock = self.owner, self.owner.home.plan.lattice, self.owner.clock
         cameras = owner.entity.eyes
         self.names = tuple(cameras)
-        try:
+        with errors_as(ScenarioError, owner.path, of=ValueError):
             lenses = [
                 camera.lens(lattice.units_per_m, clock.step_us) for camera in cameras.values()
             ]
-        except ValueError as error:
-            raise ScenarioError(f"{owner.path}: {error}") from None
         common = getattr(owner.entity, "perception", None)  # users have no errors
         perceptions = [
             present_errors(self.disturbances, name) or camera.perception or common

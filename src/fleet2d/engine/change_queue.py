@@ -21,7 +21,7 @@ from fleet2d.engine.lights import PeopleSwitches, switch
 from fleet2d.entities.behavior import Actor
 from fleet2d.entities.body import Track
 from fleet2d.entities.home_object import Door, door_hint
-from fleet2d.errors import ComponentError, PlacementError, ScenarioError
+from fleet2d.errors import ComponentError, PlacementError, ScenarioError, errors_as
 from fleet2d.floorplan.home import ALL_ROOMS, HomeChange, lattice_footprint
 from fleet2d.floorplan.mesh import Segment
 from fleet2d.floorplan.placed_objects import move_object
@@ -149,10 +149,8 @@ class ChangeQueue:
             raise ScenarioError(
                 f"changes.{index}: the key 'at' is missing: give the time of the change"
             )
-        try:
+        with errors_as(ScenarioError, f"changes.{index}", of=ScenarioError):
             self.check_names(change)
-        except ScenarioError as error:
-            raise ScenarioError(f"changes.{index}: {error}") from None
         self._put(self._step_of(change.at), change, "scenario")
 
     def ask(self, change: HomeChange, step: int, by: str) -> None:
@@ -172,10 +170,8 @@ class ChangeQueue:
         Raises:
             ComponentError: It names something unknown.
         """
-        try:
+        with errors_as(ComponentError, f"{by} requests an impossible change", of=ScenarioError):
             self.check_names(change)
-        except ScenarioError as error:
-            raise ComponentError(f"{by} requests an impossible change: {error}") from None
 
     def expect(self, row: int, actor: Actor) -> None:
         """Schedule what a body does on its way to doors and lights, after it has a new plan."""
@@ -404,10 +400,8 @@ class ChangeQueue:
         plan = self.home.plan
         old = next(item for item in self.home.objects if item.name == change.target)
         assert change.to is not None
-        try:
+        with errors_as(ScenarioError, of=(PlacementError, OverflowError)):
             new = move_object(old, plan.lattice, change.to, change.turn_deg)
-        except (PlacementError, OverflowError) as error:
-            raise ScenarioError(str(error)) from None
         inside = shapely.intersection(
             shapely.MultiPolygon(plan.polygons), lattice_footprint(plan, new)
         )

@@ -20,7 +20,7 @@ from fleet2d.engine.snapshot import (
     write_snapshot,
 )
 from fleet2d.engine.state import State
-from fleet2d.errors import ArtifactError, RunDirectoryError
+from fleet2d.errors import ArtifactError, RunDirectoryError, errors_as
 from fleet2d.runtime.clock import DAY_US, Clock
 from fleet2d.runtime.memory import release_memory
 from fleet2d.storage import files
@@ -84,10 +84,8 @@ class Checkpoint:
         Raises:
             UnusableCheckpointError: It can't be read.
         """
-        try:
+        with errors_as(UnusableCheckpointError, of=ArtifactError):
             return read_state(self.body, constants)
-        except ArtifactError as error:
-            raise UnusableCheckpointError(str(error)) from error
 
 
 class CheckpointWriter:

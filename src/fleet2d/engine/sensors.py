@@ -1,8 +1,7 @@
 """The sensors of a run: their readings, and the activities at that time."""
 
 from bisect import bisect_right
-from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterable, Sequence
 from copy import copy
 from operator import itemgetter
 from typing import Protocol, runtime_checkable
@@ -21,7 +20,7 @@ from fleet2d.entities.home_object import (
     SensorView,
     in_order,
 )
-from fleet2d.errors import InputError, ScenarioError, blame
+from fleet2d.errors import ScenarioError, blame, errors_as
 from fleet2d.runtime.clock import Clock
 from fleet2d.runtime.events import Event, EventKind
 
@@ -68,7 +67,7 @@ class Sensors(Watcher):
             if isinstance(item, Sensor):
                 sensor = item.model_copy(deep=True)
                 if isinstance(sensor, FromLog):
-                    with _in_object(name):
+                    with errors_as(None, f"objects.{name}"):
                         sensor.read(basis.clock)
                 if isinstance(sensor, OfDoor):
                     sensor.watch(_door(name, sensor.of, doors))
@@ -176,15 +175,6 @@ class Sensors(Watcher):
         activities_of_user = list(self._activities.values())[user]
         index = bisect_right(activities_of_user, step, key=itemgetter(0))
         return activities_of_user[index - 1][1] if index else ""
-
-
-@contextmanager
-def _in_object(name: str) -> Iterator[None]:
-    """Say in errors about a log which object reads it."""
-    try:
-        yield
-    except InputError as error:
-        raise type(error)(f"objects.{name}: {error}") from None
 
 
 def _door(name: str, door: str, doors: Sequence[str]) -> int:

@@ -25,7 +25,7 @@ from fleet2d.engine.world import schedule_script
 from fleet2d.entities.body import Bodies
 from fleet2d.entities.decisions import DecidingActor
 from fleet2d.entities.home_object import Door
-from fleet2d.errors import ComponentError, PlacementError, ScenarioError, blame
+from fleet2d.errors import ComponentError, PlacementError, ScenarioError, blame, errors_as
 from fleet2d.floorplan.home import Home
 from fleet2d.interventions.intervention import causes_errors
 from fleet2d.runtime.clock import Clock
@@ -112,7 +112,8 @@ def set_up(scenario: Scenario, clock: Clock, seed: int, store: RunStore) -> Stat
     # What waits for an event comes last: the event may be one that another entry causes.
     for index, entry in sorted(enumerate(scenario.script), key=lambda i: i[1].on is not None):
         path = f"script.{index}"
-        with _locate_errors(scenario, path), _prefix_errors(path):
+        errors = PlacementError, ScenarioError
+        with _locate_errors(scenario, path), errors_as(None, path, of=errors):
             schedule_script(state, entry, index)
     for name, expectation in scenario.expect.items():
         with _locate_errors(scenario, f"expect.{name}"):
@@ -212,23 +213,12 @@ def _locate_errors(scenario: Scenario, path: str) -> Iterator[None]:
         raise type(error)(f"{place}: {error}") from error
 
 
-@contextmanager
-def _prefix_errors(path: str) -> Iterator[None]:
-    """Add to errors which entry of the scenario is wrong."""
-    try:
-        yield
-    except (PlacementError, ScenarioError) as error:
-        raise type(error)(f"{path}: {error}") from error
-
-
 def _check_reads(scenario: Scenario, actors: list[DecidingActor]) -> None:
     """Refuse behaviors that read an unknown algorithm, or listen to an unknown event."""
     for actor in actors:
         for name in sorted({name for b in actor.behaviors for name in b.listens} - WATCHED_EVENTS):
-            try:
+            with errors_as(ScenarioError, f"{actor.path} listens to {name!r}", of=ComponentError):
                 actor.entity.check_interrupt(name)
-            except ComponentError as error:
-                raise ScenarioError(f"{actor.path} listens to {name!r}: {error}") from error
         for name in (name for behavior in actor.behaviors for name in behavior.reads()):
             if name not in scenario.algorithms:
                 raise ScenarioError(

@@ -48,7 +48,7 @@ from fleet2d.engine.world import repeat, request
 from fleet2d.entities.behavior import Situation
 from fleet2d.entities.decisions import DecidingActor
 from fleet2d.entities.plan import Plan, data_of
-from fleet2d.errors import ArtifactError, InputError, ScenarioError
+from fleet2d.errors import ArtifactError, InputError, ScenarioError, errors_as
 from fleet2d.floorplan.checkup import errors_in
 from fleet2d.floorplan.formats.native import native_document
 from fleet2d.floorplan.home import Home
@@ -539,10 +539,8 @@ class Simulation(InterventionMethods):
 
     def _moment(self, text: str) -> datetime | timedelta:
         """Return a time as scripts write it; a time of day is the next one."""
-        try:
+        with errors_as(InputError, f"run_until({text!r})", of=PydanticCustomError):
             when = parse_when(text)
-        except PydanticCustomError as error:
-            raise InputError(f"run_until({text!r}): {error}") from None
         if not isinstance(when, ClockTime):
             return when
         day = midnight_of(self.time)

@@ -12,7 +12,7 @@ from fleet2d.configuration.problems import did_you_mean, problem, refusal
 from fleet2d.configuration.units import MAX_DURATION, micros
 from fleet2d.entities.body import STANDING, Motion, RandomWalk, Track
 from fleet2d.entities.place import seat_at
-from fleet2d.errors import ComponentError, NoWayError
+from fleet2d.errors import ComponentError, NoWayError, errors_as
 from fleet2d.floorplan.placed_objects import POSTURES, PlacedObject, Posture
 from fleet2d.floorplan.slow_area import slowed
 from fleet2d.floorplan.space import Space, straight_way
@@ -503,10 +503,8 @@ def plan_of(body: "Body", step: int, data: Mapping[str, Any]) -> Plan:
     rows = np.array(data["rows"], np.int64).reshape(-1, 5)
     _check_rows(body, plan.time_us, rows)
     plan.legs = Legs()
-    try:
+    with errors_as(ComponentError, f"{body.path}: the plan of an intervention", of=ValueError):
         plan.legs.add(rows)
-    except ValueError as error:
-        raise ComponentError(f"{body.path}: the plan of an intervention: {error}") from None
     plan.time_us, plan.x, plan.y, plan.heading, plan.away = data["rows"][-1]
     plan.notes = [Note(*note) for note in data["notes"]]
     plan.interrupt_on(*data["interrupts"])

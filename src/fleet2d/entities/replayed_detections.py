@@ -12,6 +12,7 @@ from fleet2d.configuration.components import register
 from fleet2d.configuration.problems import check_known, counted, suggest
 from fleet2d.configuration.units import InputFileOrFolder, Length
 from fleet2d.entities.entity import SIGHTING, EvidenceSource
+from fleet2d.errors import errors_as
 from fleet2d.kernels import F64, I64, NOBODY, TURN, UNKNOWN_TRUTH, Bool
 from fleet2d.kernels import SightingColumn as Column
 from fleet2d.logs.log import Day, LogError, begin_of_run, files_of
@@ -85,7 +86,7 @@ class ReplayedDetections(EvidenceSource):
         # Imported here, as it needs more of pyarrow than most runs.
         from fleet2d.logs.detections import read_detections
 
-        try:
+        with errors_as(LogError, f"{actor.path}.perceives", of=LogError):
             log = read_detections(
                 self.path,
                 topic=self.topic,
@@ -94,8 +95,6 @@ class ReplayedDetections(EvidenceSource):
                 sort=self.sort,
             )
             self._rows = self._place(log, actor, users)
-        except LogError as error:
-            raise LogError(f"{actor.path}.perceives: {error}") from None
 
     def sightings(self, first: int, end: int) -> I64:
         """Return the detections of the steps from `first` to `end` - 1."""

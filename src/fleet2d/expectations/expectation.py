@@ -16,7 +16,7 @@ import numpy as np
 from pydantic_core import PydanticCustomError
 
 from fleet2d.configuration.units import format_duration, micros, parse_duration
-from fleet2d.errors import InputError
+from fleet2d.errors import InputError, errors_as
 from fleet2d.kernels import F64, I64, Bool, sliding_max, until
 from fleet2d.runtime.clock import Clock
 
@@ -477,10 +477,8 @@ class Word:
 
 
 def _duration(value: Any, label: str) -> timedelta:
-    try:
+    with errors_as(InputError, label, of=PydanticCustomError):
         return parse_duration(value)
-    except PydanticCustomError as error:
-        raise InputError(f"{label}: {error}") from None
 
 
 def _window(value: Any) -> timedelta | Window:

@@ -8,11 +8,11 @@ import inspect
 import operator
 import re
 from collections.abc import Callable, Mapping
-from functools import reduce
+from functools import partial, reduce
 from typing import Any
 
 from fleet2d.configuration.problems import did_you_mean, problem, problem_at
-from fleet2d.errors import InputError
+from fleet2d.errors import InputError, errors_as
 from fleet2d.expectations import learned as learned  # its words
 from fleet2d.expectations import temporal, vocabulary
 from fleet2d.expectations.expectation import WORDS, Expectation
@@ -220,13 +220,11 @@ def read_expectation(value: Any) -> Expectation:
     """
     if isinstance(value, Expectation):
         return value
-    try:
+    with errors_as(problem):
         if isinstance(value, str):
             return check_judged(parse_expectation(value))
         if isinstance(value, Mapping) and value:
             return check_judged(_read_mapping(value))
-    except InputError as error:
-        raise problem(str(error)) from None
     raise problem(
         f"expected an expectation like always(distance(ana, astro) > 0.5 m), got {value!r}"
     )
@@ -301,10 +299,8 @@ def _part(value: Mapping[str, Any], key: str) -> Expectation:
         return text
     if not isinstance(text, str):
         raise problem_at((key,), f"expected text like moving(astro), got {text!r}")
-    try:
+    with errors_as(partial(problem_at, (key,))):
         return parse_expectation(text)
-    except InputError as error:
-        raise problem_at((key,), str(error)) from None
 
 
 JSON_SCHEMA: dict[str, Any] = {

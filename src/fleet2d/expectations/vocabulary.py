@@ -16,7 +16,7 @@ from fleet2d.algorithms.observations import ROBOT
 from fleet2d.configuration.problems import did_you_mean
 from fleet2d.configuration.units import parse_time_of_day, weekdays_of
 from fleet2d.entities.behavior import Actor
-from fleet2d.errors import InputError, ScenarioError
+from fleet2d.errors import InputError, ScenarioError, errors_as
 from fleet2d.expectations.expectation import RunSignals, Trace, combine, constant, pulses, shortest
 from fleet2d.expectations.signals import (
     ANY_KIND,
@@ -564,7 +564,7 @@ class during(Condition):
         begin, separator, end = self.hours.partition("-")
         if not separator:
             raise InputError(f"during({self.hours!r}): write from when to when, like '22:00-07:00'")
-        try:
+        with errors_as(InputError, "during", of=PydanticCustomError):
             first, last = parse_time_of_day(begin.strip()), parse_time_of_day(end.strip())
             names = [name.strip() for name in self.days.split(",")] if self.days else "daily"
             if first == last:
@@ -573,8 +573,6 @@ class during(Condition):
                 )
             length = last - first if last > first else last + DAY - first
             self._set(_begin=first, _length=length, _weekdays=frozenset(weekdays_of(names)))
-        except PydanticCustomError as error:
-            raise InputError(f"during: {error}") from None
 
     def measures(self) -> Iterator[Measurement]:
         """Yield nothing: it follows from the clock."""

@@ -26,7 +26,7 @@ from fleet2d.configuration.problems import (
     suggest,
 )
 from fleet2d.configuration.units import OnDays, PositiveDuration, Share, folder_of
-from fleet2d.errors import InputError, ScenarioError
+from fleet2d.errors import errors_as
 from fleet2d.routines.activity import (
     AnyDurationDistribution,
     DurationDistribution,
@@ -182,10 +182,8 @@ class RandomVisits(Timing):
 
 
 def _check_size(members: Any) -> Any:
-    try:
+    with errors_as(problem):
         MEMBERS.check(len(members) if isinstance(members, Mapping) else 0, "the household")
-    except InputError as error:
-        raise problem(str(error)) from None
     return members
 
 
@@ -275,10 +273,8 @@ def _read_household(
         )
 
     def read() -> Household:
-        try:
+        with errors_as(problem):
             data = read_document(path).data
-        except ScenarioError as error:
-            raise problem(str(error)) from None
         count(info, PERSONA_VALUES, values_in(data))
         return validate(data)
 

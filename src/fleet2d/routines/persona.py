@@ -34,7 +34,7 @@ from fleet2d.configuration.units import (
     format_time_of_day,
     weekdays_of,
 )
-from fleet2d.errors import InputError, extra
+from fleet2d.errors import errors_as, extra
 from fleet2d.routines.activity import (
     Activity,
     AnyDurationDistribution,
@@ -561,11 +561,9 @@ def _data_of(value: object, chain: tuple[str, ...], files: list[Path]) -> Any:
     if str(path.resolve()) in chain:
         raise problem(f"the persona {path.name} extends itself")
     files.append(path)
-    try:
+    with errors_as(problem):
         EXTENDED_FILES.check(len(files), "the persona", prefix="at least ")
         data = _bundled_data(path) if path.parent in (BUNDLED, PARTS) else read_document(path).data
-    except InputError as error:
-        raise problem(str(error)) from None
     return _data_of(data, (*chain, str(path.resolve())), files)
 
 

@@ -22,6 +22,7 @@ from fleet2d.configuration.units import (
 from fleet2d.entities.behavior import Behavior, Situation
 from fleet2d.entities.place import Nearest
 from fleet2d.entities.plan import Note, Plan
+from fleet2d.errors import errors_as
 from fleet2d.floorplan.space import straight_way
 from fleet2d.kernels import F64, I64, TURN, heading_of, line_of_sight, locate, time_route
 from fleet2d.logs.layout import Layout, read_log
@@ -532,7 +533,7 @@ class Replay(Behavior):
     def start(self, actor: "Actor") -> None:
         """Read the log, plan the way through it, and report on it in `notes`."""
         self.visits: list[LoggedVisit] = []
-        try:
+        with errors_as(LogError, actor.path, of=LogError):
             log = read_log(
                 self.path,
                 self.format,
@@ -546,8 +547,6 @@ class Replay(Behavior):
                 self._start_rooms(actor, log, begin_us)
             else:
                 self._start_fixes(actor, log, begin_us)
-        except LogError as error:
-            raise LogError(f"{actor.path}: {error}") from None
 
     def decide(self, now: Situation) -> Plan:
         """Follow the log to its end, from the present step.
