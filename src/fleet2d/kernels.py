@@ -325,8 +325,16 @@ class ErrorTables(NamedTuple):
     injected: I64 = np.zeros((0, 5), np.int64)  # (n, 5): camera, identity, x, y, heading
 
 
-class UserPoses(NamedTuple):
-    """The poses of all users over a span: row u is user u, column j is step first + j."""
+class PoseBlock(NamedTuple):
+    """The poses of several bodies at consecutive steps, a row each; column j is step first + j.
+
+    Attributes:
+        x: int64 (bodies, steps), lattice units.
+        y: int64 (bodies, steps), lattice units.
+        heading: int64 (bodies, steps), 1/4096 turn.
+        away: uint8 (bodies, steps), nonzero while a body is away.
+        posture: int8 (bodies, steps), number of the posture.
+    """
 
     x: I64
     y: I64

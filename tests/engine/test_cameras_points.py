@@ -12,7 +12,7 @@ from fleet2d._core import camera_pose
 from fleet2d.engine.cameras import points_seen
 from fleet2d.errors import ComponentError, Fleet2DError, InputError
 from fleet2d.floorplan.home import Home
-from fleet2d.kernels import U64, Bool, Lenses, Poses, Reach, UserPoses
+from fleet2d.kernels import U64, Bool, Lenses, PoseBlock, Poses, Reach
 from fleet2d.sight.camera import Camera, TableContext, stack_lenses
 from fleet2d.sight.fov import FieldOfView, Flashlight, LineOfSight, VisibilityPolygon
 
@@ -162,7 +162,7 @@ def test_own_method_that_fails_is_blamed(method: str, why: str) -> None:
 
 
 def seen_one_by_one(
-    method: FieldOfView, home: Home, lenses: Lenses, robot: Poses, crowd: UserPoses, first: int
+    method: FieldOfView, home: Home, lenses: Lenses, robot: Poses, crowd: PoseBlock, first: int
 ) -> U64:
     """Return what `points_seen` does, asking about every body in every step."""
     cameras, bodies = lenses.widest.shape
@@ -212,7 +212,7 @@ def test_points_seen_are_those_of_asking_about_everybody_each_time(
     rng = np.random.default_rng(first)
     poses = wandering(rng, home, 4, 40)
     robot = Poses(*(np.ascontiguousarray(column[0]) for column in poses))
-    crowd = UserPoses(*(column[1:] for column in poses), np.zeros((3, 40), np.int8))
+    crowd = PoseBlock(*(column[1:] for column in poses), np.zeros((3, 40), np.int8))
 
     expected = seen_one_by_one(method, home, stacked, robot, crowd, first)
 

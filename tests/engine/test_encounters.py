@@ -10,7 +10,8 @@ from tests.thorough import examples
 
 from fleet2d.engine.encounters import Encounters
 from fleet2d.engine.simulation import Simulation
-from fleet2d.entities.body import Bodies, PoseBlock
+from fleet2d.entities.body import Bodies
+from fleet2d.kernels import PoseBlock
 
 UNITS = 1280  # lattice units per metre
 LYING, SITTING = 2, 1

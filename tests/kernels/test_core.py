@@ -138,6 +138,7 @@ NAMED_TUPLES = {
     "PeopleModel": "StayModel",
     "PeopleMoments": "Moments",
     "PosesToFill": "Poses",
+    "UserPoses": "PoseBlock",
 }
 
 

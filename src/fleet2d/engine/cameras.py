@@ -35,12 +35,12 @@ from fleet2d.kernels import (
     GhostDraw,
     Heights,
     Lenses,
+    PoseBlock,
     Poses,
     Reach,
     SightingColumn,
     SightMemory,
     UserDraw,
-    UserPoses,
     detect,
     new_memory,
     view_queries,
@@ -374,7 +374,7 @@ class Cameras(Watcher):
         if self.method is not None:
             block = bodies.block(self.next_step, end)
             others = slice(self._first, self._first + len(self.others))
-            crowd = UserPoses._make(column[others] for column in block)
+            crowd = PoseBlock._make(column[others] for column in block)
             poses = poses_of(block, self.row)
             step_us = self.owner.clock.step_us
             with blame("sight.method", self.next_step):
@@ -549,7 +549,7 @@ def points_seen(
     home: Home,
     lenses: Lenses,
     robot: Poses,
-    crowd: UserPoses,
+    crowd: PoseBlock,
     first: int,
     step_us: int,
 ) -> U64:

@@ -13,7 +13,7 @@ import numpy as np
 from fleet2d.configuration.units import micros
 from fleet2d.engine.basis import Basis, Watcher
 from fleet2d.entities.behavior import Command, SightEvent
-from fleet2d.entities.body import NEVER, Bodies, PoseBlock
+from fleet2d.entities.body import NEVER, Bodies
 from fleet2d.entities.decisions import DecidingActor, StandStill
 from fleet2d.errors import ScenarioError
 from fleet2d.floorplan.placed_objects import POSTURES
@@ -28,7 +28,7 @@ from fleet2d.interactions.answers import (
 )
 from fleet2d.interactions.attitude import AttitudeState
 from fleet2d.interactions.interaction import Interaction, Outcome, RequestQueue
-from fleet2d.kernels import TURN, heading_of, line_of_sight, locate
+from fleet2d.kernels import TURN, PoseBlock, heading_of, line_of_sight, locate
 from fleet2d.runtime.clock import DAY, midnight_of
 from fleet2d.runtime.determinism import Draws, stream_key
 from fleet2d.runtime.events import Event, EventKind

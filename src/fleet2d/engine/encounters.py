@@ -12,10 +12,10 @@ import numpy as np
 
 from fleet2d.engine.basis import Watcher
 from fleet2d.entities.behavior import Attention, SightEvent
-from fleet2d.entities.body import Bodies, PoseBlock
+from fleet2d.entities.body import Bodies
 from fleet2d.entities.decisions import DecidingActor
 from fleet2d.floorplan.placed_objects import POSTURES
-from fleet2d.kernels import I64, Bool, line_of_sight, locate
+from fleet2d.kernels import I64, Bool, PoseBlock, line_of_sight, locate
 from fleet2d.runtime.events import Event, EventKind
 
 # The squared distance of a person who can't be met: larger than any home [lattice units²].

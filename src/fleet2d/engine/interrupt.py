@@ -15,10 +15,10 @@ from fleet2d.configuration.components import Component, lookup, register
 from fleet2d.configuration.trust import source_files
 from fleet2d.engine.basis import Basis, Watcher
 from fleet2d.entities.behavior import Actor, SightEvent
-from fleet2d.entities.body import Bodies, PoseBlock
+from fleet2d.entities.body import Bodies
 from fleet2d.entities.entity import Robot, User
 from fleet2d.errors import ComponentError, blame
-from fleet2d.kernels import Bool
+from fleet2d.kernels import Bool, PoseBlock
 from fleet2d.runtime.events import Event
 
 Wait = tuple[int, str]

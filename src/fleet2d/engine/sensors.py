@@ -11,7 +11,7 @@ import numpy as np
 from fleet2d.algorithms.history import SensorRow
 from fleet2d.configuration.problems import suggest
 from fleet2d.engine.basis import Basis, Watcher
-from fleet2d.entities.body import Bodies, PoseBlock
+from fleet2d.entities.body import Bodies
 from fleet2d.entities.home_object import (
     Sensor,
     SensorFault,
@@ -21,6 +21,7 @@ from fleet2d.entities.home_object import (
     in_order,
 )
 from fleet2d.errors import ScenarioError, blame, errors_as
+from fleet2d.kernels import PoseBlock
 from fleet2d.runtime.clock import Clock
 from fleet2d.runtime.events import Event, EventKind
 

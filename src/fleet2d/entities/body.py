@@ -38,6 +38,7 @@ from fleet2d.kernels import (
     U8,
     Breakpoints,
     Mesh,
+    PoseBlock,
     Poses,
     Timelines,
     WalkRule,
@@ -157,24 +158,6 @@ NEVER = 1 << 62
 
 # When the posture of who only stands changes, and the postures: see `Plan.posture_times`.
 STANDING = np.zeros(0, np.int64), np.zeros(1, np.int8)
-
-
-class PoseBlock(NamedTuple):
-    """The poses of all bodies at consecutive steps: row b is body b, column j is step first + j.
-
-    Attributes:
-        x: int64 (bodies, steps), lattice units.
-        y: int64 (bodies, steps), lattice units.
-        heading: int64 (bodies, steps), 1/4096 turn.
-        away: uint8 (bodies, steps), nonzero while a body is away.
-        posture: int8 (bodies, steps), number of the posture.
-    """
-
-    x: I64
-    y: I64
-    heading: I64
-    away: U8
-    posture: I8
 
 
 def poses_of(block: PoseBlock, row: int) -> Poses:

@@ -254,23 +254,19 @@ def stack_lenses(lenses: Sequence[Lens], errs: Sequence[bool], context: TableCon
     return Lenses(
         near_squared=_row(lens.near**2 for lens in lenses),
         far_squared=_row(lens.far**2 for lens in lenses),
-        half_angle=_row(lens.half_angle for lens in lenses),
-        chance=_row(lens.chance for lens in lenses),
         moves=_row(bool(lens.forward or lens.left or lens.heading or lens.pans) for lens in lenses),
-        forward=_row(lens.forward for lens in lenses),
-        left=_row(lens.left for lens in lenses),
-        heading=_row(lens.heading for lens in lenses),
         pans=pans,
         pan_count=_row(len(lens.pans) for lens in lenses),
-        pan_us=_row(lens.pan_us for lens in lenses),
-        period=_row(lens.period for lens in lenses),
-        latency=_row(lens.latency for lens in lenses),
         errs=_row(errs),
-        points=_row(lens.points for lens in lenses),
         bodies=bodies,
         reach=reach,
         widest=widest,
+        **{name: _row(getattr(lens, name) for lens in lenses) for name in _SAME},
     )
+
+
+# What Lenses have as their cameras have it.
+_SAME = (set(Lens._fields) & set(Lenses._fields)) - {"pans"}
 
 
 def _row(values: Iterable[int]) -> I64:
