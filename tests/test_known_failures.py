@@ -324,13 +324,16 @@ CHANGES: dict[tuple[type, str], dict[str, Any]] = {
 # What is not told by tables, and which test sees it.
 ELSEWHERE = {
     (User, "color"): "tests/pictures: pictures",
-    (User, "lights"): "tests/engine/test_lights: it is day here",
+    (User, "lights"): "tests/engine/test_change_queue_lights: it is day here",
     (User, "answers"): "tests/interactions: no robot wants anything here",
     (User, "height"): "tests/engine/test_heights: there is no furniture here",
     (Robot, "height"): "tests/engine/test_heights: there is no furniture here",
     (Camera, "height"): "tests/engine/test_heights: there is no furniture here",
     (SightSettings, "heights"): "tests/engine/test_heights: there is no furniture here",
-    (SimulationSettings, "daylight"): "tests/engine/test_lights: nothing depends on the sun here",
+    (
+        SimulationSettings,
+        "daylight",
+    ): "tests/engine/test_change_queue_lights: nothing depends on the sun here",
     (Robot, "localization"): "tests/entities/test_equipment",
     (Robot, "color"): "tests/pictures: pictures",
     (Robot, "perceives"): "tests/entities/test_replayed_detections: it needs a table",

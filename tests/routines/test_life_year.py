@@ -9,9 +9,8 @@ from tests.routines.days import MONDAY
 from tests.scenes import run, scenario
 
 from fleet2d.routines.household import AWAY, Household
-from fleet2d.routines.life import Life, Lives
+from fleet2d.routines.life import FOREVER, Days, Life, Lives, Year
 from fleet2d.routines.persona import Persona, bundled_days, read_persona
-from fleet2d.routines.year import FOREVER, Days, Year
 
 NEW_YEAR = date(2026, 1, 1).toordinal()
 FLU = {"every": "60 d", "lasts": {"mean": "4 d", "std": "2 d"}, "days": "ill"}
