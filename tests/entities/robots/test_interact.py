@@ -1,7 +1,7 @@
 """Interact: the robot serves its requests, and keeps to what people answer."""
 
 from collections.abc import Sequence
-from datetime import timedelta
+from datetime import datetime, timedelta
 from typing import Any
 
 import numpy as np
@@ -12,7 +12,7 @@ import fleet2d
 from fleet2d import Algorithm, Plan, Situation
 from fleet2d.algorithms.algorithm import Present, RoomDistribution
 from fleet2d.algorithms.history import History
-from fleet2d.entities.robots.interact import Interact
+from fleet2d.entities.robots.interact import Interact, RoundMemory
 from fleet2d.errors import ScenarioError
 from fleet2d.interactions.answers import Answers, Circumstances, Reply
 from fleet2d.interactions.attitude import AttitudeState
@@ -228,7 +228,58 @@ def test_who_is_out_is_looked_for_less_and_less_often() -> None:
     moves = np.flatnonzero(np.diff(x)) / 60
     pauses = np.diff(moves)
 
-    assert [30, 60, 120, 120] == pytest.approx(pauses[pauses > 5].tolist(), abs=3)
+    assert [30, 97, 120, 120] == pytest.approx(pauses[pauses > 5].tolist(), abs=3)
+
+
+def test_who_gave_no_answer_is_not_looked_for_within_four_hours() -> None:
+    rounds: list[int] = []
+
+    class Watched(Interact):
+        """Notes when it begins a round."""
+
+        def decide(self, now: Situation) -> Plan | None:
+            plan = super().decide(now)
+            if plan is not None and "user_seen" in plan.interrupts and not now.events:
+                rounds.append(now.step)
+            return plan
+
+    content = home(
+        "6 h",
+        users={"ana": ana("bedroom", ("",))},
+        robots={"astro": {"behaviors": [Watched(), {"type": "patrol", "dwell": "1 min"}]}},
+        interactions={"pill": {**PILL, "within": "5 h", "retry": "1 min", "tries": 9}},
+    )
+    ((asked, _),) = events_of(fleet2d.run(content), "asks")
+
+    assert not [step for step in rounds if asked < step < asked + 4 * 3600]
+    assert [step for step in rounds if step > asked]
+
+
+MONDAY = datetime(2026, 1, 5, 10)
+
+
+def test_an_empty_round_is_doubted_until_it_fades_or_the_person_is_seen() -> None:
+    memory = RoundMemory()
+    memory.note_empty("ana", MONDAY, 0.5, 0.25)
+    doubted, later = (memory.chance("ana", MONDAY + timedelta(hours=h), 0.5) for h in (0, 8))
+    memory.note_found("ana", MONDAY + timedelta(hours=1))
+
+    assert 1 / 11 == pytest.approx(doubted)
+    assert 0.5 == later
+    assert 0.5 == memory.chance("ana", MONDAY + timedelta(hours=1, minutes=60), 0.5)
+
+
+def test_rounds_of_an_hour_are_remembered_by_kind_of_day_and_forgotten_in_weeks() -> None:
+    memory = RoundMemory()
+    for day in range(3):
+        memory.note_empty("ana", MONDAY + timedelta(days=day), 0.8, 0.25)
+
+    def chance(**passed: float) -> float:
+        return memory.chance("ana", MONDAY + timedelta(**passed), 0.8)
+
+    assert 0.33 == pytest.approx(chance(days=4), abs=0.02)
+    assert 0.8 == chance(days=4, hours=1) == chance(days=5)
+    assert 0.75 < chance(days=70) < 0.8
 
 
 def test_sightings_wake_nobody_who_wants_nothing() -> None:

@@ -22,7 +22,7 @@ from fleet2d.entities.robots.approach import (
 from fleet2d.errors import ComponentError
 from fleet2d.interactions.interaction import Outcome, Request
 from fleet2d.kernels import F64
-from fleet2d.runtime.determinism import sum_in_order
+from fleet2d.runtime.determinism import exp2, sum_in_order
 
 Step = Literal["seek", "ask", "carry_out"]
 ANSWERS = frozenset(str(outcome) for outcome in Outcome)
@@ -30,13 +30,81 @@ ANSWERS = frozenset(str(outcome) for outcome in Outcome)
 MOVED_M = 1.0
 # It looks into the likeliest rooms, until they have this part of the probability.
 ENOUGH = 0.9
-# After a round without a find it looks for the person again after the shorter time, and after each
-# further one it waits twice as long, up to the longer time or as long as the request is open.
-SEARCH_PAUSES = timedelta(minutes=30), timedelta(hours=2)
+# No source is surer that a person is at home: without one, all of the probability is there.
+MOST_SURE = 0.9
+# The least time between two rounds for a person; and from no answer, or from seeing who gave none
+# in the same place, to the next round.
+SEARCH_PAUSE, UNANSWERED_PAUSE = timedelta(minutes=30), timedelta(hours=4)
+SATURDAY = 5
 # How long its answer to a question takes.
 REPLY_TAKES = timedelta(seconds=10)
 # It tries again after this time if somebody was in the way.
 DETOUR_PAUSE = timedelta(minutes=2)
+
+
+class RoundCount(NamedTuple):
+    """How many rounds found a person, of how many, in an hour of the day; older ones count less."""
+
+    found: float
+    rounds: float
+    at: datetime
+
+
+class RoundMemory:
+    """What rounds through the home say about whether each person is there.
+
+    In each hour of working days and of weekends, the share of rounds that found the person is mixed
+    with the usual probability, which counts as two rounds; a round counts half after 14 days.
+    A round that found nobody lowers the probability by Bayes' rule, as one in ten misses somebody
+    who is there; that fades evenly over 8 h, or until the person is seen.
+    """
+
+    MISSED, DOUBT_LASTS = 0.1, timedelta(hours=8)
+    USUAL_COUNTS, HALF_LIFE = 2.0, timedelta(days=14)
+
+    def __init__(self) -> None:
+        self._counts: dict[tuple[str, bool, int], RoundCount] = {}
+        # When the last round ended without the person, and the probability right after it.
+        self._empty: dict[str, tuple[datetime, float]] = {}
+
+    def chance(self, person: str, time: datetime, usual: float) -> float:
+        """Return the probability that a person is at home; `usual` without any round."""
+        found, rounds, _ = self._count(person, time)
+        chance = (found + self.USUAL_COUNTS * usual) / (rounds + self.USUAL_COUNTS)
+        since, least = self._empty.get(person, (time, chance))
+        return least + min(1.0, (time - since) / self.DOUBT_LASTS) * max(0.0, chance - least)
+
+    def note_found(self, person: str, time: datetime) -> None:
+        """Remember that a person was there, on a round or not."""
+        self._add(person, time, found=1)
+        self._empty.pop(person, None)
+
+    def note_empty(self, person: str, time: datetime, usual: float, enough: float) -> timedelta:
+        """Remember that a round missed a person; return when the chance is `enough` again."""
+        chance = self.chance(person, time, usual)
+        self._add(person, time, found=0)
+        missed = self.MISSED * chance
+        least = missed / (missed + 1 - chance) if missed else 0.0
+        self._empty[person] = time, least
+        rises = max(usual - least, 1e-9)
+        return min(max((enough - least) / rises, 0.0), 1.0) * self.DOUBT_LASTS
+
+    def _count(self, person: str, time: datetime) -> RoundCount:
+        """Return the rounds for a person in an hour of such days, as they count now."""
+        last = self._counts.get(_hour_of(person, time))
+        if last is None:
+            return RoundCount(0.0, 0.0, time)
+        kept = exp2(-((time - last.at) / self.HALF_LIFE))
+        return RoundCount(kept * last.found, kept * last.rounds, time)
+
+    def _add(self, person: str, time: datetime, *, found: int) -> None:
+        last = self._count(person, time)
+        self._counts[_hour_of(person, time)] = RoundCount(last.found + found, last.rounds + 1, time)
+
+
+def _hour_of(person: str, time: datetime) -> tuple[str, bool, int]:
+    """Return a person, whether it is the weekend, and the hour."""
+    return person, time.weekday() >= SATURDAY, time.hour
 
 
 class ServedRequest(NamedTuple):
@@ -63,13 +131,14 @@ class Interact(BeliefBehavior):
 
     It looks for the person of the most valuable request on a round through the rooms where `source`
     believes the person to be, likeliest first, up to nine tenths of the probability; not while the
-    person is likely out of the home. After a round without a find it looks for that person again
-    after 30 min, then after 1 h and 2 h, or as long as the request is open. A person in view is
-    approached and addressed; the robot waits for `patience`. What is accepted is carried out.
-    Otherwise the robot goes back to where it came from, and comes back at the time that the person
-    named, or after `retry` of the interaction. A person who gave no answer isn't addressed again in
-    the same place: a sleeper isn't asked twice. Nobody is addressed in a room that the robot was
-    told to keep out of.
+    person is likely out of the home. Rounds that find nobody are evidence for that (`RoundMemory`):
+    the robot looks again once the person was seen, or is likely enough at home at that hour, after
+    30 min at least. A person in view is approached and addressed; the robot waits for `patience`.
+    What is accepted is carried out. Otherwise the robot goes back to where it came from, and comes
+    back at the time that the person named, or after `retry` of the interaction. A person who gave
+    no answer isn't addressed again in the same place, and not looked for within 4 h, unless seen in
+    another one: a sleeper isn't asked twice. Nobody is addressed in a room that the robot was told
+    to keep out of.
 
     With `timing` it asks an algorithm first: when a request comes up, when the person comes into
     view, and at most every `look`, it serves it with the probability that the algorithm names for
@@ -120,8 +189,8 @@ class Interact(BeliefBehavior):
         self.unanswered: dict[str, Point] = {}  # where a person gave no answer
         self.best_so_far: dict[str, tuple[datetime, float]] = {}  # best chance of each request
         self.left_alone: dict[str, datetime] = {}  # until when each person isn't addressed
-        # When the last round for each person was over, and for how long it looks for no other one.
-        self.not_found: dict[str, tuple[datetime, timedelta]] = {}
+        self.at_home = RoundMemory()
+        self.not_sought: dict[str, datetime] = {}  # until when it doesn't look for each person
 
     def awaits(self, now: Situation) -> frozenset[str]:
         """Leave out `user_seen` unless it waits for somebody to come into view."""
@@ -136,7 +205,7 @@ class Interact(BeliefBehavior):
         times = [queue.next_ready(now.time)]
         for request in queue.open:
             name, to = request.text, request.to
-            times += [self.left_alone.get(to), self._looks_again(now, request)]
+            times += [self.left_alone.get(to), self.not_sought.get(to)]
             if (last := self.looked.get(name)) is not None:
                 times.append(last + self.look)
         return min((time for time in times if time is not None and time > now.time), default=None)
@@ -148,7 +217,7 @@ class Interact(BeliefBehavior):
     def give_up(self, now: Situation) -> None:
         """Drop the way to a person: somebody is in the way."""
         if self.served is not None:
-            self.not_found[self.served.request.to] = now.time, DETOUR_PAUSE
+            self.not_sought[self.served.request.to] = now.time + DETOUR_PAUSE
         self.served = None
 
     def decide(self, now: Situation) -> Plan | None:
@@ -222,27 +291,25 @@ class Interact(BeliefBehavior):
             to = request.to
             if not self.seek or not request.interaction.seek:
                 continue
-            if max(self._looks_again(now, request), self.left_alone.get(to, now.time)) > now.time:
+            rests = self.not_sought.get(to, now.time), self.left_alone.get(to, now.time)
+            if max(rests) > now.time:
                 continue
             joint = self.belief(now, to).joint
-            if sum_in_order(joint.tolist()) < self.seek_at:
-                self._pause_search(now, to)
+            usual = min(MOST_SURE, sum_in_order(joint.tolist()))
+            if self.at_home.chance(to, now.time, usual) < self.seek_at:
+                self.not_sought[to] = now.time + SEARCH_PAUSE
             elif self._is_good_time(now, request):
                 return self._seek(now, request, joint)
         return None
 
-    def _looks_again(self, now: Situation, request: Request) -> datetime:
-        """Return when it may look for the person of a request."""
-        if request.to not in self.not_found:
-            return now.time
-        since, pause = self.not_found[request.to]
-        return since + min(pause, request.interaction.within)
-
-    def _pause_search(self, now: Situation, person: str) -> None:
-        """Wait before it looks for a person again who wasn't found."""
-        first, longest = SEARCH_PAUSES
-        _, pause = self.not_found.get(person, (now.time, first / 2))
-        self.not_found[person] = now.time, min(2 * pause, longest)
+    def _end_round(self, now: Situation, person: str, *, is_in_view: bool) -> None:
+        """Wait after a round without a person to address: not found, or in view and left alone."""
+        pause = UNANSWERED_PAUSE if person in self.unanswered else SEARCH_PAUSE
+        if not is_in_view:
+            usual = min(MOST_SURE, sum_in_order(self.belief(now, person).joint.tolist()))
+            doubted = self.at_home.note_empty(person, now.time, usual, self.seek_at)
+            pause = max(SEARCH_PAUSE, doubted)
+        self.not_sought[person] = now.time + pause
 
     def _may_address(self, now: Situation, request: Request, place: Point) -> bool:
         """Return whether a person in view may be addressed: one who was left alone for a while."""
@@ -254,7 +321,7 @@ class Interact(BeliefBehavior):
         if quiet_at is not None and _squared(quiet_at, place) < MOVED_M**2:
             return False
         self.unanswered.pop(request.to, None)
-        self.not_found.pop(request.to, None)
+        self.not_sought.pop(request.to, None)
         return True
 
     def _is_good_time(self, now: Situation, request: Request) -> bool:
@@ -299,6 +366,7 @@ class Interact(BeliefBehavior):
 
     def _ask(self, now: Situation, request: Request, place: Point) -> Plan:
         """Approach a person in view, address the person, and wait for the answer."""
+        self.at_home.note_found(request.to, now.time)
         x, y = now.home.plan.lattice.point_at(now.nearest_free(*now.xy))
         self.served = ServedRequest(request, "ask", request.text, place, (x, y))
         plan = now.plan()
@@ -322,6 +390,7 @@ class Interact(BeliefBehavior):
             now.requests.settle(request, Outcome.IGNORED, now.time, now.time)
         if not answers or Outcome.IGNORED in answers:
             self.unanswered[to] = served.place
+            self.not_sought[to] = now.time + UNANSWERED_PAUSE
         self.left_alone[to] = now.time + self.again
         plan = now.plan().note("withdraws", served.text)
         return plan.go_to_point(*served.came_from).stay(timedelta(seconds=1))
@@ -354,7 +423,7 @@ class Interact(BeliefBehavior):
         if served.request.to not in in_view and not last.is_over(now.step):
             plan = resumed(now.actor, now.plan(), last, now.step)
         if plan is None:
-            self._pause_search(now, served.request.to)
+            self._end_round(now, served.request.to, is_in_view=served.request.to in in_view)
             return None
         self.served = served
         return plan.interrupt_on("user_seen")
