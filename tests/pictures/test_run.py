@@ -328,7 +328,7 @@ def test_words_of_the_scale_are_above_the_legend(
     )
     figures: list[Figure] = []
     monkeypatch.setattr(
-        "fleet2d.pictures.run.save_figure", lambda figure, _: figures.append(figure)
+        "fleet2d.pictures.floorplan.save_figure", lambda figure, _: figures.append(figure)
     )
     draw_run(run, tmp_path / "run.png")
     texts = [text for axes in figures[0].axes for text in axes.texts]

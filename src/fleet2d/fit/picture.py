@@ -13,7 +13,7 @@ from fleet2d.fit.validation import sample_markov, sample_persona
 from fleet2d.kernels import F64, Bool
 from fleet2d.logs.log import AWAY
 from fleet2d.palette import OTHER_COLOR, ROOM_COLORS
-from fleet2d.pictures.floorplan import check_picture, drawing_style, save_figure
+from fleet2d.pictures.floorplan import write_picture
 
 if TYPE_CHECKING:  # they need scipy, which the picture of a persona doesn't
     from fleet2d.fit.perception import Calibration, ProbabilityGroup
@@ -33,16 +33,23 @@ def draw_persona(
 
     At the top: the shares of the rooms in each hour. At the bottom: the distribution function of
     the durations of stays, room by room.
-    """
-    from matplotlib.figure import Figure
 
+    Raises:
+        InputError: The file name has another suffix, or the file can't be written.
+    """
+    write_picture(target, lambda: _persona_figure(timeline, days, fitted, seed))
+
+
+def _persona_figure(
+    timeline: Timeline, days: Sequence[LivedDay], fitted: FittedPersona, seed: int
+) -> "Figure":
     count = len(timeline.places)
     real = timeline.rooms[[day.number for day in days]]
     sampled = sample_persona(fitted, timeline, SAMPLED, seed)[1]
     sets = (real, sampled, sample_markov(real, count, SAMPLED, seed))
     colors = [ROOM_COLORS.get(place, OTHER_COLOR) for place in timeline.places]
     columns = max(3, count)
-    figure = Figure(figsize=(2.1 * columns, 5.2), layout="constrained")
+    figure = Figure(figsize=(2.1 * columns, 5.2), dpi=150, layout="constrained")
     upper: Any
     lower: Any
     upper, lower = figure.subfigures(2, 1)  # type: ignore[misc]
@@ -62,7 +69,7 @@ def draw_persona(
     handles, names = upper.axes[0].get_legend_handles_labels()
     upper.legend(handles, names, loc="outside right upper", frameon=False, fontsize=8)
     _draw_stays(lower.subplots(1, count, sharey=True, squeeze=False)[0], sets, timeline)
-    figure.savefig(target, dpi=150, metadata={"Date": None} if target.suffix == ".svg" else None)
+    return figure
 
 
 def _draw_stays(panels: Sequence[Any], sets: Sequence[Any], timeline: Timeline) -> None:
@@ -95,10 +102,7 @@ def draw_calibration(calibration: "Calibration", target: Path) -> None:
     Raises:
         InputError: The name ends with neither `.png` nor `.svg`, or the file can't be written.
     """
-    check_picture(target)
-    with drawing_style():
-        figure = _figure(calibration)
-        save_figure(figure, target)
+    write_picture(target, lambda: _figure(calibration))
 
 
 def _figure(calibration: "Calibration") -> Figure:

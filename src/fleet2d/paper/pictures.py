@@ -12,7 +12,7 @@ from fleet2d.errors import extra
 from fleet2d.metrics.rtp_score import GAPS
 from fleet2d.paper import results
 from fleet2d.paper.results import Result
-from fleet2d.pictures.floorplan import check_picture, drawing_style, save_figure
+from fleet2d.pictures.floorplan import write_picture
 from fleet2d.studies.figures import COLORS, DARK, draw_interaction
 
 with extra("viz", "drawing needs matplotlib"):
@@ -33,9 +33,7 @@ def draw(result: Result, path: Path) -> None:
     Raises:
         InputError: The name ends with neither `.png` nor `.svg`, or the file can't be written.
     """
-    check_picture(path)
-    with drawing_style():
-        save_figure(DRAWERS[result.name](result.numbers), path)
+    write_picture(path, lambda: DRAWERS[result.name](result.numbers))
 
 
 def _figure() -> tuple[Figure, Axes]:

@@ -21,8 +21,7 @@ from fleet2d.metrics.rtp_score import (
     reliability_curve,
     top_k,
 )
-from fleet2d.pictures.floorplan import check_picture, picture
-from fleet2d.pictures.theme import apply_theme
+from fleet2d.pictures.floorplan import picture, write_picture
 from fleet2d.routines.interruptions import without_interruptions
 from fleet2d.routines.life import Life
 from fleet2d.routines.persona import Persona
@@ -90,9 +89,17 @@ def _length(time_s: int) -> str:
 
 
 def draw_diary(persona: Persona, name: str, days: Days, target: Path) -> None:
-    """Draw a strip for each day: planned activities as a band, interruptions as marks above it."""
+    """Draw a strip for each day: planned activities as a band, interruptions as marks above it.
+
+    Raises:
+        InputError: The file name has another suffix, or the file can't be written.
+    """
+    write_picture(target, lambda: _diary_figure(persona, name, days))
+
+
+def _diary_figure(persona: Persona, name: str, days: Days) -> Figure:
     colors = _colors(persona, days)
-    figure = Figure(figsize=(13, 1.2 + 0.55 * len(days)), layout="constrained")
+    figure = Figure(figsize=(13, 1.2 + 0.55 * len(days)), dpi=130, layout="constrained")
     axes = figure.subplots()
     for row, (_, episodes) in enumerate(days):
         for episode in without_interruptions(episodes):
@@ -114,7 +121,7 @@ def draw_diary(persona: Persona, name: str, days: Days, target: Path) -> None:
     patches = [Patch(color=color, label=label.replace("_", " ")) for label, color in colors.items()]
     patches.append(Patch(color=NEED_COLOR, label="needs and errands"))
     figure.legend(handles=patches, loc="outside lower center", ncols=8, fontsize=7, frameon=False)
-    apply_theme(figure).savefig(target, dpi=130)
+    return figure
 
 
 def _colors(persona: Persona, days: Days) -> dict[str, str | tuple[float, ...]]:
@@ -215,7 +222,6 @@ def draw_forecasts(name: str, belief: F64, truth: I64, path: Path) -> None:
     Raises:
         InputError: The file name has another suffix, or the file can't be written.
     """
-    check_picture(path)
     places = np.arange(belief.shape[1])
     highest, is_right = belief.max(axis=1), top_k(belief, truth, 1)
     is_true = (truth[:, None] == places).astype(np.float64)

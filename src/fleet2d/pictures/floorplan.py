@@ -3,7 +3,7 @@
 import io
 import re
 import textwrap
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from types import MappingProxyType
@@ -17,6 +17,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection, PathCollection
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
+from matplotlib.image import AxesImage
 from matplotlib.patches import PathPatch, Rectangle
 from matplotlib.path import Path as Outline
 from shapely.geometry.base import BaseGeometry
@@ -219,9 +220,19 @@ def draw_floorplan(plan: FloorPlan, path: Path) -> None:
     Raises:
         InputError: The file name has another suffix, or the file can't be written.
     """
-    check_picture(path)
     with picture(path, *figure_size(plan)) as figure:
         floorplan_axes(plan, figure.add_axes((0, 0, 1, 1)))
+
+
+def write_picture(path: Path, draw: Callable[[], Figure]) -> None:
+    """Write the figure that a function draws in the style of Fleet2D to a file.
+
+    Raises:
+        InputError: The file name has another suffix, or the file can't be written.
+    """
+    check_picture(path)
+    with drawing_style():
+        save_figure(draw(), path)
 
 
 @contextmanager
@@ -229,8 +240,9 @@ def picture(path: Path, width: float, height: float) -> Iterator[Figure]:
     """Yield a figure of a size [in] to draw on; it is written to a file when the block ends.
 
     Raises:
-        InputError: The file can't be written.
+        InputError: The file name has another suffix, or the file can't be written.
     """
+    check_picture(path)
     with drawing_style():
         figure = Figure(figsize=(width, height), dpi=DPI)
         FigureCanvasAgg(figure)
@@ -358,16 +370,15 @@ def _draw_rooms(plan: FloorPlan, axes: Axes) -> None:
     table = np.array([*colors, to_rgb(ROOM_COLORS["unknown"])])
     image = table[_spread(plan.room_of_cell)]  # index -1 is the last colour
     free_space = PathPatch(_outline(plan, plan.polygons), transform=axes.transData)
-    low = plan.lattice.origin
-    size = np.array([plan.lattice.columns, plan.lattice.rows]) * plan.lattice.cell
-    artist = axes.imshow(
-        image,
-        extent=(low[0], low[0] + float(size[0]), low[1], low[1] + float(size[1])),
-        origin="lower",
-        interpolation="nearest",
-        zorder=1,
-    )
-    artist.set_clip_path(free_space)
+    draw_cells(plan, image, axes, interpolation="nearest", zorder=1).set_clip_path(free_space)
+
+
+def draw_cells(plan: FloorPlan, image: Any, axes: Axes, **style: Any) -> AxesImage:
+    """Draw an image that has a pixel for each cell of a plan on axes in metres."""
+    lattice = plan.lattice
+    left, bottom = lattice.origin
+    right, top = left + lattice.columns * lattice.cell, bottom + lattice.rows * lattice.cell
+    return axes.imshow(image, extent=(left, right, bottom, top), origin="lower", **style)
 
 
 def _draw_borders(plan: FloorPlan, axes: Axes) -> None:
@@ -516,7 +527,6 @@ def draw_checkup(plan: FloorPlan, findings: Sequence[Finding], path: Path) -> No
     Raises:
         InputError: The file name has another suffix, or the file can't be written.
     """
-    check_picture(path)
     width, height = figure_size(plan)
     lines = _lines(findings, int(width * LETTERS_PER_IN))
     below = LINE_IN * (len(lines) + 2)

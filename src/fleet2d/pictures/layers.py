@@ -17,7 +17,7 @@ from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.kernels import TURN, Reach
 from fleet2d.palette import TEXT_COLOR, VIEW_COLOR, VIEW_EDGE
-from fleet2d.pictures.floorplan import check_picture, figure_size, floorplan_axes, picture
+from fleet2d.pictures.floorplan import draw_cells, figure_size, floorplan_axes, picture
 from fleet2d.pictures.life import SightWalls, field_of_view
 from fleet2d.pictures.theme import SCALE
 from fleet2d.runs.run import LAYER_PREFIX, Run, layer_steps, read_layer
@@ -44,7 +44,6 @@ def draw_layer(run: Run, name: str, path: Path, step: int | None = None) -> None
         ArtifactError: The run stored no such layer, or not after that step.
         InputError: The file name has another suffix, or the file can't be written.
     """
-    check_picture(path)
     values = read_layer(run, name, step)
     step = layer_steps(run, name)[-1] if step is None else step
     field = run.tables[f"{LAYER_PREFIX}{name}"].schema.field("value")
@@ -88,12 +87,7 @@ def layer_on_axes(plan: FloorPlan, values: NDArray[Any], axes: Axes) -> ScalarMa
         colors = ScalarMappable(Normalize(low, high if high > low else low + 1.0), COLORS)
         image[has_value] = colors.to_rgba(numbers)
         image[has_value, 3] = SOLID
-    left, bottom = plan.lattice.origin
-    width, height = (n * plan.lattice.cell for n in (plan.lattice.columns, plan.lattice.rows))
-    extent = (left, left + width, bottom, bottom + height)
-    axes.imshow(
-        image, extent=extent, origin="lower", interpolation="nearest", zorder=2.1, label=SCALE
-    )
+    draw_cells(plan, image, axes, interpolation="nearest", zorder=2.1, label=SCALE)
     return colors
 
 
@@ -163,7 +157,6 @@ def draw_fov(plan: FloorPlan, pose: CameraPose, path: Path) -> None:
         PlacementError: The pose is in a wall or outside the home.
         InputError: The file name has another suffix, or the file can't be written.
     """
-    check_picture(path)
     VisibleRegion(SightWalls.of(Home(plan)), pose.x, pose.y)  # raises PlacementError
     width, height = figure_size(plan)
     with picture(path, 2 * width, height) as figure:

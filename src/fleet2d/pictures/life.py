@@ -25,6 +25,7 @@ from fleet2d.floorplan.lattice import Lattice
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.kernels import F64, I16, I64, Bool, Mesh
 from fleet2d.palette import TEXT_COLOR, VIEW_COLOR, VIEW_EDGE, body_color
+from fleet2d.pictures.floorplan import draw_cells
 from fleet2d.runs.run import Run
 from fleet2d.runs.trajectory import rebuild_path
 from fleet2d.sight.fov import VisibleRegion, WallPlan
@@ -397,9 +398,7 @@ def draw_presence(plan: FloorPlan, trace: BodyTrace, axes: Axes) -> None:
     image = np.empty((*shape, 4))
     image[..., :3] = to_rgb(trace.color)
     image[..., 3] = opacity(time, plan.free)
-    low, high = np.array(lattice.origin), np.array(shape[::-1]) * lattice.cell
-    extent = (low[0], low[0] + high[0], low[1], low[1] + high[1])
-    axes.imshow(image, extent=extent, origin="lower", interpolation="bilinear", zorder=3)
+    draw_cells(plan, image, axes, interpolation="bilinear", zorder=3)
 
 
 def opacity(time: F64, free: Bool) -> F64:

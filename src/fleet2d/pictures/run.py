@@ -21,12 +21,11 @@ from fleet2d.kernels import F64, I16, I64
 from fleet2d.palette import ACCENT_COLOR, OTHER_COLOR, ROOM_COLORS, TEXT_COLOR
 from fleet2d.pictures.floorplan import (
     DPI,
-    check_picture,
     drawing_style,
     floorplan_axes,
-    save_figure,
     scale_depth,
     short_name,
+    write_picture,
 )
 from fleet2d.pictures.life import (
     HATCH_COLOR,
@@ -272,9 +271,7 @@ def draw_run(run: Run, path: Path) -> None:
         >>> with tempfile.TemporaryDirectory() as folder:
         ...     draw_run(run, Path(folder) / "picture.png")
     """
-    check_picture(path)
-    with drawing_style():
-        save_figure(_Picture(run).figure, path)
+    write_picture(path, lambda: _Picture(run).figure)
 
 
 def run_figure(run: Run) -> Figure:

@@ -19,11 +19,11 @@ from fleet2d.kernels import F64
 from fleet2d.palette import TEXT_COLOR
 from fleet2d.pictures.floorplan import (
     DPI,
-    check_picture,
-    drawing_style,
+    draw_cells,
     figure_size,
     floorplan_axes,
-    save_figure,
+    picture,
+    write_picture,
 )
 from fleet2d.pictures.layers import COLORS
 from fleet2d.pictures.life import blurred
@@ -60,10 +60,7 @@ def draw_moment(run: Run, step: int, path: Path) -> None:
         InputError: The run has no such step, or the file can't be written.
         ArtifactError: The run stored no key frames or no floor plan.
     """
-    check_picture(path)
-    with drawing_style():
-        figure = moment_figure(run, step)
-        save_figure(figure, path)
+    write_picture(path, lambda: moment_figure(run, step))
 
 
 def draw_failure(
@@ -85,13 +82,10 @@ def draw_failure(
         InputError: The run has no such step, or the file can't be written.
         ArtifactError: The run stored no key frames or no floor plan.
     """
-    check_picture(path)
     courses = evidence.signals[:MAX_COURSES] if evidence is not None else ()
-    with drawing_style():
-        width, height = figure_size(run.plan)
-        lower = COURSE_IN * len(courses) + 0.35
-        figure = Figure(figsize=(width, height + lower + HEAD_IN), dpi=DPI, facecolor="white")
-        FigureCanvasAgg(figure)
+    width, height = figure_size(run.plan)
+    lower = COURSE_IN * len(courses) + 0.35
+    with picture(path, width, height + lower + HEAD_IN) as figure:
         whole = figure.get_figheight()
         axes = figure.add_axes((0.0, lower / whole, 1.0, height / whole))
         stage = Stage(run, max(0, step - _minute(run)), step + 1, axes)
@@ -107,19 +101,15 @@ def draw_failure(
             _draw_course(run, course, step, below)
             if number == len(courses) - 1:
                 below.set_xlabel("seconds from the failure", fontsize=6, labelpad=1)
-        save_figure(figure, path)
 
 
 def _mark(plan: FloorPlan, stage: Stage, evidence: VerdictEvidence, axes: Axes) -> None:
     """Mark the rooms of an expectation, and its distances between bodies."""
     rooms = [r.index for r in plan.rooms if evidence.places & {r.name, r.type}]
-    left, bottom = plan.lattice.origin
     mask = np.isin(plan.room_of_place, rooms)
     image = np.zeros((*mask.shape, 4))
     image[mask] = (*MARK_RGB, 0.22)
-    rows, columns = mask.shape
-    extent = (left, left + columns * plan.lattice.cell, bottom, bottom + rows * plan.lattice.cell)
-    axes.imshow(image, extent=extent, origin="lower", zorder=2.2)
+    draw_cells(plan, image, axes, zorder=2.2)
     poses = {b.facts["name"]: (b.path.x[-1], b.path.y[-1]) for b in stage.bodies}
     for body, other in evidence.distances:
         here, there = poses.get(body), other if isinstance(other, tuple) else poses.get(other)
@@ -187,9 +177,7 @@ def draw_stretch(run: Run, first: int, end: int, path: Path, kind: FigureKind = 
         InputError: The file can't be written.
         ArtifactError: The run stored no key frames or no floor plan.
     """
-    check_picture(path)
-    with drawing_style():
-        save_figure(stretch_figure(run, first, end, kind), path)
+    write_picture(path, lambda: stretch_figure(run, first, end, kind))
 
 
 def stretch_figure(run: Run, first: int, end: int, kind: FigureKind = "life") -> Figure:
@@ -256,13 +244,7 @@ def draw_heat(run: Run, names: list[str], axes: Axes) -> ScalarMappable:
     colors = ScalarMappable(PowerNorm(0.5, 0, high), COLORS)
     image = colors.to_rgba(hours)
     image[..., 3] = np.clip(np.sqrt(hours / high) * 3, 0, 0.85) * plan.free
-    left, bottom = plan.lattice.origin
-    right = left + plan.lattice.columns * plan.lattice.cell
-    top = bottom + plan.lattice.rows * plan.lattice.cell
-    extent = (left, right, bottom, top)
-    axes.imshow(
-        image, extent=extent, origin="lower", interpolation="bilinear", zorder=2.1, label=SCALE
-    )
+    draw_cells(plan, image, axes, interpolation="bilinear", zorder=2.1, label=SCALE)
     return colors
 
 

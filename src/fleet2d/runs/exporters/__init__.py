@@ -20,6 +20,7 @@ from pydantic_core import PydanticCustomError
 
 from fleet2d.configuration.units import parse_duration, whole_steps
 from fleet2d.errors import InputError, RunDirectoryError, os_errors_as
+from fleet2d.kernels import I64
 from fleet2d.runs.trajectory import PathReader, Trajectory
 from fleet2d.storage.files import replacing
 
@@ -145,7 +146,8 @@ class Records:
         """
         names = [*self.users, *self.robots] if poses else []
         readers = {name: PathReader(self.run, self.run.plan, name) for name in names}
-        rows = {name: _Rows(self.run, name) for name in (self.tables if tables is None else tables)}
+        wanted = self.tables if tables is None else tables
+        rows = {name: _by_step(self.run.tables[name]) for name in wanted}
         step_us = self.run.manifest["step_us"]
         stride = whole_steps(self.part.every, step_us, "every", InputError)
         steps = stride * max(MAX_POSES // max(len(names), 1), 1)
@@ -158,46 +160,23 @@ class Records:
                     name: reader.read(first, end, self.part.every)
                     for name, reader in readers.items()
                 },
-                {name: table.between(first, end) for name, table in rows.items()},
+                {name: _between(*table, first, end) for name, table in rows.items()},
             )
 
 
-class _Rows:
-    """The rows of a table, read batch by batch where they are stored by step."""
-
-    def __init__(self, run: "Run", name: str) -> None:
-        self._batches = _batches(run, name)
-        self._schema = run.tables[name].schema
-        self._waiting: list[pa.RecordBatch] = []
-
-    def between(self, first: int, end: int) -> "pa.Table":
-        """Return the rows of steps `first` to `end` - 1; stretches must be requested in order."""
-        import pyarrow as pa
-
-        parts: list[pa.RecordBatch] = []
-        while True:
-            if not self._waiting:
-                batch = next(self._batches, None)
-                if batch is None:
-                    break
-                self._waiting.append(batch)
-            batch = self._waiting.pop()
-            step = batch.column("step").to_numpy(zero_copy_only=False)
-            low, high = np.searchsorted(step, (first, end))
-            parts.append(batch.slice(low, high - low))
-            if high < len(step):
-                self._waiting.append(batch.slice(high))
-                break
-        return pa.Table.from_batches(parts, self._schema)
-
-
-def _batches(run: "Run", name: str) -> "Iterator[pa.RecordBatch]":
-    """Yield the rows of a table in order of step."""
-    table = run.tables[name]
+def _by_step(table: "pa.Table") -> "tuple[pa.Table, I64]":
+    """Return a table in order of step, and the step of each row."""
     step = table["step"].to_numpy()
     if np.any(step[1:] < step[:-1]):  # such as violations, which are listed when they end
-        table = table.take(np.argsort(step, kind="stable"))
-    yield from table.to_batches(max_chunksize=50_000)
+        order = np.argsort(step, kind="stable")
+        table, step = table.take(order), step[order]
+    return table, step
+
+
+def _between(table: "pa.Table", step: I64, first: int, end: int) -> "pa.Table":
+    """Return the rows of the steps `first` to `end` - 1."""
+    low, high = np.searchsorted(step, (first, end)).tolist()
+    return table.slice(low, high - low)
 
 
 Exporter = Callable[["Run", Path, "Selection"], str]
