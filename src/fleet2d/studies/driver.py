@@ -47,7 +47,6 @@ from fleet2d.studies.plan import (
     check_setups,
     make_plan,
     reconcile,
-    task_of,
     write_plan,
 )
 from fleet2d.studies.reader import Study
@@ -129,7 +128,7 @@ class AdaptiveSchedule(TaskSchedule):
             self._places += places
             for place in places:
                 if self._is_missing[place]:
-                    self.add(task_of(self._planned[place]))
+                    self.add(self._planned.task(place))
                     self._unfinished += 1
 
     def _decide(self) -> None:

@@ -5,7 +5,7 @@ import re
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Self
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -142,6 +142,12 @@ class PlannedVariants:
             self.home_keys[self.home[combination]],
             float(self.simulated_s[combination]),
         )
+
+    def task(self, place: int) -> WorkerTask:
+        """Return the task to run the variant at a place."""
+        index = int(self.index[place])
+        home = self.home_keys[self.home[index // self.seeds]]
+        return WorkerTask(int(self.number[place]), index, unpacked(self.identity[place]), home)
 
     @property
     def homes(self) -> I32:
@@ -343,14 +349,14 @@ class PlannedTasks:
         if self._first or self._begin == self._end:
             return (self._first or self._last).popleft()
         self._begin += 1
-        return task_of(self._variants[self._places[self._begin - 1]])
+        return self._variants.task(self._places[self._begin - 1])
 
     def pop(self) -> WorkerTask:
         """Remove the last task and return it."""
         if self._last or self._begin == self._end:
             return (self._last or self._first).pop()
         self._end -= 1
-        return task_of(self._variants[self._places[self._end]])
+        return self._variants.task(self._places[self._end])
 
 
 class PlanSchedule(TaskSchedule):
@@ -366,13 +372,8 @@ class PlanSchedule(TaskSchedule):
             self._groups[variants.home_keys[home]] = tasks
 
 
-def task_of(variant: PlannedVariant) -> WorkerTask:
-    """Return the task to run a variant."""
-    return WorkerTask(variant.number, variant.index, variant.identity, variant.home_key)
-
-
-def setups_to_check(plan: StudyPlan) -> list[PlannedVariant]:
-    """Return variants in which each home meets each choice of every other axis, and no more.
+def setups_to_check(plan: StudyPlan) -> list[int]:
+    """Return the places of variants in which each home meets each choice of every other axis.
 
     Their set-up shows people and robots that have no room where they start, without setting up
     every variant.
@@ -381,7 +382,7 @@ def setups_to_check(plan: StudyPlan) -> list[PlannedVariant]:
     homes = np.split(by_home, np.flatnonzero(np.diff(plan.variants.home[by_home])) + 1)
     chosen = [number for home in homes for number in _covering(plan.design, home)]
     seeds = len(plan.design.seeds)
-    return [plan.variants[number * seeds] for number in chosen]
+    return [number * seeds for number in chosen]
 
 
 def _covering(design: Design, numbers: NDArray[np.integer[Any]]) -> Iterator[int]:
@@ -431,7 +432,7 @@ def check_setups(
         ScenarioError: Variants are wrong; a line per problem, with axis and value.
     """
     problems: dict[int, str] = {}
-    tasks = [task_of(variant) for variant in setups_to_check(plan)]
+    tasks = list(map(plan.variants.task, setups_to_check(plan)))
     runner = executor if len(tasks) > FEW_SETUPS else SerialExecutor()
     events = runner.run(SetupJob(plan.design), TaskSchedule(tasks))
     try:
@@ -465,8 +466,8 @@ def _without_repetition(problems: list[str]) -> list[str]:
 
 Changed = Literal["redo", "keep"]
 PLAN_BATCH = 5_000  # rows of the plan that are in memory as text
-PLAN_COLUMNS = (VARIANT, "identity", "scenario", "template", "home_key", "simulated_s")
 BATCH = 1000
+FIND_BATCH = 1 << 20  # hashes that are looked up together: bounds the memory
 
 
 class ScenarioFile:
@@ -540,25 +541,27 @@ def reconcile(
                 " choose another --out"
             )
         return ReconciledPlan(plan, len(plan.variants), 0)
-    variants, stored = plan.variants, _StoredPlan.read(directory)
-    place = _find(stored.identity, variants.identity)
+    variants, (stored_number, stored_identity) = plan.variants, _stored(directory, "identity")
+    place = _find(stored_identity, variants.identity)
     is_stored = place >= 0
-    number = np.append(stored.number, -1)[place].astype(np.int32)  # -1 for those at place -1
-    has_result = np.append(finished, np.zeros(int(stored.number.max(initial=-1)) + 1, np.bool_))
-    is_gone = _find(variants.identity, stored.identity) < 0
-    stale = np.flatnonzero(is_gone & has_result[stored.number])
-    same = np.where(is_stored, -1, _find(stored.scenario[stale], variants.scenario))
+    number = np.append(stored_number, np.int32(-1))[place]  # -1 for those at place -1
+    count = 1 + int(stored_number.max(initial=-1))
+    has_result = np.append(finished, np.zeros(count, np.bool_))[stored_number]
+    has_result[place[is_stored]] = False  # only those that are gone are left
+    stale, same = np.flatnonzero(has_result), np.full(len(variants), -1, np.int32)
+    if len(stale):
+        _, stored_scenario = _stored(directory, "scenario")
+        same = np.where(is_stored, -1, _find(stored_scenario[stale], variants.scenario))
     if len(stale) and changed is None:
         recomputed = np.count_nonzero(same >= 0)
         raise RunDirectoryError(_refusal(directory.location, int(recomputed), len(stale)))
     reused, identity = np.zeros(len(variants), np.bool_), variants.identity
     if changed == "keep":
         reused, identity = same >= 0, identity.copy()
-        number[reused] = stored.number[stale[same[reused]]]
-        identity[reused] = stored.identity[stale[same[reused]]]
+        number[reused] = stored_number[stale[same[reused]]]
+        identity[reused] = stored_identity[stale[same[reused]]]
     is_new = ~is_stored & ~reused
-    first = int(stored.number.max(initial=-1)) + 1
-    number[is_new] = np.arange(first, first + np.count_nonzero(is_new))
+    number[is_new] = np.arange(count, count + np.count_nonzero(is_new))
     numbered = replace(variants, number=number, identity=identity)
     return ReconciledPlan(
         StudyPlan(plan.design, numbered),
@@ -567,31 +570,28 @@ def reconcile(
     )
 
 
-class _StoredPlan(NamedTuple):
-    """Columns of a stored plan: a row per variant."""
-
-    number: I32
-    identity: Hashes
-    scenario: Hashes
-
-    @classmethod
-    def read(cls, directory: StudyDirectory) -> Self:
-        """Read them, some rows at a time."""
-        with directory.storage.reading(PLAN):
-            parts = [
-                (numbers_of(batch), *(packed(batch[n].to_pylist()) for n in PLAN_COLUMNS[1:3]))
-                for batch in directory.plan_batches(PLAN_COLUMNS[:3])
-            ]
-        empty = (np.zeros(0, np.int32), np.zeros(0, HASH), np.zeros(0, HASH))
-        return cls(*map(np.concatenate, zip(*(parts or [empty]), strict=True)))
+def _stored(directory: StudyDirectory, column: str) -> tuple[I32, Hashes]:
+    """Return the numbers of the variants of the stored plan, and a column of hashes: (n,) each."""
+    count, end = sum(directory.storage.row_groups(PLAN)), 0
+    with directory.storage.reading(PLAN):
+        numbers, hashes = np.empty(count, np.int32), np.empty(count, HASH)
+        for batch in directory.plan_batches((VARIANT, column)):
+            begin, end = end, end + len(batch)
+            numbers[begin:end] = numbers_of(batch)
+            hashes[begin:end] = packed(batch[column].to_pylist())
+    return numbers, hashes
 
 
-def _find(among: Hashes, wanted: Hashes) -> NDArray[np.intp]:
-    """Return the last place of each wanted hash among others, -1 where there is none: (n,)."""
+def _find(among: Hashes, wanted: Hashes) -> I32:
+    """Return the last place of each wanted hash among others, or -1: int32 (n,)."""
     order = np.argsort(among, kind="stable")
-    at = np.searchsorted(among, wanted, side="right", sorter=order) - 1
-    places = np.append(order, -1)[at]  # place -1: none is that small
-    return np.where(np.append(among, among[:1])[places] == wanted, places, -1) if len(among) else at
+    places = np.full(len(wanted), -1, np.int32)
+    for begin in range(0, len(wanted) if len(among) else 0, FIND_BATCH):
+        part = wanted[begin : begin + FIND_BATCH]
+        # A hash below all others comes to -1, the last of the order, which it doesn't equal.
+        place = order[np.searchsorted(among, part, side="right", sorter=order) - 1]
+        places[begin : begin + FIND_BATCH] = np.where(among[place] == part, place, -1)
+    return places
 
 
 def _refusal(location: str, recomputed: int, stale: int) -> str:

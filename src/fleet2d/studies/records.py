@@ -27,6 +27,8 @@ GROUP_ROWS = 5_000  # of results, that are written together
 MAX_NUMBER = 1 << 27  # above those of variants: statuses and rows are arrays by number
 MAX_HEADERS = 1_000  # that a journal has in memory, 3 kB each; as rows of a table they take 0.4
 
+_ENCODER = json.JSONEncoder(separators=(",", ":"))
+
 
 @dataclass(frozen=True)
 class VariantRecord:
@@ -110,6 +112,9 @@ def array_of(values: Iterable[Any], kind: "pa.DataType") -> "pa.Array":
     items = list(values)
     if kind == pa.string():
         return string_array(items)
+    if kind == pa.float64():
+        floats = np.array(items, np.float64)  # None becomes NaN
+        return number_array(floats, kind, np.isnan(floats))
     missing = np.array([item is None for item in items], np.bool_)
     numbers = [0 if item is None else item for item in items] if missing.any() else items
     return number_array(np.array(numbers, kind.to_pandas_dtype()), kind, missing)
@@ -213,8 +218,7 @@ class Journal:
         """
         start = self.size
         try:
-            header = json.dumps(record.header, separators=(",", ":"))
-            self._writer.add("variant", header, record.body)
+            self._writer.add("variant", _ENCODER.encode(record.header), record.body)
             self._writer.commit()
             if time.monotonic() - self._sync_time > SYNC_EVERY_S:
                 self._writer.sync()
