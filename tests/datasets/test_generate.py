@@ -148,7 +148,7 @@ def test_a_day_takes_little_room(data: Dataset) -> None:
         if name.startswith(("train/evidence", "train/labels"))
     )
     days = sum(data.arrow("runs", "train")["days"].to_pylist())
-    assert size / days < 150_000
+    assert size / days < 32_000
 
 
 def test_the_card_says_what_is_in_it(data: Dataset) -> None:

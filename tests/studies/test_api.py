@@ -60,6 +60,26 @@ def test_a_map_of_nothing_is_empty() -> None:
     assert [] == map_runs(digest_of, [])
 
 
+class Reads:
+    """A function that notes how often it was read from its pickle."""
+
+    count: ClassVar[int] = 0
+
+    def __setstate__(self, state: object) -> None:
+        Reads.count += 1
+
+    def __getstate__(self) -> str:
+        return "anything"
+
+    def __call__(self, run: Run) -> int:
+        return Reads.count
+
+
+def test_a_worker_reads_the_function_once() -> None:
+    reads = map_runs(Reads(), SEEDED, executor="serial")
+    assert 1 == len(set(reads))
+
+
 def test_a_lambda_can_be_mapped() -> None:
     pytest.importorskip("cloudpickle")
     assert [0, 1, 2, 3] == map_runs(lambda run: run.manifest["seed"], SEEDED, workers=1)

@@ -16,6 +16,7 @@ import pyarrow.parquet as pq
 import yaml
 
 from fleet2d import __version__
+from fleet2d.algorithms.presence.belief import AWAY
 from fleet2d.datasets.reader import FORMAT, MANIFEST, Dataset, open_dataset
 from fleet2d.datasets.specification import DatasetFile, DatasetPlan, PlannedRun, Shard, plan_dataset
 from fleet2d.datasets.tables import SCHEMAS, tables_of
@@ -110,16 +111,12 @@ def _count(data: Dataset, split: str) -> dict[str, Any]:
     """Return how much there is in a split, and how it is distributed."""
     runs, labels = data.arrow("runs", split), data.arrow("labels", split)
     rooms = {
-        (run, room): kind
-        for run, room, kind in zip(
-            *(data.arrow("rooms", split)[c].to_pylist() for c in ("run", "room", "kind")),
-            strict=True,
-        )
+        (row["run"], row["room"]): row["kind"] for row in data.arrow("rooms", split).to_pylist()
     }
-    places = Counter(zip(labels["run"].to_pylist(), labels["place"].to_pylist(), strict=True))
     kinds: Counter[str] = Counter()
-    for place, count in places.items():
-        kinds[rooms.get(place, "away")] += count
+    by_place = labels.group_by(["run", "place"], use_threads=False)
+    for row in by_place.aggregate([([], "count_all")]).to_pylist():
+        kinds[rooms.get((row["run"], row["place"]), AWAY)] += row["count_all"]
     return {
         "runs": len(runs),
         "days": sum(runs["days"].to_pylist()),
@@ -390,7 +387,7 @@ def _join(
         path.parent.mkdir(exist_ok=True)
         table = pa.concat_tables(tables[name])
         with partial_file(path) as partial:
-            pq.write_table(table, partial, compression="zstd", compression_level=9)
+            pq.write_table(table, partial, **_encoding(table))
         content = path.read_bytes()
         records[path.relative_to(root).as_posix()] = {
             "rows": table.num_rows,
@@ -398,6 +395,19 @@ def _join(
             "sha256": hashlib.sha256(content).hexdigest(),
         }
     return records
+
+
+def _encoding(table: pa.Table) -> dict[str, Any]:
+    """Return how a table is stored: steps and times as differences, other columns by their values.
+
+    Most rows follow the one before by the same time, so this takes a third less room.
+    """
+    moments = {"step", "next_step", "time"} & {*table.column_names}
+    return {
+        "compression": "zstd",
+        "column_encoding": dict.fromkeys(moments, "DELTA_BINARY_PACKED"),
+        "use_dictionary": [name for name in table.column_names if name not in moments],
+    }
 
 
 def _finish(root: Path, plan: DatasetPlan, files: Mapping[str, Mapping[str, Any]]) -> None:

@@ -4,6 +4,7 @@ import pickle
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal, TypeVar
 
@@ -208,13 +209,15 @@ class FunctionJob:
         """Return what the function returns, or the error, pickled."""
         try:
             scenario = self.scenarios[task.index]
-            return pickle.dumps((True, self._call(run_scenario(scenario))))
+            return pickle.dumps((True, self._callable(run_scenario(scenario))))
         except Exception as error:  # noqa: BLE001 - raised again in the driver
             return pickle.dumps((False, _portable(error)))
 
-    def _call(self, run: Run) -> Any:
+    @cached_property
+    def _callable(self) -> Callable[[Run], Any]:
+        """The function, which a worker reads once: it may hold a lot."""
         function: Callable[[Run], Any] = pickle.loads(self.function)  # noqa: S301 - our own
-        return function(run)
+        return function
 
 
 def _portable(error: Exception) -> Exception:
