@@ -6,12 +6,14 @@ span ends with each question and answer, and where the robot's plan waits for re
 
 from collections.abc import Iterable, Sequence, Set
 from dataclasses import dataclass, field
+from datetime import timedelta
 from typing import NamedTuple
 
 import numpy as np
 
 from fleet2d.configuration.units import micros
 from fleet2d.engine.basis import Basis, Watcher
+from fleet2d.engine.intervention_queue import InterventionQueue
 from fleet2d.entities.behavior import Command, SightEvent
 from fleet2d.entities.body import NEVER, Bodies
 from fleet2d.entities.decisions import DecidingActor, StandStill
@@ -69,6 +71,7 @@ class Conversations(Watcher):
         attitudes: The attitude of each user to each robot: truth, by their rows.
         log: How people answered: truth, for metrics.
         wanted: The requests that came up, for metrics.
+        interventions: Where cameras of robots that are switched off are switched off, too.
         awaited: Kinds of events that end a span, whatever plans wait for.
     """
 
@@ -79,6 +82,7 @@ class Conversations(Watcher):
     attitudes: dict[tuple[int, int], AttitudeState] = field(default_factory=dict)
     log: list[AnswerRecord] = field(default_factory=list)
     wanted: list[Wanted] = field(default_factory=list)
+    interventions: InterventionQueue | None = None
     awaited: Set[str] = frozenset()
     next_step: int = 0
 
@@ -93,6 +97,7 @@ class Conversations(Watcher):
         self._initiators: list[tuple[int, int]] = []  # users who start something, and robots
         self._starts: list[tuple[int, int, int, str]] = []  # today: step, user, robot, kind
         self._begun_days = 0
+        self._off_until: dict[int, int] = {}  # by robot: the first step at which it is on again
         self._bans: list[tuple[int, int, int]] = []  # first step without, robot, room
 
     @classmethod
@@ -371,8 +376,18 @@ class Conversations(Watcher):
             self._bans.append((until, row, room))
             text = f"{text} {robot.home.rooms[room].name}"
         if outcome == Outcome.SWITCHED_OFF:
-            robot.follow_order(StandStill(answers.off_for), step + 1)
+            self._switch_off(robot, answers.off_for, step + 1, f"users.{self.actors[user].name}")
         return Event(step, robot.name, str(outcome), text)
+
+    def _switch_off(self, robot: DecidingActor, lasts: timedelta, step: int, by: str) -> None:
+        """Let a robot stand still from a step on, and neither see nor hear."""
+        robot.follow_order(StandStill(lasts), step)
+        self._off_until[robot.row] = step + max(1, micros(lasts) // robot.clock.step_us)
+        if robot.entity.eyes and self.interventions is not None:
+            from fleet2d.interventions.robots import SwitchOff  # few robots are switched off
+
+            off = SwitchOff(entity=robot.name, camera=True, duration=lasts)
+            self.interventions.follow(off, step, by)
 
     def _end_bans(self, step: int) -> list[Event]:
         """Let robots into the rooms whose bans are over at a step."""
@@ -414,6 +429,8 @@ class Conversations(Watcher):
         """Let a person call a robot, ask it something, or complain; None: it doesn't happen."""
         person, robot, block = self.actors[user], self.actors[row], bodies.block(step, step + 1)
         if block.away[user, 0] or self._activity_at(user, step) in ASLEEP:
+            return None
+        if step < self._off_until.get(row, 0):
             return None
         lattice, point = robot.home.plan.lattice, (int(block.x[user, 0]), int(block.y[user, 0]))
         if kind == "call":

@@ -158,10 +158,16 @@ class InterventionQueue:
         """Schedule an intervention."""
         insort(self._queue, due, key=lambda due: due[:3])
 
-    def follow(self, act: Intervention, step: int) -> None:
-        """Schedule what follows from another intervention, before all that is due at that step."""
+    def follow(self, act: Intervention, step: int, by: str = FOLLOWED) -> None:
+        """Schedule what follows from another intervention, before all that is due at that step.
+
+        Args:
+            act: What follows.
+            step: The step.
+            by: From what it follows, for the manifest.
+        """
         self._ends += 1
-        self.add(DueIntervention(step, FOLLOWS, self._ends, act, FOLLOWED))
+        self.add(DueIntervention(step, FOLLOWS, self._ends, act, by))
 
     def next_due(self) -> int | None:
         """Return the step of the next intervention; None if none is scheduled."""

@@ -108,6 +108,7 @@ def set_up(scenario: Scenario, clock: Clock, seed: int, store: RunStore) -> Stat
     )
     for group in [*user_cameras, *cameras]:
         group.owner.in_view = InView(state, group)
+    conversations.interventions = state.interventions
     _remember(state, basis)
     # What waits for an event comes last: the event may be one that another entry causes.
     for index, entry in sorted(enumerate(scenario.script), key=lambda i: i[1].on is not None):

@@ -156,6 +156,28 @@ def test_a_robot_that_is_switched_off_stands_still_until_it_is_on_again() -> Non
     assert moves(off + 1800, off + 3600)
 
 
+def test_a_robot_that_is_switched_off_neither_sees_nor_hears() -> None:
+    users = {"ana": ana(outcomes=("switched_off",))}
+    users["ana"]["answers"] = Scripted(
+        outcomes=("switched_off",),
+        off_for="60 min",
+        initiative={"type": "rates", "questions": 1000},
+    )
+    run = fleet2d.run(home("2 h", users=users))
+    ((off, _),) = events_of(run, "switched_off")
+    seen, heard = table(run, "observations")["step"], events_of(run, "question")
+
+    def is_off(step: Any) -> Any:
+        return (off < step) & (step <= off + 3600)
+
+    assert not is_off(seen).any()
+    assert not [step for step, _ in heard if is_off(step)]
+    assert (seen == off).any()
+    assert [step for step, _ in heard if step > off + 3600]
+    (done,) = run.manifest["interventions"]
+    assert {"do": "switch_off", "step": off + 1, "by": "users.ana"}.items() <= done.items()
+
+
 def test_an_opportunity_is_taken_when_the_person_comes_into_view() -> None:
     behaviors = [{"type": "opportunistic"}, {"type": "patrol"}]
     run = fleet2d.run(home(robots={"astro": {"behaviors": behaviors}}))
