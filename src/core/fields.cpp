@@ -115,12 +115,14 @@ private:
     i64 number(GridCell cell) const { return (cell.row + 1) * wide_ + cell.column + 1; }
 
     void step_from(i64 cell, i32 now) {
-        for (const i64 side : {i64{-1}, i64{1}, -wide_, wide_}) reach(cell + side, now + STRAIGHT);
-        for (const i64 up : {-wide_, wide_}) {
-            for (const i64 side : {-1, 1}) {
-                const bool cuts_corner = distance_[cell + up] == CLOSED || distance_[cell + side] == CLOSED;
-                if (!cuts_corner) reach(cell + up + side, now + ACROSS);
-            }
+        const bool left = distance_[cell - 1] != CLOSED, right = distance_[cell + 1] != CLOSED;
+        if (left) reach(cell - 1, now + STRAIGHT);
+        if (right) reach(cell + 1, now + STRAIGHT);
+        for (const i64 beyond : {cell - wide_, cell + wide_}) {
+            if (distance_[beyond] == CLOSED) continue;
+            reach(beyond, now + STRAIGHT);
+            if (left) reach(beyond - 1, now + ACROSS);  // it cuts no corner
+            if (right) reach(beyond + 1, now + ACROSS);
         }
     }
 

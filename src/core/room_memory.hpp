@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <vector>
 
 #include "array.hpp"
 
@@ -56,8 +57,9 @@ struct ShownMemory {
 // Fill the columns of an observation (rows, columns) that show a memory at a step, in an hour of the day.
 //
 // `visited` has the step at which the robot last went to each room, -1 for never; the rooms come first in the table.
+// `common` are the values of the last columns, which are the same in all rows.
 inline void show_memory(const RoomMemory& memory, const ShownMemory& shown, View<const i64> visited, i64 step, i64 hour,
-                        f64 step_s, View<f32, 2> table) {
+                        f64 step_s, const std::vector<f64>& common, View<f32, 2> table) {
     const i64 rooms = visited.size();
     for (i64 k = 0; k < shown.fresh_rows.size(); ++k) {
         const i64 row = shown.fresh_rows[k], column = shown.fresh_at[k];
@@ -76,6 +78,12 @@ inline void show_memory(const RoomMemory& memory, const ShownMemory& shown, View
         const f64 all = static_cast<f64>(std::max<i64>(sum, 1));
         for (i64 room = 0; room < rooms; ++room) {
             table(room, column) = static_cast<f32>(static_cast<f64>(looks(room)) / all);
+        }
+    }
+    const i64 first = table.shape[1] - static_cast<i64>(common.size());
+    for (i64 row = 0; row < table.size(); ++row) {
+        for (std::size_t k = 0; k < common.size(); ++k) {
+            table(row, first + static_cast<i64>(k)) = static_cast<f32>(common[k]);
         }
     }
 }

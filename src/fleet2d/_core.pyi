@@ -975,7 +975,7 @@ USER_LOST: int = 0
 
 USER_SEEN: int = 1
 
-def detect(walls: Mesh, lenses: tuple[Any, ...], errors: tuple[Any, ...], rule: tuple[Any, ...], window: Window, body: int, first_other: int, memory: tuple[Any, ...], shown: numpy.typing.NDArray[numpy.uint64] | None = None, radii: numpy.typing.NDArray[numpy.int64] | None = None, heights: tuple[Any, ...] | None = None) -> tuple[int, numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int32], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64]]:
+def detect(walls: Mesh, lenses: tuple[Any, ...], errors: tuple[Any, ...], rule: tuple[Any, ...], window: Window, body: int, first_other: int, memory: tuple[Any, ...], shown: numpy.typing.NDArray[numpy.uint64] | None = None, radii: numpy.typing.NDArray[numpy.int64] | None = None, heights: tuple[Any, ...] | None = None) -> tuple[int, numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int32], numpy.typing.NDArray[numpy.int64], list[int], list[tuple[int, int, int]]]:
     """
     Look at all others in the steps of a window, up to the first with an event that stops it.
 
@@ -996,8 +996,8 @@ def detect(walls: Mesh, lenses: tuple[Any, ...], errors: tuple[Any, ...], rule: 
     Returns:
         The steps done (the stopping one included); of each sighting the step, int64 (n,), and the number among the
         distinct ones, int32 (n,); these, int64 (SIGHTING, k), with the columns of `SightingColumn` and the step of the
-        first; the number of the last sighting of each identity, int64 (identities,), -1 for none; and the identities that came into view or were
-        lost, in order of (step, identity): step, identity and kind (USER_SEEN or USER_LOST), int64 (m,) each.
+        first; the number of the last sighting of each identity, -1 for none; and the events of identities that came into
+        view or were lost, in order of (step, identity): step, identity and kind (USER_SEEN or USER_LOST).
 
     Raises:
         ValueError: Shapes don't agree, or a number is none of a user or camera.
@@ -1387,6 +1387,15 @@ class Window:
 
     def __setstate__(self, state: tuple[Any, ...]) -> None: ...
 
+def due_rows(steps: numpy.typing.NDArray[numpy.int64], now: int) -> list[int]:
+    """
+    Return the rows that are due at a step, in order.
+
+    Args:
+        steps: int64 (rows,), the step at which each is due.
+        now: The step.
+    """
+
 class Timelines:
     """
     The motion of each body of a run, piece after piece.
@@ -1418,8 +1427,10 @@ class Timelines:
     def pose(self, body: int, step: int) -> tuple[int, int, int, int]:
         """Return x, y, heading and away of a body at a step."""
 
-    def poses(self, step: int) -> tuple[numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.uint8]]:
-        """Return x, y, heading and away of all bodies at a step, (bodies,) each."""
+    def poses(self, steps: numpy.typing.NDArray[numpy.int64]) -> numpy.typing.NDArray[numpy.int64]:
+        """
+        Return x, y, heading and away of all bodies at some steps: int64 (steps, bodies, 4).
+        """
 
     def window(self, first: int, end: int) -> Window:
         """
@@ -1823,9 +1834,9 @@ def remember(step: numpy.typing.NDArray[numpy.int64], index: numpy.typing.NDArra
         memory: The `RoomMemory`, which changes.
     """
 
-def show_memory(memory: tuple[Any, ...], shown: tuple[Any, ...], visited: numpy.typing.NDArray[numpy.int64], step: int, hour: int, step_s: float, table: numpy.typing.NDArray[numpy.float32]) -> None:
+def show_memory(memory: tuple[Any, ...], shown: tuple[Any, ...], visited: numpy.typing.NDArray[numpy.int64], step: int, hour: int, step_s: float, common: Sequence[float], table: numpy.typing.NDArray[numpy.float32]) -> None:
     """
-    Fill the columns of an observation that show a memory.
+    Fill the columns of an observation that show a memory, and those that all rows have in common.
 
     Args:
         memory: The `RoomMemory`.
@@ -1834,6 +1845,7 @@ def show_memory(memory: tuple[Any, ...], shown: tuple[Any, ...], visited: numpy.
         step: The present step.
         hour: The present hour of the day.
         step_s: Length of a step [s].
+        common: The values of the last columns, the same in all rows.
         table: float32 (rows, columns), the observation, which changes; its first rows are the rooms.
     """
 

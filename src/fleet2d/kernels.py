@@ -87,6 +87,7 @@ from fleet2d._core import (
     distances_between as distances_between,
     distances_to_shape as distances_to_shape,
     DOUBLINGS as DOUBLINGS,
+    due_rows as due_rows,
     earth_mover as earth_mover,
     encode_arrays as encode_arrays,
     fill_from_neighbors as fill_from_neighbors,

@@ -53,7 +53,7 @@ def test_a_row_of_a_block_is_the_poses_of_a_body_at_each_step() -> None:
     assert [8, 9, 10, 11, 11] == block.x[1].tolist() == poses_of(block, 1).x.tolist()
     assert (3, 5) == block.x.shape == block.posture.shape
     assert [Pose(x, 0, 0, 0) for x in (8, 9, 10)] == [bodies.pose_at(1, step) for step in (1, 2, 3)]
-    assert [[5, 10, 9], [0] * 3, [0] * 3, [0] * 3] == [part.tolist() for part in bodies.poses(3)]
+    assert [[5, 0, 0, 0], [10, 0, 0, 0], [9, 0, 0, 0]] == bodies.poses(np.array([2, 3]))[1].tolist()
 
 
 def test_a_block_of_nobody_has_no_rows() -> None:

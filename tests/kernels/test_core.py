@@ -477,6 +477,7 @@ CALLS: dict[str, Args] = {
         9,
         7,
         1.0,
+        [0.5],
         np.zeros((3, 4), np.float32),
     ),
     "time_route": lambda: (POINTS[:2].copy(), 5, 7, 1000.0, 500.0),
@@ -488,6 +489,7 @@ CALLS: dict[str, Args] = {
         (100, 100, 0),
         poses(),
     ),
+    "due_rows": lambda: (np.array([5, 9, 5]), 5),
     "rooms_at": lambda: (
         np.zeros((3, 4), np.int16),
         np.array([5, 200, -9]),
@@ -716,7 +718,7 @@ CALLS: dict[str, Args] = {
         (100, 100, 0),
     ),
     "Timelines.pose": lambda: (timelines(), 1, 7),
-    "Timelines.poses": lambda: (timelines(), 7),
+    "Timelines.poses": lambda: (timelines(), np.array([7, 2])),
     "Timelines.window": lambda: (timelines(), 2, 7),
     "Timelines.runs": lambda: (timelines(), 1, 2, 7),
     "Timelines.forget": lambda: (timelines(), 3),
@@ -853,7 +855,7 @@ WRITTEN = {
     "settle_coverage": [*((1, i) for i in range(5)), (2,)],
     "trace_track": [(3, i) for i in range(4)],
     "remember": [(6, i) for i in range(3)],
-    "show_memory": [*((0, i) for i in range(3)), (6,)],
+    "show_memory": [*((0, i) for i in range(3)), (7,)],
     "trace_meander": [(5, i) for i in range(4)],
     "detect": [(7, i) for i in range(5)],
     "follow": [(2,), (3,)],
@@ -1051,7 +1053,7 @@ def use_all_methods(instance: Any) -> None:
             instance.dense(body, instance.first, min(instance.end, instance.first + 99))
     else:
         for step in (0, 4, 30):
-            instance.poses(step)
+            instance.poses(np.array([step]))
             instance.window(step, step + 20)
         instance.forget(10)
         instance.window(10, 40)

@@ -54,7 +54,8 @@ def test_observation_of_a_memory_equals_the_slow_twin(seen: list, visited: list)
     )
     table = np.full((ROOMS + 1, COLUMNS), 7, np.float32)
     expected = slow.shown(memory, columns, visited, 300_000, 9, table)
-    show_memory(memory, columns, np.array(visited), 300_000, 9, 1.0, table)
+    expected[:, 6:] = 0.25, -3
+    show_memory(memory, columns, np.array(visited), 300_000, 9, 1.0, [0.25, -3], table)
 
     assert expected.tobytes() == table.tobytes()
 

@@ -270,7 +270,7 @@ def looked(
     rule = rule._replace(stop_lost=stops[0], stop_seen=stops[1])
     before = memory.about.copy()
     heights = scene.heights_for(eyes)
-    done, step, index, distinct, newest, *events = detect(
+    done, step, index, distinct, newest, events = detect(
         home.mesh,
         lenses,
         errors,
@@ -289,7 +289,7 @@ def looked(
     return Seen(
         done,
         [tuple(row) for row in rows.tolist()],
-        list(zip(*(column.tolist() for column in events), strict=True)),
+        events,
         counts.tolist(),
         memory.noticed.tolist(),
         memory.seen.tolist(),

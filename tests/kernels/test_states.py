@@ -108,7 +108,7 @@ def use(thing: Any) -> None:
             with suppress(ValueError):
                 thing.window(step, step + 50)
             with suppress(ValueError):
-                thing.poses(step)
+                thing.poses(np.array([step]))
         thing.forget(620)
     elif kind == "Window":
         for body in range(max(0, len(thing.start) - 1)):

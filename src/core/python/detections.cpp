@@ -1,5 +1,7 @@
 #include "../detections.hpp"
 
+#include <nanobind/stl/vector.h>
+
 #include "../occlusion.hpp"
 
 #include <algorithm>
@@ -166,16 +168,12 @@ for standing, 1 sitting, 2 lying.)");
                 result = detect(walls, lenses, errors, rule, window, {body, first_other}, memory, points, widths,
                                 heights ? &*heights : nullptr);
             }
-            const i64 count = static_cast<i64>(result.events.size());
-            auto step = Array<i64>::empty({count}), identity = Array<i64>::empty({count});
-            auto kind = Array<i64>::empty({count});
-            for (i64 i = 0; i < count; ++i) {
-                const IdentityEvent& event = result.events[static_cast<std::size_t>(i)];
-                step[i] = event.step, identity[i] = event.identity, kind[i] = static_cast<i64>(event.kind);
+            std::vector<std::tuple<i64, i64, i64>> events;
+            for (const auto& [step, identity, kind] : result.events) {
+                events.emplace_back(step, identity, static_cast<i64>(kind));
             }
             return std::tuple(result.steps, array_of(result.sighted_at), array_of(result.index),
-                              columns_of(result.distinct), array_of(result.newest), std::move(step),
-                              std::move(identity), std::move(kind));
+                              columns_of(result.distinct), std::move(result.newest), std::move(events));
         },
         "walls"_a, "lenses"_a, "errors"_a, "rule"_a, "window"_a, "body"_a, "first_other"_a, "memory"_a,
         "shown"_a = nb::none(), "radii"_a = nb::none(), "heights"_a = nb::none(),
@@ -198,8 +196,8 @@ Args:
 Returns:
     The steps done (the stopping one included); of each sighting the step, int64 (n,), and the number among the
     distinct ones, int32 (n,); these, int64 (SIGHTING, k), with the columns of `SightingColumn` and the step of the
-    first; the number of the last sighting of each identity, int64 (identities,), -1 for none; and the identities that came into view or were
-    lost, in order of (step, identity): step, identity and kind (USER_SEEN or USER_LOST), int64 (m,) each.
+    first; the number of the last sighting of each identity, -1 for none; and the events of identities that came into
+    view or were lost, in order of (step, identity): step, identity and kind (USER_SEEN or USER_LOST).
 
 Raises:
     ValueError: Shapes don't agree, or a number is none of a user or camera.)");

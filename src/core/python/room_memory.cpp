@@ -1,5 +1,7 @@
 #include "../room_memory.hpp"
 
+#include <nanobind/stl/vector.h>
+
 #include "arrays.hpp"
 #include "subjects.hpp"
 
@@ -59,7 +61,7 @@ Args:
     m.def(
         "show_memory",
         [](const RoomMemory& memory, const ShownMemory& shown, View<const i64> visited, i64 step, i64 hour, f64 step_s,
-           View<f32, 2> table) {
+           const std::vector<f64>& common, View<f32, 2> table) {
             check(memory);
             const i64 rows = memory.last.size();
             require(visited.size() == memory.last.shape[1] && visited.size() <= table.size(),
@@ -74,10 +76,11 @@ Args:
                     "there is no such row or column");
             require(0 <= hour && hour < HOURS_OF_DAY, "hour must be 0 to 23");
             require(0 <= step && step < LATEST_STEP, "step must be from 0 to 2**60");
-            show_memory(memory, shown, visited, step, hour, step_s, table);
+            require(static_cast<i64>(common.size()) <= table.shape[1], "the table has fewer columns than common");
+            show_memory(memory, shown, visited, step, hour, step_s, common, table);
         },
-        "memory"_a, "shown"_a, "visited"_a, "step"_a, "hour"_a, "step_s"_a, "table"_a,
-        R"(Fill the columns of an observation that show a memory.
+        "memory"_a, "shown"_a, "visited"_a, "step"_a, "hour"_a, "step_s"_a, "common"_a, "table"_a,
+        R"(Fill the columns of an observation that show a memory, and those that all rows have in common.
 
 Args:
     memory: The `RoomMemory`.
@@ -86,6 +89,7 @@ Args:
     step: The present step.
     hour: The present hour of the day.
     step_s: Length of a step [s].
+    common: The values of the last columns, the same in all rows.
     table: float32 (rows, columns), the observation, which changes; its first rows are the rooms.)");
 }
 

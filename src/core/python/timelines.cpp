@@ -1,5 +1,7 @@
 #include "timelines.hpp"
 
+#include <nanobind/stl/vector.h>
+
 #include "mesh.hpp"
 #include "motion.hpp"
 #include "subjects.hpp"
@@ -86,16 +88,17 @@ public:
         return {pose.x, pose.y, pose.heading, pose.away};
     }
 
-    std::tuple<Array<i64>, Array<i64>, Array<i64>, Array<u8>> poses(i64 step) {
-        const i64 count = timelines_.bodies();
-        auto x = Array<i64>::empty({count}), y = Array<i64>::empty({count}), heading = Array<i64>::empty({count});
-        auto away = Array<u8>::empty({count});
-        for (i64 body = 0; body < count; ++body) {
-            check_known(body, step);
-            const BodyPose pose = timelines_.pose(body, step);
-            x[body] = pose.x, y[body] = pose.y, heading[body] = pose.heading, away[body] = static_cast<u8>(pose.away);
+    Array<i64, 3> poses(View<const i64> steps) {
+        auto poses = Array<i64, 3>::empty({steps.size(), timelines_.bodies(), 4});
+        const View<i64, 3> rows = poses;
+        for (i64 i = 0; i < steps.size(); ++i) {
+            for (i64 body = 0; body < timelines_.bodies(); ++body) {
+                const auto [x, y, heading, away] = pose(body, steps[i]);
+                i64 column = 0;
+                for (const i64 value : {x, y, heading, away}) rows(i, body, column++) = value;
+            }
         }
-        return {std::move(x), std::move(y), std::move(heading), std::move(away)};
+        return poses;
     }
 
     OwnedWindow window(i64 first, i64 end) { return window_of(0, timelines_.bodies(), first, end); }
@@ -379,6 +382,21 @@ Returns:
             [](OwnedWindow& self, const WindowState& state) { new (&self) OwnedWindow(window_of_state(state)); },
             nb::sig("def __setstate__(self, state: tuple[typing.Any, ...]) -> None"));
 
+    m.def(
+        "due_rows",
+        [](View<const i64> steps, i64 now) {
+            std::vector<i64> rows;
+            for (i64 row = 0; row < steps.size(); ++row) {
+                if (steps[row] <= now) rows.push_back(row);
+            }
+            return rows;
+        },
+        "steps"_a, "now"_a, R"(Return the rows that are due at a step, in order.
+
+Args:
+    steps: int64 (rows,), the step at which each is due.
+    now: The step.)");
+
     nb::class_<OwnedTimelines>(m, "Timelines", R"(The motion of each body of a run, piece after piece.
 
 A piece begins at a step and holds until the next one of its body begins.
@@ -401,8 +419,8 @@ Args:
                      "start: tuple[int, int, int]) -> None"),
              "Let a body walk at random from a step on; see `trace_meander`.")
         .def("pose", &OwnedTimelines::pose, "body"_a, "step"_a, "Return x, y, heading and away of a body at a step.")
-        .def("poses", &OwnedTimelines::poses, "step"_a,
-             "Return x, y, heading and away of all bodies at a step, (bodies,) each.")
+        .def("poses", &OwnedTimelines::poses, "steps"_a,
+             "Return x, y, heading and away of all bodies at some steps: int64 (steps, bodies, 4).")
         // Not unlocked: random walks are drawn on as they are asked for.
         .def("window", &OwnedTimelines::window, "first"_a, "end"_a,
              "Return the runs of equal pose of all bodies in the steps from `first` to `end` - 1.")

@@ -380,9 +380,9 @@ class Component(Settings):
     def __setattr__(self, name: str, value: Any) -> None:
         """Refuse to change configuration; store all other attributes as run state."""
         cls = type(self)
-        fields, private = _names_of(cls)
-        if name in fields or name in cls.__class_vars__:
-            noun = "configuration" if name in fields else "a ClassVar"
+        fixed, private = _names_of(cls)
+        if name in fixed:
+            noun = "configuration" if name in cls.model_fields else "a ClassVar"
             raise AttributeError(
                 f"{name} is {noun} of {cls.__name__} and can't be changed in a run; store what "
                 "changes in another attribute"
@@ -395,8 +395,9 @@ class Component(Settings):
 
 @lru_cache(maxsize=1000)
 def _names_of(cls: type[Component]) -> tuple[frozenset[str], frozenset[str]]:
-    """Return the names of the fields and the private attributes of a component; cached."""
-    return frozenset(cls.model_fields), frozenset(cls.__private_attributes__)
+    """Return the names that a component can't set, and its private attributes; cached."""
+    fixed = {*cls.model_fields, *cls.__class_vars__}
+    return frozenset(fixed), frozenset(cls.__private_attributes__)
 
 
 C = TypeVar("C", bound=type[Component])

@@ -50,7 +50,7 @@ from fleet2d.kernels import (
 )
 from fleet2d.runtime.clock import midnight_of
 from fleet2d.runtime.determinism import stream_key
-from fleet2d.runtime.events import Event
+from fleet2d.runtime.events import Event, new_event
 from fleet2d.sight.camera import (
     Disturbance,
     TableContext,
@@ -271,7 +271,7 @@ class Cameras(Watcher):
 
     @property
     def ends(self) -> tuple[bool, bool]:
-        """Whether a span ends when a body is lost, and when a body is seen."""
+        """Whether a span ends at USER_LOST, when a body is lost, and at USER_SEEN."""
         lost, seen = self.stops
         names = self.event_names
         return lost or names[USER_LOST] in self.awaited, seen or names[USER_SEEN] in self.awaited
@@ -335,7 +335,7 @@ class Cameras(Watcher):
                     self.perceived[identity] = places[number]
         names, entity = self.event_names, self.owner.name
         return [
-            Event(step, entity, names[kind], self.name_of(identity))
+            new_event((step, entity, names[kind], self.name_of(identity)))
             for step, identity, kind in result.events
         ]
 
@@ -369,7 +369,7 @@ class Cameras(Watcher):
             self.sighting_errors = SightingErrors(self, self._perceptions)
         may_redo = stop or self.sighting_errors is not None
         old_memory = [array.copy() for array in self.memory] if may_redo else []
-        stop_lost, stop_seen = self.ends if stop else (False, False)
+        stops = self.ends if stop else (False, False)
         home, window, points = self.owner.home, bodies.window(self.next_step, end), None
         if self.method is not None:
             block = bodies.block(self.next_step, end)
@@ -383,11 +383,11 @@ class Cameras(Watcher):
                     self.method, home, lenses, poses, crowd, self.next_step, step_us
                 )
                 points[self._dark] = 0
-        count, seen_at, index, distinct, latest, step, identity, kind = detect(
+        count, seen_at, index, distinct, newest, events = detect(
             home.walls,
             self.lenses,
             self.errors,
-            self.rule._replace(stop_lost=stop_lost, stop_seen=stop_seen),
+            DetectionRule(*self.rule[:-2], *stops),
             window,
             self.row,
             self._first,
@@ -396,8 +396,7 @@ class Cameras(Watcher):
             self.radii,
             self._heights_in(home),
         )
-        events = list(zip(step.tolist(), identity.tolist(), kind.tolist(), strict=True))
-        sightings, newest = SightingTable(seen_at, index, distinct.T), latest.tolist()
+        sightings = SightingTable(seen_at, index, distinct.T)
         end = looked = self.next_step + count
         if self.sighting_errors is not None:
             before = SightMemory(*old_memory)
@@ -406,7 +405,7 @@ class Cameras(Watcher):
             )
             sightings, newest = SightingTable.of_rows(rows), newest_of(rows, len(newest))
             if differs:
-                patience, stops = self.rule.patience, {USER_LOST: stop_lost, USER_SEEN: stop_seen}
+                patience = self.rule.patience
                 events = sight_events(rows, self.memory, patience, self.next_step, looked)
                 end = next((step + 1 for step, _, kind in events if stops[kind]), looked)
         return Look(looked, end, sightings, newest, events, old_memory)

@@ -59,7 +59,7 @@ class PoseColumns(NamedTuple):
 
     x: I64
     y: I64
-    away: U8
+    away: I64 | U8
 
 
 class BlockedWays(Watcher):
@@ -99,12 +99,8 @@ class BlockedWays(Watcher):
         step = bodies.step
         if bodies.pose_at(row, step)[:2] == bodies.pose_at(row, step + 1)[:2]:
             return None  # mostly it rests
-        (x, y, _, away), (next_x, next_y, _, next_away) = bodies.poses(step), bodies.poses(step + 1)
-        poses = PoseColumns(
-            np.stack([x, next_x], axis=1),
-            np.stack([y, next_y], axis=1),
-            np.stack([away, next_away], axis=1),
-        )
+        x, y, _, away = bodies.poses(np.array([step, step + 1])).T
+        poses = PoseColumns(x, y, away)
         meeting = self._first_meeting(poses, row, step, np.array([0]))
         return None if meeting is None else meeting[1]
 

@@ -82,6 +82,7 @@ class Learners:
         outputs: The latest output of each algorithm, by name.
         fresh: The outputs of the last update.
         replaced: Outputs that all but metrics read instead, by name; WITHHELD for none.
+        readable_outputs: The outputs for behaviors.
     """
 
     def __init__(self, basis: Basis) -> None:
@@ -101,12 +102,12 @@ class Learners:
             self._add(name, f"metrics.{name}", metric)
         self._room_names = [room.name for room in basis.home.rooms]
         self._due = self._earliest_due()
+        self._show_outputs()
         self.awaited = frozenset(event for learner in self.all for event in learner.component.on)
 
-    @property
-    def readable_outputs(self) -> Mapping[str, Any]:
-        """The outputs for behaviors."""
-        return Outputs(self._as_read(self.outputs), self._names)
+    def _show_outputs(self) -> None:
+        """Set the outputs that behaviors read, after some have changed."""
+        self.readable_outputs = Outputs(self._as_read(self.outputs), self._names)
 
     @property
     def known(self) -> tuple[str, ...]:
@@ -133,6 +134,7 @@ class Learners:
             output = self.outputs.get(name, WITHHELD)
         if output is not None:
             self.replaced[name] = output
+        self._show_outputs()
 
     def reset(self, name: str, learned: Path | None) -> None:
         """Restart an algorithm with nothing learned, or with the content of a file.
@@ -178,6 +180,7 @@ class Learners:
                     fresh[learner.name] = _copy(output)
         self.fresh, self._due = fresh, self._earliest_due()
         self.outputs = {**self.outputs, **fresh}  # a new mapping: others may hold the old one
+        self._show_outputs()
 
     def _waits_for(self, learner: Learner, events: Sequence[Event]) -> bool:
         """Whether one of these events updates an algorithm or a metric."""

@@ -96,9 +96,8 @@ def decide(state: State, span: Span) -> None:
             state.bodies.ask_at[row] = step
         due, in_way = bool(state.bodies.ask_at[row] <= step), None
         if due:
-            situation = Situation(
-                actor, step, state.take_pending(row), state.learners.readable_outputs
-            )
+            situation = state.situation(row, step)
+            state.pending.pop(row, None)
             due = not actor.keeps_plan(situation)
             state.interruptions.expect(row)  # for other events, if other behaviors listen now
         if due:
@@ -129,8 +128,8 @@ def _asked(state: State, step: int) -> Sequence[int]:
 
 def _follow_plan(state: State, row: int) -> None:
     """Let a body follow its plan from the present step on."""
-    plan = state.actors[row].plan
-    state.bodies.follow(row, plan.finish(), plan.began[1], plan.posture_times())
+    actor, plan = state.actors[row], state.actors[row].plan
+    state.bodies.follow(row, actor.motion, plan.began[1], plan.posture_times())
 
 
 def _yield_to_bodies(state: State, row: int, step: int, *, begins: bool) -> bool:

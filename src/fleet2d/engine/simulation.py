@@ -593,7 +593,7 @@ class Simulation(InterventionMethods):
         Raises:
             ScenarioError: There is no such body.
         """
-        return _situation(self._state, self._body(name).row, self.step)
+        return self._state.situation(self._body(name).row, self.step)
 
     def perceived_s(self, robot: str) -> float:
         """Return for how long a robot has perceived people so far, summed over people [s]."""
@@ -1021,13 +1021,8 @@ def has_to_choose(state: State, row: int, step: int) -> bool:
         return False
     if state.bodies.ask_at[row] > step and not state.clearance.looks(row, step):
         return False
-    now = _situation(state, row, step)
+    now = state.situation(row, step)
     return actor.asks_first(now) and policy.asks(now)
-
-
-def _situation(state: State, row: int, step: int) -> Situation:
-    events = tuple(state.pending.get(row, ()))
-    return Situation(state.actors[row], step, events, state.learners.readable_outputs)
 
 
 def _parsed(expectation: "Expectation | str") -> "Expectation":

@@ -25,7 +25,7 @@ from fleet2d.engine.layers import LayerBook
 from fleet2d.engine.learners import Learners
 from fleet2d.engine.recorder import Recorder
 from fleet2d.engine.sensors import Sensors
-from fleet2d.entities.behavior import SightEvent
+from fleet2d.entities.behavior import SightEvent, Situation
 from fleet2d.entities.body import Bodies
 from fleet2d.entities.decisions import DecidingActor
 from fleet2d.errors import InputError
@@ -245,6 +245,11 @@ class State:
     expectations: "RunExpectations | None" = None
     notes_emitted: list[int] = field(init=False)
     capacity: int = field(init=False)
+    _situation: Situation | None = None  # the newest one
+
+    def __getstate__(self) -> dict[str, object]:
+        """Leave out what follows from the rest."""
+        return {**self.__dict__, "_situation": None}
 
     def __post_init__(self) -> None:
         """Begin without notes."""
@@ -285,9 +290,18 @@ class State:
 
     # Decisions
 
-    def take_pending(self, row: int) -> tuple[SightEvent, ...]:
-        """Return the events that interrupted the plan of a body, once."""
-        return tuple(self.pending.pop(row, ()))
+    def situation(self, row: int, step: int) -> Situation:
+        """Return what a body knows at a step; the same object, as long as it knows the same."""
+        actor, events = self.actors[row], tuple(self.pending.get(row, ()))
+        now, outputs = self._situation, self.learners.readable_outputs
+        if (
+            now is None
+            or now.step != step
+            or now.actor is not actor
+            or (now.events != events or now.outputs is not outputs)
+        ):
+            now = self._situation = Situation(actor, step, events, outputs)
+        return now
 
     def end_plan(self, row: int, step: int) -> None:
         """Record the plan of a body up to the step at which it is replaced."""

@@ -79,8 +79,7 @@ class Samples:
             rows[:, :, 2], rows[:, :, 3] = block.x.T, block.y.T
             rows[:, :, 4], rows[:, :, 5] = block.heading.T, block.away.T
         else:
-            for i, step in enumerate(steps.tolist()):
-                rows[i, :, 2:] = np.stack(bodies.poses(step), axis=-1)
+            rows[:, :, 2:] = bodies.poses(steps)
         if rows.size:
             self._blocks.append(rows.reshape(-1, 6))
             self.count += len(steps) * len(bodies)

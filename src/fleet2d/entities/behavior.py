@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime, timedelta
-from functools import cached_property
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple
 
 from pydantic import BeforeValidator, PlainSerializer, WithJsonSchema
@@ -208,7 +208,7 @@ class SightEvent(NamedTuple):
     y: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, init=False)
 class Situation:
     """What a behavior knows when it is asked for a plan.
 
@@ -217,17 +217,25 @@ class Situation:
         step: The step at which the plan begins.
         events: The events that interrupted the last plan; empty if it just ended.
         outputs: The newest output of every algorithm, by its name in the scenario.
+        time: The local time.
     """
 
     actor: "Actor"
     step: int
-    events: Sequence[SightEvent] = ()
-    outputs: Mapping[str, Any] = field(default_factory=dict)
+    events: Sequence[SightEvent]
+    outputs: Mapping[str, Any]
+    time: datetime
 
-    @cached_property
-    def time(self) -> datetime:
-        """The local time."""
-        return self.actor.clock.time(self.step)
+    def __init__(
+        self,
+        actor: "Actor",
+        step: int,
+        events: Sequence[SightEvent] = (),
+        outputs: Mapping[str, Any] = MappingProxyType({}),
+    ) -> None:
+        # At once, as a run makes many.
+        time = actor.clock.time(step)
+        self.__dict__.update(actor=actor, step=step, events=events, outputs=outputs, time=time)
 
     @property
     def home(self) -> "Home":

@@ -1,8 +1,9 @@
 """Bodies: how a scenario declares them, how they move, and where in a home they can be."""
 
 import copy
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -35,7 +36,6 @@ from fleet2d.kernels import (
     I8,
     I64,
     TURN,
-    U8,
     Breakpoints,
     Mesh,
     PoseBlock,
@@ -43,6 +43,7 @@ from fleet2d.kernels import (
     Timelines,
     WalkRule,
     Window,
+    due_rows,
 )
 from fleet2d.runtime.clock import Clock
 from fleet2d.runtime.determinism import Draws, stream_key
@@ -63,6 +64,10 @@ class Pose(NamedTuple):
     y: int
     heading: int
     away: int
+
+
+# Makes a pose from a tuple of its fields without calling Python code, as a run has many.
+new_pose: Callable[[tuple[int, int, int, int]], Pose] = partial(tuple.__new__, Pose)
 
 
 @dataclass(frozen=True)
@@ -193,15 +198,15 @@ class Bodies:
 
     def pose(self, row: int) -> Pose:
         """Return the pose of a body at the present step."""
-        return Pose(*self._timelines.pose(row, self.step))
+        return new_pose(self._timelines.pose(row, self.step))
 
     def pose_at(self, row: int, step: int) -> Pose:
         """Return the pose of a body at a step that isn't forgotten."""
-        return Pose(*self._timelines.pose(row, step))
+        return new_pose(self._timelines.pose(row, step))
 
-    def poses(self, step: int) -> tuple[I64, I64, I64, U8]:
-        """Return x, y, heading and away of all bodies at a step, (bodies,) each."""
-        return self._timelines.poses(step)
+    def poses(self, steps: I64) -> I64:
+        """Return x, y, heading and away of all bodies at some steps: int64 (steps, bodies, 4)."""
+        return self._timelines.poses(steps)
 
     def follow(self, row: int, motion: Motion, begin: Pose, postures: tuple[I64, I8]) -> None:
         """Let a body move from the present step on.
@@ -249,11 +254,12 @@ class Bodies:
 
     def next_decision(self) -> int:
         """Return the step at which the next body decides, NEVER for none."""
-        return int(np.minimum.reduce(self.ask_at, initial=NEVER))
+        steps = self.ask_at
+        return int(steps[steps.argmin()]) if len(steps) else NEVER
 
     def due(self, step: int) -> Sequence[int]:
         """Return the rows of the bodies that decide at a step."""
-        return (self.ask_at <= step).nonzero()[0].tolist()
+        return due_rows(self.ask_at, step)
 
     def forget(self, before: int) -> None:
         """Drop the poses at steps earlier than `before`."""
@@ -306,6 +312,7 @@ class Body:
         part: The connected part of its space that it is in.
         kept_out: Indices of the rooms that it was told to keep out of.
         row: Its row among the bodies of the run.
+        interrupts: The events that have ended, or may end, its plans so far: they are checked.
         drive: How it moves along routes; None: as `Differential`, which the core computes.
     """
 
@@ -334,6 +341,7 @@ class Body:
         self._state: Pose
         self._state_step = 0
         self.row = 0
+        self.interrupts: frozenset[str] = frozenset()
 
     def join(self, bodies: Bodies, row: int) -> None:
         """Become one of the bodies of a run, whose clock and poses it uses from then on."""

@@ -377,13 +377,15 @@ class Plan:
         Raises:
             ComponentError: No such event interrupts plans of the body.
         """
-        names = [event if isinstance(event, str) else event.type_name for event in events]
-        for name in sorted(names):
+        body = self._body
+        names = frozenset(event if isinstance(event, str) else event.type_name for event in events)
+        for name in sorted(names - body.interrupts):
             try:
-                self._body.entity.check_interrupt(name)
+                body.entity.check_interrupt(name)
             except ComponentError as error:
-                raise ComponentError(f"{self._body.path}: {error}") from error
-        self.interrupts |= frozenset(names)
+                raise ComponentError(f"{body.path}: {error}") from error
+            body.interrupts |= {name}
+        self.interrupts |= names
         return self
 
     def ask_by(self, time: datetime) -> Self:

@@ -5,19 +5,21 @@ Needs the extra `gym`. To import this package registers the environments `fleet2
 """
 
 from fleet2d.errors import extra
+from fleet2d.runtime.memory import library_imports
 
-with extra("gym", "fleet2d.gym needs gymnasium and pettingzoo"):
-    import gymnasium
-    import pettingzoo  # noqa: F401
+with library_imports():
+    with extra("gym", "fleet2d.gym needs gymnasium and pettingzoo"):
+        import gymnasium
+        import pettingzoo  # noqa: F401
 
-from fleet2d.gym.env import DiscountByTime as DiscountByTime
-from fleet2d.gym.env import RobotEnv as RobotEnv
-from fleet2d.gym.env import RobotLife as RobotLife
-from fleet2d.gym.env import RobotsEnv as RobotsEnv
-from fleet2d.gym.env import VectorRobotEnv as VectorRobotEnv
-from fleet2d.gym.task import REWARDS as REWARDS
-from fleet2d.gym.task import LearningTask as LearningTask
-from fleet2d.gym.task import load_task as load_task
+    from fleet2d.gym.env import DiscountByTime as DiscountByTime
+    from fleet2d.gym.env import RobotEnv as RobotEnv
+    from fleet2d.gym.env import RobotLife as RobotLife
+    from fleet2d.gym.env import RobotsEnv as RobotsEnv
+    from fleet2d.gym.env import VectorRobotEnv as VectorRobotEnv
+    from fleet2d.gym.task import REWARDS as REWARDS
+    from fleet2d.gym.task import LearningTask as LearningTask
+    from fleet2d.gym.task import load_task as load_task
 
 for _name in ("Hangout", "Find", "Patrol"):
     gymnasium.register(

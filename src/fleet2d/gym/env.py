@@ -47,9 +47,7 @@ class RobotLife:
         self.simulation, self.robots = simulation, robots
         actors = simulation.actors
         self._actors = {robot: actors[robot] for robot in robots}
-        # Of the newest step at which each was asked for.
-        self._now: dict[str, Situation] = {}
-        self._masks: dict[str, tuple[Situation, Bool]] = {}
+        self._now: dict[str, Situation] = {}  # at the newest step at which each was asked for
 
     def __getstate__(self) -> tuple[Simulation, tuple[str, ...], list[str]]:
         """Leave out what belongs to the simulation, which keeps its state in its own way."""
@@ -89,10 +87,7 @@ class RobotLife:
 
     def mask(self, robot: str) -> Bool:
         """Return which actions are possible at the present step, bool (rooms + 1,), read-only."""
-        now, known = self.now(robot), self._masks.get(robot)
-        if known is None or known[0] is not now:
-            known = self._masks[robot] = now, self.policy(robot).mask(now)
-        return known[1]
+        return self.policy(robot).mask()
 
     def is_empty(self, robot: str) -> bool:
         """Whether the battery of a robot is empty, so that it never decides again."""
@@ -100,11 +95,11 @@ class RobotLife:
         return charge is not None and charge.is_empty
 
     def terms(self, robot: str, names: Collection[str]) -> dict[str, float]:
-        """Return terms of the reward, from the beginning of the life to the present step."""
+        """Return terms of the reward, from the beginning to the present step: at least these."""
         terms = self.policy(robot).tally(self.now(robot))
         if "in_view_min" in names:
             terms["in_view_min"] = self.simulation.perceived_s(robot) / 60
-        return {name: terms[name] for name in names}
+        return terms
 
     def copy(self) -> "RobotLife":
         """Return an independent copy."""

@@ -57,7 +57,7 @@ def lives(content: dict[str, Any], choose: Any) -> tuple[Simulation, list[F32]]:
         behavior: Any = simulation.actors["astro"].behaviors[0]
         now = simulation.situation("astro")
         observations.append(behavior.observe(now))
-        behavior.given = choose(behavior, observations[-1], behavior.mask(now))
+        behavior.given = choose(behavior, observations[-1], behavior.mask())
     return simulation, observations
 
 
@@ -147,7 +147,7 @@ def test_impossible_action_is_an_error_with_the_reason(action: int, reason: str)
     simulation.run_until_asked("astro")
     behavior: Any = simulation.actors["astro"].behaviors[0]
     with pytest.raises(InputError, match=reason):
-        behavior.check(simulation.situation("astro"), action)
+        behavior.check(simulation.situation("astro"), action, behavior.mask())
 
 
 def test_policy_without_a_file_says_what_to_give() -> None:

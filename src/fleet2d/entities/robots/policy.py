@@ -92,6 +92,7 @@ COLUMNS = (
 )
 """The columns of an observation, in their order: see docs/gym.md."""
 _AT = {name: number for number, name in enumerate(COLUMNS)}
+HERE, WAY = _AT["here"], _AT["way"]
 
 # The rows of `ShownMemory.fresh_rows` and its like: first the visits, then the person.
 PERSON = 2
@@ -319,11 +320,9 @@ class Policy(BeliefBehavior):
         actor, room, time, memory = now.actor, now.room, now.time, now.actor.recall().rooms
         table: F32 = self._fixed.copy()
         part = table[: len(self.visited)]
-        step_s = actor.clock.step_us / 1e6
-        show_memory(memory, self._shown, self.visited, now.step, time.hour, step_s, table)
         if room is not None:
-            part[room.index, _AT["here"]] = 1
-        part[:, _AT["way"]] = self._ways(now).share
+            part[room.index, HERE] = 1
+        part[:, WAY] = self.poses.ways(self.rooms + 1).share
         for name, xy in now.in_view.items():
             seen = now.home.plan.room_at(*xy) if self.user in (ANYONE, name) else None
             if seen is not None:
@@ -334,27 +333,27 @@ class Policy(BeliefBehavior):
             part[:, _AT["belief"]], away = belief.joint, belief.away
             for number, name in enumerate(self.names[:PEOPLE]):
                 part[:, _AT[f"belief_{number}"]] = room_belief(now, self.source, name).joint
+        step_s = actor.clock.step_us / 1e6
         newest = max(memory.last[self._person].tolist())
         age_s = (now.step - newest) * step_s
         minute = (time.hour * 60 + time.minute) * TURN // DAY_MINUTES
         charge, since = actor.charge, self.since
-        table[:, _AT["hour_sin"] :] = (
+        common = [
             sine(minute) / UNIT,
             cosine(minute) / UNIT,
-            time.weekday() >= SATURDAY,
+            float(time.weekday() >= SATURDAY),
             away,
             1.0 if charge is None else charge.level,
             0.0 if newest < 0 else SEEN_S / (SEEN_S + age_s),
             0.0 if since is None else min((time - since) / self.deadline, 1.0),
-        )
+        ]
+        visits, shown = self.visited, self._shown
+        show_memory(memory, shown, visits, now.step, time.hour, step_s, common, table)
         return table
 
-    def mask(self, now: Situation) -> Bool:
+    def mask(self) -> Bool:
         """Return which actions are possible, bool (rooms + 1,): rooms with a way, and to rest."""
-        return self._ways(now).mask
-
-    def _ways(self, now: Situation) -> RoomWays:
-        return self.poses.ways(self.rooms + 1)
+        return self.poses.ways(self.rooms + 1).mask
 
     def _describe_home(self, actor: Actor) -> F32:
         """Return what never changes in observations, float32 (rooms, columns)."""
@@ -438,20 +437,19 @@ class Policy(BeliefBehavior):
         return int(np.argmax(np.where(mask, scores, -np.inf)))
 
     def _action(self, now: Situation) -> int:
-        mask, action = self.mask(now), self.given
+        mask, action = self.mask(), self.given
         if action is None:
             action = self.act(self.observe(now), mask)
         self.given = None
         self.check(now, action, mask)
         return int(action)
 
-    def check(self, now: Situation, action: object, mask: Bool | None = None) -> None:
+    def check(self, now: Situation, action: object, mask: Bool) -> None:
         """Refuse an impossible action.
 
         Raises:
             InputError: It is out of range, or masked; the message says why.
         """
-        mask = self.mask(now) if mask is None else mask
         if not (isinstance(action, int | np.integer) and 0 <= action <= self.rooms):
             raise InputError(
                 f"the policy chose {action!r}: actions are whole numbers from 0 to {self.rooms}"
