@@ -144,7 +144,7 @@ WRONG: dict[str, tuple[dict[str, Any] | str, list[str]]] = {
     ),
     "reads what is missing": (
         changed({"algorithms": {"a": {"type": f"{OWN}:Share", "reads": ["ltp"]}}}),
-        ["algorithms.a.reads", "'ltp'", "not an algorithm"],
+        ["algorithms.a.reads", "'ltp'", "no algorithm"],
     ),
     "a module that is missing": (changed({"users": {"ana": {"type": "mine:Walk"}}}), ["users.ana", "mine", "no module"]),
     "a class that is missing": (changed({"users": {"ana": {"type": f"{OWN}:Walk"}}}), ["users.ana", "Walk"]),

@@ -234,7 +234,7 @@ def test_algorithms_are_handed_the_readings(plan: str) -> None:
 @pytest.mark.parametrize(
     ("sensor", "message"),
     [
-        ({"type": "contact_sensor", "of": "gate"}, "'gate', which is not a door"),
+        ({"type": "contact_sensor", "of": "gate"}, "objects.s.of: there is no door 'gate'"),
         ({"type": "occupancy_sensor", "of": "sofa"}, "no object 'sofa'.*bed"),
         ({"type": "smart_plug", "of": "cart"}, "cart has no place to use it from"),
         ({"type": "motion_sensor", "at": [50, 50]}, "outside the home"),

@@ -33,8 +33,6 @@ MAX_PATCHES = 12
 
 # Length of a bin [us]; one step where a step is longer.
 BIN_US = 60_000_000
-# Length of a bin [us]; one step where a step is longer.
-BIN_US = 60_000_000
 
 
 @dataclass(frozen=True)

@@ -48,7 +48,7 @@ class SightingTable:
         >>> rows = np.zeros((2, OBSERVATION), np.int64)
         >>> rows[:, Column.STEP] = 5, 9
         >>> both = SightingTable(np.array([5, 6, 7]), np.array([0, 0, 0], np.int32), rows[:1])
-        >>> len(both), both.between(6, 9).column(Column.STEP).tolist()
+        >>> len(both), both.between(6, 9).step.tolist()
         (3, [6, 7])
         >>> SightingTable.joined([both, SightingTable.of_rows(rows)]).index.tolist()
         [0, 0, 0, 1, 2]
@@ -89,10 +89,6 @@ class SightingTable:
             used, of_used = np.unique(index, return_inverse=True)
             index, distinct = of_used.astype(np.int32), distinct[used]
         return SightingTable(self.step[part], index, distinct)
-
-    def column(self, number: int) -> I64:
-        """Return a column: int64 (n,)."""
-        return self.step if number == Column.STEP else self.distinct[:, number][self.index]
 
     def rows(self) -> I64:
         """Return all columns of each: int64 (n, columns), stored by column."""

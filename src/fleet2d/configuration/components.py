@@ -283,9 +283,14 @@ class Settings(DescribedModel):
         frozen=True, extra="forbid", validate_default=True, allow_inf_nan=False, defer_build=True
     )
 
+    # The key that a value of some types stands for, in place of a mapping.
+    short_form: ClassVar[tuple[str, tuple[type, ...]]] = ("", ())
+
     @model_validator(mode="wrap")
     @classmethod
     def _name_known_keys(cls, data: Any, handler: ModelWrapValidatorHandler[Self]) -> Self:
+        if isinstance(data, cls.short_form[1]):
+            data = {cls.short_form[0]: data}
         if isinstance(data, Mapping):
             _refuse_early(data, cls.model_fields)
         try:

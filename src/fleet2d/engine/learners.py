@@ -23,7 +23,7 @@ from fleet2d.algorithms.algorithm import (
 )
 from fleet2d.algorithms.history import History, Log
 from fleet2d.artifacts.table import Column, Kind, TableSpec
-from fleet2d.configuration.problems import suggest
+from fleet2d.configuration.problems import check_known
 from fleet2d.configuration.units import micros, whole_steps
 from fleet2d.engine.basis import Basis
 from fleet2d.errors import ComponentError, Fleet2DError, ScenarioError, blame
@@ -95,7 +95,9 @@ class Learners:
         self.replaced: dict[str, Any] = {}
         self.all: list[Learner] = []
         self._names = tuple(algorithms)
-        _check_reads(metrics, algorithms)
+        for name, metric in metrics.items():
+            for algorithm in metric.reads():
+                check_known(algorithm, "algorithm", algorithms, where=f"metrics.{name}: ")
         for name in update_order(algorithms):
             self._add(name, f"algorithms.{name}", algorithms[name])
         for name, metric in metrics.items():
@@ -323,17 +325,6 @@ def _check_kinds(learner: Learner, kinds: Mapping[str, Kind]) -> None:
             )
 
 
-def _check_reads(metrics: Mapping[str, Metric], algorithms: Mapping[str, Algorithm]) -> None:
-    """Refuse metrics that measure an unknown algorithm."""
-    for name, metric in metrics.items():
-        for algorithm in metric.reads():
-            if algorithm not in algorithms:
-                raise ScenarioError(
-                    f"metrics.{name} measures {algorithm!r}, which is not an algorithm of the"
-                    f" scenario{suggest(algorithm, algorithms)}"
-                )
-
-
 def update_order(algorithms: Mapping[str, Algorithm]) -> list[str]:
     """Return the algorithms in an order in which each follows those that it reads.
 
@@ -342,11 +333,7 @@ def update_order(algorithms: Mapping[str, Algorithm]) -> list[str]:
     """
     for name, algorithm in algorithms.items():
         for source in algorithm.reads:
-            if source not in algorithms:
-                raise ScenarioError(
-                    f"algorithms.{name}.reads names {source!r}, which is not an algorithm of the"
-                    f" scenario{suggest(source, algorithms)}"
-                )
+            check_known(source, "algorithm", algorithms, where=f"algorithms.{name}.reads: ")
     sorter = TopologicalSorter({name: algorithm.reads for name, algorithm in algorithms.items()})
     try:
         return list(sorter.static_order())

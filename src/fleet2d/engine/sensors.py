@@ -9,7 +9,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 
 from fleet2d.algorithms.history import SensorRow
-from fleet2d.configuration.problems import suggest
+from fleet2d.configuration.problems import check_known
 from fleet2d.engine.basis import Basis, Watcher
 from fleet2d.entities.body import Bodies
 from fleet2d.entities.home_object import (
@@ -20,7 +20,7 @@ from fleet2d.entities.home_object import (
     SensorView,
     in_order,
 )
-from fleet2d.errors import ScenarioError, blame, errors_as
+from fleet2d.errors import blame, errors_as
 from fleet2d.kernels import PoseBlock
 from fleet2d.runtime.clock import Clock
 from fleet2d.runtime.events import Event, EventKind
@@ -71,7 +71,8 @@ class Sensors(Watcher):
                     with errors_as(None, f"objects.{name}"):
                         sensor.read(basis.clock)
                 if isinstance(sensor, OfDoor):
-                    sensor.watch(_door(name, sensor.of, doors))
+                    check_known(sensor.of, "door", doors, where=f"objects.{name}.of: ")
+                    sensor.watch(list(doors).index(sensor.of))
                 sensor.start(home, step_us)
                 self.names.append(name)
                 self.sensors.append(sensor)
@@ -176,12 +177,3 @@ class Sensors(Watcher):
         activities_of_user = list(self._activities.values())[user]
         index = bisect_right(activities_of_user, step, key=itemgetter(0))
         return activities_of_user[index - 1][1] if index else ""
-
-
-def _door(name: str, door: str, doors: Sequence[str]) -> int:
-    if door in doors:
-        return list(doors).index(door)
-    raise ScenarioError(
-        f"objects.{name}.of names {door!r}, which is not a door of the"
-        f" scenario{suggest(door, doors)}"
-    )

@@ -7,7 +7,7 @@ import numpy as np
 
 from fleet2d.algorithms.history import Log
 from fleet2d.artifacts.store import RunStore
-from fleet2d.configuration.problems import suggest
+from fleet2d.configuration.problems import check_known
 from fleet2d.engine.basis import Basis
 from fleet2d.engine.cameras import Cameras, SightSetup
 from fleet2d.engine.change_queue import ChangeQueue
@@ -221,11 +221,7 @@ def _check_reads(scenario: Scenario, actors: list[DecidingActor]) -> None:
             with errors_as(ScenarioError, f"{actor.path} listens to {name!r}", of=ComponentError):
                 actor.entity.check_interrupt(name)
         for name in (name for behavior in actor.behaviors for name in behavior.reads()):
-            if name not in scenario.algorithms:
-                raise ScenarioError(
-                    f"{actor.path} reads {name!r}, which is not an algorithm of the scenario"
-                    f"{suggest(name, scenario.algorithms)}"
-                )
+            check_known(name, "algorithm", scenario.algorithms, where=f"{actor.path}: ")
 
 
 def _remember(state: State, basis: Basis) -> None:

@@ -6,7 +6,7 @@ from types import MappingProxyType
 
 from shapely import Polygon
 
-from fleet2d.configuration.problems import suggest
+from fleet2d.configuration.problems import check_known
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.placed_objects import (
     MAX_HEIGHT_M,
@@ -141,10 +141,7 @@ def furniture_type(name: str) -> Furniture:
         >>> furniture_type("sofa").blocks, furniture_type("fridge").blocks
         ('path', 'sight')
     """
-    if name not in FURNITURE:
-        raise FloorPlanError(
-            f"there is no furniture of type {name!r}{suggest(name, sorted(FURNITURE))}"
-        )
+    check_known(name, "furniture of type", sorted(FURNITURE), FloorPlanError)
     return FURNITURE[name]
 
 

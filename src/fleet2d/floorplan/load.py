@@ -102,12 +102,7 @@ def load_or_mark(plan: str | Path, **lengths: float | None) -> FloorPlan:
 
 def _load_document(path: Path, cell: float | None, scale: float | None) -> FloorPlan:
     """Read a file whose ending or content determines its format."""
-    kind, content = format_by_suffix(path), {}
-    if kind is None:
-        content = read_document(path)
-        kind = _format_of(content) or ("ros" if path.suffix.lower() in YAML else None)
-    if kind is None:
-        raise _unknown_format(path, content)
+    kind, content = _recognize(path)
     if kind == "native":
         return native_plan(content, path, DEFAULT_CELL_M if cell is None else cell, scale)
     return _load_by(kind, path=path, cell=cell, scale=scale)
@@ -154,16 +149,20 @@ def format_of_file(path: Path) -> str:
     Raises:
         FloorPlanError: It can't be read, or isn't a floor plan that Fleet2D knows.
     """
-    kind = format_by_suffix(path)
-    if kind is not None:
-        return kind
+    return _recognize(path)[0]
+
+
+def _recognize(path: Path) -> tuple[str, dict[str, Any]]:
+    """Return the `type` that reads a file, and its content unless its ending tells the type."""
+    if (kind := format_by_suffix(path)) is not None:
+        return kind, {}
     content = read_document(path)
     kind = _format_of(content)
     if kind is None and path.suffix.lower() in YAML and "image" in content:
-        return "ros"
+        kind = "ros"
     if kind is None:
         raise _unknown_format(path, content)
-    return kind
+    return kind, content
 
 
 def advise_type(name: str) -> str:

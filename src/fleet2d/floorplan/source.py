@@ -5,6 +5,7 @@ from abc import abstractmethod
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import replace
 from datetime import timedelta
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, Self
 
@@ -14,7 +15,7 @@ from pydantic import AfterValidator, Field, TypeAdapter, ValidationError, model_
 from shapely import MultiPolygon, Polygon
 
 from fleet2d.configuration.components import Component, Settings
-from fleet2d.configuration.problems import problem, problem_at, suggest
+from fleet2d.configuration.problems import check_known, problem, problem_at
 from fleet2d.configuration.units import (
     AngleDeg,
     InputPath,
@@ -254,13 +255,8 @@ class FurniturePiece(Settings):
 
     @model_validator(mode="after")
     def _check_type(self) -> Self:
-        if self.type not in FURNITURE:
-            raise problem_at(
-                ("type",),
-                f"there is no furniture of type {self.type!r}"
-                f"{suggest(self.type, sorted(FURNITURE))}",
-                self.type,
-            )
+        error = partial(problem_at, ("type",), value=self.type)
+        check_known(self.type, "furniture of type", sorted(FURNITURE), error)
         if self.height is not None and (self.blocks or FURNITURE[self.type].blocks) == "sight":
             raise problem_at(
                 ("height",), "what blocks sight reaches the ceiling: give blocks: path, too"

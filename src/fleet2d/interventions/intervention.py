@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from datetime import datetime, timedelta
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, NamedTuple, Protocol, Self
 
@@ -23,6 +24,7 @@ from pydantic_core import CoreSchema, InitErrorDetails
 
 from fleet2d.configuration.components import Codec, Component, Settings, components
 from fleet2d.configuration.problems import (
+    check_known,
     did_you_mean,
     problem,
     problem_at,
@@ -277,11 +279,8 @@ def verbs() -> dict[str, type[Intervention]]:
 
 def _of_name(name: object) -> type[Intervention]:
     classes = verbs()
-    if not isinstance(name, str) or name not in classes:
-        raise problem_at(
-            ("do",), f"there is no intervention {name!r}{suggest(name, classes)}", name
-        )
-    return classes[name]
+    check_known(name, "intervention", classes, partial(problem_at, ("do",), value=name))
+    return classes[str(name)]
 
 
 def _from_short_form(

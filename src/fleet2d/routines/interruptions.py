@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from datetime import timedelta
 from functools import cache, lru_cache
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple, Self
+from typing import Annotated, NamedTuple, Self
 
 from pydantic import Field, model_validator
 
@@ -60,6 +60,8 @@ class Need(Settings):
         source: The source of its numbers, for readers.
     """
 
+    short_form = ("every", (str, int, float, timedelta))
+
     activity: str = ""
     every: AnyDurationDistribution
     asleep: AnyDurationDistribution | None = None
@@ -73,11 +75,6 @@ class Need(Settings):
     then: dict[str, Share] = Field(default_factory=dict)
     patience: Duration = timedelta(minutes=10)
     source: str = ""
-
-    @model_validator(mode="before")
-    @classmethod
-    def _read_short_form(cls, data: Any) -> Any:
-        return {"every": data} if isinstance(data, str | int | float | timedelta) else data
 
     @model_validator(mode="after")
     def _leaves_time(self) -> Self:
@@ -101,17 +98,14 @@ class Errand(Settings):
         source: The source of its numbers, for readers.
     """
 
+    short_form = ("probability", (int, float))
+
     activity: str = ""
     probability: Share
     after: tuple[str, ...] = ()
     before: tuple[str, ...] = ()
     takes: AnyDurationDistribution | None = None
     source: str = ""
-
-    @model_validator(mode="before")
-    @classmethod
-    def _read_short_form(cls, data: Any) -> Any:
-        return {"probability": data} if isinstance(data, int | float) else data
 
 
 AnyNeed = Annotated[Need, SchemaForms("text", "number")]

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from datetime import date, timedelta
-from functools import cache, cached_property
+from functools import cache, cached_property, partial
 from pathlib import Path
 from typing import Annotated, Any, Self
 
@@ -21,7 +21,7 @@ from pydantic import (
 from fleet2d.bounds import EXTENDED_FILES, PERSONA_VALUES
 from fleet2d.configuration.components import Settings, count, once
 from fleet2d.configuration.documents import read_document
-from fleet2d.configuration.problems import did_you_mean, problem, problem_at, shown, suggest
+from fleet2d.configuration.problems import check_known, problem, problem_at, shown, suggest
 from fleet2d.configuration.units import (
     WEEKDAYS,
     Duration,
@@ -128,14 +128,11 @@ class Timing(Settings):
         between: The earliest and latest begin; left out: 2.5 standard deviations around `at`.
     """
 
+    short_form = ("at", (str,))
+
     at: TimeOfDay | None = None
     spread: Duration = timedelta(minutes=15)
     between: tuple[TimeOfDay, TimeOfDay] | None = None
-
-    @model_validator(mode="before")
-    @classmethod
-    def _read_short_form(cls, data: Any) -> Any:
-        return {"at": data} if isinstance(data, str) else data
 
     @model_validator(mode="after")
     def _fits(self) -> Self:
@@ -219,13 +216,10 @@ class Pastime(Settings):
         between: The times of day at which it may begin.
     """
 
+    short_form = ("weight", (int, float))
+
     weight: float = Field(default=1.0, gt=0)
     between: tuple[TimeOfDay, TimeOfDay] | None = None
-
-    @model_validator(mode="before")
-    @classmethod
-    def _read_short_form(cls, data: Any) -> Any:
-        return {"weight": data} if isinstance(data, int | float) else data
 
 
 AnyPastime = Annotated[Pastime, SchemaForms("number")]
@@ -268,9 +262,7 @@ class DayTemplate(Settings):
     def _order_is_possible(self) -> Self:
         for name, task in self.do.items():
             for other in task.after:
-                if other not in self.do:
-                    hint = did_you_mean(other, self.do)
-                    raise problem_at(("do", name, "after"), f"there is no task {other!r}{hint}")
+                check_known(other, "task", self.do, partial(problem_at, ("do", name, "after")))
         done: set[str] = set()
         while len(done) < len(self.do):
             ready = [n for n, t in self.do.items() if n not in done and done.issuperset(t.after)]
@@ -411,11 +403,9 @@ class Persona(Settings):
     def _check_year(self) -> None:
         for name, event in self.year.items():
             known = {**bundled_days(), **self.days}
-            if event.days is not None and event.days not in known:
-                raise problem_at(
-                    ("year", name, "days"),
-                    f"there is no template {event.days!r}{suggest(event.days, known)}",
-                )
+            if event.days is not None:
+                error = partial(problem_at, ("year", name, "days"))
+                check_known(event.days, "template", known, error)
 
     @cached_property
     def plans(self) -> dict[str, DayPlan]:

@@ -4,6 +4,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import replace
 from datetime import date, datetime, timedelta
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, Self
 
@@ -34,6 +35,7 @@ from fleet2d.configuration.documents import Document
 from fleet2d.configuration.problems import (
     MAX_LINES,
     Location,
+    check_known,
     did_you_mean,
     problem,
     problem_at,
@@ -257,18 +259,13 @@ class Scenario(Settings):
         for robot, entity in self.robots.items():
             for i, behavior in enumerate(entity.behaviors):
                 for user in behavior.about():
-                    if user not in self.users:
-                        raise problem_at(
-                            ("robots", robot, "behaviors", i),
-                            f"there is no user {user!r}{suggest(user, self.users)}",
-                        )
+                    where = partial(problem_at, ("robots", robot, "behaviors", i))
+                    check_known(user, "user", self.users, where)
         return self
 
     @model_validator(mode="after")
     def _interactions_name_bodies(self) -> Self:
         for name, interaction in self.interactions.items():
-            users, robots = self.users, self.robots
-            known: dict[str, Mapping[str, Any]] = {"to": users, "fetch_from": users, "by": robots}
             if interaction.by is None and not self.robots:
                 raise problem_at(("interactions", name), "there is no robot that could do it")
             if interaction.every is not None and interaction.every < self.simulation.step:
@@ -276,14 +273,10 @@ class Scenario(Settings):
                     ("interactions", name, "every"),
                     f"expected a step ({self.simulation.step.total_seconds():g} s) or more",
                 )
-            for key, bodies in known.items():
-                body = getattr(interaction, key)
-                if body is not None and body not in bodies:
-                    noun = "robot" if key == "by" else "user"
-                    raise problem_at(
-                        ("interactions", name, key),
-                        f"there is no {noun} {body!r}{suggest(body, bodies)}",
-                    )
+            for key, section in (("to", "users"), ("fetch_from", "users"), ("by", "robots")):
+                if (body := getattr(interaction, key)) is not None:
+                    error = partial(problem_at, ("interactions", name, key))
+                    check_known(body, section[:-1], getattr(self, section), error)
         first = next(iter(self.robots), None)
         wanting = {interaction.by or first for interaction in self.interactions.values()}
         for robot, entity in self.robots.items():

@@ -383,15 +383,12 @@ class Confusable(Settings):
             users without an entry equally.
     """
 
+    short_form = ("rate", (str, int, float))
+
     rate: Share | None = None
     kind: Literal["cat", "dog", "big_dog"] | None = None
     height: Length | None = Field(default=None, gt=0, le=3)
     others: dict[str, Share] = Field(default={})
-
-    @model_validator(mode="before")
-    @classmethod
-    def _read_short_form(cls, data: Any) -> Any:
-        return {"rate": data} if isinstance(data, str | int | float) else data
 
     @classmethod
     def __get_pydantic_json_schema__(
