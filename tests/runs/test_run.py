@@ -13,7 +13,7 @@ from tests.artifacts.tables import EVERY_KIND, rows_of_every_kind, stored
 
 from fleet2d.artifacts.arrow import spec_of
 from fleet2d.artifacts.store import RunStore
-from fleet2d.errors import ArtifactError, RunDirectoryError
+from fleet2d.errors import ArtifactError, InputError, RunDirectoryError
 from fleet2d.runs.run import Run, open_run, open_store
 
 ROWS = rows_of_every_kind(300)
@@ -48,13 +48,13 @@ def test_pandas_and_polars(directory: Path) -> None:
     assert ROWS["x"].tolist() == run.polars("every_kind")["x"].to_list()
 
 
-@pytest.mark.parametrize("package", ["pandas", "polars"])
+@pytest.mark.parametrize(("package", "extra"), [("pandas", "pandas"), ("polars", "study")])
 def test_package_that_is_not_installed(
-    directory: Path, monkeypatch: pytest.MonkeyPatch, package: str
+    directory: Path, monkeypatch: pytest.MonkeyPatch, package: str, extra: str
 ) -> None:
     monkeypatch.setitem(sys.modules, package, None)
 
-    with pytest.raises(ArtifactError, match=f"pip install {package}"):
+    with pytest.raises(InputError, match=rf'pip install "fleet2d\[{extra}\]"'):
         getattr(open_run(directory), package)("every_kind")
 
 

@@ -1,4 +1,7 @@
-"""The commands `fleet2d fit` and `fleet2d calibrate`: what they print and write."""
+"""The commands `fleet2d fit` and `fleet2d calibrate`, whose functions are called from Python, too.
+
+They return what the commands print, in lines.
+"""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -11,16 +14,26 @@ if TYPE_CHECKING:
     from fleet2d.fit.validation import Validation
 
 
-fitting = typer.Typer(help="Learn from a real log.", no_args_is_help=True)
+def _print(lines: list[str], **_: Any) -> None:
+    for line in lines:
+        typer.echo(line)
+
+
+fitting = typer.Typer(help="Learn from a real log.", no_args_is_help=True, result_callback=_print)
 
 # A callback, as typer would otherwise drop the name of the only subcommand.
 fitting.callback()(lambda: None)
 UNITS = {"distance": " m", "bearing": " deg"}
 
 
-@fitting.command()
-def routine(
-    log: Annotated[Path, typer.Argument(help="A log of rooms and activities, or its folder.")],
+@fitting.command(
+    "routine",
+    help="Learn a persona from a log, and report how well its days match days held back.",
+)
+def fit_routine(
+    path: Annotated[
+        Path, typer.Argument(metavar="LOG", help="A log of rooms and activities, or its folder.")
+    ],
     out: Annotated[Path, typer.Option(help="The persona to write.")] = Path("persona.yaml"),
     layout: Annotated[
         str, typer.Option("--format", help="Its layout, see docs/replay.md; auto recognizes it.")
@@ -29,6 +42,7 @@ def routine(
         Path | None, typer.Option(help="Picture of the fit to write, .png or .svg.")
     ] = None,
     seed: Annotated[int, typer.Option(help="The seed of the sampled days.")] = 0,
+    *,
     model: Annotated[
         str, typer.Option(help="recorded: days that switch between those of the log; laws.")
     ] = "recorded",
@@ -37,24 +51,6 @@ def routine(
         bool,
         typer.Option("--private", "--share", help="A persona for others: no day of the log in it."),
     ] = False,
-) -> None:
-    """Learn a persona from a log, and report how well its days match days held back."""
-    for line in fit_routine(
-        log, out, layout, picture, seed, sort=sort, model=model, private=private
-    ):
-        typer.echo(line)
-
-
-def fit_routine(
-    path: Path,
-    out: Path,
-    layout: str = "auto",
-    picture: Path | None = None,
-    seed: int = 0,
-    *,
-    sort: bool = False,
-    model: str = "recorded",
-    private: bool = False,
 ) -> list[str]:
     """Fit a persona to a log, write it, and return a report in lines.
 
@@ -154,15 +150,21 @@ def privacy(fitted: "FittedPersona", private: bool) -> list[str]:
     return [*lines, verdict]
 
 
-calibrating = typer.Typer(help="Fit a model to a log of a real device.", no_args_is_help=True)
+calibrating = typer.Typer(
+    help="Fit a model to a log of a real device.", no_args_is_help=True, result_callback=_print
+)
 
 # A callback, as typer would otherwise drop the name of the only subcommand.
 calibrating.callback()(lambda: None)
 
 
-@calibrating.command()
-def perception(
-    detections: Annotated[
+@calibrating.command(
+    "perception",
+    help="Fit the probabilities of noticing and recognizing people to a log of a robot's"
+    " detections.",
+)
+def calibrate_perception(
+    path: Annotated[
         Path,
         typer.Argument(
             metavar="DETECTIONS.csv",
@@ -180,18 +182,6 @@ def perception(
     extends: Annotated[
         str | None, typer.Option(help="A scenario that the fragment extends, to run it as it is.")
     ] = None,
-) -> None:
-    """Fit the probabilities of noticing and recognizing people to a log of a robot's detections."""
-    for line in calibrate_perception(detections, out, picture, robot, extends):
-        typer.echo(line)
-
-
-def calibrate_perception(
-    path: Path,
-    out: Path,
-    picture: Path | None = None,
-    robot: str = "astro",
-    extends: str | None = None,
 ) -> list[str]:
     """Fit a perception to a log, write it as a scenario fragment, and return a report in lines.
 

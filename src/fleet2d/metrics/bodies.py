@@ -14,7 +14,7 @@ from fleet2d.algorithms.presence.belief import AWAY
 from fleet2d.configuration.components import register
 from fleet2d.configuration.units import Length, PositiveDuration
 from fleet2d.floorplan.home import Home
-from fleet2d.metrics.metric import Metric, pairs_of
+from fleet2d.metrics.metric import Metric, nested, pairs_of
 from fleet2d.runtime.clock import DAY_S
 
 RestPlace = tuple[float, float]
@@ -270,8 +270,5 @@ class CoPresence(Metric):
 
     def result(self) -> dict[str, Any]:
         """Return {robot: {user: share}}, without users who were never at home."""
-        results: dict[str, Any] = {}
-        for (robot, user), (together, at_home) in self.steps.items():
-            if at_home:
-                results.setdefault(robot, {})[user] = together / at_home
-        return results
+        steps = self.steps.items()
+        return nested({pair: together / home for pair, (together, home) in steps if home})

@@ -66,6 +66,18 @@ class Metric(Component):
         }
 
 
+def nested(numbers: Mapping[tuple[str, str], Any]) -> dict[str, Any]:
+    """Return numbers of pairs, such as robots and users, as {robot: {user: numbers}}.
+
+    >>> nested({("astro", "ana"): 1, ("astro", "ben"): 2})
+    {'astro': {'ana': 1, 'ben': 2}}
+    """
+    results: dict[str, Any] = {}
+    for (first, second), value in numbers.items():
+        results.setdefault(first, {})[second] = value
+    return results
+
+
 class UnknownPlaces:
     """The steps at which nobody knows where a user is, as in the gaps of a log."""
 

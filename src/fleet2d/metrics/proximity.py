@@ -13,7 +13,7 @@ from fleet2d.algorithms.history import History
 from fleet2d.configuration.components import register
 from fleet2d.configuration.units import Length
 from fleet2d.floorplan.home import Home
-from fleet2d.metrics.metric import Metric, in_sight, pairs_of
+from fleet2d.metrics.metric import Metric, in_sight, nested, pairs_of
 from fleet2d.runtime.clock import DAY_S
 
 # Hall's zones, by the distance at which they end [m].
@@ -75,13 +75,13 @@ class Blocking(Metric):
 
     def result(self) -> dict[str, Any]:
         """Return {robot: {user: {blocks, seconds}}}, with asides if there were any, per day."""
-        results: dict[str, Any] = {}
-        for (robot, user), blocks in self.blocks.items():
-            numbers = {"blocks": blocks, "seconds": self.seconds[robot, user]}
-            if self.asides[robot, user]:
-                numbers["asides"] = self.asides[robot, user]
-            results.setdefault(robot, {})[user] = {k: v / self.days for k, v in numbers.items()}
-        return results
+        results: dict[tuple[str, str], Any] = {}
+        for pair, blocks in self.blocks.items():
+            numbers = {"blocks": blocks, "seconds": self.seconds[pair]}
+            if self.asides[pair]:
+                numbers["asides"] = self.asides[pair]
+            results[pair] = {name: value / self.days for name, value in numbers.items()}
+        return nested(results)
 
 
 @register("metric", "intrusion")
@@ -123,9 +123,9 @@ class Intrusion(Metric):
 
     def result(self) -> dict[str, Any]:
         """Return {robot: {user: {zone: minutes a day}}}."""
-        minutes_by_robot: dict[str, Any] = {}
-        for (robot, user), minutes in self.minutes.items():
-            minutes_by_robot.setdefault(robot, {})[user] = {
-                zone: m / self.days for zone, m in zip(ZONES, minutes, strict=True)
+        return nested(
+            {
+                pair: {zone: m / self.days for zone, m in zip(ZONES, minutes, strict=True)}
+                for pair, minutes in self.minutes.items()
             }
-        return minutes_by_robot
+        )

@@ -7,7 +7,7 @@ strong colours, which identify bodies and alarms, only become brighter.
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
-from typing import Any, Literal, get_args
+from typing import Any, Literal, cast, get_args
 
 import numpy as np
 from matplotlib.artist import Artist
@@ -20,6 +20,7 @@ from matplotlib.patches import Patch
 from matplotlib.text import Text
 from numpy.typing import ArrayLike
 
+from fleet2d.configuration.problems import check_known
 from fleet2d.errors import InputError
 from fleet2d.kernels import F64
 
@@ -59,10 +60,8 @@ def check_theme(name: str) -> Theme:
     Raises:
         InputError: There is no such theme.
     """
-    for theme in THEMES:
-        if theme == name:
-            return theme
-    raise InputError(f"there is no theme {name!r}: choose light or dark")
+    check_known(name, "theme", THEMES, InputError)
+    return cast("Theme", name)
 
 
 @contextmanager

@@ -17,7 +17,7 @@ from fleet2d.artifacts.table import Column, Kind, TableSpec
 from fleet2d.artifacts.unfinished import Prefix
 from fleet2d.configuration.components import hook
 from fleet2d.configuration.problems import suggest
-from fleet2d.errors import ArtifactError, RunDirectoryError, printable
+from fleet2d.errors import ArtifactError, RunDirectoryError, extra, printable
 from fleet2d.floorplan.layers import Layer
 from fleet2d.runtime.clock import Clock
 from fleet2d.storage.files import PARTIAL, path_in
@@ -237,24 +237,22 @@ class Run:
         """Return a table as a pandas data frame.
 
         Raises:
-            ArtifactError: pandas is not installed, or see `arrow`.
+            ArtifactError: See `arrow`.
+            InputError: pandas is not installed.
         """
-        try:
+        with extra("pandas", "`pandas` needs pandas; `arrow` has the same table"):
             import pandas as pd  # noqa: F401 - only to check that it is installed
-        except ImportError as error:
-            raise _not_installed("pandas") from error
         return self.arrow(name).to_pandas()
 
     def polars(self, name: str) -> pl.DataFrame:
         """Return a table as a polars data frame.
 
         Raises:
-            ArtifactError: polars is not installed, or see `arrow`.
+            ArtifactError: See `arrow`.
+            InputError: polars is not installed.
         """
-        try:
+        with extra("study", "`polars` needs polars; `arrow` has the same table"):
             import polars as pl
-        except ImportError as error:
-            raise _not_installed("polars") from error
         frame = pl.from_arrow(self.arrow(name))
         assert isinstance(frame, pl.DataFrame)
         return frame
@@ -391,12 +389,6 @@ def _state_notes(root: Path, manifest: Manifest) -> list[str]:
     if names:
         notes.append(f"cut off and not readable: {printable(', '.join(names))}")
     return notes
-
-
-def _not_installed(package: str) -> ArtifactError:
-    return ArtifactError(
-        f"{package} is not installed: `pip install {package}`, or use .arrow(name)"
-    )
 
 
 def layer_table(layer: Layer) -> TableSpec:

@@ -183,7 +183,7 @@ class Subject:
         Raises:
             InputError: There is no such test.
         """
-        return _empty_test if self.test is None else load_test(*self.test)
+        return _empty_test if self.test is None else claimed_test(*self.test)[0]
 
 
 @dataclass(frozen=True)
@@ -418,16 +418,6 @@ def _optuna(seed: int, startup: int) -> "optuna.Study":
 
 def _empty_test(trial: Trial) -> None:
     """Do nothing: the expectations are in the scenario."""
-
-
-def load_test(path: Path, name: str) -> Body:
-    """Return a test of a file.
-
-    Raises:
-        InputError: There is no such file or test, or it has other arguments than a trial.
-    """
-    function, _ = claimed_test(path, name)
-    return function
 
 
 def claimed_test(path: Path, name: str) -> tuple[Body, Claim]:

@@ -2,7 +2,7 @@
 
 import re
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from fractions import Fraction
 from pathlib import Path
@@ -151,7 +151,6 @@ def write_film(
     *,
     speed: float = 60.0,
     height: int = HEIGHT_PX,
-    on_progress: Callable[[int, int], None] | None = None,
 ) -> int:
     """Write a stretch of a run as a film; return the number of distinct frames.
 
@@ -162,7 +161,6 @@ def write_film(
         end: The step before which to end.
         speed: Simulated time over the time of the film.
         height: The height of the film [pixels].
-        on_progress: Called now and then with the number of finished frames, and of all frames.
 
     Raises:
         InputError: The file name has another suffix, a number is out of range, or the file can't be
@@ -178,7 +176,7 @@ def write_film(
         stage = stage_of(run, first, end, stride, height)
         moments = np.flatnonzero(stage.changes())
         total = -(-(end - first) // stride)
-        frames = draw_frames(stage, first, moments, on_progress)
+        frames = draw_frames(stage, first, moments)
         _store(path, frames, total, rate)
     return len(moments)
 
@@ -233,12 +231,7 @@ def stage_of(run: Run, first: int, end: int, stride: int, height: int = HEIGHT_P
     return stage
 
 
-def draw_frames(
-    stage: Stage,
-    first: int,
-    moments: I64,
-    on_progress: Callable[[int, int], None] | None = None,
-) -> Iterator[tuple[int, U8]]:
+def draw_frames(stage: Stage, first: int, moments: I64) -> Iterator[tuple[int, U8]]:
     """Yield the number and the pixels of some frames of a film."""
     canvas: Any = stage.figure.canvas
     for _, artist in (*stage.body_artists, *stage.clock_artists):
@@ -257,7 +250,7 @@ def draw_frames(
             elif axes is not None:
                 axes.draw_artist(artist)
 
-    for number, moment in enumerate(moments.tolist()):
+    for moment in moments.tolist():
         if stage.show(first + moment * stage.stride):
             canvas.restore_region(background)
             draw(stage.body_artists)
@@ -265,8 +258,6 @@ def draw_frames(
         else:
             canvas.restore_region(scene)
         draw(stage.clock_artists)
-        if on_progress and number % 50 == 0:
-            on_progress(number, len(moments))
         yield moment, np.asarray(canvas.buffer_rgba())
 
 

@@ -1,7 +1,6 @@
 """Moments and parts of a run: times in words as steps, and who was where between two steps."""
 
 import re
-from collections.abc import Mapping
 from datetime import datetime, timedelta
 from typing import Any
 
@@ -129,7 +128,7 @@ def part_of_run(run: Run, first: int, end: int) -> Run:
     }
     names = [name for name in run.tables if not name.startswith("layer.")]
     tables = {name: _cut(run, name, first, end) for name in names}
-    part = Run(None, Manifest(**_fields(content)), names, tables.__getitem__)
+    part = Run(None, Manifest(**content), names, tables.__getitem__)
     part.plan = run.plan
     return part
 
@@ -149,11 +148,6 @@ def key_frame_rows(table: Any, first: int, end: int) -> I64:
         high = rows_after[0] if len(rows_after) else rows[-1]
         selected[rows[(rows >= low) & (rows <= high)]] = True
     return np.flatnonzero(selected)
-
-
-def _fields(content: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the fields of a manifest that exist in this version."""
-    return {name: value for name, value in content.items() if name in Manifest.model_fields}
 
 
 def _cut(run: Run, name: str, first: int, end: int) -> Any:

@@ -170,7 +170,6 @@ def page_app(
     token: str,
     port: int,
     live: LiveRuns | None = None,
-    page: Path = PAGE,
     seen_at: str = "",
 ) -> ASGIApp:
     """Return the application that serves the page and some runs.
@@ -180,7 +179,6 @@ def page_app(
         token: The first part of every path.
         port: The port of the server.
         live: Running simulations, beside or instead of runs; None: there are none yet.
-        page: The folder of the page's bundle.
         seen_at: Another address under which browsers reach it.
     """
     live = LiveRuns(runs) if live is None else live
@@ -191,7 +189,7 @@ def page_app(
 
     async def file(request: Request) -> Response:
         name = request.path_params.get("name", "index.html")
-        path = page / name
+        path = PAGE / name
         if path.suffix not in MEDIA or not path.is_file():
             return problem(f"there is no page {name}", 404)
         return FileResponse(path, media_type=MEDIA[path.suffix])

@@ -63,17 +63,16 @@ def strip_rows(run: Run, colors: Sequence[tuple[str, str]]) -> list[StripRow]:
     return rows
 
 
-def draw_strip(
-    run: Run, plan: FloorPlan, rows: Sequence[StripRow], axes: Axes, *, names: bool = True
-) -> None:
+def draw_strip(run: Run, plan: FloorPlan, rows: Sequence[StripRow], axes: Axes) -> None:
     """Draw a strip of time: a row for each body, coloured by the room that it is in.
+
+    Long stretches have the names of their rooms.
 
     Args:
         run: The run, for its sightings.
         plan: Its home.
         rows: The rows that `strip_rows` returned.
         axes: The axes to draw on; their limits are set.
-        names: Whether to write the names of rooms into long stretches.
     """
     begin, end = _limits(run)
     boxes: list[F64] = []
@@ -83,7 +82,7 @@ def draw_strip(
             low, high = number, number + ROW_PART
             boxes.append(np.array([[start, low], [stop, low], [stop, high], [start, high]]))
             faces.append(to_rgb(deep_color(plan.rooms[room].type) if room >= 0 else "#f1f2f4"))
-            if names and room >= 0 and stop - start > LABEL_PART * (end - begin):
+            if room >= 0 and stop - start > LABEL_PART * (end - begin):
                 name = plan.rooms[room].name.replace("_", " ")
                 axes.text(
                     (start + stop) / 2,
