@@ -18,7 +18,7 @@ import typer
 
 from fleet2d.errors import ArtifactError, RunDirectoryError, blame
 from fleet2d.options import TrustFiles, TrustFolders, file_name, split, trust_of
-from fleet2d.runtime.memory import rare_collections
+from fleet2d.runtime.memory import peak_memory_mb, rare_collections
 
 if TYPE_CHECKING:
     from fleet2d.engine.simulation import Simulation
@@ -148,7 +148,7 @@ def summary_of(run: "Run") -> dict[str, Any]:
         "digest": run.digest,
         "wall_s": wall,
         "speedup": manifest["simulated_s"] / (wall["setup"] + wall["simulate"] + wall["save"]),
-        "peak_rss_mb": _peak_rss_mb(),
+        "peak_rss_mb": peak_memory_mb(),
         "metrics": run.metrics,
         **({"expectations": verdicts} if (verdicts := manifest["expectations"]) else {}),
     }
@@ -165,11 +165,13 @@ def print_summary(summary: dict[str, Any], run: "Run") -> None:
     wall = summary["wall_s"]
     simulated = format_duration(timedelta(seconds=summary["simulated_s"]))
     seconds = wall["setup"] + wall["simulate"] + wall["save"]
+    peak = summary["peak_rss_mb"]
+    memory = "" if peak is None else f", {peak:.0f} MB"
     console.print(
         f"{simulated} in {seconds:.2f} s: {summary['speedup']:,.0f} x real time"
         f" (set-up {wall['setup']:.2f} s, simulate {wall['simulate']:.2f} s,"
         f" save {wall['save']:.2f} s;"
-        f" whole process {wall['total']:.2f} s, {summary['peak_rss_mb']:.0f} MB)",
+        f" whole process {wall['total']:.2f} s{memory})",
         highlight=False,
         soft_wrap=True,
     )
@@ -231,16 +233,6 @@ def _since_start() -> float:
     except (OSError, AttributeError, ValueError, IndexError):
         # Not on Linux: the time since this module was loaded.
         return time.perf_counter() - _LOADED
-
-
-def _peak_rss_mb() -> float | None:
-    """Return the largest memory of this process so far [MB]; None if unknown."""
-    try:
-        import resource
-    except ImportError:
-        return None
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    return peak / (1024 * 1024 if sys.platform == "darwin" else 1024)
 
 
 Arguments = Annotated[

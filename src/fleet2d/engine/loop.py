@@ -88,7 +88,7 @@ def change_home(state: State, span: Span) -> None:
 
 
 def decide(state: State, span: Span) -> None:
-    """Let bodies decide whose plan is over, and robots that would drive at a person."""
+    """Ask bodies that have no plan left, and robots about to hit a person, for a decision."""
     step, clearance, blocking = span.first, state.clearance, state.blocking
     for row in _asked(state, step):
         actor = state.actors[row]

@@ -483,15 +483,15 @@ class may_be_untested(Word, Temporal):
         return self.part
 
     def robustness(self, run: RunSignals, high: bool) -> Trace:
-        """Return that of the expectation."""
+        """Return the robustness of the expectation."""
         return self.part.robustness(run, high)
 
     def violations(self, run: RunSignals) -> list[Violation]:
-        """Return those of the expectation."""
+        """Return the violations of the expectation."""
         return self.operator.violations(run)
 
     def slack(self, run: RunSignals) -> int | None:
-        """Return that of the expectation."""
+        """Return the slack of the expectation."""
         return self.operator.slack(run)
 
     def untested(self, run: RunSignals) -> str:

@@ -332,7 +332,7 @@ class FloorPlan:
 
     @cached_property
     def sight_mesh(self) -> Mesh:
-        """The same in triangles [lattice]."""
+        """The triangulation of `sight_polygons` [lattice]."""
         if not self.glass:
             return self.mesh
         return build_mesh(self.sight_polygons, self.lattice.columns, self.lattice.rows)

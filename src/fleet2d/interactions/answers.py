@@ -169,7 +169,7 @@ class CompanyPart(AnswerPart):
     each: float = -0.5
 
     def logit(self, now: Circumstances, state: AttitudeState) -> float:
-        """Add the weight of the company."""
+        """Return the weight of the people who are present."""
         return self.each * min(now.company, 3)
 
 

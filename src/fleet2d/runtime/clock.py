@@ -136,7 +136,7 @@ class Sun:
         return share
 
     def end_at(self, time: datetime) -> datetime | None:
-        """Return the end of the night that a moment lies in, as hours do; None by day."""
+        """Return the end of the night that a moment lies in; None by day."""
         rise, fall = self.day(time.toordinal())
         if time >= fall:
             return self.day(time.toordinal() + 1)[0]

@@ -1,4 +1,4 @@
-"""Rare garbage collection while modules are imported and while a run is simulated.
+"""The memory of a process: rare garbage collection during imports and runs, and its peak.
 
 Hardly any objects of a run are in reference cycles, so they are freed without garbage collection.
 To collect after every 700 new objects, as Python does, takes up to a quarter of the time of a run
@@ -107,3 +107,13 @@ def free_bodies(actors: Iterable[object]) -> None:
     """
     for actor in actors:
         vars(actor).clear()
+
+
+def peak_memory_mb() -> float | None:
+    """Return the peak memory of this process so far [MB]; None if the system doesn't tell."""
+    try:
+        import resource
+    except ImportError:
+        return None
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return peak / (1024 * 1024 if sys.platform == "darwin" else 1024)

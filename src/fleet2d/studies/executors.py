@@ -19,8 +19,7 @@ from types import ModuleType
 from typing import Any, Generic, Protocol, TypeVar
 
 from fleet2d.errors import InputError
-from fleet2d.runtime.memory import rare_collections
-from fleet2d.studies.simulator import peak_rss_mb
+from fleet2d.runtime.memory import peak_memory_mb, rare_collections
 
 TASKS_PER_WORKER = 2  # tasks of a worker: one runs, one waits, so that it is never idle
 MAX_ATTEMPTS = 3  # of a task whose worker dies each time
@@ -443,7 +442,7 @@ def _work(job: bytes, connection: "Connection[Any, Any]") -> None:
         while True:
             task = connection.recv()
             payload = function(task)
-            connection.send(Done(payload, peak_rss_mb()))
+            connection.send(Done(payload, peak_memory_mb() or 0.0))
 
 
 def _end_with_driver() -> None:

@@ -42,7 +42,7 @@ class Spread:
     values: int
 
     def detectable(self, units: Mapping[str, int], power: float = POWER) -> float:
-        """Return the smallest mean that a study of some size tells from zero, with a power.
+        """Return the smallest mean that a study of this size detects with a given power.
 
         Args:
             units: The number of units of each level, 2 or more.

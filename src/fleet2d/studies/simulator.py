@@ -1,7 +1,6 @@
 """Running scenarios: the only module of `studies` that imports the engine."""
 
 import copy
-import sys
 import time
 import traceback
 from collections.abc import Iterable, Iterator, Mapping
@@ -14,6 +13,7 @@ from fleet2d.engine.basis import input_files
 from fleet2d.engine.simulation import Simulation
 from fleet2d.errors import ComponentError
 from fleet2d.runtime.clock import HOUR_S
+from fleet2d.runtime.memory import peak_memory_mb
 from fleet2d.scenario.model import Scenario
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ class VariantOutcome:
         metrics: The numbers to keep, by name, such as `ltp_error.ana.tv`.
         tables: The tables to keep, by name.
         wall_s: Wall time by phase: `setup`, `simulate`, `total` [s].
-        peak_rss_mb: The largest memory of the process so far [MB].
+        peak_rss_mb: The peak memory of the process [MB]; 0 if unknown.
         error: The error in words; None if there is none.
         trace: The traceback of the error.
     """
@@ -134,7 +134,7 @@ def execute(scenario: Scenario, metrics: Iterable[str], tables: Iterable[str]) -
         return VariantOutcome(
             "failed",
             wall_s=seconds,
-            peak_rss_mb=peak_rss_mb(),
+            peak_rss_mb=peak_memory_mb() or 0.0,
             error=describe_error(error),
             trace="".join(traceback.format_exception(error)),
         )
@@ -147,7 +147,7 @@ def execute(scenario: Scenario, metrics: Iterable[str], tables: Iterable[str]) -
         {name: value for name, value in numbers.items() if is_kept(name, patterns)},
         {name: run.tables[name] for name in tables if name in run.tables},
         wall_s,
-        peak_rss_mb(),
+        peak_memory_mb() or 0.0,
     )
 
 
@@ -173,16 +173,6 @@ def flat_numbers(metrics: Mapping[str, Any], prefix: str = "") -> Iterator[tuple
             yield from flat_numbers(value, f"{prefix}{name}{SEPARATOR}")
         elif isinstance(value, bool | int | float):
             yield f"{prefix}{name}", float(value)
-
-
-def peak_rss_mb() -> float:
-    """Return the largest memory of this process so far [MB]; 0 if unknown."""
-    try:
-        import resource
-    except ImportError:
-        return 0.0
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    return peak / (1024 * 1024 if sys.platform == "darwin" else 1024)
 
 
 @dataclass(frozen=True)

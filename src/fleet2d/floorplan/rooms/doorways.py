@@ -450,7 +450,7 @@ class Passage:
 
 
 def door_axes(shape: BaseGeometry) -> Iterator[list[tuple[Point, Point]]]:
-    """Yield for each door in a shape its possible lines; of an area its axes, the longer first."""
+    """Yield the possible lines of each door in a shape: of an area its axes, the longer first."""
     for part in shapely.get_parts(shape).tolist():
         corners = shapely.get_coordinates(part)
         if part.geom_type == "LineString":
