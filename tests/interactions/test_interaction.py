@@ -99,6 +99,7 @@ def test_an_answer_settles_a_request(
         ({"every": "1 h"}, "it comes up by 'at'"),
         ({"to": "anna"}, "there is no user 'anna': did you mean 'ana'?"),
         ({"by": "astra"}, "there is no robot 'astra': did you mean 'astro'?"),
+        ({"do": "ask", "about": "anna"}, "pill.about: there is no user 'anna': did you mean"),
         ({"do": "nag"}, "'remind', 'offer'"),
         ({"at": [], "every": "1 us"}, "interactions.pill.every: expected a step (1 s) or more"),
         ({"on": "feast"}, "interactions.pill.on"),

@@ -425,6 +425,16 @@ class Algorithm(Component):
             ComponentError: The learned state doesn't fit.
         """
 
+    def check_sources(self, sources: "Mapping[str, Algorithm]") -> None:
+        """Refuse algorithms in `reads` whose output it can't use; called before the run begins.
+
+        Args:
+            sources: Those algorithms, by name.
+
+        Raises:
+            ComponentError: It can't use the output of one of them.
+        """
+
     def files(self) -> list[Path]:
         """Return the files that it reads: the run stores their digests, to be reproducible."""
         return [] if self.learned is None else [self.learned]

@@ -145,6 +145,7 @@ class RunExpectations:
             possible_details(users, robots, self._queue.acts),
             home.plan.bounds,
             (clock.steps - since) * clock.step_us * MICROSECOND,
+            self._scenario.interactions,
         )
 
     # Measuring

@@ -26,7 +26,7 @@ from fleet2d.artifacts.table import Column, Kind, TableSpec
 from fleet2d.configuration.problems import check_known
 from fleet2d.configuration.units import micros, whole_steps
 from fleet2d.engine.basis import Basis
-from fleet2d.errors import ComponentError, Fleet2DError, ScenarioError, blame
+from fleet2d.errors import ComponentError, Fleet2DError, ScenarioError, blame, errors_as
 from fleet2d.metrics.metric import Metric
 from fleet2d.runtime.events import HOME, Event
 
@@ -334,6 +334,8 @@ def update_order(algorithms: Mapping[str, Algorithm]) -> list[str]:
     for name, algorithm in algorithms.items():
         for source in algorithm.reads:
             check_known(source, "algorithm", algorithms, where=f"algorithms.{name}.reads: ")
+        with errors_as(ComponentError, f"algorithms.{name}", of=ComponentError):
+            algorithm.check_sources({source: algorithms[source] for source in algorithm.reads})
     sorter = TopologicalSorter({name: algorithm.reads for name, algorithm in algorithms.items()})
     try:
         return list(sorter.static_order())

@@ -48,6 +48,11 @@ _QUANTITY = re.compile(
     r"""|(?P<time>\d{1,2}:\d\d(?:\s*-\s*\d{1,2}:\d\d)?)"""
     rf"""|(?<![\w.])(?P<number>(?:{_NUMBER}\s*{_UNIT}?\s*\.\.\s*)?{_NUMBER}\s*{_UNIT})"""
 )
+# Answers to requests, as in `remind(ana) accepted within 30 min`, which are calls of `answered`.
+_ANSWERED = re.compile(
+    r"(\w+)\s*\(([^(),]+)\)\s+(?!(?:and|or|in|not|is|if|else)\b)([a-z_]+)\b"
+    r"(?:\s+within\s+([^),&|]+?)(?=\s*(?:$|[),&|])|\s+(?:and|or)\b))?"
+)
 _LONGEST = 2000
 _DEEPEST = 40
 
@@ -70,7 +75,8 @@ def parse_expectation(text: str) -> Expectation:
             f"an expectation may have at most {_LONGEST} characters; this one has {len(text)}"
         )
     try:
-        tree = ast.parse(_QUANTITY.sub(_quoted, text.strip()), mode="eval").body
+        words = _ANSWERED.sub(_answered, text.strip())
+        tree = ast.parse(_QUANTITY.sub(_quoted, words), mode="eval").body
     except (SyntaxError, ValueError, RecursionError, MemoryError):
         raise InputError(
             f"{text!r} can't be read: write it like always(distance(ana, astro) > 0.5 m)"
@@ -80,6 +86,12 @@ def parse_expectation(text: str) -> Expectation:
 
 def _quoted(match: re.Match[str]) -> str:
     return match[0] if match["quoted"] else f'"{" ".join(match[0].split())}"'
+
+
+def _answered(match: re.Match[str]) -> str:
+    interaction, person, outcome, within = match.groups()
+    limit = f", within={within}" if within else ""
+    return f"answered({interaction}, {person}, {outcome}{limit})"
 
 
 class _Reader:

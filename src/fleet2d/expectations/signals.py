@@ -41,6 +41,7 @@ from fleet2d.expectations.expectation import (
 )
 from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.rooms.room import PRIORITY, usual_type
+from fleet2d.interactions.interaction import Interaction
 from fleet2d.kernels import F64
 from fleet2d.runtime.clock import Clock
 from fleet2d.runtime.events import KINDS, Event, EventKind
@@ -73,6 +74,7 @@ class Scene:
             activities for each user.
         bounds: The least and the greatest coordinates of the home (x, y, x, y) [m].
         remaining: Time from now to the end of the run.
+        interactions: What robots want of people, by name.
         notes: Notes for readers, about kinds of rooms that the home doesn't have.
     """
 
@@ -82,6 +84,7 @@ class Scene:
     details: Mapping[str, Collection[str]]
     bounds: tuple[float, float, float, float]
     remaining: timedelta
+    interactions: Mapping[str, Interaction] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
 
     def meant(self, name: "str | Term", of: Expectation) -> Expectation | None:

@@ -1,14 +1,16 @@
 """The operators of expectations: when something must hold, for how long, and how often."""
 
+import operator
 from collections.abc import Callable
 from dataclasses import field, replace
 from datetime import timedelta
+from functools import reduce
 from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from fleet2d.configuration.problems import did_you_mean
+from fleet2d.configuration.problems import check_known, did_you_mean
 from fleet2d.errors import InputError
 from fleet2d.expectations.expectation import (
     INFINITE,
@@ -25,9 +27,11 @@ from fleet2d.expectations.expectation import (
     shortest,
 )
 from fleet2d.expectations.signals import Scene, Signal
-from fleet2d.expectations.vocabulary import during
+from fleet2d.expectations.vocabulary import during, events
+from fleet2d.interactions.interaction import Outcome
 from fleet2d.kernels import I64
 
+ANSWERS = (*map(str, Outcome), "delivered")
 PERIODS = {"hour": timedelta(hours=1), "day": timedelta(days=1), "week": timedelta(weeks=1)}
 
 
@@ -378,6 +382,53 @@ class after(Limited):
         spans = expected.spans(run)
         slacks = (expected.slack_at(at, spans, run) for at in self.triggered(run).tolist())
         return min((slack for slack in slacks if slack is not None), default=None)
+
+
+class answered(Limited):
+    """Expect an answer to each request that comes up: `remind(ana) accepted within 30 min`.
+
+    Without `within` there is time for it as long as the request is open.
+
+    Attributes:
+        interaction: An interaction by its name, or all of a kind, such as `remind`.
+        person: The person to whom it is.
+        outcome: The answer, or `delivered`.
+    """
+
+    interaction: str
+    person: str
+    outcome: str = "accepted"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        check_known(self.outcome, "answer", ANSWERS, InputError, "answered: ")
+
+    def resolved(self, scene: Scene) -> Expectation:
+        """Return what is expected of each of the interactions.
+
+        Raises:
+            ScenarioError: There is no such interaction, or none with that person.
+        """
+        wanted = scene.interactions
+        kinds = {each.do for each in wanted.values()}
+        scene.check_name("interaction", self.interaction, [*wanted, *sorted(kinds)], self)
+        names = [n for n, each in wanted.items() if self.interaction in (n, each.do)]
+        people = dict.fromkeys(wanted[name].to for name in names)
+        scene.check_name(f"{self.interaction} to", self.person, people, self)
+        expected = (
+            after(
+                events("due", detail=f"{name} {self.person}"),
+                events(self.outcome, detail=f"{name} {self.person}"),
+                within=wanted[name].within if self.within is None else self.within,
+            )
+            for name in names
+            if wanted[name].to == self.person
+        )
+        return reduce(operator.and_, expected)
+
+    def robustness(self, run: RunSignals, high: bool) -> Trace:
+        """Not defined: what is expected depends on the interactions of the run."""
+        raise NotImplementedError(f"{self} is judged as `resolved` returns it")
 
 
 class holds_for(Word, Expectation):

@@ -273,8 +273,11 @@ class Scenario(Settings):
                     ("interactions", name, "every"),
                     f"expected a step ({self.simulation.step.total_seconds():g} s) or more",
                 )
-            for key, section in (("to", "users"), ("fetch_from", "users"), ("by", "robots")):
-                if (body := getattr(interaction, key)) is not None:
+            sections = {"to": "users", "fetch_from": "users", "by": "robots"}
+            if interaction.do == "ask":
+                sections["about"] = "users"
+            for key, section in sections.items():
+                if body := getattr(interaction, key):
                     error = partial(problem_at, ("interactions", name, key))
                     check_known(body, section[:-1], getattr(self, section), error)
         first = next(iter(self.robots), None)

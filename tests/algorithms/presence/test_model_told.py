@@ -52,6 +52,13 @@ def test_who_is_said_to_be_at_home_is_not_believed_to_be_away() -> None:
     assert away_at(told, 1199) < away_at(rtp, 1199)
 
 
+@pytest.mark.parametrize("source", ["long_term_presence", "belief_table"])
+def test_told_presence_of_another_algorithm_is_refused_before_the_run(source: str) -> None:
+    algorithms = {"other": {"type": source}, "told": {"type": "told_presence", "reads": ["other"]}}
+    with pytest.raises(ComponentError, match=r"algorithms\.told: 'other' is not a real-time"):
+        fleet2d.Simulation(home(algorithms=algorithms))
+
+
 def test_told_presence_without_a_presence_is_refused() -> None:
     with pytest.raises(ComponentError, match="give `reads:"):
         fleet2d.run(home(algorithms={"told": {"type": "told_presence"}}))

@@ -1,5 +1,6 @@
 """Interact: the robot serves its requests, and keeps to what people answer."""
 
+import re
 from collections.abc import Sequence
 from datetime import datetime, timedelta
 from typing import Any
@@ -176,6 +177,37 @@ def test_a_robot_that_is_switched_off_neither_sees_nor_hears() -> None:
     assert [step for step, _ in heard if step > off + 3600]
     (done,) = run.manifest["interventions"]
     assert {"do": "switch_off", "step": off + 1, "by": "users.ana"}.items() <= done.items()
+
+
+@pytest.mark.parametrize(
+    ("text", "holds"),
+    [
+        ("remind(ana) accepted within 30 min", True),
+        ("pill(ana) accepted", True),
+        ("pill(ana) accepted within 10 s", False),
+        ("remind(ana) declined or not remind(ana) delivered within 1 h", False),
+    ],
+)
+def test_answers_are_expected_in_words(text: str, holds: bool) -> None:
+    song = {"do": "offer", "to": "ana", "at": ["07:15"], "within": "1 h"}
+    run = fleet2d.run(home(interactions={"pill": PILL, "song": song}, expect={"answers": text}))
+    (verdict,) = run.manifest["expectations"].values()
+
+    assert holds == verdict["holds"]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("remimd(ana) accepted", "there is no interaction 'remimd': did you mean 'remind'?"),
+        ("remind(anna) accepted", "there is no remind to 'anna': did you mean 'ana'?"),
+        ("remind(ana) acepted", "there is no answer 'acepted': did you mean 'accepted'?"),
+        ("remind(ana) accepted within 3 d", "3 d is beyond the run"),
+    ],
+)
+def test_answers_that_nobody_can_give_are_refused(text: str, message: str) -> None:
+    with pytest.raises(ScenarioError, match=re.escape(message)):
+        fleet2d.run(home(expect={"answers": text}))
 
 
 def test_an_opportunity_is_taken_when_the_person_comes_into_view() -> None:

@@ -326,10 +326,21 @@ class ToldPresence(Algorithm):
 
     def start(self, home: Home) -> None:
         """Begin without answers."""
-        if len(self.reads) != 1:
-            raise ComponentError("give `reads: [rtp]`, the presence that answers correct")
         self.rooms = {room.name: room.index for room in home.rooms}
         self.told: dict[str, list[Told]] = {}  # in the present period, the last one before it first
+
+    def check_sources(self, sources: Mapping[str, Algorithm]) -> None:
+        """Refuse anything but one presence; what a class of yours returns shows in the run."""
+        if len(sources) != 1:
+            raise ComponentError("give `reads: [rtp]`, the presence that answers correct")
+        for name, source in sources.items():
+            is_presence = isinstance(source, RealTimePresence | ToldPresence)
+            is_own = not type(source).__module__.startswith("fleet2d.")
+            if not (is_presence or is_own) or isinstance(source, BeliefTable):
+                raise self._not_presence(name)
+
+    def _not_presence(self, name: str) -> ComponentError:
+        return ComponentError(f"{name!r} is not a real-time presence: name one in `reads`")
 
     def update(self, history: History, state: Present) -> Any:
         """Correct each bin of the belief by what the robot was told before."""
@@ -337,9 +348,7 @@ class ToldPresence(Algorithm):
         if belief is None:
             return None
         if not isinstance(belief, Presence) or belief.track is None:
-            raise ComponentError(
-                f"{self.reads[0]!r} is not a real-time presence: name one in `reads`"
-            )
+            raise self._not_presence(self.reads[0])
         for event in history.events:
             name, _, where = event.detail.partition(" ")
             if event.event == "told" and name in state.users:
