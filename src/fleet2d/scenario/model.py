@@ -274,10 +274,10 @@ class Scenario(Settings):
                     f"expected a step ({self.simulation.step.total_seconds():g} s) or more",
                 )
             sections = {"to": "users", "fetch_from": "users", "by": "robots"}
-            if interaction.do == "ask":
+            if interaction.do == "ask" and interaction.about:
                 sections["about"] = "users"
             for key, section in sections.items():
-                if body := getattr(interaction, key):
+                if (body := getattr(interaction, key)) is not None:
                     error = partial(problem_at, ("interactions", name, key))
                     check_known(body, section[:-1], getattr(self, section), error)
         first = next(iter(self.robots), None)
