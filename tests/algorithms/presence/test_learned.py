@@ -99,7 +99,7 @@ def changed(**arrays: object) -> bytes:
     ("content", "words"),
     [
         (WEIGHTS.read_bytes()[:-40], "can't be read as weights"),
-        (b"not a model", "can't be read as weights"),
+        (b"not a model", r"can.t be read as weights .*it is no .npz archive.*type: onnx"),
         (b"", "can't be read as weights"),
         (changed(format=np.array("fleet2d presence network 0")), "train it again"),
         (changed(format=None), "holds 'nothing'"),

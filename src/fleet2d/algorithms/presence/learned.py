@@ -1,5 +1,6 @@
 """Learned models of real-time presence: networks over all places that correct `routine`."""
 
+import zipfile
 from collections.abc import Mapping, Sequence
 from datetime import datetime
 from functools import cache
@@ -116,12 +117,14 @@ class Weights(NamedTuple):
         try:
             if path.stat().st_size > MAX_BYTES:
                 raise ValueError(f"it is larger than {MAX_BYTES:,} bytes")
+            if not zipfile.is_zipfile(path):
+                raise ValueError("it is no .npz archive")
             with path.open("rb") as opened, np.load(opened, allow_pickle=False) as file:
                 arrays = {name: file[name] for name in file.files}
         except Exception as error:  # noqa: BLE001 - a damaged archive raises almost anything
             raise InputError(
                 f"{path} can't be read as weights of a model of presence ({one_line(error, 100)}):"
-                " give a file that `fleet2d train rtp` wrote"
+                " give a file that `fleet2d train rtp` wrote, or `type: onnx` for an ONNX file"
             ) from None
         form = str(arrays.get("format", "nothing"))
         if form != FORMAT:

@@ -187,7 +187,8 @@ class RealTimePresence(PresenceAlgorithm):
 
     Attributes:
         period: How often it is updated.
-        model: The model that computes it.
+        model: The model that computes it; in most homes `learned` is best. The default stays `hmm`,
+            so that scenarios without the key have the same runs in each version.
     """
 
     period: PositiveDuration = timedelta(minutes=5)
