@@ -199,6 +199,20 @@ def test_copies_in_memory_share_what_never_changes() -> None:
         assert actor is not twin.actors[name]
 
 
+def test_copies_in_memory_share_rows_that_are_not_stored_yet_and_add_their_own() -> None:
+    simulation = Simulation(None, "simulation.duration=1 d", seed=4)
+    simulation.run_until("08:00")
+    copied = copy.deepcopy(simulation)
+    simulation.run_until("10:00")
+
+    rows, others = (s._state.recorder._events for s in (simulation, copied))
+    assert type(rows) is type(others)
+    assert len(rows) > len(others) > 0
+    assert all(row is other for row, other in zip(rows, others, strict=False))
+    recent, older = (s._state.events._recent for s in (simulation, copied))
+    assert len(recent) > len(older) > 0
+
+
 def test_a_read_simulation_has_one_home_and_one_clock() -> None:
     twin = through_a_stream(Simulation(house()))
     for actor in twin.actors.values():

@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Iterator, Mapping, Sequence, ValuesView
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Self, TypeVar
 
 from pydantic import BaseModel
 
@@ -19,6 +20,15 @@ from fleet2d.runtime.clock import Clock
 from fleet2d.runtime.events import Event
 from fleet2d.scenario.model import Scenario
 from fleet2d.sight.perception import Perception
+
+T = TypeVar("T")
+
+
+class ImmutableRows(list[T]):
+    """A list of objects that never change: a copy of a run has a list of its own, with the same."""
+
+    def __copy__(self) -> Self:
+        return self.__class__(self)
 
 
 class Watcher:

@@ -21,7 +21,7 @@ from fleet2d.algorithms.observations import (
     Truth,
 )
 from fleet2d.artifacts.table import KEY_KINDS, Column, TableSpec
-from fleet2d.engine.basis import Basis
+from fleet2d.engine.basis import Basis, ImmutableRows
 from fleet2d.engine.cameras import Cameras
 from fleet2d.engine.sensors import Sensors
 from fleet2d.engine.trajectories import (
@@ -201,10 +201,10 @@ class Recorder:
         entities = [*(actor.name for actor in basis.actors), *basis.scenario.objects]
         self._rows = {name: row for row, name in enumerate(entities)} | {HOME: -1}
         self._stores_home = basis.may_change
-        self._events: list[Event] = []
+        self._events: ImmutableRows[Event] = ImmutableRows()
         self._actors = basis.actors
         self._decisions: list[tuple[int, int, str, str, int | None]] = []
-        self._observations: list[SightingTable] = []
+        self._observations: ImmutableRows[SightingTable] = ImmutableRows()
         self._sensors, self._readings = sensors, list[SensorRow]()
         self._rooms = NearestRooms(basis.home.plan)
         self._camera_codes = _codes_of(cameras)
@@ -288,7 +288,7 @@ class Recorder:
         self.wall_s += time.perf_counter() - began
 
     def _store_observations(self) -> None:
-        blocks, self._observations = self._observations, []
+        blocks, self._observations = self._observations, ImmutableRows()
         while blocks:  # so many rows at a time that their columns take little memory
             counts = accumulate(map(len, blocks))
             size = next((k for k, count in enumerate(counts, 1) if count > MAX_ROWS), len(blocks))
@@ -338,7 +338,7 @@ class Recorder:
             return
         users = self._users
         step, entity, kind, detail = zip(*self._events, strict=True)
-        self._events = []
+        self._events = ImmutableRows()
         steps = np.array(step, np.int64)
         rows = np.array([self._rows[name] for name in entity], np.int32)
         ranks = np.array([RANKS.get(name, 0) for name in kind], np.int8)

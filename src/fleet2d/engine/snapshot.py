@@ -38,8 +38,8 @@ from fleet2d.configuration.trust import (
     is_scenario_module,
     public_name,
 )
-from fleet2d.engine.basis import components_of
-from fleet2d.engine.state import State
+from fleet2d.engine.basis import ImmutableRows, components_of
+from fleet2d.engine.state import RecentEvents, State
 from fleet2d.engine.trajectories import KeySegment
 from fleet2d.entities.body import RandomWalk, Track
 from fleet2d.entities.plan import Note
@@ -153,6 +153,8 @@ _SHARED = frozenset(
         *(datetime, timedelta, *_DTYPES),
     }
 )
+# What is copied by `copy.copy`, as its parts never change.
+_COPIED = frozenset({ImmutableRows, RecentEvents, Timelines})
 _SHARED_NAMES = frozenset(
     {
         "fleet2d.entities.users.resident.Seat",
@@ -403,7 +405,7 @@ class _StateCopier(pickle.Pickler):
         kind: Any = type(obj)
         if obj is shared_object:
             return NotImplemented
-        if kind is Timelines:
+        if kind in _COPIED:
             obj = copy.copy(obj)
         elif not (_is_shared(kind) or id(obj) in self._constants):
             return NotImplemented

@@ -2,7 +2,7 @@
 
 from array import array
 from collections import defaultdict, deque
-from collections.abc import Callable, Iterable, Iterator, Sequence, Set
+from collections.abc import Callable, Iterable, Sequence, Set
 from dataclasses import dataclass, field
 from itertools import chain, islice
 from operator import itemgetter
@@ -66,6 +66,27 @@ class Listener(NamedTuple):
     kinds: Set[str]
 
 
+class RecentEvents(deque[Event]):
+    """The newest events of a run."""
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Write the steps and texts as numbers, and the texts: a checkpoint has many events."""
+        index: defaultdict[str, int] = defaultdict()
+        index.default_factory = index.__len__
+        steps, *texts = list(zip(*self, strict=True)) or [()]
+        columns = [steps, *(map(index.__getitem__, column) for column in texts)]
+        numbers = array("q", chain.from_iterable(columns)).tobytes()
+        return RecentEvents, ((), self.maxlen), (numbers, list(index))
+
+    def __setstate__(self, state: tuple[bytes, list[str]]) -> None:
+        """Restore the events."""
+        values, texts = array("q", state[0]), state[1]
+        count = len(values) // len(Event._fields)
+        steps, *columns = (values[k * count : (k + 1) * count] for k in range(len(Event._fields)))
+        codes = (map(texts.__getitem__, column) for column in columns)
+        self.extend(map(new_event, zip(steps, *codes, strict=True)))
+
+
 class EventStream:
     """The events of a run, passed on to all sinks.
 
@@ -94,18 +115,12 @@ class EventStream:
         self._row = {name: row for row, name in enumerate([HOME, *entities])}
         self._unheard: list[Event] = []  # by the listeners
         self._awaited_steps: list[int] = []  # of awaited events since the last span began
-        self._recent: deque[Event] = deque(maxlen=self.CAPACITY)
+        self._recent = RecentEvents(maxlen=self.CAPACITY)
         self._first_step = 0  # all events from this step on are in `_recent`
 
     def __getstate__(self) -> dict[str, object]:
         """Leave out the functions: they belong to the caller, not to the run."""
-        recent = _packed(self._recent)
-        return {**self.__dict__, "listeners": [], "_unheard": [], "_recent": recent}
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        """Restore the events."""
-        events = _unpacked(*state["_recent"])
-        self.__dict__ |= {**state, "_recent": deque(events, maxlen=self.CAPACITY)}
+        return {**self.__dict__, "listeners": [], "_unheard": []}
 
     def emit(self, events: Sequence[Event]) -> None:
         """Pass events on to all sinks."""
@@ -158,24 +173,6 @@ class EventStream:
                 " more often, or read the table 'events'"
             )
         return sorted((e for e in self._recent if e.step >= step), key=lambda e: (e.step, e.rank))
-
-
-def _packed(events: Iterable[Event]) -> tuple[bytes, list[str]]:
-    """Return the steps and texts of events as numbers, and the texts: a checkpoint has many."""
-    index: defaultdict[str, int] = defaultdict()
-    index.default_factory = index.__len__
-    steps, *texts = list(zip(*events, strict=True)) or [()]
-    columns = [steps, *(map(index.__getitem__, column) for column in texts)]
-    return array("q", chain.from_iterable(columns)).tobytes(), list(index)
-
-
-def _unpacked(numbers: bytes, texts: list[str]) -> Iterator[Event]:
-    """Return events from what `_packed` returned."""
-    values = array("q", numbers)
-    count = len(values) // len(Event._fields)
-    steps, *columns = (values[k * count : (k + 1) * count] for k in range(len(Event._fields)))
-    codes = (map(texts.__getitem__, column) for column in columns)
-    return map(new_event, zip(steps, *codes, strict=True))
 
 
 def capacity_of(actors: int) -> int:

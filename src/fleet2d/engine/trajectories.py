@@ -10,7 +10,7 @@ import numpy as np
 from fleet2d.artifacts.store import ArtifactSettings
 from fleet2d.artifacts.table import PLANNED, TRACK, WALK, Column, TableSpec
 from fleet2d.configuration.units import whole_steps
-from fleet2d.engine.basis import Basis
+from fleet2d.engine.basis import Basis, ImmutableRows
 from fleet2d.entities.body import Bodies, Pose, Track
 from fleet2d.kernels import I64, SUB, Breakpoints, in_radians
 from fleet2d.runtime.clock import HOUR_US, Clock
@@ -167,7 +167,7 @@ class KeyFrames:
         self._walkers: set[int] = set()  # bodies whose present plan is a random walk
         self._walked = [1] * count  # the step before which it is collected
         self._moved: set[int] = set()  # bodies that were put elsewhere since their last plan
-        self._segments: list[KeySegment] = []
+        self._segments: ImmutableRows[KeySegment] = ImmutableRows()
         self._rows = 0
         self._end = 0  # key frames before this step are collected when they are stored
 
@@ -265,7 +265,7 @@ class KeyFrames:
         self.collect()
         if not self._segments:
             return
-        segments, self._segments, self._rows = self._segments, [], 0
+        segments, self._segments, self._rows = self._segments, ImmutableRows(), 0
         parts = [[column[s.begin : s.end] for column in s.track] for s in segments]
         time, x, y, heading, away = (np.concatenate(column) for column in zip(*parts, strict=True))
         numbers = np.array([(s.row, s.kind, s.step) for s in segments], np.int64)

@@ -17,7 +17,7 @@ from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.lattice import UNITS_PER_CELL, Lattice
 from fleet2d.floorplan.mesh import Segment, build_mesh, snap_polygon
 from fleet2d.floorplan.placed_objects import PlacedObject, Portal, UsePlace
-from fleet2d.floorplan.plan import FloorPlan, read_only
+from fleet2d.floorplan.plan import FloorPlan, cells_of, read_only
 from fleet2d.kernels import (
     F64,
     I32,
@@ -170,7 +170,7 @@ class Space:
         mask = self.part_of_cell == part
         if room is not None:
             mask &= self.plan.room_of_cell == room
-        return read_only(np.argwhere(mask))
+        return read_only(cells_of(mask))
 
     def _find_nearest(
         self, x: int, y: int, part: int | None = None, room: int | None = None
@@ -241,7 +241,7 @@ class Space:
         mask = self.part_of_cell >= 0 if part is None else self.part_of_cell == part
         if room is not None:
             mask = mask & (self.plan.room_of_cell == room)
-        cells = np.argwhere(mask)
+        cells = cells_of(mask)
         xs, ys = self.plan.lattice.centre_axes()
         away = (xs[cells[:, 1]] - x) ** 2 + (ys[cells[:, 0]] - y) ** 2
         if len(cells) > most:

@@ -12,7 +12,7 @@ from fleet2d.entities.behavior import Actor, Behavior, Situation
 from fleet2d.entities.place import points_at_distance
 from fleet2d.entities.plan import Plan
 from fleet2d.errors import ComponentError, ScenarioError
-from fleet2d.floorplan.plan import Room
+from fleet2d.floorplan.plan import Room, cells_of
 from fleet2d.kernels import CELL_CENTRE, F64, I64, SUB, Bool, heading_of, points_in_sight
 from fleet2d.runtime.determinism import sum_in_order
 
@@ -136,7 +136,7 @@ def viewpoints_of(actor: Actor, room: Room, enough: float, most: int) -> Viewpoi
 
 
 def _choose_viewpoints(actor: Actor, room: Room, enough: float, most: int) -> Viewpoints:
-    targets = spread(np.argwhere(actor.home.plan.room_of_cell == room.index), MAX_TARGET_CELLS)
+    targets = spread(cells_of(actor.home.plan.room_of_cell == room.index), MAX_TARGET_CELLS)
     points, seen = _cover(actor, room, centres(targets), enough, most)
     return Viewpoints(points, seen) if points else Viewpoints((actor.middle(room),), 0.0)
 
@@ -180,7 +180,7 @@ def places_to_see(actor: Actor, room: Room) -> tuple[list[str], I64]:
     ]
     if uses:
         return [name for name, _ in uses], plan.lattice.to_lattice([at for _, at in uses])
-    cells = spread(np.argwhere(plan.room_of_cell == room.index), MAX_TARGET_CELLS)
+    cells = spread(cells_of(plan.room_of_cell == room.index), MAX_TARGET_CELLS)
     return [], centres(cells)
 
 

@@ -19,7 +19,7 @@ from fleet2d.entities.robots.approach import (
     viewpoints_of,
 )
 from fleet2d.errors import PlacementError
-from fleet2d.floorplan.plan import Room, read_only
+from fleet2d.floorplan.plan import Room, cells_of, read_only
 from fleet2d.floorplan.space import Space
 from fleet2d.kernels import CELL_CENTRE, F64, I64, SUB, points_in_sight
 
@@ -126,7 +126,7 @@ class HangoutPlaces:
         ]
         if uses:
             return np.ascontiguousarray(plan.lattice.to_lattice(uses))
-        cells = np.argwhere(plan.room_of_cell == room.index)
+        cells = cells_of(plan.room_of_cell == room.index)
         cells = cells[:: max(1, len(cells) // MAX_SEATS)]
         return np.ascontiguousarray(cells[:, ::-1] * SUB + CELL_CENTRE)
 

@@ -35,7 +35,7 @@ from fleet2d.entities.robots.approach import (
 )
 from fleet2d.entities.robots.find import Sites
 from fleet2d.errors import ComponentError, InputError, PlacementError, extra
-from fleet2d.floorplan.plan import FloorPlan, Room, read_only
+from fleet2d.floorplan.plan import FloorPlan, Room, cells_of, read_only
 from fleet2d.kernels import (
     F32,
     I32,
@@ -170,7 +170,7 @@ class WaitingPoses:
         """Return the place (x, y) and the heading at which most of a room is in view."""
         actor, plan = self._actor, self._actor.home.plan
         stands = centres(spread(actor.space.cells(room.index, actor.part), MAX_VIEWPOINT_CELLS))
-        goals = centres(spread(np.argwhere(plan.room_of_cell == room.index), MAX_TARGET_CELLS))
+        goals = centres(spread(cells_of(plan.room_of_cell == room.index), MAX_TARGET_CELLS))
         reach, limit = sight_range(actor), cosine(self._half_angle) / UNIT
         views = [(place, goals[visible_from(actor, place, goals, reach)]) for place in stands]
         views = [(place, seen - place) for place, seen in views if len(seen)]
@@ -181,7 +181,8 @@ class WaitingPoses:
         half = DIRECTIONS[: len(DIRECTIONS) // 2]  # the others are opposite to these
         ahead, least = x * half[:, :1] + y * half[:, 1:], np.sqrt(x * x + y * y) * limit
         is_shown = np.concatenate([ahead >= least, ahead <= -least])
-        shown = np.add.reduceat(is_shown, first, axis=1, dtype=np.intp).T  # (views, directions)
+        counts = is_shown.view(np.int8)
+        shown = np.add.reduceat(counts, first, axis=1, dtype=np.int32).T  # (views, directions)
         view, facing = divmod(int(shown.argmax()), len(DIRECTIONS))
         if shown[view, facing] == 0:  # by a camera with a narrow angle
             return *actor.middle(room), 0
