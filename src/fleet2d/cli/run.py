@@ -29,8 +29,6 @@ if TYPE_CHECKING:
 FIRST_S = 30.0
 """Time after which a running component is named [s]; the next message comes after twice as long."""
 
-SEPARATOR = " · "
-
 
 @contextmanager
 def watched(first_s: float = FIRST_S) -> Iterator[None]:
@@ -160,6 +158,7 @@ def print_summary(summary: dict[str, Any], run: "Run") -> None:
     from rich.table import Table
 
     from fleet2d.configuration.units import format_duration
+    from fleet2d.metrics.metric import SEPARATOR, flat
 
     console = Console()
     wall = summary["wall_s"]
@@ -178,8 +177,8 @@ def print_summary(summary: dict[str, Any], run: "Run") -> None:
     table, hidden = Table("metric", "of", "value", "", show_edge=False), 0
     for metric, result in summary["metrics"].items():
         metric_class = _class_of(run, metric)
-        rows = _flat(metric_class.summary(result))
-        hidden += len(_flat(result)) - len(rows)
+        rows = flat(metric_class.summary(result))
+        hidden += len(flat(result)) - len(rows)
         last_unit = None
         for name, value in rows:
             unit = metric_class.units.get(name.rsplit(SEPARATOR, 1)[-1], metric_class.unit)
@@ -212,17 +211,6 @@ def _class_of(run: "Run", metric: str) -> "type[Metric]":
 
     configured = run.manifest["scenario"]["metrics"][metric]
     return cast("type[Metric]", lookup("metric", configured["type"]))
-
-
-def _flat(result: Any, prefix: str = "") -> list[tuple[str, Any]]:
-    """Return nested results as rows (name, value)."""
-    if not isinstance(result, dict):
-        return [(prefix, result)]
-    return [
-        row
-        for key, value in result.items()
-        for row in _flat(value, f"{prefix}{SEPARATOR}{key}" if prefix else key)
-    ]
 
 
 def _since_start() -> float:

@@ -11,7 +11,7 @@ from fleet2d.configuration.problems import did_you_mean
 from fleet2d.kernels import F64, I64
 from fleet2d.logs.log import LogError, PositionLog
 from fleet2d.logs.positions import RawFixes, Stamps, localize
-from fleet2d.storage.bags import LATEST_SIMULATED_NS, open_bag, planar, stamp_of
+from fleet2d.storage.bags import open_bag, planar, stamp_of
 
 TRANSFORMS = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
 
@@ -64,12 +64,7 @@ def read_bag(
     """
     with open_bag(path, LogError) as reader:
         poses, source = _poses(reader, path, id)
-    has_date = bool(len(poses.time)) and int(poses.time.max()) >= LATEST_SIMULATED_NS
-    time_us = poses.time // 1000
-    if not has_date and len(time_us):
-        time_us = time_us - time_us.min()
-    stamps = Stamps(time_us, np.arange(1, len(time_us) + 1), has_date, has_date)
-    fixes = RawFixes(stamps, poses.x, poses.y, poses.heading, [source])
+    fixes = RawFixes(Stamps.of_messages(poses.time), poses.x, poses.y, poses.heading, [source])
     return localize(path, "bag", fixes, time_zone=time_zone, sort=sort)
 
 

@@ -15,8 +15,8 @@ from fleet2d.bounds import FIXES, one_line
 from fleet2d.configuration.problems import did_you_mean
 from fleet2d.kernels import I64
 from fleet2d.logs.log import LogError, PositionLog
-from fleet2d.logs.positions import NAMES, LogTable, RawFixes, Stamps, fixes_in
-from fleet2d.storage.bags import LATEST_SIMULATED_NS, is_bag, open_bag, stamp_of
+from fleet2d.logs.positions import NAMES, LogTable, RawFixes, Stamps
+from fleet2d.storage.bags import is_bag, open_bag, stamp_of
 
 COLUMNS = {
     "time": NAMES["time"],
@@ -121,7 +121,7 @@ def _from_table(path: Path, columns: Mapping[str, str]) -> _LabelledFixes:
     label, labels = np.full(len(table.line), -1, np.int64), tuple[str, ...]()
     if "user" in table.named:
         label, labels = _codes(table.texts("user").combine_chunks())
-    return fixes_in(table), label, labels
+    return table.fixes(), label, labels
 
 
 def _codes(texts: pa.Array) -> tuple[I64, tuple[str, ...]]:
@@ -164,10 +164,7 @@ def _from_bag(path: Path, topic: str | None, columns: Mapping[str, str]) -> _Lab
         raise LogError(
             f"{path}: none of the {number} messages of {connection.topic} has a detection"
         )
-    time_ns = np.array(times, np.int64)
-    has_date = int(time_ns.max()) >= LATEST_SIMULATED_NS
-    time_us = time_ns // 1000 if has_date else (time_ns - time_ns.min()) // 1000
-    stamps = Stamps(time_us, np.arange(1, len(times) + 1), has_date, has_date)
+    stamps = Stamps.of_messages(np.array(times, np.int64))
     x, y, heading = np.array(rows, np.float64).T
     label, labels = _codes(pa.array(users, pa.string()))
     note = f"{connection.topic}: {len(times)} detections in {number} messages"

@@ -28,6 +28,7 @@ from fleet2d.configuration.units import micros
 from fleet2d.kernels import F64, I64, Bool
 from fleet2d.logs.log import LogError, PositionLog, parse_time
 from fleet2d.runtime.clock import DAY_US
+from fleet2d.storage.bags import LATEST_SIMULATED_NS
 
 NAMES = {
     "time": ("time", "timestamp", "t", "datetime", "time_s"),
@@ -74,7 +75,7 @@ def read_positions(
         LogError: A column or the tag is missing, a value is not a number, or times run backwards.
     """
     table, notes = _of_tag(LogTable.read(path, columns or {}), id)
-    return localize(path, "positions", fixes_in(table, notes), time_zone=time_zone, sort=sort)
+    return localize(path, "positions", table.fixes(notes), time_zone=time_zone, sort=sort)
 
 
 class RawFixes(NamedTuple):
@@ -140,6 +141,14 @@ class Stamps(NamedTuple):
     line: I64
     has_date: bool
     has_zone: bool
+
+    @classmethod
+    def of_messages(cls, time_ns: I64) -> Self:
+        """Return the stamps of the messages of a bag [ns]; a simulated clock has no date."""
+        has_date = bool(len(time_ns)) and int(time_ns.max()) >= LATEST_SIMULATED_NS
+        begin_ns = 0 if has_date or not len(time_ns) else time_ns.min()
+        line = np.arange(1, len(time_ns) + 1)
+        return cls((time_ns - begin_ns) // 1000, line, has_date, has_date)
 
 
 class LocalTimes(NamedTuple):
@@ -324,7 +333,24 @@ class LogTable:
 
     def numbers(self, quantity: str) -> F64:
         """Return a column of numbers, float64 (n,); NaN where it is empty."""
-        return numbers_of(self.rows, self.named[quantity], self.path, self.line)
+        column = self.column(quantity)
+        if pa.types.is_string(column.type) or pa.types.is_large_string(column.type):
+            for at, text in zip(self.line.tolist(), column.to_pylist(), strict=True):
+                try:
+                    float(text or "nan")
+                except ValueError:
+                    raise LogError(
+                        f"{self.path}, line {at}: expected a number in column"
+                        f" {self.named[quantity]!r}, got {one_line(text)!r}"
+                    ) from None
+            column = pc.cast(pc.if_else(pc.equal(column, ""), "nan", column), pa.float64())
+        try:
+            numbers = pc.fill_null(pc.cast(column, pa.float64()), float("nan"))
+        except pa.ArrowException:
+            raise LogError(
+                f"{self.path}: column {self.named[quantity]!r} holds {column.type}, not numbers"
+            ) from None
+        return numbers.to_numpy().astype(np.float64)
 
     def headings(self) -> F64:
         """Return the headings [rad], float64 (n,); NaN where there is none."""
@@ -334,8 +360,28 @@ class LogTable:
         return heading / 180 * np.pi if self.named["heading"].endswith("_deg") else heading
 
     def stamps(self) -> Stamps:
-        """Return the times of the rows."""
-        return stamps_of(self.column("time"), self.path, self.line)
+        """Return the times of the rows; those with a zone are UTC."""
+        column, path, line = self.column("time"), self.path, self.line
+        if column.null_count:
+            is_empty = pc.is_null(column).combine_chunks().to_numpy(zero_copy_only=False)
+            raise LogError(f"{path}, line {line[np.flatnonzero(is_empty)[0]]}: it has no time")
+        kind: Any = column.type
+        if pa.types.is_string(kind) or pa.types.is_large_string(kind):
+            values, has_zone = _parse_texts(column.to_pylist(), path, line)
+            return Stamps(values, line, True, has_zone)
+        if pa.types.is_timestamp(kind):
+            values = pc.cast(column, pa.timestamp("us", kind.tz), safe=False)
+            time_us = pc.cast(values, pa.int64()).to_numpy()
+            return Stamps(time_us, line, True, kind.tz is not None)
+        if pa.types.is_integer(kind) or pa.types.is_floating(kind):
+            values, has_date = _scale_numbers(column.to_numpy(), path, line)
+            return Stamps(values, line, has_date, has_date)
+        raise LogError(f"{path}: expected times as text, timestamps or numbers, got {kind}")
+
+    def fixes(self, notes: Sequence[str] = ()) -> RawFixes:
+        """Return the fixes of the rows."""
+        x, y = self.numbers("x"), self.numbers("y")
+        return RawFixes(self.stamps(), x, y, self.headings(), list(notes))
 
     def where(self, is_kept: Bool) -> Self:
         """Return the table with some of its rows: bool (n,)."""
@@ -363,12 +409,6 @@ class LogTable:
         return self.where(is_named.to_numpy(zero_copy_only=False))
 
 
-def fixes_in(table: LogTable, notes: Sequence[str] = ()) -> RawFixes:
-    """Return the fixes that a table has."""
-    x, y = table.numbers("x"), table.numbers("y")
-    return RawFixes(table.stamps(), x, y, table.headings(), list(notes))
-
-
 def _of_tag(table: LogTable, tag: str | None) -> tuple[LogTable, list[str]]:
     """Return the rows of one tag, and notes."""
     if not table.rows.num_rows:
@@ -382,45 +422,6 @@ def _of_tag(table: LogTable, tag: str | None) -> tuple[LogTable, list[str]]:
     of_tag = table.of("id", tag)
     others = len(table.line) - len(of_tag.line)
     return of_tag, [f"{others} fixes of other ids were left out"] if others else []
-
-
-def numbers_of(table: pa.Table, name: str, path: Path, line: I64) -> F64:
-    """Return a column of numbers, float64 (n,); NaN where it is empty."""
-    column = table[name]
-    if pa.types.is_string(column.type) or pa.types.is_large_string(column.type):
-        for at, text in zip(line.tolist(), column.to_pylist(), strict=True):
-            try:
-                float(text or "nan")
-            except ValueError:
-                raise LogError(
-                    f"{path}, line {at}: expected a number in column {name!r}, got"
-                    f" {one_line(text)!r}"
-                ) from None
-        column = pc.cast(pc.if_else(pc.equal(column, ""), "nan", column), pa.float64())
-    try:
-        numbers = pc.fill_null(pc.cast(column, pa.float64()), float("nan"))
-    except pa.ArrowException:
-        raise LogError(f"{path}: column {name!r} holds {column.type}, not numbers") from None
-    return numbers.to_numpy().astype(np.float64)
-
-
-def stamps_of(column: pa.ChunkedArray, path: Path, line: I64) -> Stamps:
-    """Return the times in a column; those with a zone are UTC."""
-    if column.null_count:
-        empty = np.flatnonzero(pc.is_null(column).combine_chunks().to_numpy(zero_copy_only=False))
-        raise LogError(f"{path}, line {line[empty[0]]}: it has no time")
-    kind: Any = column.type
-    if pa.types.is_string(kind) or pa.types.is_large_string(kind):
-        values, has_zone = _parse_texts(column.to_pylist(), path, line)
-        return Stamps(values, line, True, has_zone)
-    if pa.types.is_timestamp(kind):
-        values = pc.cast(column, pa.timestamp("us", kind.tz), safe=False)
-        time_us = pc.cast(values, pa.int64()).to_numpy()
-        return Stamps(time_us, line, True, kind.tz is not None)
-    if pa.types.is_integer(kind) or pa.types.is_floating(kind):
-        values, has_date = _scale_numbers(column.to_numpy(), path, line)
-        return Stamps(values, line, has_date, has_date)
-    raise LogError(f"{path}: expected times as text, timestamps or numbers, got {kind}")
 
 
 def _check_times(time_us: I64, path: Path, line: I64, *, has_date: bool) -> None:

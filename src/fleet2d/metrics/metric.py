@@ -78,6 +78,24 @@ def nested(numbers: Mapping[tuple[str, str], Any]) -> dict[str, Any]:
     return results
 
 
+SEPARATOR = " · "  # between the parts of the name of a number
+
+
+def flat(result: Any, name: str = "") -> list[tuple[str, Any]]:
+    """Return nested results of metrics as rows (name, value).
+
+    >>> flat({"distance": {"ana": 334.25}})
+    [('distance · ana', 334.25)]
+    """
+    if not isinstance(result, Mapping):
+        return [(name, result)]
+    return [
+        row
+        for key, value in result.items()
+        for row in flat(value, f"{name}{SEPARATOR}{key}" if name else str(key))
+    ]
+
+
 class UnknownPlaces:
     """The steps at which nobody knows where a user is, as in the gaps of a log."""
 

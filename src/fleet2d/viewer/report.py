@@ -2,7 +2,7 @@
 
 import base64
 import html
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from contextlib import suppress
 from datetime import timedelta
 from functools import partial
@@ -13,6 +13,7 @@ import yaml
 
 from fleet2d.configuration.units import format_duration
 from fleet2d.errors import ArtifactError, InputError
+from fleet2d.metrics.metric import flat
 from fleet2d.runs.run import Run
 from fleet2d.runtime.clock import DAY
 from fleet2d.viewer.notebook import figure_png
@@ -62,7 +63,7 @@ def report_html(run: Run) -> str:
         _what_ran(run),
         _notes(run),
         "<h2>Metrics</h2>",
-        _table(list(flat_metrics(run.metrics))) if run.metrics else "<p>The run has none.</p>",
+        _metrics(run),
         "<h2>Figures</h2>",
         *_figures(run),
         "<h2>Timeline</h2>",
@@ -97,18 +98,12 @@ def _notes(run: Run) -> str:
     return "<ul>" + "".join(f"<li>{html.escape(note)}</li>" for note in run.notes) + "</ul>"
 
 
-def flat_metrics(value: Any, name: str = "") -> list[tuple[str, str]]:
-    """Return nested results of metrics as rows (name, value).
-
-    >>> flat_metrics({"distance": {"ana": 334.25}})
-    [('distance · ana', '334.2')]
-    """
-    if isinstance(value, Mapping):
-        rows = []
-        for key, part in value.items():
-            rows += flat_metrics(part, f"{name} · {key}" if name else str(key))
-        return rows
-    return [(name, f"{value:.4g}" if isinstance(value, float) else str(value))]
+def _metrics(run: Run) -> str:
+    texts = [
+        (name, f"{value:.4g}" if isinstance(value, float) else str(value))
+        for name, value in flat(run.metrics)
+    ]
+    return _table(texts) if run.metrics else "<p>The run has none.</p>"
 
 
 def _table(rows: list[tuple[str, str]]) -> str:
