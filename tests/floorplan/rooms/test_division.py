@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import shapely
-from shapely import Polygon
+from shapely import Polygon, affinity
 
 from fleet2d.floorplan.load import load_floorplan
 from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
@@ -159,6 +159,27 @@ def test_niche_behind_a_narrow_gap_is_no_room() -> None:
 
     assert ["unknown_0"] == [room.name for room in plan.rooms]
     assert () == plan.doorways
+
+
+@pytest.mark.parametrize("degrees", [0, 30])
+@pytest.mark.parametrize(
+    ("furniture", "rooms"),
+    [((4.1, 2.6, 4.9, 3.6), 2), ((3.4, 2.6, 4.7, 5.0), 1)],
+    ids=["wall with a cupboard", "table"],
+)
+def test_wall_between_two_doorways_bounds_rooms_with_a_cupboard_at_it(
+    furniture: Box, rooms: int, degrees: float
+) -> None:
+    """A table of about the same size stands in the middle of a single room."""
+    stubs = [shapely.box(4, 1, 4.1, 1.6), shapely.box(4, 6, 4.1, 7)]
+    walls = [shapely.box(4, 2.6, 4.1, 5.0)] if rooms == 2 else []
+    free = shapely.box(1, 1, 7, 7) - shapely.union_all([*stubs, *walls, shapely.box(*furniture)])
+
+    plan = FloorPlan.build(
+        "home", affinity.rotate(free, degrees, origin=(4, 4)), doorways=None, regions_are="none"
+    )
+
+    assert rooms == len(plan.rooms)
 
 
 MAPS = {

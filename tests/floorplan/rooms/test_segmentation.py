@@ -1,10 +1,18 @@
 """Chambers that are too small to be rooms are joined to others."""
 
+from dataclasses import replace
+
 import numpy as np
+import pytest
 import shapely
 
 from fleet2d.floorplan.plan import FloorPlan
-from fleet2d.floorplan.rooms.segmentation import Chambers, Link, segment_rooms
+from fleet2d.floorplan.rooms.segmentation import (
+    Chambers,
+    Link,
+    WallDirections,
+    segment_rooms,
+)
 
 CELL = 0.1
 
@@ -44,6 +52,41 @@ def test_gap_among_furniture_is_no_room_though_it_is_as_large_as_a_toilet() -> N
     both.of_cell[:5, -41:-1] = 1  # 0.5 m deep
 
     assert [11.0] == areas(segment_rooms(both, [False], [0.9], CELL))
+
+
+STRAIGHT = WallDirections.of([shapely.box(0, 0, 5000, 5000)], 640)
+
+
+@pytest.mark.parametrize(
+    ("width", "straight", "found"),
+    [(0.8, True, [9.0, 6.0]), (0.98, True, [15.0]), (0.98, False, [9.0, 6.0])],
+)
+def test_corridor_with_straight_walls_goes_on_past_the_doors_on_either_side(
+    width: float, straight: bool, found: list[float]
+) -> None:
+    """A line from a door frame to the opposite wall is as wide as the corridor, 1 m."""
+    both = chambers(9.0, 6.0, links=(Link(0, (0, 1)),))
+    directions = replace(STRAIGHT, straight=straight)
+    across = [((0, 0), (0, 640))]
+
+    assert found == areas(segment_rooms(both, [False], [width], CELL, directions, across))
+
+
+@pytest.mark.parametrize(
+    ("end", "straight", "found"),
+    [
+        ((0, 500), False, [9.0, 3.0]),
+        ((500, 500), False, [12.0]),
+        ((500, 500), True, [9.0, 3.0]),
+    ],
+)
+def test_small_space_behind_a_slanted_gap_in_ragged_walls_lies_among_furniture(
+    end: tuple[int, int], straight: bool, found: list[float]
+) -> None:
+    both = chambers(9.0, 3.0, links=(Link(0, (0, 1)),))
+    directions, gap = replace(STRAIGHT, straight=straight), [((0, 0), end)]
+
+    assert found == areas(segment_rooms(both, [False], [0.8], CELL, directions, gap))
 
 
 def test_chamber_without_a_link_stays_a_room_however_small() -> None:

@@ -1,29 +1,42 @@
 """Passages: where free space narrows, and opens out again."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from shapely import Polygon
+from shapely import Polygon, affinity
 from tests.thorough import examples
 
 from fleet2d.floorplan.mesh import Segment, build_mesh
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.rooms import segmentation
-from fleet2d.floorplan.rooms.segmentation import MAX_DOOR_M, MIN_DOOR_M, find_passages
+from fleet2d.floorplan.rooms.segmentation import (
+    MAX_DOOR_M,
+    MIN_DOOR_M,
+    WallDirections,
+    find_passages,
+)
+from fleet2d.kernels import Mesh
 
 UNITS = 1280.0
 
 
-def passages(free: Polygon, *, gaps_only: bool = True) -> list[Segment]:
-    """Search free space in metres, with corners on multiples of 5 cm and all above zero."""
+def on_lattice(free: Polygon) -> tuple[Polygon, Mesh]:
+    """Return free space in metres, with corners on multiples of 5 cm, on the lattice."""
     polygon = shapely.orient_polygons(shapely.transform(free, lambda xy: np.rint(xy * 20) * 64))
     assert isinstance(polygon, Polygon)
-    mesh = build_mesh([polygon], 400, 400)
-    return find_passages(mesh, [polygon], UNITS, gaps_only=gaps_only)
+    return polygon, build_mesh([polygon], 400, 400)
+
+
+def passages(free: Polygon, *, gaps_only: bool = True) -> list[Segment]:
+    """Search free space in metres, with corners on multiples of 5 cm and all above zero."""
+    polygon, mesh = on_lattice(free)
+    directions = None if gaps_only else WallDirections.of([polygon], UNITS)
+    return find_passages(mesh, [polygon], UNITS, directions)
 
 
 def ends(passage: Segment) -> set[tuple[float, float]]:
@@ -101,13 +114,58 @@ def test_thick_wall_has_one_doorway() -> None:
     assert 1 == len(passages(rooms((1, 1, 4, 4), (4.4, 1, 7, 4), (4.0, 2.0, 4.4, 2.9))))
 
 
-def test_opening_that_is_no_gap_in_a_wall_counts_only_on_request() -> None:
-    """The way from the end of one wall to that of another is in line with neither."""
-    walls = shapely.union_all([shapely.box(0, 4, 4, 4.1), shapely.box(5.5, 0, 5.6, 3)])
-    free = shapely.difference(shapely.box(1, 1, 10, 7), walls)
+STUBS = shapely.union_all([shapely.box(0, 4, 4, 4.1), shapely.box(5.5, 0, 5.6, 3)])
+BLOCKS = shapely.union_all([shapely.box(0, 4, 4, 8), shapely.box(5.5, 0, 10, 3)])
 
-    assert [] == passages(free)
-    assert MAX_DOOR_M < width(passages(free, gaps_only=False)[0])
+
+def test_opening_in_line_with_no_wall_is_no_gap_in_one() -> None:
+    """The way from the end of one wall to that of another is in line with neither."""
+    assert [] == passages(shapely.difference(shapely.box(1, 1, 10, 7), STUBS))
+
+
+@pytest.mark.parametrize(
+    ("walls", "straight", "counts"),
+    [(STUBS, True, True), (STUBS, False, True), (BLOCKS, True, False), (BLOCKS, False, True)],
+)
+def test_slanted_opening_in_straight_walls_lies_between_the_ends_of_two_walls(
+    walls: Polygon, straight: bool, counts: bool
+) -> None:
+    """A way from the corner of a cupboard to that of another is one only in ragged walls."""
+    polygon, mesh = on_lattice(shapely.difference(shapely.box(1, 1, 10, 7), walls))
+    directions = replace(WallDirections.of([polygon], UNITS), straight=straight)
+
+    slanted = [
+        line
+        for line in find_passages(mesh, [polygon], UNITS, directions)
+        if not directions.are_main(np.array([[*line[0], *line[1]]])).any()
+    ]
+
+    assert counts == any(MAX_DOOR_M < width(line) for line in slanted)
+
+
+@pytest.mark.parametrize("degrees", [0, 17, 45])
+def test_main_directions_are_those_of_most_walls_however_they_are_turned(degrees: float) -> None:
+    home = affinity.rotate(rooms(LEFT, RIGHT, (4.0, 2.0, 4.1, 2.9)), degrees, origin=(5, 5))
+    directions = WallDirections.of([shapely.transform(home, lambda xy: xy * UNITS)], UNITS)
+    at = np.radians([degrees, degrees + 90, degrees + 30])
+    lines = np.zeros((3, 4), np.int64)
+    lines[:, 2:] = np.rint(1000 * np.stack([np.cos(at), np.sin(at)], axis=1))
+
+    assert directions.straight
+    assert [True, True, False] == directions.are_main(lines).tolist()
+
+
+def test_walls_with_teeth_are_ragged_but_a_round_wall_is_straight() -> None:
+    """A circle runs in all directions alike, so any passage is in line with it."""
+    teeth = [(k / 2, 10 + 0.3 * (k % 2)) for k in range(20, -1, -1)]
+    toothed = Polygon([(0, 0), (10, 0), *((y, x) for x, y in teeth[::-1]), *teeth])
+
+    straight = [
+        WallDirections.of([shapely.transform(shape, lambda xy: xy * UNITS)], UNITS).straight
+        for shape in (toothed, shapely.Point(5, 5).buffer(4))
+    ]
+
+    assert [False, True] == straight
 
 
 @pytest.mark.parametrize("batch", [1, 3, 10**6])

@@ -38,6 +38,7 @@ from fleet2d.floorplan.rooms.segmentation import (
     MAX_DOOR_M,
     MIN_DOOR_M,
     Chambers,
+    WallDirections,
     cut_chambers,
     find_passages,
     segment_rooms,
@@ -321,8 +322,9 @@ a point each millimetre, it straightens the walls first …"""
 STRAIGHTENED_M = (0.01, 0.02, 0.04, 0.08, 0.16)
 """… within the first of these tolerances that leaves few enough corners, or within the last."""
 ISLAND_M, WALL_M, THICK_M = 3.0, 1.2, 0.25
-"""A free-standing obstacle counts as a wall from a length of `ISLAND_M` on, or of `WALL_M` if its
-thickness is at most `THICK_M`; shorter ones are columns or furniture."""
+"""A free-standing obstacle counts as a wall from a length of `ISLAND_M` on, or of `WALL_M` if it is
+at most `THICK_M` thick, or parts of it are over such a length, as of a wall with a cupboard at it;
+shorter ones are columns or furniture."""
 
 
 @dataclass(frozen=True)
@@ -332,10 +334,12 @@ class Passages:
     Attributes:
         segments: Where they are [lattice], exactly from wall to wall.
         is_opening: Whether each is an opening, which is wider than a doorway.
+        directions: Main directions of the walls, if rooms are found by them.
     """
 
     segments: list[Segment]
     is_opening: list[bool]
+    directions: WallDirections | None
 
 
 def search_passages(
@@ -350,28 +354,40 @@ def search_passages(
     walls = [_without_islands(polygon, lattice.units_per_m) for polygon in polygons]
     if len(walls) > 1:  # one may lie inside a former island of another
         walls = shapely.orient_polygons(shapely.get_parts(shapely.union_all(walls))).tolist()
+    directions = WallDirections.of(walls, lattice.units_per_m) if kind == "none" else None
     walls = _with_few_corners(walls, lattice.units_per_m)
     mesh = build_mesh(walls, lattice.columns, lattice.rows)
-    narrow = find_passages(mesh, walls, lattice.units_per_m, gaps_only=kind != "none")
+    narrow = find_passages(mesh, walls, lattice.units_per_m, directions)
     lines = [_line(lattice, segment) for segment in narrow]
     polygons, fitted, _ = fit_lines(lattice, polygons, lines)
     segments = [segment for segment in fitted if segment is not None]
     limit2 = (MAX_DOOR_M * lattice.units_per_m) ** 2
     is_opening = [(x1 - x0) ** 2 + (y1 - y0) ** 2 > limit2 for (x0, y0), (x1, y1) in segments]
-    return polygons, Passages(segments, is_opening)
+    return polygons, Passages(segments, is_opening, directions)
 
 
 def _without_islands(polygon: Polygon, units_per_m: float) -> Polygon:
     """Return the polygon without its small holes: furniture and columns are not where rooms end."""
     if not polygon.interiors:
         return polygon
-    islands = np.array([Polygon(hole) for hole in polygon.interiors])
-    bounds = shapely.bounds(islands) / units_per_m
-    length = (bounds[:, 2:] - bounds[:, :2]).max(axis=1)
-    thickness = 2 * shapely.area(islands) / shapely.length(islands) / units_per_m
-    large = length >= np.where(thickness <= THICK_M, WALL_M, ISLAND_M)
-    holes = [hole for hole, is_large in zip(polygon.interiors, large, strict=True) if is_large]
+    holes = [hole for hole in polygon.interiors if _is_wall(Polygon(hole), units_per_m)]
     return Polygon(polygon.exterior, holes)
+
+
+def _is_wall(island: Polygon, units_per_m: float) -> bool:
+    """Return whether a free-standing obstacle is a wall, or furniture with a wall."""
+    if 2 * shapely.minimum_bounding_radius(island) < WALL_M * units_per_m:
+        return False
+    box = shapely.get_coordinates(shapely.oriented_envelope(island)) / units_per_m
+    length = max(math.dist(box[0], box[1]), math.dist(box[1], box[2]))
+    if length >= ISLAND_M or length < WALL_M:
+        return length >= ISLAND_M
+    if 2 * island.area <= THICK_M * units_per_m * island.length:
+        return True
+    half = THICK_M / 2 * units_per_m
+    thick = island.buffer(-half, join_style="mitre").buffer(1.01 * half, join_style="mitre")
+    thin = shapely.length(shapely.get_parts(island.difference(thick))) / 2 / units_per_m
+    return float(thin[thin >= 2 * THICK_M].sum()) >= WALL_M
 
 
 def _with_few_corners(walls: list[Polygon], units_per_m: float) -> list[Polygon]:
@@ -400,7 +416,14 @@ def divide(
     chambers = cut_chambers(lattice, polygons, mesh, free, passages.segments)
     if not regions:
         widths = [math.dist(*segment) / lattice.units_per_m for segment in passages.segments]
-        rooms = segment_rooms(chambers, passages.is_opening, widths, lattice.cell)
+        rooms = segment_rooms(
+            chambers,
+            passages.is_opening,
+            widths,
+            lattice.cell,
+            passages.directions,
+            passages.segments,
+        )
         return number_rooms(lattice, rooms)
     return label_rooms(lattice, free, regions, chambers, passages)
 

@@ -172,7 +172,10 @@ def _fit(walls: list[Polygon], ends: F64, reach: float) -> tuple[list[Polygon], 
     if index is None:
         return None
     far = (0.5 + reach / length) * along
-    jambs = [_jamb(walls[index], middle, middle + side * far) for side in (-1, 1)]
+    jambs = [
+        _jamb(walls[index], middle, end, middle + side * far)
+        for end, side in zip(ends, (-1, 1), strict=True)
+    ]
     if jambs[0] is None or jambs[1] is None or jambs[0] == jambs[1]:
         return None
     line = LineString([jambs[0], jambs[1]])
@@ -186,16 +189,19 @@ def _fit(walls: list[Polygon], ends: F64, reach: float) -> tuple[list[Polygon], 
     return changed, line
 
 
-def _jamb(polygon: Polygon, start: F64, end: F64) -> tuple[int, int] | None:
-    """Return the even lattice point where the way from `start` to `end` first meets a wall."""
-    hits = shapely.get_coordinates(shapely.intersection(polygon.boundary, LineString([start, end])))
-    if len(hits) == 0:
-        return None
-    nearest = hits[np.argmin(((hits - start) ** 2).sum(axis=1))]
+def _jamb(polygon: Polygon, start: F64, end: F64, far: F64) -> tuple[int, int] | None:
+    """Return the even lattice point where the way from `start` by `end` to `far` meets a wall.
+
+    A way that passes beside the corner at `end`, as along a slanted wall, ends there.
+    """
+    hits = shapely.get_coordinates(shapely.intersection(polygon.boundary, LineString([start, far])))
+    nearest = hits[np.argmin(((hits - start) ** 2).sum(axis=1))] if len(hits) else end
     corners = shapely.get_coordinates(polygon)
     away = np.abs(corners - nearest).max(axis=1)
     if away.min() <= CORNER_DISTANCE:
         x, y = corners[np.argmin(away)].tolist()
+    elif len(hits) == 0:
+        return None
     else:
         x, y = (2 * np.rint(nearest / 2)).tolist()
     return int(x), int(y)

@@ -12,6 +12,8 @@ Survey, Implementation, and Analysis" (ICRA 2016).
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import chain
+from typing import Any
 
 import numpy as np
 import shapely
@@ -63,6 +65,63 @@ BATCH = 64
 """Corners that are looked at together: very jagged walls have millions of pairs of them."""
 PER_CORNER = 6
 """Number of passages that are checked for each corner, the shortest first."""
+NOISE_M = 0.12
+"""Walls are straightened within this before their directions are compared."""
+SPREAD_DEG = 8
+"""Walls whose directions differ by less than this add to each other's."""
+STRAIGHT_SHARE = 0.7
+"""Walls are straight if at least this share of their length runs in main directions."""
+END_M, AROUND, AROUND_FREE = 0.5, 24, 21
+"""A wall ends at a corner if so many of as many places at this distance round it are free."""
+
+
+@dataclass(frozen=True)
+class WallDirections:
+    """The directions in which the walls of a plan run; walls at a right angle count as one.
+
+    Attributes:
+        weight: For each degree from 0 to 89, how much wall runs in that direction, float64 (90,):
+            1 if at least half as much as in the commonest one.
+        straight: Whether most of the walls run in main directions; else they are ragged, as those
+            of cluttered maps are.
+    """
+
+    weight: F64
+    straight: bool
+
+    @classmethod
+    def of(cls, polygons: Sequence[Polygon], units_per_m: float) -> "WallDirections":
+        """Return the directions of the walls around free space [lattice].
+
+        >>> square = shapely.box(0, 0, 512, 512)
+        >>> WallDirections.of([square], 128).are_main(np.array([[0, 0, 0, 9], [0, 0, 9, 9]]))
+        array([ True, False])
+        """
+        simple = shapely.simplify(shapely.MultiPolygon(list(polygons)), NOISE_M * units_per_m)
+        rings = shapely.get_rings(shapely.get_parts(simple))
+        sides = np.concatenate([np.diff(shapely.get_coordinates(ring), axis=0) for ring in rings])
+        length, degrees = np.sqrt((sides * sides).sum(axis=1)), _degrees(sides)
+        square = np.bincount(degrees, weights=length * length, minlength=90)
+        shares = [1 - abs(k) / SPREAD_DEG for k in range(1 - SPREAD_DEG, SPREAD_DEG)]
+        weight = np.convolve(np.tile(square, 3), shares, mode="same")[90:180]
+        weight = np.minimum(2 * weight / weight.max(), 1)
+        main = length[weight[degrees] >= 0.5].sum()
+        return cls(weight, bool(main >= STRAIGHT_SHARE * length.sum()))
+
+    def are_main(self, lines: I64) -> Bool:
+        """Return which lines (x0, y0, x1, y1) run in a main direction of the walls."""
+        return self.weights(lines) >= 0.5
+
+    def weights(self, lines: I64) -> F64:
+        """Return how much wall runs in the direction of each line, at most 1."""
+        return self.weight[_degrees(lines[:, 2:] - lines[:, :2])]
+
+
+def _degrees(spans: NDArray[Any]) -> I64:
+    """Return the directions of spans (n, 2) in whole degrees modulo 90."""
+    turned = np.degrees(np.arctan2(spans[:, 1], spans[:, 0]))
+    # Rounded twice, so that the last bit of a machine's arctangent doesn't matter.
+    return np.rint(turned.round(9)).astype(np.int64) % 90
 
 
 @dataclass(frozen=True)
@@ -83,16 +142,20 @@ class _Walls:
 
 
 def find_passages(
-    mesh: Mesh, polygons: Sequence[Polygon], units_per_m: float, *, gaps_only: bool = True
+    mesh: Mesh,
+    polygons: Sequence[Polygon],
+    units_per_m: float,
+    directions: WallDirections | None = None,
 ) -> list[Segment]:
-    """Return the lines at which free space narrows and opens out on both sides, shortest first.
+    """Return the lines at which free space narrows and opens out on both sides, likeliest first.
 
     Args:
         mesh: The free space.
         polygons: The same, outer rings counter-clockwise [lattice].
         units_per_m: Lattice units to a metre.
-        gaps_only: Whether openings wider than a doorway must be gaps in a wall; if not, any
-            narrowing counts.
+        directions: Main directions of the walls. In straight walls, openings wider than a doorway
+            must run in these or between the ends of two walls, and passages in main directions rank
+            before others. None if such openings must be gaps in a wall.
 
     Returns:
         Lines that don't touch each other [lattice]; their ends have even coordinates, and are on
@@ -101,19 +164,36 @@ def find_passages(
     walls = _walls(polygons)
     corners = np.flatnonzero(walls.reflex)
     batches = np.array_split(corners, -(-len(corners) // BATCH) or 1)
-    lines = _shortest_first(
+    straight = directions if directions is not None and directions.straight else None
+    wall_ends = np.zeros(0, np.int64)
+    if straight is not None:
+        wall_ends = _wall_ends(mesh, walls.start[corners], units_per_m)
+    lines = _shortest_of_each_corner(
         np.concatenate([
-            *_corner_to_corner(walls, corners, batches, units_per_m),
-            *_to_walls(walls, batches, units_per_m),
-        ])
+            _shortest_of_each_corner(_of_width(lines, units_per_m, straight, wall_ends), straight)
+            for lines in chain(
+                _corner_to_corner(walls, corners, batches, units_per_m),
+                _to_walls(walls, batches, units_per_m),
+            )
+        ]),
+        straight,
     )  # fmt: skip
     lines = lines[_all_free(mesh, lines)]
     for side in (1, -1):
         lines = lines[_opens(mesh, lines, side, units_per_m)]
-    if gaps_only:
+    if directions is None:
         lines = lines[_in_a_wall(mesh, walls, lines, units_per_m)]
     apart = lines[_one_of_each(lines, units_per_m)].tolist()
     return [((x0, y0), (x1, y1)) for x0, y0, x1, y1 in apart]
+
+
+def _wall_ends(mesh: Mesh, corners: F64, units_per_m: float) -> I64:
+    """Return the keys of those corners (n, 2) at which a wall ends: nearly all round is free."""
+    turns = np.arange(AROUND) * (2 * np.pi / AROUND)
+    circle = np.stack([np.cos(turns), np.sin(turns)], axis=1).round(9) * (END_M * units_per_m)
+    places = np.rint(corners[:, None] + circle).astype(np.int64).reshape(-1, 2)
+    free = pairs_in_sight(mesh, places, places).reshape(-1, AROUND)
+    return _keys(corners[free.sum(axis=1) >= AROUND_FREE].astype(np.int64))
 
 
 def _walls(polygons: Sequence[Polygon]) -> _Walls:
@@ -146,7 +226,7 @@ def _corner_to_corner(
         shortest = _ends_well(walls, first, walls.start[second])
         shortest &= _ends_well(walls, second, walls.start[first])
         lines = np.hstack([walls.start[first[shortest]], walls.start[second[shortest]]])
-        yield _shortest_first(_of_width(lines.astype(np.int64), units_per_m))
+        yield lines.astype(np.int64)
 
 
 def _to_walls(walls: _Walls, batches: Sequence[Corners], units_per_m: float) -> Iterator[I64]:
@@ -165,7 +245,7 @@ def _to_walls(walls: _Walls, batches: Sequence[Corners], units_per_m: float) -> 
         foot = 2 * np.rint((at + share[:, None] * along) / 2)
         shortest = _ends_well(walls, corner, foot)
         lines = np.hstack([walls.start[corner[shortest]], foot[shortest]])
-        yield _shortest_first(_of_width(lines.astype(np.int64), units_per_m))
+        yield lines.astype(np.int64)
 
 
 def _around(points: F64, units_per_m: float) -> NDArray[np.object_]:
@@ -186,10 +266,17 @@ def _ends_well(walls: _Walls, corner: NDArray[np.intp], other: F64) -> Bool:
     return is_shortest
 
 
-def _of_width(lines: I64, units_per_m: float) -> I64:
+def _of_width(
+    lines: I64, units_per_m: float, directions: WallDirections | None, wall_ends: I64
+) -> I64:
+    """Return the lines as wide as a passage; those wider than a doorway run in main directions."""
     length2 = _length2(lines)
-    low, high = (MIN_DOOR_M * units_per_m) ** 2, (MAX_OPENING_M * units_per_m) ** 2
-    return lines[(length2 >= low) & (length2 <= high)]
+    low, door, high = ((w * units_per_m) ** 2 for w in (MIN_DOOR_M, MAX_DOOR_M, MAX_OPENING_M))
+    fits = (length2 >= low) & (length2 <= high)
+    if directions is not None:
+        both_end = np.isin(_keys(lines[:, :2]), wall_ends) & np.isin(_keys(lines[:, 2:]), wall_ends)
+        fits &= directions.are_main(lines) | (length2 <= door) | both_end
+    return lines[fits]
 
 
 def _length2(lines: I64) -> I64:
@@ -197,9 +284,15 @@ def _length2(lines: I64) -> I64:
     return (span * span).sum(axis=1)
 
 
-def _shortest_first(lines: I64) -> I64:
-    """Sort the lines by length, and drop all but the shortest from each corner."""
-    order = np.lexsort((*lines.T[::-1], _length2(lines)))
+def _shortest_of_each_corner(lines: I64, directions: WallDirections | None) -> I64:
+    """Sort the lines by length, and drop all but the shortest from each corner.
+
+    Those off the main directions count as up to twice as long.
+    """
+    length2: NDArray[Any] = _length2(lines)
+    if directions is not None:
+        length2 = length2 * (2 - directions.weights(lines)) ** 2
+    order = np.lexsort((*lines.T[::-1], length2))
     ordered = lines[order]
     keys = _keys(ordered[:, :2])
     by_corner = np.argsort(keys, kind="stable")
@@ -442,16 +535,24 @@ NARROW_ROOM_M2, NARROW_ROOM_M = 3.0, 0.8
 """Least area of a room in which no disc of this diameter has a place; smaller ones are gaps among
 furniture."""
 MIN_OPEN_ROOM_M2 = 4.0
-"""Least area of a room behind an opening; a smaller space is an alcove."""
-
+"""Least area of a room behind an opening, or in ragged walls behind a doorway that runs in no main
+direction; a smaller space is an alcove, or lies among furniture."""
 
 WIDE_SHARE = 1.1
 """An opening that is wider than this share of the narrower space beside it separates no rooms: what
 is behind it is the same corridor or hall, past a column, a niche or a cupboard."""
+ACROSS_SHARE, ACROSS_DOOR_SHARE = 0.85, 0.95
+"""In straight walls, an opening or a doorway that is wider than this share of the wider space
+beside it lies across a corridor, between the doors on either side."""
 
 
 def segment_rooms(
-    chambers: Chambers, is_opening: Sequence[bool], widths_m: Sequence[float], cell: float
+    chambers: Chambers,
+    is_opening: Sequence[bool],
+    widths_m: Sequence[float],
+    cell: float,
+    directions: WallDirections | None = None,
+    lines: Sequence[Segment] = (),
 ) -> I64:
     """Join chambers into rooms.
 
@@ -460,27 +561,39 @@ def segment_rooms(
         is_opening: Whether each line at which the chambers were cut is an opening, not a doorway.
         widths_m: The length of each such line [m].
         cell: Side of a cell [m].
+        directions: Main directions of the walls, or None if they don't matter.
+        lines: Each such line [lattice], with `directions`.
 
     Returns:
         The room of each cell, by decreasing size; -1 where not free. int64 (rows, columns).
     """
     sizes = np.bincount(chambers.of_cell[chambers.of_cell >= 0], minlength=chambers.count)
     areas, across = sizes * cell**2, _clear_widths(chambers, cell)
+    is_main = np.ones(len(widths_m), np.bool_)
+    if directions is not None:
+        is_main = directions.are_main(np.reshape(np.array(lines, np.int64), (-1, 4)))
+    straight = directions is not None and directions.straight
     owner = np.arange(chambers.count)
     while True:
         candidates = []
         for link in chambers.links:
             one, other = (int(owner[chamber]) for chamber in link.chambers)
-            opening = is_opening[link.line]
-            is_wide = widths_m[link.line] > WIDE_SHARE * min(across[one], across[other])
-            least = MIN_OPEN_ROOM_M2 if opening else MIN_ROOM_M2
+            opening, width = is_opening[link.line], widths_m[link.line]
+            narrow, wide = sorted((across[one], across[other]))
+            is_wide = opening and width > WIDE_SHARE * narrow
+            if straight:
+                is_wide |= width > (ACROSS_SHARE if opening else ACROSS_DOOR_SHARE) * wide
+            is_door = not opening and (straight or is_main[link.line])
+            least = MIN_ROOM_M2 if is_door else MIN_OPEN_ROOM_M2
             for room, into in ((one, other), (other, one)):
                 is_gap = areas[room] < NARROW_ROOM_M2 and across[room] < NARROW_ROOM_M
-                if room != into and (areas[room] < least or is_gap or (opening and is_wide)):
-                    candidates.append((areas[room], not opening, link.line, room, into))
+                if room != into and (areas[room] < least or is_gap or is_wide):
+                    later = not (straight and opening and is_wide) or bool(is_main[link.line])
+                    candidates.append((later, areas[room], not opening, link.line, room, into))
         if not candidates:
             break
-        # The smallest goes first, across an opening rather than a doorway.
+        # What a slanted opening cuts off goes first, lest it seem a corridor; then the smallest,
+        # across an opening rather than a doorway.
         *_, smallest, into = min(candidates)
         areas[into] += areas[smallest]
         across[into] = max(across[into], across[smallest])
