@@ -106,27 +106,10 @@ class RosbridgePeer:
             pose = _pose(x, y, heading)
             is_robot = name in self._robots
             parent, child = (f"{name}/odom", f"{name}/base_link") if is_robot else ("map", name)
-            transforms.append(
-                {
-                    "header": self._header(frame.step, parent),
-                    "child_frame_id": child,
-                    "transform": {
-                        "translation": pose["position"],
-                        "rotation": pose["orientation"],
-                    },
-                }
-            )
+            transforms.append(self._transform(frame.step, parent, child, pose))
             if is_robot:
-                transforms.append(
-                    {
-                        "header": self._header(frame.step, "map"),
-                        "child_frame_id": parent,
-                        "transform": {
-                            "translation": {"x": 0.0, "y": 0.0, "z": 0.0},
-                            "rotation": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0},
-                        },
-                    }
-                )
+                still = _pose(0.0, 0.0, 0.0)
+                transforms.append(self._transform(frame.step, "map", parent, still))
                 self._topics[f"/{name}/odom"].publish(self._odometry(frame.step, name, body))
                 self._topics[f"/{name}/scan"].publish(self._scan(frame.step, name, body))
         self._topics["/tf"].publish({"transforms": transforms})
@@ -134,6 +117,15 @@ class RosbridgePeer:
             seen = [r for t, r in frame.rows if t == "observations" and r["robot"] == robot]
             if seen:
                 self._topics[f"/{robot}/detections"].publish(self._detections(frame.step, seen))
+
+    def _transform(
+        self, step: int, parent: str, child: str, pose: dict[str, Any]
+    ) -> dict[str, Any]:
+        return {
+            "header": self._header(step, parent),
+            "child_frame_id": child,
+            "transform": {"translation": pose["position"], "rotation": pose["orientation"]},
+        }
 
     def _odometry(self, step: int, name: str, body: Any) -> dict[str, Any]:
         x, y, heading = body["x"], body["y"], body["heading"]

@@ -9,7 +9,6 @@ import json
 import struct
 from collections.abc import Callable, Iterator, Sequence
 from datetime import UTC
-from functools import cached_property
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -110,7 +109,7 @@ class RosMessages:
                 if "observations" in records.tables
             ),
             *(
-                Topic(f"/{name}", self._encoders[name][0])
+                Topic(f"/{name}", self._encoder(name)[0])
                 for name in records.tables
                 if name != "observations"
             ),
@@ -349,12 +348,14 @@ class RosMessages:
         box = self._new("vision_msgs/msg/BoundingBox3D", self._pose(*centre), size)
         return self._new("vision_msgs/msg/Detection3D", header, [likely], box, user)
 
-    @cached_property
-    def _encoders(self) -> "_Encoders":
-        return _Encoders(self)
+    def _encoder(self, table: str) -> tuple[str, Callable[[dict[str, Any]], bytes]]:
+        """Return the type of message for rows of a table, and the function that makes it."""
+        if table == "events":
+            return "rcl_interfaces/msg/Log", self.log_entry
+        return "std_msgs/msg/String", self.json_text
 
     def _rows(self, name: str, rows: Sequence[dict[str, Any]]) -> Block:
-        _, encode = self._encoders[name]
+        _, encode = self._encoder(name)
         times = [self._time(row["step"]) for row in rows]
         return self._block(f"/{name}", times, [encode(row) for row in rows])
 
@@ -376,17 +377,6 @@ class RosMessages:
     def json_text(self, row: dict[str, Any]) -> bytes:
         """Return a row of any table as JSON in a string."""
         return self._data(self._new("std_msgs/msg/String", json.dumps(row, default=str)))
-
-
-class _Encoders(dict[str, tuple[str, Callable[[dict[str, Any]], bytes]]]):
-    """The type of message and the function that makes it, for rows of a table."""
-
-    def __init__(self, messages: RosMessages) -> None:
-        super().__init__(events=("rcl_interfaces/msg/Log", messages.log_entry))
-        self._messages = messages
-
-    def __missing__(self, table: str) -> tuple[str, Callable[[dict[str, Any]], bytes]]:
-        return "std_msgs/msg/String", self._messages.json_text
 
 
 class Template:

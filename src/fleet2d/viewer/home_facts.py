@@ -115,20 +115,19 @@ def _rooms_facts(rooms: Sequence[Room]) -> list[RoomFacts]:
     counts: Counter[str] = Counter()
     facts = []
     for room in rooms:
-        facts.append(_room_facts(room, counts[room.type]))
+        number = counts[room.type]
+        facts.append(
+            RoomFacts(
+                name=room.name,
+                type=room.type,
+                color=room_color(room.type, number),
+                deep_color=deep_color(room.type, number),
+                anchor=room.anchor_xy,
+                area_m2=room.area_m2,
+            )
+        )
         counts[room.type] += 1
     return facts
-
-
-def _room_facts(room: Room, number: int) -> RoomFacts:
-    return RoomFacts(
-        name=room.name,
-        type=room.type,
-        color=room_color(room.type, number),
-        deep_color=deep_color(room.type, number),
-        anchor=room.anchor_xy,
-        area_m2=room.area_m2,
-    )
 
 
 _MOVE = re.compile(r"(.+) to \((\S+), (\S+)\)")

@@ -21,7 +21,7 @@ from fleet2d.viewer.home_facts import walls_facts
 from fleet2d.viewer.live import LiveRun
 from fleet2d.viewer.page_data import PageData, compact_json
 from fleet2d.viewer.run_facts import live_facts
-from fleet2d.viewer.served_runs import ServedRuns, json_answer, json_body, problem
+from fleet2d.viewer.served_runs import ServedRuns, endpoint, json_answer, json_body, problem
 
 MAX_BRANCHES = 4
 
@@ -119,10 +119,10 @@ class LiveRuns:
         """Return the routes of running simulations."""
         return [
             Route("/branch", self._begin, methods=["POST"]),
-            Route("/live/{number:int}/facts.json", self._facts),
-            Route("/live/{number:int}/frames", self._frames),
+            Route("/live/{number:int}/facts.json", endpoint(self._facts)),
+            Route("/live/{number:int}/frames", endpoint(self._frames)),
             Route("/live/{number:int}/order", self._order, methods=["POST"]),
-            Route("/live/{number:int}/walls/{walls:int}.json", self._walls),
+            Route("/live/{number:int}/walls/{walls:int}.json", endpoint(self._walls)),
         ]
 
     async def _begin(self, request: Request) -> Response:
@@ -138,28 +138,18 @@ class LiveRuns:
         body = await json_body(request)
         return body if isinstance(body, Response) else await run_in_threadpool(begin, body)
 
-    async def _facts(self, request: Request) -> Response:
-        def facts() -> Response:
-            try:
-                simulation = self._live(request.path_params["number"]).engine.simulation
-                return json_answer(compact_json(live_facts(simulation)))
-            except Fleet2DError as error:
-                return problem(str(error))
+    def _requested(self, request: Request) -> LiveRun:
+        return self._live(request.path_params["number"])
 
-        return await run_in_threadpool(facts)
+    def _facts(self, request: Request) -> Response:
+        return json_answer(compact_json(live_facts(self._requested(request).engine.simulation)))
 
-    async def _walls(self, request: Request) -> Response:
-        try:
-            mesh = self._live(request.path_params["number"]).engine.mesh
-            return json_answer(compact_json(walls_facts(mesh(request.path_params["walls"]))))
-        except InputError as error:
-            return problem(str(error))
+    def _walls(self, request: Request) -> Response:
+        mesh = self._requested(request).engine.mesh(request.path_params["walls"])
+        return json_answer(compact_json(walls_facts(mesh)))
 
-    async def _frames(self, request: Request) -> Response:
-        try:
-            live = self._live(request.path_params["number"])
-        except InputError as error:
-            return problem(str(error))
+    def _frames(self, request: Request) -> Response:
+        live = self._requested(request)
 
         def lines() -> Iterator[bytes]:
             for frames in live.frames():
@@ -172,7 +162,7 @@ class LiveRuns:
         if isinstance(body, Response):
             return body
         try:
-            live = self._live(request.path_params["number"])
+            live = self._requested(request)
             order = read_body(body, LIVE_ORDER, "the request is not a valid order")
         except InputError as error:
             return problem(str(error))

@@ -376,7 +376,7 @@ def _camera(name: str, camera: Mapping[str, Any]) -> CameraFacts:
 def _table_facts(run: Run, name: str) -> TableFacts:
     description = run.manifest["tables"].get(name)
     if description is None:  # the manifest of an unfinished run doesn't list its tables
-        description = {"rows": _rows_of(run, name), "columns": _columns_of(run, name)}
+        description = _description_of(run, name)
     path = None if run.directory is None else path_in(run.directory, f"{name}.parquet")
     return TableFacts(
         name=name,
@@ -395,21 +395,16 @@ def _table_facts(run: Run, name: str) -> TableFacts:
     )
 
 
-def _rows_of(run: Run, name: str) -> int:
-    try:
-        return int(run.tables[name].num_rows)
-    except ArtifactError:
-        return 0
-
-
-def _columns_of(run: Run, name: str) -> list[dict[str, str]]:
+def _description_of(run: Run, name: str) -> dict[str, Any]:
     from fleet2d.artifacts.arrow import spec_of
 
     try:
-        columns = spec_of(run.tables[name].schema).columns
+        table = run.tables[name]
+        columns = spec_of(table.schema).columns
     except ArtifactError:
-        return []
-    return [{"name": c.name, "kind": c.kind, "unit": c.unit} for c in columns]
+        return {"rows": 0, "columns": []}
+    facts = [{"name": c.name, "kind": c.kind, "unit": c.unit} for c in columns]
+    return {"rows": table.num_rows, "columns": facts}
 
 
 def _role(scenario: Mapping[str, Any], name: str) -> Role:

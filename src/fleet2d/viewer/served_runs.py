@@ -111,21 +111,33 @@ async def json_body(request: Request) -> bytes | Response:
     return await request.body()
 
 
+def endpoint(respond: Callable[[Request], Response]) -> Endpoint:
+    """Return an endpoint that works in a thread; its response to errors is their message."""
+
+    def work(request: Request) -> Response:
+        try:
+            return respond(request)
+        except Fleet2DError as error:
+            return problem(str(error))
+
+    async def serve(request: Request) -> Response:
+        return await run_in_threadpool(work, request)
+
+    return serve
+
+
 def _endpoint(runs: ServedRuns, respond: Callable[[PageData, Request], Response]) -> Endpoint:
-    """Return the endpoint of data of a run; its response to errors is their message."""
+    """Return the endpoint of data of a run."""
 
     def work(request: Request) -> Response:
         try:
             return respond(runs.data(request.path_params["number"]), request)
-        except Fleet2DError as error:
-            return problem(str(error))
         except (OSError, ValueError, KeyError) as error:
-            return problem(f"the run can't be read: its files are damaged ({error!r})")
+            raise ArtifactError(
+                f"the run can't be read: its files are damaged ({error!r})"
+            ) from error
 
-    async def endpoint(request: Request) -> Response:
-        return await run_in_threadpool(work, request)
-
-    return endpoint
+    return endpoint(work)
 
 
 def _facts(data: PageData, _: Request) -> Response:
