@@ -21,7 +21,7 @@ from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.formats.houseexpo import read_houseexpo
 from fleet2d.floorplan.load import load_floorplan
 from fleet2d.floorplan.plan import FloorPlan
-from fleet2d.floorplan.space import ROUNDING, Space
+from fleet2d.floorplan.space import ROUNDING, PointDistances, Space
 from fleet2d.kernels import F64, I64
 
 UNITS_PER_M = 1280
@@ -392,3 +392,17 @@ def test_distance_field_is_a_little_longer_than_the_shortest_way() -> None:
         way = np.sqrt((legs**2).sum(axis=1)).sum()
         assert way - 0.15 <= field[row, column] <= 1.09 * way + 0.3
     assert np.isinf(field[0, 0])
+
+
+def test_distances_of_points_are_the_same_measured_from_the_places_and_from_the_points() -> None:
+    plan = load_floorplan()
+    space, rng = Space(plan, 0.2), np.random.default_rng(0)
+    cells = np.argwhere(space.part_of_cell >= 0)
+    centre = plan.lattice.cell_centre
+    points = np.array([centre(*cell) for cell in rng.choice(cells, 4).tolist()])
+    rows, columns = (rng.integers(0, size, 20).tolist() for size in space.part_of_cell.shape)
+    distances = PointDistances(space, points)
+
+    for place in map(centre, rows, columns):  # free and not
+        assert np.array_equal(distances.of(place), space.distances(place, points))
+    assert np.isinf([distances.of(place) for place in map(centre, rows, columns)]).any()

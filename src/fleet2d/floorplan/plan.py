@@ -122,7 +122,7 @@ def read_only(array: A) -> A:
 def cells_of(mask: Bool) -> I64:
     """Return the cells (row, column) of a mask (rows, columns), int64 (n, 2), row by row.
 
-    NumPy's `argwhere` does so, too, but takes several times as long for two dimensions.
+    NumPy's `argwhere` does so, too, but takes more than twice as long for two dimensions.
 
     Example:
         >>> cells_of(np.array([[False, True], [True, False]])).tolist()

@@ -222,7 +222,7 @@ class Space:
         cells = np.asarray(places, np.int64).reshape(-1, 2)[:, ::-1] // SUB
         return walking_distance(self.part_of_cell >= 0, np.ascontiguousarray(cells))
 
-    def _metres(self, steps: I32) -> F64:
+    def _metres(self, steps: NDArray[np.signedinteger]) -> F64:
         return np.where(steps >= 0, steps * (self.plan.lattice.cell / 5), np.inf)
 
     def _way_in(self, x: int, y: int) -> tuple[int, int] | None:
@@ -274,6 +274,40 @@ class Space:
             after=r[reflex][first],
             simple=walls_meeting[vertex] == 1,
         )
+
+
+class PointDistances:
+    """The walking distances of some points from any place, as `Space.distances` measures them.
+
+    It measures from the place, until it has done so for as many places as there are points; then it
+    measures from each point once, as a way back is as long.
+
+    Attributes:
+        space: Where the body can be.
+
+    Example:
+        >>> import fleet2d
+        >>> space = fleet2d.Home(fleet2d.load_floorplan()).space(radius=0.2)
+        >>> (row, column), *_ = space.cells(0).tolist()
+        >>> place = space.plan.lattice.cell_centre(row, column)
+        >>> PointDistances(space, np.array([place])).of(place).tolist()
+        [0.0]
+    """
+
+    def __init__(self, space: Space, points: I64) -> None:
+        self.space, self._points, self._measured = space, points, 0
+        self._steps: NDArray[np.signedinteger] | None = None  # (rows, columns, points)
+
+    def of(self, place: PointXY) -> F64:
+        """Return the distances from a lattice point, float64 (points,) [m]."""
+        if self._steps is None and self._measured < len(self._points):
+            self._measured += 1
+            return self.space.distances(place, self._points)
+        if self._steps is None:
+            steps = np.stack([self.space._steps(point) for point in self._points], axis=-1)
+            self._steps = steps.astype(np.min_scalar_type(-int(steps.max())))  # half the memory
+        x, y = place
+        return self.space._metres(self._steps[y // SUB, x // SUB])
 
 
 @dataclass(frozen=True)

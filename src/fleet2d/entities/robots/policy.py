@@ -36,8 +36,10 @@ from fleet2d.entities.robots.approach import (
 from fleet2d.entities.robots.find import Sites
 from fleet2d.errors import ComponentError, InputError, PlacementError, extra
 from fleet2d.floorplan.plan import FloorPlan, Room, cells_of, read_only
+from fleet2d.floorplan.space import PointDistances
 from fleet2d.kernels import (
     F32,
+    F64,
     I32,
     I64,
     TURN,
@@ -157,7 +159,8 @@ class WaitingPoses:
         self.index, self.points, self.headings = home.cached(("standing", *key), self._choose)
         self._key = key
         self.number = {room: number for number, room in enumerate(self.index.tolist())}
-        self._ways: dict[object, RoomWays] = {}  # from the places where it was
+        self._distances: PointDistances | None = None  # in its present space
+        self._ways: dict[tuple[int, int, int], RoomWays] = {}  # from the places where it was in it
 
     def _choose(self) -> tuple[I64, I64, I64]:
         rooms = self._actor.reachable_rooms()
@@ -192,20 +195,26 @@ class WaitingPoses:
     def ways(self, actions: int) -> "RoomWays":
         """Return the ways from where the robot is to each room, for a number of actions."""
         actor = self._actor
+        space = actor.space
+        if self._distances is None or self._distances.space is not space:
+            key = ("distances of rooms", *self._key, space)
+            distances = actor.home.cached(key, lambda: PointDistances(space, self.points))
+            self._distances, self._ways = distances, {}
         x, y, _, _ = actor.state
-        here = x, y, actor.home.version, actor.space, actions
-        ways = self._ways.get(here)
+        ways = self._ways.get((x, y, actions))
         if ways is None:
-            key = ("standing ways", *self._key, actor.speed, *here)
-            ways = actor.home.cached(key, lambda: self._measure(x, y, actions))
             if len(self._ways) >= KEPT_WAYS:
                 self._ways.clear()
-            self._ways[here] = ways
+            ways = self._ways[x, y, actions] = self._measure(self._distances.of((x, y)), actions)
         return ways
 
-    def _measure(self, x: int, y: int, actions: int) -> "RoomWays":
+    def __getstate__(self) -> dict[str, Any]:
+        """Leave out what follows from the home."""
+        return {**self.__dict__, "_distances": None, "_ways": {}}
+
+    def _measure(self, metres: F64, actions: int) -> "RoomWays":
         actor = self._actor
-        seconds = actor.seconds(actor.space.distances((x, y), self.points))
+        seconds = actor.seconds(metres)
         mask = np.zeros(actions, np.bool_)
         mask[self.index] = np.isfinite(seconds)
         mask[-1] = True
