@@ -42,8 +42,8 @@ from fleet2d.scenario.model import Scenario
 from fleet2d.sight.camera import TableContext, stack_lenses
 
 # Slots of the cache of poses, which holds half as many. A round through a large home has a few
-# thousand poses.
-SLOTS = 1 << 14
+# thousand poses, a month of going to people ten thousand.
+SLOTS = 1 << 15
 # Most steps in one call of the kernel.
 MAX_BATCH_STEPS = 1 << 16
 
