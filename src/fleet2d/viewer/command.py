@@ -2,7 +2,7 @@
 
 from datetime import timedelta
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -46,20 +46,24 @@ def view(
     scenario, overrides = split(names)
     if scenario is not None and scenario.endswith("/"):
         raise RunDirectoryError(f"{scenario} does not exist: give a run directory or a scenario")
-    from fleet2d.viewer.page_server import watch_scenario
+    from fleet2d.engine.simulation import Simulation
+    from fleet2d.viewer.live import LiveRun
+    from fleet2d.viewer.page_server import PageServer
 
+    settings: dict[str, Any] = {} if seed is None else {"seed": seed}
     with restrict_to(trust, trust_dir):
-        run = watch_scenario(
-            scenario,
-            overrides,
-            seed=seed,
-            out=out,
-            port=port,
-            seen_at=seen_at or "",
-            open_browser=browser,
-            announce=_announce,
-        )
-    typer.echo(_where(run), err=True)
+        live = LiveRun(Simulation(scenario, *overrides, out=out, **settings), paused=True)
+        server = PageServer([], port=port, live=live, seen_at=seen_at or "")
+        live.start()
+        try:
+            server.show(open_browser=browser, announce=_announce)
+        finally:
+            live.end()
+            server.end_branches()
+    if live.failure is not None:
+        raise live.failure
+    assert live.run is not None
+    typer.echo(_where(live.run), err=True)
     raise typer.Exit(130)
 
 

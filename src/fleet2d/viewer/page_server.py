@@ -13,7 +13,6 @@ from contextlib import suppress
 from http import HTTPStatus
 from pathlib import Path
 from types import FrameType
-from typing import Any
 from urllib.parse import urlsplit
 
 from starlette.applications import Starlette
@@ -25,7 +24,6 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from fleet2d import __version__
 from fleet2d.bounds import one_line
-from fleet2d.engine.simulation import Simulation
 from fleet2d.errors import InputError, end_by_signal, extra
 from fleet2d.runs.run import Run
 from fleet2d.viewer.contract import SessionFacts
@@ -329,44 +327,3 @@ class PageServer:
             thread.join(timeout=5)
 
         return stop
-
-
-def watch_scenario(
-    scenario: str | Path | None,
-    overrides: list[str],
-    *,
-    seed: int | None = None,
-    out: Path | None = None,
-    port: int = 0,
-    seen_at: str = "",
-    open_browser: bool = True,
-    announce: Callable[[str], None] = print,
-) -> Run:
-    """Run a scenario while it is watched, until Ctrl-C; return the run as it is then.
-
-    Args:
-        scenario: As for ``fleet2d.run``.
-        overrides: Changes of the scenario.
-        seed: Its seed.
-        out: The directory of the run; None: the run stays in memory.
-        port: The port of the page; 0: a free one.
-        seen_at: Another address under which browsers reach it.
-        open_browser: Whether to open the page.
-        announce: Called with the address of the page.
-
-    Raises:
-        InputError: The scenario is wrong, or the port is in use.
-    """
-    settings: dict[str, Any] = {} if seed is None else {"seed": seed}
-    live = LiveRun(Simulation(scenario, *overrides, out=out, **settings), paused=True)
-    server = PageServer([], port=port, live=live, seen_at=seen_at)
-    live.start()
-    try:
-        server.show(open_browser=open_browser, announce=announce)
-    finally:
-        live.end()
-        server.end_branches()
-    if live.failure is not None:
-        raise live.failure
-    assert live.run is not None
-    return live.run
