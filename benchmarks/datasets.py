@@ -2,6 +2,7 @@
 
     python benchmarks/datasets.py                # 64 runs of ten days, and windows into torch
     python benchmarks/datasets.py --runs 4       # to see that it works
+    python benchmarks/datasets.py --loop models  # the table of a study, models_in_the_loop.yaml
 
 Times are processor times, so that other programs disturb them less; run it on a machine that does
 nothing else all the same. Each figure is the best of several runs in the same home but the first,
@@ -16,6 +17,7 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
+import fleet2d
 from fleet2d.datasets.generate import dataset
 from fleet2d.datasets.specification import DatasetPlan, PlannedRun, plan_dataset
 from fleet2d.datasets.tables import tables_of
@@ -109,11 +111,40 @@ def fresh(days: int, windows: int) -> None:
     print(f"windows into torch: {windows / a_day / took:.1f} days of a person a second, on the fly")
 
 
+LOOP = {
+    "co_presence.astro.ana": "hangout",
+    "reach_time.astro.ana.mean": "hangout",
+    "travel.astro.relocations": "hangout",
+    "time_to_find.astro.success": "find",
+    "time_to_find.astro.mean": "find",
+}
+
+
+def loop(folder: str) -> None:
+    """Print the models of a study in the loop: means, and intervals of differences to `routine`."""
+    study = fleet2d.open_study(folder)
+    print(f"{study.variants['home'].n_unique()} homes; model: {', '.join(LOOP)}")
+    for (model,), own in study.variants.group_by("model", maintain_order=True):
+        cells = []
+        for metric, task in LOOP.items():
+            mean = own.filter(task=task)[metric].mean()
+            table = study.paired(metric, {"model": "routine"}, ["home"], ["task"])
+            ends = table.filter(model=model, task=task).select("low", "high").rows()
+            intervals = [f"({low:+.3f} to {high:+.3f})" for low, high in ends]
+            cells.append(" ".join(["-" if mean is None else f"{mean:.3f}", *intervals]))
+        print(f"{model}: {' | '.join(cells)}")
+
+
 def main() -> None:
     """Print all of it."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--runs", type=int, default=64, help="of the whole data set")
-    runs = parser.parse_args().runs
+    parser.add_argument("--loop", metavar="DIR", help="print the table of a study, and no more")
+    options = parser.parse_args()
+    if options.loop:
+        loop(options.loop)
+        return
+    runs = options.runs
     days, repeats = (1, 1) if runs < 8 else (DAYS, 5)
     for robot in ROBOTS:
         runs_alone(robot, days, repeats)

@@ -50,8 +50,11 @@ def test_labels_are_the_truth_of_their_step(data: Dataset) -> None:
 
 
 @pytest.mark.slow
-def test_the_content_is_the_same_for_any_number_of_workers(data: Dataset, tmp_path: Path) -> None:
-    assert records(data) == records(make(tmp_path / "two", workers=2))
+@pytest.mark.parametrize("workers", [2, 4])
+def test_the_content_is_the_same_for_any_number_of_workers(
+    data: Dataset, tmp_path: Path, workers: int
+) -> None:
+    assert records(data) == records(make(tmp_path / "again", workers))
 
 
 @pytest.mark.slow
