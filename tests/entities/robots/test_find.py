@@ -211,7 +211,7 @@ def test_a_distribution_of_an_own_algorithm_will_do() -> None:
         ({"policy": "magic"}, "policy"),
         ({"views": 0}, "views"),
         ({"deadline": 0}, "longer than 0"),
-        ({"source": "rpt"}, "reads 'rpt'.*did you mean 'rtp'"),
+        ({"source": "rpt"}, "there is no algorithm 'rpt': did you mean 'rtp'"),
     ],
 )
 def test_bad_settings_are_refused(fields: dict[str, Any], words: str) -> None:

@@ -186,7 +186,7 @@ def test_turning_it_off_leaves_the_life_of_people_as_it_was(ana: Any) -> None:
         ({"near": "far"}, "near"),
         ({"explore": 1.5}, "expected a share from 0 to 1"),
         ({"blocking": -1}, "blocking"),
-        ({"source": "ltp"}, "reads 'ltp'"),
+        ({"source": "ltp"}, "there is no algorithm 'ltp'"),
         ({"user": "anna"}, "there is no user 'anna'"),
     ],
 )
