@@ -176,6 +176,8 @@ class blame:  # noqa: N801  (used as a function)
         fleet2d.errors.ComponentError: users.ana failed at step 7: KeyError: 'kitchen'
     """
 
+    __slots__ = ("_outer", "path", "step")
+
     now: ClassVar["blame | None"] = None
     """The innermost component whose code is running, for the watchdog."""
 

@@ -90,6 +90,7 @@ GHOST_STREAMS = {
 }
 
 NOTHING = SightingTable.of_rows(np.zeros((0, OBSERVATION), np.int64))
+UNSEEN = SightingTable.of_rows(np.zeros((0, len(SightingColumn)), np.int64))
 
 
 class SightSetup(NamedTuple):
@@ -396,7 +397,7 @@ class Cameras(Watcher):
             self.radii,
             self._heights_in(home),
         )
-        sightings = SightingTable(seen_at, index, distinct.T)
+        sightings = SightingTable(seen_at, index, distinct.T) if len(seen_at) else UNSEEN
         end = looked = self.next_step + count
         if self.sighting_errors is not None:
             before = SightMemory(*old_memory)
